@@ -1,0 +1,24 @@
+"""Integral imaging's nouns: cameras, pictures, component images, view images."""
+
+from .camera import IICamera
+from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
+from .picture import IIPicture, add_sensor_noise
+from .presets import PRESETS, preset
+from .view import five_viewpoints, orthoscopic, refocus, view_image
+
+__all__ = [
+    "PRESETS",
+    "IICamera",
+    "IIPicture",
+    "add_sensor_noise",
+    "component_images",
+    "elementary_images",
+    "five_viewpoints",
+    "orthoscopic",
+    "picture_pixels",
+    "preset",
+    "ray_space_images",
+    "refocus",
+    "sub_images",
+    "view_image",
+]

@@ -1,0 +1,131 @@
+"""Files that appear whole or not at all, and images in and out through OpenImageIO."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+# What each file type can hold without loss.
+IMAGE_TYPES: dict[str, tuple[str, ...]] = {
+    ".png": ("uint8", "uint16"),
+    ".tif": ("uint8", "uint16", "float32"),
+    ".tiff": ("uint8", "uint16", "float32"),
+    ".exr": ("float32",),
+}
+
+
+@contextlib.contextmanager
+def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A temporary name in the same folder that becomes ``path`` if the block succeeds, and nothing if it fails.
+
+    Raises
+    ------
+    OSError
+        If the folder does not exist or cannot be written.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise IsADirectoryError(f"cannot write {path}: it is a folder")
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    except OSError as error:
+        raise type(error)(f"cannot write {path}: {error.strerror}") from None
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)  # mkstemp's private mode is not what a user expects of a picture
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_json(path: str | os.PathLike[str], data: Any) -> None:
+    """Write JSON whole or not at all; NaN and infinity become null, which strict readers accept."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(_finite(data), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return value
+
+
+def write_image(path: str | os.PathLike[str], pixels: NDArray[Any]) -> None:
+    """Write an (N, M) or (N, M, channels) array of uint8, uint16 or float32 without loss.
+
+    Raises
+    ------
+    ValueError
+        If the file type is unknown or cannot hold the array's type.
+    OSError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    allowed = image_types(path)
+    pixels = np.ascontiguousarray(pixels)
+    if pixels.dtype.name not in allowed:
+        raise ValueError(
+            f"{path.name} cannot hold {pixels.dtype.name} pixels: {path.suffix} takes {', '.join(allowed)}"
+        )
+    height, width, channels = pixels.shape if pixels.ndim == 3 else (*pixels.shape, 1)
+    spec = oiio.ImageSpec(width, height, channels, pixels.dtype.name)
+    if path.suffix == ".png":
+        spec["png:compressionLevel"] = 4  # a quarter of level 6's time for 2 % more bytes on noisy pictures
+    if path.suffix == ".exr":
+        spec["compression"] = "zip"
+    with atomic_path(path) as temporary:
+        output = oiio.ImageOutput.create(str(temporary))
+        if not output or not output.open(str(temporary), spec):
+            raise OSError(f"cannot write {path}: {oiio.geterror()}")
+        written = output.write_image(pixels)
+        if not output.close() or not written:
+            raise OSError(f"cannot write {path}: {output.geterror()}")
+
+
+def image_types(path: str | os.PathLike[str]) -> tuple[str, ...]:
+    """Pixel types a file of this name can hold; ValueError if the type of file is unknown."""
+    try:
+        return IMAGE_TYPES[Path(path).suffix.lower()]
+    except KeyError:
+        raise ValueError(f"{path} is no known picture type: known are {', '.join(IMAGE_TYPES)}") from None
+
+
+def read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
+    """Read an (N, M, channels) array of uint8, uint16 or float32, as stored.
+
+    Raises
+    ------
+    OSError
+        If the file is missing or is not a whole image.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist")
+    source = oiio.ImageInput.open(str(path))
+    if not source:
+        raise OSError(f"cannot read {path}: {oiio.geterror()}")
+    try:
+        stored = str(source.spec().format)
+        pixels = source.read_image(stored if stored in ("uint8", "uint16") else "float")
+        if pixels is None:
+            raise OSError(f"cannot read {path}: {source.geterror()}")
+    finally:
+        source.close()
+    return pixels

@@ -1,0 +1,206 @@
+"""An II-picture: pixels, the structure that says which lens each lies under, and the camera where it is known."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .camera import IICamera, Pair, whole_pair
+from .files import image_types, read_image, write_image, write_json
+
+DTYPES = ("uint8", "uint16", "float32")
+
+
+@dataclass(frozen=True, eq=False)
+class IIPicture:
+    """An integral-imaging picture with a regular structure.
+
+    Parameters
+    ----------
+    pixels : ndarray, (N, M, 3), of uint8, uint16 (sRGB) or float32 (linear light)
+        Row 0 is the top. Kept, not copied.
+    lenses : (K, L)
+        Lenslets across and down.
+    ei_pixels : (U, V)
+        Pixels across and down under each lenslet; M = K·U and N = L·V.
+    camera : IICamera, optional
+        What took it; needed to make view images.
+    erect : bool
+        True if every elementary image is upright (each rotated by 180° against what a plain lens casts).
+
+    Raises
+    ------
+    ValueError
+        If the pixels are of another shape or type, or the structure does not fit them.
+    """
+
+    pixels: NDArray[Any]
+    lenses: Pair
+    ei_pixels: Pair
+    camera: IICamera | None = None
+    erect: bool = False
+
+    def __post_init__(self) -> None:
+        for field in ("lenses", "ei_pixels"):
+            object.__setattr__(self, field, whole_pair(field, getattr(self, field)))
+        pixels = self.pixels
+        if not isinstance(pixels, np.ndarray) or pixels.ndim != 3 or pixels.shape[2] != 3:
+            shape = getattr(pixels, "shape", type(pixels).__name__)
+            raise ValueError(f"pixels are {shape}: an array of shape (N, M, 3) is needed")
+        if pixels.dtype.name not in DTYPES:
+            raise ValueError(f"pixels are {pixels.dtype.name}: one of {', '.join(DTYPES)} is needed")
+        (k, l), (u, v) = self.lenses, self.ei_pixels
+        for across, size, lens_count, side in (
+            (u, pixels.shape[1], k, "width"),
+            (v, pixels.shape[0], l, "height"),
+        ):
+            if size % across:
+                raise ValueError(f"elementary image {u}×{v} px does not divide picture {side} {size}")
+            if size != lens_count * across:
+                raise ValueError(
+                    f"{k}×{l} lenses of {u}×{v} px need a picture of {k * u}×{l * v} px, "
+                    f"this one has {pixels.shape[1]}×{pixels.shape[0]}"
+                )
+        if self.camera is not None and (self.camera.lenses, self.camera.ei_pixels) != (
+            self.lenses,
+            self.ei_pixels,
+        ):
+            raise ValueError(
+                f"the camera has {self.camera.lenses} lenses of {self.camera.ei_pixels} px, "
+                f"the picture {self.lenses} of {self.ei_pixels}"
+            )
+
+    @property
+    def size(self) -> Pair:
+        """(M, N), pixels across and down."""
+        return self.pixels.shape[1], self.pixels.shape[0]
+
+    def with_pixels(self, pixels: NDArray[Any]) -> IIPicture:
+        """The same structure and camera over other pixels."""
+        return replace(self, pixels=pixels)
+
+    def check_same_structure(self, other: IIPicture) -> None:
+        """Raise ValueError unless the other picture has the same lenses, elementary images and pixel type."""
+        for what in ("lenses", "ei_pixels", "erect"):
+            mine, theirs = getattr(self, what), getattr(other, what)
+            if mine != theirs:
+                raise ValueError(f"pictures of different structure: {what} {mine} against {theirs}")
+        if self.pixels.dtype != other.pixels.dtype:
+            raise ValueError(f"pictures of different type: {self.pixels.dtype} against {other.pixels.dtype}")
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the picture and, beside it, ``<path>.json`` with its structure and camera.
+
+        PNG holds 8 and 16 bit, EXR float, TIFF all three. A file of that name is replaced, whole.
+
+        Raises
+        ------
+        ValueError
+            If the file type is unknown or cannot hold the pixels' type.
+        OSError
+            If the files cannot be written.
+        """
+        write_image(path, self.pixels)
+        write_json(sidecar(path), self.structure_json())
+
+    def structure_json(self) -> dict[str, Any]:
+        """Everything but the pixels, as plain values."""
+        return {
+            "format": "ii-picture",
+            "version": 1,
+            "lenses": list(self.lenses),
+            "ei_pixels": list(self.ei_pixels),
+            "erect": self.erect,
+            "camera": self.camera.to_json() if self.camera else None,
+        }
+
+    @classmethod
+    def from_structure_json(cls, pixels: NDArray[Any], data: Any) -> IIPicture:
+        """Pixels and the plain values of `structure_json` put together again.
+
+        Raises
+        ------
+        ValueError
+            If the values are not those of a structure, or do not fit the pixels.
+        """
+        if not isinstance(data, dict) or data.get("format") != "ii-picture" or data.get("version") != 1:
+            raise ValueError('no II-picture structure: needs "format": "ii-picture", "version": 1')
+        if missing := {"lenses", "ei_pixels"} - set(data):
+            raise ValueError(f"no II-picture structure: {', '.join(sorted(missing))} missing")
+        camera = data.get("camera")
+        return cls(
+            pixels,
+            data["lenses"],
+            data["ei_pixels"],
+            IICamera.from_json(camera) if camera is not None else None,
+            bool(data.get("erect", False)),
+        )
+
+    @classmethod
+    def load(
+        cls, path: str | os.PathLike[str], *, lenses: Pair | None = None, ei_pixels: Pair | None = None
+    ) -> IIPicture:
+        """Read a picture and its sidecar, or a bare picture whose structure is given.
+
+        Raises
+        ------
+        ValueError
+            If there is neither sidecar nor structure, or the structure does not fit.
+        OSError
+            If the picture cannot be read.
+        """
+        image_types(path)
+        pixels = read_image(path)
+        if lenses is not None and ei_pixels is not None:
+            return cls(pixels, lenses, ei_pixels)
+        try:
+            text = sidecar(path).read_text(encoding="utf-8")
+        except FileNotFoundError:
+            raise ValueError(
+                f"{path} has no sidecar {sidecar(path).name} that gives its structure: give lenses and ei_pixels"
+            ) from None
+        try:
+            return cls.from_structure_json(pixels, json.loads(text))
+        except (ValueError, TypeError) as error:
+            raise ValueError(f"{sidecar(path)}: {error}") from None
+
+
+def sidecar(path: str | os.PathLike[str]) -> Path:
+    """Where the structure of a picture file is kept: its own name with ``.json`` behind."""
+    return Path(f"{os.fspath(path)}.json")
+
+
+def add_sensor_noise(picture: IIPicture, sigma: float = 1.0, seed: int = 0) -> IIPicture:
+    """The picture with monochromatic sensor noise: one N(0, σ) sample per pixel added to R, G and B alike.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation in 8-bit code values, whatever the picture's type.
+    seed : int
+        Same seed, same noise.
+
+    References
+    ----------
+    Olsson 2008, §5.7.1.
+    """
+    if not 0 <= sigma < np.inf:
+        raise ValueError(f"noise sigma is {sigma}: at least 0 is needed")
+    source = picture.pixels
+    if sigma == 0:
+        return picture
+    is_float = source.dtype.kind == "f"
+    peak = 1.0 if is_float else float(np.iinfo(source.dtype).max)
+    generator = np.random.default_rng(seed)
+    noisy = np.empty_like(source)
+    for row, out in zip(source, noisy, strict=True):  # row by row: no second picture of floats
+        sample = generator.standard_normal((source.shape[1], 1), dtype=np.float32)
+        value = row + sample * np.float32(sigma * peak / 255)
+        out[...] = value if is_float else np.clip(np.rint(value), 0, peak)
+    return picture.with_pixels(noisy)

@@ -1,0 +1,200 @@
+"""What a viewer of the display sees: view images, refocused images, upright elementary images."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .camera import IICamera
+from .component import sub_images
+from .picture import IIPicture
+
+
+def view_image(
+    picture: IIPicture, viewpoint_mm: ArrayLike, *, interpolation: str = "linear"
+) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """What a viewer at one point sees: one pixel through each lens.
+
+    Parameters
+    ----------
+    picture : IIPicture
+        With its camera.
+    viewpoint_mm : array_like, (3,)
+        Camera coordinates; a display's viewer stands at z < 0.
+    interpolation : {"linear", "nearest"}
+        Between the pixels of one elementary image; never across its border, where directions jump.
+
+    Returns
+    -------
+    pixels : ndarray, (L, K, 3)
+        Of the picture's type; 0 where not valid.
+    valid : ndarray of bool, (L, K)
+        False where the line leaves the pixel array.
+
+    Raises
+    ------
+    ValueError
+        If the picture has no camera, the viewpoint is not three finite numbers before the lens plane, or
+        the interpolation is unknown.
+
+    References
+    ----------
+    Olsson 2008, (4.1), (4.2) with the offset in pixels and the sign that D = lens − pixel asks for.
+    """
+    if interpolation not in ("linear", "nearest"):
+        raise ValueError(f"unknown interpolation {interpolation!r}: known are linear, nearest")
+    x, y = view_positions(camera_of(picture), viewpoint_mm, erect=picture.erect)
+    (width, height), (u, v) = picture.size, picture.ei_pixels
+    m, n = np.floor(x + 0.5).astype(np.int64), np.floor(y + 0.5).astype(np.int64)
+    valid = ((n >= 0) & (n < height))[:, None] & ((m >= 0) & (m < width))[None, :]
+    m, n = m.clip(0, width - 1), n.clip(0, height - 1)
+    if interpolation == "nearest":
+        pixels = picture.pixels[n[:, None], m[None, :]]
+    else:
+        left, right, across = _between(x, m, u)
+        above, below, down = _between(y, n, v)
+        p = picture.pixels
+        top = _mix(p[above[:, None], left], p[above[:, None], right], across[None, :, None])
+        bottom = _mix(p[below[:, None], left], p[below[:, None], right], across[None, :, None])
+        value = _mix(top, bottom, down[:, None, None])
+        pixels = value.astype(p.dtype) if p.dtype.kind == "f" else np.rint(value).astype(p.dtype)
+    pixels[~valid] = 0
+    return pixels, valid
+
+
+def view_positions(
+    camera: IICamera, viewpoint_mm: ArrayLike, *, erect: bool = False
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where on the pixel array the lines from a viewpoint through the lens centres end, in pixels.
+
+    Returns
+    -------
+    x, y : ndarray, (K,) and (L,)
+        Column of each lens column and row of each lens row; whole numbers are pixel centres.
+        Past an elementary image's border they run on into the neighbour: the side viewing zone.
+    """
+    e = np.asarray(viewpoint_mm, dtype=np.float64)
+    if e.shape != (3,) or not np.isfinite(e).all():
+        raise ValueError(f"viewpoint {viewpoint_mm!r}: three finite coordinates in mm are needed")
+    if not e[2] < camera.gap_mm:
+        raise ValueError(
+            f"viewpoint z {e[2]:g} mm is not before the lens plane at {camera.gap_mm:g} mm: a viewer stands at z < 0"
+        )
+    (k, l), (u, v) = camera.lenses, camera.ei_pixels
+    sign = -1.0 if erect else 1.0
+    lens_x = (np.arange(k) + 0.5) * camera.lens_pitch_mm[0] - camera.size_mm[0] / 2
+    lens_y = camera.size_mm[1] / 2 - (np.arange(l) + 0.5) * camera.lens_pitch_mm[1]
+    to_pixels = sign * camera.gap_mm / ((camera.gap_mm - e[2]) * camera.pixel_pitch_mm)
+    x = np.arange(k) * u + (u - 1) / 2 - (lens_x - e[0]) * to_pixels
+    y = np.arange(l) * v + (v - 1) / 2 + (lens_y - e[1]) * to_pixels
+    return x, y
+
+
+def five_viewpoints(camera: IICamera) -> dict[str, NDArray[np.float64]]:
+    """Front, up, down, left and right: viewpoints from which every lens shows its own elementary image.
+
+    The distance is three times the nearest one at which that holds from the front; the rotations about the
+    display centre are the largest at which it still holds there, less half a pixel.
+
+    References
+    ----------
+    Olsson 2008, §4.3.2, with r, φ and θ from the viewing zone.
+    """
+    (width, height), (pitch_x, pitch_y) = camera.size_mm, camera.lens_pitch_mm
+    gap = camera.gap_mm
+    tan_x, tan_y = pitch_x / 2 / gap, pitch_y / 2 / gap
+    r = 3 * max(width / 2 / tan_x, height / 2 / tan_y)
+    # A lens at the far edge, W/2, sees its own EI while (W/2 + r·sin φ) / (r·cos φ) ≤ tan.
+    inside_x = tan_x - 0.5 * camera.pixel_pitch_mm / gap
+    inside_y = tan_y - 0.5 * camera.pixel_pitch_mm / gap
+    phi = max(0.0, _rotation(inside_x, width / 2 / r))
+    theta = max(0.0, _rotation(inside_y, height / 2 / r))
+
+    def at(x: float, y: float, angle: float) -> NDArray[np.float64]:
+        return np.array([x * r * math.sin(angle), y * r * math.sin(angle), gap - r * math.cos(angle)])
+
+    return {
+        "front": at(0, 0, 0.0),
+        "up": at(0, 1, theta),
+        "down": at(0, -1, theta),
+        "left": at(-1, 0, phi),
+        "right": at(1, 0, phi),
+    }
+
+
+def _rotation(tangent: float, half_over_r: float) -> float:
+    """The angle φ at which tangent·cos φ − sin φ = half_over_r."""
+    return math.acos(min(1.0, half_over_r / math.hypot(1, tangent))) - math.atan2(1, tangent)
+
+
+def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
+    """The scene focused on one plane by shifting and adding sub-images.
+
+    Parameters
+    ----------
+    depth_mm : float
+        z of the plane in camera coordinates, beyond the lens plane.
+
+    Returns
+    -------
+    ndarray of float32, (L, K, 3)
+        In the picture's code values. A pixel is the mean of the sub-images that see it.
+    """
+    camera = camera_of(picture)
+    if not camera.gap_mm <= depth_mm < math.inf:
+        raise ValueError(f"depth {depth_mm} mm is not beyond the lens plane at {camera.gap_mm:g} mm")
+    stack = sub_images(picture)
+    v_count, u_count, rows, cols, _ = stack.shape
+    sign = -1.0 if picture.erect else 1.0
+    per_step = sign * camera.pixel_pitch_mm * (depth_mm - camera.gap_mm) / camera.gap_mm
+    total, weight = np.zeros((rows, cols, 3)), np.zeros((rows, cols, 1))
+    for v in range(v_count):
+        i0, i1, di, in_y = _shifted(rows, (v - (v_count - 1) / 2) * per_step / camera.lens_pitch_mm[1])
+        for u in range(u_count):
+            j0, j1, dj, in_x = _shifted(cols, (u - (u_count - 1) / 2) * per_step / camera.lens_pitch_mm[0])
+            si = stack[v, u]
+            value = _mix(_mix(si[i0][:, j0], si[i0][:, j1], dj), _mix(si[i1][:, j0], si[i1][:, j1], dj), di[:, None])
+            seen = (in_y[:, None] & in_x[None, :])[..., None]
+            total += np.where(seen, value, 0.0)
+            weight += seen
+    return (total / np.maximum(weight, 1)).astype(np.float32)
+
+
+def orthoscopic(picture: IIPicture) -> IIPicture:
+    """Every elementary image rotated by 180°: pseudoscopic to orthoscopic and back."""
+    (k, l), (u, v) = picture.lenses, picture.ei_pixels
+    field = picture.pixels.reshape(l, v, k, u, 3)[:, ::-1, :, ::-1]
+    turned = np.ascontiguousarray(field).reshape(picture.pixels.shape)
+    return IIPicture(turned, picture.lenses, picture.ei_pixels, picture.camera, not picture.erect)
+
+
+def camera_of(picture: IIPicture) -> IICamera:
+    """The picture's camera, or a ValueError that says it is missing."""
+    if picture.camera is None:
+        raise ValueError("the picture has no camera: gap and pixel pitch are needed to look through its lenses")
+    return picture.camera
+
+
+def _between(position, nearest, size):
+    """The two pixels around a position and the weight of the second, kept inside the elementary image."""
+    first = nearest // size * size
+    inside = np.clip(position - first, 0, size - 1)
+    low = np.minimum(np.floor(inside).astype(np.int64), max(size - 2, 0))
+    high = np.minimum(low + 1, size - 1)
+    return first + low, first + high, inside - low
+
+
+def _shifted(count, shift):
+    """Indices and weights that read a row of ``count`` pixels at index + shift, and where that is inside."""
+    position = np.arange(count) + shift
+    inside = (position >= 0) & (position <= count - 1)
+    low = np.clip(np.floor(position).astype(np.int64), 0, count - 1)
+    high = np.minimum(low + 1, count - 1)
+    return low, high, (position - low)[:, None], inside
+
+
+def _mix(a, b, weight):
+    return a * (1.0 - weight) + b * weight
