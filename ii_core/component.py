@@ -12,7 +12,8 @@ All are stacks indexed by the component image first.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numba
@@ -23,6 +24,8 @@ from .camera import Pair
 from .picture import IIPicture
 
 KINDS = ("ei", "si", "ri")
+_AXES = {"ei": (0, 2, 1, 3, 4), "si": (1, 3, 0, 2, 4), "ri": (1, 0, 2, 3, 4)}  # of the light field
+SMALL = 1 << 20  # bytes below which starting threads costs more than it saves
 
 
 def elementary_images(picture: IIPicture) -> NDArray[Any]:
@@ -48,10 +51,8 @@ def component_images(picture: IIPicture, kind: str) -> NDArray[Any]:
     ValueError
         If the kind is unknown.
     """
-    field = light_field(picture.pixels, picture.lenses, picture.ei_pixels)
-    out = np.empty(stack_shape(picture.lenses, picture.ei_pixels, kind), picture.pixels.dtype)
-    _SPLIT[kind](field, out)
-    return out
+    _check_kind(kind)
+    return _permute(light_field(picture.pixels, picture.lenses, picture.ei_pixels), kind, split=True)
 
 
 def picture_pixels(stack: NDArray[Any], kind: str) -> NDArray[Any]:
@@ -65,18 +66,9 @@ def picture_pixels(stack: NDArray[Any], kind: str) -> NDArray[Any]:
     _check_kind(kind)
     if stack.ndim != 5 or stack.shape[-1] != 3:
         raise ValueError(f"component images are {stack.shape}: five axes, the last of length 3, are needed")
-    a, b, c, d, _ = stack.shape
-    l, v, k, u = {"ei": (a, c, b, d), "si": (c, a, d, b), "ri": (b, a, c, d)}[kind]
-    out = np.empty((l * v, k * u, 3), stack.dtype)
-    _JOIN[kind](np.ascontiguousarray(stack), out.reshape(l, v, k, u, 3))
-    return out
-
-
-def stack_shape(lenses: Pair, ei_pixels: Pair, kind: str) -> tuple[int, int, int, int, int]:
-    """Shape of the stack of one kind for a structure of K×L lenses and U×V pixels."""
-    _check_kind(kind)
-    (k, l), (u, v) = lenses, ei_pixels
-    return {"ei": (l, k, v, u, 3), "si": (v, u, l, k, 3), "ri": (v, l, k, u, 3)}[kind]
+    field = _permute(stack, kind, split=False)
+    l, v, k, u, _ = field.shape
+    return field.reshape(l * v, k * u, 3)
 
 
 def light_field(pixels: NDArray[Any], lenses: Pair, ei_pixels: Pair) -> NDArray[Any]:
@@ -90,73 +82,60 @@ def _check_kind(kind: str) -> None:
         raise ValueError(f"unknown component image {kind!r}: known are {', '.join(KINDS)}")
 
 
-# Kernels read and write each cache line once: the inner loops run along the rows of both arrays.
+def _permute(source: NDArray[Any], kind: str, *, split: bool) -> NDArray[Any]:
+    """A light field [l, v, k, u] as a stack of one kind, or back, on all cores.
+
+    Plain threads, not numba's own: those of some platforms abort when two callers meet.
+    """
+    source = np.ascontiguousarray(source)
+    order = _AXES[kind] if split else np.argsort(_AXES[kind])
+    target = np.empty([source.shape[axis] for axis in order], source.dtype)
+    kernel, a, b = swap_runs, source, target
+    if kind == "ei":  # runs of U pixels
+        a, b = (x.reshape(*x.shape[:3], -1) for x in (source, target))
+    elif kind == "ri":  # runs of whole picture rows
+        a, b = (x.reshape(1, *x.shape[:2], -1) for x in (source, target))
+    else:
+        kernel = split_si if split else join_si
+    rows = a.shape[0] if kernel is split_si else target.shape[0] if kernel is join_si else a.shape[1]
+    cores = min(os.cpu_count() or 1, rows) if source.nbytes > SMALL else 1
+    bounds = np.linspace(0, rows, cores + 1).astype(int)
+    if cores == 1:
+        kernel(a, b, 0, rows)
+    else:
+        with ThreadPoolExecutor(cores) as pool:
+            list(pool.map(kernel, [a] * cores, [b] * cores, bounds[:-1], bounds[1:]))
+    return target
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def split_ei(field, out):
-    """out[l, k, v, i] = field[l, v, k, i], i running over the U·3 values of a run."""
-    for l in numba.prange(field.shape[0]):
-        for v in range(field.shape[1]):
-            for k in range(field.shape[2]):
-                for i in range(field.shape[3]):
-                    out[l, k, v, i] = field[l, v, k, i]
+@numba.njit(cache=True, nogil=True)
+def swap_runs(source, target, first, last):
+    """target[a, c, b, i] = source[a, b, c, i] for b from first to last: its own inverse."""
+    for a in range(source.shape[0]):
+        for b in range(first, last):
+            for c in range(source.shape[2]):
+                for i in range(source.shape[3]):
+                    target[a, c, b, i] = source[a, b, c, i]
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def join_ei(stack, field):
-    """field[l, v, k, i] = stack[l, k, v, i], i running over the U·3 values of a run."""
-    for l in numba.prange(field.shape[0]):
-        for v in range(field.shape[1]):
-            for k in range(field.shape[2]):
-                for i in range(field.shape[3]):
-                    field[l, v, k, i] = stack[l, k, v, i]
-
-
-@numba.njit(cache=True, nogil=True, parallel=True)
-def split_si(field, out):
-    """out[v, u, l, k] = field[l, v, k, u]: one picture row stays in cache while U sub-image rows are written."""
-    for l in numba.prange(field.shape[0]):
+# One picture row stays in cache while the U sub-image rows are written or read.
+@numba.njit(cache=True, nogil=True)
+def split_si(field, stack, first, last):
+    """stack[v, u, l, k] = field[l, v, k, u] for l from first to last."""
+    for l in range(first, last):
         for v in range(field.shape[1]):
             for u in range(field.shape[3]):
                 for k in range(field.shape[2]):
                     for c in range(3):
-                        out[v, u, l, k, c] = field[l, v, k, u, c]
+                        stack[v, u, l, k, c] = field[l, v, k, u, c]
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def join_si(stack, field):
-    """field[l, v, k, u] = stack[v, u, l, k]."""
-    for l in numba.prange(field.shape[0]):
+@numba.njit(cache=True, nogil=True)
+def join_si(stack, field, first, last):
+    """field[l, v, k, u] = stack[v, u, l, k] for l from first to last."""
+    for l in range(first, last):
         for v in range(field.shape[1]):
             for u in range(field.shape[3]):
                 for k in range(field.shape[2]):
                     for c in range(3):
                         field[l, v, k, u, c] = stack[v, u, l, k, c]
-
-
-def split_ri(field, out):
-    """out[v, l, k, u] = field[l, v, k, u]: whole rows move, which numpy does at memory speed."""
-    out[...] = field.transpose(1, 0, 2, 3, 4)
-
-
-def join_ri(stack, field):
-    """field[l, v, k, u] = stack[v, l, k, u]."""
-    field[...] = stack.transpose(1, 0, 2, 3, 4)
-
-
-def _runs(array: NDArray[Any]) -> NDArray[Any]:
-    """The last two axes, U pixels of three values, as one."""
-    return array.reshape(*array.shape[:3], -1)
-
-
-_SPLIT: dict[str, Callable[..., None]] = {
-    "ei": lambda field, out: split_ei(_runs(field), _runs(out)),
-    "si": split_si,
-    "ri": split_ri,
-}
-_JOIN: dict[str, Callable[..., None]] = {
-    "ei": lambda stack, field: join_ei(_runs(stack), _runs(field)),
-    "si": join_si,
-    "ri": join_ri,
-}
