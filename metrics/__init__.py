@@ -1,0 +1,27 @@
+"""How much of a picture survives coding: quality, rate–distortion, and charts of it."""
+
+from .chart import rd_chart
+from .depth import DepthQuality, q_depth
+from .psnr import angle_axes, mean_q_angle, q_angle, q_global
+from .rd import bd_psnr, bd_rate, rate_distortion
+from .study import read_study, summary_table, write_csv, write_study
+from .view import ViewQuality, q_view
+
+__all__ = [
+    "DepthQuality",
+    "ViewQuality",
+    "angle_axes",
+    "bd_psnr",
+    "bd_rate",
+    "mean_q_angle",
+    "q_angle",
+    "q_depth",
+    "q_global",
+    "q_view",
+    "rate_distortion",
+    "rd_chart",
+    "read_study",
+    "summary_table",
+    "write_csv",
+    "write_study",
+]

@@ -1,0 +1,133 @@
+"""PSNR over depth: how distortion spreads from near to far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ii_core import IICamera, IIPicture
+from ii_core.view import camera_of, view_positions
+
+from .psnr import check_finite, check_pair, psnr
+
+LAYERS = 250
+
+
+@dataclass(frozen=True, eq=False)
+class DepthQuality:
+    """PSNR of each depth layer.
+
+    Attributes
+    ----------
+    depth_mm : ndarray of float64, (layers,)
+        z of each layer in camera coordinates.
+    values : ndarray of float64, (layers,)
+        dB over the layer's own pixels; NaN where it has none, +inf where they are identical.
+    counts : ndarray of int64, (layers,)
+        View pixels in each layer.
+    outside : int
+        View pixels that hit something nearer or farther than all layers; they count nowhere.
+    """
+
+    depth_mm: NDArray[np.float64]
+    values: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    outside: int
+
+    @property
+    def min(self) -> float:
+        """Of the layers that have pixels; NaN if none has."""
+        return float(np.min(self._held)) if self._held.size else float("nan")
+
+    @property
+    def mean(self) -> float:
+        """Of the layers that have pixels, each weighing the same; +inf if one of them is identical."""
+        return float(np.mean(self._held)) if self._held.size else float("nan")
+
+    @property
+    def max(self) -> float:
+        """Of the layers that have pixels; NaN if none has."""
+        return float(np.max(self._held)) if self._held.size else float("nan")
+
+    @property
+    def _held(self) -> NDArray[np.float64]:
+        return self.values[self.counts > 0]
+
+
+def q_depth(reference: IIPicture, decoded: IIPicture, *, depth: ArrayLike | None = None) -> DepthQuality:
+    """PSNR of each depth layer, seen by a virtual camera that looks through every lens.
+
+    The camera stands at V = (0, 0, Λ − K·Λ), from where its field of view is the lenslets' viewing angle and
+    every lens of an array no higher than wide shows its own elementary image. Each lens gives one pixel, the
+    nearest, so that no interpolation softens the artefacts. The pixel falls into the layer nearest to its depth.
+
+    Parameters
+    ----------
+    reference, decoded : IIPicture
+        Of the same structure and type; the reference has a camera.
+    depth : array_like, (N, M)
+        Scene z at every pixel of the picture, mm, NaN where nothing is hit.
+
+    Returns
+    -------
+    DepthQuality
+        For layers at z = d·f, d = 1 … 250, with f = Λ in the pinhole approximation. The outer layers reach half
+        a layer outwards; what lies beyond is left out rather than moved in, so that a layer's value
+        always tells about its own depth. A pixel halfway between two layers belongs to the farther one.
+
+    Raises
+    ------
+    ValueError
+        If the pictures differ in structure or type, have no camera, hold a pixel in view that is not finite, or
+        if ``depth`` is missing, of another shape, or infinite.
+
+    References
+    ----------
+    Olsson 2008, (4.4)–(4.9).
+    """
+    check_pair(reference, decoded)
+    camera = camera_of(reference)
+    if depth is None:
+        raise ValueError("depth from focus is not built yet: give depth=")
+    z = np.asarray(depth)
+    if z.shape != reference.pixels.shape[:2] or z.dtype.kind not in "fiu":
+        raise ValueError(
+            f"depth is {z.dtype} of shape {z.shape}: numbers of shape {reference.pixels.shape[:2]} are needed"
+        )
+    n, m = virtual_camera_pixels(camera, erect=reference.erect)
+    a, b, z = reference.pixels[n, m], decoded.pixels[n, m], z[n, m].astype(np.float64)
+    if np.isinf(z).any():
+        raise ValueError("depth is infinite at a pixel in view: NaN is needed where nothing is hit")
+    squared_error = np.square(a.astype(np.float64) - b).sum(axis=-1)
+    if not np.isfinite(squared_error).all():
+        check_finite(reference, decoded)
+
+    hit = ~np.isnan(z)
+    d = np.floor(z[hit] / camera.gap_mm + 0.5)
+    inside = (d >= 1) & (d <= LAYERS)
+    layer = d[inside].astype(np.int64) - 1
+    counts = np.bincount(layer, minlength=LAYERS)
+    total = np.bincount(layer, weights=squared_error[hit][inside], minlength=LAYERS)
+    return DepthQuality(
+        depth_mm=np.arange(1.0, LAYERS + 1) * camera.gap_mm,
+        values=psnr(total, 3 * counts, reference.pixels.dtype),
+        counts=counts,
+        outside=int(inside.size - inside.sum()),
+    )
+
+
+def virtual_camera_pixels(camera: IICamera, *, erect: bool = False) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Row and column of the one pixel under each lens that the virtual camera sees, as an index of the picture.
+
+    Returns
+    -------
+    n, m : ndarray of int
+        Broadcast to (L, K), less the rows whose line ends off the pixel array (only an array higher than wide
+        has such rows).
+    """
+    x, y = view_positions(camera, (0.0, 0.0, camera.gap_mm * (1 - camera.lenses[0])), erect=erect)
+    m, n = (np.floor(position + 0.5).astype(np.int64) for position in (x, y))
+    return n[(n >= 0) & (n < camera.pixels[1]), None], m[None, :]

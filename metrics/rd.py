@@ -1,0 +1,261 @@
+"""Rate–distortion: measuring operating points, and Bjøntegaard's differences between curves."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ii_core import IIPicture
+
+from .psnr import q_global
+
+MIN_POINTS = 4
+# Share of the shorter curve's extent that both must cover: below it the mean is about a corner of the curves.
+MIN_OVERLAP = 0.25
+# The interpolation that its package's authors recommend as the closest to densely measured curves (Herglotz et
+# al. 2022 and 2023); the cubic of VCEG-M33 swings between points far apart.
+METHOD = "akima"
+
+
+class UndefinedDifference(ValueError):
+    """Two curves have no Bjøntegaard difference; ``short`` is the reason in a few words, for a table."""
+
+    def __init__(self, message: str, short: str) -> None:
+        super().__init__(message)
+        self.short = short
+
+
+Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def bd_rate(rates_a: ArrayLike, quality_a: ArrayLike, rates_b: ArrayLike, quality_b: ArrayLike) -> float:
+    """Mean difference in rate at equal quality of curve b against curve a.
+
+    The logarithm of the rate, interpolated over quality (Akima), is averaged over the qualities that both
+    curves reach; nothing is extrapolated.
+
+    Parameters
+    ----------
+    rates_a, quality_a : array_like, (n,)
+        The anchor: rates in any unit, quality in dB, at least four points in any order.
+    rates_b, quality_b : array_like, (m,)
+        The curve under test.
+
+    Returns
+    -------
+    float
+        Percent; negative where b needs less rate.
+
+    Raises
+    ------
+    ValueError
+        (Its subclass `UndefinedDifference` where the curves are sound but have no difference.)
+        If a curve has fewer than four points, values that are not finite, rates that are not positive and
+        different, quality that does not grow with rate, or the curves share less than a quarter of the shorter
+        one's range of quality.
+
+    References
+    ----------
+    Bjøntegaard, VCEG-M33, 2001.
+    """
+    a, b = _curve("a", rates_a, quality_a), _curve("b", rates_b, quality_b)
+    for name, (rates, quality) in (("a", a), ("b", b)):
+        falls = np.flatnonzero(np.diff(quality) <= 0)
+        if falls.size:
+            i = falls[0]
+            raise UndefinedDifference(
+                f"quality_{name} goes from {quality[i]:g} to {quality[i + 1]:g} dB between rates {rates[i]:g} and "
+                f"{rates[i + 1]:g}: quality that grows with rate is needed",
+                "quality falls",
+            )
+    _check_overlap("quality", "dB", a[1], b[1])
+    import bjontegaard
+
+    # Its own notion of overlap, a share of the union, only warns; ours has been checked.
+    return float(bjontegaard.bd_rate(*a, *b, method=METHOD, require_matching_points=False, min_overlap=0))
+
+
+def bd_psnr(rates_a: ArrayLike, quality_a: ArrayLike, rates_b: ArrayLike, quality_b: ArrayLike) -> float:
+    """Mean difference in quality at equal rate of curve b against curve a.
+
+    Quality, interpolated over the logarithm of the rate (Akima), is averaged over the rates that both curves
+    reach; nothing is extrapolated.
+
+    Parameters
+    ----------
+    rates_a, quality_a, rates_b, quality_b : array_like
+        As for `bd_rate`.
+
+    Returns
+    -------
+    float
+        dB; positive where b is better.
+
+    Raises
+    ------
+    ValueError
+        As `bd_rate`, but quality may fall, and what must overlap are the rates, on their logarithmic scale.
+
+    References
+    ----------
+    Bjøntegaard, VCEG-M33, 2001.
+    """
+    a, b = _curve("a", rates_a, quality_a), _curve("b", rates_b, quality_b)
+    _check_overlap("rate", "", a[0], b[0], np.log10)
+    import bjontegaard
+
+    return float(bjontegaard.bd_psnr(*a, *b, method=METHOD, require_matching_points=False, min_overlap=0))
+
+
+def _curve(name: str, rates: ArrayLike, quality: ArrayLike) -> Curve:
+    """A curve sorted by rate, or a ValueError."""
+    r, q = np.asarray(rates, dtype=np.float64), np.asarray(quality, dtype=np.float64)
+    if r.ndim != 1 or r.shape != q.shape:
+        raise ValueError(f"rates_{name} are {r.shape}, quality_{name} {q.shape}: two rows of equal length are needed")
+    if r.size < MIN_POINTS:
+        raise UndefinedDifference(
+            f"curve {name} has {r.size} points: at least {MIN_POINTS} are needed", f"{r.size} points"
+        )
+    for what, values in (("rates", r), ("quality", q)):
+        if not np.isfinite(values).all():
+            i = np.flatnonzero(~np.isfinite(values))[0]
+            raise ValueError(f"{what}_{name}[{i}] is {values[i]}: finite values are needed")
+    order = np.argsort(r)
+    r, q = r[order], q[order]
+    if not r[0] > 0:
+        raise ValueError(f"rates_{name} hold {r[0]:g}: positive rates are needed")
+    same = np.flatnonzero(np.diff(r) <= 0)
+    if same.size:
+        raise UndefinedDifference(
+            f"rates_{name} hold {r[same[0]]:g} more than once: different rates are needed", "repeated rates"
+        )
+    return r, q
+
+
+def _check_overlap(
+    what: str,
+    unit: str,
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    scale: Callable[[Any], Any] = lambda value: value,
+) -> None:
+    low, high = max(a.min(), b.min()), min(a.max(), b.max())
+    shorter = min(scale(a.max()) - scale(a.min()), scale(b.max()) - scale(b.min()))
+    share = max(0.0, scale(high) - scale(low)) / shorter if shorter > 0 else 0.0
+    if share < MIN_OVERLAP:
+        raise UndefinedDifference(
+            f"{what} of curve a runs from {a.min():.4g} to {a.max():.4g}, of curve b from {b.min():.4g} to "
+            f"{b.max():.4g}{' ' + unit if unit else ''}: they share {share:.0%} of the shorter, at least "
+            f"{MIN_OVERLAP:.0%} are needed",
+            f"{share:.0%} overlap",
+        )
+
+
+def rate_distortion(
+    picture: IIPicture,
+    schemes: Sequence[str],
+    rates: Sequence[float],
+    *,
+    encode: Callable[..., Any],
+    decode: Callable[[Any], IIPicture],
+    progress: Callable[[int, int, str], None] | None = None,
+    workers: int = 2,
+) -> list[dict[str, Any]]:
+    """Code a picture by every scheme at every rate and measure what comes back.
+
+    Parameters
+    ----------
+    picture : IIPicture
+    schemes : sequence of str
+        Scheme names, options after a colon: ``"si-h264:order=spiral,gop=32"``.
+    rates : sequence of float
+        Target rates, bits per pixel.
+    encode : callable
+        ``encode(picture, scheme, bpp=rate)`` gives an object with ``bpp``, ``nbytes``, ``encode_seconds`` and
+        ``reached``: whether the scheme could meet the target.
+    decode : callable
+        ``decode(coded)`` gives the picture back.
+    progress : callable, optional
+        ``progress(done, total, text)`` after every point, in the calling thread.
+    workers : int
+        Points measured at a time, in threads. Everything but the seconds is the same for any number; seconds
+        are wall-clock and fit for comparison when taken with one worker.
+
+    Returns
+    -------
+    list of dict
+        Scheme by scheme, rate by rate, as given: scheme, options, target_bpp, bpp, reached, q_global (dB),
+        encode_seconds, decode_seconds, nbytes. A target that a scheme cannot meet is a record with ``reached``
+        False and what the scheme gave instead.
+
+    Raises
+    ------
+    ValueError
+        If schemes or rates are empty, repeated or out of range. What a coder raises comes through, with a note that
+        says which point it was; points not yet begun are dropped.
+    """
+    schemes, rates = list(schemes), [float(rate) for rate in rates]
+    for what, given in (("schemes", schemes), ("rates", rates)):
+        if not given or len(set(given)) != len(given):
+            raise ValueError(f"{what} are {given}: at least one, each once, is needed")
+    if bad := [rate for rate in rates if not 0 < rate < float("inf")]:
+        raise ValueError(f"rates hold {bad[0]:g} bpp: positive rates are needed")
+    if workers < 1:
+        raise ValueError(f"workers is {workers}: at least 1 is needed")
+
+    points = [(scheme, rate) for scheme in schemes for rate in rates]
+    records: list[dict[str, Any]] = [{} for _ in points]
+    with ThreadPoolExecutor(workers) as pool:
+        futures = {
+            pool.submit(_measure, picture, scheme, rate, encode, decode): i for i, (scheme, rate) in enumerate(points)
+        }
+        try:
+            for done, future in enumerate(as_completed(futures), 1):
+                record = records[futures[future]] = future.result()
+                if progress is not None:
+                    progress(done, len(points), _told(record))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return records
+
+
+def _measure(
+    picture: IIPicture, scheme: str, rate: float, encode: Callable[..., Any], decode: Callable[[Any], IIPicture]
+) -> dict[str, Any]:
+    try:
+        coded = encode(picture, scheme, bpp=rate)
+        start = time.perf_counter()
+        decoded = decode(coded)
+        seconds = time.perf_counter() - start
+        quality = q_global(picture, decoded)
+    except Exception as error:
+        error.add_note(f"while measuring {scheme} at {rate:g} bpp")
+        raise
+    return {
+        "scheme": scheme,
+        "options": _options(scheme),
+        "target_bpp": rate,
+        "bpp": float(coded.bpp),
+        "reached": bool(coded.reached),
+        "q_global": quality,
+        "encode_seconds": float(coded.encode_seconds),
+        "decode_seconds": seconds,
+        "nbytes": int(coded.nbytes),
+    }
+
+
+def _options(scheme: str) -> dict[str, str]:
+    """What stands after the colon of a scheme's name."""
+    pairs = (item.partition("=") for item in scheme.partition(":")[2].split(",") if item)
+    return {key.strip(): value.strip() for key, _, value in pairs}
+
+
+def _told(record: dict[str, Any]) -> str:
+    missed = "" if record["reached"] else f", target {record['target_bpp']:g} not reached"
+    return f"{record['scheme']} {record['bpp']:.3g} bpp: {record['q_global']:.2f} dB{missed}"
