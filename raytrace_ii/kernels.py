@@ -1,0 +1,371 @@
+"""Numba kernels of the Whitted tracer: they read flat arrays, fill what they are given and check nothing.
+
+Rays are float32 rows, as Embree wants them; sums inside a kernel are float64.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from .texture import texture_colour
+
+# A weight this small cannot move a colour by half a step of 8 bits, not even on sRGB's steep foot.
+LEAST_WEIGHT = 0.5 / 255 / 12.92
+# Spawned rays start this share of the face's largest coordinate off the face: float32 places a hit to about
+# 1e-7 of it, and from 1e-6 on no ray meets its own face again.
+LIFT = 4e-6
+REFLECTION, REFRACTION = 0, 1
+
+# Columns of the material table and of the light table, as in scene.py.
+_MIRROR, _TRANSMISSION, _ABSORPTION = 3, 6, 9
+_SPECULAR, _SHININESS, _IOR, _LOCAL, _TEXTURE = 12, 13, 14, 15, 16
+
+
+@numba.njit(cache=True, nogil=True)
+def start_rays(locations, directions, rotation, shift, out_origins, out_directions):
+    """Place and normalise camera rays; the index of the first unusable one, or −1."""
+    bad = -1
+    for i in range(locations.shape[0]):
+        dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
+        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        if not (0.0 < length < math.inf) and bad < 0:
+            bad = i
+        inverse = 1.0 / length if length > 0.0 else 0.0
+        x, y, z = locations[i, 0], locations[i, 1], locations[i, 2]
+        for c in range(3):
+            r0, r1, r2 = rotation[c, 0], rotation[c, 1], rotation[c, 2]
+            place = r0 * x + r1 * y + r2 * z + shift[c]
+            if not math.isfinite(place) and bad < 0:
+                bad = i
+            out_origins[i, c] = place
+            out_directions[i, c] = (r0 * dx + r1 * dy + r2 * dz) * inverse
+    return bad
+
+
+@numba.njit(cache=True, nogil=True)
+def record_support(primitives, u, v, corners, object_of_face, eye, axis, depth, normal, object_id):
+    """Depth along the camera's axis, geometric normal towards the viewer and object of every primary ray."""
+    for i in range(primitives.shape[0]):
+        f = primitives[i]
+        if f < 0:
+            depth[i] = math.nan
+            object_id[i] = -1
+            for c in range(3):
+                normal[i, c] = 0.0
+            continue
+        object_id[i] = object_of_face[f]
+        px, py, pz = _hit_point(corners, f, u[i], v[i])
+        depth[i] = (px - eye[0]) * axis[0] + (py - eye[1]) * axis[1] + (pz - eye[2]) * axis[2]
+        nx, ny, nz = _face_normal(corners, f)
+        normal[i, 0], normal[i, 1], normal[i, 2] = nx, ny, nz
+
+
+@numba.njit(cache=True, nogil=True)
+def shade(
+    primitives, u, v, distances, origins, directions, weights, pixels, inside,
+    corners, normals, coordinates, object_of_face, materials, textures, texels, lights, background, ambient,
+    radiance, shadow_origins, shadow_directions, shadow_reach, shadow_colours, shadow_pixels,
+    next_origins, next_directions, next_weights, next_pixels, next_inside, next_kinds, spawn,
+):  # fmt: skip
+    """Shade one generation of rays.
+
+    Adds background and ambient light to ``radiance``; writes shadow rays with the light they would let through,
+    and, if ``spawn``, reflected and refracted rays. ``inside`` is the object whose body a ray runs in, −1 for none.
+
+    Returns
+    -------
+    shadows, spawned : int
+        How many rows of the ``shadow_`` and ``next_`` arrays were filled.
+    """
+    shadows, spawned = 0, 0
+    for i in range(primitives.shape[0]):
+        pixel = pixels[i]
+        dx, dy, dz = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
+        w0, w1, w2 = float(weights[i, 0]), float(weights[i, 1]), float(weights[i, 2])
+        f = primitives[i]
+        if f < 0:
+            b0, b1, b2 = background_colour(background, dy)
+            radiance[pixel, 0] += w0 * b0
+            radiance[pixel, 1] += w1 * b1
+            radiance[pixel, 2] += w2 * b2
+            continue
+        body = object_of_face[f]
+        m = materials[body]
+        medium = inside[i]
+        if medium >= 0:  # Beer–Lambert along the way through a body
+            t = float(distances[i])
+            w0 *= math.exp(-materials[medium, _ABSORPTION] * t)
+            w1 *= math.exp(-materials[medium, _ABSORPTION + 1] * t)
+            w2 *= math.exp(-materials[medium, _ABSORPTION + 2] * t)
+
+        gx, gy, gz = _face_normal(corners, f)
+        entering = gx * dx + gy * dy + gz * dz < 0.0
+        if not entering:
+            gx, gy, gz = -gx, -gy, -gz
+        nx, ny, nz = gx, gy, gz
+        if normals.shape[0] > 0:
+            nx, ny, nz = _shading_normal(normals, f, u[i], v[i], gx, gy, gz, dx, dy, dz)
+        px, py, pz = _hit_point(corners, f, u[i], v[i])
+        lift = LIFT * _largest(corners, f)
+        ox, oy, oz = px + lift * gx, py + lift * gy, pz + lift * gz
+
+        local = m[_LOCAL]
+        if local > 0.0 or m[_SPECULAR] > 0.0:
+            r, g, b = local * m[0], local * m[1], local * m[2]
+            if m[_TEXTURE] >= 0 and local > 0.0:
+                s0, s1, s2 = _interpolate(coordinates, f, u[i], v[i])
+                t0, t1, t2 = texture_colour(textures[int(m[_TEXTURE])], texels, s0, s1, s2)
+                r, g, b = r * t0, g * t1, b * t2
+            r, g, b = w0 * r, w1 * g, w2 * b
+            radiance[pixel, 0] += r * ambient[0]
+            radiance[pixel, 1] += g * ambient[1]
+            radiance[pixel, 2] += b * ambient[2]
+            for k in range(lights.shape[0]):
+                lx, ly, lz, reach = _towards_light(lights[k], ox, oy, oz)
+                norm = 1.0 / math.sqrt(lx * lx + ly * ly + lz * lz)
+                cosine = (nx * lx + ny * ly + nz * lz) * norm
+                if cosine <= 0.0 or gx * lx + gy * ly + gz * lz <= 0.0:
+                    continue
+                shine = 0.0
+                if m[_SPECULAR] > 0.0:
+                    hx, hy, hz = lx * norm - dx, ly * norm - dy, lz * norm - dz
+                    half = (nx * hx + ny * hy + nz * hz) / math.sqrt(hx * hx + hy * hy + hz * hz)
+                    if half > 0.0:
+                        shine = m[_SPECULAR] * half ** m[_SHININESS]
+                c0 = (r * cosine + w0 * shine) * lights[k, 4]
+                c1 = (g * cosine + w1 * shine) * lights[k, 5]
+                c2 = (b * cosine + w2 * shine) * lights[k, 6]
+                if max(c0, c1, c2) < LEAST_WEIGHT:
+                    continue
+                _put(shadow_origins, shadows, ox, oy, oz)
+                _put(shadow_directions, shadows, lx, ly, lz)
+                _put(shadow_colours, shadows, c0, c1, c2)
+                shadow_reach[shadows] = reach
+                shadow_pixels[shadows] = pixel
+                shadows += 1
+        if not spawn:
+            continue
+
+        # Shares of the light that goes on: by the mirror, and by glass through Fresnel's formulas.
+        m0, m1, m2 = w0 * m[_MIRROR], w1 * m[_MIRROR + 1], w2 * m[_MIRROR + 2]
+        t0, t1, t2 = w0 * m[_TRANSMISSION], w1 * m[_TRANSMISSION + 1], w2 * m[_TRANSMISSION + 2]
+        if max(t0, t1, t2) > 0.0:
+            ratio = 1.0 / m[_IOR] if entering else float(m[_IOR])
+            cosine = -(dx * nx + dy * ny + dz * nz)
+            reflected, cosine_t = fresnel(cosine, ratio)
+            m0, m1, m2 = m0 + reflected * t0, m1 + reflected * t1, m2 + reflected * t2
+            t0, t1, t2 = (1 - reflected) * t0, (1 - reflected) * t1, (1 - reflected) * t2
+            if max(t0, t1, t2) >= LEAST_WEIGHT:
+                along = ratio * cosine - cosine_t
+                tx, ty, tz = ratio * dx + along * nx, ratio * dy + along * ny, ratio * dz + along * nz
+                if tx * gx + ty * gy + tz * gz < 0.0:  # a bent normal must not send it back out
+                    _put(next_origins, spawned, px - lift * gx, py - lift * gy, pz - lift * gz)
+                    _put(next_directions, spawned, tx, ty, tz)
+                    _put(next_weights, spawned, t0, t1, t2)
+                    next_pixels[spawned] = pixel
+                    next_inside[spawned] = body if entering else -1
+                    next_kinds[REFRACTION] += 1
+                    spawned += 1
+        if max(m0, m1, m2) >= LEAST_WEIGHT:
+            twice = 2.0 * (dx * nx + dy * ny + dz * nz)
+            rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
+            if rx * gx + ry * gy + rz * gz <= 0.0:  # nor may it send a reflection into the face
+                twice = 2.0 * (dx * gx + dy * gy + dz * gz)
+                rx, ry, rz = dx - twice * gx, dy - twice * gy, dz - twice * gz
+            _put(next_origins, spawned, ox, oy, oz)
+            _put(next_directions, spawned, rx, ry, rz)
+            _put(next_weights, spawned, m0, m1, m2)
+            next_pixels[spawned] = pixel
+            next_inside[spawned] = medium
+            next_kinds[REFLECTION] += 1
+            spawned += 1
+    return shadows, spawned
+
+
+@numba.njit(cache=True, nogil=True)
+def add_unblocked(blocked, colours, pixels, radiance):
+    """Add the light of every shadow ray that arrived."""
+    for i in range(blocked.shape[0]):
+        if blocked[i] != 0:
+            for c in range(3):
+                radiance[pixels[i], c] += colours[i, c]
+
+
+@numba.njit(cache=True, nogil=True)
+def pass_clear_face(
+    primitives, u, v, distances, origins, directions, reach, colours, pixels,
+    corners, object_of_face, materials, first_clear, radiance,
+):  # fmt: skip
+    """Take shadow rays through the next transmissive face: coloured shadows.
+
+    A ray that met no face arrives and its light is added; the others are dimmed by Fresnel, colour and absorption,
+    moved behind the face and kept, packed to the front. Light goes straight on: no caustics.
+
+    Returns
+    -------
+    int
+        How many rays were kept.
+    """
+    kept = 0
+    for i in range(primitives.shape[0]):
+        if primitives[i] < 0:
+            for c in range(3):
+                radiance[pixels[i], c] += colours[i, c]
+            continue
+        f = primitives[i] + first_clear
+        m = materials[object_of_face[f]]
+        dx, dy, dz = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
+        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        gx, gy, gz = _face_normal(corners, f)
+        cosine = -(gx * dx + gy * dy + gz * dz) / length
+        reflected, _ = fresnel(abs(cosine), 1.0 / m[_IOR])  # the same on the way in and, unbent, out
+        through = float(distances[i]) * length if cosine < 0.0 else 0.0
+        strongest = 0.0
+        for c in range(3):
+            # The colour is the body's: half on the way in, half on the way out.
+            share = (1 - reflected) * math.sqrt(m[_TRANSMISSION + c]) * math.exp(-m[_ABSORPTION + c] * through)
+            colours[kept, c] = colours[i, c] * share
+            strongest = max(strongest, colours[kept, c])
+        if strongest < LEAST_WEIGHT:
+            continue
+        px, py, pz = _hit_point(corners, f, u[i], v[i])
+        lift = LIFT * _largest(corners, f)
+        side = 1.0 if cosine < 0.0 else -1.0
+        _put(origins, kept, px + side * lift * gx, py + side * lift * gy, pz + side * lift * gz)
+        _put(directions, kept, dx, dy, dz)
+        # A point light's direction ends at the light: what is left of it, as a share of the same direction.
+        reach[kept] = reach[i] - distances[i] if reach[i] < FAR else FAR
+        pixels[kept] = pixels[i]
+        kept += 1
+    return kept
+
+
+@numba.njit(cache=True, nogil=True)
+def fresnel(cosine, ratio):
+    """Unpolarised reflectance of a dielectric face, and the cosine behind it.
+
+    ``ratio`` is n1/n2. Total internal reflection gives (1, 0).
+    """
+    sine2 = ratio * ratio * (1.0 - cosine * cosine)
+    if sine2 >= 1.0:
+        return 1.0, 0.0
+    behind = math.sqrt(1.0 - sine2)
+    s = (ratio * cosine - behind) / (ratio * cosine + behind)
+    p = (ratio * behind - cosine) / (ratio * behind + cosine)
+    return 0.5 * (s * s + p * p), behind
+
+
+@numba.njit(cache=True, nogil=True)
+def background_colour(background, dy):
+    """Colour of the sky for a unit direction with the upward component ``dy``."""
+    t = min(abs(dy) * background[9], 1.0)
+    pole = 3 if dy > 0.0 else 6
+    return (
+        background[0] + t * (background[pole] - background[0]),
+        background[1] + t * (background[pole + 1] - background[1]),
+        background[2] + t * (background[pole + 2] - background[2]),
+    )
+
+
+@numba.njit(cache=True, nogil=True)
+def encode_srgb(radiance, scale, curve, out):
+    """Linear light times ``scale`` to rounded integer sRGB by a curve of samples over [0, 1]."""
+    last = curve.shape[0] - 1
+    for i in range(radiance.shape[0]):
+        for c in range(3):
+            x = min(max(radiance[i, c] * scale, 0.0), 1.0) * last
+            j = min(int(x), last - 1)
+            out[i, c] = int(curve[j] + (x - j) * (curve[j + 1] - curve[j]) + 0.5)
+
+
+@numba.njit(cache=True, nogil=True)
+def jitter(seed, sample, across, down, columns, first_row, first_column, out):
+    """A place in stratum ``sample`` of across × down, for each pixel its own: a hash of seed, pixel and sample."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            pixel = np.uint64(first_row + i) * np.uint64(columns) + np.uint64(first_column + j)
+            h = _mix(_mix(np.uint64(seed) ^ _mix(pixel)) + np.uint64(sample))
+            x = (sample % across + (h >> np.uint64(40)) * (1.0 / 16777216.0)) / across
+            y = (sample // across + ((h >> np.uint64(8)) & np.uint64(16777215)) * (1.0 / 16777216.0)) / down
+            out[i, j, 0] = x
+            out[i, j, 1] = y
+
+
+FAR = np.float32(1e30)  # how far a shadow ray to a directional light reaches, in its own lengths
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _mix(h):
+    """splitmix64's finaliser (Steele, Lea, Flood 2014)."""
+    h = h + np.uint64(0x9E3779B97F4A7C15)
+    h = (h ^ (h >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    h = (h ^ (h >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return h ^ (h >> np.uint64(31))
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _put(rows, i, x, y, z):
+    rows[i, 0], rows[i, 1], rows[i, 2] = x, y, z
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _interpolate(values, f, u, v):
+    w = 1.0 - u - v
+    return (
+        w * values[f, 0, 0] + u * values[f, 1, 0] + v * values[f, 2, 0],
+        w * values[f, 0, 1] + u * values[f, 1, 1] + v * values[f, 2, 1],
+        w * values[f, 0, 2] + u * values[f, 1, 2] + v * values[f, 2, 2],
+    )
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _hit_point(corners, f, u, v):
+    """The point from barycentric coordinates: it lies in the face, which origin + t·direction need not."""
+    return _interpolate(corners, f, float(u), float(v))
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _face_normal(corners, f):
+    x0, y0, z0 = float(corners[f, 0, 0]), float(corners[f, 0, 1]), float(corners[f, 0, 2])
+    ax, ay, az = corners[f, 1, 0] - x0, corners[f, 1, 1] - y0, corners[f, 1, 2] - z0
+    bx, by, bz = corners[f, 2, 0] - x0, corners[f, 2, 1] - y0, corners[f, 2, 2] - z0
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    length = math.sqrt(x * x + y * y + z * z)
+    if length == 0.0:
+        return 0.0, 0.0, 0.0
+    return x / length, y / length, z / length
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _shading_normal(normals, f, u, v, gx, gy, gz, dx, dy, dz):
+    """The interpolated vertex normal on the ray's side, or the face's own where there is none or it faces away."""
+    x, y, z = _interpolate(normals, f, float(u), float(v))
+    length = math.sqrt(x * x + y * y + z * z)
+    if length == 0.0:
+        return gx, gy, gz
+    if x * gx + y * gy + z * gz < 0.0:
+        length = -length
+    x, y, z = x / length, y / length, z / length
+    if x * dx + y * dy + z * dz >= 0.0:
+        return gx, gy, gz
+    return x, y, z
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _largest(corners, f):
+    largest = 0.0
+    for a in range(3):
+        for c in range(3):
+            largest = max(largest, abs(corners[f, a, c]))
+    return largest
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _towards_light(light, x, y, z):
+    """Direction to a light and how much of that direction a shadow ray covers."""
+    if light[0] != 0.0:
+        return -light[1], -light[2], -light[3], FAR
+    return light[1] - x, light[2] - y, light[3] - z, np.float32(0.9999)

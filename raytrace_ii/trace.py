@@ -1,0 +1,219 @@
+"""Whitted recursion over a batch of rays, generation by generation (Whitted 1980)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import kernels
+from .scene import PackedScene, Scene
+
+KINDS = ("primary", "shadow", "reflection", "refraction")
+MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
+
+
+@dataclass
+class RayCount:
+    """Rays by kind, and CPU seconds inside Embree."""
+
+    rays: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(KINDS, 0)))
+    embree_seconds: float = 0.0
+
+    def add(self, other: RayCount) -> None:
+        self.rays.update(other.rays)
+        self.embree_seconds += other.embree_seconds
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """What a batch of n rays saw: linear radiance (n, 3), depth (n,), normal (n, 3), object (n,) of the first hit."""
+
+    radiance: NDArray[np.float32]
+    depth: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    object_id: NDArray[np.int32]
+    count: RayCount
+
+
+def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: ArrayLike | None = None) -> Traced:
+    """Trace any rays through a scene.
+
+    Parameters
+    ----------
+    locations, directions : array_like, (..., 3)
+        Starting points, mm, and directions of any length, as `IICamera.rays` gives them.
+    pose : array_like, (4, 4), optional
+        Rigid transform from the camera's frame to the scene's; none is the identity.
+
+    Returns
+    -------
+    Traced
+        One row per ray, in C order; depth is along the camera's z axis, NaN on a miss; normals are those of the
+        faces, outward; object −1 on a miss.
+
+    Raises
+    ------
+    ValueError
+        If a ray has no direction or is not finite, or the pose is not rigid.
+    """
+    locations = np.asarray(locations, np.float64)
+    directions = np.asarray(directions, np.float64)
+    if locations.shape != directions.shape or locations.shape[-1:] != (3,):
+        raise ValueError(
+            f"locations {locations.shape} and directions {directions.shape}: the same (..., 3) is needed"
+        )
+    n = locations.size // 3
+    tracer = Tracer(scene, n, rigid(pose))
+    support = Support.empty((n,))
+    radiance = np.zeros((n, 3), np.float32)
+    tracer.run(locations, directions, radiance, support)
+    return Traced(radiance, support.depth, support.normal, support.object_id, tracer.count)
+
+
+@dataclass(frozen=True)
+class Support:
+    """Depth, normal and object id arrays of one block."""
+
+    depth: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    object_id: NDArray[np.int32]
+
+    @classmethod
+    def empty(cls, shape: tuple[int, ...]) -> Support:
+        return cls(np.empty(shape, np.float32), np.empty((*shape, 3), np.float32), np.empty(shape, np.int32))
+
+
+def rigid(pose: ArrayLike | None) -> NDArray[np.float64]:
+    """A (4, 4) rigid transform, checked; the identity for None."""
+    if pose is None:
+        return np.eye(4)
+    matrix = np.asarray(pose, np.float64)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+        raise ValueError("pose is not a finite 4×4 matrix")
+    turn = matrix[:3, :3]
+    if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-9) or not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        raise ValueError("pose is not rigid: a rotation and a shift with the last row 0 0 0 1 are needed")
+    return matrix
+
+
+@dataclass(frozen=True)
+class _Rays:
+    """Room for one generation of rays."""
+
+    origins: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    weights: NDArray[np.float32]
+    pixels: NDArray[np.int32]
+    inside: NDArray[np.int32]
+
+    @classmethod
+    def room(cls, n: int) -> _Rays:
+        def rows() -> NDArray[np.float32]:
+            return np.empty((n, 3), np.float32)
+
+        return cls(rows(), rows(), rows(), np.empty(n, np.int32), np.empty(n, np.int32))
+
+
+class Tracer:
+    """Traces batches of up to ``capacity`` primary rays, keeping its work arrays between batches. One a thread."""
+
+    def __init__(self, scene: Scene, capacity: int, pose: NDArray[np.float64]) -> None:
+        self.scene: PackedScene = scene.packed
+        self.max_depth = scene.max_depth
+        self.pose = pose
+        self.count = RayCount()
+        self._primary = _Rays.room(capacity)
+        self._shadow = (_Rays.room(0), np.empty(0, np.float32))
+
+    def run(
+        self,
+        locations: NDArray[Any],
+        directions: NDArray[Any],
+        radiance: NDArray[np.float32],
+        support: Support | None,
+    ) -> None:
+        """Add what each ray sees to ``radiance`` (n, 3), and fill ``support`` if given."""
+        shape = locations.shape[:-1]
+        locations, directions = locations.reshape(-1, 3), directions.reshape(-1, 3)
+        n = len(locations)
+        rays = _Rays(*(array[:n] for array in vars(self._primary).values()))
+        bad = kernels.start_rays(
+            locations, directions, self.pose[:3, :3], self.pose[:3, 3], rays.origins, rays.directions
+        )
+        if bad >= 0:
+            where = ", ".join(map(str, np.unravel_index(bad, shape)))
+            raise ValueError(f"ray [{where}] from {locations[bad]} along {directions[bad]}: a direction is needed")
+        rays.weights.fill(1)
+        rays.pixels[:] = np.arange(n, dtype=np.int32)
+        rays.inside.fill(-1)
+        self.count.rays["primary"] += n
+        for depth in range(self.max_depth + 1):
+            rays = self._generation(rays, radiance, support if depth == 0 else None, spawn=depth < self.max_depth)
+            if not len(rays.pixels):
+                break
+
+    def _generation(self, rays: _Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool) -> _Rays:
+        """Trace and shade one generation; the next one comes back."""
+        s, n = self.scene, len(rays.pixels)
+        hits, seconds = s.intersector.nearest(rays.origins, rays.directions)
+        self.count.embree_seconds += seconds
+        primitives, u, v = hits["primID"], hits["u"], hits["v"]
+        if support is not None:
+            kernels.record_support(
+                primitives, u, v, s.corners, s.object_of_face, self.pose[:3, 3], self.pose[:3, 2],
+                support.depth.reshape(-1), support.normal.reshape(-1, 3), support.object_id.reshape(-1),
+            )  # fmt: skip
+        spawn = spawn and (s.mirrors or s.transmits)
+        following = _Rays.room((1 + s.transmits) * n if spawn else 0)
+        shadow, reach = self._shadow_room(n * len(s.lights))
+        kinds = np.zeros(2, np.int64)
+        shadows, spawned = kernels.shade(
+            primitives, u, v, hits["tfar"], rays.origins, rays.directions, rays.weights, rays.pixels, rays.inside,
+            s.corners, s.normals, s.coordinates, s.object_of_face, s.materials, s.textures.table, s.textures.texels,
+            s.lights, s.background, s.ambient, radiance,
+            shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels,
+            following.origins, following.directions, following.weights, following.pixels, following.inside, kinds,
+            spawn,
+        )  # fmt: skip
+        self.count.rays["reflection"] += int(kinds[kernels.REFLECTION])
+        self.count.rays["refraction"] += int(kinds[kernels.REFRACTION])
+        if shadows:
+            self._light(_Rays(*(array[:shadows] for array in vars(shadow).values())), reach[:shadows], radiance)
+        return _Rays(*(array[:spawned] for array in vars(following).values()))
+
+    def _light(self, shadow: _Rays, reach: NDArray[np.float32], radiance: NDArray[np.float32]) -> None:
+        """Add the light of the shadow rays that nothing opaque stops, dimmed by what is clear."""
+        s = self.scene
+        self.count.rays["shadow"] += len(shadow.pixels)
+        # embreex overwrites the reach it is given, and clear faces need it once more
+        found, seconds = s.intersector.blocked(
+            shadow.origins, shadow.directions, reach.copy() if s.transmits else reach
+        )
+        self.count.embree_seconds += seconds
+        if not s.transmits:
+            kernels.add_unblocked(found, shadow.weights, shadow.pixels, radiance)
+            return
+        free = np.flatnonzero(found)
+        rays: list[NDArray[Any]]
+        rays = [array[free] for array in (shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels)]
+        for _ in range(MOST_CLEAR_FACES):
+            origins, directions, reach, colours, pixels = rays
+            hits, seconds = s.intersector.nearest_clear(origins, directions, reach.copy())
+            self.count.embree_seconds += seconds
+            kept = kernels.pass_clear_face(
+                hits["primID"], hits["u"], hits["v"], hits["tfar"], origins, directions, reach, colours, pixels,
+                s.corners, s.object_of_face, s.materials, s.opaque_faces, radiance,
+            )  # fmt: skip
+            if not kept:
+                return
+            self.count.rays["shadow"] += kept
+            rays = [array[:kept] for array in rays]
+
+    def _shadow_room(self, n: int) -> tuple[_Rays, NDArray[np.float32]]:
+        if len(self._shadow[1]) < n:
+            self._shadow = (_Rays.room(n), np.empty(n, np.float32))
+        return self._shadow
