@@ -48,14 +48,14 @@ def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
 
     figure = Figure(figsize=(8, 5.2), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
+    axes: Any = figure.add_subplot()
     _set_axes(axes, points)
     schemes = list(dict.fromkeys(point["scheme"] for point in points))
     for i, scheme in enumerate(schemes):
         _draw(axes, [point for point in points if point["scheme"] == scheme], i)
     if not all(point["reached"] for point in points):
-        style = {"color": "0.4", "marker": "o", "markerfacecolor": "white", "markeredgewidth": 1.6}
-        axes.plot([], [], linestyle=":", linewidth=1.2, label="target out of reach: what came instead", **style)
+        style = {"color": "0.4", "marker": "o", "linestyle": ":"}
+        axes.plot([], [], markerfacecolor="white", label="target out of reach: what came instead", **style)
     axes.set_title(study["picture"]["name"], loc="left")
     # Below the axes, where no curve can hide it and long scheme names have room.
     figure.legend(loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3)

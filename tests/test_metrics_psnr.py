@@ -1,0 +1,123 @@
+import math
+
+import numpy as np
+import pytest
+from skimage.metrics import peak_signal_noise_ratio
+
+from ii_core import IIPicture, preset
+from metrics import angle_axes, mean_q_angle, q_angle, q_global
+from metrics.psnr import sum_squared_errors
+
+PEAKS = {"uint8": 255, "uint16": 65535, "float32": 1.0}
+
+
+def picture(dtype="uint8", lenses=(5, 3), ei_pixels=(4, 7), seed=0):
+    shape = (lenses[1] * ei_pixels[1], lenses[0] * ei_pixels[0], 3)
+    values = np.random.default_rng(seed).random(shape) * PEAKS[dtype]
+    return IIPicture(values.astype(dtype), lenses, ei_pixels)
+
+
+@pytest.mark.parametrize("dtype", PEAKS)
+def test_q_global_is_the_psnr_of_another_implementation(dtype):
+    a, b = picture(dtype), picture(dtype, seed=1)
+    expected = peak_signal_noise_ratio(
+        a.pixels.astype(np.float64), b.pixels.astype(np.float64), data_range=PEAKS[dtype]
+    )
+    # Both sum in float64; only the order of summation differs.
+    assert q_global(a, b) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(("dtype", "offset"), [("uint8", 3), ("uint16", 700), ("float32", 0.125)])
+def test_constant_offset_in_closed_form(dtype, offset):
+    a = picture(dtype).with_pixels(np.zeros((21, 20, 3), dtype))
+    b = a.with_pixels(a.pixels + np.array(offset, dtype))
+    # Every value is exact in binary; what is left is one logarithm against another.
+    assert q_global(a, b) == pytest.approx(20 * math.log10(PEAKS[dtype] / offset), rel=1e-14)
+    np.testing.assert_allclose(q_angle(a, b), q_global(a, b), rtol=1e-14)
+
+
+def test_black_against_white_uint16_is_exactly_0_db():
+    # The largest error there is, in a sum beyond 2**32: any narrow accumulator would wrap.
+    a = picture("uint16", (64, 64), (2, 2))
+    black, white = a.with_pixels(np.zeros_like(a.pixels)), a.with_pixels(np.full_like(a.pixels, 65535))
+    assert q_global(black, white) == 0
+
+
+def test_identical_pictures_are_infinitely_good():
+    a = picture()
+    assert q_global(a, a.with_pixels(a.pixels.copy())) == math.inf
+    assert (q_angle(a, a) == math.inf).all()
+
+
+def test_distortion_of_one_sub_image_shows_there_only():
+    a = picture()
+    pixels = a.pixels.copy()
+    pixels.reshape(3, 7, 5, 4, 3)[:, 6, :, 1] ^= 1
+    q = q_angle(a, a.with_pixels(pixels))
+    assert q.shape == (7, 4)
+    assert q[6, 1] == pytest.approx(20 * math.log10(255), rel=1e-14)  # every value off by 1
+    q[6, 1] = math.inf
+    assert (q == math.inf).all()
+
+
+def test_pooling_and_averaging_are_different_rules():
+    a, b = picture(), picture(seed=1)
+    q = q_angle(a, b)
+    # Same sums, pooled in another order.
+    assert q_global(a, b) == pytest.approx(-10 * np.log10(np.mean(10 ** (-q / 10))), rel=1e-12)
+    assert mean_q_angle(a, b) == q.mean() > q_global(a, b)
+
+
+@pytest.mark.parametrize("dtype", PEAKS)
+def test_kernel_against_its_python(dtype):
+    rng = np.random.default_rng(5)
+    a, b = (rng.integers(0, 255, (2, 3, 4, 6)).astype(dtype) for _ in range(2))
+    outs = []
+    for kernel in (sum_squared_errors, sum_squared_errors.py_func):
+        outs.append(np.zeros((3, 2)))
+        kernel(a, b, np.empty(6), outs[-1])
+    np.testing.assert_array_equal(*outs)  # whole numbers: exact
+
+
+def test_pixels_in_any_memory_order():
+    a, b = picture(), picture(seed=1)
+    assert q_global(a, b.with_pixels(np.asfortranarray(b.pixels))) == q_global(a, b)
+
+
+@pytest.mark.parametrize("metric", [q_global, q_angle])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_first_pixel_that_is_not_finite_is_named(metric, bad):
+    a = picture("float32")
+    pixels = a.pixels.copy()
+    pixels[4, 9, 1] = pixels[5, 2, 0] = bad
+    with pytest.raises(ValueError, match=r"decoded pixel \(9, 4\)"):
+        metric(a, a.with_pixels(pixels))
+    with pytest.raises(ValueError, match=r"reference pixel \(9, 4\)"):
+        metric(a.with_pixels(pixels), a)
+
+
+@pytest.mark.parametrize("metric", [q_global, q_angle])
+def test_different_structure_or_type_is_refused(metric):
+    a = picture()
+    with pytest.raises(ValueError, match="ei_pixels"):
+        metric(a, picture(ei_pixels=(4, 6)))
+    with pytest.raises(ValueError, match="lenses"):
+        metric(a, IIPicture(a.pixels, (10, 3), (2, 7)))
+    with pytest.raises(ValueError, match="uint8 against uint16"):
+        metric(a, a.with_pixels(a.pixels.astype(np.uint16)))
+    with pytest.raises(ValueError, match="decoded is a ndarray"):
+        metric(a, a.pixels)
+    with pytest.raises(ValueError, match="reference is a ndarray"):
+        metric(a.pixels, a)
+
+
+def test_angles_are_those_of_the_rays():
+    camera = preset("setup3", scale=16)
+    _, d = camera.rays(rows=slice(0, 64), cols=slice(0, 64))
+    u_deg, v_deg = angle_axes(camera)
+    # 1e-9 degrees: differences of coordinates of tens of mm, in float64, over a gap of as much.
+    np.testing.assert_allclose(u_deg, np.degrees(np.arctan2(d[0, :, 0], d[0, :, 2])), atol=1e-9)
+    np.testing.assert_allclose(v_deg, np.degrees(np.arctan2(d[:, 0, 1], d[:, 0, 2])), atol=1e-9)
+    assert u_deg[0] > 0 > v_deg[0]  # the top left pixel looks right and down
+    for upright, plain in zip(angle_axes(camera, erect=True), (u_deg, v_deg), strict=True):
+        np.testing.assert_array_equal(upright, -plain)
