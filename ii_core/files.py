@@ -85,7 +85,9 @@ def write_image(path: str | os.PathLike[str], pixels: NDArray[Any]) -> None:
             f"{path.name} cannot hold {pixels.dtype.name} pixels: {path.suffix} takes {', '.join(allowed)}"
         )
     height, width, channels = pixels.shape if pixels.ndim == 3 else (*pixels.shape, 1)
-    spec = oiio.ImageSpec(width, height, channels, pixels.dtype.name)
+    # OpenImageIO knows no "float32": it would take the file type's own default, half or even uint8, without a word.
+    kind = "float" if pixels.dtype.name == "float32" else pixels.dtype.name
+    spec = oiio.ImageSpec(width, height, channels, kind)
     if path.suffix == ".png":
         spec["png:compressionLevel"] = 4  # a quarter of level 6's time for 2 % more bytes on noisy pictures
     if path.suffix == ".exr":

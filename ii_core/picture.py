@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import IICamera, Pair, whole_pair
-from .files import image_types, read_image, write_image, write_json
+from .files import atomic_path, image_types, read_image, write_image, write_json
 
 DTYPES = ("uint8", "uint16", "float32")
 
@@ -106,8 +106,9 @@ class IIPicture:
         OSError
             If the files cannot be written.
         """
-        write_image(path, self.pixels)
-        write_json(sidecar(path), self.structure_json())
+        with atomic_path(sidecar(path)) as temporary:  # neither file appears if the other cannot
+            write_json(temporary, self.structure_json())
+            write_image(path, self.pixels)
 
     def structure_json(self) -> dict[str, Any]:
         """Everything but the pixels, as plain values."""
@@ -160,7 +161,7 @@ class IIPicture:
         if lenses is not None and ei_pixels is not None:
             return cls(pixels, lenses, ei_pixels)
         try:
-            text = sidecar(path).read_text(encoding="utf-8")
+            text = sidecar(path).read_bytes()
         except FileNotFoundError:
             raise ValueError(
                 f"{path} has no sidecar {sidecar(path).name} that gives its structure: give lenses and ei_pixels"
@@ -201,6 +202,7 @@ def add_sensor_noise(picture: IIPicture, sigma: float = 1.0, seed: int = 0) -> I
     noisy = np.empty_like(source)
     for row, out in zip(source, noisy, strict=True):  # row by row: no second picture of floats
         sample = generator.standard_normal((source.shape[1], 1), dtype=np.float32)
-        value = row + sample * np.float32(sigma * peak / 255)
-        out[...] = value if is_float else np.clip(np.rint(value), 0, peak)
+        sample *= np.float32(sigma * peak / 255)
+        # Whole codes are rounded before they are added, so that R, G and B get the very same.
+        out[...] = row + sample if is_float else np.clip(row + np.rint(sample), 0, peak)
     return picture.with_pixels(noisy)
