@@ -16,11 +16,11 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Pair
+from .jit import kernel
 from .picture import IIPicture
 
 KINDS = ("ei", "si", "ri")
@@ -90,25 +90,25 @@ def _permute(source: NDArray[Any], kind: str, *, split: bool) -> NDArray[Any]:
     source = np.ascontiguousarray(source)
     order = _AXES[kind] if split else np.argsort(_AXES[kind])
     target = np.empty([source.shape[axis] for axis in order], source.dtype)
-    kernel, a, b = swap_runs, source, target
+    move, a, b = swap_runs, source, target
     if kind == "ei":  # runs of U pixels
         a, b = (x.reshape(*x.shape[:3], -1) for x in (source, target))
     elif kind == "ri":  # runs of whole picture rows
         a, b = (x.reshape(1, *x.shape[:2], -1) for x in (source, target))
     else:
-        kernel = split_si if split else join_si
-    rows = a.shape[0] if kernel is split_si else target.shape[0] if kernel is join_si else a.shape[1]
+        move = split_si if split else join_si
+    rows = a.shape[0] if move is split_si else target.shape[0] if move is join_si else a.shape[1]
     cores = min(os.cpu_count() or 1, rows) if source.nbytes > SMALL else 1
     bounds = np.linspace(0, rows, cores + 1).astype(int)
     if cores == 1:
-        kernel(a, b, 0, rows)
+        move(a, b, 0, rows)
     else:
         with ThreadPoolExecutor(cores) as pool:
-            list(pool.map(kernel, [a] * cores, [b] * cores, bounds[:-1], bounds[1:]))
+            list(pool.map(move, [a] * cores, [b] * cores, bounds[:-1], bounds[1:]))
     return target
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def swap_runs(source, target, first, last):
     """target[a, c, b, i] = source[a, b, c, i] for b from first to last: its own inverse."""
     for a in range(source.shape[0]):
@@ -119,7 +119,7 @@ def swap_runs(source, target, first, last):
 
 
 # One picture row stays in cache while the U sub-image rows are written or read.
-@numba.njit(cache=True, nogil=True)
+@kernel
 def split_si(field, stack, first, last):
     """stack[v, u, l, k] = field[l, v, k, u] for l from first to last."""
     for l in range(first, last):
@@ -130,7 +130,7 @@ def split_si(field, stack, first, last):
                         stack[v, u, l, k, c] = field[l, v, k, u, c]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def join_si(stack, field, first, last):
     """field[l, v, k, u] = stack[v, u, l, k] for l from first to last."""
     for l in range(first, last):

@@ -7,24 +7,31 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
-from .texture import texture_colour
+from ii_core.jit import inline_kernel, kernel
 
 # A weight this small cannot move a colour by half a step of 8 bits, not even on sRGB's steep foot.
 LEAST_WEIGHT = 0.5 / 255 / 12.92
-# Spawned rays start this share of the face's largest coordinate off the face: float32 places a hit to about
-# 1e-7 of it, and from 1e-6 on no ray meets its own face again.
-LIFT = 4e-6
 REFLECTION, REFRACTION = 0, 1
+IMAGE, CHECKER, NOISE = 0, 1, 2  # kinds of texture
+# Odd multipliers of the noise lattice's hash.
+_PX, _PY, _PZ, _SEED, _GOLDEN = 73856093, 19349663, 83492791, 2654435761, 0x1E3779B97F4A7C15
+# Perlin's sixteen: towards the twelve edges of a cube, four of them twice. A table, for branches would be guesses.
+_GRADIENTS = np.array(
+    [[x, y, 0] for y in (1, -1) for x in (1, -1)]
+    + [[x, 0, z] for z in (1, -1) for x in (1, -1)]
+    + [[0, y, z] for z in (1, -1) for y in (1, -1)]
+    + [[1, 1, 0], [-1, 1, 0], [0, -1, 1], [0, -1, -1]],
+    dtype=np.float64,
+)
 
 # Columns of the material table and of the light table, as in scene.py.
 _MIRROR, _TRANSMISSION, _ABSORPTION = 3, 6, 9
-_SPECULAR, _SHININESS, _IOR, _LOCAL, _TEXTURE = 12, 13, 14, 15, 16
+_SPECULAR, _SHININESS, _IOR, _LOCAL, _TEXTURE, _LEAST_HALF = 12, 13, 14, 15, 16, 17
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def start_rays(locations, directions, rotation, shift, out_origins, out_directions):
     """Place and normalise camera rays; the index of the first unusable one, or −1."""
     bad = -1
@@ -45,9 +52,9 @@ def start_rays(locations, directions, rotation, shift, out_origins, out_directio
     return bad
 
 
-@numba.njit(cache=True, nogil=True)
-def record_support(primitives, u, v, corners, object_of_face, eye, axis, depth, normal, object_id):
-    """Depth along the camera's axis, geometric normal towards the viewer and object of every primary ray."""
+@kernel
+def record_support(primitives, u, v, corners, faces, object_of_face, eye, axis, depth, normal, object_id):
+    """Depth along the camera's axis, face normal and object of every primary ray."""
     for i in range(primitives.shape[0]):
         f = primitives[i]
         if f < 0:
@@ -59,14 +66,14 @@ def record_support(primitives, u, v, corners, object_of_face, eye, axis, depth, 
         object_id[i] = object_of_face[f]
         px, py, pz = _hit_point(corners, f, u[i], v[i])
         depth[i] = (px - eye[0]) * axis[0] + (py - eye[1]) * axis[1] + (pz - eye[2]) * axis[2]
-        nx, ny, nz = _face_normal(corners, f)
-        normal[i, 0], normal[i, 1], normal[i, 2] = nx, ny, nz
+        for c in range(3):
+            normal[i, c] = faces[f, c]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def shade(
     primitives, u, v, distances, origins, directions, weights, pixels, inside,
-    corners, normals, coordinates, object_of_face, materials, textures, texels, lights, background, ambient,
+    corners, faces, normals, coordinates, object_of_face, materials, textures, texels, lights, background, ambient,
     radiance, shadow_origins, shadow_directions, shadow_reach, shadow_colours, shadow_pixels,
     next_origins, next_directions, next_weights, next_pixels, next_inside, next_kinds, spawn,
 ):  # fmt: skip
@@ -101,7 +108,7 @@ def shade(
             w1 *= math.exp(-materials[medium, _ABSORPTION + 1] * t)
             w2 *= math.exp(-materials[medium, _ABSORPTION + 2] * t)
 
-        gx, gy, gz = _face_normal(corners, f)
+        gx, gy, gz, lift = float(faces[f, 0]), float(faces[f, 1]), float(faces[f, 2]), float(faces[f, 3])
         entering = gx * dx + gy * dy + gz * dz < 0.0
         if not entering:
             gx, gy, gz = -gx, -gy, -gz
@@ -109,7 +116,6 @@ def shade(
         if normals.shape[0] > 0:
             nx, ny, nz = _shading_normal(normals, f, u[i], v[i], gx, gy, gz, dx, dy, dz)
         px, py, pz = _hit_point(corners, f, u[i], v[i])
-        lift = LIFT * _largest(corners, f)
         ox, oy, oz = px + lift * gx, py + lift * gy, pz + lift * gz
 
         local = m[_LOCAL]
@@ -125,7 +131,7 @@ def shade(
             radiance[pixel, 2] += b * ambient[2]
             for k in range(lights.shape[0]):
                 lx, ly, lz, reach = _towards_light(lights[k], ox, oy, oz)
-                norm = 1.0 / math.sqrt(lx * lx + ly * ly + lz * lz)
+                norm = 1.0 if reach == FAR else 1.0 / math.sqrt(lx * lx + ly * ly + lz * lz)
                 cosine = (nx * lx + ny * ly + nz * lz) * norm
                 if cosine <= 0.0 or gx * lx + gy * ly + gz * lz <= 0.0:
                     continue
@@ -133,7 +139,7 @@ def shade(
                 if m[_SPECULAR] > 0.0:
                     hx, hy, hz = lx * norm - dx, ly * norm - dy, lz * norm - dz
                     half = (nx * hx + ny * hy + nz * hz) / math.sqrt(hx * hx + hy * hy + hz * hz)
-                    if half > 0.0:
+                    if half > m[_LEAST_HALF]:
                         shine = m[_SPECULAR] * half ** m[_SHININESS]
                 c0 = (r * cosine + w0 * shine) * lights[k, 4]
                 c1 = (g * cosine + w1 * shine) * lights[k, 5]
@@ -185,7 +191,7 @@ def shade(
     return shadows, spawned
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def add_unblocked(blocked, colours, pixels, radiance):
     """Add the light of every shadow ray that arrived."""
     for i in range(blocked.shape[0]):
@@ -194,10 +200,10 @@ def add_unblocked(blocked, colours, pixels, radiance):
                 radiance[pixels[i], c] += colours[i, c]
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def pass_clear_face(
     primitives, u, v, distances, origins, directions, reach, colours, pixels,
-    corners, object_of_face, materials, first_clear, radiance,
+    corners, faces, object_of_face, materials, first_clear, radiance,
 ):  # fmt: skip
     """Take shadow rays through the next transmissive face: coloured shadows.
 
@@ -219,7 +225,7 @@ def pass_clear_face(
         m = materials[object_of_face[f]]
         dx, dy, dz = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        gx, gy, gz = _face_normal(corners, f)
+        gx, gy, gz, lift = float(faces[f, 0]), float(faces[f, 1]), float(faces[f, 2]), float(faces[f, 3])
         cosine = -(gx * dx + gy * dy + gz * dz) / length
         reflected, _ = fresnel(abs(cosine), 1.0 / m[_IOR])  # the same on the way in and, unbent, out
         through = float(distances[i]) * length if cosine < 0.0 else 0.0
@@ -232,7 +238,6 @@ def pass_clear_face(
         if strongest < LEAST_WEIGHT:
             continue
         px, py, pz = _hit_point(corners, f, u[i], v[i])
-        lift = LIFT * _largest(corners, f)
         side = 1.0 if cosine < 0.0 else -1.0
         _put(origins, kept, px + side * lift * gx, py + side * lift * gy, pz + side * lift * gz)
         _put(directions, kept, dx, dy, dz)
@@ -243,7 +248,7 @@ def pass_clear_face(
     return kept
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def fresnel(cosine, ratio):
     """Unpolarised reflectance of a dielectric face, and the cosine behind it.
 
@@ -258,7 +263,7 @@ def fresnel(cosine, ratio):
     return 0.5 * (s * s + p * p), behind
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def background_colour(background, dy):
     """Colour of the sky for a unit direction with the upward component ``dy``."""
     t = min(abs(dy) * background[9], 1.0)
@@ -270,7 +275,7 @@ def background_colour(background, dy):
     )
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def encode_srgb(radiance, scale, curve, out):
     """Linear light times ``scale`` to rounded integer sRGB by a curve of samples over [0, 1]."""
     last = curve.shape[0] - 1
@@ -281,7 +286,7 @@ def encode_srgb(radiance, scale, curve, out):
             out[i, c] = int(curve[j] + (x - j) * (curve[j + 1] - curve[j]) + 0.5)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel
 def jitter(seed, sample, across, down, columns, first_row, first_column, out):
     """A place in stratum ``sample`` of across × down, for each pixel its own: a hash of seed, pixel and sample."""
     for i in range(out.shape[0]):
@@ -297,7 +302,7 @@ def jitter(seed, sample, across, down, columns, first_row, first_column, out):
 FAR = np.float32(1e30)  # how far a shadow ray to a directional light reaches, in its own lengths
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@inline_kernel
 def _mix(h):
     """splitmix64's finaliser (Steele, Lea, Flood 2014)."""
     h = h + np.uint64(0x9E3779B97F4A7C15)
@@ -306,12 +311,12 @@ def _mix(h):
     return h ^ (h >> np.uint64(31))
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@inline_kernel
 def _put(rows, i, x, y, z):
     rows[i, 0], rows[i, 1], rows[i, 2] = x, y, z
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@inline_kernel
 def _interpolate(values, f, u, v):
     w = 1.0 - u - v
     return (
@@ -321,25 +326,13 @@ def _interpolate(values, f, u, v):
     )
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@inline_kernel
 def _hit_point(corners, f, u, v):
     """The point from barycentric coordinates: it lies in the face, which origin + t·direction need not."""
     return _interpolate(corners, f, float(u), float(v))
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
-def _face_normal(corners, f):
-    x0, y0, z0 = float(corners[f, 0, 0]), float(corners[f, 0, 1]), float(corners[f, 0, 2])
-    ax, ay, az = corners[f, 1, 0] - x0, corners[f, 1, 1] - y0, corners[f, 1, 2] - z0
-    bx, by, bz = corners[f, 2, 0] - x0, corners[f, 2, 1] - y0, corners[f, 2, 2] - z0
-    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    length = math.sqrt(x * x + y * y + z * z)
-    if length == 0.0:
-        return 0.0, 0.0, 0.0
-    return x / length, y / length, z / length
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
+@inline_kernel
 def _shading_normal(normals, f, u, v, gx, gy, gz, dx, dy, dz):
     """The interpolated vertex normal on the ray's side, or the face's own where there is none or it faces away."""
     x, y, z = _interpolate(normals, f, float(u), float(v))
@@ -348,24 +341,107 @@ def _shading_normal(normals, f, u, v, gx, gy, gz, dx, dy, dz):
         return gx, gy, gz
     if x * gx + y * gy + z * gz < 0.0:
         length = -length
-    x, y, z = x / length, y / length, z / length
+    inverse = 1.0 / length
+    x, y, z = x * inverse, y * inverse, z * inverse
     if x * dx + y * dy + z * dz >= 0.0:
         return gx, gy, gz
     return x, y, z
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
-def _largest(corners, f):
-    largest = 0.0
-    for a in range(3):
-        for c in range(3):
-            largest = max(largest, abs(corners[f, a, c]))
-    return largest
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
+@inline_kernel
 def _towards_light(light, x, y, z):
-    """Direction to a light and how much of that direction a shadow ray covers."""
+    """Direction to a light, a unit vector if it is far away, and how much of that direction a shadow ray covers."""
     if light[0] != 0.0:
         return -light[1], -light[2], -light[3], FAR
     return light[1] - x, light[2] - y, light[3] - z, np.float32(0.9999)
+
+
+@inline_kernel
+def _wrap(i, n):
+    i %= n
+    return i + n if i < 0 else i
+
+
+@kernel
+def texture_colour(row, texels, x, y, z):
+    """Linear colour of a texture at a texture coordinate."""
+    kind = row[0]
+    if kind == IMAGE:
+        return _image(row, texels, x, y)
+    if kind == CHECKER:
+        # A face often lies just on a cell's border: decided here, not by rounding noise.
+        odd = (math.floor(x * row[1] + 1e-6) + math.floor(y * row[2] + 1e-6) + math.floor(z * row[3] + 1e-6)) % 2
+        t = 1.0 if odd else 0.0
+    else:
+        t = 0.5 + row[11] * _fractal(x * row[1], y * row[2], z * row[3], int(row[10]))
+        t = min(max(t, 0.0), 1.0)
+    return (
+        row[4] + t * (row[7] - row[4]),
+        row[5] + t * (row[8] - row[5]),
+        row[6] + t * (row[9] - row[6]),
+    )
+
+
+@kernel
+def _image(row, texels, u, v):
+    first, width, height = int(row[1]), int(row[2]), int(row[3])
+    x = (u - math.floor(u)) * width - 0.5
+    y = (1.0 - (v - math.floor(v))) * height - 0.5
+    i, j = math.floor(x), math.floor(y)
+    fx, fy = x - i, y - j
+    i0, i1 = _wrap(int(i), width), _wrap(int(i) + 1, width)
+    a, b = first + _wrap(int(j), height) * width, first + _wrap(int(j) + 1, height) * width
+    w00, w10, w01, w11 = (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy
+    red = w00 * texels[a + i0, 0] + w10 * texels[a + i1, 0] + w01 * texels[b + i0, 0] + w11 * texels[b + i1, 0]
+    green = w00 * texels[a + i0, 1] + w10 * texels[a + i1, 1] + w01 * texels[b + i0, 1] + w11 * texels[b + i1, 1]
+    blue = w00 * texels[a + i0, 2] + w10 * texels[a + i1, 2] + w01 * texels[b + i0, 2] + w11 * texels[b + i1, 2]
+    return red, green, blue
+
+
+@kernel
+def _fractal(x, y, z, packed):
+    """Octaves of gradient noise, each of half the size and strength."""
+    octaves, seed = packed % 16, packed // 16
+    total, strength = 0.0, 1.0
+    for octave in range(octaves):
+        total += strength * gradient_noise(x, y, z, seed + octave)
+        x, y, z, strength = 2.03 * x, 2.03 * y, 2.03 * z, 0.5 * strength
+    return total
+
+
+@kernel
+def gradient_noise(x, y, z, seed):
+    """Perlin's improved gradient noise (2002) with hashed lattice gradients; about −1…1, 0 on the lattice."""
+    fx, fy, fz = math.floor(x), math.floor(y), math.floor(z)
+    x, y, z = x - fx, y - fy, z - fz
+    u, v, w = _fade(x), _fade(y), _fade(z)
+    i0, j0, k0 = np.int64(fx) * _PX + seed * _SEED, np.int64(fy) * _PY, np.int64(fz) * _PZ
+    i1, j1, k1 = i0 + _PX, j0 + _PY, k0 + _PZ
+    near = _lerp(
+        v,
+        _lerp(u, _slope(i0 ^ j0 ^ k0, x, y, z), _slope(i1 ^ j0 ^ k0, x - 1, y, z)),
+        _lerp(u, _slope(i0 ^ j1 ^ k0, x, y - 1, z), _slope(i1 ^ j1 ^ k0, x - 1, y - 1, z)),
+    )
+    far = _lerp(
+        v,
+        _lerp(u, _slope(i0 ^ j0 ^ k1, x, y, z - 1), _slope(i1 ^ j0 ^ k1, x - 1, y, z - 1)),
+        _lerp(u, _slope(i0 ^ j1 ^ k1, x, y - 1, z - 1), _slope(i1 ^ j1 ^ k1, x - 1, y - 1, z - 1)),
+    )
+    return _lerp(w, near, far)
+
+
+@inline_kernel
+def _fade(t):
+    return t * t * t * (t * (t * 6 - 15) + 10)
+
+
+@inline_kernel
+def _lerp(t, a, b):
+    return a + t * (b - a)
+
+
+@inline_kernel
+def _slope(cell, x, y, z):
+    """Dot product with one of twelve gradients towards the edges of a cube, chosen by a multiplicative hash."""
+    h = ((cell * _GOLDEN) >> 60) & 15
+    return _GRADIENTS[h, 0] * x + _GRADIENTS[h, 1] * y + _GRADIENTS[h, 2] * z

@@ -196,23 +196,29 @@ class _Job:
         if tracer is None:
             tracer = self.local.tracer = Tracer(self.scene, TILE_RAYS, self.pose)
         tracer.count = RayCount()
-        radiance = np.zeros((height * width, 3), np.float32)
-        support = Support.empty((height, width)) if len(self.out) > 1 else None
+        n = height * width
+        radiance = np.zeros((n, 3), np.float32)
+        support = self._support(rows, cols)
         for sample in range(self.samples):
             place = self._place(sample, rows, cols)
             L, D = self.camera.rays(rows, cols, place)
             tracer.run(L, D, radiance, support if sample == 0 else None)
-        pixels = self.out["pixels"]
+        # A tile is whole rows or a piece of one: its block of each array is one run of memory.
+        pixels = self.out["pixels"][rows, cols].reshape(n, 3)
         curve = _CURVES[pixels.dtype.name]
         if curve is None:
-            pixels[rows, cols] = (radiance / self.samples).reshape(height, width, 3)
+            np.divide(radiance, self.samples, out=pixels)
         else:
-            block = np.empty((height * width, 3), pixels.dtype)
-            kernels.encode_srgb(radiance, 1 / self.samples, curve, block)
-            pixels[rows, cols] = block.reshape(height, width, 3)
-        for name in self.out.keys() - {"pixels"}:
-            self.out[name][rows, cols] = getattr(support, name)
+            kernels.encode_srgb(radiance, 1 / self.samples, curve, pixels)
         return tracer.count
+
+    def _support(self, rows: slice, cols: slice) -> Support | None:
+        """The tile's part of the support images, with scratch for those nobody asked for."""
+        if len(self.out) == 1:
+            return None
+        shape = rows.stop - rows.start, cols.stop - cols.start
+        wanted = {name: self.out[name][rows, cols] for name in self.out if name != "pixels"}
+        return Support(**{**vars(Support.empty(shape)), **wanted})
 
     def _place(self, sample: int, rows: slice, cols: slice) -> ArrayLike:
         if self.samples == 1:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .intersect import Intersector
+from .kernels import LEAST_WEIGHT
 from .texture import Texture, TextureTable
 
 Vector = tuple[float, float, float]
@@ -172,18 +173,22 @@ class Scene:
         return np.stack([every.min(axis=0), every.max(axis=0)])
 
 
+# Spawned rays start this share of the face's largest coordinate off the face: float32 places a hit to about
+# 1e-7 of it, and from 1e-6 on no ray meets its own face again.
+LIFT = 4e-6
+
 # Columns of the material table.
 COLOUR, MIRROR, TRANSMISSION, ABSORPTION = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
-SPECULAR, SHININESS, IOR, LOCAL, TEXTURE = 12, 13, 14, 15, 16
-MATERIAL_COLUMNS = 17
+SPECULAR, SHININESS, IOR, LOCAL, TEXTURE, LEAST_HALF = 12, 13, 14, 15, 16, 17
+MATERIAL_COLUMNS = 18
 
 
 class PackedScene:
     """What the kernels read.
 
-    ``corners`` is (F, 3, 3) float32 positions; ``normals`` the same for shading, of no faces if every body is
-    flat; ``coordinates`` the same for textures, of no faces if there are none. A scene without textures, smooth
-    bodies or glass pays for none of them.
+    ``corners`` is (F, 3, 3) float32 positions, ``faces`` (F, 4) unit normals and lifts. ``normals`` is like
+    ``corners`` for shading, of no faces if every body is flat; ``coordinates`` for textures, of no faces if there
+    are none: a scene pays only for what it has.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -192,6 +197,7 @@ class PackedScene:
             np.arange(len(bodies), dtype=np.int32), [len(body.faces) for body in bodies]
         ).astype(np.int32)
         self.corners = _per_corner([b.vertices for b in bodies], bodies)
+        self.faces = _face_table(self.corners)
         smooth = any(b.normals is not None for b in bodies)
         textured = any(b.material.texture is not None for b in bodies)
         self.normals = _per_corner([b.normals for b in bodies], bodies) if smooth else np.empty((0, 3, 3), np.float32)
@@ -208,10 +214,10 @@ class PackedScene:
             row[ABSORPTION] = m.absorption_per_mm
             row[SPECULAR], row[SHININESS], row[IOR] = m.specular, m.shininess, m.ior
             row[LOCAL] = max(0.0, 1 - max(m.mirror) - max(m.transmission))
+            # below this cosine the highlight is too weak to see, and its power need not be taken
+            row[LEAST_HALF] = (LEAST_WEIGHT / max(m.specular, LEAST_WEIGHT)) ** (1 / m.shininess)
             row[TEXTURE] = self.textures.index(m.texture)
-        self.lights = np.array(
-            [[light.kind == "directional", *light.vector, *light.colour] for light in scene.lights], np.float64
-        ).reshape(-1, 7)
+        self.lights = np.array([_light_row(light) for light in scene.lights], np.float64).reshape(-1, 7)
         b = scene.background
         self.background = np.array(
             [*b.horizon, *b.zenith, *b.nadir, 1 / math.sin(math.radians(b.spread_deg))], np.float64
@@ -231,3 +237,19 @@ def _per_corner(values: Sequence[NDArray[Any] | None], bodies: Sequence[Body]) -
         for v, b in zip(values, bodies, strict=True)
     ]
     return np.ascontiguousarray(np.concatenate(parts))
+
+
+def _light_row(light: Light) -> list[float]:
+    vector = np.asarray(light.vector, np.float64)
+    if light.kind == "directional":
+        return [1.0, *(vector / np.linalg.norm(vector)), *light.colour]
+    return [0.0, *vector, *light.colour]
+
+
+def _face_table(corners: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Unit normal (0 for a face without area) and lift, in mm, of every face."""
+    p = corners.astype(np.float64)
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    return np.column_stack([unit, LIFT * np.abs(p).max(axis=(1, 2))]).astype(np.float32)

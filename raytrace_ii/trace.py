@@ -164,7 +164,7 @@ class Tracer:
         primitives, u, v = hits["primID"], hits["u"], hits["v"]
         if support is not None:
             kernels.record_support(
-                primitives, u, v, s.corners, s.object_of_face, self.pose[:3, 3], self.pose[:3, 2],
+                primitives, u, v, s.corners, s.faces, s.object_of_face, self.pose[:3, 3], self.pose[:3, 2],
                 support.depth.reshape(-1), support.normal.reshape(-1, 3), support.object_id.reshape(-1),
             )  # fmt: skip
         spawn = spawn and (s.mirrors or s.transmits)
@@ -173,8 +173,8 @@ class Tracer:
         kinds = np.zeros(2, np.int64)
         shadows, spawned = kernels.shade(
             primitives, u, v, hits["tfar"], rays.origins, rays.directions, rays.weights, rays.pixels, rays.inside,
-            s.corners, s.normals, s.coordinates, s.object_of_face, s.materials, s.textures.table, s.textures.texels,
-            s.lights, s.background, s.ambient, radiance,
+            s.corners, s.faces, s.normals, s.coordinates, s.object_of_face, s.materials,
+            s.textures.table, s.textures.texels, s.lights, s.background, s.ambient, radiance,
             shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels,
             following.origins, following.directions, following.weights, following.pixels, following.inside, kinds,
             spawn,
@@ -206,7 +206,7 @@ class Tracer:
             self.count.embree_seconds += seconds
             kept = kernels.pass_clear_face(
                 hits["primID"], hits["u"], hits["v"], hits["tfar"], origins, directions, reach, colours, pixels,
-                s.corners, s.object_of_face, s.materials, s.opaque_faces, radiance,
+                s.corners, s.faces, s.object_of_face, s.materials, s.opaque_faces, radiance,
             )  # fmt: skip
             if not kept:
                 return

@@ -1,0 +1,24 @@
+"""How kernels are compiled: once, lazily, kept on disk, without the GIL.
+
+numba's cache watches only a kernel's own file: a kernel that called one of another file would miss an edit there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numba
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile on first call and keep the result, or just compile where nothing can be kept."""
+    try:
+        return numba.njit(cache=True, nogil=True)(function)
+    except RuntimeError:  # no folder to keep it in can be written
+        return numba.njit(nogil=True)(function)
+
+
+def inline_kernel(function: Callable[..., Any]) -> Any:
+    """A kernel's own helper, copied into its caller."""
+    return numba.njit(nogil=True, inline="always")(function)
