@@ -40,9 +40,16 @@ def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise ValueError(f"{path} is no known chart type: known are {', '.join(SUFFIXES)}")
-    points = study["points"]
-    if not points:
+    if not study["points"]:
         raise ValueError("the study has no points: nothing to draw")
+    figure = draw(study)
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=150, format=suffix[1:])
+
+
+def draw(study: Mapping[str, Any]) -> Any:
+    """The matplotlib Figure of a study with points; see `rd_chart`."""
+    points = study["points"]
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -59,8 +66,7 @@ def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
     axes.set_title(study["picture"]["name"], loc="left")
     # Below the axes, where no curve can hide it and long scheme names have room.
     figure.legend(loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=150, format=suffix[1:])
+    return figure
 
 
 def _set_axes(axes: Any, points: Sequence[Mapping[str, Any]]) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IICamera, IIPicture
 from ii_core.component import light_field
+from ii_core.jit import kernel
 
 
 def q_global(reference: IIPicture, decoded: IIPicture) -> float:
@@ -140,7 +140,7 @@ def _squared_errors(reference: IIPicture, decoded: IIPicture) -> NDArray[np.floa
 
 # Not parallel: studies measure from several threads at once, which not every numba threading layer survives, and
 # one thread already runs at memory speed. Sums of whole numbers below 2^53 are exact in float64.
-@numba.njit(cache=True, nogil=True)
+@kernel
 def sum_squared_errors(a, b, run, out):
     """out[v, u] = Σ (a − b)² over l, k and colour; the fields are [l, v, k, i], i over the U·3 values of a run."""
     for v in range(a.shape[1]):

@@ -11,6 +11,7 @@ import pytest
 from ii_core import IIPicture
 from metrics import bd_psnr, bd_rate, q_global, rate_distortion, rd_chart, read_study, summary_table, write_csv
 from metrics import write_study as _write_study
+from metrics.chart import draw
 
 RATES = np.array([0.02, 0.05, 0.1, 0.35, 1.0])
 
@@ -276,6 +277,23 @@ def test_chart_comes_from_the_file_alone_and_shows_its_data(tmp_path, suffix):
         assert not np.array_equal(images[0], images[2])
     else:
         assert files[0].read_bytes()[:5] == b"%PDF-"
+
+
+def test_chart_joins_targets_met_and_shows_the_floor_apart(tmp_path):
+    write_study(tmp_path / "s.json", made_up())
+    axes = draw(read_study(tmp_path / "s.json")).axes[0]
+    lines = {line.get_label(): line for line in axes.lines}
+    met = lines["ei-h264  (not below 0.31 bpp)"]
+    assert met.get_xdata().tolist() == [0.35, 1.0] and met.get_linestyle() == "-"
+    assert lines["si-h264"].get_xdata().tolist() == RATES.tolist()
+    assert met.get_color() != lines["si-h264"].get_color() and met.get_marker() != lines["si-h264"].get_marker()
+    (hollow,) = (line for line in axes.lines if line.get_linestyle() == "None" and len(line.get_xdata()))
+    assert hollow.get_xdata().tolist() == [0.31] and hollow.get_color() == met.get_color()
+    assert hollow.get_ydata()[0] == pytest.approx(curve(0.31) + 6, rel=1e-15)  # the very number
+    assert hollow.get_markerfacecolor() == "white"
+    (floor,) = (line for line in axes.lines if line.get_linestyle() == ":" and len(line.get_xdata()) == 2)
+    assert list(floor.get_xdata()) == [0.31, 0.31]
+    assert axes.get_xscale() == "log"
 
 
 def test_chart_of_one_point_of_lossless_only_and_of_many_schemes(tmp_path):
