@@ -4,7 +4,7 @@ from .camera import IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
 from .picture import IIPicture, add_sensor_noise
 from .presets import PRESETS, preset
-from .view import five_viewpoints, orthoscopic, refocus, view_image
+from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stand_back, view_image
 
 __all__ = [
     "PRESETS",
@@ -17,8 +17,10 @@ __all__ = [
     "orthoscopic",
     "picture_pixels",
     "preset",
+    "projection_camera",
     "ray_space_images",
     "refocus",
+    "stand_back",
     "sub_images",
     "view_image",
 ]

@@ -84,7 +84,8 @@ def write_image(path: str | os.PathLike[str], pixels: NDArray[Any]) -> None:
         raise ValueError(
             f"{path.name} cannot hold {pixels.dtype.name} pixels: {path.suffix} takes {', '.join(allowed)}"
         )
-    height, width, channels = pixels.shape if pixels.ndim == 3 else (*pixels.shape, 1)
+    pixels = pixels.reshape(*pixels.shape[:2], -1)  # OpenImageIO 3.2 reads past the end of an array of two axes
+    height, width, channels = pixels.shape
     # OpenImageIO knows no "float32": it would take the file type's own default, half or even uint8, without a word.
     kind = "float" if pixels.dtype.name == "float32" else pixels.dtype.name
     spec = oiio.ImageSpec(width, height, channels, kind)

@@ -156,6 +156,8 @@ class IIPicture:
         OSError
             If the picture cannot be read.
         """
+        if (lenses is None) != (ei_pixels is None):
+            raise ValueError("the structure of a picture needs both lenses and ei_pixels, only one is given")
         image_types(path)
         pixels = read_image(path)
         if lenses is not None and ei_pixels is not None:

@@ -125,6 +125,43 @@ def five_viewpoints(camera: IICamera) -> dict[str, NDArray[np.float64]]:
     }
 
 
+def projection_camera(camera: IICamera, across: int) -> tuple[IICamera, NDArray[np.float64]]:
+    """A 2D pinhole camera that sees the scene through the whole of a display, and where it stands.
+
+    Its pinhole is the nearest point from which every lens shows its own elementary image, and its picture is just
+    the display: what (4.5)'s virtual camera sees, at any resolution.
+
+    Parameters
+    ----------
+    camera : IICamera
+    across : int
+        Pixels across; rows follow from the display's shape.
+
+    Returns
+    -------
+    pinhole : IICamera
+        Of one lens. Its picture stands on its head, as behind any pinhole; `orthoscopic` turns it.
+    pose : ndarray, (4, 4)
+        From the pinhole camera's frame to the II-camera's.
+    """
+    (width, height), gap = camera.size_mm, camera.lenses[0] * camera.gap_mm
+    pinhole = IICamera(
+        name="projection",
+        pixels=(across, max(1, round(across * height / width))),
+        lenses=(1, 1),
+        pixel_pitch_mm=width / across,
+        gap_mm=gap,
+    )
+    return pinhole, stand_back(pinhole, camera.gap_mm)
+
+
+def stand_back(camera: IICamera, plane_mm: float = 0.0) -> NDArray[np.float64]:
+    """The pose in which a camera of one lens has the plane z = ``plane_mm`` fill its picture, edge to edge."""
+    pose = np.eye(4)
+    pose[2, 3] = plane_mm - 2 * camera.gap_mm
+    return pose
+
+
 def _rotation(tangent: float, half_over_r: float) -> float:
     """The angle φ at which tangent·cos φ − sin φ = half_over_r."""
     return math.acos(min(1.0, half_over_r / math.hypot(1, tangent))) - math.atan2(1, tangent)

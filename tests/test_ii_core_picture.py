@@ -286,3 +286,12 @@ def test_noise_of_zero_and_nonsense():
 def test_sixteen_bit_png_is_stored_with_sixteen_bits(tmp_path):
     picture("uint16").save(tmp_path / "p.png")
     assert str(oiio.ImageInput.open(str(tmp_path / "p.png")).spec().format) == "uint16"
+
+
+@pytest.mark.parametrize("suffix", [".exr", ".tif"])
+def test_an_array_of_two_axes_comes_back_as_one_channel(tmp_path, suffix):
+    # 512×1024 is large enough that reading past its end, as OpenImageIO does with two axes, would crash
+    depth = np.random.default_rng(0).random((512, 1024), np.float32)
+    depth[:100] = np.nan
+    write_image(tmp_path / f"depth{suffix}", depth)
+    np.testing.assert_array_equal(read_image(tmp_path / f"depth{suffix}")[..., 0], depth)

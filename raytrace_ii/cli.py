@@ -1,0 +1,361 @@
+"""The command ``raytrace-ii``: render, code, measure and study II-pictures.
+
+The only module that reaches every package; it does so inside its functions, so that help comes at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from ii_core import IIPicture
+
+    from .render import Shot
+
+app = typer.Typer(
+    help="Integral imaging: synthesize, code and evaluate 3-D pictures.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]
+Workers = Annotated[int | None, typer.Option(help="Threads; as many as cores if not given.")]
+
+DEMO_RATES = (0.02, 0.05, 0.15, 0.4, 1.0)
+
+
+@app.command()
+def scenes() -> None:
+    """List the scenes that come with the package."""
+    from .load import scene_names
+
+    _columns(scene_names())
+
+
+@app.command()
+def cameras() -> None:
+    """List the cameras."""
+    from ii_core import PRESETS
+
+    _columns(
+        {
+            name: f"{p.pixels[0]}×{p.pixels[1]} px, {p.lenses[0]}×{p.lenses[1]} lenses: {p.about}"
+            for name, p in PRESETS.items()
+        }
+    )
+
+
+@app.command()
+def schemes() -> None:
+    """List the coding schemes."""
+    from codec import schemes
+
+    _columns(schemes())
+
+
+@app.command()
+def render(
+    scene: Annotated[str, typer.Argument(help="A scene's name, or a .toml file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help=".png, .tif (8 or 16 bit) or .exr (linear float).")],
+    camera: Annotated[str, typer.Option(help="A camera's name.")] = "setup1",
+    scale: Annotated[int, typer.Option(help="Divides the number of lenses, at the same pixels per lens.")] = 1,
+    samples: Annotated[int, typer.Option(help="Rays per pixel.")] = 1,
+    seed: Annotated[int, typer.Option(help="Of samples and noise.")] = 0,
+    noise: Annotated[float, typer.Option(help="σ of sensor noise, in steps of 8 bits.")] = 0.0,
+    bits: Annotated[int, typer.Option(help="8 or 16, for .png and .tif.")] = 8,
+    depth: Annotated[Path | None, typer.Option(help="Write z in mm to this .exr.")] = None,
+    normal: Annotated[Path | None, typer.Option(help="Write unit normals to this .exr.")] = None,
+    object_id: Annotated[Path | None, typer.Option(help="Write object numbers to this .exr, −1 for none.")] = None,
+    projection: Annotated[Path | None, typer.Option(help="Write what a 2D camera sees to this .png.")] = None,
+    workers: Workers = None,
+    force: Force = False,
+) -> None:
+    """Ray trace a scene through a camera. A camera of one lens stands back and gives its picture upright."""
+    import numpy as np
+
+    from ii_core import orthoscopic, preset, projection_camera, stand_back
+    from ii_core.files import write_image
+
+    from .load import load_scene
+    from .render import render
+
+    wanted = {"depth": depth, "normal": normal, "object_id": object_id}
+    extra = {name: path for name, path in wanted.items() if path is not None}
+    if bits not in (8, 16):
+        raise ValueError(f"bits is {bits}: 8 or 16 is needed")
+    dtype = "float32" if output.suffix == ".exr" else f"uint{bits}"
+    _check_picture(output, dtype, force)
+    for path in extra.values():
+        _check_picture(path, "float32", force)
+    if projection:
+        _check_picture(projection, "uint8", force)
+    ii_camera = preset(camera, scale=scale)
+    loaded = load_scene(scene)
+    flat = ii_camera.lenses == (1, 1)
+    with progress_bar(f"render {scene}") as report:
+        shot = render(
+            loaded,
+            ii_camera,
+            samples=samples,
+            seed=seed,
+            noise=noise,
+            dtype=dtype,
+            workers=workers,
+            pose=stand_back(ii_camera) if flat else None,
+            support=tuple(extra),
+            progress=lambda done, total: report(done, total, ""),
+        )
+    (orthoscopic(shot.picture) if flat else shot.picture).save(output)
+    for name, path in extra.items():
+        image = getattr(shot, name).astype(np.float32)
+        write_image(path, image[::-1, ::-1] if flat else image)
+    if projection:
+        pinhole, pose = projection_camera(ii_camera, 1024)
+        view = render(loaded, pinhole, samples=4, pose=pose, support=(), workers=workers)
+        write_image(projection, orthoscopic(view.picture).pixels)
+    _say_stats(shot)
+
+
+@app.command()
+def encode(
+    picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The coded file.")],
+    scheme: Annotated[str, typer.Option(help="As in `raytrace-ii schemes`, options after a colon.")] = "si-h264",
+    bpp: Annotated[float | None, typer.Option(help="Bits per pixel to aim at.")] = None,
+    qp: Annotated[int | None, typer.Option(help="Quantiser to keep.")] = None,
+    force: Force = False,
+) -> None:
+    """Code an II-picture."""
+    from codec import encode
+    from ii_core import IIPicture
+
+    _check_output(output, force)
+    original = IIPicture.load(picture)
+    with _spinner(f"{scheme} codes {picture.name}"):
+        coded = encode(original, scheme, bpp=bpp, qp=qp)
+    coded.save(output)
+    print(f"{output}: {coded.nbytes} bytes, {coded.bpp:.4g} bpp in {coded.encode_seconds:.1f} s")
+    if not coded.reached:
+        print(f"{scheme} cannot reach {bpp:g} bpp with this picture: {coded.bpp:.4g} is as near as it comes")
+
+
+@app.command()
+def decode(
+    coded: Annotated[Path, typer.Argument(help="A file that `encode` wrote.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help=".png or .tif.")],
+    force: Force = False,
+) -> None:
+    """Decode an II-picture."""
+    from codec import decode
+
+    _check_picture(output, "uint8", force)
+    with _spinner(f"decode {coded.name}"):
+        picture = decode(coded)
+    picture.save(output)
+
+
+@app.command()
+def measure(
+    reference: Annotated[Path, typer.Argument(help="The II-picture as it was.")],
+    decoded: Annotated[Path, typer.Argument(help="The II-picture to judge, or a coded file.")],
+    json: Annotated[Path | None, typer.Option(help="Write the numbers here.")] = None,
+    force: Force = False,
+) -> None:
+    """Compare two II-pictures of the same structure."""
+    from ii_core import IIPicture
+    from ii_core.files import write_json
+    from metrics import q_angle, q_global
+
+    if json:
+        _check_output(json, force)
+    a, b = IIPicture.load(reference), _picture(decoded)
+    angle = q_angle(a, b)
+    numbers: dict[str, Any] = {
+        "reference": str(reference),
+        "decoded": str(decoded),
+        "q_global": q_global(a, b),
+        "q_angle": angle.tolist(),
+        "unit": "dB",
+    }
+    rows = {
+        "Q_global": f"{numbers['q_global']:.2f} dB",
+        "Q_angle": f"{angle.min():.2f} … {angle.max():.2f} dB over {angle.shape[1]}×{angle.shape[0]} angles",
+    }
+    if a.camera and min(a.lenses) >= 11:  # SSIM's window
+        from metrics import q_view
+
+        view = q_view(a, b)
+        numbers["q_view"] = {**view.values, "mean": view.mean}
+        rows["Q_view"] = f"{view.mean:.4f} (" + ", ".join(f"{k} {v:.4f}" for k, v in view.values.items()) + ")"
+    if json:
+        write_json(json, numbers)
+    _columns(rows)
+
+
+@app.command()
+def study(
+    picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A folder for chart and numbers.")],
+    schemes: Annotated[str, typer.Option(help="Schemes, parted by commas; options of one by semicolons.")] = (
+        "si-h264,ei-h264,ri-h264,jpeg2000"
+    ),
+    rates: Annotated[str, typer.Option(help="Bits per pixel, parted by commas.")] = ",".join(map(str, DEMO_RATES)),
+    workers: Workers = None,
+    force: Force = False,
+) -> None:
+    """Chart quality against rate for several schemes."""
+    from ii_core import IIPicture
+
+    names = [name.replace(";", ",") for name in schemes.split(",")]
+    try:
+        targets = [float(rate) for rate in rates.split(",")]
+    except ValueError:
+        raise ValueError(f"rates are {rates!r}: numbers parted by commas are needed") from None
+    files = {suffix: output / f"{picture.stem}{suffix}" for suffix in (".json", ".csv", ".png")}
+    for path in files.values():
+        _check_output(path, force, make_folder=True)
+    original = IIPicture.load(picture)
+    run_study(original, picture.stem, names, targets, output, workers=workers)
+
+
+def run_study(
+    picture: IIPicture, name: str, schemes: Sequence[str], rates: Sequence[float], folder: Path, *,
+    workers: int | None = None, extra: dict[str, Any] | None = None,
+) -> None:  # fmt: skip
+    """Measure; leave ``name``.json, .csv and, drawn from the JSON, .png in a folder; print a table."""
+    from codec import check_scheme, decode, encode
+    from metrics import rate_distortion, rd_chart, read_study, write_csv, write_study
+
+    from .render import cores
+
+    for scheme in schemes:
+        check_scheme(scheme)
+    with progress_bar(f"code {name}") as report:
+        records = rate_distortion(
+            picture, schemes, rates, encode=encode, decode=decode, progress=report, workers=workers or cores()
+        )
+    write_study(folder / f"{name}.json", name, records, extra, picture=picture)
+    write_csv(folder / f"{name}.csv", records)
+    drawn = read_study(folder / f"{name}.json")
+    rd_chart(drawn, folder / f"{name}.png")
+    print_summary(name, drawn)
+
+
+def print_summary(name: str, study: dict[str, Any]) -> None:
+    """The study as a table in the terminal."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from metrics import summary_table
+
+    rows = summary_table(study)
+    table = Table(title=f"{name}: Q_global in dB at bits per pixel; gain, BD-rate and BD-PSNR against jpeg2000")
+    for column in rows[0]:
+        table.add_column(column, justify="left" if column == "scheme" else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row.values())
+    console = Console()
+    Console(width=max(console.width, 150)).print(table)
+
+
+def _picture(path: Path) -> IIPicture:
+    """An II-picture, or the one in a coded file."""
+    from ii_core import IIPicture
+    from ii_core.files import IMAGE_TYPES
+
+    if path.suffix in IMAGE_TYPES:
+        return IIPicture.load(path)
+    from codec import decode
+
+    return decode(path)
+
+
+def _check_picture(path: Path, dtype: str, force: bool) -> None:
+    """Raise, before any work, unless a picture of this type can be written there."""
+    from ii_core.files import image_types
+
+    if dtype not in image_types(path):
+        raise ValueError(f"{path} cannot hold {dtype} pixels: {path.suffix} takes {', '.join(image_types(path))}")
+    _check_output(path, force)
+
+
+def _check_output(path: Path, force: bool, *, make_folder: bool = False) -> None:
+    """Raise, before any work, unless a file can be written there without losing another."""
+    if make_folder:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"cannot write {path}: {path.parent} is no folder")
+    if not os.access(path.parent, os.W_OK):
+        raise PermissionError(f"cannot write {path}: {path.parent} cannot be written")
+    if path.exists() and not force:
+        raise FileExistsError(f"{path} is there already: --force replaces it")
+
+
+def _columns(rows: dict[str, str]) -> None:
+    """Names and what they are, in two columns."""
+    width = max(map(len, rows), default=0)
+    for name, text in rows.items():
+        print(f"{name:<{width}}  {text}")
+
+
+def _say_stats(shot: Shot) -> None:
+    s = shot.stats
+    counts = ", ".join(f"{count / 1e6:.2f} M {kind}" for kind, count in s.rays.items() if count)
+    print(f"{counts} rays in {s.seconds:.1f} s, {s.embree_seconds:.1f} s of {s.cpu_seconds:.1f} CPU s inside Embree")
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Callable[[int, int, str], None]]:
+    """A bar on the terminal's error stream; yields what to call with done, total and a word on the last step."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("{task.fields[step]}"), console=Console(stderr=True)) as bar:
+        task = bar.add_task(title, total=None, step="")
+        yield lambda done, total, step: bar.update(task, completed=done, total=total, step=step)
+
+
+@contextmanager
+def _spinner(title: str) -> Iterator[None]:
+    from rich.console import Console
+
+    with Console(stderr=True).status(title):
+        yield
+
+
+def main() -> None:
+    """Run the command; a bad input is one line on the error stream and exit code 2."""
+    try:
+        code = app(standalone_mode=False)
+        sys.exit(code if isinstance(code, int) else 0)
+    except (ValueError, OSError, MemoryError) as error:
+        _fail(str(error) or type(error).__name__)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        sys.exit(130)
+    except typer.Abort:
+        sys.exit(130)
+    except Exception as error:
+        # A wrong option or argument: typer's own complaint, without its frame.
+        if not hasattr(error, "format_message"):
+            raise
+        _fail(error.format_message())
+
+
+def _fail(message: str) -> None:
+    print(f"error: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()
