@@ -108,7 +108,7 @@ def render(
     _ = scene.packed  # Embree's tree, before there are threads to build it twice
     tiles = list(_tiles(camera.pixels))
     count = RayCount()
-    with ThreadPoolExecutor(workers or cores()) as pool:
+    with ThreadPoolExecutor(workers if workers is not None else cores()) as pool:
         futures = [pool.submit(job.tile, *tile) for tile in tiles]
         try:
             for done, future in enumerate(as_completed(futures), 1):
@@ -139,7 +139,11 @@ def cores() -> int:
 
 
 def _check(samples: int, seed: int, dtype: str, workers: int | None, support: tuple[str, ...]) -> None:
-    for name, value, least in (("samples", samples, 1), ("seed", seed, 0), ("workers", workers or 1, 1)):
+    for name, value, least in (
+        ("samples", samples, 1),
+        ("seed", seed, 0),
+        ("workers", 1 if workers is None else workers, 1),
+    ):
         if not isinstance(value, int | np.integer) or value < least:
             raise ValueError(f"{name} is {value!r}: a whole number of at least {least} is needed")
     if dtype not in _CURVES:

@@ -95,7 +95,8 @@ def rigid(pose: ArrayLike | None) -> NDArray[np.float64]:
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
         raise ValueError("pose is not a finite 4×4 matrix")
     turn = matrix[:3, :3]
-    if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-9) or not np.array_equal(matrix[3], [0, 0, 0, 1]):
+    turns = np.allclose(turn @ turn.T, np.eye(3), atol=1e-9) and np.linalg.det(turn) > 0
+    if not turns or not np.array_equal(matrix[3], [0, 0, 0, 1]):
         raise ValueError("pose is not rigid: a rotation and a shift with the last row 0 0 0 1 are needed")
     return matrix
 
@@ -146,7 +147,10 @@ class Tracer:
         )
         if bad >= 0:
             where = ", ".join(map(str, np.unravel_index(bad, shape)))
-            raise ValueError(f"ray [{where}] from {locations[bad]} along {directions[bad]}: a direction is needed")
+            raise ValueError(
+                f"ray [{where}] from {locations[bad].tolist()} along {directions[bad].tolist()}: "
+                "a finite place and a finite direction other than zero are needed"
+            )
         rays.weights.fill(1)
         rays.pixels[:] = np.arange(n, dtype=np.int32)
         rays.inside.fill(-1)

@@ -1,0 +1,121 @@
+"""Small scenes and rays that the tracer's tests share."""
+
+import math
+
+import numpy as np
+
+from raytrace_ii import Background, Body, Light, Material, Scene
+from raytrace_ii.kernels import texture_colour
+from raytrace_ii.shapes import Box, Mesh, Plane, Sphere, rotation
+from raytrace_ii.texture import Checker, Image, Noise, TextureTable
+
+WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
+UNIFORM = Background(horizon=WHITE, zenith=WHITE, nadir=WHITE)
+
+
+def body(mesh, *, name="body", at=(0, 0, 0), turn=(0, 0, 0), scale=1.0, flat=False, coordinates=None, **material):
+    """A mesh set up in a scene; material parameters go to `Material`."""
+    matrix = rotation(turn)
+    return Body(
+        name=name,
+        vertices=(mesh.vertices * scale) @ matrix.T + np.asarray(at),
+        faces=mesh.faces,
+        normals=None if flat or mesh.normals is None else mesh.normals @ matrix.T,
+        texture_coordinates=coordinates,
+        material=Material(**material),
+    )
+
+
+def sphere(radius=1.0, segments=96):
+    return Sphere(shape="sphere", radius_mm=radius, segments=segments).mesh()
+
+
+def box(*size):
+    return Box(shape="box", size_mm=size).mesh()
+
+
+def floor(x=100.0, z=None):
+    """A rectangle in y = 0 that faces up."""
+    return Plane(shape="plane", size_mm=(x, x if z is None else z)).mesh()
+
+
+def wall(z, half=50.0):
+    """A square at one z that faces the camera."""
+    corners = np.array([[-half, -half, z], [half, -half, z], [half, half, z], [-half, half, z]], float)
+    return Mesh(corners, np.array([[0, 2, 1], [0, 3, 2]]), None, (corners[:, :2] + half) / (2 * half))
+
+
+def ramp(mesh, half, **more):
+    """A wall whose red grows with x and green with y: 0 at −half, 1 at +half; blue is 1 everywhere.
+
+    Two texels make it: a bilinear texture is exactly straight between their centres, u = ¼ and ¾.
+    """
+    texels = np.array([[[0, 1, 1], [1, 1, 1]], [[0, 0, 1], [1, 0, 1]]], np.float32)
+    uv = 0.5 + mesh.vertices[:, :2] / (4 * half)
+    coordinates = np.column_stack([uv, np.zeros(len(uv))])
+    return body(mesh, coordinates=coordinates, colour=WHITE, texture=Image(texels), name="ramp", **more)
+
+
+def sun(towards, colour=WHITE):
+    """A directional light that stands in the direction ``towards``."""
+    return Light(kind="directional", vector=tuple(-np.asarray(towards, float)), colour=colour)
+
+
+def lamp(position, colour=WHITE):
+    return Light(kind="point", vector=tuple(position), colour=colour)
+
+
+def spread(generator, n):
+    """Unit vectors all around."""
+    out = generator.normal(size=(n, 3))
+    return out / np.linalg.norm(out, axis=1, keepdims=True)
+
+
+def hall(max_depth=5):
+    """Mirrors, clear and coloured glass, textures, a highlight, three lights and a sky before a coding setup."""
+    ground = floor(400, 400)
+    ball = sphere(4, 48)
+    return Scene(
+        name="hall",
+        bodies=[
+            body(
+                ground, name="floor", at=(0, -9, 150), coordinates=ground.vertices,
+                texture=Checker(((0.9, 0.8, 0.6), (0.1, 0.2, 0.3)), (7, 7, 7)), colour=WHITE,
+            ),
+            body(box(14, 12, 2), name="mirror", at=(-11, 0, 70), turn=(0, -25, 0), mirror=(0.8, 0.8, 0.7)),
+            body(sphere(5, 48), name="glass", at=(2, -3, 35), transmission=(0.95,) * 3, ior=1.5),
+            body(
+                box(6, 9, 3), name="filter", at=(14, -2, 45), turn=(0, 20, 5),
+                transmission=(0.9, 0.4, 0.2), absorption_per_mm=(0.01, 0.1, 0.2), ior=1.33,
+            ),
+            body(
+                ball, name="stone", at=(8, 2, 60), coordinates=ball.vertices, specular=0.6, shininess=30,
+                texture=Noise(((0.7, 0.1, 0.1), (0.9, 0.9, 0.5)), (2, 2, 2), octaves=3), mirror=(0.1,) * 3,
+            ),
+        ],
+        lights=[
+            sun((0.4, 1.0, -0.5), (0.6, 0.6, 0.5)),
+            lamp((-15, 20, 20), (0.3, 0.2, 0.2)),
+            lamp((10, 12, 100), (0.1, 0.2, 0.4)),
+        ],
+        background=Background(horizon=(0.7, 0.8, 0.9), zenith=(0.1, 0.3, 0.7), nadir=(0.3, 0.3, 0.3), spread_deg=40),
+        ambient=(0.2, 0.2, 0.25),
+        max_depth=max_depth,
+    )  # fmt: skip
+
+
+def texture_at(texture, points):
+    """Linear colours, (n, 3), of a texture at (n, 3) texture coordinates."""
+    packed = TextureTable([texture])
+    return np.array([texture_colour(packed.table, 0, packed.texels, *map(float, p)) for p in points])
+
+
+def reflectance(cosine, ior):
+    """Unpolarised Fresnel reflectance from air, by angles: sines and tangents of their sum and difference."""
+    incident = math.acos(cosine)
+    if incident == 0:
+        return ((ior - 1) / (ior + 1)) ** 2
+    refracted = math.asin(math.sin(incident) / ior)
+    s = math.sin(incident - refracted) / math.sin(incident + refracted)
+    p = math.tan(incident - refracted) / math.tan(incident + refracted)
+    return (s * s + p * p) / 2
