@@ -1,0 +1,85 @@
+"""Γ: the order in which the component images of a picture become frames (5.2).
+
+A component image has a place in a grid of ``rows`` × ``cols`` (see `codec.sequence.layout` for which grid), and is
+named by its flat index ``row * cols + col``. An order is the permutation that lists these indices frame by frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Indices = NDArray[np.int64]
+
+
+def selection_order(order: str, rows: int, cols: int) -> Indices:
+    """Γ(j) for j = 0 … J−1: which component image is frame j.
+
+    Parameters
+    ----------
+    order : {"row", "column", "parallel", "zigzag", "spiral"}
+        Row by row; column by column; rows alternately rightward and leftward; along the anti-diagonals, alternately
+        down and up, as JPEG scans a block; or in rings around the centre, outward.
+    rows, cols : int
+        The grid, at least 1 × 1.
+
+    Returns
+    -------
+    ndarray of int64, (rows * cols,)
+        Flat indices. Neighbours in ``parallel`` and ``spiral`` are neighbours in the grid, whatever its shape.
+
+    Raises
+    ------
+    ValueError
+        If the order is unknown or the grid is empty.
+
+    References
+    ----------
+    Olsson 2008, §5.5.2 and Figure 5.4. The figure's spiral is lost: ours starts at the centre, where the view differs
+    least from all others and makes the best only I picture, and ends in the upper left corner.
+    """
+    if order not in ORDERS:
+        raise ValueError(f"unknown order {order!r}: known are {', '.join(ORDERS)}")
+    if rows < 1 or cols < 1:
+        raise ValueError(f"a grid of {rows}×{cols} component images has no order: at least 1×1 is needed")
+    return np.ascontiguousarray(ORDERS[order](np.arange(rows * cols, dtype=np.int64).reshape(rows, cols)))
+
+
+def inverse(permutation: NDArray[Any]) -> Indices:
+    """Where each component image went: ``inverse(p)[p[j]] == j``."""
+    back = np.empty(len(permutation), np.int64)
+    back[permutation] = np.arange(len(permutation))
+    return back
+
+
+def _parallel(grid: Indices) -> Indices:
+    grid[1::2] = grid[1::2, ::-1].copy()
+    return grid.ravel()
+
+
+def _zigzag(grid: Indices) -> Indices:
+    row, col = np.indices(grid.shape)
+    diagonal = row + col
+    along = np.where(diagonal % 2, row, -row)
+    return grid.ravel()[np.lexsort((along.ravel(), diagonal.ravel()))]
+
+
+def _spiral(grid: Indices) -> Indices:
+    """Peel the grid clockwise from the upper left corner inward, then walk that path backwards."""
+    peeled = []
+    while grid.size:
+        peeled.append(grid[0])
+        grid = np.rot90(grid[1:])
+    return np.concatenate(peeled)[::-1]
+
+
+ORDERS: dict[str, Callable[[Indices], Indices]] = {
+    "row": lambda grid: grid.ravel(),
+    "column": lambda grid: grid.T.ravel(),
+    "parallel": _parallel,
+    "zigzag": _zigzag,
+    "spiral": _spiral,
+}
