@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from .camera import IICamera, Pair, whole_pair
 from .files import atomic_path, image_types, read_image, write_image, write_json
+from .jit import kernel
 
 DTYPES = ("uint8", "uint16", "float32")
 
@@ -198,13 +200,31 @@ def add_sensor_noise(picture: IIPicture, sigma: float = 1.0, seed: int = 0) -> I
     source = picture.pixels
     if sigma == 0:
         return picture
-    is_float = source.dtype.kind == "f"
-    peak = 1.0 if is_float else float(np.iinfo(source.dtype).max)
-    generator = np.random.default_rng(seed)
+    peak = 1.0 if source.dtype.kind == "f" else float(np.iinfo(source.dtype).max)
     noisy = np.empty_like(source)
-    for row, out in zip(source, noisy, strict=True):  # row by row: no second picture of floats
-        sample = generator.standard_normal((source.shape[1], 1), dtype=np.float32)
+
+    def block(top: int) -> None:
+        rows = slice(top, top + NOISE_ROWS)
+        sample = np.random.default_rng((seed, top)).standard_normal(source[rows].shape[:2], dtype=np.float32)
         sample *= np.float32(sigma * peak / 255)
-        # Whole codes are rounded before they are added, so that R, G and B get the very same.
-        out[...] = row + sample if is_float else np.clip(row + np.rint(sample), 0, peak)
+        if source.dtype.kind == "f":
+            np.add(source[rows], sample[..., None], out=noisy[rows])
+        else:
+            add_code_noise(source[rows], sample, peak, noisy[rows])
+
+    with ThreadPoolExecutor() as pool:
+        list(pool.map(block, range(0, source.shape[0], NOISE_ROWS)))
     return picture.with_pixels(noisy)
+
+
+NOISE_ROWS = 64  # rows that share a generator: the noise is the same on any number of cores
+
+
+@kernel
+def add_code_noise(source, noise, peak, out):
+    """Add noise in whole codes, the very same to R, G and B, kept between 0 and peak."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            step = np.rint(noise[i, j])
+            for c in range(3):
+                out[i, j, c] = min(max(source[i, j, c] + step, 0.0), peak)

@@ -4,7 +4,7 @@ from .chart import rd_chart
 from .depth import DepthQuality, q_depth
 from .psnr import angle_axes, mean_q_angle, q_angle, q_global
 from .rd import bd_psnr, bd_rate, rate_distortion
-from .study import read_study, summary_table, write_csv, write_study
+from .study import provenance, read_study, summary_table, write_csv, write_study
 from .view import ViewQuality, q_view
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "bd_psnr",
     "bd_rate",
     "mean_q_angle",
+    "provenance",
     "q_angle",
     "q_depth",
     "q_global",

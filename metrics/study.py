@@ -81,9 +81,7 @@ def write_study(
                 **picture.structure_json(),
             },
             "pooling": POOLING,
-            "git": _git(),
-            "machine": {"platform": platform.platform(), "cpus": os.cpu_count()},
-            "versions": _versions(),
+            **provenance(),
             "extra": dict(extra or {}),
             # Infinity is no JSON number: a lossless point says so.
             "points": [{**record, "lossless": record["q_global"] == math.inf} for record in records],
@@ -214,6 +212,15 @@ def _check_points(records: Any) -> None:
     for i, record in enumerate(records):
         if missing := set(FIELDS) - set(record):
             raise ValueError(f"points[{i}] has no {', '.join(sorted(missing))}")
+
+
+def provenance() -> dict[str, Any]:
+    """What a number was measured on: commit, machine and versions of the libraries."""
+    return {
+        "git": _git(),
+        "machine": {"platform": platform.platform(), "cpus": os.cpu_count()},
+        "versions": _versions(),
+    }
 
 
 def _git() -> dict[str, Any] | None:

@@ -232,13 +232,14 @@ def run_study(
     workers: int | None = None, extra: dict[str, Any] | None = None,
 ) -> None:  # fmt: skip
     """Measure; leave ``name``.json, .csv and, drawn from the JSON, .png in a folder; print a table."""
-    from codec import check_scheme, decode, encode
+    from codec import decode, encode
+    from codec.base import parse_scheme
     from metrics import rate_distortion, rd_chart, read_study, write_csv, write_study
 
     from .render import cores
 
     for scheme in schemes:
-        check_scheme(scheme)
+        parse_scheme(scheme)  # a misspelt one is found before hours of work
     with progress_bar(f"code {name}") as report:
         records = rate_distortion(
             picture, schemes, rates, encode=encode, decode=decode, progress=report, workers=workers or cores()
@@ -320,9 +321,18 @@ def progress_bar(title: str) -> Iterator[Callable[[int, int, str], None]]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("{task.fields[step]}"), console=Console(stderr=True)) as bar:
-        task = bar.add_task(title, total=None, step="")
-        yield lambda done, total, step: bar.update(task, completed=done, total=total, step=step)
+    bar = Progress(*columns, TextColumn("{task.fields[step]}"), console=Console(stderr=True))
+    task = bar.add_task(title, total=None, step="")
+
+    def report(done: int, total: int, step: str) -> None:
+        bar.start()  # only now: what fails before its first step leaves no empty bar
+        bar.update(task, completed=done, total=total, step=step)
+
+    try:
+        yield report
+    finally:
+        if bar.live.is_started:
+            bar.stop()
 
 
 @contextmanager

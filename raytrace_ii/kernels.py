@@ -14,6 +14,7 @@ from ii_core.jit import inline_kernel, kernel
 # A weight this small cannot move a colour by half a step of 8 bits, not even on sRGB's steep foot.
 LEAST_WEIGHT = 0.5 / 255 / 12.92
 REFLECTION, REFRACTION = 0, 1
+PULL = 4e-6  # how far, as a share of the way to the middle of its face, a hit moves before rays start from it
 IMAGE, CHECKER, NOISE = 0, 1, 2  # kinds of texture
 # Odd multipliers of the noise lattice's hash.
 _PX, _PY, _PZ, _SEED, _GOLDEN = 73856093, 19349663, 83492791, 2654435761, 0x1E3779B97F4A7C15
@@ -100,47 +101,47 @@ def shade(
             radiance[pixel, 2] += w2 * b2
             continue
         body = object_of_face[f]
-        m = materials[body]
+        gx, gy, gz, lift = float(faces[f, 0]), float(faces[f, 1]), float(faces[f, 2]), float(faces[f, 3])
+        entering = gx * dx + gy * dy + gz * dz < 0.0
         medium = inside[i]
+        if medium < 0 and not entering:  # the camera stands in the body
+            medium = body
         if medium >= 0:  # Beer–Lambert along the way through a body
             t = float(distances[i])
             w0 *= math.exp(-materials[medium, _ABSORPTION] * t)
             w1 *= math.exp(-materials[medium, _ABSORPTION + 1] * t)
             w2 *= math.exp(-materials[medium, _ABSORPTION + 2] * t)
-
-        gx, gy, gz, lift = float(faces[f, 0]), float(faces[f, 1]), float(faces[f, 2]), float(faces[f, 3])
-        entering = gx * dx + gy * dy + gz * dz < 0.0
         if not entering:
             gx, gy, gz = -gx, -gy, -gz
         nx, ny, nz = gx, gy, gz
         if normals.shape[0] > 0:
             nx, ny, nz = _shading_normal(normals, f, u[i], v[i], gx, gy, gz, dx, dy, dz)
-        px, py, pz = _hit_point(corners, f, u[i], v[i])
+        px, py, pz = _start_point(corners, f, u[i], v[i])
         ox, oy, oz = px + lift * gx, py + lift * gy, pz + lift * gz
 
-        local = m[_LOCAL]
-        if local > 0.0 or m[_SPECULAR] > 0.0:
-            r, g, b = local * m[0], local * m[1], local * m[2]
-            if m[_TEXTURE] >= 0 and local > 0.0:
+        local = materials[body, _LOCAL]
+        if local > 0.0 or materials[body, _SPECULAR] > 0.0:
+            r, g, b = local * materials[body, 0], local * materials[body, 1], local * materials[body, 2]
+            if materials[body, _TEXTURE] >= 0 and local > 0.0:
                 s0, s1, s2 = _interpolate(coordinates, f, u[i], v[i])
-                t0, t1, t2 = texture_colour(textures[int(m[_TEXTURE])], texels, s0, s1, s2)
+                t0, t1, t2 = texture_colour(textures, int(materials[body, _TEXTURE]), texels, s0, s1, s2)
                 r, g, b = r * t0, g * t1, b * t2
             r, g, b = w0 * r, w1 * g, w2 * b
             radiance[pixel, 0] += r * ambient[0]
             radiance[pixel, 1] += g * ambient[1]
             radiance[pixel, 2] += b * ambient[2]
             for k in range(lights.shape[0]):
-                lx, ly, lz, reach = _towards_light(lights[k], ox, oy, oz)
+                lx, ly, lz, reach = _towards_light(lights, k, ox, oy, oz)
                 norm = 1.0 if reach == FAR else 1.0 / math.sqrt(lx * lx + ly * ly + lz * lz)
                 cosine = (nx * lx + ny * ly + nz * lz) * norm
                 if cosine <= 0.0 or gx * lx + gy * ly + gz * lz <= 0.0:
                     continue
                 shine = 0.0
-                if m[_SPECULAR] > 0.0:
+                if materials[body, _SPECULAR] > 0.0:
                     hx, hy, hz = lx * norm - dx, ly * norm - dy, lz * norm - dz
                     half = (nx * hx + ny * hy + nz * hz) / math.sqrt(hx * hx + hy * hy + hz * hz)
-                    if half > m[_LEAST_HALF]:
-                        shine = m[_SPECULAR] * half ** m[_SHININESS]
+                    if half > materials[body, _LEAST_HALF]:
+                        shine = materials[body, _SPECULAR] * half ** materials[body, _SHININESS]
                 c0 = (r * cosine + w0 * shine) * lights[k, 4]
                 c1 = (g * cosine + w1 * shine) * lights[k, 5]
                 c2 = (b * cosine + w2 * shine) * lights[k, 6]
@@ -156,10 +157,18 @@ def shade(
             continue
 
         # Shares of the light that goes on: by the mirror, and by glass through Fresnel's formulas.
-        m0, m1, m2 = w0 * m[_MIRROR], w1 * m[_MIRROR + 1], w2 * m[_MIRROR + 2]
-        t0, t1, t2 = w0 * m[_TRANSMISSION], w1 * m[_TRANSMISSION + 1], w2 * m[_TRANSMISSION + 2]
+        m0, m1, m2 = (
+            w0 * materials[body, _MIRROR],
+            w1 * materials[body, _MIRROR + 1],
+            w2 * materials[body, _MIRROR + 2],
+        )
+        t0, t1, t2 = (
+            w0 * materials[body, _TRANSMISSION],
+            w1 * materials[body, _TRANSMISSION + 1],
+            w2 * materials[body, _TRANSMISSION + 2],
+        )
         if max(t0, t1, t2) > 0.0:
-            ratio = 1.0 / m[_IOR] if entering else float(m[_IOR])
+            ratio = 1.0 / materials[body, _IOR] if entering else float(materials[body, _IOR])
             cosine = -(dx * nx + dy * ny + dz * nz)
             reflected, cosine_t = fresnel(cosine, ratio)
             m0, m1, m2 = m0 + reflected * t0, m1 + reflected * t1, m2 + reflected * t2
@@ -222,22 +231,26 @@ def pass_clear_face(
                 radiance[pixels[i], c] += colours[i, c]
             continue
         f = primitives[i] + first_clear
-        m = materials[object_of_face[f]]
+        body = object_of_face[f]
         dx, dy, dz = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         gx, gy, gz, lift = float(faces[f, 0]), float(faces[f, 1]), float(faces[f, 2]), float(faces[f, 3])
         cosine = -(gx * dx + gy * dy + gz * dz) / length
-        reflected, _ = fresnel(abs(cosine), 1.0 / m[_IOR])  # the same on the way in and, unbent, out
+        reflected, _ = fresnel(abs(cosine), 1.0 / materials[body, _IOR])  # the same on the way in and, unbent, out
         through = float(distances[i]) * length if cosine < 0.0 else 0.0
         strongest = 0.0
         for c in range(3):
             # The colour is the body's: half on the way in, half on the way out.
-            share = (1 - reflected) * math.sqrt(m[_TRANSMISSION + c]) * math.exp(-m[_ABSORPTION + c] * through)
+            share = (
+                (1 - reflected)
+                * math.sqrt(materials[body, _TRANSMISSION + c])
+                * math.exp(-materials[body, _ABSORPTION + c] * through)
+            )
             colours[kept, c] = colours[i, c] * share
             strongest = max(strongest, colours[kept, c])
         if strongest < LEAST_WEIGHT:
             continue
-        px, py, pz = _hit_point(corners, f, u[i], v[i])
+        px, py, pz = _start_point(corners, f, u[i], v[i])
         side = 1.0 if cosine < 0.0 else -1.0
         _put(origins, kept, px + side * lift * gx, py + side * lift * gy, pz + side * lift * gz)
         _put(directions, kept, dx, dy, dz)
@@ -333,6 +346,17 @@ def _hit_point(corners, f, u, v):
 
 
 @inline_kernel
+def _start_point(corners, f, u, v):
+    """The hit point drawn a hair towards the middle of its face, for rays to start from.
+
+    On an edge it would lie in the neighbouring face too, which a ray from there cannot meet: light would come in
+    at the corners of a closed room.
+    """
+    u, v = float(u), float(v)
+    return _interpolate(corners, f, u + PULL * (1.0 / 3.0 - u), v + PULL * (1.0 / 3.0 - v))
+
+
+@inline_kernel
 def _shading_normal(normals, f, u, v, gx, gy, gz, dx, dy, dz):
     """The interpolated vertex normal on the ray's side, or the face's own where there is none or it faces away."""
     x, y, z = _interpolate(normals, f, float(u), float(v))
@@ -349,11 +373,11 @@ def _shading_normal(normals, f, u, v, gx, gy, gz, dx, dy, dz):
 
 
 @inline_kernel
-def _towards_light(light, x, y, z):
+def _towards_light(lights, k, x, y, z):
     """Direction to a light, a unit vector if it is far away, and how much of that direction a shadow ray covers."""
-    if light[0] != 0.0:
-        return -light[1], -light[2], -light[3], FAR
-    return light[1] - x, light[2] - y, light[3] - z, np.float32(0.9999)
+    if lights[k, 0] != 0.0:
+        return -lights[k, 1], -lights[k, 2], -lights[k, 3], FAR
+    return lights[k, 1] - x, lights[k, 2] - y, lights[k, 3] - z, np.float32(0.9999)
 
 
 @inline_kernel
@@ -363,28 +387,34 @@ def _wrap(i, n):
 
 
 @kernel
-def texture_colour(row, texels, x, y, z):
+def texture_colour(table, row, texels, x, y, z):
     """Linear colour of a texture at a texture coordinate."""
-    kind = row[0]
+    kind = table[row, 0]
     if kind == IMAGE:
-        return _image(row, texels, x, y)
+        return _image(table, row, texels, x, y)
     if kind == CHECKER:
         # A face often lies just on a cell's border: decided here, not by rounding noise.
-        odd = (math.floor(x * row[1] + 1e-6) + math.floor(y * row[2] + 1e-6) + math.floor(z * row[3] + 1e-6)) % 2
+        odd = (
+            math.floor(x * table[row, 1] + 1e-6)
+            + math.floor(y * table[row, 2] + 1e-6)
+            + math.floor(z * table[row, 3] + 1e-6)
+        ) % 2
         t = 1.0 if odd else 0.0
     else:
-        t = 0.5 + row[11] * _fractal(x * row[1], y * row[2], z * row[3], int(row[10]))
+        t = 0.5 + table[row, 11] * _fractal(
+            x * table[row, 1], y * table[row, 2], z * table[row, 3], int(table[row, 10])
+        )
         t = min(max(t, 0.0), 1.0)
     return (
-        row[4] + t * (row[7] - row[4]),
-        row[5] + t * (row[8] - row[5]),
-        row[6] + t * (row[9] - row[6]),
+        table[row, 4] + t * (table[row, 7] - table[row, 4]),
+        table[row, 5] + t * (table[row, 8] - table[row, 5]),
+        table[row, 6] + t * (table[row, 9] - table[row, 6]),
     )
 
 
 @kernel
-def _image(row, texels, u, v):
-    first, width, height = int(row[1]), int(row[2]), int(row[3])
+def _image(table, row, texels, u, v):
+    first, width, height = int(table[row, 1]), int(table[row, 2]), int(table[row, 3])
     x = (u - math.floor(u)) * width - 0.5
     y = (1.0 - (v - math.floor(v))) * height - 0.5
     i, j = math.floor(x), math.floor(y)

@@ -101,7 +101,7 @@ def render(
     ValueError
         If a parameter is out of range.
     """
-    _check(samples, seed, dtype, workers, support)
+    _check(samples, seed, noise, dtype, workers, support)
     matrix = rigid(pose)
     started, cpu = time.perf_counter(), time.process_time()
     job = _Job(scene, camera, samples, seed, matrix, _empty_shot(camera, dtype, support))
@@ -138,14 +138,13 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _check(samples: int, seed: int, dtype: str, workers: int | None, support: tuple[str, ...]) -> None:
-    for name, value, least in (
-        ("samples", samples, 1),
-        ("seed", seed, 0),
-        ("workers", 1 if workers is None else workers, 1),
-    ):
+def _check(samples: int, seed: int, noise: float, dtype: str, workers: int | None, support: tuple[str, ...]) -> None:
+    workers = cores() if workers is None else workers
+    for name, value, least in (("samples", samples, 1), ("seed", seed, 0), ("workers", workers, 1)):
         if not isinstance(value, int | np.integer) or value < least:
             raise ValueError(f"{name} is {value!r}: a whole number of at least {least} is needed")
+    if not 0 <= noise < math.inf:
+        raise ValueError(f"noise sigma is {noise}: at least 0 is needed")
     if dtype not in _CURVES:
         raise ValueError(f"unknown pixel type {dtype!r}: known are {', '.join(_CURVES)}")
     if unknown := set(support) - set(SUPPORT):

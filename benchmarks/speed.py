@@ -1,0 +1,143 @@
+"""How fast, as ratios taken within one run: ours against the library's bare call or a copy. ``make bench``.
+
+Everything is interleaved and the median taken, because machines drift. Numbers go to
+``benchmarks/results/speed.json`` with the commit they were taken on.
+"""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.bare import bare_encoder
+from codec import encode
+from ii_core import IIPicture, component_images, preset
+from ii_core.files import write_json
+from metrics import provenance
+from raytrace_ii import Scene, load_scene, render
+from raytrace_ii.intersect import Intersector
+
+RESULTS = Path(__file__).parent / "results"
+REPEATS = 7
+
+
+def main() -> None:
+    """Measure all, print and keep."""
+    targets = [
+        ("render apples: CPU time / EmbreeScene.run alone", "≤ 1.5", lambda: render_ratio("apples")),
+        ("render cuboid: CPU time / EmbreeScene.run alone", "≤ 1.5", lambda: render_ratio("cuboid")),
+        ("render apples: speed of 2 workers / 1 worker", "≥ 1.8", lambda: workers_ratio("apples")),
+        ("render cuboid: speed of 2 workers / 1 worker", "≥ 1.8", lambda: workers_ratio("cuboid")),
+        ("II → EI / numpy copy, setup1", "≤ 2", lambda: rearrange_ratio("ei")),
+        ("II → SI / numpy copy, setup1", "≤ 2", lambda: rearrange_ratio("si")),
+        ("II → RI / numpy copy, setup1", "≤ 2", lambda: rearrange_ratio("ri")),
+        ("encode si-h264 / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("si-h264")),
+        ("encode ei-h264 / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("ei-h264")),
+        ("peak memory of rendering setup1 at full size, GiB", "≤ 1.5", peak_memory),
+    ]
+    rows = []
+    for what, target, measure in targets:
+        values = measure()
+        row = {"what": what, "target": target, "median": statistics.median(values), "all": values}
+        rows.append(row)
+        print(f"{what:<52} {target:>6}  {row['median']:.2f}   ({min(values):.2f} … {max(values):.2f})", flush=True)
+    RESULTS.mkdir(exist_ok=True)
+    write_json(RESULTS / "speed.json", {**provenance(), "rows": rows})
+
+
+def render_ratio(name: str) -> list[float]:
+    """CPU time of a render against that of Embree on the very same rays, 2 Mpixel at one sample."""
+    scene, camera = load_scene(name), preset("setup1", scale=4)
+    calls = recorded_calls(scene, lambda: render(scene, camera, workers=1))
+    ratios = []
+    for _ in range(REPEATS):
+        whole = _cpu(lambda: render(scene, camera, workers=1))
+        ratios.append(whole / _cpu(lambda: [call() for call in calls]))
+    return ratios
+
+
+def recorded_calls(scene: Scene, run: Callable[[], object]) -> list[Callable[[], object]]:
+    """The calls of ``EmbreeScene.run`` that ``run`` makes, with copies of their rays, ready to be made again."""
+    calls: list[Callable[[], object]] = []
+    intersector = scene.packed.intersector
+
+    class Recorder:
+        def __init__(self, tree: Any) -> None:
+            self.tree = tree
+
+        def run(self, *arrays: Any, **options: Any) -> Any:
+            rays = [array.copy() for array in arrays]
+            kept = {k: v.copy() if isinstance(v, np.ndarray) else v for k, v in options.items()}
+            calls.append(lambda: self.tree.run(*rays, **kept))
+            return self.tree.run(*arrays, **options)
+
+    trees = {name: tree for name, tree in vars(intersector).items() if hasattr(tree, "run")}
+    assert isinstance(intersector, Intersector) and trees
+    try:
+        for name, tree in trees.items():
+            setattr(intersector, name, Recorder(tree))
+        run()
+    finally:
+        for name, tree in trees.items():
+            setattr(intersector, name, tree)
+    return calls
+
+
+def workers_ratio(name: str) -> list[float]:
+    """Wall-clock speed of two workers against one, 8 Mpixel."""
+    scene, camera = load_scene(name), preset("setup1", scale=2)
+    render(scene, preset("setup1", scale=32))
+    one, two = (lambda n=n: render(scene, camera, workers=n) for n in (1, 2))
+    return [_wall(one) / _wall(two) for _ in range(REPEATS)]
+
+
+def rearrange_ratio(kind: str) -> list[float]:
+    """Time of a rearrangement at full setup1 against copying the same array."""
+    camera = preset("setup1")
+    pixels = np.random.default_rng(0).integers(0, 256, (camera.pixels[1], camera.pixels[0], 3), np.uint8)
+    picture = IIPicture(pixels, camera.lenses, camera.ei_pixels)
+    component_images(picture, kind)
+    return [_wall(lambda: component_images(picture, kind)) / _wall(pixels.copy) for _ in range(2 * REPEATS)]
+
+
+def encode_ratio(scheme: str) -> list[float]:
+    """CPU time of `encode` from picture to bytes against the encoder alone on frames that lie ready."""
+    scene = load_scene("apples")
+    picture = render(scene, preset("setup1", scale=4), noise=1.0, support=()).picture
+    bare = bare_encoder(picture, scheme, qp=30)
+    encode(picture, scheme, qp=30)
+    return [_cpu(lambda: encode(picture, scheme, qp=30)) / _cpu(bare) for _ in range(REPEATS)]
+
+
+def peak_memory() -> list[float]:
+    """GiB resident at most in a process that renders Apples at full setup1 and keeps picture and depth."""
+    script = (
+        "import resource; from ii_core import preset; from raytrace_ii import load_scene, render;"
+        "shot = render(load_scene('apples'), preset('setup1'), support=('depth',));"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return [float(run.stdout)]
+
+
+def _cpu(call: Callable[[], object]) -> float:
+    start = time.process_time()
+    call()
+    return time.process_time() - start
+
+
+def _wall(call: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    call()
+    return time.perf_counter() - start
+
+
+if __name__ == "__main__":
+    main()

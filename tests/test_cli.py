@@ -1,0 +1,259 @@
+"""The command line, run in this process: what it writes, and that bad input is one line, exit code 2 and no file."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from ii_core import IIPicture, preset
+from ii_core.files import read_image
+from raytrace_ii import cli
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the command; its exit code, output and error output."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["raytrace-ii", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        captured = capsys.readouterr()
+        return stop.value.code, captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def picture(tmp_path_factory):
+    """A small picture on disk: 16×8 lenses of 16×16 px, a smooth random texture."""
+    camera = preset("setup1", scale=32)
+    width, height = camera.pixels
+    y, x = np.mgrid[0:height, 0:width]
+    shade = 128 + 60 * np.sin(x / 37) * np.cos(y / 23)
+    pixels = np.stack([shade, 255 - shade, 0.5 * shade], axis=-1).astype(np.uint8)
+    path = tmp_path_factory.mktemp("picture") / "small.png"
+    IIPicture(pixels, camera.lenses, camera.ei_pixels, camera).save(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [("scenes", "apples"), ("scenes", "cuboid"), ("cameras", "setup2-64"), ("cameras", "pinhole2d")]
+    + [("schemes", name) for name in ("si-h264", "ei-h264", "ri-h264", "jpeg2000")],
+)
+def test_lists(run, command, name):
+    code, out, _ = run(command)
+    assert code == 0
+    assert any(line.split()[0] == name for line in out.splitlines())
+
+
+def test_from_scene_to_measurement(run, tmp_path):
+    shot, depth, flat = (tmp_path / name for name in ("a.png", "depth.exr", "flat.png"))
+    code, out, _ = run(
+        "render", "apples", "--scale", 32, "-o", shot, "--depth", depth, "--projection", flat, "--noise", 1
+    )
+    assert code == 0 and "primary" in out
+    original = IIPicture.load(shot)
+    assert original.lenses == (16, 8) and original.camera == preset("setup1", scale=32)
+    z = read_image(depth)[..., 0]
+    assert z.shape == original.pixels.shape[:2] and z.dtype == np.float32 and np.nanmin(z) > 0
+    assert read_image(flat).shape == (512, 1024, 3)
+
+    coded, decoded, numbers = (tmp_path / name for name in ("a.ii", "b.png", "m.json"))
+    code, out, _ = run("encode", shot, "--scheme", "si-h264", "--qp", 20, "-o", coded)
+    assert code == 0 and "bpp" in out
+    assert run("decode", coded, "-o", decoded)[0] == 0
+    code, out, _ = run("measure", shot, decoded, "--json", numbers)
+    assert code == 0 and "Q_global" in out
+    measured = json.loads(numbers.read_text())
+    assert measured["q_global"] > 30  # a quantiser of 20 leaves errors of a few codes
+    # a coded file is as good as the picture in it
+    assert run("measure", shot, coded, "--json", numbers, "--force")[0] == 0
+    assert json.loads(numbers.read_text())["q_global"] == measured["q_global"]
+
+
+def test_study_leaves_chart_numbers_and_a_table(run, picture, tmp_path):
+    code, out, _ = run(
+        "study",
+        picture,
+        "--schemes",
+        "si-h264:order=row;gop=16,jpeg2000",
+        "--rates",
+        "0.1,0.5,2",
+        "-o",
+        tmp_path / "s",
+    )
+    assert code == 0
+    assert "si-h264:order=row,gop=16" in out and "jpeg2000" in out
+    study = json.loads((tmp_path / "s" / "small.json").read_text())
+    assert [p["target_bpp"] for p in study["points"]] == [0.1, 0.5, 2] * 2
+    assert (tmp_path / "s" / "small.csv").read_text().count("\n") == 7
+    assert read_image(tmp_path / "s" / "small.png").shape[0] > 300
+
+
+def test_a_rate_out_of_reach_is_said(run, picture, tmp_path):
+    code, out, _ = run("encode", picture, "--scheme", "ei-h264", "--bpp", 0.01, "-o", tmp_path / "x.ii")
+    assert code == 0 and "cannot reach 0.01 bpp" in out
+
+
+def test_a_picture_of_one_lens_is_upright(run, tmp_path):
+    path = tmp_path / "flat.png"
+    assert run("render", "apples", "--camera", "pinhole2d", "--scale", 64, "-o", path)[0] == 0
+    flat = IIPicture.load(path)
+    top, bottom = flat.pixels[:4].reshape(-1, 3).mean(0), flat.pixels[-4:].reshape(-1, 3).mean(0)
+    assert flat.erect and top[2] > top[0] and bottom[0] > bottom[2]  # blue sky over a sandy floor
+
+
+@pytest.mark.parametrize("suffix", [".exr", ".tif"])
+def test_other_picture_files(run, tmp_path, suffix):
+    assert run("render", "apples", "--scale", 64, "--bits", 16, "-o", tmp_path / f"a{suffix}")[0] == 0
+    kind = IIPicture.load(tmp_path / f"a{suffix}").pixels.dtype.name
+    assert kind == {".exr": "float32", ".tif": "uint16"}[suffix]
+
+
+SCENE = """
+[material.m]
+colour = "#808080"
+[[object]]
+shape = "sphere"
+radius_mm = 5
+position_mm = [0, 0, 30]
+material = "m"
+"""
+BAD_SCENES = {
+    "a wrong key": (SCENE + "radius = 3\n", "radius"),
+    "no geometry": ('[material.m]\ncolour = "#808080"\n', "no geometry"),
+    "an unknown material": (SCENE.replace('material = "m"', 'material = "x"'), "unknown material 'x'"),
+    "a missing mesh": ('[material.m]\n[[object]]\nmesh = "gone.obj"\nmaterial = "m"\n', "gone.obj does not exist"),
+    "a missing texture": ('[texture.t]\nkind = "image"\nfile = "gone.png"\n' + SCENE, "gone.png does not exist"),
+    "not a number": (SCENE.replace("[0, 0, 30]", "[0, 0, nan]"), "finite"),
+    "no TOML": ("[[[", "bad.toml"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD_SCENES)
+def test_bad_scenes_are_one_line(run, tmp_path, kind):
+    text, said = BAD_SCENES[kind]
+    scene = tmp_path / "bad.toml"
+    scene.write_text(text)
+    check_refused(run("render", scene, "--scale", 64, "-o", tmp_path / "out.png"), said)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.toml"]
+
+
+def test_a_mesh_with_vertices_that_are_not_numbers(run, tmp_path):
+    (tmp_path / "bad.obj").write_text("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (tmp_path / "s.toml").write_text('[material.m]\n[[object]]\nmesh = "bad.obj"\nmaterial = "m"\n')
+    check_refused(run("render", tmp_path / "s.toml", "-o", tmp_path / "out.png"), "finite")
+
+
+BAD_RENDERS = {
+    "unknown scene 'nope': known are apples": ["nope"],
+    "unknown camera 'nope': known are setup1": ["apples", "--camera", "nope"],
+    "scale 3 does not divide": ["apples", "--scale", 3],
+    "samples is 0": ["apples", "--scale", 64, "--samples", 0],
+    "workers is 0": ["apples", "--scale", 64, "--workers", 0],
+    "noise sigma is -1": ["apples", "--scale", 64, "--noise", -1],
+    "bits is 12": ["apples", "--scale", 64, "--bits", 12],
+    "No such option: --nope": ["apples", "--nope", 1],
+}
+
+
+@pytest.mark.parametrize("said", BAD_RENDERS)
+def test_bad_render_arguments_are_one_line(run, tmp_path, said):
+    check_refused(run("render", *BAD_RENDERS[said], "-o", tmp_path / "out.png"), said)
+    assert not list(tmp_path.iterdir())
+
+
+def test_outputs_that_cannot_be_written_are_found_before_any_work(run, tmp_path):
+    (tmp_path / "file").write_text("")
+    check_refused(run("render", "apples", "-o", tmp_path / "gone" / "a.png"), "is no folder")
+    check_refused(run("render", "apples", "-o", tmp_path / "file" / "a.png"), "is no folder")
+    check_refused(run("render", "apples", "-o", tmp_path / "a.bmp"), "no known picture type")
+    check_refused(
+        run("render", "apples", "-o", tmp_path / "a.png", "--depth", tmp_path / "d.png"), "cannot hold float32"
+    )
+    check_refused(run("study", tmp_path / "x.png", "-o", tmp_path / "file" / "s"), "file")
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_nothing_is_replaced_without_force(run, tmp_path):
+    path = tmp_path / "mine.png"
+    path.write_bytes(b"precious")
+    check_refused(run("render", "apples", "--scale", 64, "-o", path), "--force replaces it")
+    assert path.read_bytes() == b"precious"
+    assert run("render", "apples", "--scale", 64, "-o", path, "--force")[0] == 0
+    assert IIPicture.load(path).lenses == (8, 4)
+
+
+BAD_CODINGS = {
+    "unknown scheme 'si-h26': known are": ["--scheme", "si-h26", "--bpp", 1],
+    "has no option": ["--scheme", "si-h264:speed=3", "--bpp", 1],
+    "bpp is 0": ["--bpp", 0],
+    "bpp is -1": ["--bpp", -1],
+    "bpp is nan": ["--bpp", "nan"],
+    "bpp is None and qp is None": [],
+    "qp is 99": ["--qp", 99],
+}
+
+
+@pytest.mark.parametrize("said", BAD_CODINGS)
+def test_bad_encodings_are_one_line(run, picture, tmp_path, said):
+    check_refused(run("encode", picture, *BAD_CODINGS[said], "-o", tmp_path / "x.ii"), said)
+    assert not list(tmp_path.iterdir())
+
+
+def test_pictures_that_do_not_fit_their_structure(run, picture, tmp_path):
+    bare = tmp_path / "bare.png"
+    bare.write_bytes(picture.read_bytes())
+    check_refused(run("encode", bare, "--bpp", 1, "-o", tmp_path / "x.ii"), "no sidecar")
+    structure = json.loads(picture.with_name("small.png.json").read_text())
+    structure.update(ei_pixels=[17, 16], camera=None)
+    (tmp_path / "bare.png.json").write_text(json.dumps(structure))
+    check_refused(
+        run("encode", bare, "--bpp", 1, "-o", tmp_path / "x.ii"),
+        "elementary image 17×16 px does not divide picture width 256",
+    )
+
+
+def test_files_that_are_none(run, picture, tmp_path):
+    coded = tmp_path / "a.ii"
+    assert run("encode", picture, "--qp", 30, "-o", coded)[0] == 0
+    whole = coded.read_bytes()
+    for name, content in {"cut.ii": whole[: len(whole) // 2], "other.ii": b"GIF89a" * 100, "empty.ii": b""}.items():
+        (tmp_path / name).write_bytes(content)
+        check_refused(run("decode", tmp_path / name, "-o", tmp_path / "out.png"), name)
+        assert not (tmp_path / "out.png").exists()
+    check_refused(run("decode", tmp_path / "gone.ii", "-o", tmp_path / "out.png"), "gone.ii")
+
+
+def test_pictures_of_different_structure_are_not_measured(run, picture, tmp_path):
+    other = IIPicture(IIPicture.load(picture).pixels, (32, 16), (8, 8))
+    other.save(tmp_path / "other.png")
+    check_refused(run("measure", picture, tmp_path / "other.png"), "different structure")
+
+
+def test_help_and_no_command(run):
+    code, out, _ = run("--help")
+    assert code == 0 and "render" in out
+    check_refused(run("nope"), "No such command 'nope'")
+
+
+def test_as_a_process(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "raytrace_ii.cli", "render", "nope", "-o", str(tmp_path / "a.png")],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr.startswith("error: unknown scene 'nope'") and done.stderr.count("\n") == 1
+
+
+def check_refused(result, said):
+    """Exit code 2, nothing on the output, and one line on the error stream that says what is wrong."""
+    code, out, err = result
+    assert code == 2, (code, out, err)
+    assert out == ""
+    assert err.startswith("error: ") and err.count("\n") == 1 and said in err, err
