@@ -36,7 +36,7 @@ def nearest_rate(
 
     The coder is asked for the target; while it misses by more than `TOLERANCE` it is asked again, for more or less,
     at most `RERUNS` times. A miss by a factor of `FAR`, or a size that does not follow what is asked, means a limit:
-    one run at the limit itself tells whether the target lies beyond it.
+    one run at the limit itself tells whether the target lies beyond it, and is the answer if it does.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def nearest_rate(
             probed.add(over)
             limit = coarsest() if over else finest()
             runs.append(limit)
-            if within(len(limit.payload), target) or over == (len(limit.payload) > target):
-                break
+            if over == (len(limit.payload) > target) or within(len(limit.payload), target):
+                return limit, len(runs)
         points.append((ask, size))
         ask = _next(points, target)
     return min(runs, key=lambda run: abs(math.log(len(run.payload) / target))), len(runs)

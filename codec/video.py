@@ -140,6 +140,8 @@ def _parameters(options: Options, rate: str) -> str:
             f"me=umh:merange={options['merange']}:mvrange=512",
             # Macroblock tree repeats to the byte only without B pictures, and no coder of 2008 had it.
             "weightp=0:psy=0:mbtree=0",
+            # Not beyond the standard's coarsest quantiser: there x264 throws pictures away to hold a rate.
+            f"qpmax={COARSEST}",
             rate,
         ]
     )

@@ -1,0 +1,186 @@
+"""What every registered scheme must keep; see `codec.base.Coder`."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from codec import decode, encode, schemes, timed_decode
+from codec.base import find
+from ii_core import IICamera, IIPicture
+
+SCHEMES = sorted(schemes())
+
+
+@cache
+def textured(k=32, l=16, u=8, v=8):
+    """A ball before a wall, both textured, with disparity and sensor noise: what coders meet."""
+    rng = np.random.default_rng(5)
+    wall, ball = (_texture(l + 4 * v + 8, k + 4 * u + 8, rng) for _ in range(2))
+    field = np.empty((l, v, k, u, 3), np.uint8)
+    y, x = np.mgrid[:l, :k]
+    for row in range(v):
+        for col in range(u):
+            inside = np.hypot(x - k / 2 + 0.8 * (col - u / 2), y - l / 2 + 0.8 * (row - v / 2)) < l / 3
+            value = np.where(
+                inside[..., None], _shifted(ball, 0.8 * row, 0.8 * col, l, k), _shifted(wall, 2 * row, 2 * col, l, k)
+            )
+            field[:, row, :, col] = np.clip(value + rng.standard_normal((l, k, 1)), 0, 255)
+    camera = IICamera(pixels=(k * u, l * v), lenses=(k, l), pixel_pitch_mm=0.0061, gap_mm=0.18, name="bench")
+    return IIPicture(field.reshape(l * v, k * u, 3), (k, l), (u, v), camera, erect=True)
+
+
+def _texture(rows, cols, rng):
+    """Grey-ish noise at several scales."""
+    total = np.full((rows, cols, 3), 120.0)
+    for scale in (2, 4, 8, 16):
+        cells = rng.standard_normal((rows // scale + 2, cols // scale + 2, 1)) + 0.3 * rng.standard_normal(3)
+        total += 7 * np.sqrt(scale) * np.kron(cells, np.ones((scale, scale, 1)))[:rows, :cols]
+    return total
+
+
+def _shifted(texture, down, right, rows, cols):
+    i, j = int(down), int(right)
+    a, b = down - i, right - j
+    part = texture[i : i + rows + 1, j : j + cols + 1]
+    part = part[:-1] * (1 - a) + part[1:] * a
+    return part[:, :-1] * (1 - b) + part[:, 1:] * b
+
+
+@cache
+def large():
+    """Enough frames of every kind that headers weigh little."""
+    return textured(64, 32, 16, 16)
+
+
+def psnr(a, b):
+    return 10 * np.log10(255**2 / np.mean((a.pixels.astype(float) - b.pixels) ** 2))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_round_trip(scheme):
+    picture = textured()
+    coded = encode(picture, scheme, bpp=8)
+    decoded = decode(coded)
+    assert decoded.pixels.shape == picture.pixels.shape
+    assert decoded.pixels.dtype == picture.pixels.dtype
+    assert (decoded.lenses, decoded.ei_pixels, decoded.erect) == (picture.lenses, picture.ei_pixels, picture.erect)
+    assert decoded.camera == picture.camera
+    assert psnr(picture, decoded) > 38
+    assert decoded.pixels.flags.writeable
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_rate_is_met_and_accounted_for(scheme, tmp_path):
+    picture = large()
+    coded = encode(picture, scheme, bpp=1.5)
+    assert coded.reached
+    assert coded.bpp == pytest.approx(1.5, rel=0.02)
+    assert coded.bpp == 8 * coded.nbytes / picture.pixels[..., 0].size
+    assert coded.nbytes == len(coded.payload)
+    path = tmp_path / "coded.ii"
+    coded.save(path)
+    assert path.read_bytes().endswith(coded.payload)
+    assert path.stat().st_size - coded.nbytes < 2000
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_same_bytes_again_and_beside_itself(scheme):
+    picture = textured()
+    first = encode(picture, scheme, bpp=1.5).payload
+    with ThreadPoolExecutor(2) as pool:
+        others = list(pool.map(lambda _: encode(picture, scheme, bpp=1.5).payload, range(2)))
+    assert others == [first, first]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_file_decodes_by_itself(scheme, tmp_path):
+    coded = encode(textured(), scheme, bpp=1.5)
+    path = tmp_path / "coded.ii"
+    coded.save(path)
+    from_file, from_memory = decode(str(path)), decode(coded)
+    np.testing.assert_array_equal(from_file.pixels, from_memory.pixels)
+    assert from_file.structure_json() == from_memory.structure_json()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize(
+    ("lenses", "ei_pixels"),
+    [((1, 1), (1, 1)), ((5, 3), (1, 1)), ((1, 1), (7, 2)), ((1, 9), (3, 1)), ((17, 2), (2, 19))],
+)
+def test_any_size_down_to_one_pixel(scheme, lenses, ei_pixels):
+    rng = np.random.default_rng(3)
+    (k, l), (u, v) = lenses, ei_pixels
+    picture = IIPicture(rng.integers(0, 256, (l * v, k * u, 3), np.uint8), lenses, ei_pixels)
+    decoded = decode(encode(picture, scheme, bpp=10_000))  # more than there is: lossless but for colour
+    assert np.abs(decoded.pixels.astype(int) - picture.pixels).max() <= 1
+    assert decode(encode(picture, scheme, bpp=1.0)).pixels.shape == picture.pixels.shape
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize(("bpp", "side"), [(1e-4, 1), (1000.0, -1)])
+def test_an_unreachable_rate_gives_the_nearest_and_says_so(scheme, bpp, side):
+    coded = encode(textured(), scheme, bpp=bpp)
+    assert not coded.reached
+    assert coded.target_bpp == bpp
+    assert (coded.bpp - bpp) * side > 0
+    decode(coded)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("dtype", ["uint16", "float32"])
+def test_pixel_types_it_does_not_take_are_refused(scheme, dtype):
+    picture = IIPicture(np.zeros((4, 4, 3), dtype), (2, 2), (2, 2))
+    with pytest.raises(ValueError, match=f"pixels are {dtype}: scheme {scheme} takes uint8"):
+        encode(picture, scheme, bpp=1.0)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("bpp", [0, -1, np.nan, np.inf, True, "0.1"])
+def test_a_rate_that_is_none_is_refused(scheme, bpp):
+    with pytest.raises(ValueError, match=r"bpp is .*: a positive number is needed"):
+        encode(textured(), scheme, bpp=bpp)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_exactly_one_way_to_ask_for_quality(scheme):
+    with pytest.raises(ValueError, match="needed"):
+        encode(textured(), scheme)
+    if find(scheme).qp_range is None:
+        with pytest.raises(ValueError, match="give bpp instead of qp"):
+            encode(textured(), scheme, qp=28)
+        return
+    low, high = find(scheme).qp_range
+    with pytest.raises(ValueError, match="exactly one of bpp and qp is needed"):
+        encode(textured(), scheme, qp=28, bpp=1)
+    for qp in (low - 1, high + 1, 28.5, True):
+        with pytest.raises(ValueError, match=f"a whole number from {low} to {high} is needed"):
+            encode(textured(), scheme, qp=qp)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_costs_are_recorded_apart(scheme):
+    coded = encode(textured(), scheme, bpp=1.5)
+    assert 0 < coded.codec_seconds <= coded.encode_seconds
+    decoding = timed_decode(coded)
+    assert 0 < decoding.codec_seconds <= decoding.seconds
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_damaged_payloads_end_in_a_value_error_or_a_picture(scheme):
+    """Past a file's checksum, as only malice gets: whatever comes, no crash and no other error."""
+    coded = encode(textured(16, 8, 4, 4), scheme, bpp=2)
+    rng = np.random.default_rng(11)
+    for _ in range(60):
+        payload = bytearray(coded.payload)
+        at = rng.integers(len(payload), size=rng.integers(1, 6))
+        for position in at:
+            payload[position] ^= 1 << rng.integers(8)
+        if rng.integers(3) == 0:
+            del payload[at[0] :]
+        try:
+            assert decode(replace(coded, payload=bytes(payload))).pixels.shape == (32, 64, 3)
+        except ValueError as error:
+            assert "is damaged" in str(error)

@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from codec import encode, schemes
+from codec.base import parse_scheme, register
+from codec.jpeg2000 import Jpeg2000
+from ii_core import IIPicture
+
+PICTURE = IIPicture(np.zeros((4, 4, 3), np.uint8), (2, 2), (2, 2))
+
+
+def test_schemes_tell_their_options_and_defaults():
+    told = schemes()
+    assert set(told) == {"ei-h264", "si-h264", "ri-h264", "jpeg2000"}
+    assert "order=parallel" in told["si-h264"]
+    assert "merange=16 (motion range in pixels; a whole number from 16 to 128)" in told["si-h264"]
+    assert all("\n" not in line for line in told.values())
+
+
+def test_options_default_and_override():
+    coder, options = parse_scheme("si-h264:order=spiral,gop=32")
+    assert coder.name == "si-h264"
+    assert options == {"order": "spiral", "gop": 32, "bframes": 0, "merange": 16}
+    assert parse_scheme("jpeg2000")[1] == {}
+
+
+@pytest.mark.parametrize(
+    ("scheme", "message"),
+    [
+        ("si-h26", "unknown scheme 'si-h26': known are ei-h264, jpeg2000, ri-h264, si-h264"),
+        ("", "unknown scheme ''"),
+        (None, "scheme is None: a name is needed"),
+        ("si-h264:speed=3", "scheme si-h264 has no option speed: known are order, gop, bframes, merange"),
+        ("jpeg2000:order=row", "scheme jpeg2000 has no option order: known are none"),
+        ("si-h264:order", "'order' is no option=value"),
+        ("si-h264:", "'' is no option=value"),
+        ("si-h264:gop=4,gop=8", "option gop is given twice"),
+        (
+            "si-h264:order=diagonal",
+            "option order is 'diagonal': one of row, column, parallel, zigzag, spiral is needed",
+        ),
+        ("si-h264:bframes=4", "option bframes is '4': a whole number from 0 to 3 is needed"),
+        ("si-h264:gop=-1", "option gop is '-1': a whole number from 0"),
+        ("si-h264:merange=8", "option merange is '8': a whole number from 16 to 128 is needed"),
+        ("si-h264:gop=2.5", "option gop is '2.5'"),
+    ],
+)
+def test_what_is_wrong_is_said(scheme, message):
+    with pytest.raises(ValueError) as caught:
+        encode(PICTURE, scheme, bpp=1)
+    assert message in str(caught.value)
+
+
+def test_only_pictures_are_coded():
+    with pytest.raises(ValueError, match="picture is ndarray: an IIPicture is needed"):
+        encode(PICTURE.pixels, "jpeg2000", bpp=1)
+
+
+def test_a_name_is_given_once():
+    with pytest.raises(ValueError, match="'jpeg2000' is registered already"):
+        register(Jpeg2000())
+
+
+def test_pictures_beyond_all_bounds_are_refused_before_work():
+    huge = IIPicture(np.broadcast_to(np.uint8(0), (1 << 16, 1 << 16, 3)), (1 << 12, 1 << 12), (16, 16))
+    with pytest.raises(ValueError, match="65536×65536 pixels"):
+        encode(huge, "si-h264", bpp=1)
+    wide = IIPicture(np.broadcast_to(np.uint8(0), (1, 20_000, 3)), (20_000, 1), (1, 1))
+    with pytest.raises(ValueError, match="frames of scheme si-h264 would have 20000×1 pixels"):
+        encode(wide, "si-h264", bpp=1)
