@@ -14,7 +14,6 @@ from ii_core.jit import inline_kernel, kernel
 # A weight this small cannot move a colour by half a step of 8 bits, not even on sRGB's steep foot.
 LEAST_WEIGHT = 0.5 / 255 / 12.92
 REFLECTION, REFRACTION = 0, 1
-PULL = 4e-6  # how far, as a share of the way to the middle of its face, a hit moves before rays start from it
 IMAGE, CHECKER, NOISE = 0, 1, 2  # kinds of texture
 # Odd multipliers of the noise lattice's hash.
 _PX, _PY, _PZ, _SEED, _GOLDEN = 73856093, 19349663, 83492791, 2654435761, 0x1E3779B97F4A7C15
@@ -116,7 +115,7 @@ def shade(
         nx, ny, nz = gx, gy, gz
         if normals.shape[0] > 0:
             nx, ny, nz = _shading_normal(normals, f, u[i], v[i], gx, gy, gz, dx, dy, dz)
-        px, py, pz = _start_point(corners, f, u[i], v[i])
+        px, py, pz = _start_point(corners, faces, f, u[i], v[i])
         ox, oy, oz = px + lift * gx, py + lift * gy, pz + lift * gz
 
         local = materials[body, _LOCAL]
@@ -250,7 +249,7 @@ def pass_clear_face(
             strongest = max(strongest, colours[kept, c])
         if strongest < LEAST_WEIGHT:
             continue
-        px, py, pz = _start_point(corners, f, u[i], v[i])
+        px, py, pz = _start_point(corners, faces, f, u[i], v[i])
         side = 1.0 if cosine < 0.0 else -1.0
         _put(origins, kept, px + side * lift * gx, py + side * lift * gy, pz + side * lift * gz)
         _put(directions, kept, dx, dy, dz)
@@ -346,14 +345,14 @@ def _hit_point(corners, f, u, v):
 
 
 @inline_kernel
-def _start_point(corners, f, u, v):
+def _start_point(corners, faces, f, u, v):
     """The hit point drawn a hair towards the middle of its face, for rays to start from.
 
     On an edge it would lie in the neighbouring face too, which a ray from there cannot meet: light would come in
     at the corners of a closed room.
     """
-    u, v = float(u), float(v)
-    return _interpolate(corners, f, u + PULL * (1.0 / 3.0 - u), v + PULL * (1.0 / 3.0 - v))
+    u, v, pull = float(u), float(v), float(faces[f, 4])
+    return _interpolate(corners, f, u + pull * (1.0 / 3.0 - u), v + pull * (1.0 / 3.0 - v))
 
 
 @inline_kernel

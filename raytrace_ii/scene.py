@@ -76,6 +76,8 @@ class Light:
     def __post_init__(self) -> None:
         if self.kind not in ("point", "directional"):
             raise ValueError(f"unknown light {self.kind!r}: known are point, directional")
+        if not all(map(math.isfinite, (*self.vector, *self.colour))):
+            raise ValueError(f"a {self.kind} light has {self.vector}, {self.colour}: finite numbers are needed")
         if self.kind == "directional" and not math.hypot(*self.vector) > 0:
             raise ValueError("a directional light has the direction zero: a direction is needed")
 
@@ -116,11 +118,11 @@ class Body:
         vertices, faces = np.asarray(self.vertices), np.asarray(self.faces)
         if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
             raise ValueError(f"object {self.name!r} has no geometry: triangles are needed")
-        bad = ~np.isfinite(vertices).all(axis=1)
+        bad = ~(np.abs(vertices) <= np.finfo(np.float32).max).all(axis=1)
         if bad.any():
             at = int(np.argmax(bad))
             raise ValueError(
-                f"object {self.name!r}: vertex {at} is {vertices[at].tolist()}: finite numbers are needed"
+                f"object {self.name!r}: vertex {at} is {vertices[at].tolist()}: finite float32 numbers are needed"
             )
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise ValueError(
@@ -140,7 +142,7 @@ class Scene:
     Raises
     ------
     ValueError
-        If there is no body.
+        If there is no body, or ``max_depth`` is negative.
     """
 
     bodies: Sequence[Body]
@@ -153,6 +155,8 @@ class Scene:
     def __post_init__(self) -> None:
         if not self.bodies:
             raise ValueError(f"scene {self.name!r} has no geometry: at least one object is needed")
+        if not self.max_depth >= 0:
+            raise ValueError(f"max_depth is {self.max_depth}: at least 0 is needed")
         # Transmissive faces go last, so that opaque ones are a prefix that shadow rays may be tested against alone.
         ordered = sorted(self.bodies, key=lambda body: body.material.transmissive)
         object.__setattr__(self, "bodies", tuple(ordered))
@@ -186,7 +190,7 @@ MATERIAL_COLUMNS = 18
 class PackedScene:
     """What the kernels read.
 
-    ``corners`` is (F, 3, 3) float32 positions, ``faces`` (F, 4) unit normals and lifts. ``normals`` is like
+    ``corners`` is (F, 3, 3) float32 positions, ``faces`` (F, 5) unit normals, lifts and pulls. ``normals`` is like
     ``corners`` for shading, of no faces if every body is flat; ``coordinates`` for textures, of no faces if there
     are none: a scene pays only for what it has.
     """
@@ -247,9 +251,16 @@ def _light_row(light: Light) -> list[float]:
 
 
 def _face_table(corners: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Unit normal (0 for a face without area) and lift, in mm, of every face."""
+    """Unit normal (0 for a face without area), lift in mm and pull of every face.
+
+    The pull takes a hit about as far towards the middle of its face as the lift takes it off the face, as a share
+    of the way.
+    """
     p = corners.astype(np.float64)
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-    return np.column_stack([unit, LIFT * np.abs(p).max(axis=(1, 2))]).astype(np.float32)
+    lift = LIFT * np.abs(p).max(axis=(1, 2))
+    longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
+    pull = np.minimum(np.divide(lift, longest, out=np.zeros_like(lift), where=longest > 0), 0.25)
+    return np.column_stack([unit, lift, pull]).astype(np.float32)
