@@ -28,11 +28,11 @@ def cuboid_tiles() -> NDArray[np.uint8]:
     ]
     sheet = np.empty((TILES * TILE, TILES * TILE, 3))
     for i in range(TILES * TILES):
-        where = np.asarray(patterns[i % len(patterns)](float(generator.integers(2, 5))), float)[..., None]
-        dark, light = generator.uniform(0.05, 0.45, 3), generator.uniform(0.5, 1.0, 3)
-        tile = dark + where * (light - dark) + generator.normal(0, 0.03, (TILE, TILE, 1))
+        where = np.asarray(patterns[i % len(patterns)](float(generator.integers(2, 4))), float)[..., None]
+        dark, light = generator.uniform(0.2, 0.5, 3), generator.uniform(0.5, 0.85, 3)
+        tile = dark + where * (light - dark)
         frame = np.minimum.reduce([x, y, 1 - x, 1 - y]) < 0.035
-        tile[frame] *= 0.35
+        tile[frame] *= 0.5
         row, column = divmod(i, TILES)
         sheet[row * TILE : (row + 1) * TILE, column * TILE : (column + 1) * TILE] = tile
     return np.rint(np.clip(sheet, 0, 1) * 255).astype(np.uint8)

@@ -24,10 +24,7 @@ from ii_core import (
 )
 from ii_core.files import write_image
 from raytrace_ii import Scene, Shot, load_scene, render
-from raytrace_ii.cli import progress_bar, run_study
-
-SCHEMES = ("si-h264", "ei-h264", "ri-h264", "jpeg2000")
-RATES = (0.02, 0.05, 0.15, 0.4, 1.0)
+from raytrace_ii.cli import RATES, SCHEMES, progress_bar, run_study
 
 
 def main() -> None:

@@ -30,7 +30,9 @@ app = typer.Typer(
 Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]
 Workers = Annotated[int | None, typer.Option(help="Threads; as many as cores if not given.")]
 
-DEMO_RATES = (0.02, 0.05, 0.15, 0.4, 1.0)
+RATES = (0.02, 0.05, 0.15, 0.4, 1.0)
+SCHEMES = ("si-h264", "ei-h264", "ri-h264", "jpeg2000")
+STUDY_SUFFIXES = ("_rd.json", "_rd.csv", "_rd.png")
 
 
 @app.command()
@@ -205,10 +207,10 @@ def measure(
 def study(
     picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder for chart and numbers.")],
-    schemes: Annotated[str, typer.Option(help="Schemes, parted by commas; options of one by semicolons.")] = (
-        "si-h264,ei-h264,ri-h264,jpeg2000"
+    schemes: Annotated[str, typer.Option(help="Schemes, parted by commas; options of one by semicolons.")] = ",".join(
+        SCHEMES
     ),
-    rates: Annotated[str, typer.Option(help="Bits per pixel, parted by commas.")] = ",".join(map(str, DEMO_RATES)),
+    rates: Annotated[str, typer.Option(help="Bits per pixel, parted by commas.")] = ",".join(map(str, RATES)),
     workers: Workers = None,
     force: Force = False,
 ) -> None:
@@ -220,9 +222,8 @@ def study(
         targets = [float(rate) for rate in rates.split(",")]
     except ValueError:
         raise ValueError(f"rates are {rates!r}: numbers parted by commas are needed") from None
-    files = {suffix: output / f"{picture.stem}{suffix}" for suffix in (".json", ".csv", ".png")}
-    for path in files.values():
-        _check_output(path, force, make_folder=True)
+    for suffix in STUDY_SUFFIXES:
+        _check_output(output / f"{picture.stem}{suffix}", force, make_folder=True)
     original = IIPicture.load(picture)
     run_study(original, picture.stem, names, targets, output, workers=workers)
 
@@ -231,7 +232,7 @@ def run_study(
     picture: IIPicture, name: str, schemes: Sequence[str], rates: Sequence[float], folder: Path, *,
     workers: int | None = None, extra: dict[str, Any] | None = None,
 ) -> None:  # fmt: skip
-    """Measure; leave ``name``.json, .csv and, drawn from the JSON, .png in a folder; print a table."""
+    """Measure; leave name_rd.json, .csv and, drawn from the JSON, .png in a folder; print a table."""
     from codec import decode, encode
     from codec.base import parse_scheme
     from metrics import rate_distortion, rd_chart, read_study, write_csv, write_study
@@ -244,10 +245,11 @@ def run_study(
         records = rate_distortion(
             picture, schemes, rates, encode=encode, decode=decode, progress=report, workers=workers or cores()
         )
-    write_study(folder / f"{name}.json", name, records, extra, picture=picture)
-    write_csv(folder / f"{name}.csv", records)
-    drawn = read_study(folder / f"{name}.json")
-    rd_chart(drawn, folder / f"{name}.png")
+    numbers, table, chart = (folder / f"{name}{suffix}" for suffix in STUDY_SUFFIXES)
+    write_study(numbers, name, records, extra, picture=picture)
+    write_csv(table, records)
+    drawn = read_study(numbers)
+    rd_chart(drawn, chart)
     print_summary(name, drawn)
 
 

@@ -88,10 +88,10 @@ def test_study_leaves_chart_numbers_and_a_table(run, picture, tmp_path):
     )
     assert code == 0
     assert "si-h264:order=row,gop=16" in out and "jpeg2000" in out
-    study = json.loads((tmp_path / "s" / "small.json").read_text())
+    study = json.loads((tmp_path / "s" / "small_rd.json").read_text())
     assert [p["target_bpp"] for p in study["points"]] == [0.1, 0.5, 2] * 2
-    assert (tmp_path / "s" / "small.csv").read_text().count("\n") == 7
-    assert read_image(tmp_path / "s" / "small.png").shape[0] > 300
+    assert (tmp_path / "s" / "small_rd.csv").read_text().count("\n") == 7
+    assert read_image(tmp_path / "s" / "small_rd.png").shape[0] > 300
 
 
 def test_a_rate_out_of_reach_is_said(run, picture, tmp_path):
