@@ -153,37 +153,41 @@ R_CR, B_CB = _fixed(1.5748), _fixed(1.8556)
 G_CB, G_CR = _fixed(-0.0722 * 1.8556 / 0.7152), _fixed(-0.2126 * 1.5748 / 0.7152)
 
 
-# In both kernels one row of every frame of the batch is handled before the next row: the frames of a batch are
-# interleaved in the picture, so a cache line of it serves several of them while it is at hand.
+# Both kernels handle one row of a few frames before the next row: neighbouring frames are interleaved in the
+# picture, so that a cache line of it serves several of them while it is at hand.
+TILE = 16
 
 
 @numba.njit(cache=True, nogil=True)
 def gather_ycbcr(pixels, origins, step_y, step_x, width, planes):
     """planes[b, :, y, x] = YCbCr of pixels[origins[b] + y·step_y + x·step_x]."""
     top = np.int32(255)
-    for y in range(planes.shape[2]):
-        for b in range(origins.size):
-            first = origins[b] + y * step_y
-            for x in range(width):
-                p = first + x * step_x
-                red, green, blue = np.int32(pixels[p, 0]), np.int32(pixels[p, 1]), np.int32(pixels[p, 2])
-                planes[b, 0, y, x] = (YR * red + YG * green + YB * blue + HALF) >> BITS
-                # Pure blue and pure red round to 256.
-                planes[b, 1, y, x] = min(((BR * red + BG * green + BB * blue + HALF) >> BITS) + MID, top)
-                planes[b, 2, y, x] = min(((RR * red + RG * green + RB * blue + HALF) >> BITS) + MID, top)
+    for tile in range(0, origins.size, TILE):
+        for y in range(planes.shape[2]):
+            for b in range(tile, min(tile + TILE, origins.size)):
+                line = pixels[origins[b] + y * step_y :]
+                luma, cb, cr = planes[b, 0, y], planes[b, 1, y], planes[b, 2, y]
+                for x in range(width):
+                    p = np.uint64(x) * np.uint64(step_x)  # unsigned: no check for indices from the end
+                    red, green, blue = np.int32(line[p, 0]), np.int32(line[p, 1]), np.int32(line[p, 2])
+                    luma[x] = (YR * red + YG * green + YB * blue + HALF) >> BITS
+                    # Pure blue and pure red round to 256.
+                    cb[x] = min(((BR * red + BG * green + BB * blue + HALF) >> BITS) + MID, top)
+                    cr[x] = min(((RR * red + RG * green + RB * blue + HALF) >> BITS) + MID, top)
 
 
 @numba.njit(cache=True, nogil=True)
 def scatter_rgb(planes, origins, step_y, step_x, width, pixels):
     """pixels[origins[b] + y·step_y + x·step_x] = RGB of planes[b, :, y, x]."""
     low, top = np.int32(0), np.int32(255)
-    for y in range(planes.shape[2]):
-        for b in range(origins.size):
-            first = origins[b] + y * step_y
-            for x in range(width):
-                p = first + x * step_x
-                luma = (np.int32(planes[b, 0, y, x]) << BITS) + HALF
-                cb, cr = np.int32(planes[b, 1, y, x]) - MID, np.int32(planes[b, 2, y, x]) - MID
-                pixels[p, 0] = min(max((luma + R_CR * cr) >> BITS, low), top)
-                pixels[p, 1] = min(max((luma + G_CB * cb + G_CR * cr) >> BITS, low), top)
-                pixels[p, 2] = min(max((luma + B_CB * cb) >> BITS, low), top)
+    for tile in range(0, origins.size, TILE):
+        for y in range(planes.shape[2]):
+            for b in range(tile, min(tile + TILE, origins.size)):
+                line = pixels[origins[b] + y * step_y :]
+                for x in range(width):
+                    p = np.uint64(x) * np.uint64(step_x)
+                    luma = (np.int32(planes[b, 0, y, x]) << BITS) + HALF
+                    cb, cr = np.int32(planes[b, 1, y, x]) - MID, np.int32(planes[b, 2, y, x]) - MID
+                    line[p, 0] = min(max((luma + R_CR * cr) >> BITS, low), top)
+                    line[p, 1] = min(max((luma + G_CB * cb + G_CR * cr) >> BITS, low), top)
+                    line[p, 2] = min(max((luma + B_CB * cb) >> BITS, low), top)
