@@ -45,7 +45,7 @@ class Sphere(Shape):
     segments: Annotated[int, Field(ge=3)] = 96
 
     def mesh(self) -> Mesh:
-        angle = np.linspace(-np.pi / 2, np.pi / 2, self.segments // 2 + 1)
+        angle = np.linspace(-np.pi / 2, np.pi / 2, max(self.segments // 2, 2) + 1)
         profile = self.radius_mm * np.column_stack([np.cos(angle), np.sin(angle)])
         profile[[0, -1], 0] = 0
         mesh = revolve(profile, self.segments)
