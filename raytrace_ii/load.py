@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloa
 from ii_core.files import read_image
 
 from .scene import Background, Body, Light, Material, Scene
-from .shapes import AnyShape, Mesh, Point3, Sizes, rotation
+from .shapes import AnyShape, Mesh, Point3, rotation
 from .texture import Checker, Noise, Texture, image_texture, linear
 
 MESH_TYPES = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -31,7 +32,7 @@ def _colour(value: Any) -> Point3:
     if not (
         isinstance(value, list | tuple)
         and len(value) == 3
-        and all(isinstance(c, int | float) and 0 <= c <= 1 for c in value)
+        and all(isinstance(c, int | float) and not isinstance(c, bool) and 0 <= c <= 1 for c in value)
     ):
         raise ValueError(f"colour {value!r}: #rrggbb or three numbers from 0 to 1 are needed")
     r, g, b = (float(c) for c in linear(value))
@@ -47,8 +48,21 @@ def _share(value: Any) -> Point3:
     return _colour(value)
 
 
+def _sizes(value: Any) -> Point3:
+    """One number for all three axes, or three."""
+    three = value if isinstance(value, list | tuple) else [value] * 3
+    if not (
+        len(three) == 3
+        and all(isinstance(s, int | float) and not isinstance(s, bool) and 0 < s < math.inf for s in three)
+    ):
+        raise ValueError(f"{value!r}: one number or three are needed, greater than 0")
+    x, y, z = (float(s) for s in three)
+    return x, y, z
+
+
 Colour = Annotated[Point3, BeforeValidator(_colour)]
 Share = Annotated[Point3, BeforeValidator(_share)]
+OneOrThree = Annotated[Point3, BeforeValidator(_sizes)]
 NotNegative = Annotated[float, Field(ge=0)]
 
 
@@ -63,7 +77,7 @@ class _ImageTexture(_Strict):
 
 class _TwoColours(_Strict):
     colours: tuple[Colour, Colour]
-    size: PositiveFloat | Sizes
+    size: OneOrThree
     on: Literal["body", "surface"] = "body"
 
 
@@ -125,7 +139,7 @@ class _Object(BaseModel):
     material: str
     position_mm: Point3 = (0.0, 0.0, 0.0)
     rotate_deg: Point3 = (0.0, 0.0, 0.0)
-    scale: PositiveFloat | Sizes = 1.0
+    scale: OneOrThree = (1.0, 1.0, 1.0)
 
 
 class _SceneFile(_Strict):
@@ -142,6 +156,18 @@ class _SceneFile(_Strict):
 
 class _ShapeHolder(_Strict):
     value: AnyShape
+
+
+# By what pydantic calls the part of a file that a model describes.
+_MODELS: dict[str, type[BaseModel]] = {
+    "background": _Background,
+    "point": _PointLight,
+    "directional": _DirectionalLight,
+    "image": _ImageTexture,
+    "checker": _CheckerTexture,
+    "noise": _NoiseTexture,
+    **{get_args(shape.model_fields["shape"].annotation)[0]: shape for shape in get_args(get_args(AnyShape)[0])},
+}
 
 
 def scene_names() -> dict[str, str]:
@@ -188,21 +214,71 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
         raise ValueError(f"{path}: {_first(error)}") from None
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+    except OSError as error:
+        raise type(error)(f"{path}: {error}") from None
+
+
+# pydantic's complaints in the words of the rest of the house; its own stand where none are given.
+_WORDS = {
+    "missing": "is missing",
+    "greater_than": "{input!r}: a number greater than {gt:g} is needed",
+    "greater_than_equal": "{input!r}: a number of at least {ge:g} is needed",
+    "less_than": "{input!r}: a number less than {lt:g} is needed",
+    "less_than_equal": "{input!r}: a number of at most {le:g} is needed",
+    "finite_number": "{input!r}: a finite number is needed",
+    "float_type": "{input!r}: a number is needed",
+    "float_parsing": "{input!r}: a number is needed",
+    "int_type": "{input!r}: a whole number is needed",
+    "int_parsing": "{input!r}: a whole number is needed",
+    "int_from_float": "{input!r}: a whole number is needed",
+    "string_type": "{input!r}: a text is needed",
+    "bool_type": "{input!r}: true or false is needed",
+    "bool_parsing": "{input!r}: true or false is needed",
+    "tuple_type": "{input!r}: a list of numbers is needed",
+    "list_type": "{input!r}: a list is needed",
+    "literal_error": "unknown {input!r}: known are {expected}",
+    "union_tag_invalid": "unknown {discriminator} {tag!r}: known are {expected_tags}",
+    "union_tag_not_found": "{discriminator} is missing",
+}
 
 
 def _first(error: ValidationError) -> str:
     """The first complaint as one line, with the place in the file's own terms."""
     complaints = error.errors()
     first = complaints[0]
-    place = ".".join(str(part) for part in first["loc"] if part != "value")
-    text = first["msg"].removeprefix("Value error, ")
-    text = {"extra_forbidden": "no such key", "missing": "is missing"}.get(first["type"], text)
+    place = list(first["loc"])
+    if first["type"] == "extra_forbidden":
+        text = f"no such key: known are {_known(_keys(error.title, place))}"
+    elif first["type"] in _WORDS:
+        context = {k: v.replace("'", "") if isinstance(v, str) else v for k, v in first.get("ctx", {}).items()}
+        text = _WORDS[first["type"]].format(input=first["input"], **context)
+    else:
+        text = first["msg"].removeprefix("Value error, ")
+    # The kind by which pydantic chose is no key of the file.
+    if error.title == _ShapeHolder.__name__:
+        place = place[2:]
+    elif place[0] in ("light", "texture"):
+        del place[2:3]
     more = f" (and {len(complaints) - 1} more)" if len(complaints) > 1 else ""
-    return f"{place}: {text}{more}"
+    return f"{'.'.join(map(str, place))}{': ' if place else ''}{text}{more}"
+
+
+def _keys(title: str, place: list[Any]) -> list[str]:
+    """The keys that may stand where an unknown one was found."""
+    if title == _SceneFile.__name__:
+        if len(place) == 1:
+            return list(_SceneFile.model_fields)
+        return list((_Material if place[0] == "material" else _MODELS[place[-2]]).model_fields)
+    model = _MODELS[place[1]] if title == _ShapeHolder.__name__ else _MeshFile
+    return [*model.model_fields, *_Object.model_fields]
+
+
+def _known(names: Iterable[str]) -> str:
+    return ", ".join(names) or "none"
 
 
 def _scene(file: _SceneFile, path: Path) -> Scene:
-    textures = {name: _texture(value, path.parent) for name, value in file.texture.items()}
+    textures = {name: _texture(name, value, path.parent) for name, value in file.texture.items()}
     materials = {name: _material(name, value, textures) for name, value in file.material.items()}
     if not file.object:
         raise ValueError("no geometry: at least one [[object]] is needed")
@@ -211,7 +287,7 @@ def _scene(file: _SceneFile, path: Path) -> Scene:
     return Scene(
         name=path.stem,
         bodies=bodies,
-        lights=[_light(value) for value in file.light],
+        lights=[_light(i, value) for i, value in enumerate(file.light)],
         background=Background(
             horizon=sky.horizon,
             zenith=sky.zenith if sky.zenith is not None else sky.horizon,
@@ -223,25 +299,30 @@ def _scene(file: _SceneFile, path: Path) -> Scene:
     )
 
 
-def _light(value: _PointLight | _DirectionalLight) -> Light:
+def _light(index: int, value: _PointLight | _DirectionalLight) -> Light:
     r, g, b = (c * value.intensity for c in value.colour)
     vector = value.position_mm if isinstance(value, _PointLight) else value.direction
-    return Light(kind=value.kind, vector=vector, colour=(r, g, b))
+    try:
+        return Light(kind=value.kind, vector=vector, colour=(r, g, b))
+    except ValueError as error:
+        raise ValueError(f"light.{index}: {error}") from None
 
 
-def _texture(value: _ImageTexture | _CheckerTexture | _NoiseTexture, folder: Path) -> Texture:
+def _texture(name: str, value: _ImageTexture | _CheckerTexture | _NoiseTexture, folder: Path) -> Texture:
     if isinstance(value, _ImageTexture):
-        return image_texture(read_image(folder / value.file))
-    size = value.size if isinstance(value.size, tuple) else (value.size, value.size, value.size)
+        try:
+            return image_texture(read_image(folder / value.file))
+        except OSError as error:
+            raise type(error)(f"texture.{name}.file: {error}") from None
     on_surface = value.on == "surface"
     if isinstance(value, _NoiseTexture):
-        return Noise(value.colours, size, value.octaves, value.contrast, value.seed, on_surface)
-    return Checker(value.colours, size, on_surface)
+        return Noise(value.colours, value.size, value.octaves, value.contrast, value.seed, on_surface)
+    return Checker(value.colours, value.size, on_surface)
 
 
 def _material(name: str, value: _Material, textures: dict[str, Texture]) -> Material:
     if value.texture is not None and value.texture not in textures:
-        raise ValueError(f"material.{name}: unknown texture {value.texture!r}: known are {', '.join(textures)}")
+        raise ValueError(f"material.{name}: unknown texture {value.texture!r}: known are {_known(textures)}")
     texture = textures[value.texture] if value.texture is not None else None
     if texture is not None and "colour" not in value.model_fields_set:
         value = value.model_copy(update={"colour": (1.0, 1.0, 1.0)})
@@ -252,12 +333,12 @@ def _material(name: str, value: _Material, textures: dict[str, Texture]) -> Mate
 
 
 def _body(index: int, value: _Object, materials: dict[str, Material], folder: Path) -> Body:
-    where = f"object.{index}"
+    where = f"object.{index} ({value.name})" if value.name else f"object.{index}"
     if value.material not in materials:
-        raise ValueError(f"{where}: unknown material {value.material!r}: known are {', '.join(materials)}")
+        raise ValueError(f"{where}: unknown material {value.material!r}: known are {_known(materials)}")
     material = materials[value.material]
     mesh, label = _mesh(where, value.model_extra or {}, folder)
-    size = np.array(value.scale if isinstance(value.scale, tuple) else (value.scale,) * 3)
+    size = np.array(value.scale)
     turn = rotation(value.rotate_deg)
     vertices = (mesh.vertices * size) @ turn.T + value.position_mm
     normals = None if mesh.normals is None else (mesh.normals / size) @ turn.T
@@ -284,6 +365,8 @@ def _coordinates(where: str, texture: Texture | None, mesh: Mesh, size: NDArray[
 def _mesh(where: str, parameters: dict[str, Any], folder: Path) -> tuple[Mesh, str]:
     """The mesh that an object's own parameters describe, and what to call it."""
     checked: Callable[[], tuple[Mesh, str]]
+    if "mesh" in parameters and "shape" in parameters:
+        raise ValueError(f"{where}: both mesh and shape: one of them is needed")
     if "mesh" in parameters:
 
         def checked() -> tuple[Mesh, str]:
@@ -299,7 +382,11 @@ def _mesh(where: str, parameters: dict[str, Any], folder: Path) -> tuple[Mesh, s
     try:
         return checked()
     except ValidationError as error:
-        raise ValueError(f"{where}.{_first(error)}") from None
+        raise ValueError(f"{where}: {_first(error)}") from None
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from None
+    except OSError as error:
+        raise type(error)(f"{where}: {error}") from None
 
 
 def read_mesh(path: Path, *, smooth: bool = True) -> Mesh:
@@ -321,7 +408,8 @@ def read_mesh(path: Path, *, smooth: bool = True) -> Mesh:
     try:
         mesh = trimesh.load(path, force="mesh", process=False)
     except Exception as error:  # trimesh raises whatever its parsers do
-        raise ValueError(f"{path.name} cannot be read as a mesh: {error}") from None
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise ValueError(f"{path.name} cannot be read as a mesh: {reason}") from None
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise ValueError(f"{path.name} holds no triangles")
     if not np.isfinite(mesh.vertices).all():

@@ -1,0 +1,541 @@
+"""Scene files: everything that may stand in them works, and what may not is named."""
+
+import math
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+
+from ii_core.files import write_image
+from raytrace_ii import load_scene, scene_names, trace
+from raytrace_ii.load import read_mesh
+from raytrace_ii.texture import Checker, Image, Noise, linear
+
+BALL = """
+[material.m]
+colour = "#808080"
+
+[[object]]
+shape = "sphere"
+radius_mm = 1
+material = "m"
+"""
+
+
+def written(tmp_path, text):
+    path = tmp_path / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def load(tmp_path, text):
+    return load_scene(written(tmp_path, text))
+
+
+# What may stand in a file
+
+
+def test_every_key_does_what_it_says(tmp_path):
+    write_image(tmp_path / "skin.png", np.full((2, 2, 3), (255, 0, 128), np.uint8))
+    scene = load(
+        tmp_path,
+        """
+        title = "All"
+        about = "one of each"
+        ambient = [0.5, 0.5, 1.0]
+        max_depth = 9
+
+        [background]
+        horizon = "#ffffff"
+        zenith = "#0000ff"
+        nadir = [0, 0, 0]
+        spread_deg = 30
+
+        [[light]]
+        kind = "point"
+        position_mm = [1, 2, 3]
+        colour = "#ff0000"
+        intensity = 2.5
+
+        [[light]]
+        kind = "directional"
+        direction = [0, -2, 0]
+
+        [texture.skin]
+        kind = "image"
+        file = "skin.png"
+
+        [texture.board]
+        kind = "checker"
+        colours = ["#000000", "#ffffff"]
+        size = 2.5
+        on = "surface"
+
+        [texture.cloud]
+        kind = "noise"
+        colours = [[0, 0, 0], [1, 1, 1]]
+        size = [1, 2, 3]
+        octaves = 4
+        contrast = 0.5
+        seed = 12
+
+        [material.skin]
+        texture = "skin"
+        specular = 0.3
+        shininess = 70
+        mirror = 0.25
+
+        [material.board]
+        texture = "board"
+        colour = "#808080"
+
+        [material.cloud]
+        texture = "cloud"
+
+        [material.glass]
+        colour = [1, 0, 0.5]
+        transmission = [0.9, 0.5, 0.1]
+        ior = 1.7
+        absorption_per_mm = [0, 0.1, 0.2]
+
+        [[object]]
+        name = "pane"
+        shape = "box"
+        size_mm = [1, 2, 3]
+        material = "glass"
+
+        [[object]]
+        shape = "sphere"
+        radius_mm = 2
+        segments = 12
+        position_mm = [10, 20, 30]
+        rotate_deg = [0, 0, 90]
+        scale = [1, 2, 3]
+        material = "skin"
+
+        [[object]]
+        shape = "plane"
+        size_mm = [5, 6]
+        material = "board"
+
+        [[object]]
+        shape = "cylinder"
+        radius_mm = 1
+        height_mm = 4
+        top_mm = 0.5
+        segments = 8
+        scale = 2
+        material = "cloud"
+
+        [[object]]
+        shape = "revolve"
+        profile_mm = [[0, 0], [1, 1], [0, 2]]
+        segments = 8
+        steps = 6
+        lobes = 3
+        lobe_depth = 0.2
+        sideways_mm = [0.5, 0]
+        material = "cloud"
+
+        [[object]]
+        shape = "box_grid"
+        count = [2, 2, 2]
+        spacing_mm = [3, 3, 3]
+        box_mm = 1
+        jitter = 0.1
+        grow = 0.2
+        tiles = 2
+        seed = 3
+        material = "skin"
+        """,
+    )
+    assert scene.name == "scene" and scene.max_depth == 9
+    np.testing.assert_allclose(scene.ambient, linear([0.5, 0.5, 1.0]))
+    sky = scene.background
+    assert (sky.horizon, sky.zenith, sky.nadir, sky.spread_deg) == ((1, 1, 1), (0, 0, 1), (0, 0, 0), 30)
+    point, sun = scene.lights
+    assert (point.kind, point.vector, point.colour) == ("point", (1, 2, 3), (2.5, 0, 0))
+    assert (sun.kind, sun.vector, sun.colour) == ("directional", (0, -2, 0), (1, 1, 1))
+    # glass goes last; objects without a name are called by their shape and place in the file
+    names = [body.name for body in scene.bodies]
+    assert names == ["sphere 1", "plane 2", "cylinder 3", "revolve 4", "box_grid 5", "pane"]
+    by_name = dict(zip(names, scene.bodies, strict=True))
+
+    pane = by_name["pane"].material
+    np.testing.assert_allclose(pane.colour, linear([1, 0, 0.5]))
+    np.testing.assert_allclose(pane.transmission, linear([0.9, 0.5, 0.1]))  # a colour is sRGB, a number a share
+    assert (pane.ior, pane.absorption_per_mm) == (1.7, (0, 0.1, 0.2))
+
+    ball = by_name["sphere 1"]
+    assert (ball.material.specular, ball.material.shininess) == (0.3, 70)
+    assert ball.material.mirror == (0.25, 0.25, 0.25)
+    assert ball.material.colour == (1, 1, 1), "a texture alone is not dimmed"
+    assert isinstance(ball.material.texture, Image)
+    np.testing.assert_allclose(ball.material.texture.pixels[0, 0], linear([1, 0, 128 / 255]), rtol=1e-6)
+    # scaled along its own axes, then turned, then moved: x of scale 1 becomes y
+    np.testing.assert_allclose(ball.vertices.min(axis=0), [10 - 2 * 2, 20 - 2, 30 - 2 * 3], atol=1e-9)
+    np.testing.assert_allclose(ball.vertices.max(axis=0), [10 + 2 * 2, 20 + 2, 30 + 2 * 3], atol=1e-9)
+    # normals stay those of the ellipsoid: along x/1², y/2², z/3² of its own axes
+    own = (ball.vertices - [10, 20, 30])[:, [1, 0, 2]] * [1, -1, 1]
+    gradient = own / np.square([1.0, 2, 3])
+    gradient = gradient[:, [1, 0, 2]] * [-1, 1, 1]
+    unit = ball.normals / np.linalg.norm(ball.normals, axis=1, keepdims=True)
+    np.testing.assert_allclose(unit, gradient / np.linalg.norm(gradient, axis=1, keepdims=True), atol=1e-9)
+
+    board = by_name["plane 2"]
+    assert board.material.texture == Checker(((0, 0, 0), (1, 1, 1)), (2.5, 2.5, 2.5), True)
+    assert board.material.colour != (1, 1, 1), "its own colour multiplies the texture"
+    np.testing.assert_array_equal(np.ptp(board.texture_coordinates, axis=0), [1, 1, 0])
+    cylinder = by_name["cylinder 3"]
+    assert cylinder.material.texture == Noise(((0, 0, 0), (1, 1, 1)), (1, 2, 3), 4, 0.5, 12, False)
+    # a solid texture keeps its size in mm when its body is scaled
+    np.testing.assert_allclose(np.ptp(cylinder.texture_coordinates[:, 1]), 8)
+    assert len(by_name["box_grid 5"].faces) == 8 * 12
+    assert trace(scene, [(0, 0, -50)], [(0, 0, 1)]).object_id[0] >= 0
+
+
+def test_little_needs_to_stand_in_a_file(tmp_path):
+    scene = load(tmp_path, BALL)
+    assert scene.lights == [] and scene.max_depth == 6
+    np.testing.assert_allclose(scene.ambient, 0.1)
+    assert scene.background.horizon == scene.background.zenith == scene.background.nadir == (0, 0, 0)
+    even = load(tmp_path, '[background]\nhorizon = "#ffffff"\n' + BALL)
+    assert even.background.zenith == even.background.nadir == (1, 1, 1)
+
+
+def test_packaged_scenes_load_and_say_what_they_are():
+    names = scene_names()
+    assert "apples" in names
+    for name, about in names.items():
+        assert about
+        scene = load_scene(name)
+        assert scene.name == name and scene.bodies and scene.lights
+        assert np.isfinite(scene.bounds_mm).all()
+        seen = trace(scene, np.zeros((50, 3)), [(x, -0.1, 1) for x in np.linspace(-0.3, 0.3, 50)])
+        assert np.isfinite(seen.radiance).all() and seen.radiance.max() > 0
+
+
+# What may not
+
+
+def ball(old, new):
+    assert old in BALL
+    return BALL.replace(old, new)
+
+
+CHECKER = '[texture.t]\nkind = "checker"\ncolours = ["#ffffff", "#000000"]\nsize = 1\n'
+OBJECT_KEYS = "name, material, position_mm, rotate_deg, scale"
+COLOUR = "#rrggbb or three numbers from 0 to 1 are needed"
+WRONG = {
+    "unknown key": ("fog = 1\n" + BALL, "fog: no such key: known are title, about, ambient, max_depth"),
+    "unknown key of an object": (
+        BALL + "size = 1\n",
+        f"object.0: size: no such key: known are shape, radius_mm, segments, {OBJECT_KEYS}",
+    ),
+    "unknown key of a mesh": (
+        ball('shape = "sphere"\nradius_mm = 1', 'mesh = "a.obj"\nsegments = 3'),
+        f"object.0: segments: no such key: known are mesh, smooth, {OBJECT_KEYS}",
+    ),
+    "unknown key of a material": (
+        ball("colour", "color"),
+        "material.m.color: no such key: known are colour, texture, specular, shininess, mirror, transmission, ior,",
+    ),
+    "unknown key of a light": (
+        '[[light]]\nkind = "point"\nposition_mm = [0, 0, 0]\npower = 1\n' + BALL,
+        "light.0.power: no such key: known are kind, position_mm, colour, intensity",
+    ),
+    "unknown key of a texture": (
+        CHECKER + "octaves = 1\n" + BALL,
+        "texture.t.octaves: no such key: known are colours, size, on, kind",
+    ),
+    "unknown key of the background": (
+        '[background]\nhorizon = "#000000"\nsky = 1\n' + BALL,
+        "background.sky: no such key: known are horizon, zenith, nadir, spread_deg",
+    ),
+    "several": ("fog = 1\nrain = 1\n" + BALL, "fog: no such key: known are .* (and 1 more)"),
+    "unknown material": (ball('material = "m"', 'material = "q"'), "object.0: unknown material 'q': known are m"),
+    "no material at all": (
+        '[[object]]\nname = "ball"\nshape = "sphere"\nradius_mm = 1\nmaterial = "m"\n',
+        "object.0 (ball): unknown material 'm': known are none",
+    ),
+    "unknown texture": (
+        CHECKER + ball('colour = "#808080"', 'texture = "u"'),
+        "material.m: unknown texture 'u': known are t",
+    ),
+    "unknown shape": (
+        ball('"sphere"', '"ball"'),
+        "object.0: unknown shape 'ball': known are sphere, box, plane, cylinder, revolve, box_grid",
+    ),
+    "neither shape nor mesh": (ball('shape = "sphere"\n', ""), "object.0: shape is missing"),
+    "both": (BALL + 'mesh = "a.obj"\n', "object.0: both mesh and shape: one of them is needed"),
+    "unknown light": (
+        '[[light]]\nkind = "spot"\n' + BALL,
+        "light.0: unknown kind 'spot': known are point, directional",
+    ),
+    "light of no kind": ("[[light]]\nintensity = 1\n" + BALL, "light.0: kind is missing"),
+    "light without a place": ('[[light]]\nkind = "point"\n' + BALL, "light.0.position_mm: is missing"),
+    "light along nothing": (
+        '[[light]]\nkind = "directional"\ndirection = [0, 0, 0]\n' + BALL,
+        "light.0: a directional light has the direction zero: a direction is needed",
+    ),
+    "negative light": (
+        '[[light]]\nkind = "point"\nposition_mm = [0, 0, 0]\nintensity = -1\n' + BALL,
+        "light.0.intensity: -1: a number of at least 0 is needed",
+    ),
+    "unknown kind of texture": (
+        '[texture.t]\nkind = "marble"\n' + BALL,
+        "texture.t: unknown kind 'marble': known are image, checker, noise",
+    ),
+    "texture neither here nor there": (
+        CHECKER + 'on = "top"\n' + BALL,
+        "texture.t.on: unknown 'top': known are body or surface",
+    ),
+    "texture without size": (
+        CHECKER.replace("size = 1", "size = 0") + BALL,
+        "texture.t.size: 0: one number or three are needed, greater than 0",
+    ),
+    "texture of one colour": (CHECKER.replace('"#ffffff", ', "") + BALL, "texture.t.colours.1: is missing"),
+    "octaves": (
+        CHECKER.replace("checker", "noise") + "octaves = 9\n" + BALL,
+        "texture.t.octaves: 9: a number of at most 8 is needed",
+    ),
+    "no objects": ('[material.m]\ncolour = "#ffffff"\n', "no geometry: at least one [[object]] is needed"),
+    "nothing": ("", "no geometry: at least one [[object]] is needed"),
+    "nan": (ball("radius_mm = 1", "radius_mm = nan"), "object.0: radius_mm: nan: a finite number is needed"),
+    "infinite place": (
+        BALL + "position_mm = [0, inf, 0]\n",
+        "object.0.position_mm.1: inf: a finite number is needed",
+    ),
+    "negative size": (
+        ball("radius_mm = 1", "radius_mm = -1"),
+        "object.0: radius_mm: -1: a number greater than 0 is needed",
+    ),
+    "no size": (ball("radius_mm = 1\n", ""), "object.0: radius_mm: is missing"),
+    "size beyond float32": (
+        ball("radius_mm = 1", "radius_mm = 1e39"),
+        "object 'sphere 0': vertex 0 is [0.0, -1e+39, 0.0]: finite float32 numbers are needed",
+    ),
+    "two segments": (BALL + "segments = 2\n", "object.0: segments: 2: a number of at least 3 is needed"),
+    "half a segment": (BALL + "segments = 4.5\n", "object.0: segments: 4.5: a whole number is needed"),
+    "two coordinates": (BALL + "position_mm = [1, 2]\n", "object.0.position_mm.2: is missing"),
+    "one coordinate": (BALL + "position_mm = 3\n", "object.0.position_mm: 3: a list of numbers is needed"),
+    **{
+        f"scale {scale}": (
+            BALL + f"scale = {scale}\n",
+            f"object.0.scale: {says}: one number or three are needed, greater than 0",
+        )
+        for scale, says in (
+            ("-1", "-1"),
+            ("0", "0"),
+            ("[1, 2]", "[1, 2]"),
+            ("[1, 0, 1]", "[1, 0, 1]"),
+            ("nan", "nan"),
+            ("inf", "inf"),
+            ('"big"', "'big'"),
+            ("true", "True"),
+        )
+    },
+    **{
+        f"colour {colour}": (ball('"#808080"', colour), f"material.m.colour: colour {says}: {COLOUR}")
+        for colour, says in (
+            ('"red"', "'red'"),
+            ('"#12345"', "'#12345'"),
+            ('"#12345g"', "'#12345g'"),
+            ("[2, 0, 0]", "[2, 0, 0]"),
+            ("[0, 0]", "[0, 0]"),
+            ("[nan, 0, 0]", "[nan, 0, 0]"),
+            ("[true, 0, 0]", "[True, 0, 0]"),
+            ("1", "1"),
+        )
+    },
+    "more than a mirror": (
+        ball("colour", "mirror = 2\ncolour"),
+        "material.m.mirror: 2: a share from 0 to 1 is needed",
+    ),
+    "more than all light": (
+        ball("colour", "mirror = 0.7\ntransmission = 0.5\ncolour"),
+        "material.m: mirror 0.7 and transmission 0.5 are more than all the light: at most 1 together is needed",
+    ),
+    "negative absorption": (
+        ball("colour", "absorption_per_mm = [1, -1, 0]\ncolour"),
+        "material.m.absorption_per_mm.1: -1: a number of at least 0 is needed",
+    ),
+    "no index of refraction": (
+        ball("colour", "ior = 0\ncolour"),
+        "material.m.ior: 0: a number greater than 0 is needed",
+    ),
+    "background without horizon": ('[background]\nzenith = "#000000"\n' + BALL, "background.horizon: is missing"),
+    "no spread": (
+        '[background]\nhorizon = "#000000"\nspread_deg = 0\n' + BALL,
+        "background.spread_deg: 0: a number greater than 0 is needed",
+    ),
+    "negative depth": ("max_depth = -1\n" + BALL, "max_depth: -1: a number of at least 0 is needed"),
+    "ambient": ("ambient = 1.5\n" + BALL, "ambient: 1.5: a share from 0 to 1 is needed"),
+    "one object instead of a list": (ball("[[object]]", "[object]"), "object: {.*}: a list is needed"),
+    "no TOML": (BALL + "scale =\n", "Invalid value (at line 9, column 8)"),
+    "unknown type of mesh": (
+        ball('shape = "sphere"\nradius_mm = 1', 'mesh = "a.fbx"'),
+        "object.0: a.fbx is no known mesh type: known are .glb, .gltf, .obj, .ply, .stl",
+    ),
+    "mesh that is no name": (
+        ball('shape = "sphere"\nradius_mm = 1', "mesh = 3"),
+        "object.0: mesh: 3: a text is needed",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_may_not_stand_in_a_file_is_named_in_one_line(case, tmp_path):
+    text, says = WRONG[case]
+    path = written(tmp_path, text)
+    with pytest.raises(ValueError) as caught:
+        load_scene(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith(f"{path}: ")
+    rest = message.removeprefix(f"{path}: ")
+    head, _, tail = says.partition(".*")
+    assert rest.startswith(head) and rest.endswith(tail), rest
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            BALL.replace('shape = "sphere"\nradius_mm = 1', 'name = "cow"\nmesh = "no.obj"'),
+            "object.0 (cow): {}/no.obj does not exist",
+        ),
+        ('[texture.t]\nkind = "image"\nfile = "no.png"\n' + BALL, "texture.t.file: {}/no.png does not exist"),
+    ],
+)
+def test_missing_files_are_named_with_who_asks_for_them(text, says, tmp_path):
+    path = written(tmp_path, text)
+    with pytest.raises(FileNotFoundError) as caught:
+        load_scene(path)
+    assert str(caught.value) == f"{path}: {says.format(tmp_path)}"
+
+
+def test_broken_files_are_named_with_who_asks_for_them(tmp_path):
+    (tmp_path / "bad.png").write_bytes(b"no picture")
+    with pytest.raises(OSError, match=r"scene\.toml: texture\.t\.file: cannot read .*bad\.png"):
+        load(tmp_path, '[texture.t]\nkind = "image"\nfile = "bad.png"\n' + BALL)
+    for name, content in (("bad.glb", b"glTF"), ("bad.ply", b"no\nmesh"), ("empty.obj", b"v 0 0 0\n")):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(
+            ValueError, match=rf"scene\.toml: object\.0: {name} (cannot be read as a mesh|holds no tri)"
+        ) as e:
+            load(tmp_path, ball('shape = "sphere"\nradius_mm = 1', f'mesh = "{name}"'))
+        assert "\n" not in str(e.value)
+    (tmp_path / "nan.obj").write_text("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(ValueError, match=r"object\.0: nan\.obj holds vertices that are not finite numbers"):
+        load(tmp_path, ball('shape = "sphere"\nradius_mm = 1', 'mesh = "nan.obj"'))
+    path = tmp_path / "latin.toml"
+    path.write_bytes(b'title = "\xff"\n')
+    with pytest.raises(ValueError, match=r"latin\.toml: .*utf-8"):
+        load_scene(path)
+
+
+def test_unknown_and_missing_scenes(tmp_path):
+    with pytest.raises(ValueError, match=r"unknown scene 'appels': known are apples.*, or give a \.toml file"):
+        load_scene("appels")
+    with pytest.raises(FileNotFoundError, match=r"none\.toml does not exist"):
+        load_scene(tmp_path / "none.toml")
+
+
+# Mesh files
+
+# A foot with four toes of different lengths: like none of its mirror images. Right-handed, as files are.
+CORNERS = np.array([[0, 0, 0], [3, 0, 0], [0, 2, 0], [0, 0, 1.0]])
+FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+
+
+def mesh_file(tmp_path, kind):
+    mesh = trimesh.Trimesh(CORNERS, FACES, process=False)
+    assert mesh.is_watertight and mesh.volume > 0
+    path = tmp_path / f"foot.{kind}"
+    mesh.export(path)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["obj", "ply", "stl", "glb", "gltf"])
+def test_mesh_files_are_not_mirrored(kind, tmp_path):
+    """Into our left-handed frame by z → −z: the body looks the same, and its faces point out."""
+    if kind == "gltf":
+        for name, content in trimesh.Trimesh(CORNERS, FACES, process=False).scene().export(file_type="gltf").items():
+            (tmp_path / name).write_bytes(content)
+        path = (tmp_path / "model.gltf").rename(tmp_path / "foot.gltf")
+    else:
+        path = mesh_file(tmp_path, kind)
+    mesh = read_mesh(path)
+    p = mesh.vertices[mesh.faces]
+    np.testing.assert_allclose(np.unique(p.reshape(-1, 3).round(6), axis=0), np.unique(CORNERS * [1, 1, -1], axis=0))
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    outward = np.einsum("ij,ij->i", normal, p.mean(axis=1) - p.reshape(-1, 3).mean(axis=0))
+    assert (outward > 0).all()
+    volume = np.einsum("ij,ij->", p[:, 0], np.cross(p[:, 1], p[:, 2])) / 6
+    assert volume == pytest.approx(1.0)  # 3·2·1/6
+    assert (np.einsum("fcj,fj->fc", mesh.normals[mesh.faces], normal) > 0).all()
+
+    # Seen through the whole chain: a foot before the camera, its long toe to the right, the middle one up, the short
+    # one, +z of the file, towards the viewer.
+    scene = load(tmp_path, ball('shape = "sphere"\nradius_mm = 1', f'mesh = "{path.name}"\nposition_mm = [0, 0, 10]'))
+    assert scene.bodies[0].name == "foot 0"
+    np.testing.assert_allclose(scene.bounds_mm, [[0, 0, 9], [3, 2, 10]], atol=1e-6)
+    aims = np.array([[2.9, 0.01, 0], [0.01, 1.9, 0], [0.01, 0.01, 0], [-0.1, 0.1, 0], [2.9, 1.9, 0]])
+    seen = trace(scene, aims, np.broadcast_to([0.0, 0, 1], aims.shape))
+    np.testing.assert_array_equal(seen.object_id, [0, 0, 0, -1, -1])
+    assert seen.depth[2] == pytest.approx(9, abs=0.02)
+    assert (seen.normal[:3, 2] < 0).all(), "the side seen faces the viewer"
+
+
+def test_meshes_shade_flat_if_asked_to(tmp_path):
+    path = mesh_file(tmp_path, "ply")
+    assert read_mesh(path, smooth=False).normals is None
+    flat = load(tmp_path, ball('shape = "sphere"\nradius_mm = 1', 'mesh = "foot.ply"\nsmooth = false'))
+    assert flat.bodies[0].normals is None
+
+
+def test_a_meshs_texture_coordinates_are_kept(tmp_path):
+    (tmp_path / "sheet.obj").write_text(
+        "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+    )
+    # red at the top left, which is v = 1 and u = 0, and black elsewhere
+    pixels = np.zeros((2, 2, 3), np.uint8)
+    pixels[0, 0] = 255, 0, 0
+    write_image(tmp_path / "corner.png", pixels)
+    scene = load(
+        tmp_path,
+        """
+        ambient = 1
+        [texture.t]
+        kind = "image"
+        file = "corner.png"
+        [material.m]
+        texture = "t"
+        [[object]]
+        mesh = "sheet.obj"
+        material = "m"
+        position_mm = [0, 0, 5]
+        """,
+    )
+    centres = np.array([[0.5, 0.75, 0], [1.5, 0.75, 0], [0.5, 0.25, 0], [1.5, 0.25, 0]])
+    seen = trace(scene, centres, np.broadcast_to([0.0, 0, 1], centres.shape))
+    np.testing.assert_allclose(seen.radiance[:, 0], [1, 0, 0, 0], atol=1e-6)
+    without = ball('shape = "sphere"\nradius_mm = 1', 'mesh = "foot.ply"').replace(
+        'colour = "#808080"', 'texture = "t"'
+    )
+    mesh_file(tmp_path, "ply")
+    with pytest.raises(
+        ValueError, match=r"object\.0: a texture on the surface needs texture coordinates, the mesh has"
+    ):
+        load(tmp_path, CHECKER + 'on = "surface"\n' + without)
+    load(tmp_path, CHECKER + without)
+
+
+def test_a_binary_stl_of_no_area_draws_nothing(tmp_path):
+    triangle = struct.pack("<12fH", 0, 0, 0, *[0.0] * 9, 0)
+    (tmp_path / "point.stl").write_bytes(b"\0" * 80 + struct.pack("<I", 1) + triangle)
+    scene = load(tmp_path, ball('shape = "sphere"\nradius_mm = 1', 'mesh = "point.stl"'))
+    seen = trace(scene, [(0, 0, -5)], [(0, 0, 1)])
+    assert seen.object_id[0] == -1 and math.isnan(seen.depth[0])
