@@ -8,7 +8,7 @@ from typing import Any
 import av
 import numpy as np
 
-from codec.base import parse_scheme
+from codec import parse_scheme
 from codec.sequence import gathered
 from codec.video import H264, _encoder, _parameters
 from ii_core import IIPicture

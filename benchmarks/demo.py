@@ -24,7 +24,7 @@ from ii_core import (
 )
 from ii_core.files import write_image
 from raytrace_ii import Scene, Shot, load_scene, render
-from raytrace_ii.cli import RATES, SCHEMES, progress_bar, run_study
+from raytrace_ii.cli import RATES, SCHEMES, progress_bar, run_study, spinner
 
 
 def main() -> None:
@@ -39,7 +39,8 @@ def main() -> None:
     for name in arguments.scenes.split(","):
         scene = load_scene(name)
         shot = shoot(scene, name, arguments.scale)
-        write_pictures(scene, shot, name, arguments.output)
+        with spinner(f"write the pictures of {name}"):
+            write_pictures(scene, shot, name, arguments.output)
         rays = {"rays": shot.stats.rays, "render_seconds": shot.stats.seconds, "sensor_noise_sigma": 1.0, "seed": 0}
         run_study(shot.picture, name, SCHEMES, RATES, arguments.output, extra=rays)
     print(f"{time.perf_counter() - started:.0f} s; pictures, charts (.png) and numbers (.json): {arguments.output}/")

@@ -116,14 +116,15 @@ def render(
             support=tuple(extra),
             progress=lambda done, total: report(done, total, ""),
         )
-    (orthoscopic(shot.picture) if flat else shot.picture).save(output)
-    for name, path in extra.items():
-        image = getattr(shot, name).astype(np.float32)
-        write_image(path, image[::-1, ::-1] if flat else image)
-    if projection:
-        pinhole, pose = projection_camera(ii_camera, 1024)
-        view = render(loaded, pinhole, samples=4, pose=pose, support=(), workers=workers)
-        write_image(projection, orthoscopic(view.picture).pixels)
+    with spinner(f"write {output}"):
+        (orthoscopic(shot.picture) if flat else shot.picture).save(output)
+        for name, path in extra.items():
+            image = getattr(shot, name).astype(np.float32)
+            write_image(path, image[::-1, ::-1] if flat else image)
+        if projection:
+            pinhole, pose = projection_camera(ii_camera, 1024)
+            view = render(loaded, pinhole, samples=4, pose=pose, support=(), workers=workers)
+            write_image(projection, orthoscopic(view.picture).pixels)
     _say_stats(shot)
 
 
@@ -142,7 +143,7 @@ def encode(
 
     _check_output(output, force)
     original = IIPicture.load(picture)
-    with _spinner(f"{scheme} codes {picture.name}"):
+    with spinner(f"{scheme} codes {picture.name}"):
         coded = encode(original, scheme, bpp=bpp, qp=qp)
     coded.save(output)
     print(f"{output}: {coded.nbytes} bytes, {coded.bpp:.4g} bpp in {coded.encode_seconds:.1f} s")
@@ -160,7 +161,7 @@ def decode(
     from codec import decode
 
     _check_picture(output, "uint8", force)
-    with _spinner(f"decode {coded.name}"):
+    with spinner(f"decode {coded.name}"):
         picture = decode(coded)
     picture.save(output)
 
@@ -233,8 +234,7 @@ def run_study(
     workers: int | None = None, extra: dict[str, Any] | None = None,
 ) -> None:  # fmt: skip
     """Measure; leave name_rd.json, .csv and, drawn from the JSON, .png in a folder; print a table."""
-    from codec import decode, encode
-    from codec.base import parse_scheme
+    from codec import decode, encode, parse_scheme
     from metrics import rate_distortion, rd_chart, read_study, write_csv, write_study
 
     from .render import cores
@@ -338,7 +338,8 @@ def progress_bar(title: str) -> Iterator[Callable[[int, int, str], None]]:
 
 
 @contextmanager
-def _spinner(title: str) -> Iterator[None]:
+def spinner(title: str) -> Iterator[None]:
+    """A sign of life on the terminal's error stream, for work whose steps cannot be counted."""
     from rich.console import Console
 
     with Console(stderr=True).status(title):
