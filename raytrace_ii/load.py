@@ -314,6 +314,8 @@ def _texture(name: str, value: _ImageTexture | _CheckerTexture | _NoiseTexture, 
             return image_texture(read_image(folder / value.file))
         except OSError as error:
             raise type(error)(f"texture.{name}.file: {error}") from None
+        except ValueError as error:
+            raise ValueError(f"texture.{name}.file: {value.file}: {error}") from None
     on_surface = value.on == "surface"
     if isinstance(value, _NoiseTexture):
         return Noise(value.colours, value.size, value.octaves, value.contrast, value.seed, on_surface)

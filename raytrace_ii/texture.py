@@ -89,7 +89,15 @@ def linear(srgb: Any) -> NDArray[np.float64]:
 
 
 def image_texture(pixels: NDArray[Any]) -> Image:
-    """An image texture from stored pixels: integers are sRGB, floats linear; grey is spread, alpha dropped."""
+    """An image texture from stored pixels: integers are sRGB, floats linear; grey is spread, alpha dropped.
+
+    Raises
+    ------
+    ValueError
+        If a pixel is not finite.
+    """
+    if not np.isfinite(pixels).all():
+        raise ValueError("image holds pixels that are not finite numbers")
     if pixels.dtype.kind == "u":
         table = linear(np.arange(np.iinfo(pixels.dtype).max + 1) / np.iinfo(pixels.dtype).max)
         pixels = table[pixels]

@@ -427,6 +427,9 @@ def test_broken_files_are_named_with_who_asks_for_them(tmp_path):
         ) as e:
             load(tmp_path, ball('shape = "sphere"\nradius_mm = 1', f'mesh = "{name}"'))
         assert "\n" not in str(e.value)
+    write_image(tmp_path / "nan.exr", np.full((2, 2, 3), np.nan, np.float32))
+    with pytest.raises(ValueError, match=r"texture\.t\.file: nan\.exr: image holds pixels that are not finite"):
+        load(tmp_path, '[texture.t]\nkind = "image"\nfile = "nan.exr"\n' + BALL)
     (tmp_path / "nan.obj").write_text("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     with pytest.raises(ValueError, match=r"object\.0: nan\.obj holds vertices that are not finite numbers"):
         load(tmp_path, ball('shape = "sphere"\nradius_mm = 1', 'mesh = "nan.obj"'))
