@@ -54,7 +54,7 @@ class Jpeg2000(Coder):
         raw_bytes = width * height * RAW_BPP / 8
         at_ratio = partial(_encode, picture.pixels)
         run, runs = nearest_rate(
-            lambda size: at_ratio(raw_bytes / size),
+            lambda size: at_ratio(min(raw_bytes / size, COARSEST)),
             width * height * bpp / 8,
             coarsest=lambda: at_ratio(COARSEST),
             finest=lambda: at_ratio(LOSSLESS),

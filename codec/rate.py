@@ -10,6 +10,9 @@ TOLERANCE = 0.02  # of the target
 RERUNS = 3
 # A miss so large that the coder is probably at its limit, which one run there settles.
 FAR = 1.25
+# The coarsest quantiser is the floor unless rate control has got well below it already, by starving the pictures that
+# others are predicted from.
+FLOOR = 1.1
 
 
 @dataclass(frozen=True)
@@ -35,8 +38,8 @@ def nearest_rate(
     """The run whose size comes nearest to a target, and how many runs there were.
 
     The coder is asked for the target; while it misses by more than `TOLERANCE` it is asked again, for more or less,
-    at most `RERUNS` times. A miss by a factor of `FAR`, or a size that does not follow what is asked, means a limit:
-    one run at the limit itself tells whether the target lies beyond it, and is the answer if it does.
+    at most `RERUNS` times. A miss by a factor of `FAR`, or a size that does not follow what is asked, suggests a
+    limit: one run at the limit itself tells whether the target lies beyond it.
 
     Parameters
     ----------
@@ -56,15 +59,16 @@ def nearest_rate(
         runs.append(run)
         size = len(run.payload)
         if within(size, target):
-            break
+            return run, len(runs)
         over = size > target
-        far = not 1 / FAR < size / target < FAR
-        if (far or _stuck(points, ask, size)) and over not in probed:
+        if (not 1 / FAR < size / target < FAR or _stuck(points, ask, size)) and over not in probed:
             probed.add(over)
             limit = coarsest() if over else finest()
             runs.append(limit)
-            if over == (len(limit.payload) > target) or within(len(limit.payload), target):
-                return limit, len(runs)
+            if not over and len(limit.payload) <= target:
+                return limit, len(runs)  # more bytes of a worse run would buy nothing
+            if over and target < len(limit.payload) < FLOOR * size:
+                break
         points.append((ask, size))
         ask = _next(points, target)
     return min(runs, key=lambda run: abs(math.log(len(run.payload) / target))), len(runs)
@@ -75,7 +79,7 @@ def _stuck(points: list[tuple[float, float]], ask: float, size: float) -> bool:
     if not points:
         return False
     asked, got = math.log(ask / points[-1][0]), math.log(size / points[-1][1])
-    return got / asked < 0.5
+    return asked == 0 or got / asked < 0.5
 
 
 def _next(points: list[tuple[float, float]], target: float) -> float:

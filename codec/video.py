@@ -42,7 +42,7 @@ BIT_RATE = 1e9
 MAX_FRAME_RATE = 10**8
 BUFFER_FRAMES = 32
 BUFFER_START = 0.65
-MAX_BUFFER_KBIT = 2_000_000  # x264 multiplies by 1000 in 32 bits
+MAX_KBIT = 2_000_000  # x264 multiplies by 1000 in 32 bits
 
 CHUNK = 1 << 16  # bytes of a stream parsed at once
 
@@ -122,10 +122,10 @@ def _rate_control(size: float, shape: Layout) -> tuple[str, int]:
     """x264's parameters and the frame rate that make a sequence of ``size`` bytes."""
     frame_bits = 8 * size / shape.frames
     frame_rate = round(min(max(BIT_RATE / frame_bits, 1), MAX_FRAME_RATE))
-    kilobits = max(1, round(frame_bits * frame_rate / 1000))
+    kilobits = max(1, round(min(frame_bits * frame_rate / 1000, MAX_KBIT)))
     # Half the sequence at most: a buffer that holds more binds nothing.
     frames = min(BUFFER_FRAMES, max(1.0, shape.frames / 2))
-    buffer = max(1, round(min(frame_bits * frames / 1000, MAX_BUFFER_KBIT)))
+    buffer = max(1, round(min(frame_bits * frames / 1000, MAX_KBIT)))
     rate = f"bitrate={kilobits}:vbv-maxrate={kilobits}:vbv-bufsize={buffer}:vbv-init={BUFFER_START}"
     return rate, frame_rate
 
@@ -140,7 +140,7 @@ def _parameters(options: Options, rate: str) -> str:
             f"me=umh:merange={options['merange']}:mvrange=512",
             # Macroblock tree repeats to the byte only without B pictures, and no coder of 2008 had it.
             "weightp=0:psy=0:mbtree=0",
-            # Not beyond the standard's coarsest quantiser: there x264 throws pictures away to hold a rate.
+            # To hold a rate x264 would go beyond the standard's coarsest quantiser, and drop residuals altogether.
             f"qpmax={COARSEST}",
             rate,
         ]

@@ -120,7 +120,7 @@ def test_any_size_down_to_one_pixel(scheme, lenses, ei_pixels):
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize(("bpp", "side"), [(1e-4, 1), (1000.0, -1)])
+@pytest.mark.parametrize(("bpp", "side"), [(1e-310, 1), (1e-4, 1), (1000.0, -1), (1e308, -1)])
 def test_an_unreachable_rate_gives_the_nearest_and_says_so(scheme, bpp, side):
     coded = encode(textured(), scheme, bpp=bpp)
     assert not coded.reached

@@ -51,6 +51,12 @@ def test_a_ceiling_close_by_is_noticed_when_asking_more_gives_no_more():
     assert coder.search(1000) == (905, 3)
 
 
+def test_a_coder_that_goes_below_its_coarsest_quantiser_is_followed():
+    size, runs = Fake(lambda ask: 1.4 * ask, coarsest=5000).search(1000)
+    assert abs(size - 1000) <= 20
+    assert runs == 3
+
+
 def test_a_limit_beyond_the_target_does_not_end_the_search():
     size, _ = Fake(lambda ask: 1.5 * ask, coarsest=10).search(10_000)
     assert abs(size - 10_000) <= 200
