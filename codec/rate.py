@@ -25,7 +25,7 @@ class Run:
 
 def within(size: float, target: float) -> bool:
     """Whether a size counts as the target."""
-    return abs(size - target) <= TOLERANCE * target
+    return abs(size / target - 1) <= TOLERANCE
 
 
 def nearest_rate(
