@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, lamp, ramp, reflectance, sphere, sun, wall
+from trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, lamp, ramp, reflectance, sphere, spread, sun, wall
 
 from raytrace_ii import Background, Material, Scene, kernels, trace
 from raytrace_ii.scene import LIFT
+from raytrace_ii.shapes import Mesh
 from raytrace_ii.texture import Checker
 
 # Radiance is float32 and the sum of a few terms, each from cosines that are right to about 1e-7.
@@ -176,6 +177,18 @@ def test_a_camera_inside_glass_looks_out_through_one_face():
         np.testing.assert_allclose(looked(scene, (0, 0, 3), direction), expected, rtol=2e-3)
 
 
+def test_absorption_follows_a_ray_from_a_mirror_to_a_wall_inside_glass():
+    """In through a face, 10 mm to a mirror at 45°, 5 mm up to a ceiling, all in the same glass."""
+    absorption = np.array([0.02, 0.1, 0.3])
+    glass = body(box(40, 40, 40), at=(0, 0, 30), transmission=WHITE, ior=1.5, absorption_per_mm=tuple(absorption))
+    mirror = body(wall(0, 3), at=(0, 0, 20), turn=(45, 0, 0), mirror=WHITE, name="mirror")
+    ceiling = body(floor(20), at=(0, 5, 20), turn=(180, 0, 0), colour=WHITE, name="ceiling")
+    expected = (1 - reflectance(1.0, 1.5)) * np.exp(-15 * absorption)
+    seen = looked(Scene(bodies=[glass, mirror, ceiling], ambient=WHITE, max_depth=2), (0, 0, 0), (0, 0, 1))
+    # the front's and the mirror's rays start 2e-4 mm off: that times α of 0.3
+    np.testing.assert_allclose(seen, expected, rtol=3e-4)
+
+
 # Mirrors
 
 
@@ -223,6 +236,37 @@ def test_no_depth_is_local_light_only():
     mirror = body(wall(20), mirror=(0.75,) * 3, colour=(0.8, 0.4, 0.2))
     scene = Scene(bodies=[mirror], ambient=WHITE, background=UNIFORM, max_depth=0)
     np.testing.assert_allclose(looked(scene, (0, 0, 0), (0, 0, 1)), 0.25 * np.array([0.8, 0.4, 0.2]), rtol=RTOL)
+
+
+def bent(mesh, normal):
+    """A mesh that pretends to have one normal all over."""
+    return Mesh(mesh.vertices, mesh.faces, np.broadcast_to(np.asarray(normal, float), mesh.vertices.shape))
+
+
+def test_a_bent_normal_cannot_send_a_reflection_into_its_face():
+    """Steeply bent, the mirror would show what is behind it: the face's own normal takes over."""
+    angle = math.radians(70)
+    sky = Background(horizon=(0.2, 0.3, 0.4), zenith=WHITE, nadir=BLACK)
+    mirror = body(bent(wall(20), (0, math.sin(angle), -math.cos(angle))), mirror=WHITE)
+    seen = looked(Scene(bodies=[mirror], background=sky, max_depth=1), (0, 0, 0), (0, 0, 1))
+    np.testing.assert_allclose(seen, (0.2, 0.3, 0.4), rtol=RTOL)
+    # bent by less, it is the bent normal that counts: by 20° up, the ray leaves 40° up
+    angle = math.radians(20)
+    mirror = body(bent(wall(20), (0, math.sin(angle), -math.cos(angle))), mirror=WHITE)
+    seen = looked(Scene(bodies=[mirror], background=sky, max_depth=1), (0, 0, 0), (0, 0, 1))
+    np.testing.assert_allclose(
+        seen, np.array([0.2, 0.3, 0.4]) * (1 - math.sin(2 * angle)) + math.sin(2 * angle), rtol=RTOL
+    )
+
+
+def test_a_bent_normal_cannot_send_refracted_light_back():
+    """Leaving glass nearly along the face and straight along its bent normal, light would turn round: it is dropped."""
+    pane = body(bent(wall(5, 500), (0, 0.8, -0.6)), transmission=WHITE, ior=1.5)
+    direction = np.array([0, 1 - 0.005, -0.1]) / np.linalg.norm([0, 1 - 0.005, -0.1])
+    seen = trace(Scene(bodies=[pane], background=UNIFORM, max_depth=1), [(0, 0, 10)], [direction])
+    reflected, behind = kernels.fresnel(float(direction @ [0, 0.8, -0.6]), 1.5)
+    assert behind > 0 and seen.count.rays["refraction"] == 0
+    np.testing.assert_allclose(seen.radiance[0], reflected, rtol=1e-5)
 
 
 # Light and shadow
@@ -298,6 +342,27 @@ def test_matt_light_goes_with_the_cosine_and_not_with_distance():
     # seen from below, the other side of an open face is lit by what is below
     other = looked(Scene(bodies=[ground], lights=[sun((0, -1, 0))]), (0, -20, 0), (0, 1, 0))
     np.testing.assert_allclose(other, [0.8, 0.4, 0.2], rtol=RTOL)
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_smooth_shading_goes_by_the_true_normal_inside_and_out(inside):
+    """With normals v/R at its vertices a flat face of a ball has P/|P| between them, exactly."""
+    ball = body(sphere(5, 10), colour=WHITE)
+    directions = spread(np.random.default_rng(0), 2000)
+    starts = np.zeros_like(directions) if inside else -20 * directions
+    light = (3.0, 1.0, -0.5) if inside else (3e3, 1e3, -5e2)
+    seen = trace(Scene(bodies=[ball], lights=[lamp(light)]), starts, directions)
+    steps = (seen.depth - starts[:, 2]) / directions[:, 2]
+    points = starts + steps[:, None] * directions
+    normal = points / np.linalg.norm(points, axis=1, keepdims=True) * (-1 if inside else 1)
+    towards = np.array(light) - points
+    cosine = np.einsum("ij,ij->i", normal, towards) / np.linalg.norm(towards, axis=1)
+    # where the face itself faces the light, and z gives the point well
+    facing = np.einsum("ij,ij->i", seen.normal, towards) * (-1 if inside else 1) > 1e-3
+    sure = facing & (cosine > 1e-3) & (np.abs(directions[:, 2]) > 0.1)
+    assert sure.sum() > 500
+    np.testing.assert_allclose(seen.radiance[sure, 0], cosine[sure], atol=3e-5)
+    assert (seen.radiance[~facing] == 0).all(), "a face turned away gets none, whatever its smooth normal says"
 
 
 def test_a_shadow_ends_where_the_straight_line_says():
