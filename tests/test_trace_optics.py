@@ -260,7 +260,7 @@ def test_a_bent_normal_cannot_send_a_reflection_into_its_face():
 
 
 def test_a_bent_normal_cannot_send_refracted_light_back():
-    """Leaving glass nearly along the face and straight along its bent normal, light would turn round: it is dropped."""
+    """Leaving glass nearly along the face and along its bent normal, light would turn round: it is dropped."""
     pane = body(bent(wall(5, 500), (0, 0.8, -0.6)), transmission=WHITE, ior=1.5)
     direction = np.array([0, 1 - 0.005, -0.1]) / np.linalg.norm([0, 1 - 0.005, -0.1])
     seen = trace(Scene(bodies=[pane], background=UNIFORM, max_depth=1), [(0, 0, 10)], [direction])
