@@ -239,10 +239,9 @@ def pass_clear_face(
         through = float(distances[i]) * length if cosine < 0.0 else 0.0
         strongest = 0.0
         for c in range(3):
-            # The colour is the body's: half on the way in, half on the way out.
             share = (
                 (1 - reflected)
-                * math.sqrt(materials[body, _TRANSMISSION + c])
+                * materials[body, _TRANSMISSION + c]
                 * math.exp(-materials[body, _ABSORPTION + c] * through)
             )
             colours[kept, c] = colours[i, c] * share

@@ -31,7 +31,8 @@ class Material:
     mirror : (3,)
         Share of light reflected as by a mirror.
     transmission : (3,)
-        Share of light that enters the body; split by Fresnel into reflected and refracted.
+        Share of light that each face of the body hands on, split by Fresnel into reflected and refracted: a pane
+        takes it twice.
     ior : float
         Index of refraction of the body.
     absorption_per_mm : (3,)

@@ -274,7 +274,7 @@ def test_a_bent_normal_cannot_send_refracted_light_back():
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 60.0])
 def test_a_pane_casts_a_coloured_shadow(degrees):
-    """Two faces let 1 − R through each, the body its colour, and absorption takes its part along the slanting way."""
+    """Two faces let 1 − R of their colour through each, and absorption takes its part along the slanting way."""
     angle, thick, ior = math.radians(degrees), 2.0, 1.5
     towards = np.array([math.sin(angle), math.cos(angle), 0])
     ground = body(floor(400), colour=WHITE)
@@ -283,7 +283,7 @@ def test_a_pane_casts_a_coloured_shadow(degrees):
         box(300, thick, 300), at=(0, 10, 0), transmission=colour, absorption_per_mm=absorption, ior=ior, name="pane"
     )
     expected = (
-        np.array(colour)
+        np.array(colour) ** 2
         * (1 - reflectance(math.cos(angle), ior)) ** 2
         * np.exp(-np.array(absorption) * thick / math.cos(angle))
     )
@@ -292,6 +292,16 @@ def test_a_pane_casts_a_coloured_shadow(degrees):
         dimmed = looked(Scene(bodies=[ground, pane], lights=[light]), (0, 5, 0), (0.02, -1, 0.03))
         # the way inside starts a lift, 6e-4 mm, behind the face: twice as long at 60°, times α of 0.4
         np.testing.assert_allclose(dimmed / free, expected, rtol=1e-3)
+
+
+def test_a_pane_is_as_dark_to_look_through_as_its_shadow():
+    colour, ior = (0.9, 0.5, 0.2), 1.5
+    pane = body(box(300, 2, 300), at=(0, 10, 0), transmission=colour, ior=ior)
+    sky = Background(horizon=WHITE, zenith=WHITE, nadir=WHITE)
+    # depth 2 is the way through both faces and the first face's own reflection, nothing that goes to and fro
+    seen = looked(Scene(bodies=[pane], background=sky, max_depth=2), (0, 5, 0), (0, 1, 0))
+    r = reflectance(1.0, ior)
+    np.testing.assert_allclose(seen, np.array(colour) ** 2 * (1 - r) ** 2 + r * np.array(colour), rtol=1e-5)
 
 
 def test_panes_multiply_and_what_is_opaque_between_them_blocks():
