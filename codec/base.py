@@ -407,6 +407,7 @@ def _check_picture(coder: Coder, picture: IIPicture) -> None:
         raise ValueError(
             f"pixels are {picture.pixels.dtype.name}: scheme {coder.name} takes {', '.join(coder.dtypes)}"
         )
+    picture.check_regular()
     width, height = picture.size
     if width * height > MAX_PIXELS:
         raise ValueError(f"the picture has {width}×{height} pixels: at most {MAX_PIXELS} are allowed")

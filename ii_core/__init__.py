@@ -3,20 +3,21 @@
 from .camera import IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
 from .picture import IIPicture, add_sensor_noise
-from .presets import PRESETS, preset
+from .presets import camera_names, preset, preset_cameras
 from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stand_back, view_image
 
 __all__ = [
-    "PRESETS",
     "IICamera",
     "IIPicture",
     "add_sensor_noise",
+    "camera_names",
     "component_images",
     "elementary_images",
     "five_viewpoints",
     "orthoscopic",
     "picture_pixels",
     "preset",
+    "preset_cameras",
     "projection_camera",
     "ray_space_images",
     "refocus",

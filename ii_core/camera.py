@@ -7,41 +7,55 @@ centred on the origin; the lens plane is z = gap. A pixel (m, n) is column m fro
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .lattice import lens_centres, nearest_lens, pixel_positions
+from .lattice import LATTICES, Lattice
+from .optics import Bundle, Element, FrontElement, LensModel, Under, chain, unit_disk
 
 Pair = tuple[int, int]
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class IICamera:
-    """A rectangular lenslet array before a pixel array, in the pinhole approximation.
+    """An array of lenslets before an array of pixels.
 
-    The same class is the 2D pinhole camera: an array of one lens.
+    With one lens it is a 2D camera. With the defaults it is a rectangular array in the pinhole approximation, in
+    which every lens covers a whole number of pixels.
 
     Parameters
     ----------
     pixels : (M, N)
         Pixels across and down.
     lenses : (K, L)
-        Lenslets across and down. They must divide ``pixels``: the structure is regular.
+        Lenslets across and down.
     pixel_pitch_mm : float
         δP, the side of a square pixel.
     gap_mm : float
         Λ, the distance from the pixel array to the lens plane.
+    lens_pitch_mm : float or (float, float), optional
+        δL across and down; the pixel array shared out evenly if not given.
+    lattice : {"rectangular", "hexagonal"}
+        In a hexagonal array odd rows of lenses stand half a pitch to the right.
+    optics : sequence of `Element` or their plain values
+        The lens model, a pinhole if none is named, and what stands before the array; see `optics`.
+    lens_offset_mm : (x, y)
+        Shift of the lens array against the pixel array: moving lenslets.
+    origin_mm : (x, y, z)
+        Centre of the pixel array: one of several, as in a stack of sensors or an array of cameras.
     name : str
         What to call it in files and messages.
 
     Raises
     ------
     ValueError
-        If a count is below one, a length is not positive and finite, or the lenses do not divide the pixels.
+        If a value is out of range.
 
     References
     ----------
@@ -52,28 +66,89 @@ class IICamera:
     lenses: Pair
     pixel_pitch_mm: float
     gap_mm: float
+    lens_pitch_mm: tuple[float, float] = None  # type: ignore[assignment]  # filled in below
+    lattice: str = "rectangular"
+    optics: tuple[Element, ...] = ()
+    lens_offset_mm: tuple[float, float] = (0.0, 0.0)
+    origin_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     name: str = ""
 
     def __post_init__(self) -> None:
-        for field in ("pixels", "lenses"):
-            object.__setattr__(self, field, whole_pair(field, getattr(self, field)))
-        for field in ("pixel_pitch_mm", "gap_mm"):
-            value = float(getattr(self, field))
-            if not 0 < value < math.inf:
-                raise ValueError(f"{field} is {value:g}: a positive length in mm is needed")
+        def put(field: str, value: Any) -> None:
             object.__setattr__(self, field, value)
-        check_structure(self.pixels, self.lenses)
+
+        for field in ("pixels", "lenses"):
+            put(field, whole_pair(field, getattr(self, field)))
+        for field in ("pixel_pitch_mm", "gap_mm"):
+            put(field, positive(field, getattr(self, field)))
+        if self.lens_pitch_mm is None:
+            put(
+                "lens_pitch_mm",
+                tuple(m * self.pixel_pitch_mm / k for m, k in zip(self.pixels, self.lenses, strict=True)),
+            )
+        else:
+            both = self.lens_pitch_mm if isinstance(self.lens_pitch_mm, Sequence) else (self.lens_pitch_mm,) * 2
+            put("lens_pitch_mm", (positive("lens_pitch_mm", both[0]), positive("lens_pitch_mm", both[1])))
+        if self.lattice not in LATTICES:
+            raise ValueError(f"unknown lattice {self.lattice!r}: known are {', '.join(LATTICES)}")
+        for field, count in (("lens_offset_mm", 2), ("origin_mm", 3)):
+            put(field, finite(field, getattr(self, field), count))
+        model, front = chain(self.optics)
+        put("optics", (model, *front))
+        if hasattr(model, "thickness"):
+            model.thickness(self.lens_pitch_mm)  # a sphere too small for its cell is refused here
 
     @property
-    def ei_pixels(self) -> Pair:
-        """(U, V), pixels across and down in one elementary image."""
-        return self.pixels[0] // self.lenses[0], self.pixels[1] // self.lenses[1]
+    def lens_model(self) -> LensModel:
+        """What stands over every lenslet."""
+        return self.optics[0]  # type: ignore[return-value]
 
     @property
-    def lens_pitch_mm(self) -> tuple[float, float]:
-        """δL across and down."""
-        u, v = self.ei_pixels
-        return u * self.pixel_pitch_mm, v * self.pixel_pitch_mm
+    def front(self) -> tuple[FrontElement, ...]:
+        """What stands before the array."""
+        return self.optics[1:]  # type: ignore[return-value]
+
+    @cached_property
+    def lens_lattice(self) -> Lattice:
+        """The lens centres, in pixels from the top left corner of the pixel array."""
+        pitch = []
+        for pixels, lenses, lens_pitch in zip(self.pixels, self.lenses, self.lens_pitch_mm, strict=True):
+            even, given = pixels / lenses, lens_pitch / self.pixel_pitch_mm
+            # A pitch in millimetres is not a whole number of pixels to the last bit; to a billionth it is.
+            pitch.append(even if abs(given - even) < 1e-9 * even else round(given, 9))
+        shift = self.lens_offset_mm[0] / self.pixel_pitch_mm, -self.lens_offset_mm[1] / self.pixel_pitch_mm
+        origin = [(m - k * p) / 2 + s for m, k, p, s in zip(self.pixels, self.lenses, pitch, shift, strict=True)]
+        return Lattice(self.lenses, (pitch[0], pitch[1]), (origin[0], origin[1]), self.lattice == "hexagonal")
+
+    @property
+    def regular(self) -> bool:
+        """Whether every lens covers its own rectangle of whole pixels, M = K·U and N = L·V."""
+        lattice = self.lens_lattice
+        whole = all(
+            p == round(p) and k * p == m for p, k, m in zip(lattice.pitch, self.lenses, self.pixels, strict=True)
+        )
+        return whole and not lattice.hexagonal and lattice.origin == (0.0, 0.0)
+
+    @property
+    def ei_pixels(self) -> tuple[Any, Any]:
+        """(U, V), pixels across and down in one elementary image: whole numbers if the structure is regular."""
+        u, v = self.lens_lattice.pitch
+        return (int(u), int(v)) if self.regular else (u, v)
+
+    @property
+    def erect(self) -> bool:
+        """Whether elementary images are upright."""
+        return self.lens_model.erect
+
+    @property
+    def samples_aperture(self) -> bool:
+        """Whether rays of a pixel spread over an aperture."""
+        return self.lens_model.samples_aperture
+
+    @property
+    def model(self) -> IICamera | None:
+        """The camera whose parameters describe the picture: itself."""
+        return self
 
     @property
     def size_mm(self) -> tuple[float, float]:
@@ -90,7 +165,8 @@ class IICamera:
         rows: slice = slice(None),
         cols: slice = slice(None),
         sample: ArrayLike = (0.5, 0.5),
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        place: ArrayLike = (0.5, 0.5),
+    ) -> tuple[Floats, Floats]:
         """Location points and direction vectors of a block of pixels.
 
         Parameters
@@ -100,48 +176,83 @@ class IICamera:
         sample : array_like, (2,) or (h, w, 2)
             Where in each pixel the ray starts, right and down from its top left corner, in [0, 1].
             The lens is the one over the pixel's centre, so a sample never strays under a neighbour.
+        place : array_like, (2,) or (h, w, 2)
+            Where on the lens's aperture, in [0, 1] each way; (½, ½) is its centre.
 
         Returns
         -------
         L, D : ndarray of float64, (h, w, 3)
-            Lens centres, mm, and lens centre minus pixel, mm, not normalised.
+            Where rays leave the camera, mm, and where to, not normalised; for a pinhole the lens centre, and lens
+            centre minus pixel. A ray that the optics block has the direction 0.
 
         References
         ----------
         Olsson 2008, (3.15), (3.19), (3.20).
         """
-        m = np.arange(self.pixels[0])[cols]
-        n = np.arange(self.pixels[1])[rows]
-        return self.rays_at(m[None, :], n[:, None], sample)
+        return self.rays_at(*self._block(rows, cols), sample, place)
 
     def rays_at(
-        self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5)
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), place: ArrayLike = (0.5, 0.5)
+    ) -> tuple[Floats, Floats]:
         """Rays of any pixels: m and n broadcast against each other; see `rays`.
 
         Raises
         ------
         ValueError
-            If ``sample`` leaves the pixel.
+            If ``sample`` leaves the pixel or ``place`` the aperture.
         """
-        offset = np.asarray(sample, dtype=np.float64)
-        if offset.shape[-1:] != (2,) or not ((offset >= 0) & (offset <= 1)).all():
-            raise ValueError("sample must hold (right, down) positions inside the pixel, each in [0, 1]")
-        m, n = np.asarray(m), np.asarray(n)
-        (width, height), pitch = self.size_mm, self.pixel_pitch_mm
-        lens_x = lens_centres(nearest_lens(m, self.pixels[0], self.lenses[0]), self.lens_pitch_mm[0], width)
-        lens_y = -lens_centres(nearest_lens(n, self.pixels[1], self.lenses[1]), self.lens_pitch_mm[1], height)
-        shape = np.broadcast_shapes(m.shape, n.shape, offset.shape[:-1])
-        L, D = np.empty((*shape, 3)), np.empty((*shape, 3))
-        L[..., 0], L[..., 1], L[..., 2] = lens_x, lens_y, self.gap_mm
-        D[..., 0] = lens_x - pixel_positions(m, offset[..., 0], pitch, width)
-        D[..., 1] = lens_y + pixel_positions(n, offset[..., 1], pitch, height)
-        D[..., 2] = self.gap_mm
+        L, D, weight = self.weighted_rays_at(m, n, sample, place)
+        if weight is not None:
+            D[weight == 0] = 0
         return L, D
 
+    def weighted_rays(
+        self,
+        rows: slice = slice(None),
+        cols: slice = slice(None),
+        sample: ArrayLike = (0.5, 0.5),
+        place: ArrayLike = (0.5, 0.5),
+    ) -> tuple[Floats, Floats, Floats | None]:
+        """L and D as `rays` gives them, and the share of light (h, w) that the optics let through, None for all."""
+        return self.weighted_rays_at(*self._block(rows, cols), sample, place)
+
+    def weighted_rays_at(
+        self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), place: ArrayLike = (0.5, 0.5)
+    ) -> tuple[Floats, Floats, Floats | None]:
+        """As `weighted_rays`, for any pixels."""
+        sample, place = _inside("sample", sample), _inside("place", place)
+        m, n = np.asarray(m), np.asarray(n)
+        shape = np.broadcast_shapes(m.shape, n.shape, sample.shape[:-1], place.shape[:-1])
+        rays = self._bundle(m, n, sample, place)
+        L, D = np.empty((*shape, 3)), np.empty((*shape, 3))
+        for axis, (place_mm, towards) in enumerate(zip(rays[:3], rays[3:6], strict=True)):
+            L[..., axis] = place_mm + self.origin_mm[axis]
+            D[..., axis] = towards
+        return L, D, None if rays.weight is None else np.broadcast_to(rays.weight, shape).copy()
+
+    def _block(self, rows: slice, cols: slice) -> tuple[NDArray[Any], NDArray[Any]]:
+        return np.arange(self.pixels[0])[None, cols], np.arange(self.pixels[1])[rows, None]
+
+    def _bundle(self, m: NDArray[Any], n: NDArray[Any], sample: Floats, place: Floats) -> Bundle:
+        lattice, pitch, (width, height) = self.lens_lattice, self.pixel_pitch_mm, self.size_mm
+        k, l = lattice.nearest(m, n)
+        x, y = lattice.centres(k, l)
+        ax, ay = unit_disk(place) if self.lens_model.samples_aperture else (np.float64(0), np.float64(0))
+        under = Under(
+            px=(m + sample[..., 0]) * pitch - width / 2,
+            py=height / 2 - (n + sample[..., 1]) * pitch,
+            cx=x * pitch - width / 2,
+            cy=height / 2 - y * pitch,
+            k=k, l=l, ax=ax, ay=ay, gap=self.gap_mm, cell=self.lens_pitch_mm,
+        )  # fmt: skip
+        rays = self.lens_model.leave(under)
+        for front in self.front:
+            rays = front.pass_on(rays)
+        return rays
+
     def to_json(self) -> dict[str, Any]:
-        """Plain values that `from_json` takes back."""
-        return {
+        """Plain values that `from_json` takes back; what is as usual is left out."""
+        data: dict[str, Any] = {
             "kind": "lenslet-array",
             "name": self.name,
             "pixels": list(self.pixels),
@@ -149,9 +260,19 @@ class IICamera:
             "pixel_pitch_mm": self.pixel_pitch_mm,
             "gap_mm": self.gap_mm,
         }
+        usual = IICamera(
+            pixels=self.pixels, lenses=self.lenses, pixel_pitch_mm=self.pixel_pitch_mm, gap_mm=self.gap_mm
+        )
+        for field in ("lens_pitch_mm", "lattice", "lens_offset_mm", "origin_mm"):
+            value = getattr(self, field)
+            if value != getattr(usual, field):
+                data[field] = list(value) if isinstance(value, tuple) else value
+        if self.optics != usual.optics:
+            data["optics"] = [e.to_json() for e in self.optics]
+        return data
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> IICamera:
+    def from_json(cls, data: Any) -> IICamera:
         """A camera from `to_json`'s values.
 
         Raises
@@ -159,19 +280,55 @@ class IICamera:
         ValueError
             If a value is missing, unknown or out of range.
         """
-        known = {"kind", "name", "pixels", "lenses", "pixel_pitch_mm", "gap_mm"}
-        if not isinstance(data, Mapping) or set(data) != known or data["kind"] != "lenslet-array":
-            raise ValueError(f"not a lenslet-array camera: needs exactly the keys {', '.join(sorted(known))}")
-        try:
-            return cls(
-                pixels=tuple(data["pixels"]),
-                lenses=tuple(data["lenses"]),
-                pixel_pitch_mm=data["pixel_pitch_mm"],
-                gap_mm=data["gap_mm"],
-                name=str(data["name"]),
+        needed = {"pixels", "lenses", "pixel_pitch_mm", "gap_mm"}
+        known = needed | {
+            "kind",
+            "name",
+            "lens_pitch_mm",
+            "lattice",
+            "optics",
+            "lens_offset_mm",
+            "origin_mm",
+            "about",
+        }
+        if not isinstance(data, Mapping) or data.get("kind", "lenslet-array") != "lenslet-array":
+            raise ValueError('no camera: needs "kind": "lenslet-array"')
+        if missing := needed - set(data):
+            raise ValueError(f"camera: {', '.join(sorted(missing))} missing")
+        if unknown := set(data) - known:
+            raise ValueError(
+                f"camera: no such key {', '.join(sorted(unknown))}: known are {', '.join(sorted(known))}"
             )
+        parameters = {key: value for key, value in data.items() if key not in ("kind", "about")}
+        if not isinstance(parameters.get("optics", ()), Sequence) or isinstance(parameters.get("optics"), str):
+            raise ValueError(f"camera: optics are {parameters['optics']!r}: a list of elements is needed")
+        try:
+            return cls(**{**parameters, "name": str(parameters.get("name", ""))})
         except TypeError as error:
             raise ValueError(f"camera has a value of the wrong type: {error}") from None
+
+
+def _inside(name: str, value: ArrayLike) -> Floats:
+    place = np.asarray(value, dtype=np.float64)
+    if place.shape[-1:] != (2,) or not ((place >= 0) & (place <= 1)).all():
+        raise ValueError(f"{name} must hold positions (right, down), each in [0, 1]")
+    return place
+
+
+def positive(name: str, value: Any) -> float:
+    """A length, or a ValueError that names it."""
+    number = float(value)
+    if not 0 < number < math.inf:
+        raise ValueError(f"{name} is {number:g}: a positive length in mm is needed")
+    return number
+
+
+def finite(name: str, value: Any, count: int) -> tuple[Any, ...]:
+    """So many finite numbers, or a ValueError that names them."""
+    numbers = tuple(float(x) for x in value)
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{name} is {value}: {count} finite numbers are needed")
+    return numbers
 
 
 def whole_pair(name: str, value: Any) -> Pair:
@@ -179,18 +336,8 @@ def whole_pair(name: str, value: Any) -> Pair:
     try:
         a, b = value
         across, down = int(a), int(b)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} is {value!r}: two whole numbers are needed") from None
     if (across, down) != (a, b) or across < 1 or down < 1:
         raise ValueError(f"{name} is {a}×{b}: two whole numbers of at least 1 are needed")
     return across, down
-
-
-def check_structure(pixels: Pair, lenses: Pair) -> None:
-    """Raise ValueError unless K×L lenses divide M×N pixels."""
-    for count, lens_count, side in ((pixels[0], lenses[0], "width"), (pixels[1], lenses[1], "height")):
-        if count % lens_count:
-            raise ValueError(
-                f"{lenses[0]}×{lenses[1]} lenses do not divide picture {side} {count}: "
-                "a regular structure needs whole pixels per lens"
-            )

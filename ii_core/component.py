@@ -52,6 +52,7 @@ def component_images(picture: IIPicture, kind: str) -> NDArray[Any]:
         If the kind is unknown.
     """
     _check_kind(kind)
+    picture.check_regular()
     return _permute(light_field(picture.pixels, picture.lenses, picture.ei_pixels), kind, split=True)
 
 

@@ -21,7 +21,7 @@ DTYPES = ("uint8", "uint16", "float32")
 
 @dataclass(frozen=True, eq=False)
 class IIPicture:
-    """An integral-imaging picture with a regular structure.
+    """An integral-imaging picture.
 
     Parameters
     ----------
@@ -30,7 +30,8 @@ class IIPicture:
     lenses : (K, L)
         Lenslets across and down.
     ei_pixels : (U, V)
-        Pixels across and down under each lenslet; M = K·U and N = L·V.
+        Pixels across and down under each lenslet; M = K·U and N = L·V. Not whole numbers if a camera with a
+        hexagonal array or with pixels shared between lenses says so.
     camera : IICamera, optional
         What took it; needed to make view images.
     erect : bool
@@ -44,38 +45,62 @@ class IIPicture:
 
     pixels: NDArray[Any]
     lenses: Pair
-    ei_pixels: Pair
+    ei_pixels: tuple[Any, Any]
     camera: IICamera | None = None
     erect: bool = False
 
     def __post_init__(self) -> None:
-        for field in ("lenses", "ei_pixels"):
-            object.__setattr__(self, field, whole_pair(field, getattr(self, field)))
-        pixels = self.pixels
+        pixels, camera = self.pixels, self.camera
         if not isinstance(pixels, np.ndarray) or pixels.ndim != 3 or pixels.shape[2] != 3:
             shape = getattr(pixels, "shape", type(pixels).__name__)
             raise ValueError(f"pixels are {shape}: an array of shape (N, M, 3) is needed")
         if pixels.dtype.name not in DTYPES:
             raise ValueError(f"pixels are {pixels.dtype.name}: one of {', '.join(DTYPES)} is needed")
-        (k, l), (u, v) = self.lenses, self.ei_pixels
-        for across, size, lens_count, side in (
-            (u, pixels.shape[1], k, "width"),
-            (v, pixels.shape[0], l, "height"),
-        ):
+        object.__setattr__(self, "lenses", whole_pair("lenses", self.lenses))
+        if camera is not None and not camera.regular:
+            self._check_irregular(camera)
+        else:
+            object.__setattr__(self, "ei_pixels", whole_pair("ei_pixels", self.ei_pixels))
+            self._check_regular(camera)
+
+    def _check_regular(self, camera: IICamera | None) -> None:
+        (k, l), (u, v), (width, height) = self.lenses, self.ei_pixels, self.size
+        for across, size, lens_count, side in ((u, width, k, "width"), (v, height, l, "height")):
             if size % across:
                 raise ValueError(f"elementary image {u}×{v} px does not divide picture {side} {size}")
             if size != lens_count * across:
                 raise ValueError(
                     f"{k}×{l} lenses of {u}×{v} px need a picture of {k * u}×{l * v} px, "
-                    f"this one has {pixels.shape[1]}×{pixels.shape[0]}"
+                    f"this one has {width}×{height}"
                 )
-        if self.camera is not None and (self.camera.lenses, self.camera.ei_pixels) != (
-            self.lenses,
-            self.ei_pixels,
-        ):
+        if camera is not None and (camera.lenses, camera.ei_pixels) != (self.lenses, self.ei_pixels):
             raise ValueError(
-                f"the camera has {self.camera.lenses} lenses of {self.camera.ei_pixels} px, "
+                f"the camera has {camera.lenses} lenses of {camera.ei_pixels} px, "
                 f"the picture {self.lenses} of {self.ei_pixels}"
+            )
+
+    def _check_irregular(self, camera: IICamera) -> None:
+        u, v = self.ei_pixels
+        object.__setattr__(self, "ei_pixels", (float(u), float(v)))
+        if camera.pixels != self.size or (camera.lenses, camera.ei_pixels) != (self.lenses, self.ei_pixels):
+            raise ValueError(
+                f"the camera has {camera.pixels[0]}×{camera.pixels[1]} px and {camera.lenses} lenses of "
+                f"{camera.ei_pixels} px, "
+                f"the picture {self.size[0]}×{self.size[1]} and {self.lenses} of {self.ei_pixels}"
+            )
+
+    @property
+    def regular(self) -> bool:
+        """Whether every lens covers its own rectangle of whole pixels; only then are there component images."""
+        return self.camera is None or self.camera.regular
+
+    def check_regular(self) -> None:
+        """Raise ValueError unless the structure is regular."""
+        if not self.regular:
+            u, v = self.ei_pixels
+            raise ValueError(
+                f"the structure is not regular, elementary images of {u:.5g}×{v:.5g} px: "
+                "ii_core.regular brings the picture to a regular one"
             )
 
     @property

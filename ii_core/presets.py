@@ -1,75 +1,112 @@
-"""Cameras by name: the dissertation's coding setups and its 2D pinhole camera (Tables 3.1, 5.1, 5.2)."""
+"""Cameras by name, from the JSON files of ``assets/cameras``, and from files of the user's own."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
 
-from .camera import IICamera, Pair
+from .camera import IICamera
 
-PIXEL_PITCH_MM = 0.0061
-# The dissertation gives f for setup 3 only; its viewing angle (2.1) is kept for the other setups.
-VIEW_ANGLE_DEG = math.degrees(2 * math.atan(0.39 / (2 * 0.73)))
-
-
-@dataclass(frozen=True)
-class Preset:
-    """The structure of a named camera and what it is for."""
-
-    pixels: Pair
-    lenses: Pair
-    about: str
-
-
-PRESETS = {
-    "setup1": Preset((8192, 4096), (512, 256), "coding setup 1: many small elementary images, 16×16 px"),
-    **{
-        f"setup2-{ei}": Preset(
-            (8192, 4096), (8192 // ei, 4096 // ei), f"coding setup 2 with {ei}×{ei} px elementary images"
-        )
-        for ei in (16, 32, 64, 128, 256)
-    },
-    "setup3": Preset((4096, 4096), (64, 64), "coding setup 3: as many lenses as pixels per lens"),
-    "pinhole2d": Preset((8192, 4608), (1, 1), "a 2D camera: one pinhole"),
-}
 ALIASES = {"setup2": "setup2-16"}
 
 
-def preset(name: str, *, scale: int = 1) -> IICamera:
-    """A camera by name.
+def camera_names() -> dict[str, str]:
+    """Names of the cameras that come with the package, each with a line on what it is."""
+    return {path.stem: str(_read(path).get("about", "")) for path in _folder().glob("*.json")}
+
+
+def preset(name: str | os.PathLike[str], *, scale: int = 1) -> IICamera:
+    """A camera by name, or from a JSON file.
 
     Parameters
     ----------
-    name : str
-        One of `PRESETS`; ``setup2`` is ``setup2-16``.
+    name : str or path
+        One of `camera_names`; ``setup2`` is ``setup2-16``. Or a file that ends in ``.json``.
     scale : int
         Divides the number of lenses (of pixels, for a camera of one lens) along both axes. Sensor size,
-        pixels per elementary image and viewing angle stay, so pixel pitch, lens pitch and gap grow by ``scale``
-        and a scene looks the same, coarser, at every scale.
+        pixels per elementary image and viewing angle stay, so pixel pitch, lens pitch, gap and everything else
+        about a lenslet grow by ``scale`` and a scene looks the same, coarser, at every scale.
 
     Raises
     ------
     ValueError
-        If the name is unknown or the scale does not divide the lenses.
+        If the name is unknown, the file is wrong, the scale does not divide the lenses, or the name stands for
+        several cameras.
+    OSError
+        If the file is missing.
     """
+    cameras = preset_cameras(name, scale=scale)
+    if len(cameras) > 1:
+        raise ValueError(f"camera {str(name)!r} is a set of {len(cameras)}: preset_cameras gives them all")
+    return cameras[0]
+
+
+def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IICamera, ...]:
+    """All cameras of a name: one, or those of a camera array, of moving lenslets or of stacked sensors.
+
+    Parameters and errors are those of `preset`.
+    """
+    path = Path(name)
+    if path.suffix != ".json":
+        stem = ALIASES.get(str(name), str(name))
+        path = _folder() / f"{stem}.json"
+        if not path.is_file() or os.sep in stem:
+            known = ", ".join([*sorted(camera_names()), *ALIASES])
+            raise ValueError(f"unknown camera {str(name)!r}: known are {known}, or give a .json file")
+    data = _read(path)
     try:
-        p = PRESETS[ALIASES.get(name, name)]
-    except KeyError:
-        raise ValueError(f"unknown camera {name!r}: known are {', '.join([*PRESETS, *ALIASES])}") from None
-    divided, what = (p.pixels, "pixels") if p.lenses == (1, 1) else (p.lenses, "lenses")
-    if not isinstance(scale, int) or scale < 1 or divided[0] % scale or divided[1] % scale:
+        members = data["cameras"] if data.get("kind") == "set" else [data]
+        return tuple(scaled(IICamera.from_json({"name": path.stem, **member}), scale) for member in members)
+    except (ValueError, TypeError, KeyError) as error:
+        raise ValueError(f"{path if Path(name).suffix else name}: {error}") from None
+
+
+def scaled(camera: IICamera, scale: int) -> IICamera:
+    """The camera with ``scale`` times as large, fewer lenslets, or pixels if it has but one lens."""
+    single = camera.lenses == (1, 1)
+    divided, what = (camera.pixels, "pixels") if single else (camera.lenses, "lenses")
+    if not isinstance(scale, int) or scale < 1 or any(n % scale for n in (*divided, *camera.pixels)):
         raise ValueError(
-            f"scale {scale} does not divide the {divided[0]}×{divided[1]} {what} of {name}: "
-            "a whole number that divides both is needed"
+            f"scale {scale} does not divide the {divided[0]}×{divided[1]} {what} and "
+            f"{camera.pixels[0]}×{camera.pixels[1]} pixels: a whole number that divides all is needed"
         )
-    lenses = p.lenses if p.lenses == (1, 1) else (p.lenses[0] // scale, p.lenses[1] // scale)
-    pitch = PIXEL_PITCH_MM * scale
-    pixels = p.pixels[0] // scale, p.pixels[1] // scale
-    lens_width = pixels[0] // lenses[0] * pitch
-    return IICamera(
-        name=name,
+    pixels = camera.pixels[0] // scale, camera.pixels[1] // scale
+    pitch = camera.pixel_pitch_mm * scale
+    if single:
+        return replace(camera, pixels=pixels, pixel_pitch_mm=pitch)
+    return replace(
+        camera,
         pixels=pixels,
-        lenses=lenses,
+        lenses=(camera.lenses[0] // scale, camera.lenses[1] // scale),
         pixel_pitch_mm=pitch,
-        gap_mm=lens_width / (2 * math.tan(math.radians(VIEW_ANGLE_DEG) / 2)),
+        gap_mm=camera.gap_mm * scale,
+        lens_pitch_mm=_times(camera.lens_pitch_mm, scale),
+        lens_offset_mm=_times(camera.lens_offset_mm, scale),
+        origin_mm=_times(camera.origin_mm, scale),
+        optics=tuple(element.scaled(scale) for element in camera.optics),
     )
+
+
+def _times(lengths: tuple[float, ...], scale: int) -> Any:
+    return tuple(x * scale for x in lengths)
+
+
+def _folder() -> Path:
+    return Path(str(files("assets") / "cameras"))
+
+
+def _read(path: Path) -> Mapping[str, Any]:
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist")
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    if not isinstance(data, Mapping):
+        raise ValueError(f"{path}: no camera: an object is needed")
+    return data

@@ -46,6 +46,7 @@ def view_image(
     """
     if interpolation not in ("linear", "nearest"):
         raise ValueError(f"unknown interpolation {interpolation!r}: known are linear, nearest")
+    picture.check_regular()
     x, y = view_positions(camera_of(picture), viewpoint_mm, erect=picture.erect)
     (width, height), (u, v) = picture.size, picture.ei_pixels
     m, n = np.floor(x + 0.5).astype(np.int64), np.floor(y + 0.5).astype(np.int64)
@@ -89,7 +90,7 @@ def view_positions(
     lens_y = camera.size_mm[1] / 2 - (np.arange(l) + 0.5) * camera.lens_pitch_mm[1]
     to_pixels = sign * camera.gap_mm / ((camera.gap_mm - e[2]) * camera.pixel_pitch_mm)
     x = np.arange(k) * u + (u - 1) / 2 - (lens_x - e[0]) * to_pixels
-    y = np.arange(l) * v + (v - 1) / 2 + (lens_y - e[1]) * to_pixels
+    y = np.arange(l) * v + (v - 1) / 2 + (lens_y - e[1]) * to_pixels * camera.lens_model.vertical_parallax
     return x, y
 
 
@@ -202,6 +203,7 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
 
 def orthoscopic(picture: IIPicture) -> IIPicture:
     """Every elementary image rotated by 180°: pseudoscopic to orthoscopic and back."""
+    picture.check_regular()
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
     field = picture.pixels.reshape(l, v, k, u, 3)[:, ::-1, :, ::-1]
     turned = np.ascontiguousarray(field).reshape(picture.pixels.shape)

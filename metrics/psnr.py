@@ -62,6 +62,7 @@ def q_angle(reference: IIPicture, decoded: IIPicture) -> NDArray[np.float64]:
     Olsson 2008, (2.18).
     """
     total = _squared_errors(reference, decoded)
+    reference.check_regular()
     return psnr(total, reference.pixels.size // total.size, reference.pixels.dtype)
 
 
@@ -129,7 +130,9 @@ def psnr(squared_error: Any, count: Any, dtype: np.dtype[Any]) -> NDArray[np.flo
 def _squared_errors(reference: IIPicture, decoded: IIPicture) -> NDArray[np.float64]:
     """Sum of squared errors of each sub-image, (V, U)."""
     check_pair(reference, decoded)
-    structure = reference.lenses, reference.ei_pixels
+    structure: Any = reference.lenses, reference.ei_pixels
+    if not reference.regular:
+        structure = reference.size, (1, 1)
     a, b = light_field(reference.pixels, *structure), light_field(decoded.pixels, *structure)
     out = np.zeros((a.shape[1], a.shape[3]))
     sum_squared_errors(a.reshape(*a.shape[:3], -1), b.reshape(*b.shape[:3], -1), np.empty(a.shape[3] * 3), out)

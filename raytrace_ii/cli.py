@@ -46,14 +46,9 @@ def scenes() -> None:
 @app.command()
 def cameras() -> None:
     """List the cameras."""
-    from ii_core import PRESETS
+    from ii_core import camera_names
 
-    _columns(
-        {
-            name: f"{p.pixels[0]}×{p.pixels[1]} px, {p.lenses[0]}×{p.lenses[1]} lenses: {p.about}"
-            for name, p in PRESETS.items()
-        }
-    )
+    _columns(dict(sorted(camera_names().items())))
 
 
 @app.command()

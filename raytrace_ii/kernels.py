@@ -32,13 +32,26 @@ _SPECULAR, _SHININESS, _IOR, _LOCAL, _TEXTURE, _LEAST_HALF = 12, 13, 14, 15, 16,
 
 
 @kernel
-def start_rays(locations, directions, rotation, shift, out_origins, out_directions):
-    """Place and normalise camera rays; the index of the first unusable one, or −1."""
-    bad = -1
+def start_rays(
+    locations, directions, shares, rotation, shift, out_origins, out_directions, out_weights, out_pixels, out_inside
+):
+    """Place and normalise the camera rays that carry light, packed to the front.
+
+    ``shares`` is the share of light of every ray, empty if all carry all.
+
+    Returns
+    -------
+    count, bad : int
+        How many rays there are, and the index of the first unusable one, or −1.
+    """
+    count, bad = 0, -1
     for i in range(locations.shape[0]):
+        share = shares[i] if shares.shape[0] > 0 else 1.0
+        if share == 0.0:
+            continue
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        if not (0.0 < length < math.inf) and bad < 0:
+        if not (0.0 < length < math.inf and 0.0 < share < math.inf) and bad < 0:
             bad = i
         inverse = 1.0 / length if length > 0.0 else 0.0
         x, y, z = locations[i, 0], locations[i, 1], locations[i, 2]
@@ -47,27 +60,31 @@ def start_rays(locations, directions, rotation, shift, out_origins, out_directio
             place = r0 * x + r1 * y + r2 * z + shift[c]
             if not math.isfinite(place) and bad < 0:
                 bad = i
-            out_origins[i, c] = place
-            out_directions[i, c] = (r0 * dx + r1 * dy + r2 * dz) * inverse
-    return bad
+            out_origins[count, c] = place
+            out_directions[count, c] = (r0 * dx + r1 * dy + r2 * dz) * inverse
+            out_weights[count, c] = share
+        out_pixels[count] = i
+        out_inside[count] = -1
+        count += 1
+    return count, bad
 
 
 @kernel
-def record_support(primitives, u, v, corners, faces, object_of_face, eye, axis, depth, normal, object_id):
+def record_support(primitives, u, v, pixels, corners, faces, object_of_face, eye, axis, depth, normal, object_id):
     """Depth along the camera's axis, face normal and object of every primary ray."""
     for i in range(primitives.shape[0]):
-        f = primitives[i]
+        f, pixel = primitives[i], pixels[i]
         if f < 0:
-            depth[i] = math.nan
-            object_id[i] = -1
+            depth[pixel] = math.nan
+            object_id[pixel] = -1
             for c in range(3):
-                normal[i, c] = 0.0
+                normal[pixel, c] = 0.0
             continue
-        object_id[i] = object_of_face[f]
+        object_id[pixel] = object_of_face[f]
         px, py, pz = _hit_point(corners, f, u[i], v[i])
-        depth[i] = (px - eye[0]) * axis[0] + (py - eye[1]) * axis[1] + (pz - eye[2]) * axis[2]
+        depth[pixel] = (px - eye[0]) * axis[0] + (py - eye[1]) * axis[1] + (pz - eye[2]) * axis[2]
         for c in range(3):
-            normal[i, c] = faces[f, c]
+            normal[pixel, c] = faces[f, c]
 
 
 @kernel
@@ -298,16 +315,33 @@ def encode_srgb(radiance, scale, curve, out):
 
 
 @kernel
-def jitter(seed, sample, across, down, columns, first_row, first_column, out):
-    """A place in stratum ``sample`` of across × down, for each pixel its own: a hash of seed, pixel and sample."""
+def jitter(seed, sample, across, down, shuffle, columns, first_row, first_column, out):
+    """A place in one stratum of across × down, for each pixel its own: a hash of seed, pixel and sample.
+
+    The stratum is ``sample``, or, if ``shuffle``, one of a walk through all that starts elsewhere in every pixel:
+    places on the aperture must not follow those in the pixel.
+    """
+    strata = across * down
+    stride = max(1, int(0.618 * strata)) if shuffle else 1
+    while _common_divisor(stride, strata) > 1:
+        stride += 1
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             pixel = np.uint64(first_row + i) * np.uint64(columns) + np.uint64(first_column + j)
-            h = _mix(_mix(np.uint64(seed) ^ _mix(pixel)) + np.uint64(sample))
-            x = (sample % across + (h >> np.uint64(40)) * (1.0 / 16777216.0)) / across
-            y = (sample // across + ((h >> np.uint64(8)) & np.uint64(16777215)) * (1.0 / 16777216.0)) / down
+            own = _mix(np.uint64(seed) ^ _mix(pixel))
+            h = _mix(own + np.uint64(sample))
+            stratum = (sample * stride + int(own >> np.uint64(33))) % strata if shuffle else sample
+            x = (stratum % across + (h >> np.uint64(40)) * (1.0 / 16777216.0)) / across
+            y = (stratum // across + ((h >> np.uint64(8)) & np.uint64(16777215)) * (1.0 / 16777216.0)) / down
             out[i, j, 0] = x
             out[i, j, 1] = y
+
+
+@kernel
+def _common_divisor(a, b):
+    while b:
+        a, b = b, a % b
+    return a
 
 
 FAR = np.float32(1e30)  # how far a shadow ray to a directional light reaches, in its own lengths

@@ -21,6 +21,7 @@ from .scene import Scene
 from .trace import RayCount, Support, Tracer, rigid
 
 TILE_RAYS = 65536  # enough that numpy's overhead vanishes, few enough that work arrays stay in cache
+APERTURE_SEED = 1 << 40  # apart from all seeds a person gives
 SUPPORT = ("depth", "normal", "object_id")
 
 
@@ -119,7 +120,7 @@ def render(
             pool.shutdown(cancel_futures=True)
             raise
     out = job.out
-    picture = IIPicture(out["pixels"], camera.lenses, camera.ei_pixels, camera)
+    picture = IIPicture(out["pixels"], camera.lenses, camera.ei_pixels, camera.model, camera.erect)
     return Shot(
         picture=add_sensor_noise(picture, noise, seed) if noise else picture,
         **{name: out.get(name) for name in SUPPORT},
@@ -203,9 +204,8 @@ class _Job:
         radiance = np.zeros((n, 3), np.float32)
         support = self._support(rows, cols)
         for sample in range(self.samples):
-            place = self._place(sample, rows, cols)
-            L, D = self.camera.rays(rows, cols, place)
-            tracer.run(L, D, radiance, support if sample == 0 else None)
+            L, D, shares = self.camera.weighted_rays(rows, cols, *self._places(sample, rows, cols))
+            tracer.run(L, D, radiance, support if sample == 0 else None, shares)
         # A tile is whole rows or a piece of one: its block of each array is one run of memory.
         pixels = self.out["pixels"][rows, cols].reshape(n, 3)
         curve = _CURVES[pixels.dtype.name]
@@ -223,12 +223,19 @@ class _Job:
         wanted = {name: self.out[name][rows, cols] for name in self.out if name != "pixels"}
         return Support(**{**vars(Support.empty(shape)), **wanted})
 
-    def _place(self, sample: int, rows: slice, cols: slice) -> ArrayLike:
+    def _places(self, sample: int, rows: slice, cols: slice) -> list[ArrayLike]:
+        """Where in the pixel and where on the aperture."""
         if self.samples == 1:
-            return (0.5, 0.5)
+            return [(0.5, 0.5), (0.5, 0.5)]
         down = max(d for d in range(1, math.isqrt(self.samples) + 1) if self.samples % d == 0)
-        out = np.empty((rows.stop - rows.start, cols.stop - cols.start, 2))
-        kernels.jitter(
-            self.seed, sample, self.samples // down, down, self.camera.pixels[0], rows.start, cols.start, out
-        )
-        return out
+        places: list[ArrayLike] = []
+        for aperture in (False, True):
+            out = np.empty((rows.stop - rows.start, cols.stop - cols.start, 2))
+            kernels.jitter(
+                self.seed + APERTURE_SEED * aperture, sample, self.samples // down, down, aperture,
+                self.camera.pixels[0], rows.start, cols.start, out,
+            )  # fmt: skip
+            places.append(out)
+            if not self.camera.samples_aperture:
+                return [out, (0.5, 0.5)]
+        return places

@@ -86,6 +86,10 @@ class Support:
     def empty(cls, shape: tuple[int, ...]) -> Support:
         return cls(np.empty(shape, np.float32), np.empty((*shape, 3), np.float32), np.empty(shape, np.int32))
 
+    def clear(self) -> None:
+        """As if no ray hit anything."""
+        self.depth[...], self.normal[...], self.object_id[...] = np.nan, 0, -1
+
 
 def rigid(pose: ArrayLike | None) -> NDArray[np.float64]:
     """A (4, 4) rigid transform, checked; the identity for None."""
@@ -136,24 +140,29 @@ class Tracer:
         directions: NDArray[Any],
         radiance: NDArray[np.float32],
         support: Support | None,
+        shares: NDArray[np.float64] | None = None,
     ) -> None:
-        """Add what each ray sees to ``radiance`` (n, 3), and fill ``support`` if given."""
+        """Add what each ray sees to ``radiance`` (n, 3), and fill ``support`` if given.
+
+        ``shares`` is the share of light that each ray carries; one that carries none is not traced.
+        """
         shape = locations.shape[:-1]
         locations, directions = locations.reshape(-1, 3), directions.reshape(-1, 3)
-        n = len(locations)
-        rays = _Rays(*(array[:n] for array in vars(self._primary).values()))
-        bad = kernels.start_rays(
-            locations, directions, self.pose[:3, :3], self.pose[:3, 3], rays.origins, rays.directions
-        )
+        shares = np.empty(0) if shares is None else shares.reshape(-1)
+        room = self._primary
+        n, bad = kernels.start_rays(
+            locations, directions, shares, self.pose[:3, :3], self.pose[:3, 3],
+            room.origins, room.directions, room.weights, room.pixels, room.inside,
+        )  # fmt: skip
         if bad >= 0:
             where = ", ".join(map(str, np.unravel_index(bad, shape)))
             raise ValueError(
                 f"ray [{where}] from {locations[bad].tolist()} along {directions[bad].tolist()}: "
                 "a finite place and a finite direction other than zero are needed"
             )
-        rays.weights.fill(1)
-        rays.pixels[:] = np.arange(n, dtype=np.int32)
-        rays.inside.fill(-1)
+        if support is not None and n < len(locations):
+            support.clear()
+        rays = _Rays(*(array[:n] for array in vars(room).values()))
         self.count.rays["primary"] += n
         for depth in range(self.max_depth + 1):
             rays = self._generation(rays, radiance, support if depth == 0 else None, spawn=depth < self.max_depth)
@@ -168,7 +177,8 @@ class Tracer:
         primitives, u, v = hits["primID"], hits["u"], hits["v"]
         if support is not None:
             kernels.record_support(
-                primitives, u, v, s.corners, s.faces, s.object_of_face, self.pose[:3, 3], self.pose[:3, 2],
+                primitives, u, v, rays.pixels, s.corners, s.faces, s.object_of_face,
+                self.pose[:3, 3], self.pose[:3, 2],
                 support.depth.reshape(-1), support.normal.reshape(-1, 3), support.object_id.reshape(-1),
             )  # fmt: skip
         spawn = spawn and (s.mirrors or s.transmits)

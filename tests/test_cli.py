@@ -151,7 +151,7 @@ def test_a_mesh_with_vertices_that_are_not_numbers(run, tmp_path):
 
 BAD_RENDERS = {
     "unknown scene 'nope': known are apples": ["nope"],
-    "unknown camera 'nope': known are setup1": ["apples", "--camera", "nope"],
+    "unknown camera 'nope': known are": ["apples", "--camera", "nope"],
     "scale 3 does not divide": ["apples", "--scale", 3],
     "samples is 0": ["apples", "--scale", 64, "--samples", 0],
     "workers is 0": ["apples", "--scale", 64, "--workers", 0],

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from ii_core import PRESETS, IICamera, preset
+from ii_core import IICamera, preset
 
 CASES = [("setup1", 8), ("setup1", 64), ("setup2-32", 8), ("setup2-128", 4), ("setup3", 8)]
 
@@ -102,7 +102,7 @@ def test_a_sample_for_every_pixel():
 
 @pytest.mark.parametrize("sample", [(-0.1, 0), (0, 1.01), (math.nan, 0), (0.5,), 0.5])
 def test_samples_outside_the_pixel_are_refused(sample):
-    with pytest.raises(ValueError, match="inside the pixel"):
+    with pytest.raises(ValueError, match="must hold positions"):
         preset("setup3", scale=64).rays(sample=sample)
 
 
@@ -133,7 +133,9 @@ def test_setup3_lenslet():
     assert camera.lens_pitch_mm == pytest.approx((0.39, 0.39), abs=0.005)
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize(
+    "name", ("setup1", "setup2-16", "setup2-32", "setup2-64", "setup2-128", "setup2-256", "setup3", "pinhole2d")
+)
 @pytest.mark.parametrize("scale", [2, 4, 16])
 def test_scale_keeps_what_a_scene_sees(name, scale):
     full, scaled = preset(name), preset(name, scale=scale)
@@ -150,10 +152,12 @@ def test_scale_keeps_what_a_scene_sees(name, scale):
 
 
 def test_preset_refusals():
-    with pytest.raises(ValueError, match=r"unknown camera 'setup9': known are setup1, .*setup3, pinhole2d, setup2"):
+    with pytest.raises(
+        ValueError, match=r"unknown camera 'setup9': known are .*pinhole2d, .*setup1, .*setup3, .*setup2"
+    ):
         preset("setup9")
     for scale in (3, 0, -1, 512, 1.5):
-        with pytest.raises(ValueError, match=rf"scale {scale} does not divide the 512×256 lenses of setup1"):
+        with pytest.raises(ValueError, match=rf"setup1: scale {scale} does not divide the 512×256 lenses"):
             preset("setup1", scale=scale)
 
 
@@ -167,8 +171,11 @@ GOOD = {"pixels": (8, 6), "lenses": (2, 3), "pixel_pitch_mm": 0.1, "gap_mm": 1.0
         ({"pixel_pitch_mm": 0}, "pixel_pitch_mm is 0"),
         ({"gap_mm": -1}, "gap_mm is -1"),
         ({"gap_mm": math.inf}, "gap_mm is inf"),
-        ({"lenses": (3, 3)}, "3×3 lenses do not divide picture width 8"),
-        ({"lenses": (2, 4)}, "2×4 lenses do not divide picture height 6"),
+        ({"lens_pitch_mm": 0}, "lens_pitch_mm is 0"),
+        ({"lattice": "square"}, "unknown lattice 'square': known are rectangular, hexagonal"),
+        ({"optics": ["prism"]}, "unknown optical element 'prism': known are pinhole"),
+        ({"optics": ["pinhole", "grin"]}, "grin is a lens model: it must be the first"),
+        ({"origin_mm": (0, 0)}, "origin_mm is"),
         ({"lenses": (0, 1)}, "lenses is 0×1: two whole numbers of at least 1"),
         ({"pixels": (8.5, 6)}, "pixels is 8.5×6"),
         ({"pixels": 8}, "pixels is 8: two whole numbers"),
@@ -188,11 +195,11 @@ def test_json_round_trip():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"kind": "fisheye"}, "not a lenslet-array camera"),
-        ({"colour": 1}, "not a lenslet-array camera"),
+        ({"kind": "fisheye"}, "no camera"),
+        ({"colour": 1}, "no such key colour"),
         ({"gap_mm": 0}, "gap_mm is 0"),
         ({"gap_mm": None}, "wrong type"),
-        ({"pixels": 5}, "wrong type"),
+        ({"pixels": 5}, "pixels is 5"),
         ({"lenses": ["two", 2]}, "lenses is"),
     ],
 )
@@ -203,5 +210,5 @@ def test_broken_json(change, message):
 
 def test_json_that_is_no_object_or_lacks_a_key():
     for data in (None, [], {"kind": "lenslet-array"}):
-        with pytest.raises(ValueError, match="needs exactly the keys gap_mm"):
+        with pytest.raises(ValueError, match=r"no camera|gap_mm, lenses, pixel_pitch_mm, pixels missing"):
             IICamera.from_json(data)

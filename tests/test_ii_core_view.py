@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ii_core import PRESETS, IICamera, IIPicture, five_viewpoints, orthoscopic, preset, refocus, view_image
+from ii_core import IICamera, IIPicture, five_viewpoints, orthoscopic, preset, refocus, view_image
 from ii_core.view import view_positions
 
 CAMERA = IICamera(pixels=(42, 30), lenses=(7, 5), pixel_pitch_mm=0.25, gap_mm=2.0)  # 6×6 px under each lens
@@ -209,7 +209,9 @@ def check_five(camera):
     return views
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize(
+    "name", ("setup1", "setup2-16", "setup2-32", "setup2-64", "setup2-128", "setup2-256", "setup3", "pinhole2d")
+)
 @pytest.mark.parametrize("scale", [1, 16])
 def test_five_viewpoints_of_the_presets(name, scale):
     views = check_five(preset(name, scale=scale))

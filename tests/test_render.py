@@ -103,7 +103,7 @@ def test_support_images_are_those_of_the_first_sample_and_only_those_asked_for(h
     np.testing.assert_array_equal(none.picture.pixels, full.picture.pixels)
 
     place = np.empty((64, 128, 2))
-    kernels.jitter(1, 0, 3, 1, 128, 0, 0, place)
+    kernels.jitter(1, 0, 3, 1, False, 128, 0, 0, place)
     first = trace(hall_scene, *SMALL.rays(sample=place))
     np.testing.assert_array_equal(full.depth.ravel(), first.depth)
     np.testing.assert_array_equal(np.isnan(full.depth), full.object_id == -1)
@@ -177,10 +177,10 @@ class Watched(IICamera):
 
     asked = None
 
-    def rays(self, rows=slice(None), cols=slice(None), sample=(0.5, 0.5)):
-        L, D = super().rays(rows, cols, sample)
+    def weighted_rays(self, rows=slice(None), cols=slice(None), sample=(0.5, 0.5), place=(0.5, 0.5)):
+        L, D, weight = super().weighted_rays(rows, cols, sample, place)
         self.asked.append((rows, cols, np.broadcast_to(sample, (*L.shape[:2], 2)).copy(), L, D))
-        return L, D
+        return L, D, weight
 
 
 def places(samples, seed=0):
@@ -227,9 +227,9 @@ def test_samples_depend_on_seed_pixel_and_nothing_else():
 def test_jitter_equals_its_python_source():
     compiled, plain = np.empty((3, 4, 2)), np.empty((3, 4, 2))
     with np.errstate(over="ignore"):  # 64-bit hashes wrap
-        for seed, sample in ((0, 0), (2**40 + 17, 5), (2**63 - 1, 1)):
-            kernels.jitter(seed, sample, 3, 2, 9999, 10, 20, compiled)
-            kernels.jitter.py_func(seed, sample, 3, 2, 9999, 10, 20, plain)
+        for seed, sample, shuffle in ((0, 0, False), (2**40 + 17, 5, True), (2**63 - 1, 1, True)):
+            kernels.jitter(seed, sample, 3, 2, shuffle, 9999, 10, 20, compiled)
+            kernels.jitter.py_func(seed, sample, 3, 2, shuffle, 9999, 10, 20, plain)
             np.testing.assert_array_equal(compiled, plain)
 
 

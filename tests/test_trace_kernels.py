@@ -39,9 +39,26 @@ def test_start_rays_name_the_first_bad_one():
     locations, directions = np.zeros((6, 3)), np.ones((6, 3))
     directions[4] = 0
     directions[2, 1] = np.nan
-    out = np.empty((6, 3), np.float32), np.empty((6, 3), np.float32)
+    rows = [np.empty((6, 3), np.float32) for _ in range(3)]
+    out = (*rows, np.empty(6, np.int32), np.empty(6, np.int32))
+    all_of_it = np.empty(0)
     for function in (kernels.start_rays, kernels.start_rays.py_func):
-        assert function(locations, directions, np.eye(3), np.zeros(3), *out) == 2
-        assert function(locations[:2], directions[:2], np.eye(3), np.ones(3), *(o[:2] for o in out)) == -1
-        np.testing.assert_array_equal(out[0][:2], 1)
-        np.testing.assert_allclose(out[1][:2], 3**-0.5, rtol=1e-7)
+        assert function(locations, directions, all_of_it, np.eye(3), np.zeros(3), *out) == (6, 2)
+        assert function(locations[:2], directions[:2], all_of_it, np.eye(3), np.ones(3), *out) == (2, -1)
+        np.testing.assert_array_equal(rows[0][:2], 1)
+        np.testing.assert_allclose(rows[1][:2], 3**-0.5, rtol=1e-7)
+        np.testing.assert_array_equal(rows[2][:2], 1)
+
+
+def test_rays_without_light_are_left_out():
+    locations, directions = np.arange(12.0).reshape(4, 3), np.ones((4, 3))
+    directions[1] = 0  # blocked: nobody asks where it goes
+    rows = [np.empty((4, 3), np.float32) for _ in range(3)]
+    pixels, inside = np.empty(4, np.int32), np.empty(4, np.int32)
+    for function in (kernels.start_rays, kernels.start_rays.py_func):
+        shares = np.array([0.25, 0, 0, 1])
+        found = function(locations, directions, shares, np.eye(3), np.zeros(3), *rows, pixels, inside)
+        assert found == (2, -1)
+        assert pixels[:2].tolist() == [0, 3]
+        np.testing.assert_array_equal(rows[0][:2], locations[[0, 3]])
+        np.testing.assert_array_equal(rows[2][:2, 0], [0.25, 1])

@@ -1,0 +1,340 @@
+"""What a camera's interior does to a ray, as a chain of elements.
+
+The first element, the lens model, stands over every pixel's own lenslet and turns a point of the pixel and a place on
+the aperture into a ray that leaves the lens plane. Each further element stands somewhere in front of the array and
+turns one ray into another. Rays run from the pixel out into the scene; light comes the other way along them.
+
+Lengths are millimetres, frame as in `camera`. The arrays of a bundle broadcast against each other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64] | np.float64
+Focal = float | tuple[tuple[float, ...], ...]
+
+
+class Bundle(NamedTuple):
+    """Rays: location, direction of any length, and weight: the share of light that gets through, 0 if blocked."""
+
+    lx: Array
+    ly: Array
+    lz: Array
+    dx: Array
+    dy: Array
+    dz: Array
+    weight: Array | None = None
+
+
+class Under(NamedTuple):
+    """What a lens model is given: pixel points, the centres and numbers of their lenses, places on the aperture.
+
+    ``ax`` and ``ay`` lie on the unit disk; 0 is the centre. ``cell`` is the lens pitch across and down.
+    """
+
+    px: Array
+    py: Array
+    cx: Array
+    cy: Array
+    k: NDArray[np.int64]
+    l: NDArray[np.int64]
+    ax: Array
+    ay: Array
+    gap: float
+    cell: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Element:
+    """An optical element: its parameters as plain values, and itself scaled with its camera."""
+
+    kind: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value is not None and field.name != "focal_mm" and not _positive(value) and field.name != "z_mm":
+                raise ValueError(f"{self.kind}: {field.name} is {value}: a positive number is needed")
+
+    def to_json(self) -> dict[str, Any]:
+        return {"kind": self.kind, **{k: v for k, v in asdict(self).items() if v is not None}}
+
+    def scaled(self, factor: float) -> Element:
+        """The element of a camera whose lenslets are ``factor`` times as large."""
+        return self
+
+
+class LensModel(Element):
+    """The element over every lenslet."""
+
+    erect: ClassVar[bool] = False
+    samples_aperture: ClassVar[bool] = False
+    vertical_parallax: ClassVar[bool] = True
+
+    def leave(self, under: Under) -> Bundle:
+        """Rays that leave the lens plane."""
+        raise NotImplementedError
+
+
+class FrontElement(Element):
+    """An element between the array and the scene."""
+
+    def pass_on(self, rays: Bundle) -> Bundle:
+        """Rays behind it turned to rays before it."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pinhole(LensModel):
+    """The ray from the pixel through the lens centre (3.15), (3.20)."""
+
+    kind: ClassVar[str] = "pinhole"
+
+    def leave(self, u: Under) -> Bundle:
+        return Bundle(u.cx, u.cy, _like(u.gap), u.cx - u.px, u.cy - u.py, _like(u.gap))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grin(LensModel):
+    """A gradient-index rod: the elementary image is erect, so that the ray is mirrored about the lens's axis."""
+
+    kind: ClassVar[str] = "grin"
+    erect: ClassVar[bool] = True
+
+    def leave(self, u: Under) -> Bundle:
+        return Bundle(u.cx, u.cy, _like(u.gap), u.px - u.cx, u.py - u.cy, _like(u.gap))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lenticular(LensModel):
+    """A vertical cylinder lens over a column of pixels: horizontal parallax only; each row looks straight ahead."""
+
+    kind: ClassVar[str] = "lenticular"
+    vertical_parallax: ClassVar[bool] = False
+
+    def leave(self, u: Under) -> Bundle:
+        return Bundle(u.cx, u.py, _like(u.gap), u.cx - u.px, _like(0.0), _like(u.gap))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lenslet(LensModel):
+    """An ideal thin lens with an aperture. Its rays meet where the pixel is imaged, at z − Λ = fΛ/(Λ − f) (2.3).
+
+    Λ = f is depth priority, the rays of a pixel are parallel; Λ ≠ f resolution priority. Written by slopes,
+    x' = (a − p)/Λ − (a − c)/f, nothing happens as Λ passes f.
+
+    Parameters
+    ----------
+    focal_mm : float or rows of floats
+        f; rows and columns of several focal lengths repeat over the array.
+    aperture_mm : float, optional
+        Diameter of the round aperture; none is the centre alone.
+    """
+
+    kind: ClassVar[str] = "lenslet"
+    samples_aperture: ClassVar[bool] = True
+    focal_mm: Focal
+    aperture_mm: float | None = None
+
+    def __post_init__(self) -> None:
+        focal = self.focal_mm
+        if isinstance(focal, Sequence):
+            rows = tuple(tuple(float(f) for f in row) for row in focal)
+            if not rows or not rows[0] or len({len(row) for row in rows}) != 1:
+                raise ValueError(f"lenslet: focal_mm is {focal}: rows of equal length are needed")
+            object.__setattr__(self, "focal_mm", rows)
+        if not all(_positive(f) for f in np.ravel(focal)):
+            raise ValueError(f"lenslet: focal_mm is {focal}: positive lengths are needed")
+        if self.aperture_mm is not None and not 0 <= self.aperture_mm < math.inf:
+            raise ValueError(f"lenslet: aperture_mm is {self.aperture_mm}: at least 0 is needed")
+
+    def leave(self, u: Under) -> Bundle:
+        focal = np.atleast_2d(np.asarray(self.focal_mm, np.float64))
+        f = focal[u.l % focal.shape[0], u.k % focal.shape[1]] if focal.size > 1 else focal[0, 0]
+        radius = (self.aperture_mm or 0.0) / 2
+        ax, ay = radius * u.ax, radius * u.ay
+        dx = (u.cx + ax - u.px) - ax * (u.gap / f)
+        dy = (u.cy + ay - u.py) - ay * (u.gap / f)
+        return Bundle(u.cx + ax, u.cy + ay, _like(u.gap), dx, dy, _like(u.gap))
+
+    def scaled(self, factor: float) -> Lenslet:
+        f = self.focal_mm
+        focal = tuple(tuple(x * factor for x in row) for row in f) if isinstance(f, tuple) else f * factor
+        aperture = None if self.aperture_mm is None else self.aperture_mm * factor
+        return replace(self, focal_mm=focal, aperture_mm=aperture)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SphericalLenslet(LensModel):
+    """A plano-convex lens, flat towards the pixels at z = Λ, refracting exactly by Snell's law at both faces.
+
+    Rays leave from the sphere. Blocked are rays that leave their own lens's cell inside the glass and rays
+    that are totally reflected. f = R/(n − 1) for a thin one.
+
+    Parameters
+    ----------
+    radius_mm : float
+        R, of the sphere; at least half the diagonal of the lens's cell.
+    ior : float
+        n.
+    aperture_mm : float, optional
+        Diameter, on the flat face, over which rays are spread; none is the centre alone.
+    """
+
+    kind: ClassVar[str] = "spherical-lenslet"
+    samples_aperture: ClassVar[bool] = True
+    radius_mm: float
+    ior: float
+    aperture_mm: float | None = None
+
+    def thickness(self, cell: tuple[float, float]) -> float:
+        """Glass on the axis, mm, if the sphere meets the flat face at the cell's corners."""
+        half = math.hypot(*cell) / 2
+        if half > self.radius_mm:
+            raise ValueError(
+                f"spherical-lenslet: radius_mm is {self.radius_mm:g}: at least half the cell's diagonal, "
+                f"{half:g}, is needed"
+            )
+        return self.radius_mm - math.sqrt(self.radius_mm**2 - half**2)
+
+    def leave(self, u: Under) -> Bundle:
+        n, radius = self.ior, self.radius_mm
+        spread = (self.aperture_mm or 0.0) / 2
+        ax, ay = np.broadcast_arrays(spread * u.ax + 0 * u.px, spread * u.ay + 0 * u.py)  # from the lens's axis
+        tx, ty, tz = u.cx + ax - u.px, u.cy + ay - u.py, u.gap
+        length = np.sqrt(tx * tx + ty * ty + tz * tz)
+        tx, ty = tx / length / n, ty / length / n  # Snell at the flat face
+        tz = np.sqrt(1 - tx * tx - ty * ty)
+        # The sphere's centre lies on the axis at this height over the flat face; the ray leaves at the far root.
+        centre = self.thickness(u.cell) - radius
+        along = ax * tx + ay * ty - centre * tz
+        s = -along + np.sqrt(along * along - (ax * ax + ay * ay + centre * centre - radius * radius))
+        ex, ey, ez = ax + s * tx, ay + s * ty, s * tz
+        nx, ny, nz = ex / radius, ey / radius, (ez - centre) / radius
+        cosine = tx * nx + ty * ny + tz * nz
+        sine2 = n * n * (1 - cosine * cosine)
+        inside = (abs(ex) <= u.cell[0] / 2) & (abs(ey) <= u.cell[1] / 2) & (ez >= 0)
+        through = inside & (sine2 < 1)
+        bend = n * cosine - np.sqrt(np.maximum(0, 1 - sine2))
+        dx, dy, dz = n * tx - bend * nx, n * ty - bend * ny, n * tz - bend * nz
+        return Bundle(u.cx + ex, u.cy + ey, u.gap + ez, dx, dy, dz, through.astype(np.float64))
+
+    def scaled(self, factor: float) -> SphericalLenslet:
+        aperture = None if self.aperture_mm is None else self.aperture_mm * factor
+        return replace(self, radius_mm=self.radius_mm * factor, aperture_mm=aperture)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lens(FrontElement):
+    """An ideal thin lens about the z axis: a depth-control lens, or the main lens of a plenoptic camera.
+
+    A ray that meets it at h leaves with its slope changed by −h/f. What passes outside of its rim, or never reaches
+    it, is blocked.
+
+    Parameters
+    ----------
+    z_mm : float
+        Where it stands.
+    focal_mm : float
+        Negative for a diverging lens.
+    diameter_mm : float, optional
+        Of the rim; none is endless.
+    """
+
+    kind: ClassVar[str] = "lens"
+    z_mm: float
+    focal_mm: float
+    diameter_mm: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not math.isfinite(self.z_mm) or not math.isfinite(self.focal_mm) or self.focal_mm == 0:
+            raise ValueError(f"lens: z_mm {self.z_mm}, focal_mm {self.focal_mm}: finite, and f not 0, are needed")
+
+    def pass_on(self, rays: Bundle) -> Bundle:
+        lx, ly, lz, dx, dy, dz, weight = rays
+        reaches = (dz > 0) & (lz <= self.z_mm)
+        safe = np.where(dz > 0, dz, 1.0)
+        x, y = lx + dx / safe * (self.z_mm - lz), ly + dy / safe * (self.z_mm - lz)
+        passes = reaches & True
+        if self.diameter_mm is not None:
+            passes = passes & (x * x + y * y <= (self.diameter_mm / 2) ** 2)
+        if not np.all(passes):
+            weight = np.asarray(passes * (1.0 if weight is None else weight), np.float64)
+        return Bundle(
+            x, y, _like(self.z_mm), dx - safe * x / self.focal_mm, dy - safe * y / self.focal_mm, dz, weight
+        )
+
+
+KINDS: dict[str, type[Element]] = {
+    cls.kind: cls for cls in (Pinhole, Grin, Lenticular, Lenslet, SphericalLenslet, Lens)
+}
+
+
+def element(data: Any) -> Element:
+    """An element from its name or from `Element.to_json`'s values.
+
+    Raises
+    ------
+    ValueError
+        If the kind or a parameter is unknown, missing or out of range.
+    """
+    data = {"kind": data} if isinstance(data, str) else data
+    if not isinstance(data, Mapping) or data.get("kind") not in KINDS:
+        kind = data.get("kind") if isinstance(data, Mapping) else data
+        raise ValueError(f"unknown optical element {kind!r}: known are {', '.join(KINDS)}")
+    cls = KINDS[data["kind"]]
+    known = {field.name for field in fields(cls)}
+    parameters = {key: value for key, value in data.items() if key != "kind"}
+    if unknown := set(parameters) - known:
+        raise ValueError(
+            f"{cls.kind} has no {', '.join(sorted(unknown))}: known are {', '.join(sorted(known)) or 'none'}"
+        )
+    try:
+        return cls(**parameters)
+    except TypeError as error:
+        raise ValueError(f"{cls.kind}: {error}") from None
+
+
+def chain(elements: Sequence[Any]) -> tuple[LensModel, tuple[FrontElement, ...]]:
+    """A lens model, a pinhole if none is named, and what stands before it.
+
+    Raises
+    ------
+    ValueError
+        If a lens model is not the first element.
+    """
+    built = [e if isinstance(e, Element) else element(e) for e in elements]
+    if not built or not isinstance(built[0], LensModel):
+        built.insert(0, Pinhole())
+    model, front = built[0], built[1:]
+    assert isinstance(model, LensModel)
+    for e in front:
+        if not isinstance(e, FrontElement):
+            raise ValueError(f"{e.kind} is a lens model: it must be the first element, and the only one")
+    return model, tuple(e for e in front if isinstance(e, FrontElement))
+
+
+def unit_disk(place: NDArray[np.float64]) -> tuple[Array, Array]:
+    """The unit square (…, 2) spread evenly over the unit disk, (½, ½) at its centre (Shirley and Chiu 1997)."""
+    a, b = 2 * place[..., 0] - 1, 2 * place[..., 1] - 1
+    wide = abs(a) > abs(b)
+    radius = np.where(wide, a, b)
+    safe = np.where(radius == 0, 1.0, radius)
+    angle = np.where(wide, (np.pi / 4) * (b / safe), np.pi / 2 - (np.pi / 4) * (a / safe))
+    return radius * np.cos(angle), radius * np.sin(angle)
+
+
+def _like(value: float) -> Array:
+    return np.float64(value)
+
+
+def _positive(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < math.inf
