@@ -2,6 +2,7 @@
 
 from .camera import IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
+from .maps import MapCamera, read_maps, write_maps
 from .picture import IIPicture, add_sensor_noise
 from .presets import camera_names, preset, preset_cameras
 from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stand_back, view_image
@@ -9,6 +10,7 @@ from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stan
 __all__ = [
     "IICamera",
     "IIPicture",
+    "MapCamera",
     "add_sensor_noise",
     "camera_names",
     "component_images",
@@ -20,8 +22,10 @@ __all__ = [
     "preset_cameras",
     "projection_camera",
     "ray_space_images",
+    "read_maps",
     "refocus",
     "stand_back",
     "sub_images",
     "view_image",
+    "write_maps",
 ]

@@ -20,6 +20,7 @@ IMAGE_TYPES: dict[str, tuple[str, ...]] = {
     ".tif": ("uint8", "uint16", "float32"),
     ".tiff": ("uint8", "uint16", "float32"),
     ".exr": ("float32",),
+    ".hdr": ("float32",),
 }
 
 

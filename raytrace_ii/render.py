@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IICamera, IIPicture, add_sensor_noise
+from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise
 
 from . import kernels
 from .scene import Scene
@@ -58,7 +58,7 @@ class Shot:
 
 def render(
     scene: Scene,
-    camera: IICamera,
+    camera: IICamera | MapCamera,
     *,
     samples: int = 1,
     seed: int = 0,
@@ -77,7 +77,8 @@ def render(
     ----------
     samples : int
         Rays per pixel: 1 goes through the pixel's centre, more are spread over the pixel, one in each cell of a
-        grid, by a hash of ``seed`` and the pixel. They stay under the pixel's own lens.
+        grid, by a hash of ``seed`` and the pixel. They stay under the pixel's own lens. Over an aperture they are
+        spread likewise. Stored maps have their own number.
     seed : int
         For samples and noise.
     noise : float
@@ -102,6 +103,10 @@ def render(
     ValueError
         If a parameter is out of range.
     """
+    if isinstance(camera, MapCamera):
+        if samples not in (1, camera.stored_samples):
+            raise ValueError(f"samples is {samples}: the maps hold {camera.stored_samples} for each pixel")
+        samples = camera.stored_samples
     _check(samples, seed, noise, dtype, workers, support)
     matrix = rigid(pose)
     started, cpu = time.perf_counter(), time.process_time()
@@ -152,7 +157,7 @@ def _check(samples: int, seed: int, noise: float, dtype: str, workers: int | Non
         raise ValueError(f"unknown support image {', '.join(sorted(unknown))}: known are {', '.join(SUPPORT)}")
 
 
-def _empty_shot(camera: IICamera, dtype: str, support: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+def _empty_shot(camera: IICamera | MapCamera, dtype: str, support: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     columns, rows = camera.pixels
     out: dict[str, NDArray[Any]] = {"pixels": np.empty((rows, columns, 3), dtype)}
     for name, kind, shape in (("depth", "f4", ()), ("normal", "f4", (3,)), ("object_id", "i4", ())):
@@ -186,7 +191,7 @@ class _Job:
     """One picture being rendered; `tile` runs on any thread."""
 
     scene: Scene
-    camera: IICamera
+    camera: IICamera | MapCamera
     samples: int
     seed: int
     pose: NDArray[np.float64]
@@ -204,7 +209,7 @@ class _Job:
         radiance = np.zeros((n, 3), np.float32)
         support = self._support(rows, cols)
         for sample in range(self.samples):
-            L, D, shares = self.camera.weighted_rays(rows, cols, *self._places(sample, rows, cols))
+            L, D, shares = self._rays(sample, rows, cols)
             tracer.run(L, D, radiance, support if sample == 0 else None, shares)
         # A tile is whole rows or a piece of one: its block of each array is one run of memory.
         pixels = self.out["pixels"][rows, cols].reshape(n, 3)
@@ -223,7 +228,12 @@ class _Job:
         wanted = {name: self.out[name][rows, cols] for name in self.out if name != "pixels"}
         return Support(**{**vars(Support.empty(shape)), **wanted})
 
-    def _places(self, sample: int, rows: slice, cols: slice) -> list[ArrayLike]:
+    def _rays(self, sample: int, rows: slice, cols: slice) -> tuple[Any, Any, Any]:
+        if isinstance(self.camera, MapCamera):
+            return self.camera.stored_rays(sample, rows, cols)
+        return self.camera.weighted_rays(rows, cols, *self._places(self.camera, sample, rows, cols))
+
+    def _places(self, camera: IICamera, sample: int, rows: slice, cols: slice) -> list[ArrayLike]:
         """Where in the pixel and where on the aperture."""
         if self.samples == 1:
             return [(0.5, 0.5), (0.5, 0.5)]
@@ -233,9 +243,9 @@ class _Job:
             out = np.empty((rows.stop - rows.start, cols.stop - cols.start, 2))
             kernels.jitter(
                 self.seed + APERTURE_SEED * aperture, sample, self.samples // down, down, aperture,
-                self.camera.pixels[0], rows.start, cols.start, out,
+                camera.pixels[0], rows.start, cols.start, out,
             )  # fmt: skip
             places.append(out)
-            if not self.camera.samples_aperture:
+            if not camera.samples_aperture:
                 return [out, (0.5, 0.5)]
         return places

@@ -1,0 +1,112 @@
+"""The price of storing a camera as pictures: errors of L and D and of the rendered picture, against bytes.
+
+    python -m benchmarks.map_precision [--scale 4]
+
+For each format the largest and the root mean square angle between stored and true direction (µrad), the same for
+locations (µm), and the PSNR of *Apples* and *Cuboid* rendered from the maps against float maps. Numbers and chart go
+to ``benchmarks/results/map_precision.json`` and ``.png``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ii_core import IICamera, preset, read_maps, write_maps
+from ii_core.files import write_json
+from ii_core.maps import FORMATS
+from metrics import provenance, q_global
+from raytrace_ii import load_scene, render
+
+RESULTS = Path(__file__).parent / "results"
+SCENES = ("apples", "cuboid")
+CAMERAS = ("setup1", "setup3", "spherical")
+
+
+def main() -> None:
+    """Measure, print, keep and draw."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=4)
+    arguments = parser.parse_args()
+    scenes = {name: load_scene(name) for name in SCENES}
+    rows: list[dict[str, Any]] = []
+    for name in CAMERAS:
+        camera = preset(name, scale=arguments.scale)
+        exact = {
+            scene: render(loaded, stored(camera, "exr")[0], support=()).picture for scene, loaded in scenes.items()
+        }
+        for format in FORMATS:
+            maps, size = stored(camera, format)
+            row = {"camera": name, "format": format, "bytes_per_pixel": size / camera.pixels[0] / camera.pixels[1]}
+            row |= errors(camera, maps)
+            for scene, loaded in scenes.items():
+                picture = render(loaded, maps, support=()).picture
+                row[f"psnr_{scene}"] = q_global(exact[scene], picture)
+            rows.append(row)
+            print(
+                "  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()), flush=True
+            )
+    write_json(RESULTS / "map_precision.json", {**provenance(), "scale": arguments.scale, "rows": rows})
+    chart(rows, RESULTS / "map_precision.png")
+
+
+def stored(camera: IICamera, format: str) -> tuple[Any, int]:
+    """The camera from its maps, and the bytes of the two images."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_maps([camera], folder, format=format)
+        size = sum(path.stat().st_size for path in Path(folder).iterdir() if path.suffix != ".json")
+        return read_maps(folder)[0], size
+
+
+def errors(camera: IICamera, maps: Any) -> dict[str, float]:
+    """Angle and location errors over all rays that carry light."""
+    L, D, weight = camera.weighted_rays()
+    l, d, _ = maps.stored_rays(0)
+    on = np.ones(L.shape[:2], bool) if weight is None else weight > 0
+    D, d = (x[on] / np.linalg.norm(x[on], axis=-1, keepdims=True) for x in (D, d))
+    angle = np.linalg.norm(np.cross(D, d), axis=-1)  # its sine, which is the angle at this size
+    place = np.linalg.norm((L - l)[on], axis=-1)
+    return {
+        "angle_max_urad": float(angle.max() * 1e6),
+        "angle_rms_urad": float(np.sqrt((angle**2).mean()) * 1e6),
+        "place_max_um": float(place.max() * 1e3),
+        "place_rms_um": float(np.sqrt((place**2).mean()) * 1e3),
+    }
+
+
+def chart(rows: list[dict[str, Any]], path: Path) -> None:
+    """PSNR over bytes, a marker a format, a colour a camera."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 4.5), layout="constrained")
+    markers = dict(zip(FORMATS, "osD^", strict=True))
+    colours = dict(zip(CAMERAS, ("#0072B2", "#D55E00", "#009E73"), strict=True))
+    for axes, scene in zip(figure.subplots(1, 2, sharey=True), SCENES, strict=True):
+        for row in rows:
+            if not np.isfinite(row[f"psnr_{scene}"]):
+                continue  # the float maps are what the others are held against
+            axes.plot(
+                row["bytes_per_pixel"], row[f"psnr_{scene}"], markers[row["format"]], color=colours[row["camera"]],
+                markersize=8,
+            )  # fmt: skip
+        axes.set_title(scene)
+        axes.set_xlabel("bytes per ray, as stored")
+        axes.grid(True, color="0.9")
+        axes.set_xscale("log")
+    axes = figure.axes[0]
+    axes.set_ylabel("PSNR against float maps [dB]")
+    for format in FORMATS:
+        if format != "exr":
+            axes.plot([], [], markers[format], color="0.4", label=format)
+    for name in CAMERAS:
+        axes.plot([], [], "s", color=colours[name], label=name)
+    axes.legend(fontsize="small")
+    figure.savefig(path, dpi=120)
+
+
+if __name__ == "__main__":
+    main()

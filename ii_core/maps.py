@@ -1,0 +1,295 @@
+"""Cameras as pictures: L and D stored as images that anyone can open, and a camera made of nothing but them.
+
+A folder holds, for every pixel array and sample, two images whose red, green and blue are x, y and z, and a third
+with the share of light of every ray if not all carry all; beside them ``camera.json``. A stored number x stands for
+
+    X = x / C · (max − min) + min
+
+by channel (3.12). Integers of b bits have C = 2^b; ``max`` is put so that both true extremes are codes, which
+(3.11) with the true maximum would miss. Floats have C = 1: EXR holds millimetres as they are, box (0, 1); ``.hdr``
+knows no negative numbers and gets the true box.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .camera import IICamera, whole_pair
+from .files import read_image, write_image, write_json
+
+FORMATS = {
+    "png16": (".png", "uint16"),
+    "png8": (".png", "uint8"),
+    "exr": (".exr", "float32"),
+    "hdr": (".hdr", "float32"),
+}
+SHEET = "camera.json"
+BLOCK_ROWS = 64  # rows of rays in memory at a time
+
+Box = list[list[float]]
+Rays = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]
+
+
+def write_maps(
+    cameras: Sequence[IICamera],
+    folder: str | os.PathLike[str],
+    *,
+    format: str = "png16",
+    samples: Sequence[tuple[ArrayLike, ArrayLike]] = (((0.5, 0.5), (0.5, 0.5)),),
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Store cameras, one pixel array each, as maps.
+
+    Parameters
+    ----------
+    cameras : sequence of IICamera
+        All of the same structure.
+    folder : path
+        Made if need be; files of the same names are replaced.
+    format : {"png16", "png8", "exr", "hdr"}
+    samples : sequence of (sample, place)
+        Where in the pixel and on the aperture rays start; one pair of maps each. Centres by default.
+    progress : callable, optional
+        Called with maps written and maps in all.
+
+    Raises
+    ------
+    ValueError
+        If the format is unknown or the cameras differ in structure.
+    OSError
+        If the folder cannot be written.
+
+    References
+    ----------
+    Olsson 2008, (3.11), (3.12).
+    """
+    if format not in FORMATS:
+        raise ValueError(f"unknown format {format!r}: known are {', '.join(FORMATS)}")
+    first = cameras[0]
+    if any((c.pixels, c.lenses) != (first.pixels, first.lenses) for c in cameras):
+        raise ValueError("the cameras differ in pixels or lenses: one folder holds arrays of one structure")
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    arrays: list[dict[str, Any]] = []
+    total = len(cameras) * len(samples)
+    for i, camera in enumerate(cameras):
+        stored = []
+        for j, where in enumerate(samples):
+            ending = "" if total == 1 else f"_{i}_{j}"
+            stored.append(_write_pair(camera, where, folder, ending, format))
+            if progress is not None:
+                progress(len(samples) * i + j + 1, total)
+        arrays.append({"camera": camera.to_json(), "samples": stored})
+    write_json(folder / SHEET, {**_structure(first), "arrays": arrays})
+
+
+def _structure(camera: IICamera) -> dict[str, Any]:
+    focal = getattr(camera.lens_model, "focal_mm", None)
+    return {
+        "format": "ii-camera-maps",
+        "version": 1,
+        "name": camera.name,
+        "kind": camera.lens_model.kind,
+        "pixels": list(camera.pixels),
+        "lenses": list(camera.lenses),
+        "ei_pixels": list(camera.ei_pixels),
+        "pixel_pitch_mm": camera.pixel_pitch_mm,
+        "lens_pitch_mm": list(camera.lens_pitch_mm),
+        "gap_mm": camera.gap_mm,
+        "focal_mm": focal,
+        "lattice": camera.lattice,
+        "erect": camera.erect,
+    }
+
+
+def _write_pair(
+    camera: IICamera, where: tuple[ArrayLike, ArrayLike], folder: Path, ending: str, format: str
+) -> dict[str, Any]:
+    """Two or three images, and what the sheet says of them."""
+    suffix, dtype = FORMATS[format]
+    boxes, weighted = _extremes(camera, where)
+    if format == "exr":
+        boxes = {name: [[0.0, 1.0]] * 3 for name in boxes}
+    out = {name: np.empty((camera.pixels[1], camera.pixels[0], 3), dtype) for name in boxes}
+    if weighted:
+        out["W"] = np.empty((camera.pixels[1], camera.pixels[0], 3), dtype)
+        boxes["W"] = [[0.0, 1.0]] * 3
+    steps = 2 ** (8 * np.dtype(dtype).itemsize) if dtype != "float32" else 1
+    sheet: dict[str, Any] = {}
+    for name, box in boxes.items():
+        sheet[name] = {"file": f"{name}{ending}{suffix}", "C": steps, "box": [_widened(b, steps) for b in box]}
+    for rows, L, D, weight in _blocks(camera, where):
+        values = {"L": L, "D": D}
+        if weighted:
+            share = np.ones(L.shape[:2]) if weight is None else weight
+            values["W"] = np.repeat(share[..., None], 3, axis=2)
+        for name, value in values.items():
+            out[name][rows] = encode(value, sheet[name]["box"], steps, dtype)
+    for name, pixels in out.items():
+        write_image(folder / sheet[name]["file"], pixels)
+    return sheet
+
+
+def _blocks(camera: IICamera, where: tuple[ArrayLike, ArrayLike]) -> Iterator[tuple[slice, Any, Any, Any]]:
+    """Rays by strips of rows, with unit directions."""
+    for top in range(0, camera.pixels[1], BLOCK_ROWS):
+        rows = slice(top, min(top + BLOCK_ROWS, camera.pixels[1]))
+        L, D, weight = camera.weighted_rays(rows, slice(None), *where)
+        if weight is not None:
+            D[weight == 0] = (0, 0, 1)  # wherever: it is not stored for its direction
+        yield rows, L, D / np.linalg.norm(D, axis=-1, keepdims=True), weight
+
+
+def _extremes(camera: IICamera, where: tuple[ArrayLike, ArrayLike]) -> tuple[dict[str, Box], bool]:
+    """True box of what the rays that carry light need, and whether any is dimmed."""
+    low, high, weighted = np.full((2, 3), np.inf), np.full((2, 3), -np.inf), False
+    for _, L, D, weight in _blocks(camera, where):
+        for i, value in enumerate((L, D)):
+            needed = value.reshape(-1, 3) if weight is None else value[weight > 0]
+            low[i] = np.minimum(low[i], needed.min(axis=0, initial=np.inf))
+            high[i] = np.maximum(high[i], needed.max(axis=0, initial=-np.inf))
+        weighted = weighted or (weight is not None and bool((weight != 1).any()))
+    if not np.isfinite(low).all():
+        raise ValueError(f"camera {camera.name!r} lets no ray out: its optics block them all")
+    boxes = {name: np.stack([low[i], high[i]], axis=1).tolist() for i, name in enumerate("LD")}
+    return boxes, weighted
+
+
+def _widened(box: Sequence[float], steps: int) -> list[float]:
+    """The box whose last code is the true maximum."""
+    low, high = box
+    return [low, low + (high - low) * steps / (steps - 1)] if steps > 1 else [low, high]
+
+
+def encode(values: NDArray[np.float64], box: Box, steps: int, dtype: str) -> NDArray[Any]:
+    """Numbers to stored ones (3.11); an extent of zero stores 0."""
+    low, high = np.array(box).T
+    extent = high - low
+    share = (values - low) / np.where(extent == 0, 1, extent)
+    return np.clip(np.rint(share * steps), 0, steps - 1).astype(dtype) if steps > 1 else share.astype(dtype)
+
+
+def decode(stored: NDArray[Any], box: Box, steps: float) -> NDArray[np.float64]:
+    """Stored numbers to what they stand for (3.12)."""
+    low, high = np.array(box).T
+    return stored / steps * (high - low) + low
+
+
+@dataclass(frozen=True, eq=False)
+class _Map:
+    stored: NDArray[Any]
+    box: Box
+    steps: float
+
+    def block(self, rows: slice, cols: slice) -> NDArray[np.float64]:
+        return decode(self.stored[rows, cols], self.box, self.steps)
+
+
+@dataclass(frozen=True, eq=False)
+class MapCamera:
+    """A camera of which nothing is known but its rays: one pixel array, ``stored_samples`` rays a pixel.
+
+    Made by `read_maps`. `render` takes it where it takes an `IICamera`.
+    """
+
+    pixels: tuple[int, int]
+    lenses: tuple[int, int]
+    ei_pixels: tuple[Any, Any]
+    erect: bool
+    model: IICamera | None
+    name: str
+    maps: tuple[dict[str, _Map], ...]
+
+    @property
+    def stored_samples(self) -> int:
+        """Rays per pixel."""
+        return len(self.maps)
+
+    def stored_rays(self, sample: int, rows: slice = slice(None), cols: slice = slice(None)) -> Rays:
+        """L, D and the share of light, or None for all, of one sample of a block of pixels."""
+        maps = self.maps[sample]
+        L, D = maps["L"].block(rows, cols), maps["D"].block(rows, cols)
+        if "W" in maps:
+            return L, D, maps["W"].block(rows, cols)[..., 0]
+        dark = (D == 0).all(axis=-1)  # made by hand: a ray without a direction is none
+        return L, D, (~dark).astype(np.float64) if dark.any() else None
+
+
+def read_maps(folder: str | os.PathLike[str]) -> tuple[MapCamera, ...]:
+    """Cameras from a folder of maps, one a pixel array.
+
+    Of the sheet only ``arrays`` is needed, and in it of each image ``file`` and, for other than metric floats, ``C``
+    and ``box``. Without ``lenses`` the picture is of one lens.
+
+    Raises
+    ------
+    ValueError
+        If the sheet or an image is not as described.
+    OSError
+        If one is missing.
+    """
+    path = Path(folder) / SHEET
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist")
+    try:
+        sheet = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(sheet, Mapping) or not isinstance(sheet.get("arrays"), list) or not sheet["arrays"]:
+            raise ValueError('no camera maps: "arrays" with at least one is needed')
+        return tuple(_map_camera(sheet, array, path.parent) for array in sheet["arrays"])
+    except (ValueError, TypeError, KeyError) as error:
+        raise ValueError(f"{path}: {error.args[0] if error.args else error}") from None
+
+
+def _map_camera(sheet: Mapping[str, Any], array: Mapping[str, Any], folder: Path) -> MapCamera:
+    if not isinstance(array, Mapping) or not array.get("samples"):
+        raise ValueError('an array has no "samples"')
+    maps = tuple(
+        {name: _map(pair, name, folder) for name in ("L", "D", "W") if name in pair} for pair in array["samples"]
+    )
+    for pair in maps:
+        if not {"L", "D"} <= set(pair):
+            raise ValueError("every sample needs the images L and D")
+    height, width = maps[0]["L"].stored.shape[:2]
+    for pair in maps:
+        for name, image in pair.items():
+            if image.stored.shape[:2] != (height, width):
+                raise ValueError(
+                    f"{name} has {image.stored.shape[1]}×{image.stored.shape[0]} pixels, "
+                    f"the first L {width}×{height}: the same is needed"
+                )
+    lenses = whole_pair("lenses", sheet.get("lenses", (1, 1)))
+    model = IICamera.from_json(array["camera"]) if array.get("camera") else None
+    if model is not None and (model.pixels, model.lenses) != ((width, height), lenses):
+        raise ValueError(f"the camera has {model.pixels} pixels, the maps {(width, height)}")
+    ei = (
+        model.ei_pixels
+        if model
+        else whole_pair("width and height over lenses", (width / lenses[0], height / lenses[1]))
+    )
+    name = str(sheet.get("name", folder.name))
+    return MapCamera((width, height), lenses, ei, bool(sheet.get("erect", False)), model, name, maps)
+
+
+def _map(pair: Mapping[str, Any], name: str, folder: Path) -> _Map:
+    entry = pair[name]
+    stored = read_image(folder / entry["file"])
+    if stored.shape[2] < 3:
+        raise ValueError(f"{entry['file']} has {stored.shape[2]} channels: x, y and z are needed")
+    integer = stored.dtype.kind == "u"
+    steps = entry.get("C", 2 ** (8 * stored.dtype.itemsize) if integer else 1)
+    box = entry.get("box", [[0.0, 1.0]] * 3)
+    if integer and "box" not in entry:
+        raise ValueError(f"{entry['file']} holds codes: its box is needed")
+    if np.shape(box) != (3, 2) or not np.isfinite(np.array(box, float)).all() or not steps > 0:
+        raise ValueError(
+            f"{entry['file']}: C is {steps}, box {box}: a positive C and three pairs of numbers are needed"
+        )
+    return _Map(stored[..., :3], box, float(steps))
