@@ -71,8 +71,7 @@ def write_maps(
     ----------
     Olsson 2008, (3.11), (3.12).
     """
-    if format not in FORMATS:
-        raise ValueError(f"unknown format {format!r}: known are {', '.join(FORMATS)}")
+    check_format(format)
     first = cameras[0]
     if any((c.pixels, c.lenses) != (first.pixels, first.lenses) for c in cameras):
         raise ValueError("the cameras differ in pixels or lenses: one folder holds arrays of one structure")
@@ -89,6 +88,12 @@ def write_maps(
                 progress(len(samples) * i + j + 1, total)
         arrays.append({"camera": camera.to_json(), "samples": stored})
     write_json(folder / SHEET, {**_structure(first), "arrays": arrays})
+
+
+def check_format(format: str) -> None:
+    """Raise ValueError, with the known ones, unless it is a format of maps."""
+    if format not in FORMATS:
+        raise ValueError(f"unknown format {format!r}: known are {', '.join(FORMATS)}")
 
 
 def _structure(camera: IICamera) -> dict[str, Any]:

@@ -73,7 +73,9 @@ def camera(
 ) -> None:
     """Store a camera as L and D maps, report on it, or solve for a missing measure."""
     from ii_core import preset_cameras, write_maps
+    from ii_core.maps import check_format
 
+    check_format(format)
     if solve is not None:
         _print_solution(solve)
         return

@@ -155,9 +155,10 @@ def shade(
                 shine = 0.0
                 if materials[body, _SPECULAR] > 0.0:
                     hx, hy, hz = lx * norm - dx, ly * norm - dy, lz * norm - dz
-                    half = (nx * hx + ny * hy + nz * hz) / math.sqrt(hx * hx + hy * hy + hz * hz)
-                    if half > materials[body, _LEAST_HALF]:
-                        shine = materials[body, _SPECULAR] * half ** materials[body, _SHININESS]
+                    half, square = nx * hx + ny * hy + nz * hz, hx * hx + hy * hy + hz * hz
+                    # too weak to see, as nearly everywhere: told without a root or a power
+                    if half > 0.0 and half * half > materials[body, _LEAST_HALF] ** 2 * square:
+                        shine = materials[body, _SPECULAR] * (half / math.sqrt(square)) ** materials[body, _SHININESS]
                 c0 = (r * cosine + w0 * shine) * lights[k, 4]
                 c1 = (g * cosine + w1 * shine) * lights[k, 5]
                 c2 = (b * cosine + w2 * shine) * lights[k, 6]

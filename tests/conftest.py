@@ -1,0 +1,34 @@
+"""What several test files share."""
+
+import sys
+
+import pytest
+
+from raytrace_ii import cli
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the command in this process; its exit code, output and error output."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["raytrace-ii", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        captured = capsys.readouterr()
+        return stop.value.code, captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture
+def refused():
+    """Check a result of `run`: exit code 2, nothing on the output, one line on the error stream that says why."""
+
+    def check(result, said):
+        code, out, err = result
+        assert code == 2, (code, out, err)
+        assert out == ""
+        assert err.startswith("error: ") and err.count("\n") == 1 and said in err, err
+
+    return check
