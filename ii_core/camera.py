@@ -87,8 +87,11 @@ class IICamera:
                 tuple(m * self.pixel_pitch_mm / k for m, k in zip(self.pixels, self.lenses, strict=True)),
             )
         else:
-            both = self.lens_pitch_mm if isinstance(self.lens_pitch_mm, Sequence) else (self.lens_pitch_mm,) * 2
-            put("lens_pitch_mm", (positive("lens_pitch_mm", both[0]), positive("lens_pitch_mm", both[1])))
+            given = self.lens_pitch_mm
+            both = tuple(given) if isinstance(given, Sequence) else (given,) * 2
+            if len(both) != 2:
+                raise ValueError(f"lens_pitch_mm is {given!r}: one length, or two, across and down, are needed")
+            put("lens_pitch_mm", tuple(positive("lens_pitch_mm", length) for length in both))
         if self.lattice not in LATTICES:
             raise ValueError(f"unknown lattice {self.lattice!r}: known are {', '.join(LATTICES)}")
         for field, count in (("lens_offset_mm", 2), ("origin_mm", 3)):
@@ -97,6 +100,14 @@ class IICamera:
         put("optics", (model, *front))
         if hasattr(model, "thickness"):
             model.thickness(self.lens_pitch_mm)  # a sphere too small for its cell is refused here
+        behind = self.gap_mm
+        for element in front:
+            if element.z_mm < behind:  # no ray would ever reach it, and the picture be black
+                raise ValueError(
+                    f"{element.kind}: z_mm is {element.z_mm:g}: what stands behind it is at {behind:g}, "
+                    "elements are needed in order, away from the pixels"
+                )
+            behind = element.z_mm
 
     @property
     def lens_model(self) -> LensModel:
@@ -116,7 +127,8 @@ class IICamera:
             even, given = pixels / lenses, lens_pitch / self.pixel_pitch_mm
             # A pitch in millimetres is not a whole number of pixels to the last bit; to a billionth it is.
             pitch.append(even if abs(given - even) < 1e-9 * even else round(given, 9))
-        shift = self.lens_offset_mm[0] / self.pixel_pitch_mm, -self.lens_offset_mm[1] / self.pixel_pitch_mm
+        shift = [round(offset / self.pixel_pitch_mm, 9) for offset in self.lens_offset_mm]
+        shift[1] *= -1  # rows run down
         origin = [(m - k * p) / 2 + s for m, k, p, s in zip(self.pixels, self.lenses, pitch, shift, strict=True)]
         return Lattice(self.lenses, (pitch[0], pitch[1]), (origin[0], origin[1]), self.lattice == "hexagonal")
 
@@ -243,7 +255,7 @@ class IICamera:
             py=height / 2 - (n + sample[..., 1]) * pitch,
             cx=x * pitch - width / 2,
             cy=height / 2 - y * pitch,
-            k=k, l=l, ax=ax, ay=ay, gap=self.gap_mm, cell=self.lens_pitch_mm,
+            k=k, l=l, ax=ax, ay=ay, gap=self.gap_mm, cell=self.lens_pitch_mm, hexagonal=lattice.hexagonal,
         )  # fmt: skip
         rays = self.lens_model.leave(under)
         for front in self.front:

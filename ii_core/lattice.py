@@ -1,8 +1,8 @@
 """Where lens centres lie on the pixel array, and which lens a pixel is under. All in units of pixels.
 
 Positions are measured from the array's top left corner, to the right and down; pixel (m, n) has its centre at
-(m + ½, n + ½). Only +, −, × and ÷ are used, and distances are compared to a millionth of a pixel, so that a pixel on
-the border of two lenses goes to the same one on every platform.
+(m + ½, n + ½). Only +, −, × and ÷ are used, and what differs by less than a millionth of a pixel is a tie, so that a
+pixel on the border of two lenses goes to the same one on every platform, however the border was computed.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .jit import kernel
 
 LATTICES = ("rectangular", "hexagonal")
+TIE = 1e-6  # pixels
 
 
 class Lattice(NamedTuple):
@@ -39,30 +40,32 @@ class Lattice(NamedTuple):
         A pixel halfway between two lenses belongs to the one further right or, in another row, further up.
         """
         if not self.hexagonal:
-            return tuple(
-                np.clip(np.floor((i + 0.5 - origin) / pitch), 0, count - 1).astype(np.int64)
-                for i, origin, pitch, count in zip((m, n), self.origin, self.pitch, self.lenses, strict=True)
-            )  # type: ignore[return-value]
+            right = np.floor((m + 0.5 - self.origin[0] + TIE) / self.pitch[0])
+            up = np.ceil((n + 0.5 - self.origin[1] - TIE) / self.pitch[1]) - 1
+            k, l = right.clip(0, self.lenses[0] - 1), up.clip(0, self.lenses[1] - 1)
+            return k.astype(np.int64), l.astype(np.int64)
         m, n = np.broadcast_arrays(m, n)
         k, l = np.empty(m.size, np.int64), np.empty(m.size, np.int64)
-        # No lens further off in y than half a row and the longest way in x can be the nearest.
-        reach = math.ceil(self.pitch[0] / self.pitch[1]) + 1
-        nearest_hexagonal(m.ravel(), n.ravel(), self.lenses, self.pitch, self.origin, reach, k, l)
+        nearest_hexagonal(m.ravel(), n.ravel(), self.lenses, self.pitch, self.origin, k, l)
         return k.reshape(m.shape), l.reshape(m.shape)
 
 
 @kernel
-def nearest_hexagonal(m, n, lenses, pitch, origin, reach, out_k, out_l):
-    """Nearest lens of an array whose odd rows stand half a pitch to the right, by distance."""
+def nearest_hexagonal(m, n, lenses, pitch, origin, out_k, out_l):
+    """Nearest lens of an array whose odd rows stand half a pitch to the right, by distance.
+
+    All odd rows have their lenses at the same x, and so have all even ones: the nearest lens is in the nearest row of
+    its kind, which is the pixel's own row or a neighbour of it.
+    """
     for i in range(m.shape[0]):
         x, y = m[i] + 0.5 - origin[0], n[i] + 0.5 - origin[1]
         row = min(max(math.floor(y / pitch[1]), 0), lenses[1] - 1)
         best = math.inf
-        for l in range(max(row - reach, 0), min(row + reach, lenses[1] - 1) + 1):
+        for l in range(max(row - 1, 0), min(row + 1, lenses[1] - 1) + 1):
             shifted = x - 0.5 * pitch[0] * (l % 2)
-            k = min(max(math.floor(shifted / pitch[0]), 0), lenses[0] - 1)
+            k = min(max(math.floor((shifted + TIE) / pitch[0]), 0), lenses[0] - 1)
             dx, dy = shifted - (k + 0.5) * pitch[0], y - (l + 0.5) * pitch[1]
-            distance = math.floor((dx * dx + dy * dy) * 1e6 + 0.5)
-            if distance < best:
+            distance = dx * dx + dy * dy
+            if distance < best - TIE:
                 best = distance
                 out_k[i], out_l[i] = k, l

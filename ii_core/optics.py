@@ -36,7 +36,8 @@ class Bundle(NamedTuple):
 class Under(NamedTuple):
     """What a lens model is given: pixel points, the centres and numbers of their lenses, places on the aperture.
 
-    ``ax`` and ``ay`` lie on the unit disk; 0 is the centre. ``cell`` is the lens pitch across and down.
+    ``ax`` and ``ay`` lie on the unit disk; 0 is the centre. ``cell`` is the lens pitch across and down; in a
+    hexagonal array the lens's own cell is what is nearer to its centre than to any other.
     """
 
     px: Array
@@ -49,6 +50,16 @@ class Under(NamedTuple):
     ay: Array
     gap: float
     cell: tuple[float, float]
+    hexagonal: bool = False
+
+    def owns(self, x: Array, y: Array) -> NDArray[np.bool_]:
+        """Whether a place, from the lens's centre, lies in the lens's own cell, border and all."""
+        across, down = self.cell
+        if not self.hexagonal:
+            return (abs(x) <= across / 2) & (abs(y) <= down / 2)
+        # nearer than to the lens beside, the one two rows off, and the one beside in the next row
+        slanting = abs(x) * across / 2 + abs(y) * down <= (across * across / 4 + down * down) / 2
+        return (abs(x) <= across / 2) & (abs(y) <= down) & slanting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,8 +71,12 @@ class Element:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if value is not None and field.name != "focal_mm" and not _positive(value) and field.name != "z_mm":
-                raise ValueError(f"{self.kind}: {field.name} is {value}: a positive number is needed")
+            if (value is None and field.default is None) or field.name in ("focal_mm", "z_mm"):
+                continue
+            if field.name == "aperture_mm" and _number(value) and value == 0:  # a pinhole
+                continue
+            if not _number(value) or value <= 0:
+                raise ValueError(f"{self.kind}: {field.name} is {value!r}: a positive number is needed")
 
     def to_json(self) -> dict[str, Any]:
         return {"kind": self.kind, **{k: v for k, v in asdict(self).items() if v is not None}}
@@ -84,7 +99,9 @@ class LensModel(Element):
 
 
 class FrontElement(Element):
-    """An element between the array and the scene."""
+    """An element between the array and the scene, at ``z_mm``."""
+
+    z_mm: float
 
     def pass_on(self, rays: Bundle) -> Bundle:
         """Rays behind it turned to rays before it."""
@@ -144,16 +161,15 @@ class Lenslet(LensModel):
     aperture_mm: float | None = None
 
     def __post_init__(self) -> None:
-        focal = self.focal_mm
-        if isinstance(focal, Sequence):
-            rows = tuple(tuple(float(f) for f in row) for row in focal)
-            if not rows or not rows[0] or len({len(row) for row in rows}) != 1:
-                raise ValueError(f"lenslet: focal_mm is {focal}: rows of equal length are needed")
-            object.__setattr__(self, "focal_mm", rows)
-        if not all(_positive(f) for f in np.ravel(focal)):
-            raise ValueError(f"lenslet: focal_mm is {focal}: positive lengths are needed")
-        if self.aperture_mm is not None and not 0 <= self.aperture_mm < math.inf:
-            raise ValueError(f"lenslet: aperture_mm is {self.aperture_mm}: at least 0 is needed")
+        super().__post_init__()
+        focal: Any = self.focal_mm
+        rows = focal if isinstance(focal, list | tuple) else [[focal]]
+        if not all(isinstance(row, list | tuple) and row and len(row) == len(rows[0]) for row in rows) or not rows:
+            raise ValueError(f"lenslet: focal_mm is {focal!r}: one length, or rows of equally many, are needed")
+        if not all(_number(f) and f > 0 for row in rows for f in row):
+            raise ValueError(f"lenslet: focal_mm is {focal!r}: positive lengths are needed")
+        if rows is focal:
+            object.__setattr__(self, "focal_mm", tuple(tuple(float(f) for f in row) for row in rows))
 
     def leave(self, u: Under) -> Bundle:
         focal = np.atleast_2d(np.asarray(self.focal_mm, np.float64))
@@ -175,15 +191,15 @@ class Lenslet(LensModel):
 class SphericalLenslet(LensModel):
     """A plano-convex lens, flat towards the pixels at z = Λ, refracting exactly by Snell's law at both faces.
 
-    Rays leave from the sphere. Blocked are rays that leave their own lens's cell inside the glass and rays
-    that are totally reflected. f = R/(n − 1) for a thin one.
+    Rays leave from the sphere. Blocked are rays that enter beside their own lens's cell or leave it inside the
+    glass, and rays that are totally reflected. f = R/(n − 1) for a thin one.
 
     Parameters
     ----------
     radius_mm : float
         R, of the sphere; at least half the diagonal of the lens's cell.
     ior : float
-        n.
+        n, at least 1.
     aperture_mm : float, optional
         Diameter, on the flat face, over which rays are spread; none is the centre alone.
     """
@@ -193,6 +209,11 @@ class SphericalLenslet(LensModel):
     radius_mm: float
     ior: float
     aperture_mm: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.ior >= 1:
+            raise ValueError(f"spherical-lenslet: ior is {self.ior}: at least 1 is needed")
 
     def thickness(self, cell: tuple[float, float]) -> float:
         """Glass on the axis, mm, if the sphere meets the flat face at the cell's corners."""
@@ -215,13 +236,13 @@ class SphericalLenslet(LensModel):
         # The sphere's centre lies on the axis at this height over the flat face; the ray leaves at the far root.
         centre = self.thickness(u.cell) - radius
         along = ax * tx + ay * ty - centre * tz
-        s = -along + np.sqrt(along * along - (ax * ax + ay * ay + centre * centre - radius * radius))
+        beside = ax * ax + ay * ay + centre * centre - radius * radius  # positive if it enters beside the sphere
+        s = -along + np.sqrt(np.maximum(0, along * along - beside))
         ex, ey, ez = ax + s * tx, ay + s * ty, s * tz
         nx, ny, nz = ex / radius, ey / radius, (ez - centre) / radius
         cosine = tx * nx + ty * ny + tz * nz
         sine2 = n * n * (1 - cosine * cosine)
-        inside = (abs(ex) <= u.cell[0] / 2) & (abs(ey) <= u.cell[1] / 2) & (ez >= 0)
-        through = inside & (sine2 < 1)
+        through = u.owns(ax, ay) & u.owns(ex, ey) & (ez >= 0) & (sine2 < 1)
         bend = n * cosine - np.sqrt(np.maximum(0, 1 - sine2))
         dx, dy, dz = n * tx - bend * nx, n * ty - bend * ny, n * tz - bend * nz
         return Bundle(u.cx + ex, u.cy + ey, u.gap + ez, dx, dy, dz, through.astype(np.float64))
@@ -255,8 +276,10 @@ class Lens(FrontElement):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not math.isfinite(self.z_mm) or not math.isfinite(self.focal_mm) or self.focal_mm == 0:
-            raise ValueError(f"lens: z_mm {self.z_mm}, focal_mm {self.focal_mm}: finite, and f not 0, are needed")
+        if not _number(self.z_mm) or not _number(self.focal_mm) or self.focal_mm == 0:
+            raise ValueError(
+                f"lens: z_mm is {self.z_mm!r}, focal_mm {self.focal_mm!r}: finite numbers, and f not 0, are needed"
+            )
 
     def pass_on(self, rays: Bundle) -> Bundle:
         lx, ly, lz, dx, dy, dz, weight = rays
@@ -287,10 +310,10 @@ def element(data: Any) -> Element:
         If the kind or a parameter is unknown, missing or out of range.
     """
     data = {"kind": data} if isinstance(data, str) else data
-    if not isinstance(data, Mapping) or data.get("kind") not in KINDS:
-        kind = data.get("kind") if isinstance(data, Mapping) else data
+    kind = data.get("kind") if isinstance(data, Mapping) else data
+    if not isinstance(data, Mapping) or not isinstance(kind, str) or kind not in KINDS:
         raise ValueError(f"unknown optical element {kind!r}: known are {', '.join(KINDS)}")
-    cls = KINDS[data["kind"]]
+    cls = KINDS[kind]
     known = {field.name for field in fields(cls)}
     parameters = {key: value for key, value in data.items() if key != "kind"}
     if unknown := set(parameters) - known:
@@ -336,5 +359,5 @@ def _like(value: float) -> Array:
     return np.float64(value)
 
 
-def _positive(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < math.inf
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,175 @@
+"""Which lens a pixel is under: against distances to every lens there is."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+
+from ii_core import IICamera
+from ii_core.lattice import Lattice, nearest_hexagonal
+from ii_core.presets import camera_names, preset_cameras
+
+# Eighths of a pixel make ties that are exact in binary; tenths make ties that rounding blurs; the rest, none.
+LENGTHS = st.one_of(
+    st.integers(2, 48).map(lambda i: i / 8), st.integers(2, 60).map(lambda i: i / 10), st.floats(0.3, 7.0)
+)
+COUNTS = st.integers(1, 6)
+
+
+def by_distance(lattice, m, n):
+    """Lenses by brute force, and whether the second best is clearly a tie or clearly none.
+
+    What is equal to 1e-9 px² is a tie (rounding of squares up to 1e3 is 1e-13): then the upper row wins, and in a row
+    the lens to the right. What differs by less than 1e-4 px² but more than that is nobody's to decide.
+    """
+    l, k = (i.ravel() for i in np.mgrid[: lattice.lenses[1], : lattice.lenses[0]])
+    x, y = lattice.centres(k, l)
+    distance = (m[:, None] + 0.5 - x) ** 2 + (n[:, None] + 0.5 - y) ** 2
+    excess = distance - distance.min(axis=1, keepdims=True)
+    tied = excess < 1e-9
+    best = np.where(tied, l * 1000 - k, math.inf).argmin(axis=1)
+    return k[best], l[best], ~((excess > 1e-9) & (excess < 1e-4)).any(axis=1)
+
+
+def check(lattice, width=12, height=12, outside=0):
+    n, m = (i.ravel() for i in np.mgrid[-outside : height + outside, -outside : width + outside])
+    k, l = lattice.nearest(m, n)
+    right_k, right_l, clear = by_distance(lattice, m, n)
+    np.testing.assert_array_equal(k[clear], right_k[clear])
+    np.testing.assert_array_equal(l[clear], right_l[clear])
+
+
+@settings(max_examples=150, deadline=None)
+@given(lenses=st.tuples(COUNTS, COUNTS), pitch=st.tuples(LENGTHS, LENGTHS), shift=st.tuples(LENGTHS, LENGTHS))
+@example(lenses=(20, 1), pitch=(0.3, 1.0), shift=(-1.0, 0.0))  # 1.5/0.3 and 4.5/0.3: ties that float64 just misses
+def test_rectangular_nearest_is_nearest(lenses, pitch, shift):
+    check(Lattice(lenses, pitch, (shift[0] - 2, shift[1] - 2), False), outside=2)
+
+
+@settings(max_examples=150, deadline=None)
+@given(lenses=st.tuples(COUNTS, COUNTS), across=LENGTHS, ratio=st.floats(0.2, 5.0), shift=st.tuples(LENGTHS, LENGTHS))
+@example(lenses=(3, 3), across=4.0, ratio=0.5, shift=(2.0, 2.5))  # whole pixels: many ties of two, three and four
+@example(lenses=(2, 5), across=4.0, ratio=5.0, shift=(2.5, 2.5))
+def test_hexagonal_nearest_is_nearest(lenses, across, ratio, shift):
+    check(Lattice(lenses, (across, across * ratio), (shift[0] - 2, shift[1] - 2), True), outside=2)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    lattice=st.sampled_from(["rectangular", "hexagonal"]), pitch=st.tuples(LENGTHS, LENGTHS),
+    offset=st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4)), lenses=st.tuples(COUNTS, COUNTS),
+)  # fmt: skip
+def test_a_shifted_array_moves_its_lenses(lattice, pitch, offset, lenses):
+    camera = IICamera(
+        pixels=(11, 9), lenses=lenses, pixel_pitch_mm=0.1, gap_mm=1, lattice=lattice,
+        lens_pitch_mm=(pitch[0] * 0.1, pitch[1] * 0.1), lens_offset_mm=offset,
+    )  # fmt: skip
+    check(camera.lens_lattice, 11, 9)
+    # Lens (0, 0) in millimetres: the array's corner, half a pitch, and the shift, whose y points up.
+    x, y = camera.lens_lattice.centres(np.int64(0), np.int64(0))
+    expected = (
+        5.5 - lenses[0] * pitch[0] / 2 + pitch[0] / 2 + offset[0] / 0.1,
+        4.5 - lenses[1] * pitch[1] / 2 + pitch[1] / 2 - offset[1] / 0.1,
+    )
+    assert (x, y) == pytest.approx(expected, abs=1e-7)  # pitch and shift are kept to a billionth of a pixel
+
+
+def test_ties_go_right_or_up():
+    # Lenses 2 px apart from a corner on a pixel's centre: every other pixel lies on a border.
+    lattice = Lattice((3, 3), (2.0, 2.0), (0.5, 0.5), False)
+    assert [int(k) for k in lattice.nearest(np.arange(6), 0)[0]] == [0, 0, 1, 1, 2, 2]
+    assert [int(l) for l in lattice.nearest(0, np.arange(6))[1]] == [0, 0, 0, 1, 1, 2]
+    # In a hexagonal array: right in a row; and between rows, where three lenses are equally far, the upper row.
+    lattice = Lattice((3, 3), (2.0, 2.0), (0.5, 0.5), True)
+    k, l = lattice.nearest(np.arange(6), np.zeros(6, int))
+    assert (k.tolist(), l.tolist()) == ([0, 0, 1, 1, 2, 2], [0] * 6)
+    # A 3-4-5 triangle: lenses (0, 0), (1, 0) and, in the odd row below, (0, 1) all stand 2.5 px from pixel (4, 3).
+    lattice = Lattice((2, 2), (4.0, 4.0), (0.5, 0.0), True)
+    x, y = lattice.centres(np.array([0, 1, 0]), np.array([0, 0, 1]))
+    np.testing.assert_array_equal(np.hypot(x - 4.5, y - 3.5), 2.5)
+    k, l = lattice.nearest(np.array([4]), np.array([3]))
+    assert (k[0], l[0]) == (1, 0)
+
+
+@pytest.mark.parametrize("hexagonal", [False, True])
+@pytest.mark.parametrize("lost", [1e-12, -1e-12])
+def test_a_tie_survives_the_way_its_border_was_computed(hexagonal, lost):
+    exact = Lattice((4, 3), (3.0, 2.5), (0.5, 0.5), hexagonal)
+    blurred = exact._replace(pitch=(3.0 + lost, 2.5 - lost), origin=(0.5 - lost, 0.5 + lost))
+    n, m = np.mgrid[:9, :13]
+    for one, other in zip(exact.nearest(m, n), blurred.nearest(m, n), strict=True):
+        np.testing.assert_array_equal(*np.broadcast_arrays(one, other))
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.8660254, 1.0, 3.7])
+def test_kernel_is_its_python(ratio):
+    n, m = (i.ravel() for i in np.mgrid[-3:15, -3:15])
+    arguments = (m, n, (5, 4), (2.5, 2.5 * ratio), (0.3, -0.7))
+    results = []
+    for function in (nearest_hexagonal, nearest_hexagonal.py_func):
+        k, l = np.full(m.size, -9), np.full(m.size, -9)
+        function(*arguments, k, l)
+        results.append((k, l))
+    np.testing.assert_array_equal(results[0], results[1])
+
+
+@pytest.mark.parametrize("lattice", ["rectangular", "hexagonal"])
+def test_one_lens_takes_every_pixel(lattice):
+    for pitch in (None, 0.01, 1000.0):  # as wide as the sensor, far smaller, far wider
+        camera = IICamera(
+            pixels=(5, 3), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=1, lattice=lattice, lens_pitch_mm=pitch
+        )
+        L, D = camera.rays()
+        assert (L == L[0, 0]).all() and np.isfinite(D).all()
+        np.testing.assert_allclose(L[0, 0], (0, 0, 1), atol=1e-12)  # rounding of half the lens's width, 500 mm
+
+
+def test_one_pixel_one_lens():
+    L, D = IICamera(pixels=(1, 1), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=1).rays()
+    np.testing.assert_array_equal(L, [[[0, 0, 1]]])
+    np.testing.assert_array_equal(D, [[[0, 0, 1]]])
+
+
+def test_more_lenses_than_pixels():
+    camera = IICamera(pixels=(3, 3), lenses=(9, 9), pixel_pitch_mm=0.1, gap_mm=1)
+    k, l = camera.lens_lattice.nearest(np.arange(3)[None, :], np.arange(3)[:, None])
+    assert k.ravel().tolist() == [1, 4, 7] and l.ravel().tolist() == [1, 4, 7]
+
+
+IRREGULAR = {"hexagonal", "hdtv", "plenoptic", "grin-hexagonal-depth-control", "moving-lenslets"}
+
+
+@pytest.mark.parametrize("name", sorted(camera_names()))
+def test_which_presets_are_regular(name):
+    for camera in preset_cameras(name):
+        assert camera.regular == (name not in IRREGULAR)
+        whole = all(isinstance(x, int) for x in camera.ei_pixels)
+        assert whole == camera.regular
+
+
+def test_whole_structures_share_pixels_out_exactly():
+    for name in sorted(set(camera_names()) - IRREGULAR):
+        camera = preset_cameras(name)[0]
+        (u, v), (width, height) = camera.ei_pixels, camera.pixels
+        k, l = camera.lens_lattice.nearest(np.arange(width), np.arange(height))
+        np.testing.assert_array_equal(k, np.arange(width) // u)
+        np.testing.assert_array_equal(l, np.arange(height) // v)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    structure=st.tuples(*[st.integers(1, 40)] * 4), pitch=st.floats(1e-4, 1.0), given_in_mm=st.booleans()
+)  # fmt: skip
+def test_any_whole_structure_is_regular(structure, pitch, given_in_mm):
+    k, l, u, v = structure
+    assume(k * u <= 400 and l * v <= 400)
+    camera = IICamera(
+        pixels=(k * u, l * v), lenses=(k, l), pixel_pitch_mm=pitch, gap_mm=1,
+        lens_pitch_mm=(u * pitch, v * pitch) if given_in_mm else None,
+    )  # fmt: skip
+    assert camera.regular and camera.ei_pixels == (u, v)
+    columns, rows = camera.lens_lattice.nearest(np.arange(k * u), np.arange(l * v))
+    np.testing.assert_array_equal(columns, np.arange(k * u) // u)
+    np.testing.assert_array_equal(rows, np.arange(l * v) // v)
