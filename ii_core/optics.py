@@ -52,7 +52,7 @@ class Under(NamedTuple):
     cell: tuple[float, float]
     hexagonal: bool = False
 
-    def owns(self, x: Array, y: Array) -> NDArray[np.bool_]:
+    def owns(self, x: NDArray[Any], y: NDArray[Any]) -> NDArray[np.bool_]:
         """Whether a place, from the lens's centre, lies in the lens's own cell, border and all."""
         across, down = self.cell
         if not self.hexagonal:

@@ -87,7 +87,8 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
         gap_mm=camera.gap_mm * scale,
         lens_pitch_mm=_times(camera.lens_pitch_mm, scale),
         lens_offset_mm=_times(camera.lens_offset_mm, scale),
-        origin_mm=_times(camera.origin_mm, scale),
+        # The depth of a sensor in its stack grows with the gap; where a camera stands among others does not.
+        origin_mm=(*camera.origin_mm[:2], camera.origin_mm[2] * scale),
         optics=tuple(element.scaled(scale) for element in camera.optics),
     )
 
