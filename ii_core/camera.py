@@ -302,6 +302,7 @@ class IICamera:
             "lens_offset_mm",
             "origin_mm",
             "about",
+            "notes",
         }
         if not isinstance(data, Mapping) or data.get("kind", "lenslet-array") != "lenslet-array":
             raise ValueError('no camera: needs "kind": "lenslet-array"')
@@ -311,7 +312,7 @@ class IICamera:
             raise ValueError(
                 f"camera: no such key {', '.join(sorted(unknown))}: known are {', '.join(sorted(known))}"
             )
-        parameters = {key: value for key, value in data.items() if key not in ("kind", "about")}
+        parameters = {key: value for key, value in data.items() if key not in ("kind", "about", "notes")}
         if not isinstance(parameters.get("optics", ()), Sequence) or isinstance(parameters.get("optics"), str):
             raise ValueError(f"camera: optics are {parameters['optics']!r}: a list of elements is needed")
         try:
