@@ -265,6 +265,8 @@ def _regular_camera(camera: IICamera, ei_pixels: Pair, *, shrink: bool) -> IICam
 def _same_focus(camera: IICamera, gap: float) -> LensModel:
     """The lens model that focuses behind another gap where the camera's does."""
     model = camera.lens_model
+    if isinstance(model, SphericalLenslet) and model.ior == 1:  # bends nothing
+        return Pinhole()
     if isinstance(model, SphericalLenslet):  # the stretched cell may be too large for the sphere
         model = Lenslet(focal_mm=model.radius_mm / (model.ior - 1), aperture_mm=model.aperture_mm)
     if not isinstance(model, Lenslet) or gap == camera.gap_mm:
