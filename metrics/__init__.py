@@ -2,6 +2,7 @@
 
 from .chart import rd_chart
 from .depth import DepthQuality, q_depth
+from .focus import FocusDepth, depth_from_focus, linear_layers, logarithmic_layers
 from .psnr import angle_axes, mean_q_angle, q_angle, q_global
 from .rd import bd_psnr, bd_rate, rate_distortion
 from .study import provenance, read_study, summary_table, write_csv, write_study
@@ -9,10 +10,14 @@ from .view import ViewQuality, q_view
 
 __all__ = [
     "DepthQuality",
+    "FocusDepth",
     "ViewQuality",
     "angle_axes",
     "bd_psnr",
     "bd_rate",
+    "depth_from_focus",
+    "linear_layers",
+    "logarithmic_layers",
     "mean_q_angle",
     "provenance",
     "q_angle",

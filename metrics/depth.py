@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IICamera, IIPicture
 from ii_core.view import camera_of, view_positions
 
+from .focus import check_layers, depth_from_focus, nearest_layer
 from .psnr import check_finite, check_pair, psnr
-
-LAYERS = 250
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +28,17 @@ class DepthQuality:
     counts : ndarray of int64, (layers,)
         View pixels in each layer.
     outside : int
-        View pixels that hit something nearer or farther than all layers; they count nowhere.
+        View pixels that hit something nearer or farther than all layers; they count nowhere. 0 if the depth is
+        estimated: it is always that of a layer, or none.
+    source : str
+        Where depth came from: ``given``, or ``focus`` with the method, as in ``focus (dissertation)``.
     """
 
     depth_mm: NDArray[np.float64]
     values: NDArray[np.float64]
     counts: NDArray[np.int64]
     outside: int
+    source: str
 
     @property
     def min(self) -> float:
@@ -57,7 +60,13 @@ class DepthQuality:
         return self.values[self.counts > 0]
 
 
-def q_depth(reference: IIPicture, decoded: IIPicture, *, depth: ArrayLike | None = None) -> DepthQuality:
+def q_depth(
+    reference: IIPicture,
+    decoded: IIPicture,
+    *,
+    depth: ArrayLike | None = None,
+    layers_mm: ArrayLike | None = None,
+) -> DepthQuality:
     """PSNR of each depth layer, seen by a virtual camera that looks through every lens.
 
     The camera stands at V = (0, 0, Λ − K·Λ), from where its field of view is the lenslets' viewing angle and
@@ -68,21 +77,26 @@ def q_depth(reference: IIPicture, decoded: IIPicture, *, depth: ArrayLike | None
     ----------
     reference, decoded : IIPicture
         Of the same structure and type; the reference has a camera.
-    depth : array_like, (N, M)
-        Scene z at every pixel of the picture, mm, NaN where nothing is hit.
+    depth : array_like, (N, M), optional
+        Scene z at every pixel of the picture, mm, NaN where nothing is hit. If it is not given, depth is estimated
+        from the reference: `depth_from_focus`.
+    layers_mm : array_like, (layers,), optional
+        Depths of the layers, increasing; z = d·f, d = 1 … 250, with f = Λ in the pinhole approximation, if not
+        given. See `linear_layers` and `logarithmic_layers`.
 
     Returns
     -------
     DepthQuality
-        For layers at z = d·f, d = 1 … 250, with f = Λ in the pinhole approximation. The outer layers reach half
-        a layer outwards; what lies beyond is left out rather than moved in, so that a layer's value
-        always tells about its own depth. A pixel halfway between two layers belongs to the farther one.
+        The outer layers reach half a layer outwards; what lies beyond is left out rather than moved in, so that a
+        layer's value always tells about its own depth. A pixel halfway between two layers belongs to the farther
+        one.
 
     Raises
     ------
     ValueError
-        If the pictures differ in structure or type, have no camera, hold a pixel in view that is not finite, or
-        if ``depth`` is missing, of another shape, or infinite.
+        If the pictures differ in structure or type, have no camera, hold a pixel in view that is not finite, if
+        ``depth`` is of another shape or infinite, or if the layers are not depths that increase. Without
+        ``depth`` also as `depth_from_focus`.
 
     References
     ----------
@@ -90,32 +104,37 @@ def q_depth(reference: IIPicture, decoded: IIPicture, *, depth: ArrayLike | None
     """
     check_pair(reference, decoded)
     camera = camera_of(reference)
-    if depth is None:
-        raise ValueError("depth from focus is not built yet: give depth=")
-    z = np.asarray(depth)
-    if z.shape != reference.pixels.shape[:2] or z.dtype.kind not in "fiu":
-        raise ValueError(
-            f"depth is {z.dtype} of shape {z.shape}: numbers of shape {reference.pixels.shape[:2]} are needed"
-        )
-    n, m = virtual_camera_pixels(camera, erect=reference.erect)
-    a, b, z = reference.pixels[n, m], decoded.pixels[n, m], z[n, m].astype(np.float64)
-    if np.isinf(z).any():
-        raise ValueError("depth is infinite at a pixel in view: NaN is needed where nothing is hit")
+    layers = check_layers(layers_mm, camera)
+    n, m, lens_rows = _seen(camera, reference.erect)
+    a, b = reference.pixels[n, m], decoded.pixels[n, m]
     squared_error = np.square(a.astype(np.float64) - b).sum(axis=-1)
     if not np.isfinite(squared_error).all():
         check_finite(reference, decoded)
+    if depth is None:
+        source = "focus (dissertation)"
+        layer = depth_from_focus(reference, layers_mm=layers).layer[lens_rows]
+        missing = layer < 0
+    else:
+        source = "given"
+        z = np.asarray(depth)
+        if z.shape != reference.pixels.shape[:2] or z.dtype.kind not in "fiu":
+            raise ValueError(
+                f"depth is {z.dtype} of shape {z.shape}: numbers of shape {reference.pixels.shape[:2]} are needed"
+            )
+        z = z[n, m].astype(np.float64)
+        if np.isinf(z).any():
+            raise ValueError("depth is infinite at a pixel in view: NaN is needed where nothing is hit")
+        layer, missing = nearest_layer(z, layers, camera.gap_mm), np.isnan(z)
 
-    hit = ~np.isnan(z)
-    d = np.floor(z[hit] / camera.gap_mm + 0.5)
-    inside = (d >= 1) & (d <= LAYERS)
-    layer = d[inside].astype(np.int64) - 1
-    counts = np.bincount(layer, minlength=LAYERS)
-    total = np.bincount(layer, weights=squared_error[hit][inside], minlength=LAYERS)
+    inside = layer >= 0
+    counts = np.bincount(layer[inside], minlength=layers.size)
+    total = np.bincount(layer[inside], weights=squared_error[inside], minlength=layers.size)
     return DepthQuality(
-        depth_mm=np.arange(1.0, LAYERS + 1) * camera.gap_mm,
+        depth_mm=layers,
         values=psnr(total, 3 * counts, reference.pixels.dtype),
         counts=counts,
-        outside=int(inside.size - inside.sum()),
+        outside=int((~inside & ~missing).sum()),
+        source=source,
     )
 
 
@@ -128,6 +147,13 @@ def virtual_camera_pixels(camera: IICamera, *, erect: bool = False) -> tuple[NDA
         Broadcast to (L, K), less the rows whose line ends off the pixel array (only an array higher than wide
         has such rows).
     """
+    n, m, _ = _seen(camera, erect)
+    return n, m
+
+
+def _seen(camera: IICamera, erect: bool) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """As `virtual_camera_pixels`, and the rows of lenses that are left."""
     x, y = view_positions(camera, (0.0, 0.0, camera.gap_mm * (1 - camera.lenses[0])), erect=erect)
     m, n = (np.floor(position + 0.5).astype(np.int64) for position in (x, y))
-    return n[(n >= 0) & (n < camera.pixels[1]), None], m[None, :]
+    kept = np.flatnonzero((n >= 0) & (n < camera.pixels[1]))
+    return n[kept, None], m[None, :], kept

@@ -101,8 +101,6 @@ def test_depth_is_taken_at_the_very_pixel():
 def test_refusals():
     a = picture()
     depth = np.full(a.pixels.shape[:2], 10.0)
-    with pytest.raises(ValueError, match="depth from focus is not built yet: give depth="):
-        q_depth(a, a)
     with pytest.raises(ValueError, match=r"shape \(48, 71\): numbers of shape \(48, 72\)"):
         q_depth(a, a, depth=depth[:, 1:])
     with pytest.raises(ValueError, match="depth is bool"):
