@@ -98,15 +98,21 @@ def precision() -> str:
         psnr = [row[f"psnr_{scene}"] for scene in ("apples", "cuboid")]
         shown = " · ".join("reference" if value is None else f"{value:.1f} dB" for value in psnr)
         lines.append(
-            f"| {row['camera']} | {row['format']} | {row['bytes_per_pixel']:.2g} | {row['angle_max_urad']:.3g} · "
-            f"{row['angle_rms_urad']:.3g} µrad | {row['place_max_um']:.2g} · {row['place_rms_um']:.2g} µm | {shown} |"
+            f"| {row['camera']} | {row['format']} | {row['bytes_per_pixel']:.2g} | {figure(row['angle_max_urad'])} · "
+            f"{figure(row['angle_rms_urad'])} µrad | {figure(row['place_max_um'])} · {figure(row['place_rms_um'])} µm "
+            f"| {shown} |"
         )
     return "\n".join([*lines, "", VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""])
 
 
-VERDICT = """**PNG-16** is enough for every picture that gets a sensor's noise, which alone leaves 47.5 dB: pixels change only
-where a ray grazes an edge. **EXR** is for pictures that must agree to the bit. **PNG-8** and **RGBE** are for looking
-at a camera, not for rendering with it: an error of a milliradian moves a point 100 mm away by a tenth of a
+def figure(value: float) -> str:
+    """Two or three digits that say something."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.2g}" if value > 1e-6 else "0"
+
+
+VERDICT = """**PNG-16** is enough for every picture that gets a sensor's noise, which alone leaves 47.5 dB: pixels
+change only where a ray grazes an edge. **EXR** is for pictures that must agree to the bit. **PNG-8** and **RGBE** are
+for looking at a camera, not for rendering with it: an error of a milliradian moves a point 100 mm away by a tenth of a
 millimetre, a whole lens of `setup1`. RGBE is the worst of all in spite of its bytes, for its eight bits are relative
 to the largest of the three numbers."""
 
