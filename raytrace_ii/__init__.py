@@ -2,12 +2,13 @@
 
 from .load import load_scene, scene_names
 from .render import Shot, Stats, render
-from .scene import Background, Body, Light, Material, Scene
+from .scene import Background, Body, Fog, Light, Material, Scene
 from .trace import trace
 
 __all__ = [
     "Background",
     "Body",
+    "Fog",
     "Light",
     "Material",
     "Scene",

@@ -14,7 +14,7 @@ from ii_core.jit import inline_kernel, kernel
 # A weight this small cannot move a colour by half a step of 8 bits, not even on sRGB's steep foot.
 LEAST_WEIGHT = 0.5 / 255 / 12.92
 REFLECTION, REFRACTION = 0, 1
-IMAGE, CHECKER, NOISE = 0, 1, 2  # kinds of texture
+IMAGE, CHECKER, NOISE, VERTEX = 0, 1, 2, 3  # kinds of texture
 # Odd multipliers of the noise lattice's hash.
 _PX, _PY, _PZ, _SEED, _GOLDEN = 73856093, 19349663, 83492791, 2654435761, 0x1E3779B97F4A7C15
 # Perlin's sixteen: towards the twelve edges of a cube, four of them twice. A table, for branches would be guesses.
@@ -90,14 +90,16 @@ def record_support(primitives, u, v, pixels, corners, faces, object_of_face, eye
 @kernel
 def shade(
     primitives, u, v, distances, origins, directions, weights, pixels, inside,
-    corners, faces, normals, coordinates, object_of_face, materials, textures, texels, lights, background, ambient,
-    radiance, shadow_origins, shadow_directions, shadow_reach, shadow_colours, shadow_pixels,
+    corners, faces, normals, coordinates, object_of_face, materials, textures, texels, lights, background, fog,
+    ambient, radiance, shadow_origins, shadow_directions, shadow_reach, shadow_colours, shadow_pixels,
     next_origins, next_directions, next_weights, next_pixels, next_inside, next_kinds, spawn,
 ):  # fmt: skip
     """Shade one generation of rays.
 
     Adds background and ambient light to ``radiance``; writes shadow rays with the light they would let through,
     and, if ``spawn``, reflected and refracted rays. ``inside`` is the object whose body a ray runs in, −1 for none.
+    ``fog`` is its colour and density, of no length if there is none; it lies outside bodies, and before the sky not
+    at all.
 
     Returns
     -------
@@ -127,6 +129,12 @@ def shade(
             w0 *= math.exp(-materials[medium, _ABSORPTION] * t)
             w1 *= math.exp(-materials[medium, _ABSORPTION + 1] * t)
             w2 *= math.exp(-materials[medium, _ABSORPTION + 2] * t)
+        elif fog.shape[0] > 0:
+            clear = math.exp(-fog[3] * float(distances[i]))
+            radiance[pixel, 0] += w0 * (1.0 - clear) * fog[0]
+            radiance[pixel, 1] += w1 * (1.0 - clear) * fog[1]
+            radiance[pixel, 2] += w2 * (1.0 - clear) * fog[2]
+            w0, w1, w2 = w0 * clear, w1 * clear, w2 * clear
         if not entering:
             gx, gy, gz = -gx, -gy, -gz
         nx, ny, nz = gx, gy, gz
@@ -425,6 +433,8 @@ def texture_colour(table, row, texels, x, y, z):
     kind = table[row, 0]
     if kind == IMAGE:
         return _image(table, row, texels, x, y)
+    if kind == VERTEX:
+        return x, y, z
     if kind == CHECKER:
         # A face often lies just on a cell's border: decided here, not by rounding noise.
         odd = (
@@ -491,6 +501,28 @@ def gradient_noise(x, y, z, seed):
         _lerp(u, _slope(i0 ^ j1 ^ k1, x, y - 1, z - 1), _slope(i1 ^ j1 ^ k1, x - 1, y - 1, z - 1)),
     )
     return _lerp(w, near, far)
+
+
+@kernel
+def terrain(x, z, seed, octaves, rough, ridged, out):
+    """Heights of a fractal surface over points (m, n), about −1…1, or 0…1 if folded into ridges (Musgrave 1998).
+
+    Ridges are rough only where they are high already: valleys stay smooth.
+    """
+    for i in range(x.shape[0]):
+        for j in range(x.shape[1]):
+            total, strength, most, weight, scale = 0.0, 1.0, 0.0, 1.0, 1.0
+            for octave in range(octaves):
+                # between the lattice's planes: on one of them noise is 0 at every corner
+                n = gradient_noise(x[i, j] * scale, 0.37 + octave, z[i, j] * scale, seed + octave)
+                if ridged:
+                    n = (1.0 - abs(n)) ** 2 * weight
+                    weight = min(max(1.6 * n, 0.0), 1.0)
+                    most += strength
+                total += strength * n
+                strength *= rough
+                scale *= 2.03
+            out[i, j] = total / most if ridged else total
 
 
 @inline_kernel

@@ -16,27 +16,12 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloa
 
 from ii_core.files import read_image
 
-from .scene import Background, Body, Light, Material, Scene
-from .shapes import AnyShape, Mesh, Point3, rotation
-from .texture import Checker, Noise, Texture, image_texture, linear
+from .modelling import PARTS, AnyShape
+from .scene import Background, Body, Fog, Light, Material, Scene
+from .shapes import Mesh, Point3, rotation
+from .texture import Checker, Colour, Noise, Texture, VertexColours, image_texture, srgb_colour
 
 MESH_TYPES = (".glb", ".gltf", ".obj", ".ply", ".stl")
-
-
-def _colour(value: Any) -> Point3:
-    """``"#rrggbb"`` or three sRGB numbers in [0, 1], to linear."""
-    if isinstance(value, str):
-        if not (len(value) == 7 and value[0] == "#" and all(c in "0123456789abcdefABCDEF" for c in value[1:])):
-            raise ValueError(f"colour {value!r}: #rrggbb or three numbers from 0 to 1 are needed")
-        value = [int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-    if not (
-        isinstance(value, list | tuple)
-        and len(value) == 3
-        and all(isinstance(c, int | float) and not isinstance(c, bool) and 0 <= c <= 1 for c in value)
-    ):
-        raise ValueError(f"colour {value!r}: #rrggbb or three numbers from 0 to 1 are needed")
-    r, g, b = (float(c) for c in linear(value))
-    return r, g, b
 
 
 def _share(value: Any) -> Point3:
@@ -45,7 +30,7 @@ def _share(value: Any) -> Point3:
         if not 0 <= value <= 1:
             raise ValueError(f"{value}: a share from 0 to 1 is needed")
         return float(value), float(value), float(value)
-    return _colour(value)
+    return srgb_colour(value)
 
 
 def _sizes(value: Any) -> Point3:
@@ -60,7 +45,6 @@ def _sizes(value: Any) -> Point3:
     return x, y, z
 
 
-Colour = Annotated[Point3, BeforeValidator(_colour)]
 Share = Annotated[Point3, BeforeValidator(_share)]
 OneOrThree = Annotated[Point3, BeforeValidator(_sizes)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -90,6 +74,13 @@ class _NoiseTexture(_TwoColours):
     octaves: Annotated[int, Field(ge=1, le=8)] = 1
     contrast: NotNegative = 1.0
     seed: Annotated[int, Field(ge=0, lt=1024)] = 0
+
+
+class _VertexTexture(_Strict):
+    kind: Literal["vertex"]
+
+
+_AnyTexture = _ImageTexture | _CheckerTexture | _NoiseTexture | _VertexTexture
 
 
 class _Material(_Strict):
@@ -124,6 +115,11 @@ class _Background(_Strict):
     spread_deg: Annotated[float, Field(gt=0, le=90)] = 90.0
 
 
+class _Fog(_Strict):
+    colour: Colour
+    density_per_mm: PositiveFloat
+
+
 class _MeshFile(_Strict):
     """A mesh file stands in for a shape: right-handed as files are, with −z into the scene."""
 
@@ -148,8 +144,9 @@ class _SceneFile(_Strict):
     ambient: Share = (0.1, 0.1, 0.1)
     max_depth: Annotated[int, Field(ge=0, le=64)] = 6
     background: _Background = _Background(horizon=(0.0, 0.0, 0.0))
+    fog: _Fog | None = None
     light: list[Annotated[_PointLight | _DirectionalLight, Field(discriminator="kind")]] = []
-    texture: dict[str, Annotated[_ImageTexture | _CheckerTexture | _NoiseTexture, Field(discriminator="kind")]] = {}
+    texture: dict[str, Annotated[_AnyTexture, Field(discriminator="kind")]] = {}
     material: dict[str, _Material] = {}
     object: list[_Object] = []
 
@@ -166,6 +163,9 @@ _MODELS: dict[str, type[BaseModel]] = {
     "image": _ImageTexture,
     "checker": _CheckerTexture,
     "noise": _NoiseTexture,
+    "vertex": _VertexTexture,
+    "fog": _Fog,
+    **{get_args(part.model_fields["part"].annotation)[0]: part for part in PARTS},
     **{get_args(shape.model_fields["shape"].annotation)[0]: shape for shape in get_args(get_args(AnyShape)[0])},
 }
 
@@ -236,6 +236,7 @@ _WORDS = {
     "bool_parsing": "{input!r}: true or false is needed",
     "tuple_type": "{input!r}: a list of numbers is needed",
     "list_type": "{input!r}: a list is needed",
+    "model_type": "{input!r}: a table of keys is needed",
     "literal_error": "unknown {input!r}: known are {expected}",
     "union_tag_invalid": "unknown {discriminator} {tag!r}: known are {expected_tags}",
     "union_tag_not_found": "{discriminator} is missing",
@@ -257,6 +258,8 @@ def _first(error: ValidationError) -> str:
     # The kind by which pydantic chose is no key of the file.
     if error.title == _ShapeHolder.__name__:
         place = place[2:]
+        if len(place) > 2 and place[0] == "parts":
+            del place[2:3]
     elif place[0] in ("light", "texture"):
         del place[2:3]
     more = f" (and {len(complaints) - 1} more)" if len(complaints) > 1 else ""
@@ -269,6 +272,8 @@ def _keys(title: str, place: list[Any]) -> list[str]:
         if len(place) == 1:
             return list(_SceneFile.model_fields)
         return list((_Material if place[0] == "material" else _MODELS[place[-2]]).model_fields)
+    if title == _ShapeHolder.__name__ and len(place) > 4:  # a part of a shape
+        return list(_MODELS[place[4]].model_fields)
     model = _MODELS[place[1]] if title == _ShapeHolder.__name__ else _MeshFile
     return [*model.model_fields, *_Object.model_fields]
 
@@ -294,6 +299,7 @@ def _scene(file: _SceneFile, path: Path) -> Scene:
             nadir=sky.nadir if sky.nadir is not None else sky.horizon,
             spread_deg=sky.spread_deg,
         ),
+        fog=Fog(colour=file.fog.colour, density_per_mm=file.fog.density_per_mm) if file.fog else None,
         ambient=file.ambient,
         max_depth=file.max_depth,
     )
@@ -308,7 +314,7 @@ def _light(index: int, value: _PointLight | _DirectionalLight) -> Light:
         raise ValueError(f"light.{index}: {error}") from None
 
 
-def _texture(name: str, value: _ImageTexture | _CheckerTexture | _NoiseTexture, folder: Path) -> Texture:
+def _texture(name: str, value: _AnyTexture, folder: Path) -> Texture:
     if isinstance(value, _ImageTexture):
         try:
             return image_texture(read_image(folder / value.file))
@@ -316,6 +322,8 @@ def _texture(name: str, value: _ImageTexture | _CheckerTexture | _NoiseTexture, 
             raise type(error)(f"texture.{name}.file: {error}") from None
         except ValueError as error:
             raise ValueError(f"texture.{name}.file: {value.file}: {error}") from None
+    if isinstance(value, _VertexTexture):
+        return VertexColours()
     on_surface = value.on == "surface"
     if isinstance(value, _NoiseTexture):
         return Noise(value.colours, value.size, value.octaves, value.contrast, value.seed, on_surface)
@@ -357,6 +365,10 @@ def _body(index: int, value: _Object, materials: dict[str, Material], folder: Pa
 def _coordinates(where: str, texture: Texture | None, mesh: Mesh, size: NDArray[np.float64]) -> Any:
     if texture is None:
         return None
+    if isinstance(texture, VertexColours):
+        if mesh.colours is None:
+            raise ValueError(f"{where}: a texture of vertex colours needs them, the mesh has none")
+        return mesh.colours
     if not texture.on_surface:
         return mesh.vertices * size
     if mesh.uv is None:

@@ -93,6 +93,23 @@ class Background:
     spread_deg: float = 90.0
 
 
+@dataclass(frozen=True, kw_only=True)
+class Fog:
+    """Air perspective: what lies at a distance t keeps the share exp(−density·t), ``colour`` (linear) comes in.
+
+    It fills all space outside transmissive bodies, along reflected and refracted ways too; lights and the sky
+    shine through it: the sky's colours are taken as they are seen. Give the fog the horizon's colour and far
+    things fade into it.
+    """
+
+    colour: Vector
+    density_per_mm: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.density_per_mm < math.inf:
+            raise ValueError(f"fog has a density of {self.density_per_mm} per mm: more than 0 is needed")
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Body:
     """One object: a triangle mesh in scene coordinates (mm) with its material.
@@ -105,7 +122,8 @@ class Body:
     normals : ndarray, (V, 3), optional
         Vertex normals for smooth shading; None shades flat.
     texture_coordinates : ndarray, (V, 3), optional
-        (u, v, 0) for textures on the surface, positions in the body's own frame for solid ones.
+        (u, v, 0) for textures on the surface, positions in the body's own frame for solid ones, linear colours for
+        those of the vertices.
     """
 
     name: str
@@ -149,6 +167,7 @@ class Scene:
     bodies: Sequence[Body]
     lights: Sequence[Light] = ()
     background: Background = field(default_factory=Background)
+    fog: Fog | None = None
     ambient: Vector = (0.0, 0.0, 0.0)
     max_depth: int = 6
     name: str = ""
@@ -227,6 +246,8 @@ class PackedScene:
         self.background = np.array(
             [*b.horizon, *b.zenith, *b.nadir, 1 / math.sin(math.radians(b.spread_deg))], np.float64
         )
+        fog = scene.fog
+        self.fog = np.array([*fog.colour, fog.density_per_mm] if fog else [], np.float64)
         self.ambient = np.array(scene.ambient, np.float64)
         opaque = int(np.searchsorted([body.material.transmissive for body in bodies], True))
         self.opaque_faces = sum(len(body.faces) for body in bodies[:opaque])

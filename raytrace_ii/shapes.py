@@ -20,12 +20,16 @@ Sizes = tuple[PositiveFloat, PositiveFloat, PositiveFloat]
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Vertices (V, 3) and faces (F, 3); normals (V, 3), or None for flat shading; uv (V, 2), or None."""
+    """Vertices (V, 3) and faces (F, 3); normals (V, 3), or None for flat shading; uv (V, 2), or None.
+
+    ``colours`` (V, 3) are linear colours of the vertices, or None.
+    """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     normals: NDArray[np.float64] | None = None
     uv: NDArray[np.float64] | None = None
+    colours: NDArray[np.float64] | None = None
 
 
 class Shape(BaseModel):
@@ -167,12 +171,6 @@ class BoxGrid(Shape):
         turns = _rotations(self.jitter * generator.uniform(-0.6, 0.6, centres.shape))
         tile = generator.integers(0, self.tiles**2, (len(centres), 6))
         return boxes(centres, np.full((len(centres), 3), self.box_mm), turns, tile, self.tiles)
-
-
-AnyShape = Annotated[
-    Sphere | Box | Plane | Cylinder | Revolve | BoxGrid,
-    Field(discriminator="shape"),
-]
 
 
 def revolve(profile: NDArray[np.float64], segments: int, bend: Any = None) -> Mesh:

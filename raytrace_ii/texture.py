@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BeforeValidator
 
-from .kernels import CHECKER, IMAGE, NOISE
+from .kernels import CHECKER, IMAGE, NOISE, VERTEX
 
 COLUMNS = 12  # kind, then what the kind needs
 
@@ -46,7 +47,14 @@ class Noise:
     on_surface: bool = False
 
 
-Texture = Image | Checker | Noise
+@dataclass(frozen=True)
+class VertexColours:
+    """The linear colours of the mesh's own vertices, which stand in the place of texture coordinates."""
+
+    on_surface = True
+
+
+Texture = Image | Checker | Noise | VertexColours
 
 
 class TextureTable:
@@ -68,6 +76,8 @@ class TextureTable:
                 used += width * height
             elif isinstance(texture, Checker):
                 rows.append([CHECKER, *(1 / s for s in texture.size), *texture.colours[0], *texture.colours[1]])
+            elif isinstance(texture, VertexColours):
+                rows.append([VERTEX])
             else:
                 scale = (1 / s for s in texture.size)
                 octaves = texture.octaves + texture.seed % 1024 * 16  # one column for both
@@ -86,6 +96,25 @@ def linear(srgb: Any) -> NDArray[np.float64]:
     """sRGB in [0, 1] to linear light (IEC 61966-2-1)."""
     c = np.asarray(srgb, dtype=np.float64)
     return np.where(c <= 0.04045, c / 12.92, ((np.maximum(c, 0) + 0.055) / 1.055) ** 2.4)
+
+
+def srgb_colour(value: Any) -> tuple[float, float, float]:
+    """``"#rrggbb"`` or three sRGB numbers in [0, 1], to linear."""
+    if isinstance(value, str):
+        if not (len(value) == 7 and value[0] == "#" and all(c in "0123456789abcdefABCDEF" for c in value[1:])):
+            raise ValueError(f"colour {value!r}: #rrggbb or three numbers from 0 to 1 are needed")
+        value = [int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    if not (
+        isinstance(value, list | tuple)
+        and len(value) == 3
+        and all(isinstance(c, int | float) and not isinstance(c, bool) and 0 <= c <= 1 for c in value)
+    ):
+        raise ValueError(f"colour {value!r}: #rrggbb or three numbers from 0 to 1 are needed")
+    r, g, b = (float(c) for c in linear(value))
+    return r, g, b
+
+
+Colour = Annotated[tuple[float, float, float], BeforeValidator(srgb_colour)]
 
 
 def image_texture(pixels: NDArray[Any]) -> Image:

@@ -188,7 +188,7 @@ class Tracer:
         shadows, spawned = kernels.shade(
             primitives, u, v, hits["tfar"], rays.origins, rays.directions, rays.weights, rays.pixels, rays.inside,
             s.corners, s.faces, s.normals, s.coordinates, s.object_of_face, s.materials,
-            s.textures.table, s.textures.texels, s.lights, s.background, s.ambient, radiance,
+            s.textures.table, s.textures.texels, s.lights, s.background, s.fog, s.ambient, radiance,
             shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels,
             following.origins, following.directions, following.weights, following.pixels, following.inside, kinds,
             spawn,

@@ -228,7 +228,7 @@ CHECKER = '[texture.t]\nkind = "checker"\ncolours = ["#ffffff", "#000000"]\nsize
 OBJECT_KEYS = "name, material, position_mm, rotate_deg, scale"
 COLOUR = "#rrggbb or three numbers from 0 to 1 are needed"
 WRONG = {
-    "unknown key": ("fog = 1\n" + BALL, "fog: no such key: known are title, about, ambient, max_depth"),
+    "unknown key": ("mist = 1\n" + BALL, "mist: no such key: known are title, about, ambient, max_depth"),
     "unknown key of an object": (
         BALL + "size = 1\n",
         f"object.0: size: no such key: known are shape, radius_mm, segments, {OBJECT_KEYS}",
@@ -253,7 +253,7 @@ WRONG = {
         '[background]\nhorizon = "#000000"\nsky = 1\n' + BALL,
         "background.sky: no such key: known are horizon, zenith, nadir, spread_deg",
     ),
-    "several": ("fog = 1\nrain = 1\n" + BALL, "fog: no such key: known are .* (and 1 more)"),
+    "several": ("mist = 1\nrain = 1\n" + BALL, "mist: no such key: known are .* (and 1 more)"),
     "unknown material": (ball('material = "m"', 'material = "q"'), "object.0: unknown material 'q': known are m"),
     "no material at all": (
         '[[object]]\nname = "ball"\nshape = "sphere"\nradius_mm = 1\nmaterial = "m"\n',
