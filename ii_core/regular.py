@@ -234,13 +234,12 @@ def _rectangles(lattice: Lattice, owner: Ints) -> tuple[Ints, Ints, Pair]:
 
 
 def _in_cell(lattice: Lattice, dx: NDArray[Any], dy: NDArray[Any]) -> Mask:
-    """Which offsets from a lens centre lie in its cell, (V, U)."""
+    """Which offsets of at most half a pitch from a lens centre lie in its cell, (V, U)."""
     (p, q), grid = lattice.pitch, (dy.size, dx.size)
     if not lattice.hexagonal:
         return np.ones(grid, np.bool_)
-    # The bisectors towards the lenses half a pitch aside in the next rows, and to those two rows off.
-    aside = abs(dx)[None, :] * p + 2 * abs(dy)[:, None] * q <= p * p / 4 + q * q
-    return np.ascontiguousarray(aside & (abs(dy)[:, None] <= q))
+    # Nearer than the lenses half a pitch aside in the next rows; others are too far off to matter here.
+    return abs(dx)[None, :] * p + 2 * abs(dy)[:, None] * q <= p * p / 4 + q * q
 
 
 def _regular_camera(camera: IICamera, ei_pixels: Pair, *, shrink: bool) -> IICamera:

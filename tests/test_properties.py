@@ -258,6 +258,13 @@ def test_viewing_zone(name):
     assert zone["width_mm"][0] == pytest.approx(camera.lens_pitch_mm[0], rel=1e-6)
 
 
+def test_viewing_zone_of_a_hexagonal_array_reaches_over_half_a_lens_more():
+    camera = lens_camera(lattice="hexagonal")  # 6 lenses of 1 mm across, 6.5 with the odd rows', gap 2 mm
+    zone = ii.viewing_zone(camera)
+    assert zone["nearest_mm"] == pytest.approx(6.5 * 2)
+    assert zone["width_mm"] == pytest.approx([1.0, 6.5 - 3])
+
+
 def test_viewing_zone_without_parallax_down():
     zone = ii.viewing_zone(preset("hpo"))
     assert zone["width_mm"][1] == math.inf and zone["nearest_mm"] == pytest.approx(512 * 0.182687179)
