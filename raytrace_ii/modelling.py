@@ -290,13 +290,14 @@ class Heightfield(Shape):
         How many times wider the far edge is; rows stand apart in the same proportion.
     cells : (x, z)
     height_mm, feature_mm : float
-        Height of the coarsest octave and its wavelength.
+        Height at the far edge, in proportion to the row's width elsewhere, and wavelength of the coarsest octave.
     octaves, ridged : int, bool
         Octaves of noise, each of half the wavelength and ``rough`` times the height; folded into ridges or not.
     rise_mm : float
         How much the ground rises from near to far.
     valley_mm : float
-        Half width of a valley along x = 0, in proportion to the row's width; 0 for none.
+        Half width of a valley along x = 0 at the near edge, wider as the rows are; its floor keeps a quarter of the
+        height. 0 for none.
     colours : list of (height_mm, colour)
         Colours from the bottom up, mixed in between.
     steep : colour, optional
@@ -329,10 +330,10 @@ class Heightfield(Shape):
         y = np.empty(x.shape)
         scale = 1 / self.feature_mm
         terrain(x * scale, z * scale, self.seed, self.octaves, self.rough, self.ridged, y)
-        y *= self.height_mm
+        y *= self.height_mm * (wide / self.widen)[:, None]
         if self.valley_mm > 0:
             t = np.clip(np.abs(x) / (self.valley_mm * wide[:, None]), 0, 1)
-            y *= t * t * (3 - 2 * t)
+            y *= 0.25 + 0.75 * t * t * (3 - 2 * t)
         y += self.rise_mm * away[:, None]
         points = np.stack([x, y, z], axis=-1)
         normals = _unit(np.cross(np.gradient(points, axis=0), np.gradient(points, axis=1)))
