@@ -66,6 +66,7 @@ def q_depth(
     *,
     depth: ArrayLike | None = None,
     layers_mm: ArrayLike | None = None,
+    method: str = "dissertation",
 ) -> DepthQuality:
     """PSNR of each depth layer, seen by a virtual camera that looks through every lens.
 
@@ -83,6 +84,8 @@ def q_depth(
     layers_mm : array_like, (layers,), optional
         Depths of the layers, increasing; z = d·f, d = 1 … 250, with f = Λ in the pinhole approximation, if not
         given. See `linear_layers` and `logarithmic_layers`.
+    method : {"dissertation", "robust"}
+        How depth is estimated, if it is; see `depth_from_focus`.
 
     Returns
     -------
@@ -111,8 +114,8 @@ def q_depth(
     if not np.isfinite(squared_error).all():
         check_finite(reference, decoded)
     if depth is None:
-        source = "focus (dissertation)"
-        layer = depth_from_focus(reference, layers_mm=layers).layer[lens_rows]
+        source = f"focus ({method})"
+        layer = depth_from_focus(reference, layers_mm=layers, method=method).layer[lens_rows]
         missing = layer < 0
     else:
         source = "given"

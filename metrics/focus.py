@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IICamera, IIPicture
 from ii_core.jit import kernel
-from ii_core.view import camera_of, view_positions
+from ii_core.view import camera_of, view_image, view_positions
+
+from .psnr import peak
 
 LAYERS = 250
 Floats = NDArray[np.float64]
@@ -30,6 +32,14 @@ def _square(step: int) -> NDArray[np.int64]:
 BASE = _square(1)
 REFERENCE = _square(7)
 FILTER = np.ones((5, 5))
+METHODS = ("dissertation", "robust")
+# The robust method's lenses: eight directions, from near for layers that only near lenses see to far for far layers.
+STAR = np.unique([(i * r, j * r) for r in (1, 2, 4, 7, 10, 14) for i in (-1, 0, 1) for j in (-1, 0, 1)], axis=0)
+# In steps of 8 bits, summed over R, G and B: from where on a difference is that of another surface, however large,
+# and by how much a neighbour's colour differs when it counts e times less.
+OTHER_SURFACE, ALIKE = 30.0, 60.0
+# Costs that differ less, in shares of the peak, differ by rounding: an even picture must not have a depth.
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +49,8 @@ class FocusDepth:
     Attributes
     ----------
     depth_mm : ndarray of float64, (L, K)
-        z in camera coordinates; NaN where nothing tells one depth from another.
+        z in camera coordinates; NaN where nothing tells one depth from another. That of the layer, or, of the
+        robust method, of the bottom of the parabola through its cost and those of both neighbours.
     layer : ndarray of int64, (L, K)
         Row of ``layers_mm``, −1 where the depth is NaN.
     confidence : ndarray of float32, (L, K)
@@ -97,6 +108,7 @@ def depth_from_focus(
     picture: IIPicture,
     *,
     layers_mm: ArrayLike | None = None,
+    method: str = "dissertation",
     base: ArrayLike = BASE,
     reference: ArrayLike = REFERENCE,
     weights: ArrayLike = FILTER,
@@ -137,8 +149,14 @@ def depth_from_focus(
     layers_mm : array_like, (layers,), optional
         Depths to try, increasing; `linear_layers` if not given. See also `logarithmic_layers`. None but those
         beyond the lens plane can be chosen.
+    method : {"dissertation", "robust"}
+        How alike the lenses see a layer. ``robust`` compares each neighbour's pixel with the lens's own one, sums
+        |Δ| over colours, counts none above 30 steps of 8 bits (another surface covers the point), and takes the
+        mean over the left, right, upper or lower half of the neighbours, whichever is least: behind an edge one
+        half still sees the point. Its neighbours stand in eight directions, 1, 2, 4, 7, 10 and 14 lenses away, and
+        h counts those view pixels less whose colour differs.
     base, reference : array_like of int, (n, 2)
-        Lenses of B and R, to the right and down from the one looked through.
+        Lenses of B and R, to the right and down from the one looked through; of the dissertation's method.
     weights : array_like, (odd, odd)
         h, not negative; each layer's cost becomes the weighted mean over those neighbours that have one. 5×5 equal
         weights by default: the size of B.
@@ -178,6 +196,8 @@ def depth_from_focus(
     """
     if interpolation not in ("linear", "nearest"):
         raise ValueError(f"unknown interpolation {interpolation!r}: known are linear, nearest")
+    if method not in METHODS:
+        raise ValueError(f"unknown method {method!r}: known are {', '.join(METHODS)}")
     camera = camera_of(picture)
     picture.check_regular()
     if camera.front:
@@ -189,19 +209,27 @@ def depth_from_focus(
         raise ValueError("weights must be of two odd sides, finite, not negative and not all 0")
     _check_finite(picture)
 
-    lenses = np.unique(np.concatenate([b, r]), axis=0)
-    members = np.stack([(lenses[:, None] == p).all(axis=2).any(axis=1) for p in (b, r)], axis=1)
+    lenses = np.unique(np.concatenate([b, r]), axis=0) if method == "dissertation" else STAR
     across, down = np.unique(lenses[:, 0]), np.unique(lenses[:, 1])
     cols, rows = pixel_tables(camera, layers, across, down, erect=picture.erect, nearest=interpolation == "nearest")
     where = np.column_stack([np.searchsorted(across, lenses[:, 0]), np.searchsorted(down, lenses[:, 1])])
-
     (k, l) = picture.lenses
     cost, smooth = (np.empty((layers.size, l, k), np.float32) for _ in range(2))
-    _by_rows(workers, l, focus_cost, picture.pixels, *cols, *rows, where, members, cost)
-    _by_rows(workers, l, weigh, cost, h, smooth)
-    layer, confidence = np.empty((l, k), np.int64), np.empty((l, k), np.float32)
-    _by_rows(workers, l, choose, smooth, layer, confidence)
-    return FocusDepth(np.where(layer < 0, np.nan, layers[layer]), layer, confidence, layers)
+    if method == "dissertation":
+        members = np.stack([(lenses[:, None] == p).all(axis=2).any(axis=1) for p in (b, r)], axis=1)
+        _by_rows(workers, l, focus_cost, picture.pixels, *cols, *rows, where, members, cost)
+        _by_rows(workers, l, weigh, cost, h, smooth)
+    else:
+        step = peak(picture.pixels.dtype) / 255
+        own, sides = int(np.flatnonzero((lenses == 0).all(axis=1))[0]), np.column_stack([lenses < 0, lenses > 0])
+        _by_rows(workers, l, half_cost, picture.pixels, *cols, *rows, where, sides, own, OTHER_SURFACE * step, cost)
+        view = view_image(picture, (0.0, 0.0, camera.gap_mm * (1 - k)), interpolation=interpolation)[0]
+        _by_rows(workers, l, weigh_alike, cost, h, view.astype(np.float64), ALIKE * step, smooth)
+    layer, fit, confidence = np.empty((l, k), np.int64), np.empty((l, k)), np.empty((l, k), np.float32)
+    _by_rows(workers, l, choose, smooth, ROUNDING * peak(picture.pixels.dtype), layer, fit, confidence)
+    place = layer + (fit if method == "robust" else 0.0)
+    depth = np.where(layer < 0, np.nan, np.interp(place, np.arange(layers.size), layers))
+    return FocusDepth(depth, layer, confidence, layers)
 
 
 Table = tuple[NDArray[np.int32], Floats]
@@ -332,6 +360,75 @@ def focus_cost(pixels, cols, col_weights, rows, row_weights, where, members, out
 
 
 @kernel
+def half_cost(pixels, cols, col_weights, rows, row_weights, where, sides, own, limit, out, first, last):
+    """out[d, l, k] = min over halves of the mean over their neighbours of min(Σ_rgb |p − p_own|, limit), or NaN.
+
+    As `focus_cost`; ``sides`` (n, 4) says which half each neighbour is in, ``own`` is the neighbour at step 0.
+    """
+    total, count = np.empty(4), np.empty(4)
+    for l in range(first, last):
+        for d in range(out.shape[0]):
+            for k in range(out.shape[2]):
+                out[d, l, k] = np.nan
+                total[:], count[:] = 0.0, 0.0
+                q0, q1, q2 = 0.0, 0.0, 0.0
+                for step in range(-1, where.shape[0]):
+                    i = own if step < 0 else step
+                    m, n = cols[d, where[i, 0], k], rows[d, where[i, 1], l]
+                    if (m < 0 or n < 0) and step < 0:
+                        break
+                    if m < 0 or n < 0 or step == own:
+                        continue
+                    x, y = col_weights[d, where[i, 0], k], row_weights[d, where[i, 1], l]
+                    right, below = m + (x > 0), n + (y > 0)
+                    a, b, c, e = (1 - y) * (1 - x), (1 - y) * x, y * (1 - x), y * x
+                    p0 = a * pixels[n, m, 0] + b * pixels[n, right, 0] + c * pixels[below, m, 0]
+                    p1 = a * pixels[n, m, 1] + b * pixels[n, right, 1] + c * pixels[below, m, 1]
+                    p2 = a * pixels[n, m, 2] + b * pixels[n, right, 2] + c * pixels[below, m, 2]
+                    p0, p1 = p0 + e * pixels[below, right, 0], p1 + e * pixels[below, right, 1]
+                    p2 += e * pixels[below, right, 2]
+                    if step < 0:
+                        q0, q1, q2 = p0, p1, p2
+                        continue
+                    difference = min(abs(p0 - q0) + abs(p1 - q1) + abs(p2 - q2), limit)
+                    for s in range(4):
+                        if sides[i, s]:
+                            total[s] += difference
+                            count[s] += 1
+                best = np.inf
+                for s in range(4):
+                    if count[s] > 1:  # one neighbour alone agrees too easily
+                        best = min(best, total[s] / count[s])
+                if best < np.inf:
+                    out[d, l, k] = best
+
+
+@kernel
+def weigh_alike(cost, h, view, alike, out, first, last):
+    """As `weigh`, with weights h·exp(−Σ_rgb |Δview|/alike): what looks alike is taken to lie at one depth."""
+    layers, rows, cols = cost.shape
+    up, left = h.shape[0] // 2, h.shape[1] // 2
+    total, weight = np.empty(layers), np.empty(layers)
+    for l in range(first, last):
+        for k in range(cols):
+            total[:], weight[:] = 0.0, 0.0
+            for j in range(max(0, l - up), min(rows, l + up + 1)):
+                for i in range(max(0, k - left), min(cols, k + left + 1)):
+                    difference = 0.0
+                    for c in range(3):
+                        difference += abs(view[j, i, c] - view[l, k, c])
+                    w = h[up - (j - l), left - (i - k)] * math.exp(-difference / alike)
+                    for d in range(layers):
+                        if not np.isnan(cost[d, j, i]):
+                            total[d] += w * cost[d, j, i]
+                            weight[d] += w
+            for d in range(layers):
+                out[d, l, k] = np.nan
+                if weight[d] > 0 and not np.isnan(cost[d, l, k]):
+                    out[d, l, k] = total[d] / weight[d]
+
+
+@kernel
 def weigh(cost, h, out, first, last):
     """out = cost ∗ h for rows ``first`` to ``last``, over those neighbours that have a cost."""
     layers, rows, cols = cost.shape
@@ -355,8 +452,11 @@ def weigh(cost, h, out, first, last):
 
 
 @kernel
-def choose(cost, layer, confidence, first, last):
-    """The nearest of the cheapest layers, −1 if all cost the same, for rows ``first`` to ``last``."""
+def choose(cost, tie, layer, fit, confidence, first, last):
+    """The nearest of the cheapest layers, −1 if all cost the same but for ``tie``, for rows ``first`` to ``last``.
+
+    ``fit`` is how many layers farther, −½ to ½, the parabola through it and its neighbours has its bottom.
+    """
     for l in range(first, last):
         for k in range(cost.shape[2]):
             best, low, high, total, count = -1, np.inf, -np.inf, 0.0, 0
@@ -369,7 +469,11 @@ def choose(cost, layer, confidence, first, last):
                 high = max(high, c)
                 if c < low:
                     best, low = d, c
-            if low < high:
+            layer[l, k], fit[l, k], confidence[l, k] = -1, 0.0, 0.0
+            if high - low > tie:
                 layer[l, k], confidence[l, k] = best, 1 - low * count / total
-            else:
-                layer[l, k], confidence[l, k] = -1, 0
+                if 0 < best < cost.shape[0] - 1:
+                    before, after = np.float64(cost[best - 1, l, k]), np.float64(cost[best + 1, l, k])
+                    bend = before - 2 * low + after
+                    if bend > 0:  # not NaN, and not three alike
+                        fit[l, k] = (before - after) / (2 * bend)

@@ -7,7 +7,19 @@ from trace_scenes import UNIFORM, WHITE, body, wall
 from ii_core import IICamera, IIPicture, orthoscopic, preset
 from metrics import depth_from_focus, linear_layers, logarithmic_layers, q_depth
 from metrics.depth import virtual_camera_pixels
-from metrics.focus import BASE, FILTER, REFERENCE, choose, focus_cost, nearest_layer, pixel_tables, weigh
+from metrics.focus import (
+    BASE,
+    FILTER,
+    REFERENCE,
+    STAR,
+    choose,
+    focus_cost,
+    half_cost,
+    nearest_layer,
+    pixel_tables,
+    weigh,
+    weigh_alike,
+)
 from raytrace_ii import Scene, render
 from raytrace_ii.texture import Image
 
@@ -186,11 +198,15 @@ def test_kernels_against_their_python():
     results = []
     for kind in ("__call__", "py_func"):
         cost, smooth = np.zeros((3, 4, 5), np.float32), np.zeros((3, 4, 5), np.float32)
-        layer, confidence = np.zeros((4, 5), np.int64), np.zeros((4, 5), np.float32)
+        halves, alike = np.zeros((3, 4, 5), np.float32), np.zeros((3, 4, 5), np.float32)
+        layer, fit, confidence = np.zeros((4, 5), np.int64), np.zeros((4, 5)), np.zeros((4, 5), np.float32)
+        sides, own = np.column_stack([lenses < 0, lenses > 0]), int(np.flatnonzero((lenses == 0).all(axis=1))[0])
         getattr(focus_cost, kind)(a.pixels, *cols, *rows, where, members, cost, 0, 4)
         getattr(weigh, kind)(cost, FILTER, smooth, 0, 4)
-        getattr(choose, kind)(smooth, layer, confidence, 0, 4)
-        results.append((cost, smooth, layer, confidence))
+        getattr(half_cost, kind)(a.pixels, *cols, *rows, where, sides, own, 90.0, halves, 0, 4)
+        getattr(weigh_alike, kind)(halves, FILTER, a.pixels[::6, ::6].astype(float), 60.0, alike, 0, 4)
+        getattr(choose, kind)(smooth, 1e-4, layer, fit, confidence, 0, 4)
+        results.append((cost, smooth, halves, alike, layer, fit, confidence))
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_allclose(compiled, plain, rtol=1e-6)  # one multiply–add may be fused
 
@@ -202,18 +218,20 @@ def test_any_number_of_threads_gives_the_same():
     np.testing.assert_array_equal(one.confidence, three.confidence)
 
 
+@pytest.mark.parametrize("method", ["dissertation", "robust"])
 @pytest.mark.parametrize("d", [7, 12, 20, 40])
-def test_a_textured_wall_lies_in_its_layer(d):
+def test_a_textured_wall_lies_in_its_layer(d, method):
     camera = preset("setup1", scale=8)
     shot = shoot(textured_wall(d * camera.gap_mm))
-    f = depth_from_focus(shot.picture)
+    f = depth_from_focus(shot.picture, method=method)
     error = np.abs(f.layer + 1 - d)
     # Lenses at the picture's edge have their partners on one side only: a few of them may miss.
     assert (error <= 1).mean() > 0.97
 
 
 @pytest.mark.parametrize("make", ["black", "constant", "one lens", "one-pixel images", "layers before the lenses"])
-def test_where_nothing_tells_the_layers_apart_there_is_no_depth(make):
+@pytest.mark.parametrize("method", ["dissertation", "robust"])
+def test_where_nothing_tells_the_layers_apart_there_is_no_depth(make, method):
     a, layers = picture(), LAYERS
     if make == "black":
         a = a.with_pixels(np.zeros_like(a.pixels))
@@ -227,9 +245,9 @@ def test_where_nothing_tells_the_layers_apart_there_is_no_depth(make):
         layers = GAP * np.array([100.0, 101.0, 102.0])
     else:
         layers = np.array([0.2, 0.5, 1.0]) * GAP
-    f = depth_from_focus(a, layers_mm=layers)
+    f = depth_from_focus(a, layers_mm=layers, method=method)
     assert np.isnan(f.depth_mm).all() and (f.layer == -1).all() and (f.confidence == 0).all()
-    q = q_depth(a, a, layers_mm=layers)
+    q = q_depth(a, a, layers_mm=layers, method=method)
     assert np.isnan(q.values).all() and q.counts.sum() == q.outside == 0
 
 
@@ -294,6 +312,47 @@ def test_other_types_give_the_same_depth(dtype):
     np.testing.assert_allclose(f.confidence, g.confidence, atol=1e-5)
 
 
+def test_robust_cost_in_the_open():
+    a = picture((9, 9), (5, 5))
+    across = np.unique(STAR[:, 0])
+    cols, rows = pixel_tables(a.camera, LAYERS, across, across)
+    sides, own = np.column_stack([STAR < 0, STAR > 0]), int(np.flatnonzero((STAR == 0).all(axis=1))[0])
+    where = np.searchsorted(across, STAR)
+    cost = np.zeros((6, 9, 9), np.float32)
+    half_cost(a.pixels, *cols, *rows, where, sides, own, 30.0, cost, 0, 9)
+    expected = np.full(cost.shape, np.nan)
+    for d, l, k in np.ndindex(cost.shape):
+
+        def pixel(i, j, d=d, l=l, k=k):
+            m, n = cols[0][d, where[i, 0], k], rows[0][d, where[i, 1], l]
+            x, y = cols[1][d, where[i, 0], k], rows[1][d, where[i, 1], l]
+            if min(m, n) < 0:
+                return None
+            p = np.pad(a.pixels.astype(float), ((0, 1), (0, 1), (0, 0)))
+            return (p[n, m] * (1 - x) + p[n, m + 1] * x) * (1 - y) + (p[n + 1, m] * (1 - x) + p[n + 1, m + 1] * x) * y
+
+        mine = pixel(own, 0)
+        found = {tuple(STAR[i]): pixel(i, 0) for i in range(len(STAR)) if i != own}
+        far = {step: min(np.abs(p - mine).sum(), 30) for step, p in found.items() if p is not None}
+        halves = [[v for s, v in far.items() if sign * s[axis] > 0] for axis in (0, 1) for sign in (-1, 1)]
+        means = [np.mean(half) for half in halves if len(half) > 1]
+        expected[d, l, k] = min(means) if means else np.nan
+    np.testing.assert_allclose(cost, expected, rtol=1e-6)  # kept in float32
+
+
+def test_the_robust_method_sees_past_edges_and_between_layers():
+    camera = preset("setup1", scale=8)
+    shot = shoot(textured_wall(8 * camera.gap_mm, left=True), textured_wall(24.3 * camera.gap_mm, seed=1))
+    z = seen_depth(shot) / camera.gap_mm
+    right = {}
+    for method in ("dissertation", "robust"):
+        f = depth_from_focus(shot.picture, method=method)
+        right[method] = (np.abs(f.layer + 1 - z) <= 1).mean()
+    assert right["robust"] > 0.99 > 0.95 > right["dissertation"]
+    behind = z > 20
+    assert np.abs(f.depth_mm / camera.gap_mm - z)[behind].mean() < 0.2  # the nearest layer alone: 0.3
+
+
 def test_layers():
     camera = picture().camera
     np.testing.assert_allclose(linear_layers(camera)[[0, 99, 249]], [GAP, 100 * GAP, 250 * GAP], rtol=1e-15)
@@ -321,6 +380,7 @@ def test_layers():
         ({"reference": [1, 2]}, r"reference is int64 of shape \(2,\)"),
         ({"weights": np.ones((4, 3))}, "two odd sides"),
         ({"weights": np.zeros((3, 3))}, "not all 0"),
+        ({"method": "guess"}, "known are dissertation, robust"),
         ({"interpolation": "cubic"}, "known are linear, nearest"),
     ],
 )
