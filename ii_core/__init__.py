@@ -5,6 +5,7 @@ from .component import component_images, elementary_images, picture_pixels, ray_
 from .maps import MapCamera, read_maps, write_maps
 from .picture import IIPicture, add_sensor_noise
 from .presets import camera_names, preset, preset_cameras
+from .regular import from_smallest_rectangle, resampled, smallest_rectangle
 from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stand_back, view_image
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "component_images",
     "elementary_images",
     "five_viewpoints",
+    "from_smallest_rectangle",
     "orthoscopic",
     "picture_pixels",
     "preset",
@@ -24,6 +26,8 @@ __all__ = [
     "ray_space_images",
     "read_maps",
     "refocus",
+    "resampled",
+    "smallest_rectangle",
     "stand_back",
     "sub_images",
     "view_image",

@@ -89,3 +89,43 @@ def test_presets_are_what_the_list_says():
     assert preset("hdtv").pixels == (3840, 2160) and preset("hdtv").lenses == (160, 125)
     assert preset("hdtv").ei_pixels == pytest.approx((24, 17.28))
     assert preset("plenoptic").ei_pixels == pytest.approx((13.84, 13.84), abs=0.005)
+
+
+def test_a_hexagonal_picture_is_made_regular_and_coded(run, refused, tmp_path):
+    assert run("render", "apples", "--camera", "hexagonal", "--scale", 8, "-o", tmp_path / "h.png")[0] == 0
+    for method, ei in (("resample", (16, 14)), ("rectangle", (16, 18))):
+        out = tmp_path / f"{method}.png"
+        arguments = ("regular", tmp_path / "h.png", "--method", method, "--mask", tmp_path / f"{method}_mask.png")
+        code, said, _ = run(*arguments, "-o", out)
+        assert code == 0 and "owned by their lens" in said
+        made = IIPicture.load(out)
+        assert made.regular and made.lenses == (64, 37) and made.ei_pixels == ei
+        owned = read_image(tmp_path / f"{method}_mask.png")[..., 0]
+        assert owned.shape == made.pixels.shape[:2] and 0.6 < (owned == 255).mean() < 1
+        assert run("encode", out, "--qp", 30, "-o", tmp_path / f"{method}.ii")[0] == 0
+    refused(run("regular", tmp_path / "h.png", "--method", "x", "-o", tmp_path / "x.png"), "unknown method 'x'")
+
+
+@pytest.mark.parametrize("name", ["setup3", "plenoptic2", "hdtv", "moving-lenslets"])
+def test_reports(run, name):
+    code, out, _ = run("camera", name, "--report")
+    assert code == 0
+    for what in (
+        "viewing angle",
+        "image plane",
+        "depth range",
+        "viewing zone",
+        "elementary image",
+        "L and D maps",
+        "limit",
+    ):
+        assert what in out
+
+
+def test_solving_for_what_is_missing(run, refused):
+    code, out, _ = run("camera", "--solve", "pitch=0.39,gap=0.73,pixel=0.0061")
+    found = {line.split()[0]: float(line.split()[1]) for line in out.splitlines()}
+    assert code == 0 and found["view_angle_deg"] == pytest.approx(29.91, abs=0.005)  # to the digits of 0.39 and 0.73
+    refused(run("camera", "--solve", "pitch=0.39"), "under-determined")
+    refused(run("camera", "--solve", "pitch=0.39,gap=0.73,pixel=0.0061,angle=31"), "contradictory")
+    refused(run("camera", "--solve", "width=3"), "'width=3' is no measure")

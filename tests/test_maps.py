@@ -197,7 +197,7 @@ def test_what_cannot_be_stored(tmp_path):
         write_maps([SMALL, preset("setup1", scale=64)], tmp_path)
     blind = IICamera(
         pixels=(4, 4), lenses=(2, 2), pixel_pitch_mm=1, gap_mm=1, name="blind",
-        optics=["pinhole", {"kind": "lens", "z_mm": 0.5, "focal_mm": 9}],
+        optics=["pinhole", {"kind": "lens", "z_mm": 2, "focal_mm": 9, "diameter_mm": 0.5}],
     )  # fmt: skip
     with pytest.raises(ValueError, match="camera 'blind' lets no ray out"):
         write_maps([blind], tmp_path)
