@@ -6,6 +6,7 @@ import math
 import os
 import tomllib
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
@@ -19,7 +20,7 @@ from ii_core.files import read_image
 from .modelling import PARTS, AnyShape
 from .scene import Background, Body, Fog, Light, Material, Scene
 from .shapes import Mesh, Point3, rotation
-from .texture import Checker, Colour, Noise, Texture, VertexColours, image_texture, srgb_colour
+from .texture import Checker, Colour, Image, Noise, Texture, VertexColours, image_texture, srgb_colour
 
 MESH_TYPES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 
@@ -57,6 +58,7 @@ class _Strict(BaseModel):
 class _ImageTexture(_Strict):
     kind: Literal["image"]
     file: str
+    repeat: tuple[PositiveFloat, PositiveFloat] = (1.0, 1.0)
 
 
 class _TwoColours(_Strict):
@@ -317,7 +319,7 @@ def _light(index: int, value: _PointLight | _DirectionalLight) -> Light:
 def _texture(name: str, value: _AnyTexture, folder: Path) -> Texture:
     if isinstance(value, _ImageTexture):
         try:
-            return image_texture(read_image(folder / value.file))
+            return replace(image_texture(read_image(folder / value.file)), repeat=value.repeat)
         except OSError as error:
             raise type(error)(f"texture.{name}.file: {error}") from None
         except ValueError as error:
@@ -373,7 +375,8 @@ def _coordinates(where: str, texture: Texture | None, mesh: Mesh, size: NDArray[
         return mesh.vertices * size
     if mesh.uv is None:
         raise ValueError(f"{where}: a texture on the surface needs texture coordinates, the mesh has none")
-    return np.column_stack([mesh.uv, np.zeros(len(mesh.uv))])
+    repeat = texture.repeat if isinstance(texture, Image) else (1.0, 1.0)
+    return np.column_stack([mesh.uv * repeat, np.zeros(len(mesh.uv))])
 
 
 def _mesh(where: str, parameters: dict[str, Any], folder: Path) -> tuple[Mesh, str]:

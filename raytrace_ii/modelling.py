@@ -447,7 +447,7 @@ class Strands(Shape):
         found = np.empty((0, 3))
         while len(found) < self.count:
             n = _unit(generator.normal(size=(4 * self.count, 3)))
-            face = (n[:, 2] < 0) & (n[:, 1] < 0.55 + 0.25 * np.abs(n[:, 0])) & (np.abs(n[:, 0]) < 0.92)
+            face = (n[:, 2] < 0) & (n[:, 1] < 0.56 + 0.1 * n[:, 0] ** 2) & (np.abs(n[:, 0]) < 0.92)
             good = ~face & (n[:, 1] > -0.45)
             found = np.concatenate([found, n[good]])
         return found[: self.count]
@@ -461,7 +461,8 @@ class Strands(Shape):
         phase = 2.4 * lock + generator.normal(0, 0.35, n)
         side = np.where(out[:, 0] * radii[0] >= self.parting_mm, 1.0, -1.0)
         point = out * radii * 1.01
-        combed = np.column_stack([side * 0.9, 0.15 * np.ones(n), 0.45 * np.ones(n)])
+        behind = np.maximum(out[:, 2], 0)  # what grows there falls where it is
+        combed = np.column_stack([side * 0.9 * (1 - behind) ** 2, 0.15 * np.ones(n), 0.45 * np.ones(n)])
         heading = _unit(0.6 * out + combed + generator.normal(0, 0.08, (n, 3)))
         points = [point]
         for _ in range(self.steps):
@@ -496,9 +497,9 @@ class Strands(Shape):
             (~below & (size < layer))[:, None], point * (layer / np.maximum(size, 1e-6))[:, None], point
         )
         point = np.where(below[:, None], point * (1 + (grow - 1)[:, None] * flat), outward)
-        free = self.face * radii[0]
-        front = (point[:, 2] < -0.15 * radii[2]) & (point[:, 1] < 0.62 * radii[1])
-        inside = front & (np.abs(point[:, 0]) < free)
+        # the curtain opens from the hairline down
+        free = self.face * radii[0] * np.sqrt(np.clip((0.8 - point[:, 1] / radii[1]) / 0.7, 0, 1))
+        inside = (point[:, 2] < -0.1 * radii[2]) & (np.abs(point[:, 0]) < free)
         x = np.where(inside, side * free, point[:, 0])
         return np.column_stack([x, point[:, 1], point[:, 2]])
 

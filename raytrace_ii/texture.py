@@ -17,9 +17,14 @@ COLUMNS = 12  # kind, then what the kind needs
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """An image, linear float32 (H, W, 3), row 0 on top at v = 1; repeats beyond [0, 1]; bilinear."""
+    """An image, linear float32 (H, W, 3), row 0 on top at v = 1; repeats beyond [0, 1]; bilinear.
+
+    ``repeat`` is how often a scene file lays it over the unit square: texture coordinates are multiplied by it
+    when the body is made.
+    """
 
     pixels: NDArray[np.float32]
+    repeat: tuple[float, float] = (1.0, 1.0)
     on_surface = True
 
 
