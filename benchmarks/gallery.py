@@ -111,7 +111,7 @@ def in_scene() -> str:
     shutil.copy(RESULTS / "camera_in_scene.png", DOCS / "images" / "camera_in_scene.png")
     lines = [
         IN_SCENE,
-        "| *Apples* | aperture / pitch | triangles of the camera | as it is | Fresnel's losses added | no stray light |",
+        "| *Apples* | aperture | triangles of the camera | as it is | Fresnel's losses added | no stray light |",
         "|---|---|---|---|---|---|",
     ]
     lines += [
