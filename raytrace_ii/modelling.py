@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, model_validator
 
 from .kernels import terrain
-from .shapes import Box, BoxGrid, Cylinder, Mesh, Plane, Point3, Revolve, Shape, Sizes, Sphere, rotation
+from .shapes import Box, BoxGrid, Cylinder, Mesh, Plane, Point3, Revolve, Shape, Sizes, Sphere, rotation, smooth_curve
 from .texture import Colour
 
 Array = NDArray[Any]
@@ -129,7 +129,53 @@ class Capsule(_Part):
         return self.radius_mm if self.end_radius_mm is None else self.end_radius_mm
 
 
-PARTS = (Ball, Block, Capsule)
+class Tube(_Part):
+    """A smooth curve through points (x, y, z, radius), thickened by the radius.
+
+    The nearest point is looked for on ``steps`` straight pieces; the curve itself is smooth.
+    """
+
+    part: Literal["tube"]
+    points_mm: Annotated[list[tuple[float, float, float, PositiveFloat]], Field(min_length=2)]
+    steps: PositiveInt = 12
+
+    def distance(self, x: Array, y: Array, z: Array) -> Array:
+        shape = np.broadcast_shapes(x.shape, y.shape, z.shape)
+        nearest, place = np.full(shape, np.inf), np.zeros(shape)
+        for i, (a, b) in enumerate(pairwise(self._curve(self.steps))):
+            dx, dy, dz = x - a[0], y - a[1], z - a[2]
+            along = b - a
+            t = dx * along[0] + dy * along[1] + dz * along[2]
+            t = np.clip(t / max(float(along[:3] @ along[:3]), 1e-12), 0, 1)
+            off = (dx - t * along[0]) ** 2 + (dy - t * along[1]) ** 2 + (dz - t * along[2]) ** 2
+            off = np.sqrt(off) - a[3] - t * along[3]
+            closer = off < nearest
+            np.copyto(nearest, off, where=closer)
+            np.copyto(place, t + i, where=closer)
+        # From there to the curve itself, by two steps of Gauss and Newton: pieces would show as rings.
+        fine = self._curve(32 * self.steps)
+        parameter = np.linspace(0, self.steps, len(fine))
+        speed = np.gradient(fine[:, :3], parameter, axis=0)
+        for _ in range(2):
+            away = [p - np.interp(place, parameter, c) for p, c in zip((x, y, z), fine.T[:3], strict=True)]
+            slope = [np.interp(place, parameter, c) for c in speed.T]
+            step = sum(p * c for p, c in zip(away, slope, strict=True)) / sum(c * c for c in slope)
+            place = np.clip(place + np.clip(step, -1, 1), 0, self.steps)
+        away = [p - np.interp(place, parameter, c) for p, c in zip((x, y, z), fine.T[:3], strict=True)]
+        return np.asarray(np.sqrt(sum(p * p for p in away)) - np.interp(place, parameter, fine[:, 3]))
+
+    def bounds(self) -> tuple[Array, Array]:
+        curve = self._curve(32 * self.steps)
+        return (curve[:, :3] - curve[:, 3:]).min(axis=0), (curve[:, :3] + curve[:, 3:]).max(axis=0)
+
+    def _curve(self, steps: int) -> Array:
+        curve = smooth_curve(np.array(self.points_mm, float), steps) + [*self.at_mm, 0.0]
+        # between a thick and a thin point the curve may dip below the thin one
+        curve[:, 3] = np.maximum(curve[:, 3], min(point[3] for point in self.points_mm))
+        return np.asarray(curve)
+
+
+PARTS = (Ball, Block, Capsule, Tube)
 
 
 class Implicit(Shape):
@@ -138,7 +184,7 @@ class Implicit(Shape):
     Parameters
     ----------
     parts : list
-        Balls, blocks and capsules; see `Ball`, `Block`, `Capsule`.
+        Balls, blocks, capsules and tubes; see `Ball`, `Block`, `Capsule`, `Tube`.
     cell_mm : float
         Side of a cell of the grid that the surface is found on (marching cubes).
     grow_mm : float
@@ -148,7 +194,7 @@ class Implicit(Shape):
     """
 
     shape: Literal["implicit"]
-    parts: Annotated[list[Annotated[Ball | Block | Capsule, Field(discriminator="part")]], Field(min_length=1)]
+    parts: Annotated[list[Annotated[Ball | Block | Capsule | Tube, Field(discriminator="part")]], Field(min_length=1)]
     cell_mm: PositiveFloat
     grow_mm: float = 0.0
     front_mm: tuple[float, float, float, float] | None = None
@@ -290,7 +336,9 @@ class Heightfield(Shape):
         How many times wider the far edge is; rows stand apart in the same proportion.
     cells : (x, z)
     height_mm, feature_mm : float
-        Height at the far edge, in proportion to the row's width elsewhere, and wavelength of the coarsest octave.
+        Height and wavelength of the coarsest octave.
+    swell : bool
+        Let heights grow with the rows' width, up to ``height_mm`` at the far edge.
     octaves, ridged : int, bool
         Octaves of noise, each of half the wavelength and ``rough`` times the height; folded into ridges or not.
     rise_mm : float
@@ -309,6 +357,7 @@ class Heightfield(Shape):
     widen: Annotated[float, Field(ge=1)] = 1.0
     cells: tuple[PositiveInt, PositiveInt] = (200, 200)
     height_mm: NotNegative
+    swell: bool = False
     feature_mm: PositiveFloat
     octaves: Annotated[int, Field(ge=1, le=12)] = 6
     rough: Annotated[float, Field(gt=0, lt=1)] = 0.5
@@ -330,7 +379,7 @@ class Heightfield(Shape):
         y = np.empty(x.shape)
         scale = 1 / self.feature_mm
         terrain(x * scale, z * scale, self.seed, self.octaves, self.rough, self.ridged, y)
-        y *= self.height_mm * (wide / self.widen)[:, None]
+        y *= self.height_mm * (wide / self.widen if self.swell else np.ones_like(wide))[:, None]
         if self.valley_mm > 0:
             t = np.clip(np.abs(x) / (self.valley_mm * wide[:, None]), 0, 1)
             y *= 0.25 + 0.75 * t * t * (3 - 2 * t)

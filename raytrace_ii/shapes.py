@@ -239,7 +239,7 @@ def boxes(
 
 
 def smooth_curve(points: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
-    """A Catmull–Rom curve through (n, 2) points, ``steps`` pieces in all, evenly in parameter."""
+    """A Catmull–Rom curve through points (n, any), ``steps`` pieces in all, evenly in parameter."""
     padded = np.concatenate([[2 * points[0] - points[1]], points, [2 * points[-1] - points[-2]]])
     t = np.linspace(0, len(points) - 1, steps + 1)
     i = np.minimum(t.astype(int), len(points) - 2)
