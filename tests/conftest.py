@@ -1,10 +1,16 @@
 """What several test files share."""
 
+import os
 import sys
 
 import pytest
+from hypothesis import settings
 
 from raytrace_ii import cli
+
+# The first call of a kernel compiles it, which no deadline foresees. On CI the examples are the same every time.
+settings.register_profile("here", deadline=None, derandomize="CI" in os.environ)
+settings.load_profile("here")
 
 
 @pytest.fixture
