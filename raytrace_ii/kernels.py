@@ -129,7 +129,16 @@ def shade(
             w0 *= math.exp(-materials[medium, _ABSORPTION] * t)
             w1 *= math.exp(-materials[medium, _ABSORPTION + 1] * t)
             w2 *= math.exp(-materials[medium, _ABSORPTION + 2] * t)
-        elif fog.shape[0] > 0:
+        # the back of what lets nothing through is seen from outside: a sheet, a hair
+        if fog.shape[0] > 0 and (
+            medium < 0
+            or max(
+                materials[medium, _TRANSMISSION],
+                materials[medium, _TRANSMISSION + 1],
+                materials[medium, _TRANSMISSION + 2],
+            )
+            == 0.0
+        ):
             clear = math.exp(-fog[3] * float(distances[i]))
             radiance[pixel, 0] += w0 * (1.0 - clear) * fog[0]
             radiance[pixel, 1] += w1 * (1.0 - clear) * fog[1]

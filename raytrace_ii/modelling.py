@@ -169,7 +169,7 @@ class Tube(_Part):
         return (curve[:, :3] - curve[:, 3:]).min(axis=0), (curve[:, :3] + curve[:, 3:]).max(axis=0)
 
     def _curve(self, steps: int) -> Array:
-        curve = smooth_curve(np.array(self.points_mm, float), steps) + [*self.at_mm, 0.0]
+        curve = smooth_curve(np.array(self.points_mm, float), steps) + np.array([*self.at_mm, 0.0])
         # between a thick and a thin point the curve may dip below the thin one
         curve[:, 3] = np.maximum(curve[:, 3], min(point[3] for point in self.points_mm))
         return np.asarray(curve)
