@@ -80,10 +80,12 @@ def view_positions(
     e = np.asarray(viewpoint_mm, dtype=np.float64)
     if e.shape != (3,) or not np.isfinite(e).all():
         raise ValueError(f"viewpoint {viewpoint_mm!r}: three finite coordinates in mm are needed")
-    if not e[2] < camera.gap_mm:
+    plane = camera.origin_mm[2] + camera.gap_mm
+    if not e[2] < plane:
         raise ValueError(
-            f"viewpoint z {e[2]:g} mm is not before the lens plane at {camera.gap_mm:g} mm: a viewer stands at z < 0"
+            f"viewpoint z {e[2]:g} mm is not before the lens plane at {plane:g} mm: a viewer stands at z < 0"
         )
+    e = e - camera.origin_mm
     (k, l), (u, v) = camera.lenses, camera.ei_pixels
     sign = -1.0 if erect else 1.0
     lens_x = (np.arange(k) + 0.5) * camera.lens_pitch_mm[0] - camera.size_mm[0] / 2
@@ -115,7 +117,8 @@ def five_viewpoints(camera: IICamera) -> dict[str, NDArray[np.float64]]:
     theta = max(0.0, _rotation(inside_y, height / 2 / r))
 
     def at(x: float, y: float, angle: float) -> NDArray[np.float64]:
-        return np.array([x * r * math.sin(angle), y * r * math.sin(angle), gap - r * math.cos(angle)])
+        place = np.array([x * r * math.sin(angle), y * r * math.sin(angle), gap - r * math.cos(angle)])
+        return place + camera.origin_mm
 
     return {
         "front": at(0, 0, 0.0),
@@ -153,7 +156,9 @@ def projection_camera(camera: IICamera, across: int) -> tuple[IICamera, NDArray[
         pixel_pitch_mm=width / across,
         gap_mm=gap,
     )
-    return pinhole, stand_back(pinhole, camera.gap_mm)
+    pose = stand_back(pinhole, camera.gap_mm)
+    pose[:3, 3] += camera.origin_mm
+    return pinhole, pose
 
 
 def stand_back(camera: IICamera, plane_mm: float = 0.0) -> NDArray[np.float64]:

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -286,3 +287,17 @@ def test_refocus_keeps_code_values_and_even_images():
         picture = IIPicture(np.full((24, 40, 3), value, dtype), (10, 6), (4, 4), camera)
         for z in (1.5, 5.0, 12.0):
             np.testing.assert_allclose(refocus(picture, z), value, rtol=1e-6)  # a mean of equals, in float32
+
+
+def test_a_shifted_array_shows_the_same_to_a_shifted_viewer():
+    here = preset("setup1", scale=32)
+    origin = (3.0, -2.0, 0.5)
+    there = replace(here, origin_mm=origin)
+    pixels = np.random.default_rng(5).integers(0, 256, (*here.pixels[::-1], 3), np.uint8)
+    a, b = (IIPicture(pixels, c.lenses, c.ei_pixels, c) for c in (here, there))
+    for name, viewpoint in five_viewpoints(here).items():
+        np.testing.assert_allclose(five_viewpoints(there)[name], viewpoint + origin, rtol=1e-12)  # one sum apart
+        for one, other in zip(view_image(a, viewpoint), view_image(b, viewpoint + origin), strict=True):
+            assert (one != other).mean() < 0.01  # rounding of the sum may move a value by one code
+    with pytest.raises(ValueError, match="not before the lens plane"):
+        view_image(b, (0, 0, 0.6 + there.gap_mm))

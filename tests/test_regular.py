@@ -254,7 +254,7 @@ def test_view_of_the_regular_picture_is_the_view_of_the_scene(kind, erect):
             continue  # places down are stretched, directions are not: no one eye sees it so
         local = eye - made.origin_mm
         local[1] *= stretch
-        view, valid = view_image(regular, local)
+        view, valid = view_image(regular, local + made.origin_mm)
         x, y = np.broadcast_arrays(cx - camera.pixels[0] / 2, camera.pixels[1] / 2 - cy)
         rows = slice(1, -1)
         if camera.lens_lattice.hexagonal:
