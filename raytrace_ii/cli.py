@@ -302,6 +302,8 @@ def measure(
     reference: Annotated[Path, typer.Argument(help="The II-picture as it was.")],
     decoded: Annotated[Path, typer.Argument(help="The II-picture to judge, or a coded file.")],
     json: Annotated[Path | None, typer.Option(help="Write the numbers here.")] = None,
+    plots: Annotated[Path | None, typer.Option(help="Draw angles, depth and views into this folder.")] = None,
+    depth: Annotated[Path | None, typer.Option(help="True z in mm, an .exr; estimated if not given.")] = None,
     force: Force = False,
 ) -> None:
     """Compare two II-pictures of the same structure."""
@@ -311,6 +313,11 @@ def measure(
 
     if json:
         _check_output(json, force)
+    if plots:
+        from metrics.plots import NAMES, plot_all
+
+        for name in NAMES:
+            _check_output(plots / name, force, make_folder=True)
     a, b = IIPicture.load(reference), _picture(decoded)
     numbers: dict[str, Any] = {
         "reference": str(reference),
@@ -329,9 +336,32 @@ def measure(
         view = q_view(a, b)
         numbers["q_view"] = {**view.values, "mean": view.mean}
         rows["Q_view"] = f"{view.mean:.4f} (" + ", ".join(f"{k} {v:.4f}" for k, v in view.values.items()) + ")"
+    layers = _depth_quality(a, b, depth)
+    if layers is not None:
+        numbers["q_depth"] = {"depth_mm": layers.depth_mm.tolist(), "values": layers.values.tolist()}
+        numbers["q_depth"] |= {"counts": layers.counts.tolist(), "source": layers.source}
+        held = int((layers.counts > 0).sum())
+        span = f"{layers.min:.2f} … {layers.max:.2f} dB over {held} layers" if held else "no depth found"
+        rows["Q_depth"] = f"{span}; depth: {layers.source}"
+    if plots:
+        with spinner(f"draw into {plots}"):
+            plot_all(a, b, layers, plots)
     if json:
         write_json(json, numbers)
     _columns(rows)
+
+
+def _depth_quality(a: IIPicture, b: IIPicture, depth: Path | None) -> Any:
+    """Q_depth over a given depth map or, where the structure allows, over one estimated; else None."""
+    from ii_core.files import read_image
+    from metrics import q_depth
+
+    if depth is not None:
+        return q_depth(a, b, depth=read_image(depth)[..., 0])
+    if not a.regular or a.camera is None or a.camera.front:
+        return None
+    with spinner("find depth"):
+        return q_depth(a, b)
 
 
 @app.command()
