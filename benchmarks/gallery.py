@@ -22,14 +22,16 @@ from ii_core import (
     camera_names,
     five_viewpoints,
     orthoscopic,
+    preset,
     preset_cameras,
+    projection_camera,
     stand_back,
     sub_images,
     view_image,
 )
 from ii_core.files import write_image
 from ii_core.regular import resampled
-from raytrace_ii import Scene, load_scene, render
+from raytrace_ii import Scene, load_scene, render, scene_names
 
 ROOT = Path(__file__).parent.parent
 DOCS, CAMERAS, RESULTS = ROOT / "docs", ROOT / "assets" / "cameras", ROOT / "benchmarks" / "results"
@@ -52,6 +54,7 @@ def main() -> None:
         text.append(entry(name, preset_cameras(name), cameras[0]))
         print(name, flush=True)
     text += [precision(), in_scene()]
+    write_image(DOCS / "images" / "scenes.png", all_scenes())
     (DOCS / "cameras.md").write_text("\n".join(text), encoding="utf-8")
 
 
@@ -81,6 +84,19 @@ def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
     about = sheet["about"][:1].upper() + sheet["about"][1:]
     picture = f"![L, D, detail and view of {name}](images/cameras/{name}.png)"
     return f"\n## {name}\n\n{about}. {sheet['notes']}\n\n{facts}.\n\n{picture}\n"
+
+
+def all_scenes() -> NDArray[np.uint8]:
+    """What a viewer sees of every scene through setup 1's display, two in a row."""
+    pinhole, pose = projection_camera(preset("setup1"), 480)
+    pictures = [
+        orthoscopic(render(load_scene(name), pinhole, samples=9, pose=pose, support=()).picture).pixels
+        for name in sorted(scene_names())
+    ]
+    padded = [np.pad(p, ((0, GAP), (0, GAP), (0, 0)), constant_values=255) for p in pictures]
+    padded += [np.full_like(padded[0], 255)] * (len(padded) % 2)
+    rows = [np.concatenate(padded[i : i + 2], axis=1) for i in range(0, len(padded), 2)]
+    return np.concatenate(rows)[:-GAP, :-GAP]
 
 
 def precision() -> str:
