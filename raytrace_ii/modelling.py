@@ -531,6 +531,7 @@ class Strands(Shape):
                 [away[..., 2], 0 * t + 0 * swing, -away[..., 0]], -1
             )
             line = line + 0.4 * self.wave_mm * (1 + np.cos(phase[:, None] + 3 * t))[..., None] * away
+            line = self._off_face(line, radii, side[:, None])
         widths = self.width_mm * np.linspace(1, 0.35, self.steps + 1) * np.ones((n, 1))
         return line, widths
 
@@ -546,11 +547,14 @@ class Strands(Shape):
             (~below & (size < layer))[:, None], point * (layer / np.maximum(size, 1e-6))[:, None], point
         )
         point = np.where(below[:, None], point * (1 + (grow - 1)[:, None] * flat), outward)
-        # the curtain opens from the hairline down
-        free = self.face * radii[0] * np.sqrt(np.clip((0.8 - point[:, 1] / radii[1]) / 0.7, 0, 1))
-        inside = (point[:, 2] < -0.1 * radii[2]) & (np.abs(point[:, 0]) < free)
-        x = np.where(inside, side * free, point[:, 0])
-        return np.column_stack([x, point[:, 1], point[:, 2]])
+        return self._off_face(point, radii, side)
+
+    def _off_face(self, point: Array, radii: Array, side: Array) -> Array:
+        """A curtain that opens from the hairline down, and under the chin lies wholly to the sides and behind."""
+        high = point[..., 1] / radii[1]
+        free = self.face * radii[0] * np.sqrt(np.clip((0.62 - high) / 0.55, 0, 1))
+        inside = (point[..., 2] < np.where(high < -0.6, 0.35, -0.1) * radii[2]) & (np.abs(point[..., 0]) < free)
+        return np.stack([np.where(inside, side * free, point[..., 0]), point[..., 1], point[..., 2]], axis=-1)
 
 
 AnyShape = Annotated[
