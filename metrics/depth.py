@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IICamera, IIPicture
 from ii_core.view import camera_of, view_positions
 
-from .focus import check_layers, depth_from_focus, nearest_layer
+from .focus import check_layers, depth_from_focus, nearest_layer, virtual_viewpoint
 from .psnr import check_finite, check_pair, psnr
 
 
@@ -82,8 +82,8 @@ def q_depth(
         Scene z at every pixel of the picture, mm, NaN where nothing is hit. If it is not given, depth is estimated
         from the reference: `depth_from_focus`.
     layers_mm : array_like, (layers,), optional
-        Depths of the layers, increasing; z = d·f, d = 1 … 250, with f = Λ in the pinhole approximation, if not
-        given. See `linear_layers` and `logarithmic_layers`.
+        Depths of the layers, increasing; z = d·f from the pixel array, d = 1 … 250, with f = Λ in the pinhole
+        approximation, if not given. See `linear_layers` and `logarithmic_layers`.
     method : {"dissertation", "robust"}
         How depth is estimated, if it is; see `depth_from_focus`.
 
@@ -156,7 +156,7 @@ def virtual_camera_pixels(camera: IICamera, *, erect: bool = False) -> tuple[NDA
 
 def _seen(camera: IICamera, erect: bool) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """As `virtual_camera_pixels`, and the rows of lenses that are left."""
-    x, y = view_positions(camera, (0.0, 0.0, camera.gap_mm * (1 - camera.lenses[0])), erect=erect)
+    x, y = view_positions(camera, virtual_viewpoint(camera), erect=erect)
     m, n = (np.floor(position + 0.5).astype(np.int64) for position in (x, y))
     kept = np.flatnonzero((n >= 0) & (n < camera.pixels[1]))
     return n[kept, None], m[None, :], kept

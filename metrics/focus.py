@@ -38,6 +38,9 @@ STAR = np.unique([(i * r, j * r) for r in (1, 2, 4, 7, 10, 14) for i in (-1, 0, 
 # In steps of 8 bits, summed over R, G and B: from where on a difference is that of another surface, however large,
 # and by how much a neighbour's colour differs when it counts e times less.
 OTHER_SURFACE, ALIKE = 30.0, 60.0
+# Neighbours that a half needs: one alone agrees too easily. More would keep out wrong near layers, which few lenses
+# see, but also the lenses at the picture's edge.
+FEWEST = 2
 # Costs that differ less, in shares of the peak, differ by rounding: an even picture must not have a depth.
 ROUNDING = 1e-6
 
@@ -66,8 +69,13 @@ class FocusDepth:
 
 
 def linear_layers(camera: IICamera, count: int = LAYERS) -> Floats:
-    """Layers at z = d·f, d = 1 … count, with f = Λ in the pinhole approximation, mm."""
-    return np.arange(1.0, count + 1) * camera.gap_mm
+    """Layers at z = d·f from the pixel array, d = 1 … count, with f = Λ in the pinhole approximation, mm."""
+    return np.arange(1.0, count + 1) * camera.gap_mm + camera.origin_mm[2]
+
+
+def virtual_viewpoint(camera: IICamera) -> Floats:
+    """V, (0, 0, Λ − K·Λ) before the middle of the array, in camera coordinates."""
+    return np.array([0.0, 0.0, camera.gap_mm * (1 - camera.lenses[0])]) + camera.origin_mm
 
 
 def logarithmic_layers(near_mm: float, far_mm: float, count: int = LAYERS) -> Floats:
@@ -223,7 +231,7 @@ def depth_from_focus(
         step = peak(picture.pixels.dtype) / 255
         own, sides = int(np.flatnonzero((lenses == 0).all(axis=1))[0]), np.column_stack([lenses < 0, lenses > 0])
         _by_rows(workers, l, half_cost, picture.pixels, *cols, *rows, where, sides, own, OTHER_SURFACE * step, cost)
-        view = view_image(picture, (0.0, 0.0, camera.gap_mm * (1 - k)), interpolation=interpolation)[0]
+        view = view_image(picture, virtual_viewpoint(camera), interpolation=interpolation)[0]
         _by_rows(workers, l, weigh_alike, cost, h, view.astype(np.float64), ALIKE * step, smooth)
     layer, fit, confidence = np.empty((l, k), np.int64), np.empty((l, k)), np.empty((l, k), np.float32)
     _by_rows(workers, l, choose, smooth, ROUNDING * peak(picture.pixels.dtype), layer, fit, confidence)
@@ -264,7 +272,7 @@ def pixel_tables(
     with np.errstate(divide="ignore"):
         # At the lens plane and before it nothing is in focus: infinitely far off through all but the own lens.
         per_lens = np.where(beyond > 0, camera.gap_mm / beyond, np.inf)
-    x, y = view_positions(camera, (0.0, 0.0, camera.gap_mm * (1 - camera.lenses[0])), erect=erect)
+    x, y = view_positions(camera, virtual_viewpoint(camera), erect=erect)
     sign = -1.0 if erect else 1.0
     # Without vertical parallax one row of pixels, under whatever lens, sees one row of the scene.
     vertical = sign * per_lens if camera.lens_model.vertical_parallax else np.full_like(per_lens, -1.0)
@@ -397,7 +405,7 @@ def half_cost(pixels, cols, col_weights, rows, row_weights, where, sides, own, l
                             count[s] += 1
                 best = np.inf
                 for s in range(4):
-                    if count[s] > 1:  # one neighbour alone agrees too easily
+                    if count[s] >= FEWEST:
                         best = min(best, total[s] / count[s])
                 if best < np.inf:
                     out[d, l, k] = best
