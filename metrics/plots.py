@@ -18,7 +18,7 @@ from .chart import COLOURS, SUFFIXES
 from .depth import DepthQuality
 from .psnr import angle_axes, peak, q_angle
 
-NAMES = ("q_angle.png", "views.png", "pair_reference.png", "pair_decoded.png", "q_depth.png")
+PLOTS = ("q_angle.png", "views.png", "pair_reference.png", "pair_decoded.png", "q_depth.png")
 AMPLIFY = (32, 16, 8, 4, 2, 1)  # of differences: the first that keeps nine values in ten from clipping
 
 
@@ -243,7 +243,7 @@ def _pair_figure(picture: IIPicture) -> Any:
 def plot_all(
     reference: IIPicture, decoded: IIPicture, quality: DepthQuality | None, folder: str | os.PathLike[str]
 ) -> list[Path]:
-    """Draw all of NAMES that the pictures allow into a folder.
+    """Draw all of PLOTS that the pictures allow into a folder.
 
     Returns
     -------
@@ -268,7 +268,7 @@ def plot_all(
         (quality is not None, lambda path: plot_depth(cast(DepthQuality, quality), path)),
     ]
     paths = []
-    for name, (possible, draw) in zip(NAMES, works, strict=True):
+    for name, (possible, draw) in zip(PLOTS, works, strict=True):
         if possible:
             paths.append(Path(folder, name))
             draw(paths[-1])

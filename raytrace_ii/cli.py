@@ -314,9 +314,9 @@ def measure(
     if json:
         _check_output(json, force)
     if plots:
-        from metrics.plots import NAMES, plot_all
+        from metrics import PLOTS, plot_all
 
-        for name in NAMES:
+        for name in PLOTS:
             _check_output(plots / name, force, make_folder=True)
     a, b = IIPicture.load(reference), _picture(decoded)
     numbers: dict[str, Any] = {

@@ -8,7 +8,7 @@ from ii_core import IICamera, IIPicture, five_viewpoints, view_image
 from ii_core.files import read_image, write_image
 from metrics import angle_axes, q_angle, q_depth
 from metrics.plots import (
-    NAMES,
+    PLOTS,
     _angle_figure,
     _depth_figure,
     _pair_figure,
@@ -119,7 +119,7 @@ def test_all_are_written_and_none_else(dtype, tmp_path):
     q = q_depth(a, b, depth=np.full(a.pixels.shape[:2], 15.0))
     paths = plot_all(a, b, q, tmp_path)
     assert sorted(paths) == sorted(tmp_path.iterdir())
-    assert [p.name for p in paths] == list(NAMES)
+    assert [p.name for p in paths] == list(PLOTS)
     assert all(min(read_image(p).shape[:2]) > 200 for p in paths)
 
 
@@ -137,7 +137,7 @@ def test_the_command_draws(run, refused, tmp_path):
     code, out, _ = run("measure", tmp_path / "a.png", tmp_path / "b.png", "--plots", folder, "--json", numbers)
     assert code == 0
     assert "Q_depth" in out and "focus (dissertation)" in out
-    assert sorted(p.name for p in folder.iterdir()) == sorted(NAMES)
+    assert sorted(p.name for p in folder.iterdir()) == sorted(PLOTS)
     kept = json.loads(numbers.read_text())["q_depth"]
     expected = q_depth(a, worse(a))
     assert kept["counts"] == expected.counts.tolist() and kept["source"] == expected.source
