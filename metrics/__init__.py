@@ -1,5 +1,6 @@
 """How much of a picture survives coding: quality, rate–distortion, and charts of it."""
 
+from .angle import AngleQuality, q_angle_ssim, q_angle_ycbcr
 from .chart import rd_chart
 from .depth import DepthQuality, q_depth
 from .focus import FocusDepth, depth_from_focus, linear_layers, logarithmic_layers
@@ -11,6 +12,7 @@ from .view import ViewQuality, q_view
 
 __all__ = [
     "PLOTS",
+    "AngleQuality",
     "DepthQuality",
     "FocusDepth",
     "ViewQuality",
@@ -28,6 +30,8 @@ __all__ = [
     "plot_views",
     "provenance",
     "q_angle",
+    "q_angle_ssim",
+    "q_angle_ycbcr",
     "q_depth",
     "q_global",
     "q_view",
