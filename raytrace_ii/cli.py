@@ -303,7 +303,8 @@ def measure(
     decoded: Annotated[Path, typer.Argument(help="The II-picture to judge, or a coded file.")],
     json: Annotated[Path | None, typer.Option(help="Write the numbers here.")] = None,
     plots: Annotated[Path | None, typer.Option(help="Draw angles, depth and views into this folder.")] = None,
-    depth: Annotated[Path | None, typer.Option(help="True z in mm, an .exr; estimated if not given.")] = None,
+    depth: Annotated[Path | None, typer.Option(help="Quality over depth, of this map: z in mm, an .exr.")] = None,
+    focus: Annotated[bool, typer.Option("--focus", help="Quality over depth, estimated from focus.")] = False,
     force: Force = False,
 ) -> None:
     """Compare two II-pictures of the same structure."""
@@ -336,7 +337,7 @@ def measure(
         view = q_view(a, b)
         numbers["q_view"] = {**view.values, "mean": view.mean}
         rows["Q_view"] = f"{view.mean:.4f} (" + ", ".join(f"{k} {v:.4f}" for k, v in view.values.items()) + ")"
-    layers = _depth_quality(a, b, depth)
+    layers = _depth_quality(a, b, depth) if depth or focus or plots else None
     if layers is not None:
         numbers["q_depth"] = {"depth_mm": layers.depth_mm.tolist(), "values": layers.values.tolist()}
         numbers["q_depth"] |= {"counts": layers.counts.tolist(), "source": layers.source}
@@ -376,9 +377,12 @@ def study(
     force: Force = False,
 ) -> None:
     """Chart quality against rate for several schemes."""
+    from codec import parse_scheme
     from ii_core import IIPicture
 
     names = [name.replace(";", ",") for name in schemes.split(",")]
+    for name in names:
+        parse_scheme(name)  # a misspelt one is found before anything is made
     try:
         targets = [float(rate) for rate in rates.split(",")]
     except ValueError:
@@ -394,13 +398,11 @@ def run_study(
     workers: int | None = None, extra: dict[str, Any] | None = None,
 ) -> None:  # fmt: skip
     """Measure; leave name_rd.json, .csv and, drawn from the JSON, .png in a folder; print a table."""
-    from codec import decode, encode, parse_scheme
+    from codec import decode, encode
     from metrics import rate_distortion, rd_chart, read_study, write_csv, write_study
 
     from .render import cores
 
-    for scheme in schemes:
-        parse_scheme(scheme)  # a misspelt one is found before hours of work
     with progress_bar(f"code {name}") as report:
         records = rate_distortion(
             picture, schemes, rates, encode=encode, decode=decode, progress=report, workers=workers or cores()

@@ -79,6 +79,12 @@ def test_study_leaves_chart_numbers_and_a_table(run, picture, tmp_path):
     assert read_image(tmp_path / "s" / "small_rd.png").shape[0] > 300
 
 
+def test_a_study_that_cannot_be_leaves_nothing(run, refused, picture, tmp_path):
+    refused(run("study", picture, "--schemes", "si-h264,si-h26", "-o", tmp_path / "s"), "unknown scheme 'si-h26'")
+    refused(run("study", picture, "--rates", "1,two", "-o", tmp_path / "s"), "numbers parted by commas")
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_rate_out_of_reach_is_said(run, picture, tmp_path):
     code, out, _ = run("encode", picture, "--scheme", "ei-h264", "--bpp", 0.01, "-o", tmp_path / "x.ii")
     assert code == 0 and "cannot reach 0.01 bpp" in out
