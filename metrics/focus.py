@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IICamera, IIPicture
-from ii_core.jit import kernel
+from ii_core.jit import inline_kernel, kernel
 from ii_core.view import camera_of, view_image, view_positions
 
 from .psnr import peak
@@ -329,6 +329,19 @@ def _by_rows(workers: int | None, rows: int, work: Callable[..., None], *argumen
             done.result()
 
 
+@inline_kernel
+def _between(pixels, m, n, x, y):
+    """The colour x of the way from pixel (m, n) to its right neighbour and y of the way to the one below."""
+    # A weight of 0 must not reach for a pixel that may be off the picture.
+    right, below = m + (x > 0), n + (y > 0)
+    a, b, c, e = (1 - y) * (1 - x), (1 - y) * x, y * (1 - x), y * x
+    return (
+        a * pixels[n, m, 0] + b * pixels[n, right, 0] + c * pixels[below, m, 0] + e * pixels[below, right, 0],
+        a * pixels[n, m, 1] + b * pixels[n, right, 1] + c * pixels[below, m, 1] + e * pixels[below, right, 1],
+        a * pixels[n, m, 2] + b * pixels[n, right, 2] + c * pixels[below, m, 2] + e * pixels[below, right, 2],
+    )
+
+
 @kernel
 def focus_cost(pixels, cols, col_weights, rows, row_weights, where, members, out, first, last):
     """out[d, l, k] = Σ_rgb |B_d − R_d|, NaN where nothing can be compared; rows ``first`` to ``last`` of lenses.
@@ -347,14 +360,7 @@ def focus_cost(pixels, cols, col_weights, rows, row_weights, where, members, out
                     if m < 0 or n < 0:
                         continue
                     x, y = col_weights[d, where[i, 0], k], row_weights[d, where[i, 1], l]
-                    # A weight of 0 must not reach for a pixel that may be off the picture.
-                    right, below = m + (x > 0), n + (y > 0)
-                    a, b, c, e = (1 - y) * (1 - x), (1 - y) * x, y * (1 - x), y * x
-                    p0 = a * pixels[n, m, 0] + b * pixels[n, right, 0] + c * pixels[below, m, 0]
-                    p1 = a * pixels[n, m, 1] + b * pixels[n, right, 1] + c * pixels[below, m, 1]
-                    p2 = a * pixels[n, m, 2] + b * pixels[n, right, 2] + c * pixels[below, m, 2]
-                    p0, p1 = p0 + e * pixels[below, right, 0], p1 + e * pixels[below, right, 1]
-                    p2 += e * pixels[below, right, 2]
+                    p0, p1, p2 = _between(pixels, m, n, x, y)
                     if members[i, 0]:
                         b0, b1, b2 = b0 + p0, b1 + p1, b2 + p2
                         in_b += 1
@@ -388,13 +394,7 @@ def half_cost(pixels, cols, col_weights, rows, row_weights, where, sides, own, l
                     if m < 0 or n < 0 or step == own:
                         continue
                     x, y = col_weights[d, where[i, 0], k], row_weights[d, where[i, 1], l]
-                    right, below = m + (x > 0), n + (y > 0)
-                    a, b, c, e = (1 - y) * (1 - x), (1 - y) * x, y * (1 - x), y * x
-                    p0 = a * pixels[n, m, 0] + b * pixels[n, right, 0] + c * pixels[below, m, 0]
-                    p1 = a * pixels[n, m, 1] + b * pixels[n, right, 1] + c * pixels[below, m, 1]
-                    p2 = a * pixels[n, m, 2] + b * pixels[n, right, 2] + c * pixels[below, m, 2]
-                    p0, p1 = p0 + e * pixels[below, right, 0], p1 + e * pixels[below, right, 1]
-                    p2 += e * pixels[below, right, 2]
+                    p0, p1, p2 = _between(pixels, m, n, x, y)
                     if step < 0:
                         q0, q1, q2 = p0, p1, p2
                         continue
