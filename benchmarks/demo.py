@@ -24,7 +24,8 @@ from ii_core import (
 )
 from ii_core.files import write_image
 from raytrace_ii import Scene, Shot, load_scene, render
-from raytrace_ii.cli import RATES, SCHEMES, progress_bar, run_study, spinner
+from raytrace_ii.cli.common import progress_bar, spinner
+from raytrace_ii.cli.evaluate import RATES, SCHEMES, run_study
 
 
 def main() -> None:

@@ -23,7 +23,7 @@ from ii_core.files import write_json
 from metrics import provenance
 from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.intersect import Intersector
-from raytrace_ii.render import SUPPORT
+from raytrace_ii.rendering import SUPPORT
 
 RESULTS = Path(__file__).parent / "results"
 REPEATS = 7

@@ -1,9 +1,16 @@
-"""A Whitted ray tracer driven by an II-camera's rays."""
+"""A Whitted ray tracer driven by an II-camera's rays.
 
-from .load import load_scene, scene_names
-from .render import Shot, Stats, render
-from .scene import Background, Body, Fog, Light, Material, Scene
-from .trace import trace
+Names are imported when they are first used: the command's help must not wait for numba.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .load import load_scene, scene_names
+    from .rendering import Shot, Stats, render
+    from .scene import Background, Body, Fog, Light, Material, Scene
+    from .tracing import trace
 
 __all__ = [
     "Background",
@@ -19,3 +26,18 @@ __all__ = [
     "scene_names",
     "trace",
 ]
+
+_HOMES = {"load_scene": "load", "scene_names": "load", "Shot": "rendering", "Stats": "rendering"}
+_HOMES |= {"render": "rendering", "trace": "tracing"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(f".{_HOMES.get(name, 'scene')}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

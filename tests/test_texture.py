@@ -1,6 +1,5 @@
 """Textures: checkers counted by hand, noise on its lattice, images texel by texel, and codes that survive."""
 
-import importlib
 import math
 
 import numpy as np
@@ -10,10 +9,10 @@ from hypothesis import strategies as st
 from trace_scenes import BLACK, WHITE, body, box, sphere, texture_at, wall
 
 from raytrace_ii import Scene, kernels, trace
+from raytrace_ii.rendering import _CURVES as CURVES
 from raytrace_ii.shapes import rotation
 from raytrace_ii.texture import Checker, Image, Noise, TextureTable, image_texture, linear
 
-CURVES = importlib.import_module("raytrace_ii.render")._CURVES  # its function hides the module
 BOARD = Checker((WHITE, BLACK), (2.0, 2.0, 2.0))
 CLOUD = Noise((BLACK, WHITE), (1.0, 1.0, 1.0), contrast=1.0)
 finite = st.floats(-50, 50)

@@ -18,7 +18,7 @@ from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise
 
 from . import kernels
 from .scene import Scene
-from .trace import RayCount, Support, Tracer, rigid
+from .tracing import RayCount, Support, Tracer, rigid
 
 TILE_RAYS = 65536  # enough that numpy's overhead vanishes, few enough that work arrays stay in cache
 APERTURE_SEED = 1 << 40  # apart from all seeds a person gives

@@ -1,0 +1,39 @@
+"""The command ``raytrace-ii``: render, code, measure and study II-pictures.
+
+The only package that reaches every other; it does so inside its functions, so that help comes at once.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from . import synthesize, pictures, coding, evaluate
+from .common import app
+
+__all__ = ["app", "coding", "evaluate", "main", "pictures", "synthesize"]
+
+
+def main() -> None:
+    """Run the command; a bad input is one line on the error stream and exit code 2."""
+    try:
+        code = app(standalone_mode=False)
+        sys.exit(code if isinstance(code, int) else 0)
+    except (ValueError, OSError, MemoryError) as error:
+        _fail(str(error) or type(error).__name__)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        sys.exit(130)
+    except typer.Abort:
+        sys.exit(130)
+    except Exception as error:
+        # A wrong option or argument: typer's own complaint, without its frame.
+        if not hasattr(error, "format_message"):
+            raise
+        _fail(error.format_message())
+
+
+def _fail(message: str) -> None:
+    print(f"error: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(2)

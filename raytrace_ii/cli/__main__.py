@@ -1,0 +1,5 @@
+"""``python -m raytrace_ii.cli``."""
+
+from . import main
+
+main()
