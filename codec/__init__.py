@@ -1,10 +1,11 @@
 """Coding: II-pictures to bitstreams and back, by pseudo video sequences and by JPEG 2000."""
 
-from .base import Encoded, decode, encode, parse_scheme, register, schemes, timed_decode
+from .base import options, parse_scheme, register, schemes
+from .coded import Encoded, decode, encode, timed_decode
 from .jpeg2000 import Jpeg2000
 from .video import H264
 
 for _coder in (H264("ei"), H264("si"), H264("ri"), Jpeg2000()):
     register(_coder)
 
-__all__ = ["Encoded", "decode", "encode", "parse_scheme", "schemes", "timed_decode"]
+__all__ = ["Encoded", "decode", "encode", "options", "parse_scheme", "schemes", "timed_decode"]

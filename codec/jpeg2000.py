@@ -16,7 +16,7 @@ from PIL.Jpeg2KImagePlugin import Jpeg2KImageFile
 
 from ii_core import IIPicture
 
-from .base import Coder, Coding, Options
+from .base import Coder, Coding, Goal, Options
 from .rate import Run, nearest_rate
 
 LEVELS = 5
@@ -44,18 +44,18 @@ class Jpeg2000(Coder):
         """Pillow and its OpenJPEG."""
         return {"pillow": PIL.__version__, "openjpeg": str(features.version("jpg_2000"))}
 
-    def check(self, picture: IIPicture) -> None:
+    def check(self, picture: IIPicture, options: Options) -> None:
         """Any size will do."""
 
-    def encode(self, picture: IIPicture, options: Options, *, bpp: float | None, qp: int | None) -> Coding:
+    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> Coding:
         """A rate at or above that of lossless coding gives the lossless picture."""
-        assert bpp is not None
+        assert goal.bpp is not None
         width, height = picture.size
         raw_bytes = width * height * RAW_BPP / 8
         at_ratio = partial(_encode, picture.pixels)
         run, runs = nearest_rate(
             lambda size: at_ratio(min(raw_bytes / size, COARSEST)),
-            width * height * bpp / 8,
+            width * height * goal.bpp / 8,
             coarsest=lambda: at_ratio(COARSEST),
             finest=lambda: at_ratio(LOSSLESS),
         )

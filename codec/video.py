@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ii_core import IIPicture
 
-from .base import Coder, Coding, Option, Options
+from .base import Coder, Coding, Goal, Option, Options
 from .order import ORDERS
 from .rate import Run, nearest_rate
 from .sequence import Layout, gathered, layout, scatter
@@ -65,6 +65,7 @@ class H264(Coder):
         "merange": Option(about="motion range in pixels", default=16, low=16, high=128),
     }
     qp_range = (LOSSLESS, COARSEST)
+    scale_about = "constant quantiser, 0 is lossless but for colour"
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
@@ -76,7 +77,7 @@ class H264(Coder):
         """PyAV and the libavcodec in it."""
         return {"av": av.__version__, "libavcodec": ".".join(map(str, av.library_versions["libavcodec"]))}
 
-    def check(self, picture: IIPicture) -> None:
+    def check(self, picture: IIPicture, options: Options) -> None:
         """Frames must not be larger than x264 takes."""
         shape = self._layout(picture)
         if max(shape.width, shape.height) > MAX_SIDE:
@@ -85,7 +86,7 @@ class H264(Coder):
                 f"at most {MAX_SIDE}×{MAX_SIDE} are allowed"
             )
 
-    def encode(self, picture: IIPicture, options: Options, *, bpp: float | None, qp: int | None) -> Coding:
+    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> Coding:
         """An Annex B byte stream, parameter sets in band."""
         pixels, shape = np.ascontiguousarray(picture.pixels), self._layout(picture)
 
@@ -95,10 +96,10 @@ class H264(Coder):
         def at_rate(size: float) -> Run:
             return _encode(pixels, shape, options, *_rate_control(size, shape))
 
-        if qp is not None:
-            return Coding(run=constant(qp))
-        assert bpp is not None
-        target = bpp * picture.size[0] * picture.size[1] / 8
+        if goal.qp is not None:
+            return Coding(run=constant(goal.qp))
+        assert goal.bpp is not None
+        target = goal.bpp * picture.size[0] * picture.size[1] / 8
         if target < MIN_FRAME_BYTES * shape.frames:  # no need to ask for what headers alone exceed
             return Coding(run=constant(COARSEST))
         run, runs = nearest_rate(

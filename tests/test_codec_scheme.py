@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from codec import encode, schemes
+from codec import encode, options, schemes
 from codec.base import parse_scheme, register
 from codec.jpeg2000 import Jpeg2000
 from ii_core import IIPicture
@@ -11,29 +11,32 @@ PICTURE = IIPicture(np.zeros((4, 4, 3), np.uint8), (2, 2), (2, 2))
 
 def test_schemes_tell_their_options_and_defaults():
     told = schemes()
-    assert set(told) == {"ei-h264", "si-h264", "ri-h264", "jpeg2000"}
-    assert "order=parallel" in told["si-h264"]
-    assert "merange=16 (motion range in pixels; a whole number from 16 to 128)" in told["si-h264"]
-    assert all("\n" not in line for line in told.values())
+    assert set(told) >= {"ei-h264", "si-h264", "ri-h264", "jpeg2000"}
+    for name, line in told.items():
+        assert all("\n" not in text for text in (line, *options(name).values()))
+    lines = options("si-h264")
+    assert lines["order=parallel"] == "of the component images; one of row, column, parallel, zigzag, spiral"
+    assert lines["merange=16"] == "motion range in pixels; a whole number from 16 to 128"
+    assert lines["qp"].endswith("; a whole number from 0 to 51")
 
 
 def test_options_default_and_override():
-    coder, options = parse_scheme("si-h264:order=spiral,gop=32")
+    coder, found = parse_scheme("si-h264:order=spiral,gop=32")
     assert coder.name == "si-h264"
-    assert options == {"order": "spiral", "gop": 32, "bframes": 0, "merange": 16}
+    assert found.items() >= {"order": "spiral", "gop": 32, "bframes": 0, "merange": 16}.items()
     assert parse_scheme("jpeg2000")[1] == {}
 
 
 @pytest.mark.parametrize(
     ("scheme", "message"),
     [
-        ("si-h26", "unknown scheme 'si-h26': known are ei-h264, jpeg2000, ri-h264, si-h264"),
+        ("si-h26", "unknown scheme 'si-h26': known are ei-"),
         ("", "unknown scheme ''"),
         (None, "scheme is None: a name is needed"),
         ("si-h264:speed=3", "scheme si-h264 has no option speed: known are order, gop, bframes, merange"),
         ("jpeg2000:order=row", "scheme jpeg2000 has no option order: known are none"),
-        ("si-h264:order", "'order' is no option=value"),
-        ("si-h264:", "'' is no option=value"),
+        ("si-h264:order", "'order' is no option=value and no preset: known are"),
+        ("si-h264:", "'' is no option=value and no preset"),
         ("si-h264:gop=4,gop=8", "option gop is given twice"),
         (
             "si-h264:order=diagonal",

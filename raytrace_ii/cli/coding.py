@@ -11,11 +11,21 @@ from .common import Force, app, check_output, check_picture, columns, spinner
 
 
 @app.command()
-def schemes() -> None:
+def schemes(
+    names: Annotated[list[str] | None, typer.Argument(help="Only these.")] = None,
+    help_options: Annotated[bool, typer.Option("--help-options", help="Say what can be asked of each.")] = False,
+) -> None:
     """List the coding schemes."""
-    from codec import schemes
+    from codec import options, schemes
 
-    columns(schemes())
+    known = schemes()
+    asked = {name: options(name) for name in names or known}  # a misspelt one is found before anything is printed
+    if not help_options:
+        columns({name: known[name] for name in asked})
+        return
+    for name, lines in asked.items():
+        print(f"{name}: {known[name]}")
+        columns({f"  {key}": text for key, text in lines.items()})
 
 
 @app.command()
@@ -25,6 +35,7 @@ def encode(
     scheme: Annotated[str, typer.Option(help="As in `raytrace-ii schemes`, options after a colon.")] = "si-h264",
     bpp: Annotated[float | None, typer.Option(help="Bits per pixel to aim at.")] = None,
     qp: Annotated[int | None, typer.Option(help="Quantiser to keep.")] = None,
+    quality: Annotated[float | None, typer.Option(help="Quality to keep, where a scheme has a scale for it.")] = None,
     force: Force = False,
 ) -> None:
     """Code an II-picture."""
@@ -34,7 +45,7 @@ def encode(
     check_output(output, force)
     original = IIPicture.load(picture)
     with spinner(f"{scheme} codes {picture.name}"):
-        coded = encode(original, scheme, bpp=bpp, qp=qp)
+        coded = encode(original, scheme, bpp=bpp, qp=qp, quality=quality)
     coded.save(output)
     print(f"{output}: {coded.nbytes} bytes, {coded.bpp:.4g} bpp in {coded.encode_seconds:.1f} s")
     if not coded.reached:
