@@ -112,7 +112,7 @@ def image_types(path: str | os.PathLike[str]) -> tuple[str, ...]:
 
 
 def read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
-    """Read an (N, M, channels) array of uint8, uint16 or float32, as stored.
+    """Read an (N, M, channels) array of uint8, uint16 or float32, as stored; alpha, if any, is not multiplied in.
 
     Raises
     ------
@@ -122,7 +122,9 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist")
-    source = oiio.ImageInput.open(str(path))
+    plain = oiio.ImageSpec()
+    plain.attribute("oiio:UnassociatedAlpha", 1)  # left alone it multiplies what PNG stores by alpha
+    source = oiio.ImageInput.open(str(path), plain)
     if not source:
         raise OSError(f"cannot read {path}: {oiio.geterror()}")
     try:

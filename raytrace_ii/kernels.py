@@ -14,7 +14,8 @@ from ii_core.jit import inline_kernel, kernel
 # A weight this small cannot move a colour by half a step of 8 bits, not even on sRGB's steep foot.
 LEAST_WEIGHT = 0.5 / 255 / 12.92
 REFLECTION, REFRACTION = 0, 1
-IMAGE, CHECKER, NOISE, VERTEX = 0, 1, 2, 3  # kinds of texture
+IMAGE, CHECKER, NOISE, VERTEX, STRIPES = 0, 1, 2, 3, 4  # kinds of texture
+POINT, DIRECTIONAL, SPOT = 0, 1, 2  # kinds of light
 # Odd multipliers of the noise lattice's hash.
 _PX, _PY, _PZ, _SEED, _GOLDEN = 73856093, 19349663, 83492791, 2654435761, 0x1E3779B97F4A7C15
 # Perlin's sixteen: towards the twelve edges of a cube, four of them twice. A table, for branches would be guesses.
@@ -26,9 +27,11 @@ _GRADIENTS = np.array(
     dtype=np.float64,
 )
 
-# Columns of the material table and of the light table, as in scene.py.
+# Columns of the material table and of the light table, as in packing.py.
 _MIRROR, _TRANSMISSION, _ABSORPTION = 3, 6, 9
-_SPECULAR, _SHININESS, _IOR, _LOCAL, _TEXTURE, _LEAST_HALF = 12, 13, 14, 15, 16, 17
+_SPECULAR, _SHININESS, _IOR, _LOCAL, _TEXTURE, _LEAST_HALF, _EMISSION = 12, 13, 14, 15, 16, 17, 18
+_LIGHT_COLOUR, _CONE_AXIS, _CONE_SCALE, _CONE_OFFSET = 4, 7, 10, 11
+_SKY_IMAGE, _SKY_TURN, _SKY_INTENSITY = 10, 11, 12
 
 
 @kernel
@@ -70,10 +73,15 @@ def start_rays(
 
 
 @kernel
-def record_support(primitives, u, v, pixels, corners, faces, object_of_face, eye, axis, depth, normal, object_id):
-    """Depth along the camera's axis, face normal and object of every primary ray."""
+def record_support(
+    primitives, u, v, distances, pixels, corners, faces, object_of_face, eye, axis, depth, normal, object_id,
+    ray_length,
+):  # fmt: skip
+    """Depth along the camera's axis, face normal and object of every primary ray, and its length if there is room."""
     for i in range(primitives.shape[0]):
         f, pixel = primitives[i], pixels[i]
+        if ray_length.shape[0] > 0:
+            ray_length[pixel] = distances[i] if f >= 0 else math.nan
         if f < 0:
             depth[pixel] = math.nan
             object_id[pixel] = -1
@@ -113,7 +121,7 @@ def shade(
         w0, w1, w2 = float(weights[i, 0]), float(weights[i, 1]), float(weights[i, 2])
         f = primitives[i]
         if f < 0:
-            b0, b1, b2 = background_colour(background, dy)
+            b0, b1, b2 = _sky(background, textures, texels, dx, dy, dz)
             radiance[pixel, 0] += w0 * b0
             radiance[pixel, 1] += w1 * b1
             radiance[pixel, 2] += w2 * b2
@@ -152,6 +160,9 @@ def shade(
         px, py, pz = _start_point(corners, faces, f, u[i], v[i])
         ox, oy, oz = px + lift * gx, py + lift * gy, pz + lift * gz
 
+        for c in range(3):
+            if materials[body, _EMISSION + c] > 0.0:
+                radiance[pixel, c] += (w0, w1, w2)[c] * materials[body, _EMISSION + c]
         local = materials[body, _LOCAL]
         if local > 0.0 or materials[body, _SPECULAR] > 0.0:
             r, g, b = local * materials[body, 0], local * materials[body, 1], local * materials[body, 2]
@@ -176,9 +187,10 @@ def shade(
                     # too weak to see, as nearly everywhere: told without a root or a power
                     if half > 0.0 and half * half > materials[body, _LEAST_HALF] ** 2 * square:
                         shine = materials[body, _SPECULAR] * (half / math.sqrt(square)) ** materials[body, _SHININESS]
-                c0 = (r * cosine + w0 * shine) * lights[k, 4]
-                c1 = (g * cosine + w1 * shine) * lights[k, 5]
-                c2 = (b * cosine + w2 * shine) * lights[k, 6]
+                cone = _cone(lights, k, lx, ly, lz, norm) if lights[k, 0] == SPOT else 1.0
+                c0 = (r * cosine + w0 * shine) * cone * lights[k, _LIGHT_COLOUR]
+                c1 = (g * cosine + w1 * shine) * cone * lights[k, _LIGHT_COLOUR + 1]
+                c2 = (b * cosine + w2 * shine) * cone * lights[k, _LIGHT_COLOUR + 2]
                 if max(c0, c1, c2) < LEAST_WEIGHT:
                     continue
                 _put(shadow_origins, shadows, ox, oy, oz)
@@ -321,6 +333,19 @@ def background_colour(background, dy):
     )
 
 
+@inline_kernel
+def _sky(background, textures, texels, dx, dy, dz):
+    """Colour of the surroundings for a unit direction: of the equirectangular image, or of the gradient."""
+    if background[_SKY_IMAGE] < 0.0:
+        return background_colour(background, dy)
+    row = int(background[_SKY_IMAGE])
+    half = 0.5 / textures[row, 3]  # of a texel: the top row does not run into the bottom one
+    u = 0.5 + math.atan2(np.float64(dx), np.float64(dz)) / (2.0 * math.pi) - background[_SKY_TURN]
+    v = 0.5 + math.asin(min(max(np.float64(dy), -1.0), 1.0)) / math.pi
+    r, g, b = _image(textures, row, texels, u, min(max(v, half), 1.0 - half))
+    return background[_SKY_INTENSITY] * r, background[_SKY_INTENSITY] * g, background[_SKY_INTENSITY] * b
+
+
 @kernel
 def encode_srgb(radiance, scale, curve, out):
     """Linear light times ``scale`` to rounded integer sRGB by a curve of samples over [0, 1]."""
@@ -425,9 +450,17 @@ def _shading_normal(normals, f, u, v, gx, gy, gz, dx, dy, dz):
 @inline_kernel
 def _towards_light(lights, k, x, y, z):
     """Direction to a light, a unit vector if it is far away, and how much of that direction a shadow ray covers."""
-    if lights[k, 0] != 0.0:
+    if lights[k, 0] == DIRECTIONAL:
         return -lights[k, 1], -lights[k, 2], -lights[k, 3], FAR
     return lights[k, 1] - x, lights[k, 2] - y, lights[k, 3] - z, np.float32(0.9999)
+
+
+@inline_kernel
+def _cone(lights, k, lx, ly, lz, norm):
+    """Share of a spot light in a direction: 1 in its inner cone, 0 outside the outer one."""
+    cosine = -(lx * lights[k, _CONE_AXIS] + ly * lights[k, _CONE_AXIS + 1] + lz * lights[k, _CONE_AXIS + 2]) * norm
+    share = min(max(cosine * lights[k, _CONE_SCALE] + lights[k, _CONE_OFFSET], 0.0), 1.0)
+    return share * share
 
 
 @inline_kernel
@@ -452,6 +485,14 @@ def texture_colour(table, row, texels, x, y, z):
             + math.floor(z * table[row, 3] + 1e-6)
         ) % 2
         t = 1.0 if odd else 0.0
+    elif kind == STRIPES:
+        s = x * table[row, 1] + y * table[row, 2] + z * table[row, 3]
+        if table[row, 10] > 0.0:
+            away = abs(s - 2.0 * math.floor(0.5 * s) - 0.5)  # from the middle of a stripe of the first colour
+            inner = 0.5 - abs(away - 1.0)  # how far inside the second colour, in widths
+            t = min(max(0.5 + inner / table[row, 10], 0.0), 1.0)
+        else:
+            t = 1.0 if math.floor(s + 1e-6) % 2 else 0.0
     else:
         t = 0.5 + table[row, 11] * _fractal(
             x * table[row, 1], y * table[row, 2], z * table[row, 3], int(table[row, 10])

@@ -1,4 +1,4 @@
-"""A scene as the tracer wants it: flat arrays of faces, materials, textures and lights, checked once."""
+"""A scene: bodies with materials, lights and surroundings, checked when they are made."""
 
 from __future__ import annotations
 
@@ -6,16 +6,33 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .intersect import Intersector
-from .kernels import LEAST_WEIGHT
-from .texture import Texture, TextureTable
+from .texture import Image, Texture, VertexColours
+
+if TYPE_CHECKING:
+    from .packing import PackedScene
 
 Vector = tuple[float, float, float]
+
+
+def _numbers(what: str, value: Any, count: int = 3, least: float = -math.inf) -> None:
+    """Refuse anything but ``count`` finite numbers of at least ``least``."""
+    numbers = np.asarray(value, np.float64) if np.ndim(value) == 1 else np.empty(0)
+    if numbers.shape != (count,) or not (np.isfinite(numbers).all() and (numbers >= least).all()):
+        floor = f" of at least {least:g}" if least > -math.inf else ""
+        raise ValueError(f"{what} is {value}: {count} finite numbers{floor} are needed")
+
+
+def _number(what: str, value: float, least: float, *, above: bool = False) -> None:
+    """Refuse a number that is not finite or too small; ``above`` refuses the least itself."""
+    if not (least < value < math.inf or (value == least and not above)):
+        raise ValueError(
+            f"{what} is {value}: a finite number {'above' if above else 'of at least'} {least:g} is needed"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,13 +50,29 @@ class Material:
     transmission : (3,)
         Share of light that each face of the body hands on, split by Fresnel into reflected and refracted: a pane
         takes it twice.
-    ior : float
-        Index of refraction of the body.
+    ior : float or (3,)
+        Index of refraction of the body; three for red, green and blue disperse.
     absorption_per_mm : (3,)
         Beer–Lambert coefficient inside the body.
     texture : Texture, optional
+    emission : (3,)
+        Light that the surface gives off on both sides, whatever falls on it; of any strength. It lights nothing else.
+    normal_map : Image, optional
+        As `texture.normal_map` reads it; over (u, v), so that the texture, if any, must lie on the surface too.
+    normal_scale : float
+        Factor of the map's x and y.
+    alpha_cutoff : float
+        Where the texture's alpha is below it there is no surface; 0 for no cut-outs.
+    priority : int
+        Where transmissive bodies overlap the one of higher priority is there (Schmidt and Budge 2002); of equal
+        ones the one entered first.
 
     The matt share is what ``mirror`` and ``transmission`` leave: energy stays in bounds.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range, or cut-outs have no alpha.
     """
 
     colour: Vector = (0.8, 0.8, 0.8)
@@ -47,50 +80,136 @@ class Material:
     shininess: float = 50.0
     mirror: Vector = (0.0, 0.0, 0.0)
     transmission: Vector = (0.0, 0.0, 0.0)
-    ior: float = 1.5
+    ior: float | Vector = 1.5
     absorption_per_mm: Vector = (0.0, 0.0, 0.0)
     texture: Texture | None = None
+    emission: Vector = (0.0, 0.0, 0.0)
+    normal_map: Image | None = None
+    normal_scale: float = 1.0
+    alpha_cutoff: float = 0.0
+    priority: int = 0
 
     def __post_init__(self) -> None:
+        for what in ("colour", "mirror", "transmission", "absorption_per_mm", "emission"):
+            _numbers(what, getattr(self, what), least=0)
+        _number("specular", self.specular, 0)
+        _number("shininess", self.shininess, 0, above=True)
+        for ior in self.iors:
+            _number("ior", ior, 0, above=True)
         if max(self.mirror) + max(self.transmission) > 1 + 1e-9:
             raise ValueError(
                 f"mirror {max(self.mirror):g} and transmission {max(self.transmission):g} "
                 "are more than all the light: at most 1 together is needed"
             )
+        _number("normal_scale", self.normal_scale, 0)
+        if not 0 <= self.alpha_cutoff <= 1:
+            raise ValueError(f"alpha_cutoff is {self.alpha_cutoff}: a number from 0 to 1 is needed")
+        if self.alpha_cutoff > 0 and (not isinstance(self.texture, Image) or self.texture.alpha is None):
+            raise ValueError(f"alpha_cutoff is {self.alpha_cutoff}: an image texture with alpha is needed")
+        if not isinstance(self.priority, int | np.integer):
+            raise ValueError(f"priority is {self.priority!r}: a whole number is needed")
+        shares = self.texture is None or (self.texture.on_surface and not isinstance(self.texture, VertexColours))
+        if self.normal_map is not None and not shares:
+            raise ValueError("a normal map needs a texture on the surface or none: they share (u, v)")
+
+    @property
+    def iors(self) -> Vector:
+        """Index of refraction for red, green and blue."""
+        if np.ndim(self.ior) == 0:
+            return (self.ior,) * 3  # type: ignore[return-value]
+        _numbers("ior", self.ior)
+        return self.ior  # type: ignore[return-value]
 
     @property
     def transmissive(self) -> bool:
         return max(self.transmission) > 0
 
 
+LIGHTS = ("point", "directional", "spot")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Light:
-    """A point light at a position, or a directional light shining along a direction (mm, camera frame).
+    """A light in the scene's frame, mm. None falls off with distance.
 
-    Neither falls off with distance.
+    Parameters
+    ----------
+    kind : {"point", "directional", "spot"}
+    vector : (3,)
+        Where a point or a spot light stands, or along which direction a directional one shines.
+    colour : (3,)
+        Linear.
+    direction : (3,)
+        Along which a spot light shines.
+    cone_deg : (inner, outer)
+        Half angles of a spot light: all its light within the inner cone, none outside the outer one, between them
+        ((cos θ − cos outer)/(cos inner − cos outer))², as in glTF's KHR_lights_punctual.
+
+    Raises
+    ------
+    ValueError
+        If the kind is unknown or a value is out of range.
     """
 
     kind: str
     vector: Vector
     colour: Vector
+    direction: Vector = (0.0, 0.0, 1.0)
+    cone_deg: tuple[float, float] = (0.0, 45.0)
 
     def __post_init__(self) -> None:
-        if self.kind not in ("point", "directional"):
-            raise ValueError(f"unknown light {self.kind!r}: known are point, directional")
-        if not all(map(math.isfinite, (*self.vector, *self.colour))):
-            raise ValueError(f"a {self.kind} light has {self.vector}, {self.colour}: finite numbers are needed")
+        if self.kind not in LIGHTS:
+            raise ValueError(f"unknown light {self.kind!r}: known are {', '.join(LIGHTS)}")
+        _numbers(f"vector of a {self.kind} light", self.vector)
+        _numbers(f"colour of a {self.kind} light", self.colour, least=0)
+        _numbers(f"direction of a {self.kind} light", self.direction)
         if self.kind == "directional" and not math.hypot(*self.vector) > 0:
             raise ValueError("a directional light has the direction zero: a direction is needed")
+        if self.kind == "spot" and not math.hypot(*self.direction) > 0:
+            raise ValueError("a spot light has the direction zero: a direction is needed")
+        _numbers("cone_deg", self.cone_deg, 2, least=0)
+        if not self.cone_deg[0] < self.cone_deg[1] <= 90:
+            raise ValueError(f"cone_deg is {self.cone_deg}: an inner angle below the outer, at most 90, is needed")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Background:
-    """Sky: horizon colour, running to zenith and nadir at ``spread_deg`` above and below it. Linear colours."""
+    """Sky: a gradient, or an image of all directions. Linear colours.
+
+    Parameters
+    ----------
+    horizon, zenith, nadir : (3,)
+        The gradient runs from horizon to zenith and nadir at ``spread_deg`` above and below it, as the sine.
+    image : Image, optional
+        Equirectangular, in place of the gradient. Its centre lies towards +z, straight ahead of a camera; right of
+        it +x, its top row up at +y, its left and right edges meet behind at −z.
+    turn_deg : float
+        Turns the image about y, +z towards +x: by 90 its centre lies towards +x.
+    intensity : float
+        Factor of the image.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range.
+    """
 
     horizon: Vector = (0.0, 0.0, 0.0)
     zenith: Vector = (0.0, 0.0, 0.0)
     nadir: Vector = (0.0, 0.0, 0.0)
     spread_deg: float = 90.0
+    image: Image | None = None
+    turn_deg: float = 0.0
+    intensity: float = 1.0
+
+    def __post_init__(self) -> None:
+        for what in ("horizon", "zenith", "nadir"):
+            _numbers(f"{what} of the background", getattr(self, what), least=0)
+        if not 0 < self.spread_deg <= 90:
+            raise ValueError(f"spread_deg of the background is {self.spread_deg}: above 0, at most 90 is needed")
+        if not math.isfinite(self.turn_deg):
+            raise ValueError(f"turn_deg of the background is {self.turn_deg}: a finite number is needed")
+        _number("intensity of the background", self.intensity, 0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +225,7 @@ class Fog:
     density_per_mm: float
 
     def __post_init__(self) -> None:
+        _numbers("colour of the fog", self.colour, least=0)
         if not 0 < self.density_per_mm < math.inf:
             raise ValueError(f"fog has a density of {self.density_per_mm} per mm: more than 0 is needed")
 
@@ -122,8 +242,13 @@ class Body:
     normals : ndarray, (V, 3), optional
         Vertex normals for smooth shading; None shades flat.
     texture_coordinates : ndarray, (V, 3), optional
-        (u, v, 0) for textures on the surface, positions in the body's own frame for solid ones, linear colours for
-        those of the vertices.
+        (u, v, 0) for textures on the surface and normal maps, positions in the body's own frame for solid ones,
+        linear colours for those of the vertices.
+
+    Raises
+    ------
+    ValueError
+        If there is no geometry, it does not fit together, or the material needs coordinates that are not there.
     """
 
     name: str
@@ -152,6 +277,8 @@ class Body:
             value = getattr(self, what)
             if value is not None and np.shape(value) != vertices.shape:
                 raise ValueError(f"object {self.name!r}: {what} are {np.shape(value)}, vertices {vertices.shape}")
+        if self.material.normal_map is not None and self.texture_coordinates is None:
+            raise ValueError(f"object {self.name!r}: a normal map needs texture coordinates, there are none")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -161,7 +288,7 @@ class Scene:
     Raises
     ------
     ValueError
-        If there is no body, or ``max_depth`` is negative.
+        If there is no body, ``max_depth`` is negative or ``ambient`` is no colour.
     """
 
     bodies: Sequence[Body]
@@ -177,6 +304,7 @@ class Scene:
             raise ValueError(f"scene {self.name!r} has no geometry: at least one object is needed")
         if not self.max_depth >= 0:
             raise ValueError(f"max_depth is {self.max_depth}: at least 0 is needed")
+        _numbers("ambient", self.ambient, least=0)
         # Transmissive faces go last, so that opaque ones are a prefix that shadow rays may be tested against alone.
         ordered = sorted(self.bodies, key=lambda body: body.material.transmissive)
         object.__setattr__(self, "bodies", tuple(ordered))
@@ -188,6 +316,8 @@ class Scene:
     @cached_property
     def packed(self) -> PackedScene:
         """The arrays that kernels read, and Embree's tree, built on first use."""
+        from .packing import PackedScene
+
         return PackedScene(self)
 
     @property
@@ -195,94 +325,3 @@ class Scene:
         """(2, 3): least and greatest corner."""
         every = np.concatenate([np.asarray(b.vertices, np.float64) for b in self.bodies])
         return np.stack([every.min(axis=0), every.max(axis=0)])
-
-
-# Spawned rays start this share of the face's largest coordinate off the face: float32 places a hit to about
-# 1e-7 of it, and from 1e-6 on no ray meets its own face again.
-LIFT = 4e-6
-
-# Columns of the material table.
-COLOUR, MIRROR, TRANSMISSION, ABSORPTION = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
-SPECULAR, SHININESS, IOR, LOCAL, TEXTURE, LEAST_HALF = 12, 13, 14, 15, 16, 17
-MATERIAL_COLUMNS = 18
-
-
-class PackedScene:
-    """What the kernels read.
-
-    ``corners`` is (F, 3, 3) float32 positions, ``faces`` (F, 5) unit normals, lifts and pulls. ``normals`` is like
-    ``corners`` for shading, of no faces if every body is flat; ``coordinates`` for textures, of no faces if there
-    are none: a scene pays only for what it has.
-    """
-
-    def __init__(self, scene: Scene) -> None:
-        bodies = scene.bodies
-        self.object_of_face = np.repeat(
-            np.arange(len(bodies), dtype=np.int32), [len(body.faces) for body in bodies]
-        ).astype(np.int32)
-        self.corners = _per_corner([b.vertices for b in bodies], bodies)
-        self.faces = _face_table(self.corners)
-        smooth = any(b.normals is not None for b in bodies)
-        textured = any(b.material.texture is not None for b in bodies)
-        self.normals = _per_corner([b.normals for b in bodies], bodies) if smooth else np.empty((0, 3, 3), np.float32)
-        self.coordinates = (
-            _per_corner([b.texture_coordinates if b.material.texture else None for b in bodies], bodies)
-            if textured
-            else np.empty((0, 3, 3), np.float32)
-        )
-        self.textures = TextureTable([b.material.texture for b in bodies])
-        self.materials = np.zeros((len(bodies), MATERIAL_COLUMNS), np.float32)
-        for row, body in zip(self.materials, bodies, strict=True):
-            m = body.material
-            row[COLOUR], row[MIRROR], row[TRANSMISSION] = m.colour, m.mirror, m.transmission
-            row[ABSORPTION] = m.absorption_per_mm
-            row[SPECULAR], row[SHININESS], row[IOR] = m.specular, m.shininess, m.ior
-            row[LOCAL] = max(0.0, 1 - max(m.mirror) - max(m.transmission))
-            # below this cosine the highlight is too weak to see, and its power need not be taken
-            row[LEAST_HALF] = (LEAST_WEIGHT / max(m.specular, LEAST_WEIGHT)) ** (1 / m.shininess)
-            row[TEXTURE] = self.textures.index(m.texture)
-        self.lights = np.array([_light_row(light) for light in scene.lights], np.float64).reshape(-1, 7)
-        b = scene.background
-        self.background = np.array(
-            [*b.horizon, *b.zenith, *b.nadir, 1 / math.sin(math.radians(b.spread_deg))], np.float64
-        )
-        fog = scene.fog
-        self.fog = np.array([*fog.colour, fog.density_per_mm] if fog else [], np.float64)
-        self.ambient = np.array(scene.ambient, np.float64)
-        opaque = int(np.searchsorted([body.material.transmissive for body in bodies], True))
-        self.opaque_faces = sum(len(body.faces) for body in bodies[:opaque])
-        self.mirrors = any(max(body.material.mirror) > 0 for body in bodies)
-        self.transmits = opaque < len(bodies)
-        self.intersector = Intersector(self.corners, self.opaque_faces)
-
-
-def _per_corner(values: Sequence[NDArray[Any] | None], bodies: Sequence[Body]) -> NDArray[np.float32]:
-    """Vertex values gathered to (F, 3, 3) float32, zero where a body has none."""
-    parts = [
-        np.zeros((len(b.faces), 3, 3), np.float32) if v is None else np.asarray(v, np.float32)[np.asarray(b.faces)]
-        for v, b in zip(values, bodies, strict=True)
-    ]
-    return np.ascontiguousarray(np.concatenate(parts))
-
-
-def _light_row(light: Light) -> list[float]:
-    vector = np.asarray(light.vector, np.float64)
-    if light.kind == "directional":
-        return [1.0, *(vector / np.linalg.norm(vector)), *light.colour]
-    return [0.0, *vector, *light.colour]
-
-
-def _face_table(corners: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Unit normal (0 for a face without area), lift in mm and pull of every face.
-
-    The pull takes a hit about as far towards the middle of its face as the lift takes it off the face, as a share
-    of the way.
-    """
-    p = corners.astype(np.float64)
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-    lift = LIFT * np.abs(p).max(axis=(1, 2))
-    longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
-    pull = np.minimum(np.divide(lift, longest, out=np.zeros_like(lift), where=longest > 0), 0.25)
-    return np.column_stack([unit, lift, pull]).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Textures: images on (u, v), checkers and noise in space; packed into arrays for the kernels."""
+"""Textures: images on (u, v), checkers, stripes and noise in space; packed into arrays for the kernels."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from .kernels import CHECKER, IMAGE, NOISE, VERTEX
+from .kernels import CHECKER, IMAGE, NOISE, STRIPES, VERTEX
 
 COLUMNS = 12  # kind, then what the kind needs
 
@@ -20,11 +20,12 @@ class Image:
     """An image, linear float32 (H, W, 3), row 0 on top at v = 1; repeats beyond [0, 1]; bilinear.
 
     ``repeat`` is how often a scene file lays it over the unit square: texture coordinates are multiplied by it
-    when the body is made.
+    when the body is made. ``alpha`` (H, W), 0…1, is kept for cut-outs where the file has it.
     """
 
     pixels: NDArray[np.float32]
     repeat: tuple[float, float] = (1.0, 1.0)
+    alpha: NDArray[np.float32] | None = None
     on_surface = True
 
 
@@ -35,6 +36,33 @@ class Checker:
     colours: tuple[tuple[float, float, float], tuple[float, float, float]]
     size: tuple[float, float, float]
     on_surface: bool = False
+
+
+@dataclass(frozen=True)
+class Stripes:
+    """Two linear colours in turn, each ``width`` wide (mm; in (u, v) units if ``on_surface``) along ``axis``.
+
+    The first starts at the origin. ``soft`` is the share of the width over which they run into each other.
+
+    Raises
+    ------
+    ValueError
+        If the axis is zero, the width not positive, or ``soft`` not from 0 to 1.
+    """
+
+    colours: tuple[tuple[float, float, float], tuple[float, float, float]]
+    width: float
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    soft: float = 0.0
+    on_surface: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 < self.width < np.inf:
+            raise ValueError(f"stripes are {self.width} wide: more than 0 is needed")
+        if not 0 < np.linalg.norm(self.axis) < np.inf:
+            raise ValueError(f"the axis of stripes is {self.axis}: a finite direction other than zero is needed")
+        if not 0 <= self.soft <= 1:
+            raise ValueError(f"the soft edge of stripes is {self.soft}: a share from 0 to 1 is needed")
 
 
 @dataclass(frozen=True)
@@ -59,7 +87,7 @@ class VertexColours:
     on_surface = True
 
 
-Texture = Image | Checker | Noise | VertexColours
+Texture = Image | Checker | Stripes | Noise | VertexColours
 
 
 class TextureTable:
@@ -83,6 +111,9 @@ class TextureTable:
                 rows.append([CHECKER, *(1 / s for s in texture.size), *texture.colours[0], *texture.colours[1]])
             elif isinstance(texture, VertexColours):
                 rows.append([VERTEX])
+            elif isinstance(texture, Stripes):
+                steps = np.asarray(texture.axis) / np.linalg.norm(texture.axis) / texture.width
+                rows.append([STRIPES, *steps, *texture.colours[0], *texture.colours[1], texture.soft])
             else:
                 scale = (1 / s for s in texture.size)
                 octaves = texture.octaves + texture.seed % 1024 * 16  # one column for both
@@ -123,7 +154,7 @@ Colour = Annotated[tuple[float, float, float], BeforeValidator(srgb_colour)]
 
 
 def image_texture(pixels: NDArray[Any]) -> Image:
-    """An image texture from stored pixels: integers are sRGB, floats linear; grey is spread, alpha dropped.
+    """An image texture from stored pixels: integers are sRGB, floats linear; grey is spread, alpha kept aside.
 
     Raises
     ------
@@ -132,9 +163,36 @@ def image_texture(pixels: NDArray[Any]) -> Image:
     """
     if not np.isfinite(pixels).all():
         raise ValueError("image holds pixels that are not finite numbers")
-    if pixels.dtype.kind == "u":
-        table = linear(np.arange(np.iinfo(pixels.dtype).max + 1) / np.iinfo(pixels.dtype).max)
-        pixels = table[pixels]
-    if pixels.shape[2] < 3:
-        pixels = np.repeat(pixels[..., :1], 3, axis=2)
-    return Image(np.ascontiguousarray(pixels[..., :3], np.float32))
+    data, alpha = _split(pixels)
+    if data.dtype.kind == "u":
+        data = linear(np.arange(np.iinfo(data.dtype).max + 1) / np.iinfo(data.dtype).max)[data]
+    return Image(np.ascontiguousarray(data, np.float32), alpha=alpha)
+
+
+def normal_map(pixels: NDArray[Any]) -> Image:
+    """A normal map from stored pixels, which are data and not sRGB: x, y, z of −1…1 stand as 0…1.
+
+    Tangent space as in glTF 2.0, §3.9.3: x along growing u, y along growing v, z out of the face.
+
+    Raises
+    ------
+    ValueError
+        If there are not three channels, or a pixel is not finite.
+    """
+    if pixels.shape[2] < 3 or not np.isfinite(pixels).all():
+        raise ValueError(f"a normal map has {pixels.shape[2]} channels: three of finite numbers are needed")
+    data = pixels[..., :3]
+    if data.dtype.kind == "u":
+        data = data / np.float32(np.iinfo(data.dtype).max)
+    return Image(np.ascontiguousarray(data, np.float32))
+
+
+def _split(pixels: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.float32] | None]:
+    """Three channels of colour, and alpha as 0…1 if there is a second or fourth."""
+    channels = pixels.shape[2]
+    alpha = None
+    if channels in (2, 4):
+        alpha = pixels[..., -1].astype(np.float32)
+        if pixels.dtype.kind == "u":
+            alpha /= np.float32(np.iinfo(pixels.dtype).max)
+    return pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2), alpha

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import kernels
-from .scene import PackedScene, Scene
+from .packing import PackedScene
+from .scene import Scene
 
 KINDS = ("primary", "shadow", "reflection", "refraction")
+_NO_LENGTHS = np.empty(0, np.float32)
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
 
@@ -30,12 +32,13 @@ class RayCount:
 
 @dataclass(frozen=True, eq=False)
 class Traced:
-    """What a batch of n rays saw: linear radiance (n, 3), depth (n,), normal (n, 3), object (n,) of the first hit."""
+    """What n rays saw: linear radiance (n, 3), and depth, normal (n, 3), object, ray length of the first hit."""
 
     radiance: NDArray[np.float32]
     depth: NDArray[np.float32]
     normal: NDArray[np.float32]
     object_id: NDArray[np.int32]
+    ray_length: NDArray[np.float32]
     count: RayCount
 
 
@@ -53,7 +56,7 @@ def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: Array
     -------
     Traced
         One row per ray, in C order; depth is along the camera's z axis, NaN on a miss; normals are those of the
-        faces, outward; object −1 on a miss.
+        faces, outward; object −1 on a miss; ray length from the ray's start, mm, NaN on a miss.
 
     Raises
     ------
@@ -68,27 +71,36 @@ def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: Array
         )
     n = locations.size // 3
     tracer = Tracer(scene, n, rigid(pose))
-    support = Support.empty((n,))
+    support = Support.empty((n,), ray_length=True)
+    assert support.ray_length is not None
     radiance = np.zeros((n, 3), np.float32)
     tracer.run(locations, directions, radiance, support)
-    return Traced(radiance, support.depth, support.normal, support.object_id, tracer.count)
+    return Traced(radiance, support.depth, support.normal, support.object_id, support.ray_length, tracer.count)
 
 
 @dataclass(frozen=True)
 class Support:
-    """Depth, normal and object id arrays of one block."""
+    """Depth, normal, object id and, if wanted, ray length arrays of one block."""
 
     depth: NDArray[np.float32]
     normal: NDArray[np.float32]
     object_id: NDArray[np.int32]
+    ray_length: NDArray[np.float32] | None = None
 
     @classmethod
-    def empty(cls, shape: tuple[int, ...]) -> Support:
-        return cls(np.empty(shape, np.float32), np.empty((*shape, 3), np.float32), np.empty(shape, np.int32))
+    def empty(cls, shape: tuple[int, ...], *, ray_length: bool = False) -> Support:
+        return cls(
+            np.empty(shape, np.float32),
+            np.empty((*shape, 3), np.float32),
+            np.empty(shape, np.int32),
+            np.empty(shape, np.float32) if ray_length else None,
+        )
 
     def clear(self) -> None:
         """As if no ray hit anything."""
         self.depth[...], self.normal[...], self.object_id[...] = np.nan, 0, -1
+        if self.ray_length is not None:
+            self.ray_length[...] = np.nan
 
 
 def rigid(pose: ArrayLike | None) -> NDArray[np.float64]:
@@ -177,9 +189,10 @@ class Tracer:
         primitives, u, v = hits["primID"], hits["u"], hits["v"]
         if support is not None:
             kernels.record_support(
-                primitives, u, v, rays.pixels, s.corners, s.faces, s.object_of_face,
+                primitives, u, v, hits["tfar"], rays.pixels, s.corners, s.faces, s.object_of_face,
                 self.pose[:3, 3], self.pose[:3, 2],
                 support.depth.reshape(-1), support.normal.reshape(-1, 3), support.object_id.reshape(-1),
+                _NO_LENGTHS if support.ray_length is None else support.ray_length.reshape(-1),
             )  # fmt: skip
         spawn = spawn and (s.mirrors or s.transmits)
         following = _Rays.room((1 + s.transmits) * n if spawn else 0)

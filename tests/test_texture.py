@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trace_scenes import BLACK, WHITE, body, box, sphere, texture_at, wall
 
+from ii_core.files import read_image
 from raytrace_ii import Scene, kernels, trace
 from raytrace_ii.rendering import _CURVES as CURVES
 from raytrace_ii.shapes import rotation
-from raytrace_ii.texture import Checker, Image, Noise, TextureTable, image_texture, linear
+from raytrace_ii.texture import Checker, Image, Noise, Stripes, TextureTable, image_texture, linear, normal_map
 
 BOARD = Checker((WHITE, BLACK), (2.0, 2.0, 2.0))
 CLOUD = Noise((BLACK, WHITE), (1.0, 1.0, 1.0), contrast=1.0)
@@ -287,3 +288,71 @@ def test_each_texture_has_one_row_and_its_own_texels():
     seen = trace(Scene(bodies=bodies, ambient=WHITE), start, np.broadcast_to([0.0, 0, 1], start.shape))
     expected = [texture_at(t, [(0.5, 0.5, 0.5)])[0] for t in (first, BOARD, second, CLOUD)]
     np.testing.assert_allclose(seen.radiance, expected, atol=1e-6)
+
+
+# Stripes, alpha and normal maps
+
+
+def test_stripes_alternate_along_their_axis_only():
+    pair = Stripes((WHITE, BLACK), 2.0, axis=(0, 5, 0))
+    np.testing.assert_array_equal(
+        red(pair, (9, 1, 4), (-9, 3, 1), (0, 5, 0), (0, -1, 0), (3, -3, 0)), [1, 0, 1, 0, 1]
+    )
+    slanting = Stripes((WHITE, BLACK), 1.0, axis=(1, 1, 0))
+    along = np.array([0.5, 1.5, 2.5])
+    np.testing.assert_array_equal(red(slanting, *(a * np.array([1, 1, 0]) / math.sqrt(2) for a in along)), [1, 0, 1])
+    np.testing.assert_array_equal(red(slanting, *((4.0 + 0.4, -4.0, z) for z in (0, 9))), [1, 1])
+
+
+def test_a_border_of_stripes_belongs_to_the_one_after_it():
+    pair = Stripes((WHITE, BLACK), 2.0)
+    np.testing.assert_array_equal(
+        red(pair, (2 - 1e-6, 0, 0), (2, 0, 0), (4 - 1e-6, 0, 0), (2 - 1e-4, 0, 0)), [0, 0, 1, 1]
+    )
+
+
+@given(finite)
+@settings(max_examples=50)
+def test_soft_stripes_are_a_clipped_triangle_wave(x):
+    width, soft = 2.0, 0.25
+    s = x / width % 2
+    expected = np.interp(s, [0, soft / 2, 1 - soft / 2, 1 + soft / 2, 2 - soft / 2, 2], [0.5, 1, 1, 0, 0, 0.5])
+    assert red(Stripes((WHITE, BLACK), width, soft=soft), (x, 0, 0))[0] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "options", [{"width": 0}, {"width": math.nan}, {"axis": (0, 0, 0)}, {"axis": (0, math.nan, 1)}, {"soft": 1.5}]
+)
+def test_bad_stripes_are_refused(options):
+    with pytest.raises(ValueError, match="stripes"):
+        Stripes(**{"colours": (WHITE, BLACK), "width": 1.0, **options})
+
+
+def test_alpha_is_kept_beside_the_colours():
+    for channels in (2, 4):
+        pixels = np.full((2, 3, channels), 255, np.uint8)
+        pixels[..., -1] = [[0, 51, 102], [153, 204, 255]]
+        image = image_texture(pixels)
+        np.testing.assert_array_equal(image.pixels, np.ones((2, 3, 3)))
+        np.testing.assert_allclose(image.alpha, [[0, 0.2, 0.4], [0.6, 0.8, 1]], atol=1e-7)
+    assert image_texture(np.ones((1, 1, 3), np.float32)).alpha is None
+
+
+def test_colours_under_alpha_are_read_as_stored(tmp_path):
+    import OpenImageIO as oiio
+
+    stored = np.array([[[200, 100, 50, 0], [200, 100, 50, 128], [200, 100, 50, 255]]], np.uint8)
+    out = oiio.ImageOutput.create(str(tmp_path / "a.png"))
+    spec = oiio.ImageSpec(3, 1, 4, "uint8")
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    out.open(str(tmp_path / "a.png"), spec)
+    out.write_image(stored)
+    out.close()
+    np.testing.assert_array_equal(read_image(tmp_path / "a.png"), stored)
+
+
+def test_a_normal_map_is_data_not_srgb():
+    pixels = np.array([[[0, 51, 255], [102, 153, 204]]], np.uint8)
+    np.testing.assert_allclose(normal_map(pixels).pixels, pixels / 255, atol=1e-7)
+    with pytest.raises(ValueError, match="a normal map has 1 channels: three"):
+        normal_map(pixels[..., :1])

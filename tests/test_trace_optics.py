@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, lamp, ramp, reflectance, sphere, spread, sun, wall
 
 from raytrace_ii import Background, Material, Scene, kernels, trace
-from raytrace_ii.scene import LIFT
+from raytrace_ii.packing import LIFT
 from raytrace_ii.shapes import Mesh
 from raytrace_ii.texture import Checker
 

@@ -7,7 +7,7 @@ import pytest
 from trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, lamp, sphere, spread, sun, wall
 
 from raytrace_ii import Background, Body, Light, Material, Scene, trace
-from raytrace_ii.scene import LIFT
+from raytrace_ii.packing import LIFT
 from raytrace_ii.shapes import Mesh, rotation
 
 LIGHT = np.array([0.5, 0.7, -0.4]) / np.linalg.norm([0.5, 0.7, -0.4])
@@ -230,8 +230,8 @@ def test_depth_and_lights_out_of_range_are_refused():
     ball = body(sphere(1, 8))
     with pytest.raises(ValueError, match="max_depth is -1"):
         Scene(bodies=[ball], max_depth=-1)
-    with pytest.raises(ValueError, match="unknown light 'spot': known are point, directional"):
-        Light(kind="spot", vector=(0, 0, 1), colour=WHITE)
+    with pytest.raises(ValueError, match="unknown light 'laser': known are point, directional, spot"):
+        Light(kind="laser", vector=(0, 0, 1), colour=WHITE)
     with pytest.raises(ValueError, match="directional light has the direction zero"):
         sun((0, 0, 0))
     for vector in ((0, math.nan, 1), (math.inf, 0, 0)):
