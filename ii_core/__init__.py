@@ -2,6 +2,7 @@
 
 from .camera import IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
+from .formats import find_views, load_mosaic, picture_of, write_hci, write_quilt, write_views
 from .maps import MapCamera, read_maps, write_maps
 from .picture import IIPicture, add_sensor_noise
 from .presets import camera_names, preset, preset_cameras
@@ -16,9 +17,12 @@ __all__ = [
     "camera_names",
     "component_images",
     "elementary_images",
+    "find_views",
     "five_viewpoints",
     "from_smallest_rectangle",
+    "load_mosaic",
     "orthoscopic",
+    "picture_of",
     "picture_pixels",
     "preset",
     "preset_cameras",
@@ -31,5 +35,8 @@ __all__ = [
     "stand_back",
     "sub_images",
     "view_image",
+    "write_hci",
     "write_maps",
+    "write_quilt",
+    "write_views",
 ]

@@ -58,6 +58,13 @@ def check_output(path: Path, force: bool, *, make_folder: bool = False) -> None:
         raise FileExistsError(f"{path} is there already: --force replaces it")
 
 
+def check_folder(folder: Path, force: bool) -> None:
+    """Make a folder to fill, unless it would mix with what is there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    if any(folder.iterdir()) and not force:
+        raise FileExistsError(f"{folder} is not empty: --force writes into it all the same")
+
+
 def columns(rows: dict[str, str]) -> None:
     """Names and what they are, in two columns."""
     width = max(map(len, rows), default=0)

@@ -1,4 +1,4 @@
-"""Commands that turn II-pictures into other pictures: regular."""
+"""Commands that turn II-pictures into other pictures and back: regular, import, export, components."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .common import Force, app, check_output, check_picture, spinner
+from .common import Force, app, check_folder, check_output, check_picture, load_any, progress_bar, spinner
 
 
 @app.command()
@@ -40,3 +40,135 @@ def regular(
             write_image(mask, owned.astype(np.uint8) * 255)
     (k, l), (u, v) = made.lenses, made.ei_pixels
     print(f"{output}: {k}×{l} lenses of {u}×{v} px, {owned.mean():.1%} of the pixels owned by their lens")
+
+
+@app.command("import")
+def import_(
+    source: Annotated[
+        Path, typer.Argument(help="A folder of views, a quilt (name_qsCxRaA.png) or a lenslet picture.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The II-picture: .png, .tif or .exr.")],
+    ei_pixels: Annotated[
+        str | None, typer.Option(help="U×V pixels under each lens, as 15x15: the source is a lenslet picture.")
+    ] = None,
+    grid: Annotated[str | None, typer.Option(help="Rows×columns of views, as 9x9, where names do not say.")] = None,
+    transposed: Annotated[
+        bool | None, typer.Option("--transposed/--not-transposed", help="The first number runs across.")
+    ] = None,
+    flip_down: Annotated[
+        bool | None, typer.Option("--flip-down/--no-flip-down", help="Views are numbered from the bottom up.")
+    ] = None,
+    flip_across: Annotated[
+        bool | None, typer.Option("--flip-across/--no-flip-across", help="Views are numbered from right to left.")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Make an II-picture of a light field from elsewhere.
+
+    In which order the views lie is found from the pictures, as far as they tell, and said.
+    """
+    from ii_core import find_views, load_mosaic, picture_of
+    from ii_core.files import image_types
+
+    image_types(output)
+    check_output(output, force)
+    if ei_pixels is not None:
+        made, order = load_mosaic(source, _pair("ei-pixels", ei_pixels)), None
+    else:
+        views = find_views(source, grid=None if grid is None else _pair("grid", grid))
+        with spinner(f"import {source.name}"):
+            made, order = picture_of(views, transposed=transposed, flip_down=flip_down, flip_across=flip_across)
+    check_picture(output, made.pixels.dtype.name, force)
+    made.save(output)
+    (k, l), (u, v) = made.lenses, made.ei_pixels
+    print(f"{output}: {k}×{l} lenses of {u}×{v} px, {made.pixels.dtype}")
+    if order is not None:
+        print(order.describe())
+
+
+@app.command()
+def export(
+    picture: Annotated[Path, typer.Argument(help="An II-picture of regular structure, or a coded file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A folder, or a file for a quilt or mosaic.")],
+    to: Annotated[str, typer.Option(help="views, hci, quilt or mosaic.")] = "views",
+    depth: Annotated[Path | None, typer.Option(help="z in mm, an .exr: hci gets its disparity map.")] = None,
+    row: Annotated[int | None, typer.Option(help="Row of views for a quilt, from 0; the middle one.")] = None,
+    force: Force = False,
+) -> None:
+    """Write an II-picture as other light field programs read it."""
+    from ii_core import write_hci, write_quilt, write_views
+    from ii_core.files import read_image, write_image
+    from ii_core.formats import quilt_path
+
+    if to not in ("views", "hci", "quilt", "mosaic"):
+        raise ValueError(f"unknown layout {to!r}: known are views, hci, quilt, mosaic")
+    if depth is not None and to != "hci":
+        raise ValueError(f"depth has no place in layout {to}: hci takes it")
+    original = load_any(picture)
+    if to in ("views", "hci"):
+        check_folder(output, force)
+        with spinner(f"export {picture.name}"):
+            if to == "views":
+                count = write_views(original, output)
+            else:
+                z = None if depth is None else read_image(depth)[..., 0]
+                count = write_hci(original, output, depth=z)
+        print(f"{output}: {count} views of {original.lenses[0]}×{original.lenses[1]} px")
+        return
+    target = quilt_path(output, original) if to == "quilt" else output
+    check_picture(target, original.pixels.dtype.name, force)
+    if to == "quilt":
+        write_quilt(original, target, row=row)
+    else:
+        write_image(target, original.pixels)
+    print(target)
+
+
+@app.command()
+def components(
+    picture: Annotated[Path, typer.Argument(help="An II-picture of regular structure, or a coded file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A folder for the component images.")],
+    type: Annotated[str, typer.Option(help="ei, si or ri.")] = "si",
+    sheet: Annotated[Path | None, typer.Option(help="Write all of them side by side, a line between, here.")] = None,
+    force: Force = False,
+) -> None:
+    """Write the elementary, sub- or ray-space images of an II-picture.
+
+    Their names are ei_LENSROW_LENSCOLUMN, si_V_U and ri_V_LENSROW.
+    """
+    import numpy as np
+
+    from ii_core import component_images
+    from ii_core.component import KINDS
+    from ii_core.files import write_image
+
+    if type not in KINDS:
+        raise ValueError(f"unknown component image {type!r}: known are {', '.join(KINDS)}")
+    original = load_any(picture)
+    check_folder(output, force)
+    if sheet:
+        check_picture(sheet, original.pixels.dtype.name, force)
+    stack = component_images(original, type)
+    rows, cols, height, width, _ = stack.shape
+    suffix = ".exr" if stack.dtype.kind == "f" else ".png"
+    digits = len(str(max(rows, cols) - 1))
+    with progress_bar(f"write {output}") as report:
+        for i, (row, col) in enumerate(np.ndindex(rows, cols)):
+            write_image(output / f"{type}_{row:0{digits}}_{col:0{digits}}{suffix}", stack[row, col])
+            report(i + 1, rows * cols, "")
+    if sheet:
+        lined = np.zeros((rows, height + 1, cols, width + 1, 3), stack.dtype)
+        lined[:, :-1, :, :-1] = stack.transpose(0, 2, 1, 3, 4)
+        write_image(sheet, lined.reshape(rows * (height + 1), cols * (width + 1), 3)[:-1, :-1])
+    print(f"{output}: {rows}×{cols} images of {width}×{height} px")
+
+
+def _pair(name: str, text: str) -> tuple[int, int]:
+    """Two counts from text like 9x9."""
+    try:
+        a, b = (int(part) for part in text.lower().replace("×", "x").split("x"))
+    except ValueError:
+        a = b = 0
+    if a < 1 or b < 1:
+        raise ValueError(f"{name} is {text!r}: two whole numbers as in 9x9 are needed")
+    return a, b

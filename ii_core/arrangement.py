@@ -1,0 +1,200 @@
+"""How a grid of views hangs together: which number runs across, which way, and how far the scene moves.
+
+A stranger's grid has two numbers, say (a, b), for every view. What they mean is found from the pictures as far as
+pictures tell:
+
+- **Which number runs across.** Between neighbours along it the scene moves sideways, along the other up or down.
+- **Whether the two run the same way.** With both from left to right and from top to bottom, a point has the same
+  disparity along both; if one of them runs backwards, the opposite.
+- **Which way both run** no shift can tell: turned about altogether, the grid shows the same shifts of a scene inside
+  out. Left to right is assumed, and the sign of the disparity that follows is reported: where all that is known to
+  lie before the plane of agreement comes out behind it, the grid is to be flipped both ways.
+
+Disparity is in view pixels per step and positive where a point moves to the left as the camera moves to the right
+(up as it moves down): the point is nearer than the plane on which the views agree. This is the sign of the HCI
+benchmark.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Set
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+Read = Callable[[int, int], NDArray[Any]]
+
+SEARCHED_SIDE = 384  # larger views are shrunk to about this before the search
+REACH = 0.25  # of the side, how far a point may move; what moves as far is not believed
+FAR = 2  # pixels: motion that is seen well; below it views farther apart are compared
+BLOCK = 8
+FEW = 12  # blocks that move: fewer show nothing
+CLEAR = 1.0  # 8-bit codes, and twice what is left, by which a block's best shift must beat its median one
+LEAN = 0.25  # of all that shifts along either axis gain, how much one must gain more
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arrangement:
+    """What the two numbers (a, b) of a view mean.
+
+    Parameters
+    ----------
+    transposed : bool
+        a runs across, b down; otherwise a down and b across.
+    flip_down, flip_across : bool
+        The number that runs down (across) runs from the bottom up (from right to left).
+    disparity : (float, float) or None
+        Where most points lie, the 5th and the 95th percentile, pixels per step; None if not seen.
+    basis : str
+        How much of it was given, seen in the pictures, or assumed.
+    """
+
+    transposed: bool = False
+    flip_down: bool = False
+    flip_across: bool = False
+    disparity: tuple[float, float] | None = None
+    basis: str = "assumed"
+
+    def grid(self, shape: tuple[int, int]) -> tuple[int, int]:
+        """(rows, columns) of a grid of that many views along a and b."""
+        return (shape[1], shape[0]) if self.transposed else shape
+
+    def place(self, a: int, b: int, shape: tuple[int, int]) -> tuple[int, int]:
+        """(row, column) of view (a, b) as the cameras stood, from the top left."""
+        rows, cols = self.grid(shape)
+        row, col = (b, a) if self.transposed else (a, b)
+        return rows - 1 - row if self.flip_down else row, cols - 1 - col if self.flip_across else col
+
+    def describe(self) -> str:
+        """One line on the order and the sign, and on what of it is more than an assumption."""
+        across = "right to left" if self.flip_across else "left to right"
+        down = "bottom to top" if self.flip_down else "top to bottom"
+        first, second = (across, down) if self.transposed else (down, across)
+        line = f"numbers run {first}, then {second} ({self.basis})"
+        if self.disparity is None:
+            return line
+        low, high = self.disparity
+        side = "behind" if high <= 0 else "before" if low >= 0 else "on both sides of"
+        return f"{line}; disparity {low:+.2f} … {high:+.2f} px a step, {side} the plane where views agree"
+
+
+def estimate(read: Read, shape: tuple[int, int], given: Arrangement, fixed: Set[str] = frozenset()) -> Arrangement:
+    """The arrangement of a grid of views, from a few of them around its middle.
+
+    Parameters
+    ----------
+    read : callable
+        Gives view (a, b) as (T, S, 3).
+    shape : (int, int)
+        Views along a and b.
+    given : Arrangement
+        What is taken where nothing is seen.
+    fixed : set of str
+        Of "transposed", "flip_down" and "flip_across": what stays as given whatever the pictures say.
+    """
+    pairs = {axis: _pair(read, shape, axis) for axis in (0, 1) if shape[axis] > 1}
+    seen: list[str] = []
+    gains = {axis: (_moves(a, b)[2], _moves(a.T, b.T)[2]) for axis, (a, b, _) in pairs.items()}
+    made = given
+    if "transposed" not in fixed:
+        # (a across, b down) against (a down, b across)
+        swapped, straight = (sum(pair[axis ^ turn] for axis, pair in gains.items()) for turn in (0, 1))
+        if abs(swapped - straight) > LEAN * (swapped + straight):
+            made = replace(made, transposed=swapped > straight)
+            seen.append("which runs across")
+    across = 0 if made.transposed else 1
+    maps = {axis: _map(a, b, scale, upright=axis == across) for axis, (a, b, scale) in pairs.items()}
+    if (sign := _agreement(maps)) and not {"flip_down", "flip_across"} <= set(fixed):
+        backwards = sign < 0
+        if "flip_down" in fixed:
+            made = replace(made, flip_across=made.flip_down ^ backwards)
+        else:
+            made = replace(made, flip_down=made.flip_across ^ backwards)
+        seen.append("that one runs backwards" if backwards else "that both run the same way")
+    free = [part for part in ("transposed", "flip_down", "flip_across") if part not in fixed]
+    basis = f"seen: {', '.join(seen)}" if seen else "assumed" if free else "given"
+    if seen and len(fixed & {"flip_down", "flip_across"}) == 0:
+        basis += "; from the left is assumed"
+    return replace(made, disparity=_range(maps, made, across), basis=basis)
+
+
+def _pair(read: Read, shape: tuple[int, int], axis: int) -> tuple[Floats, Floats, float]:
+    """Two grey views along an axis, far enough apart to see motion, and view pixels per step in one of theirs."""
+    at = [count // 2 for count in shape]
+    shrink = max(1, round(max(read(*at).shape[:2]) / SEARCHED_SIDE))
+
+    def view(index: int) -> Floats:
+        place = (index, at[1]) if axis == 0 else (at[0], index)
+        return _grey(read(*place), shrink)
+
+    step, widest = 1, shape[axis] - 1
+    while True:
+        first = min(at[axis], widest - step)
+        a, b = view(first), view(first + step)
+        if 2 * step > widest or max(_typical_motion(a, b), _typical_motion(a.T, b.T)) >= FAR:
+            return a, b, shrink / step
+        step *= 2
+
+
+def _grey(view: NDArray[Any], shrink: int) -> Floats:
+    """Luma in 8-bit codes, squares of pixels averaged."""
+    grey = view.astype(np.float32) @ np.array([0.2126, 0.7152, 0.0722], np.float32)
+    grey *= np.float32(255 if view.dtype.kind == "f" else 255 / np.iinfo(view.dtype).max)
+    height, width = (side // shrink for side in grey.shape)
+    return grey[: height * shrink, : width * shrink].reshape(height, shrink, width, shrink).mean((1, 3))
+
+
+def _typical_motion(a: Floats, b: Floats) -> float:
+    moved, weight, _ = _moves(a, b)
+    return float(np.percentile(np.abs(moved[weight > 0]), 80)) if (weight > 0).any() else 0.0
+
+
+def _moves(a: Floats, b: Floats) -> tuple[Floats, Floats, float]:
+    """How far each block of ``a`` lies to the left in ``b``, how clearly so, and what shifting gains in all."""
+    reach = int(max(1, min(a.shape[1] * REACH, a.shape[1] - 1)))
+    block = [min(BLOCK, side) for side in a.shape]
+    rows, cols = (side // size for side, size in zip(a.shape, block, strict=True))
+    shifts = np.arange(-reach, reach + 1)
+    costs = np.empty((len(shifts), rows, cols), np.float32)
+    columns = np.arange(a.shape[1])
+    for cost, shift in zip(costs, shifts, strict=True):
+        difference = np.abs(a - b[:, np.clip(columns - shift, 0, a.shape[1] - 1)])
+        tiles = difference[: rows * block[0], : cols * block[1]].reshape(rows, block[0], cols, block[1])
+        cost[:] = tiles.mean((1, 3))
+    least = costs.min(0)
+    weight = np.median(costs, axis=0) - least
+    moved = shifts[costs.argmin(0)].astype(np.float32)
+    weight[(weight < CLEAR + 2 * least) | (np.abs(moved) == reach)] = 0
+    moving = (weight > 0) & (moved != 0)
+    gain = float((costs[reach] - least)[moving].sum()) if moving.sum() >= FEW else 0.0
+    return moved, weight, gain
+
+
+def _map(a: Floats, b: Floats, scale: float, *, upright: bool) -> tuple[Floats, Floats]:
+    """Disparity of each block, pixels per step along its own axis, and its weight; both upright."""
+    moved, weight, _ = _moves(a, b) if upright else _moves(a.T, b.T)
+    return (moved * scale, weight) if upright else (moved.T * scale, weight.T)
+
+
+def _agreement(maps: dict[int, tuple[Floats, Floats]]) -> int:
+    """1 if the disparities along the two numbers agree, −1 if they are opposite, 0 if neither is clear."""
+    if len(maps) < 2:
+        return 0
+    (p, wp), (q, wq) = maps[0], maps[1]
+    weight = wp * wq
+    energy = float(np.sqrt((weight * p**2).sum() * (weight * q**2).sum()))
+    product = float((weight * p * q).sum())
+    return int(np.sign(product)) if abs(product) > LEAN * energy else 0
+
+
+def _range(maps: dict[int, tuple[Floats, Floats]], made: Arrangement, across: int) -> tuple[float, float] | None:
+    for axis, flipped in ((across, made.flip_across), (1 - across, made.flip_down)):
+        if axis in maps:
+            d, weight = maps[axis]
+            if (weight > 0).any():
+                low, high = np.percentile(d[weight > 0], (5, 95))
+                return (-float(high), -float(low)) if flipped else (float(low), float(high))
+    return None

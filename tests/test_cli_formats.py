@@ -1,0 +1,85 @@
+"""raytrace-ii import, export and components."""
+
+import numpy as np
+import pytest
+
+from ii_core import IIPicture, preset, sub_images
+from ii_core.files import read_image
+from ii_core.formats import read_pfm
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory):
+    """A rendered picture with depth, on disk."""
+    from ii_core.files import write_image
+    from raytrace_ii import load_scene, render
+
+    folder = tmp_path_factory.mktemp("shot")
+    made = render(load_scene("apples"), preset("setup1", scale=16), support=("depth",))
+    made.picture.save(folder / "a.png")
+    write_image(folder / "z.exr", made.depth.astype(np.float32))
+    return folder / "a.png"
+
+
+@pytest.mark.parametrize("to", ["views", "hci"])
+def test_export_and_import(run, shot, tmp_path, to):
+    code, out, _ = run("export", shot, "--to", to, "-o", tmp_path / "lf")
+    assert code == 0 and "256 views of 32×16 px" in out
+    code, out, _ = run("import", tmp_path / "lf", "-o", tmp_path / "back.png")
+    assert code == 0 and "32×16 lenses of 16×16 px" in out and "(given); disparity -" in out
+    a, b = IIPicture.load(shot), IIPicture.load(tmp_path / "back.png")
+    np.testing.assert_array_equal(a.pixels, b.pixels)
+    assert (a.camera == b.camera) == (to == "views")
+
+
+def test_hci_with_depth(run, shot, tmp_path):
+    assert run("export", shot, "--to", "hci", "--depth", shot.parent / "z.exr", "-o", tmp_path / "lf")[0] == 0
+    assert np.nanmax(read_pfm(tmp_path / "lf" / "gt_disp_lowres.pfm")) < 0
+
+
+def test_quilt_and_mosaic(run, shot, tmp_path):
+    code, out, _ = run("export", shot, "--to", "quilt", "-o", tmp_path / "q.png")
+    assert code == 0 and "_qs" in out
+    assert run("import", out.strip(), "-o", tmp_path / "back.png")[0] == 0
+    back, original = IIPicture.load(tmp_path / "back.png"), IIPicture.load(shot)
+    np.testing.assert_array_equal(sub_images(back)[0], sub_images(original)[8])
+    assert run("export", shot, "--to", "mosaic", "-o", tmp_path / "m.png")[0] == 0
+    assert run("import", tmp_path / "m.png", "--ei-pixels", "16x16", "-o", tmp_path / "mm.png")[0] == 0
+    np.testing.assert_array_equal(IIPicture.load(tmp_path / "mm.png").pixels, original.pixels)
+
+
+def test_flips_are_overridden(run, shot, tmp_path):
+    run("export", shot, "--to", "hci", "-o", tmp_path / "lf")
+    assert run("import", tmp_path / "lf", "--flip-down", "--flip-across", "-o", tmp_path / "b.png")[0] == 0
+    a, b = (sub_images(IIPicture.load(path)) for path in (shot, tmp_path / "b.png"))
+    np.testing.assert_array_equal(a[::-1, ::-1], b)
+
+
+@pytest.mark.parametrize(
+    ("kind", "count", "size"), [("si", 256, (16, 32)), ("ri", 256, (32, 16)), ("ei", 512, (16, 16))]
+)
+def test_components(run, shot, tmp_path, kind, count, size):
+    sheet = tmp_path / "sheet.png"
+    assert run("components", shot, "--type", kind, "-o", tmp_path / "views", "--sheet", sheet)[0] == 0
+    files = sorted((tmp_path / "views").iterdir())
+    assert len(files) == count and read_image(files[0]).shape[:2] == size
+    rows = 16
+    assert read_image(sheet).shape[:2] == (rows * (size[0] + 1) - 1, count // rows * (size[1] + 1) - 1)
+    if kind == "si":
+        np.testing.assert_array_equal(read_image(files[35]), sub_images(IIPicture.load(shot))[2, 3])
+
+
+def test_refused(run, refused, shot, tmp_path):
+    out = tmp_path / "o.png"
+    refused(run("export", shot, "--to", "cube", "-o", out), "unknown layout 'cube': known are views, hci")
+    refused(run("export", shot, "--depth", shot, "-o", out), "depth has no place in layout views")
+    refused(run("export", shot, "--to", "quilt", "--row", 16, "-o", out), "row 16 of views is asked for")
+    refused(run("components", shot, "--type", "vi", "-o", out), "unknown component image 'vi'")
+    refused(run("import", shot, "-o", out), "is no folder and its name says no _qsCxRaA")
+    refused(run("import", shot, "--grid", "9by9", "-o", out), "grid is '9by9'")
+    refused(run("import", shot, "--ei-pixels", "0x3", "-o", out), "ei-pixels is '0x3'")
+    refused(run("import", tmp_path / "none", "-o", out), "is no folder")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "x").touch()
+    refused(run("components", shot, "-o", tmp_path / "full"), "is not empty: --force")
+    assert not out.exists()

@@ -1,0 +1,328 @@
+"""Light fields from elsewhere: round trips exact to the bit, orders found, and what is refused."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset, sub_images, view_image
+from ii_core.arrangement import Arrangement, estimate
+from ii_core.files import read_image, write_image
+from ii_core.formats import camera_views, read_pfm, view_disparity, write_hci, write_quilt, write_views
+from raytrace_ii import load_scene, render
+
+counts = st.integers(1, 5)
+structures = st.tuples(counts, counts, counts, counts).filter(lambda s: s[2] * s[3] > 1)
+
+
+def noise(k, l, u, v, dtype="uint8", erect=False):
+    rng = np.random.default_rng(k + 10 * l + 100 * u + 1000 * v)
+    pixels = rng.integers(0, np.iinfo(dtype).max + 1, (l * v, k * u, 3), dtype)
+    return IIPicture(pixels, (k, l), (u, v), erect=erect)
+
+
+def same(a, b):
+    np.testing.assert_array_equal(a.pixels, b.pixels)
+    assert a.pixels.dtype == b.pixels.dtype
+    assert (a.lenses, a.ei_pixels, a.erect) == (b.lenses, b.ei_pixels, b.erect)
+
+
+@pytest.fixture(scope="module")
+def shot():
+    """A rendered picture with depth; near things in front of far ones."""
+    return render(load_scene("apples"), preset("setup1", scale=4), support=("depth",))
+
+
+@given(structure=structures, dtype=st.sampled_from(["uint8", "uint16"]), erect=st.booleans())
+@settings(max_examples=30)
+def test_view_folders_come_back_to_the_bit(tmp_path_factory, structure, dtype, erect):
+    folder, picture = tmp_path_factory.mktemp("v"), noise(*structure, dtype, erect)
+    assert write_views(picture, folder) == structure[2] * structure[3]
+    if min(structure[2:]) > 1:
+        back, order = picture_of(find_views(folder))
+        assert order.basis == "given"
+        same(back, picture)
+    else:  # one number varies: the grid is to be said
+        with pytest.raises(ValueError, match="do not hold a row and a column number: give the grid"):
+            find_views(folder)
+        back, _ = picture_of(
+            find_views(folder, grid=(structure[3], structure[2])), flip_down=False, flip_across=False
+        )
+        same(back, IIPicture(in_camera_order(picture), picture.lenses, picture.ei_pixels))
+
+
+def in_camera_order(picture):
+    (k, l), (u, v) = picture.lenses, picture.ei_pixels
+    field = picture.pixels.reshape(l, v, k, u, 3)
+    return (field[:, ::-1, :, ::-1] if picture.erect else field).reshape(picture.pixels.shape)
+
+
+@given(structure=structures, erect=st.booleans())
+@settings(max_examples=20)
+def test_hci_folders_come_back_to_the_bit(tmp_path_factory, structure, erect):
+    folder, picture = tmp_path_factory.mktemp("h"), noise(*structure, "uint16", erect)
+    write_hci(picture, folder)
+    back, _ = picture_of(find_views(folder))
+    np.testing.assert_array_equal(back.pixels, in_camera_order(picture))
+    assert (back.lenses, back.ei_pixels) == (picture.lenses, picture.ei_pixels)
+
+
+@given(structure=st.tuples(counts, counts, st.integers(2, 12), st.just(1)))
+@settings(max_examples=20)
+def test_quilts_come_back_to_the_bit(tmp_path_factory, structure):
+    picture = noise(*structure)
+    path = write_quilt(picture, tmp_path_factory.mktemp("q") / "shot.png")
+    back, _ = picture_of(find_views(path))
+    same(back, picture)
+    again = write_quilt(back, path.with_name("again.png"))
+    np.testing.assert_array_equal(read_image(again), read_image(path))
+
+
+@given(structure=structures)
+@settings(max_examples=10)
+def test_mosaics_come_back_to_the_bit(tmp_path_factory, structure):
+    picture = noise(*structure)
+    path = tmp_path_factory.mktemp("m") / "lenslets.png"
+    write_image(path, picture.pixels)
+    same(load_mosaic(path, picture.ei_pixels), picture)
+
+
+def test_floats_go_through_exr(tmp_path):
+    pixels = np.random.default_rng(0).random((6, 8, 3), np.float32)
+    picture = IIPicture(pixels, (4, 3), (2, 2))
+    write_views(picture, tmp_path)
+    same(picture_of(find_views(tmp_path))[0], picture)
+
+
+def test_view_zero_of_a_quilt_is_the_leftmost_and_lies_bottom_left(tmp_path):
+    picture = IIPicture(np.repeat(np.arange(6, dtype=np.uint8), 3).reshape(1, 6, 3), (1, 1), (6, 1))
+    tiles = read_image(write_quilt(picture, tmp_path / "q.png"))[..., 0]
+    assert tiles.tolist() in ([[3, 4, 5], [0, 1, 2]], [[4, 5], [2, 3], [0, 1]])
+    same(picture_of(find_views(tmp_path / f"q_qs{tiles.shape[1]}x{tiles.shape[0]}a1.png"))[0], picture)
+
+
+def test_what_tiles_leave_over_is_cut_off_at_the_right_and_the_top(tmp_path):
+    quilt = np.zeros((5, 7, 3), np.uint8)
+    quilt[1:, :6] = 9
+    write_image(tmp_path / "q_qs3x2a1.png", quilt)
+    picture, _ = picture_of(find_views(tmp_path / "q_qs3x2a1.png"))
+    assert picture.ei_pixels == (6, 1) and picture.lenses == (2, 2) and (picture.pixels == 9).all()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "view_{a:02}_{b:02}.png",
+        "{a}_{b}.png",
+        "out_{a:02}_{b:02}_-{b}.5_11{a}.25.png",  # Stanford
+        "IMG_0001_{n:03}_{a:02}_{b:02}.png",  # decoded Lytro, serial number before the two
+        "s7t{b}f{a}.png",
+    ],
+)
+def test_two_numbers_in_any_name(tmp_path, name):
+    picture = noise(4, 3, 5, 2)
+    for n, (row, col, view) in enumerate(camera_views(picture)):
+        write_image(tmp_path / name.format(a=2 * row + 1, b=col, n=n), view)
+    write_image(tmp_path / "thumbnail.png", np.zeros((1, 1, 3), np.uint8))
+    second_first = name.startswith("s7")
+    back, _ = picture_of(find_views(tmp_path), transposed=second_first, flip_down=False, flip_across=False)
+    same(back, picture)
+
+
+ORDERS = [
+    dict(transposed=t, flip_down=d, flip_across=a)
+    for t in (False, True)
+    for d in (False, True)
+    for a in (False, True)
+]
+
+
+@pytest.mark.parametrize("order", ORDERS, ids=str)
+def test_the_order_of_a_rendered_picture_is_found(shot, order):
+    """Seen are the axes and whether they agree; with one flip given the other follows, whatever it is."""
+    stack = sub_images(shot.picture)
+    rows, cols = stack.shape[:2]
+    arrangement = Arrangement(**order)
+    shape = (cols, rows) if order["transposed"] else (rows, cols)
+
+    def read(a, b):
+        return stack[arrangement.place(a, b, shape)]
+
+    seen = estimate(read, shape, Arrangement())
+    assert seen.transposed == order["transposed"]
+    assert not seen.flip_across
+    assert seen.flip_down == (order["flip_down"] != order["flip_across"])
+    told = estimate(read, shape, Arrangement(flip_across=order["flip_across"]), {"flip_across"})
+    assert {key: getattr(told, key) for key in order} == order
+    low, high = told.disparity
+    assert low < high <= 0  # an II-picture's scene lies behind its lenses
+    told = estimate(read, shape, Arrangement(flip_down=order["flip_down"]), {"flip_down"})
+    assert {key: getattr(told, key) for key in order} == order
+
+
+def test_without_detail_nothing_is_seen_and_that_is_said():
+    flat = estimate(lambda a, b: np.full((40, 60, 3), 77, np.uint8), (4, 5), Arrangement())
+    assert flat == Arrangement() and flat.describe().endswith("then left to right (assumed)")
+
+
+def test_views_follow_the_viewer_to_the_right(shot):
+    """SI_{u+1,v} is what a viewer further to the right sees, by the view image of the same picture."""
+    (u, v), camera = shot.picture.ei_pixels, shot.picture.camera
+    far = -1e7  # so far off that all lenses show the same direction
+    per_pixel = camera.pixel_pitch_mm / camera.gap_mm * (camera.gap_mm - far)
+    stack = sub_images(shot.picture)
+    for du, dv in ((0, 0), (3, 0), (0, 2), (-4, -5)):
+        right, down = (du + 0.5) * per_pixel, (dv + 0.5) * per_pixel
+        seen, valid = view_image(shot.picture, (right, -down, far), interpolation="nearest")
+        assert valid.all()
+        np.testing.assert_array_equal(seen, stack[v // 2 + dv, u // 2 + du])
+
+
+def test_disparity_takes_the_middle_view_to_its_neighbours(shot, tmp_path):
+    write_hci(shot.picture, tmp_path, depth=shot.depth)
+    d = read_pfm(tmp_path / "gt_disp_lowres.pfm")
+    np.testing.assert_array_equal(d, view_disparity(shot.picture, shot.depth))
+    stack, depth = sub_images(shot.picture), shot.depth
+    (u, v), (k, _) = shot.picture.ei_pixels, shot.picture.lenses
+    assert np.nanmax(d) < 0
+    # Where the same point is seen, its depth is the same in the other view at x − d, and its colour nearly so.
+    here, there = depth[v // 2 :: v, u // 2 :: u], depth[v // 2 :: v, u // 2 + 1 :: u]
+    x = np.rint(np.arange(k) - d)
+    inside = np.isfinite(d) & (x < k)
+    rows, cols = np.nonzero(inside)
+    target = x[inside].astype(int)
+    partner = np.abs(there[rows, target] - here[rows, cols]) < 0.01 * here[rows, cols]
+    assert partner.mean() > 0.6
+    moved = stack[v // 2, u // 2 + 1][rows[partner], target[partner]].astype(float)
+    stood = stack[v // 2, u // 2 + 1][rows[partner], cols[partner]].astype(float)
+    reference = stack[v // 2, u // 2][rows[partner], cols[partner]]
+    assert np.abs(moved - reference).mean() < 0.5 * np.abs(stood - reference).mean()
+
+
+def test_disparity_by_hand():
+    """δP = 0.1, Λ = 2, δL = 0.4: a point at z = 10 moves 0.1·8/(2·0.4) = 1 pixel along with the viewer."""
+    from ii_core import IICamera
+
+    camera = IICamera(pixels=(12, 8), lenses=(3, 2), pixel_pitch_mm=0.1, gap_mm=2.0)
+    picture = IIPicture(np.zeros((8, 12, 3), np.uint8), (3, 2), (4, 4), camera)
+    depth = np.full((8, 12), 10.0)
+    depth[2, 2] = np.nan  # lens (0, 0), view (2, 2)
+    d = view_disparity(picture, depth)
+    assert np.isnan(d[0, 0])
+    np.testing.assert_allclose(d.ravel()[1:], -1.0, rtol=1e-6)
+
+
+def refuse(match, *arguments, **options):
+    with pytest.raises(ValueError, match=match):
+        picture_of(find_views(*arguments, **options))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_views(noise(4, 3, 3, 2), tmp_path)
+    (tmp_path / "structure.json").unlink()
+    return tmp_path
+
+
+def test_missing_views_are_named(folder):
+    (folder / "view_01_02.png").unlink()
+    refuse(r"1 of 6 views are missing in .*: \(1, 2\)", folder)
+
+
+def test_gaps_in_the_numbers(folder):
+    for row in (0, 1):
+        shutil.move(folder / f"view_0{row}_02.png", folder / f"view_0{row}_03.png")
+    refuse("view numbers in .* have gaps: 0, 1, 3", folder)
+
+
+def test_views_of_another_size(folder):
+    write_image(folder / "view_01_01.png", np.zeros((3, 5, 3), np.uint8))
+    refuse("view_01_01.png has 5×3 px, view_00_00.png 4×3 px|view_.* has 4×3 px, view_01_01.png 5×3 px", folder)
+
+
+def test_views_of_another_type(folder):
+    write_image(folder / "view_01_01.png", np.zeros((3, 4, 3), np.uint16))
+    refuse("all must be of one type", folder)
+
+
+def test_mixed_file_types(folder):
+    shutil.move(folder / "view_01_01.png", folder / "view_01_01.tif")
+    refuse("mixed types .png, .tif", folder)
+
+
+def test_transparent_views(folder):
+    write_image(folder / "view_01_01.png", np.zeros((3, 4, 4), np.uint8))
+    refuse("view_01_01.png is transparent", folder)
+
+
+def test_opaque_alpha_and_grey_are_read(folder):
+    view = np.full((3, 4, 4), 255, np.uint8)
+    write_image(folder / "view_01_01.png", view)
+    write_image(folder / "view_01_00.png", view[..., :1])
+    picture, _ = picture_of(find_views(folder))
+    assert (picture.pixels[1::2, 1::3] == 255).all() and (picture.pixels[1::2, 0::3] == 255).all()
+
+
+def test_a_broken_view_is_an_os_error(folder):
+    (folder / "view_01_01.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
+    with pytest.raises(OSError, match="view_01_01.png"):
+        picture_of(find_views(folder))
+
+
+def test_one_view_and_none(tmp_path):
+    refuse("holds no pictures", tmp_path)
+    write_image(tmp_path / "view_0_0.png", np.zeros((3, 4, 3), np.uint8))
+    refuse("holds one view", tmp_path)
+    write_image(tmp_path / "q.png", np.zeros((3, 4, 3), np.uint8))
+    refuse("one view", tmp_path / "q.png", grid=(1, 1))
+    refuse("cannot hold 5×1 tiles", tmp_path / "q.png", grid=(1, 5))
+    refuse("no folder and its name says no _qsCxRaA", tmp_path / "q.png")
+
+
+def test_grids_that_do_not_fit(folder):
+    refuse("a grid of 4×2 views is asked for: 6 are there", folder, grid=(4, 2))
+
+
+def test_hci_without_parameters_needs_a_square(tmp_path):
+    write_hci(noise(2, 2, 3, 3), tmp_path)
+    (tmp_path / "parameters.cfg").unlink()
+    assert find_views(tmp_path).shape == (3, 3)
+    (tmp_path / "input_Cam008.png").unlink()
+    refuse("holds 8 views, no square", tmp_path)
+
+
+def test_hci_with_wrong_parameters(tmp_path):
+    write_hci(noise(2, 2, 3, 2), tmp_path)
+    (tmp_path / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 4\nnum_cams_y = 2\n")
+    refuse("a grid of 2×4 views is asked for: 6 are there", tmp_path)
+    (tmp_path / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = many\n")
+    refuse("does not say num_cams_x", tmp_path)
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"ei_pixels": 3}'])
+def test_a_structure_that_is_none(folder, text):
+    (folder / "structure.json").write_text(text)
+    refuse("is no structure of an II-picture", folder)
+
+
+def test_a_structure_of_another_picture(folder):
+    (folder / "structure.json").write_text(json.dumps(noise(4, 3, 2, 2).structure_json()))
+    refuse("says 2×2 views, 2×3 are there", folder)
+
+
+def test_lenses_that_do_not_fit_a_mosaic(tmp_path):
+    write_image(tmp_path / "m.png", np.zeros((7, 9, 3), np.uint8))
+    with pytest.raises(ValueError, match="lenses of 10×2 px do not fit"):
+        load_mosaic(tmp_path / "m.png", (10, 2))
+    assert load_mosaic(tmp_path / "m.png", (4, 3)).lenses == (2, 2)
+
+
+def test_disparity_needs_a_camera_and_its_own_depth(shot, tmp_path):
+    with pytest.raises(ValueError, match="has no camera"):
+        write_hci(noise(2, 2, 2, 2), tmp_path, depth=np.zeros((4, 4)))
+    with pytest.raises(ValueError, match=r"depth is \(4, 4\)"):
+        write_hci(shot.picture, tmp_path, depth=np.zeros((4, 4)))
+    assert list(tmp_path.iterdir()) == []
