@@ -62,17 +62,14 @@ class Views:
         Views along the first and the second number.
     read : callable
         Gives view (a, b) as (T, S, 3), checked against the others.
-    order : Arrangement
-        What the layout says of their order.
     known : frozenset of str
-        Which parts of it the layout settles.
+        Which parts of an `Arrangement` the layout settles, at their defaults.
     structure : dict, optional
         What `write_views` left of the picture that the views came from.
     """
 
     shape: tuple[int, int]
     read: Read
-    order: Arrangement = Arrangement()
     known: frozenset[str] = frozenset()
     structure: dict[str, Any] | None = None
 
@@ -123,9 +120,14 @@ def picture_of(
         If one cannot be read.
     """
     given = {"transposed": transposed, "flip_down": flip_down, "flip_across": flip_across}
+<<<<<<< HEAD
     chosen: Any = {name: value for name, value in given.items() if value is not None}
     start = Arrangement(**{name: getattr(views.order, name) for name in given} | chosen)
     order = estimate(views.read, views.shape, start, views.known | set(chosen))
+=======
+    chosen: Any = {name: value for name, value in given.items() if value is not None}
+    order = estimate(views.read, views.shape, Arrangement(**chosen), views.known | set(chosen))
+>>>>>>> c0bf05a (Imported views: only what a layout settles is kept with them)
     first = views.read(0, 0)
     height, width = first.shape[:2]
     rows, cols = order.grid(views.shape)

@@ -268,7 +268,7 @@ def test_opaque_alpha_and_grey_are_read(folder):
 
 def test_a_broken_view_is_an_os_error(folder):
     (folder / "view_01_01.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
-    with pytest.raises(OSError, match="view_01_01.png"):
+    with pytest.raises(OSError, match=r"view_01_01\.png"):
         picture_of(find_views(folder))
 
 
