@@ -120,14 +120,8 @@ def picture_of(
         If one cannot be read.
     """
     given = {"transposed": transposed, "flip_down": flip_down, "flip_across": flip_across}
-<<<<<<< HEAD
-    chosen: Any = {name: value for name, value in given.items() if value is not None}
-    start = Arrangement(**{name: getattr(views.order, name) for name in given} | chosen)
-    order = estimate(views.read, views.shape, start, views.known | set(chosen))
-=======
     chosen: Any = {name: value for name, value in given.items() if value is not None}
     order = estimate(views.read, views.shape, Arrangement(**chosen), views.known | set(chosen))
->>>>>>> c0bf05a (Imported views: only what a layout settles is kept with them)
     first = views.read(0, 0)
     height, width = first.shape[:2]
     rows, cols = order.grid(views.shape)
