@@ -206,6 +206,17 @@ def sidecar(path: str | os.PathLike[str]) -> Path:
     return Path(f"{os.fspath(path)}.json")
 
 
+def codes8(pixels: NDArray[Any]) -> NDArray[np.uint8]:
+    """Pixels as a screen shows them: 8-bit sRGB, of 16 bits rounded, of linear floats clipped; NaN is black."""
+    if pixels.dtype == np.uint8:
+        return pixels
+    if pixels.dtype == np.uint16:
+        return ((pixels.astype(np.uint32) * 255 + 32767) // 65535).astype(np.uint8)
+    x = np.clip(np.nan_to_num(pixels), 0, 1)
+    curve = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+    return np.rint(255 * curve).astype(np.uint8)
+
+
 def add_sensor_noise(picture: IIPicture, sigma: float = 1.0, seed: int = 0) -> IIPicture:
     """The picture with monochromatic sensor noise: one N(0, σ) sample per pixel added to R, G and B alike.
 

@@ -9,10 +9,10 @@ import sys
 
 import typer
 
-from . import synthesize, pictures, coding, evaluate
+from . import synthesize, pictures, coding, evaluate, show
 from .common import app
 
-__all__ = ["app", "coding", "evaluate", "main", "pictures", "synthesize"]
+__all__ = ["app", "coding", "evaluate", "main", "pictures", "show", "synthesize"]
 
 
 def main() -> None:

@@ -1,0 +1,271 @@
+"""A page that shows an II-picture in a browser: one HTML file with everything in it, or a folder to be served.
+
+The page holds the mosaic of sub-images (2.13) cut into square pages, which become the layers of one texture; its
+shader looks through the lenses as `ii_core.view_image` does (4.1), and focuses by shifting and adding.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import json
+import math
+import os
+from collections.abc import Callable, Iterator
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from ii_core import IICamera, IIPicture, five_viewpoints
+from ii_core.files import atomic_path
+from ii_core.picture import codes8
+
+from .psnr import q_angle, q_global
+from .view import WINDOW, q_view
+
+PAGE_SIDE = 2048  # the largest texture every WebGL2 takes
+PREVIEW_SIDE = 512
+MOST_LAYERS = 256  # and the most layers
+MAX_EMBEDDED = 256 << 20  # bytes of a page; browsers read no more in reasonable time
+JPEG_QUALITY = 95
+ASSUMED_ANGLE_DEG = 20.0  # of a picture whose camera nobody knows
+FARTHEST = 250  # gaps to the last layer in focus, as in `q_depth`
+
+
+def write_viewer(
+    path: str | os.PathLike[str],
+    picture: IIPicture,
+    decoded: IIPicture | None = None,
+    *,
+    depth: NDArray[Any] | None = None,
+    title: str = "",
+    lossless: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> int:
+    """One self-contained HTML file, which opens from disk in a browser with WebGL2.
+
+    Parameters
+    ----------
+    path : path
+        The page; replaced whole.
+    picture : IIPicture
+        Of a regular structure. 16 bits and floats are shown as 8-bit sRGB.
+    decoded : IIPicture, optional
+        Of the same structure, to compare it with.
+    depth : ndarray, (N, M), optional
+        z in mm of every pixel, as `raytrace_ii.render` gives it: clicks focus by it instead of by the picture.
+    title : str
+        The name shown.
+    lossless : bool
+        Pages as WebP without loss, four times as large, instead of JPEG 4:4:4 of quality 95.
+    progress : callable, optional
+        Called with pages done and pages in all.
+
+    Returns
+    -------
+    int
+        Bytes written.
+
+    Raises
+    ------
+    ValueError
+        If the structures do not match, the depth map has another size, or the page would be larger than
+        `MAX_EMBEDDED`.
+    OSError
+        If the file cannot be written.
+    """
+    page = _Page(picture, decoded, depth, title, lossless)
+    used = 0
+    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+        head, tail = page.html("\x00").split("\x00")
+        file.write(head)
+        for kind, where, data in page.parts(progress):
+            used += 4 * len(data) // 3
+            if used > MAX_EMBEDDED:
+                raise ValueError(
+                    f"{path} would be larger than {MAX_EMBEDDED >> 20} MB, the most a page can hold: --serve shows "
+                    f"the picture of {picture.size[0]}×{picture.size[1]} px without one"
+                )
+            arguments = "".join(f"{n}, " for n in where)
+            file.write(f'<script>ii.{kind}({arguments}"{base64.b64encode(data).decode()}")</script>\n')
+        file.write("<script>ii.done()</script>" + tail)
+    return Path(path).stat().st_size
+
+
+def write_viewer_folder(
+    folder: str | os.PathLike[str],
+    picture: IIPicture,
+    decoded: IIPicture | None = None,
+    *,
+    depth: NDArray[Any] | None = None,
+    title: str = "",
+    lossless: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """The page as index.html with its data in files beside it, for a web server; parameters as `write_viewer`."""
+    page = _Page(picture, decoded, depth, title, lossless)
+    order: list[list[Any]] = []
+    for number, (kind, where, data) in enumerate(page.parts(progress)):
+        name = f"{number}.{kind}"
+        (Path(folder) / name).write_bytes(data)
+        order.append([kind, name, *where])
+    text = page.html(f"<script>ii.fetch({json.dumps(order)})</script>")
+    with atomic_path(Path(folder) / "index.html") as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+class _Page:
+    """What one page shows, checked once."""
+
+    def __init__(
+        self, picture: IIPicture, decoded: IIPicture | None, depth: NDArray[Any] | None, title: str, lossless: bool
+    ) -> None:
+        picture.check_regular()
+        if decoded is not None:
+            picture.check_same_structure(decoded)
+        if depth is not None and depth.shape != picture.pixels.shape[:2]:
+            raise ValueError(f"depth is {depth.shape}, the picture {picture.pixels.shape[:2]}: the same size is needed")
+        self.pictures = [picture] if decoded is None else [picture, decoded]
+        self.depth = None if depth is None else depth_view(picture, depth)
+        self.title, self.lossless = title or "II-picture", lossless
+        (k, l), (u, v) = picture.lenses, picture.ei_pixels
+        self.side = min(PAGE_SIDE, max(k * u, l * v))
+        self.grid = -(-(k * u) // self.side), -(-(l * v) // self.side)
+        if math.prod(self.grid) > MOST_LAYERS:
+            raise ValueError(
+                f"a picture of {k * u}×{l * v} px fills {math.prod(self.grid)} texture layers: "
+                f"{MOST_LAYERS} of {self.side}×{self.side} px are what every browser has"
+            )
+
+    def html(self, data: str) -> str:
+        """The page around its data."""
+        folder = files("assets") / "viewer"
+        text = {name: (folder / name).read_text(encoding="utf-8") for name in ("page.html", "style.css")}
+        script = "\n".join((folder / name).read_text(encoding="utf-8") for name in ("lightfield.js", "viewer.js"))
+        meta = json.dumps(self.meta()).replace("<", "\\u003c")
+        compared = len(self.pictures) > 1
+        return Template(text["page.html"]).substitute(
+            title=html.escape(self.title),
+            about=html.escape(self.about()),
+            style=text["style.css"],
+            compare=COMPARE if compared else "",
+            keys=", M comparison" if compared else "",
+            quality=self.quality() if compared else "",
+            script=f"{script}\nii.start({meta});",
+            data=data,
+        )
+
+    def meta(self) -> dict[str, Any]:
+        """What the script must know."""
+        picture = self.pictures[0]
+        (u, _), assumed = picture.ei_pixels, picture.camera is None
+        camera = picture.camera or _assumed(picture)
+        front, left, up = (five_viewpoints(camera)[name] for name in ("front", "left", "up"))
+        plane = camera.origin_mm[2] + camera.gap_mm
+        far = 4.0 if assumed else (FARTHEST - 1) * camera.pixel_pitch_mm / camera.lens_pitch_mm[0]
+        return {
+            "name": self.title,
+            "lenses": list(picture.lenses),
+            "ei": list(picture.ei_pixels),
+            "sign": -1 if picture.erect else 1,
+            "side": self.side,
+            "across": self.grid[0],
+            "pages": math.prod(self.grid),
+            "compared": len(self.pictures) > 1,
+            "focus": [-far if assumed else -far / 4, far] if u > 1 else [-1, 1],
+            "camera": {
+                "gap_mm": camera.gap_mm,
+                "pixel_pitch_mm": camera.pixel_pitch_mm,
+                "lens_pitch_mm": list(camera.lens_pitch_mm),
+                "size_mm": list(camera.size_mm),
+                "vertical_parallax": camera.lens_model.vertical_parallax,
+                "distance_mm": plane - front[2],
+                "phi": math.atan2(camera.origin_mm[0] - left[0], plane - left[2]),
+                "theta": math.atan2(up[1] - camera.origin_mm[1], plane - up[2]),
+                "assumed": assumed,
+            },
+        }
+
+    def about(self) -> str:
+        """One line on the picture."""
+        picture = self.pictures[0]
+        (k, l), (u, v) = picture.lenses, picture.ei_pixels
+        camera = f"camera {picture.camera.name}" if picture.camera else f"no camera: {ASSUMED_ANGLE_DEG:g}° assumed"
+        return f"{k} × {l} lenses of {u} × {v} px, {camera}"
+
+    def quality(self) -> str:
+        """A table of what the comparison costs, in HTML."""
+        a, b = self.pictures
+        angle = q_angle(a, b)
+        rows = [
+            ("Q<sub>global</sub>", f"{q_global(a, b):.2f} dB"),
+            ("Q<sub>angle</sub>", f"{angle.min():.2f} … {angle.max():.2f} dB"),
+        ]
+        if a.camera is not None and min(a.lenses) >= WINDOW:
+            rows += [(f"Q<sub>view</sub> {name}", f"{value:.4f}") for name, value in q_view(a, b).values.items()]
+        lines = "".join(f"<tr><th>{name}</th><td>{text}</td></tr>" for name, text in rows)
+        return f'<table aria-label="Quality of the decoded picture">{lines}</table>'
+
+    def parts(self, progress: Callable[[int, int], None] | None) -> Iterator[tuple[str, tuple[int, ...], bytes]]:
+        """Kind, place and bytes of everything the page shows, what is seen first first."""
+        (u, v), (k, l) = self.pictures[0].ei_pixels, self.pictures[0].lenses
+        yield "preview", (), self._preview()
+        if self.depth is not None:
+            yield "depth", (), self.depth.astype("<f4").tobytes()
+        across, down = self.grid
+        centre = (u // 2 + 0.5) * k / self.side - 0.5, (v // 2 + 0.5) * l / self.side - 0.5
+        layers = sorted(
+            range(across * down), key=lambda i: math.hypot(i % across - centre[0], i // across - centre[1])
+        )
+        total = len(layers) * len(self.pictures)
+        for done, (layer, number) in enumerate(((i, n) for i in layers for n in range(len(self.pictures))), 1):
+            yield "page", (number, layer), self._encoded(self._layer(self.pictures[number], layer))
+            if progress:
+                progress(done, total)
+
+    def _layer(self, picture: IIPicture, layer: int) -> NDArray[np.uint8]:
+        (k, l), (u, v), side = picture.lenses, picture.ei_pixels, self.side
+        x0, y0 = layer % self.grid[0] * side, layer // self.grid[0] * side
+        x, y = np.arange(x0, min(x0 + side, k * u)), np.arange(y0, min(y0 + side, l * v))
+        rows, columns = y % l * v + y // l, x % k * u + x // k
+        return codes8(picture.pixels[rows[:, None], columns])
+
+    def _encoded(self, pixels: NDArray[np.uint8]) -> bytes:
+        out = io.BytesIO()
+        if self.lossless:
+            Image.fromarray(pixels).save(out, "WEBP", lossless=True, quality=20, method=2)
+        else:
+            Image.fromarray(pixels).save(out, "JPEG", quality=JPEG_QUALITY, subsampling=0)
+        return out.getvalue()
+
+    def _preview(self) -> bytes:
+        picture = self.pictures[0]
+        (u, v), step = picture.ei_pixels, max(1, -(-max(picture.lenses) // PREVIEW_SIDE))
+        view = picture.pixels[v // 2 :: v * step, u // 2 :: u * step]
+        out = io.BytesIO()
+        Image.fromarray(codes8(np.ascontiguousarray(view))).save(out, "JPEG", quality=85)
+        return out.getvalue()
+
+
+COMPARE = """<label>Show <select data-state="mode"><option>original<option>decoded<option>split<option>difference</select>
+      </label>
+      <label>Split at <input type="range" data-state="split"></label>
+      <label>Gain <input type="range" data-state="gain"></label>"""
+
+
+def depth_view(picture: IIPicture, depth: NDArray[Any]) -> NDArray[np.float32]:
+    """The part of a depth map on the lenslet grid that the sub-image in the middle has, (L, K)."""
+    u, v = picture.ei_pixels
+    return np.asarray(depth[v // 2 :: v, u // 2 :: u], np.float32)
+
+
+def _assumed(picture: IIPicture) -> IICamera:
+    """A camera for a picture that has none: square pixels of 1 mm, so many across as it has, seen at 20°."""
+    gap = picture.ei_pixels[0] / 2 / math.tan(math.radians(ASSUMED_ANGLE_DEG / 2))
+    return IICamera(pixels=picture.size, lenses=picture.lenses, pixel_pitch_mm=1.0, gap_mm=gap, name="assumed")
