@@ -13,6 +13,7 @@ import json
 import math
 import os
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -22,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ii_core import IICamera, IIPicture, five_viewpoints
+from ii_core import IICamera, IIPicture, five_viewpoints, view_image
 from ii_core.files import atomic_path
 from ii_core.picture import codes8
 
@@ -130,7 +131,9 @@ class _Page:
         if decoded is not None:
             picture.check_same_structure(decoded)
         if depth is not None and depth.shape != picture.pixels.shape[:2]:
-            raise ValueError(f"depth is {depth.shape}, the picture {picture.pixels.shape[:2]}: the same size is needed")
+            raise ValueError(
+                f"depth is {depth.shape}, the picture {picture.pixels.shape[:2]}: the same size is needed"
+            )
         self.pictures = [picture] if decoded is None else [picture, decoded]
         self.depth = None if depth is None else depth_view(picture, depth)
         self.title, self.lossless = title or "II-picture", lossless
@@ -245,16 +248,18 @@ class _Page:
         return out.getvalue()
 
     def _preview(self) -> bytes:
+        """What the viewer sees from the front, where the page starts."""
         picture = self.pictures[0]
-        (u, v), step = picture.ei_pixels, max(1, -(-max(picture.lenses) // PREVIEW_SIDE))
-        view = picture.pixels[v // 2 :: v * step, u // 2 :: u * step]
+        camera = picture.camera or _assumed(picture)
+        view, _ = view_image(replace(picture, camera=camera), five_viewpoints(camera)["front"])
+        step = max(1, -(-max(picture.lenses) // PREVIEW_SIDE))
         out = io.BytesIO()
-        Image.fromarray(codes8(np.ascontiguousarray(view))).save(out, "JPEG", quality=85)
+        Image.fromarray(codes8(np.ascontiguousarray(view[::step, ::step]))).save(out, "JPEG", quality=90, subsampling=0)
         return out.getvalue()
 
 
-COMPARE = """<label>Show <select data-state="mode"><option>original<option>decoded<option>split<option>difference</select>
-      </label>
+COMPARE = """<label>Show <select data-state="mode">
+        <option>original<option>decoded<option>split<option>difference</select></label>
       <label>Split at <input type="range" data-state="split"></label>
       <label>Gain <input type="range" data-state="gain"></label>"""
 

@@ -43,9 +43,12 @@ class Viewer {
     this.depthMap = new Float32Array(data.buffer, data.byteOffset, data.byteLength / 4);
   }
 
+  // Unless the link says where, what lies in the middle is in focus.
   async finished() {
     await Promise.all(this.work);
     this.say("");
+    if (!/[#&]f=/.test(location.hash)) this.state.f = this.pick(this.cursor);
+    this.redraw();
   }
 
   // --- geometry ----------------------------------------------------------------------------------------------

@@ -17,7 +17,9 @@ def view(
     compare: Annotated[Path | None, typer.Option(help="A decoded II-picture, or a coded file, beside it.")] = None,
     depth: Annotated[Path | None, typer.Option(help="A map of z in mm, .exr, by which clicks focus.")] = None,
     lossless: Annotated[bool, typer.Option("--lossless", help="Pixels as they are, in a larger page.")] = False,
-    serve: Annotated[bool, typer.Option("--serve", help="Serve the page on this machine instead of writing it.")] = False,
+    serve: Annotated[
+        bool, typer.Option("--serve", help="Serve the page on this machine instead of writing it.")
+    ] = False,
     port: Annotated[int, typer.Option(help="To serve on; 0 for any that is free.")] = 0,
     force: Force = False,
 ) -> None:

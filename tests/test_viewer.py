@@ -1,0 +1,364 @@
+"""The page in a real browser. Where none is installed these tests are skipped, and say so."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import urllib.request
+
+import numpy as np
+import pytest
+
+from ii_core import IICamera, IIPicture, preset, view_image
+from ii_core.files import write_image
+from metrics import viewer
+from metrics.viewer import depth_view, write_viewer, write_viewer_folder
+from raytrace_ii import load_scene, render
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if path is None:
+        pytest.skip(f"no browser is installed: one of {', '.join(BROWSERS)} is needed")
+    with playwright.sync_playwright() as driver:
+        running = driver.chromium.launch(executable_path=path, args=FLAGS)
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def show(browser):
+    """Open a page file; whatever the page complains of fails the test."""
+    opened, complaints = [], []
+
+    def call(path, fragment="", wait=True):
+        tab = browser.new_page(viewport={"width": 1000, "height": 700})
+        opened.append(tab)
+        tab.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+        tab.on("pageerror", lambda error: complaints.append(str(error)))
+        tab.goto(path if "://" in str(path) else f"file://{path}{fragment}")
+        if wait:
+            tab.evaluate("async () => { await ii.ready }")
+        return tab
+
+    yield call
+    for tab in opened:
+        tab.close()
+    assert complaints == []
+
+
+@pytest.fixture(scope="module")
+def shot():
+    return render(load_scene("apples"), preset("setup1", scale=16), support=("depth",))
+
+
+def snapshot(tab, **state):
+    """What the page shows with one pixel a lens, and from where."""
+    got = tab.evaluate(
+        """state => { ii.viewer.set(state); const s = ii.viewer.snapshot();
+                      return [s.width, s.height, Array.from(s.data), ii.viewer.viewpoint()] }""",
+        state,
+    )
+    return np.array(got[2], np.uint8).reshape(got[1], got[0], 4)[..., :3].astype(float), got[3]
+
+
+def psnr(a, b):
+    return 10 * np.log10(255**2 / max(np.mean((a - b) ** 2), 1e-9))
+
+
+PLACES = [(0, 0, 1), (0.7, -0.3, 1), (-1, 1, 1), (1.8, 0, 1), (0.2, 0.1, 0.5)]
+
+
+def test_every_place_shows_its_view_image(show, shot, tmp_path):
+    write_viewer(tmp_path / "v.html", shot.picture, lossless=True)
+    tab = show(tmp_path / "v.html")
+    for x, y, r in PLACES:
+        shown, viewpoint = snapshot(tab, x=x, y=y, r=r, f=0, a=1)
+        wanted, valid = view_image(shot.picture, viewpoint)
+        assert np.abs(shown - wanted)[valid].max() <= 1  # the card rounds a half its own way
+
+
+def test_jpeg_pages_show_it_nearly(show, shot, tmp_path):
+    write_viewer(tmp_path / "v.html", shot.picture)
+    shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=0.5, y=0.2, f=0, a=1)
+    assert psnr(shown, view_image(shot.picture, viewpoint)[0]) >= 35
+
+
+def moved(picture, **change):
+    camera = picture.camera
+    return IIPicture(picture.pixels, picture.lenses, picture.ei_pixels, camera, **change)
+
+
+def test_upright_elementary_images_look_the_other_way(show, shot, tmp_path):
+    picture = moved(shot.picture, erect=True)
+    write_viewer(tmp_path / "v.html", picture, lossless=True)
+    shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=0.6, y=-0.4, f=0, a=1)
+    assert np.abs(shown - view_image(picture, viewpoint)[0]).max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("lenses", "ei_pixels"), [((1, 1), (1, 1)), ((7, 5), (1, 1)), ((1, 1), (9, 4)), ((3, 2), (1, 6))]
+)
+@pytest.mark.parametrize("with_camera", [True, False])
+def test_any_structure(show, tmp_path, lenses, ei_pixels, with_camera):
+    size = lenses[0] * ei_pixels[0], lenses[1] * ei_pixels[1]
+    pixels = np.random.default_rng(1).integers(0, 256, (size[1], size[0], 3), np.uint8)
+    camera = IICamera(pixels=size, lenses=lenses, pixel_pitch_mm=0.01, gap_mm=0.3) if with_camera else None
+    picture = IIPicture(pixels, lenses, ei_pixels, camera)
+    write_viewer(tmp_path / "v.html", picture, lossless=True)
+    shown, viewpoint = snapshot(show(tmp_path / "v.html"), f=0, a=1)
+    if with_camera:
+        wanted, valid = view_image(picture, viewpoint)
+        assert np.abs(shown - wanted)[valid].max() <= 1
+    else:
+        assert shown.shape == (lenses[1], lenses[0], 3)
+
+
+def test_a_mosaic_of_several_pages(show, shot, tmp_path, monkeypatch):
+    monkeypatch.setattr(viewer, "PAGE_SIDE", 100)  # cuts through sub-images of 32×16 px
+    write_viewer(tmp_path / "v.html", shot.picture, lossless=True)
+    shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=-0.4, y=0.9, f=0, a=1)
+    assert np.abs(shown - view_image(shot.picture, viewpoint)[0]).max() <= 1
+
+
+def focused(picture, viewpoint, shift, radius):
+    """What the shader does, in numpy: pixels within the aperture, each from the lens that sees the same point."""
+    from ii_core.view import view_positions
+
+    (k, l), (u, v) = picture.lenses, picture.ei_pixels
+    field = picture.pixels.reshape(l, v, k, u, 3).astype(float)
+    x, y = view_positions(picture.camera, viewpoint)
+    x, y = x - np.arange(k) * u, y - np.arange(l) * v
+    total, weights = np.zeros((l, k, 3)), np.zeros((l, k, 1))
+    for row in range(l):
+        for col in range(k):
+            for j in range(v):
+                for i in range(u):
+                    off = np.array([i - x[col], j - y[row]])
+                    weight = np.prod(np.maximum(0, 1 - np.abs(off) / radius))
+                    at = np.array([col, row]) + shift * off
+                    if weight <= 0 or (at < -0.5).any() or (at > [k - 0.5, l - 0.5]).any():
+                        continue
+                    low = np.floor(at).astype(int)
+                    (tx, ty), (x0, x1), (y0, y1) = (
+                        at - low,
+                        np.clip([low[0], low[0] + 1], 0, k - 1),
+                        np.clip([low[1], low[1] + 1], 0, l - 1),
+                    )
+                    p = field[:, j, :, i]
+                    value = (1 - ty) * ((1 - tx) * p[y0, x0] + tx * p[y0, x1]) + ty * (
+                        (1 - tx) * p[y1, x0] + tx * p[y1, x1]
+                    )
+                    total[row, col] += weight * value
+                    weights[row, col] += weight
+    return total / weights
+
+
+@pytest.mark.parametrize("erect", [False, True])
+def test_focus_and_aperture(show, tmp_path, erect):
+    rng = np.random.default_rng(2)
+    camera = IICamera(pixels=(40, 24), lenses=(10, 6), pixel_pitch_mm=0.01, gap_mm=0.1)
+    picture = IIPicture(rng.integers(0, 256, (24, 40, 3), np.uint8), (10, 6), (4, 4), camera, erect)
+    write_viewer(tmp_path / "v.html", picture, lossless=True)
+    tab = show(tmp_path / "v.html")
+    shown, viewpoint = snapshot(tab, x=0.3, y=0.2, f=0.7, a=1.8)
+    if erect:  # the same formulas with the other sign, which `view_positions` takes
+        from functools import partial
+
+        import ii_core.view
+
+        original = ii_core.view.view_positions
+        ii_core.view.view_positions = partial(original, erect=True)
+        try:
+            wanted = focused(picture, viewpoint, -0.7, 1.8)
+        finally:
+            ii_core.view.view_positions = original
+    else:
+        wanted = focused(picture, viewpoint, 0.7, 1.8)
+    assert np.abs(shown - wanted).max() <= 2  # 8-bit rounding of sums in single precision
+
+
+def test_dragging_turns_the_scene(show, shot, tmp_path):
+    write_viewer(tmp_path / "v.html", shot.picture, lossless=True)
+    tab = show(tmp_path / "v.html", "#f=0")
+    box = tab.locator("#main").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + box["width"] / 4, y - box["height"] / 8, steps=5)
+    tab.mouse.up()
+    tab.wait_for_timeout(300)
+    state = tab.evaluate("ii.viewer.state")
+    assert state["x"] == pytest.approx(-0.5, abs=0.01) and state["y"] == pytest.approx(-0.25, abs=0.01)
+    shown, viewpoint = snapshot(tab)
+    assert viewpoint[0] < 0 and viewpoint[1] < 0
+    assert psnr(shown, view_image(shot.picture, viewpoint)[0]) >= 35
+    assert re.search(r"x=-0\.5", tab.url)  # a drag is no click: the focus stayed
+
+
+def lens_at(tab, k, l):
+    """Where a lens lies on the page."""
+    return tab.evaluate(
+        """([k, l]) => {
+             const v = ii.viewer, m = v.map(v.pane("main"));
+             const box = document.getElementById("main").getBoundingClientRect();
+             const at = (n, axis) => (n - m.origin[axis]) / m.pace[axis] / v.density;
+             return [box.left + at(k, 0), box.top + at(l, 1)]; }""",
+        [k, l],
+    )
+
+
+# on the red apple in front, the green one and the large one behind, away from their edges
+@pytest.mark.parametrize("lens", [(5, 11), (16, 13), (10, 8)])
+def test_a_click_focuses_by_the_depth_map(show, shot, tmp_path, lens):
+    write_viewer(tmp_path / "v.html", shot.picture, depth=shot.depth)
+    tab = show(tmp_path / "v.html", "#f=0")
+    tab.mouse.click(*lens_at(tab, *lens))
+    tab.wait_for_timeout(100)
+    depth = tab.evaluate("ii.viewer.depthOf(ii.viewer.state.f)")
+    around = depth_view(shot.picture, shot.depth)[lens[1] - 1 : lens[1] + 2, lens[0] - 1 : lens[0] + 2]
+    # the line of sight meets the map between its pixels: one of the nine around is what it finds
+    assert np.abs(around - depth).min() < 0.02 * depth
+
+
+def test_a_click_without_a_map_finds_where_views_agree(show, tmp_path):
+    """A textured plane: seven places all lie on it."""
+    rng = np.random.default_rng(4)
+    k, l, u, shift = 48, 24, 7, 1.5
+    wall = np.kron(rng.integers(40, 216, (40, 80, 3)), np.ones((2, 2, 1)))
+    camera = IICamera(pixels=(k * u, l * u), lenses=(k, l), pixel_pitch_mm=0.01, gap_mm=0.2)
+    field = np.empty((l, u, k, u, 3), np.uint8)
+    for v in range(u):
+        for h in range(u):  # a point at lens n in view 0 is at n + 1.5·h in view h
+            rows, cols = (np.arange(n) + 20 - shift * (h if n == k else v) for n in (l, k))
+            top = (
+                wall[np.floor(rows).astype(int)] * (1 - rows % 1)[:, None, None]
+                + wall[np.floor(rows).astype(int) + 1] * (rows % 1)[:, None, None]
+            )
+            c0, t = np.floor(cols).astype(int), (cols % 1)[None, :, None]
+            field[:, v, :, h] = top[:, c0] * (1 - t) + top[:, c0 + 1] * t
+    picture = IIPicture(field.reshape(l * u, k * u, 3), (k, l), (u, u), camera)
+    write_viewer(tmp_path / "v.html", picture, lossless=True)
+    tab = show(tmp_path / "v.html", "#f=0")
+    found = [tab.evaluate("p => ii.viewer.pick(p)", [col, row]) for col in (14, 20, 30, 36) for row in (10, 14)]
+    span = tab.evaluate("ii.viewer.meta.focus")
+    assert found == pytest.approx([shift] * len(found), abs=(span[1] - span[0]) / 500)
+
+
+def test_comparison_shows_the_difference(show, shot, tmp_path):
+    a = shot.picture
+    b = a.with_pixels(np.minimum(a.pixels, 245) + np.uint8(10))
+    write_viewer(tmp_path / "v.html", a, b, lossless=True)
+    tab = show(tmp_path / "v.html")
+    assert tab.evaluate("ii.viewer.state.mode") == "split"
+    first, _ = snapshot(tab, mode="original", f=0)
+    second, _ = snapshot(tab, mode="decoded")
+    shown, _ = snapshot(tab, mode="difference", gain=4)
+    np.testing.assert_allclose(shown, np.clip(127.5 + 4 * (second - first), 0, 255), atol=6)  # 4 × rounding, and it
+    split, _ = snapshot(tab, mode="split", split=0.5)
+    np.testing.assert_array_equal(split[:, :14], first[:, :14])
+    np.testing.assert_array_equal(split[:, 18:], second[:, 18:])
+    assert "dB" in tab.locator("table").inner_text()
+
+
+def test_stereo_pairs_and_keys(show, shot, tmp_path):
+    write_viewer(tmp_path / "v.html", shot.picture)
+    tab = show(tmp_path / "v.html", "#stereo=cross-eyed&eyes=1&f=0")
+    tab.locator("#main").focus()
+    assert tab.evaluate("ii.viewer.state.stereo") == "cross-eyed"
+    for key in ("ArrowRight", "ArrowUp", "+", "]", ".", "s"):
+        tab.keyboard.press(key)
+    tab.wait_for_timeout(300)
+    state = tab.evaluate("ii.viewer.state")
+    assert state["stereo"] == "anaglyph" and state["x"] == 0.05 and state["y"] == 0.05
+    assert state["zoom"] == 1.2 and state["a"] == 1.5 and state["f"] > 0
+    again = show(tmp_path / "v.html", tab.evaluate("location.hash"))
+    for key, value in again.evaluate("ii.viewer.state").items():
+        assert value == (state[key] if isinstance(value, str) else pytest.approx(state[key], rel=1e-4, abs=1e-5))
+
+
+def test_a_damaged_link_is_ignored(show, shot, tmp_path):
+    write_viewer(tmp_path / "v.html", shot.picture)
+    tab = show(tmp_path / "v.html", "#x=nonsense&r=-5&stereo=smell&mode=difference&f=1&__proto__=2")
+    state = tab.evaluate("ii.viewer.state")
+    assert (state["x"], state["r"], state["stereo"], state["mode"]) == (0, 0.35, "off", "original")
+
+
+def test_every_control_has_a_name(show, shot, tmp_path):
+    write_viewer(tmp_path / "v.html", shot.picture, shot.picture)
+    tab = show(tmp_path / "v.html")
+    nameless = tab.evaluate(
+        """[...document.querySelectorAll("input, select, button, [tabindex], [role=img]")]
+             .filter(e => !(e.labels?.[0]?.innerText || e.innerText || e.getAttribute("aria-label"))).length"""
+    )
+    assert nameless == 0
+    assert tab.evaluate("document.querySelectorAll('input, select').length") == 11
+
+
+def test_without_webgl2_the_page_says_so(show, shot, tmp_path, browser):
+    write_viewer(tmp_path / "v.html", shot.picture)
+    tab = browser.new_page()
+    tab.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    tab.goto(f"file://{tmp_path / 'v.html'}")
+    assert "WebGL2" in tab.locator("#failure").inner_text()
+    tab.close()
+
+
+def test_the_centre_view_comes_first(show, shot, tmp_path):
+    """Served with every page held back: the preview stands for them."""
+    write_viewer_folder(tmp_path, shot.picture, lossless=True)
+    text = (tmp_path / "index.html").read_text()
+    (tmp_path / "early.html").write_text(re.sub(r"<script>ii\.fetch.*</script>", "", text))
+    tab = show(tmp_path / "early.html", wait=False)
+    order = json.loads(re.search(r"ii\.fetch\((\[.*\])\)", text)[1])
+    assert order[0][0] == "preview"
+    data = list((tmp_path / order[0][1]).read_bytes())
+    tab.evaluate("async data => { ii.viewer.preview(new Uint8Array(data)); await ii.viewer.finished() }", data)
+    shown, viewpoint = snapshot(tab, f=0)
+    assert psnr(shown, view_image(shot.picture, viewpoint)[0]) > 30  # JPEG of quality 90
+
+
+def test_the_largest_picture(show, tmp_path):
+    camera = preset("setup1")
+    row = np.arange(8192)[:, None] % 251
+    pixels = np.broadcast_to(row.astype(np.uint8), (4096, 8192, 3)).copy()
+    pixels[::7] //= 2
+    write_viewer(tmp_path / "v.html", IIPicture(pixels, camera.lenses, camera.ei_pixels, camera))
+    shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=0.8, y=-0.6, f=0, a=1)
+    picture = IIPicture(pixels, camera.lenses, camera.ei_pixels, camera)
+    assert psnr(shown, view_image(picture, viewpoint)[0]) >= 35
+
+
+def test_command_refuses_what_it_cannot_show(run, refused, shot, tmp_path, monkeypatch):
+    path = tmp_path / "a.png"
+    shot.picture.save(path)
+    refused(run("view", path), "one of --output and --serve is needed")
+    refused(run("view", path, "-o", tmp_path / "a.png"), "is no page: .html is needed")
+    write_image(tmp_path / "bare.png", shot.picture.pixels)
+    refused(run("view", tmp_path / "bare.png", "-o", tmp_path / "b.html"), "bare.png")
+    monkeypatch.setattr(viewer, "MAX_EMBEDDED", 1000)
+    refused(run("view", path, "-o", tmp_path / "v.html"), "--serve")
+    assert not list(tmp_path.glob("*.html")) and not list(tmp_path.glob(".*"))
+
+
+def test_served(shot, tmp_path):
+    path = tmp_path / "a.png"
+    shot.picture.save(path)
+    command = [sys.executable, "-m", "raytrace_ii.cli", "view", str(path), "--serve"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            url = server.stdout.readline().split()[0]
+            with urllib.request.urlopen(url) as page:
+                text = page.read().decode()
+            order = json.loads(re.search(r"ii\.fetch\((\[.*\])\)", text)[1])
+            for _, name, *_ in order:
+                with urllib.request.urlopen(url + name) as data:
+                    assert len(data.read()) > 100
+        finally:
+            server.terminate()
