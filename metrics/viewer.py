@@ -254,7 +254,8 @@ class _Page:
         view, _ = view_image(replace(picture, camera=camera), five_viewpoints(camera)["front"])
         step = max(1, -(-max(picture.lenses) // PREVIEW_SIDE))
         out = io.BytesIO()
-        Image.fromarray(codes8(np.ascontiguousarray(view[::step, ::step]))).save(out, "JPEG", quality=90, subsampling=0)
+        small = np.ascontiguousarray(view[::step, ::step])
+        Image.fromarray(codes8(small)).save(out, "JPEG", quality=90, subsampling=0)
         return out.getvalue()
 
 
