@@ -65,3 +65,29 @@ def decode(
     with spinner(f"decode {coded.name}"):
         picture = decode(coded)
     picture.save(output)
+
+
+def study_orders(path: Path, folder: Path, force: bool) -> None:
+    """Leave name_orders.json in a folder and print its table: what each order promises before coding."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from codec.analysis import analyse_orders
+    from ii_core import IIPicture
+    from ii_core.files import write_json
+    from metrics import provenance
+
+    numbers = folder / f"{path.stem}_orders.json"
+    check_output(numbers, force, make_folder=True)
+    with spinner(f"analyse {path.name}"):
+        rows = [analysis.to_json() for analysis in analyse_orders(IIPicture.load(path))]
+    write_json(numbers, {**provenance(), "picture": path.name, "rows": rows})
+    table = Table(title=f"{path.stem}: consecutive frames; e is the mean energy of their difference")
+    for column in ("images", "order", "frames", "mean c", "σ of c", "undefined", "e", "e a sample"):
+        table.add_column(column, justify="left" if column in ("images", "order") else "right")
+    for r in rows:
+        table.add_row(
+            r["kind"], r["order"], str(r["frames"]), f"{r['correlation_mean']:.4f}", f"{r['correlation_sigma']:.4f}",
+            str(r["undefined"]), f"{r['energy']:.4g}", f"{r['energy_per_sample']:.1f}",
+        )  # fmt: skip
+    Console().print(table)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .coding import study_orders
 from .common import Force, Workers, app, check_output, columns, load_any, progress_bar, spinner
 
 if TYPE_CHECKING:
@@ -94,6 +95,9 @@ def study(
         SCHEMES
     ),
     rates: Annotated[str, typer.Option(help="Bits per pixel, parted by commas.")] = ",".join(map(str, RATES)),
+    orders: Annotated[
+        bool, typer.Option("--orders", help="Code nothing: correlation and residuals of every order instead.")
+    ] = False,
     workers: Workers = None,
     force: Force = False,
 ) -> None:
@@ -101,6 +105,9 @@ def study(
     from codec import parse_scheme
     from ii_core import IIPicture
 
+    if orders:
+        study_orders(picture, output, force)
+        return
     names = [name.replace(";", ",") for name in schemes.split(",")]
     for name in names:
         parse_scheme(name)  # a misspelt one is found before anything is made
