@@ -72,7 +72,7 @@ def study_orders(path: Path, folder: Path, force: bool) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from codec.analysis import analyse_orders
+    from codec import analyse_orders
     from ii_core import IIPicture
     from ii_core.files import write_json
     from metrics import provenance
