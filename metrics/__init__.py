@@ -3,7 +3,8 @@
 from .angle import AngleQuality, q_angle_ssim, q_angle_ycbcr
 from .chart import rd_chart
 from .depth import DepthQuality, q_depth
-from .focus import FocusDepth, depth_from_focus, linear_layers, logarithmic_layers
+from .focus import FocusDepth, depth_from_focus
+from .layers import linear_layers, logarithmic_layers
 from .plots import PLOTS, plot_all, plot_angle, plot_depth, plot_pair, plot_views
 from .psnr import angle_axes, mean_q_angle, q_angle, q_global
 from .rd import bd_psnr, bd_rate, rate_distortion

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IICamera, IIPicture
 from ii_core.view import camera_of, view_positions
 
-from .focus import check_layers, depth_from_focus, nearest_layer, virtual_viewpoint
-from .psnr import check_finite, check_pair, psnr
+from .focus import FocusDepth, depth_from_focus
+from .layers import check_layers, nearest_layer, virtual_viewpoint
+from .psnr import check_finite, check_mask, check_pair, peak, psnr
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,11 @@ class DepthQuality:
         estimated: it is always that of a layer, or none.
     source : str
         Where depth came from: ``given``, or ``focus`` with the method, as in ``focus (dissertation)``.
+    layer : ndarray of int64, (L', K)
+        Layer of each pixel that the virtual camera sees, −1 where it has none; L' is L, less the rows of lenses
+        that the camera does not see.
+    error : ndarray of float64, (L', K)
+        Root of the mean over R, G and B of the squared error at each of these pixels, in shares of the peak.
     """
 
     depth_mm: NDArray[np.float64]
@@ -39,6 +45,14 @@ class DepthQuality:
     counts: NDArray[np.int64]
     outside: int
     source: str
+    layer: NDArray[np.int64]
+    error: NDArray[np.float64]
+
+    def error_map(self, layer: int) -> NDArray[np.float64]:
+        """The error at the pixels of one layer, NaN at all others, (L', K)."""
+        if not 0 <= layer < self.values.size:
+            raise ValueError(f"layer is {layer}: 0 to {self.values.size - 1} are needed")
+        return np.where(self.layer == layer, self.error, np.nan)
 
     @property
     def min(self) -> float:
@@ -64,9 +78,10 @@ def q_depth(
     reference: IIPicture,
     decoded: IIPicture,
     *,
-    depth: ArrayLike | None = None,
+    depth: ArrayLike | FocusDepth | None = None,
     layers_mm: ArrayLike | None = None,
     method: str = "dissertation",
+    mask: ArrayLike | None = None,
 ) -> DepthQuality:
     """PSNR of each depth layer, seen by a virtual camera that looks through every lens.
 
@@ -78,14 +93,16 @@ def q_depth(
     ----------
     reference, decoded : IIPicture
         Of the same structure and type; the reference has a camera.
-    depth : array_like, (N, M), optional
-        Scene z at every pixel of the picture, mm, NaN where nothing is hit. If it is not given, depth is estimated
-        from the reference: `depth_from_focus`.
+    depth : array_like, (N, M), or FocusDepth, optional
+        Scene z at every pixel of the picture, mm, NaN where nothing is hit; or what `depth_from_focus` found in the
+        reference before, with its layers. If it is not given, depth is estimated from the reference now.
     layers_mm : array_like, (layers,), optional
         Depths of the layers, increasing; z = d·f from the pixel array, d = 1 … 250, with f = Λ in the pinhole
         approximation, if not given. See `linear_layers` and `logarithmic_layers`.
     method : {"dissertation", "robust"}
         How depth is estimated, if it is; see `depth_from_focus`.
+    mask : array_like of bool, (N, M), optional
+        Which pixels count; see `q_global`.
 
     Returns
     -------
@@ -98,8 +115,8 @@ def q_depth(
     ------
     ValueError
         If the pictures differ in structure or type, have no camera, hold a pixel in view that is not finite, if
-        ``depth`` is of another shape or infinite, or if the layers are not depths that increase. Without
-        ``depth`` also as `depth_from_focus`.
+        ``depth`` is of another shape or infinite, if it was found for other layers or lenses, or if the layers are
+        not depths that increase. Without ``depth`` also as `depth_from_focus`.
 
     References
     ----------
@@ -107,38 +124,58 @@ def q_depth(
     """
     check_pair(reference, decoded)
     camera = camera_of(reference)
-    layers = check_layers(layers_mm, camera)
     n, m, lens_rows = _seen(camera, reference.erect)
-    a, b = reference.pixels[n, m], decoded.pixels[n, m]
+    counted = np.ones(np.broadcast_shapes(n.shape, m.shape), bool)
+    if mask is not None:
+        counted = check_mask(mask, reference)[n, m]
+    a, b = (np.where(counted[..., None], picture.pixels[n, m], 0) for picture in (reference, decoded))
     squared_error = np.square(a.astype(np.float64) - b).sum(axis=-1)
     if not np.isfinite(squared_error).all():
-        check_finite(reference, decoded)
+        check_finite(reference, decoded, mask)
+    if isinstance(depth, FocusDepth) and layers_mm is None:
+        layers_mm = depth.layers_mm
+    layers = check_layers(layers_mm, camera)
     if depth is None:
-        source = f"focus ({method})"
-        layer = depth_from_focus(reference, layers_mm=layers, method=method).layer[lens_rows]
+        depth = depth_from_focus(reference, layers_mm=layers, method=method)
+    if isinstance(depth, FocusDepth):
+        if depth.layer.shape != reference.lenses[::-1] or not np.array_equal(depth.layers_mm, layers):
+            raise ValueError(
+                f"depth has {depth.layer.shape[::-1]} lenses and {depth.layers_mm.size} layers: those of picture and "
+                f"of layers_mm, {reference.lenses} lenses and {layers.size} layers, are needed"
+            )
+        source, layer = f"focus ({depth.method})", depth.layer[lens_rows]
         missing = layer < 0
     else:
         source = "given"
-        z = np.asarray(depth)
-        if z.shape != reference.pixels.shape[:2] or z.dtype.kind not in "fiu":
-            raise ValueError(
-                f"depth is {z.dtype} of shape {z.shape}: numbers of shape {reference.pixels.shape[:2]} are needed"
-            )
-        z = z[n, m].astype(np.float64)
+        z = _true_depth(depth, reference)[n, m].astype(np.float64)
         if np.isinf(z).any():
             raise ValueError("depth is infinite at a pixel in view: NaN is needed where nothing is hit")
         layer, missing = nearest_layer(z, layers, camera.gap_mm), np.isnan(z)
 
+    outside = int((counted & (layer < 0) & ~missing).sum())
+    layer = np.where(counted, layer, -1)
     inside = layer >= 0
     counts = np.bincount(layer[inside], minlength=layers.size)
     total = np.bincount(layer[inside], weights=squared_error[inside], minlength=layers.size)
+    dtype = reference.pixels.dtype
     return DepthQuality(
         depth_mm=layers,
-        values=psnr(total, 3 * counts, reference.pixels.dtype),
+        values=psnr(total, 3 * counts, dtype),
         counts=counts,
-        outside=int((~inside & ~missing).sum()),
+        outside=outside,
         source=source,
+        layer=layer,
+        error=np.where(counted, np.sqrt(squared_error / 3) / peak(dtype), np.nan),
     )
+
+
+def _true_depth(depth: ArrayLike, picture: IIPicture) -> NDArray[Any]:
+    z = np.asarray(depth)
+    if z.shape != picture.pixels.shape[:2] or z.dtype.kind not in "fiu":
+        raise ValueError(
+            f"depth is {z.dtype} of shape {z.shape}: numbers of shape {picture.pixels.shape[:2]} are needed"
+        )
+    return z
 
 
 def virtual_camera_pixels(camera: IICamera, *, erect: bool = False) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -2,35 +2,81 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IIPicture, five_viewpoints, view_image
 from ii_core.view import camera_of
 
-from .psnr import check_finite, check_pair, peak
+from .psnr import check_finite, check_mask, check_pair, peak, psnr
 
 WINDOW = 11  # pixels across the Gaussian of Wang 2004
 # BT.601, as MATLAB's rgb2gray, with which Wang's ssim.m is used.
 LUMA = np.array([0.2989, 0.5870, 0.1140])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ViewQuality:
-    """Mean SSIM of each view image, and their mean."""
+    """Mean SSIM and PSNR of each view image.
+
+    Attributes
+    ----------
+    values : dict of str to float
+        MSSIM by view name; NaN where no window is valid throughout.
+    psnr : dict of str to float
+        dB over the valid pixels' R, G and B; +inf where they are identical, NaN where there are none.
+    pooled_psnr : float
+        Of the errors of all views together, dB.
+    """
 
     values: dict[str, float]
+    psnr: dict[str, float]
+    pooled_psnr: float
 
     @property
     def mean(self) -> float:
-        """Arithmetic mean over the views."""
-        return sum(self.values.values()) / len(self.values)
+        """Arithmetic mean of MSSIM over the views that have one."""
+        return _mean(self.values)
+
+    @property
+    def mean_psnr(self) -> float:
+        """Arithmetic mean of PSNR over the views that have one, dB; at least ``pooled_psnr``."""
+        return _mean(self.psnr)
+
+    @property
+    def worst(self) -> float:
+        """MSSIM of the worst view."""
+        return min(_known(self.values).values(), default=math.nan)
+
+    @property
+    def worst_view(self) -> str | None:
+        """Name of the worst view by MSSIM, the first of equals; None if none has one."""
+        known = _known(self.values)
+        return min(known, key=known.__getitem__) if known else None
 
 
-def q_view(reference: IIPicture, decoded: IIPicture) -> ViewQuality:
-    """Mean structural similarity of five view images: front, up, down, left and right.
+def _known(values: dict[str, float]) -> dict[str, float]:
+    return {name: value for name, value in values.items() if not math.isnan(value)}
+
+
+def _mean(values: dict[str, float]) -> float:
+    known = _known(values).values()
+    return sum(known) / len(known) if known else math.nan
+
+
+def q_view(
+    reference: IIPicture,
+    decoded: IIPicture,
+    *,
+    viewpoints: Mapping[str, ArrayLike] | None = None,
+    mask: ArrayLike | None = None,
+) -> ViewQuality:
+    """Mean structural similarity, and PSNR, of five view images: front, up, down, left and right.
 
     The SSIM is that of Wang et al. 2004: luma on a range of 255, an 11×11 Gaussian window of σ = 1.5,
     K1 = 0.01, K2 = 0.03, averaged over the region the window fits into. Luma is BT.601, not rounded; code
@@ -39,18 +85,23 @@ def q_view(reference: IIPicture, decoded: IIPicture) -> ViewQuality:
     Parameters
     ----------
     reference, decoded : IIPicture
-        Of the same structure and type; the reference has a camera, from which `five_viewpoints` follow.
+        Of the same structure and type; the reference has a camera.
+    viewpoints : mapping of str to array_like (3,), optional
+        Where from, mm in camera coordinates; `five_viewpoints` of the camera if not given.
+    mask : array_like of bool, (N, M), optional
+        Which pixels count; see `q_global`. A view pixel counts if all do that it is interpolated from.
 
     Returns
     -------
     ViewQuality
-        ``values`` by view name, and ``mean``; 1 for identical pictures.
+        ``values`` by view name, and ``mean``; 1 for identical pictures. View pixels whose line leaves the pixel
+        array are not valid: PSNR leaves them out, MSSIM every window that holds one.
 
     Raises
     ------
     ValueError
         If the pictures differ in structure or type, have no camera, have fewer than 11 lenses across or down,
-        or hold a pixel that is not finite.
+        or hold a pixel in view that is not finite; if there is no viewpoint, or one is not before the lens plane.
 
     References
     ----------
@@ -61,20 +112,42 @@ def q_view(reference: IIPicture, decoded: IIPicture) -> ViewQuality:
     k, l = reference.lenses
     if min(k, l) < WINDOW:
         raise ValueError(f"{k}×{l} lenses give view images of {k}×{l} pixels: SSIM needs at least {WINDOW}×{WINDOW}")
+    viewpoints = five_viewpoints(camera) if viewpoints is None else viewpoints
+    if not viewpoints:
+        raise ValueError("there are no viewpoints: at least one is needed")
+    values, each, errors, counts = {}, {}, 0.0, 0
+    for name, viewpoint in viewpoints.items():
+        a, b, valid = view_pair(reference, decoded, viewpoint, mask=mask)
+        if not (np.isfinite(a[valid]).all() and np.isfinite(b[valid]).all()):
+            check_finite(reference, decoded, mask)
+        values[name] = _mssim(a, b, valid)
+        squared = float(np.square(a[valid].astype(np.float64) - b[valid]).sum())
+        each[name] = float(psnr(squared, 3 * valid.sum(), a.dtype))
+        errors, counts = errors + squared, counts + 3 * int(valid.sum())
+    return ViewQuality(values, each, float(psnr(errors, counts, reference.pixels.dtype)))
+
+
+def view_pair(
+    reference: IIPicture, decoded: IIPicture, viewpoint_mm: ArrayLike, *, mask: ArrayLike | None = None
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_]]:
+    """The same view image of both pictures, (L, K, 3) each, and where it is valid, (L, K)."""
+    other = reference.with_pixels(decoded.pixels)  # same structure, and surely the same camera
+    (a, valid), (b, _) = (view_image(picture, viewpoint_mm) for picture in (reference, other))
+    if mask is not None:
+        counted = np.repeat(check_mask(mask, reference)[..., None].astype(np.float32), 3, axis=2)
+        valid &= view_image(reference.with_pixels(counted), viewpoint_mm)[0][..., 0] == 1
+    return a, b, valid
+
+
+def _mssim(a: NDArray[Any], b: NDArray[Any], valid: NDArray[np.bool_]) -> float:
     from skimage.metrics import structural_similarity
 
-    other = reference.with_pixels(decoded.pixels)  # same structure, and surely the same camera
-    values = {}
-    for name, viewpoint in five_viewpoints(camera).items():
-        a, b = _luma(reference, viewpoint), _luma(other, viewpoint)
-        if not (np.isfinite(a).all() and np.isfinite(b).all()):
-            check_finite(reference, decoded)
-        values[name] = float(
-            structural_similarity(a, b, data_range=255, gaussian_weights=True, sigma=1.5, use_sample_covariance=False)
-        )
-    return ViewQuality(values)
-
-
-def _luma(picture: IIPicture, viewpoint: NDArray[np.float64]) -> NDArray[np.float64]:
-    pixels, _ = view_image(picture, viewpoint)
-    return pixels @ LUMA * (255 / peak(pixels.dtype))
+    x, y = (image @ LUMA * (255 / peak(image.dtype)) for image in (a, b))
+    options = {"data_range": 255, "gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
+    if valid.all():
+        return float(structural_similarity(x, y, **options))
+    side = WINDOW // 2
+    x, y = (np.where(valid, image, 0.0) for image in (x, y))
+    _, similarity = structural_similarity(x, y, full=True, **options)
+    whole = np.lib.stride_tricks.sliding_window_view(valid, (WINDOW, WINDOW)).all(axis=(2, 3))
+    return float(similarity[side:-side, side:-side][whole].mean()) if whole.any() else math.nan

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture, orthoscopic, view_image
-from metrics import q_depth
+from metrics import depth_from_focus, logarithmic_layers, q_depth
 from metrics.depth import virtual_camera_pixels
 
 GAP = 1.5
@@ -112,3 +112,49 @@ def test_refusals():
     f = picture(dtype="float32")
     with pytest.raises(ValueError, match=r"decoded pixel \(0, 0\) is \[nan"):
         q_depth(f, f.with_pixels(f.pixels * np.float32(np.nan)), depth=depth)
+
+
+def test_depth_found_before_serves_again():
+    a = picture()
+    b = a.with_pixels(a.pixels + np.uint8(3))
+    layers = logarithmic_layers(3 * GAP, 30 * GAP, 9)
+    found = depth_from_focus(a, layers_mm=layers, method="robust")
+    again, now = q_depth(a, b, depth=found), q_depth(a, b, layers_mm=layers, method="robust")
+    np.testing.assert_array_equal(again.values, now.values)
+    assert again.source == now.source == "focus (robust)" and (again.depth_mm == layers).all()
+    with pytest.raises(ValueError, match=r"\(12, 8\) lenses and 9 layers: those of picture"):
+        q_depth(a, b, depth=found, layers_mm=layers[:5])
+    with pytest.raises(ValueError, match=r"\(6, 4\) lenses and 9 layers"):
+        q_depth(picture((6, 4)), picture((6, 4)), depth=found)
+
+
+def test_error_maps_lie_where_the_errors_are():
+    a = picture()
+    depth = halves(a, 20 * GAP, 100 * GAP)
+    n, m = virtual_camera_pixels(a.camera)
+    pixels = a.pixels.copy()
+    pixels[n[2], m[0, 9]] += np.array([3, 0, 4], np.uint8)
+    q = q_depth(a, a.with_pixels(pixels), depth=depth)
+    assert q.layer.shape == q.error.shape == (8, 12)
+    assert (q.layer[:, :6] == 19).all() and (q.layer[:, 6:] == 99).all()
+    map_ = q.error_map(99)
+    assert np.isnan(map_[:, :6]).all() and np.nansum(map_) == map_[2, 9] == pytest.approx((25 / 3) ** 0.5 / 255)
+    assert (q.error_map(19)[:, :6] == 0).all() and np.isnan(q.error_map(5)).all()
+    with pytest.raises(ValueError, match="layer is 250: 0 to 249"):
+        q.error_map(250)
+
+
+def test_masked_pixels_count_in_no_layer():
+    a = picture()
+    mask = np.ones(a.pixels.shape[:2], bool)
+    mask[:24] = False  # four rows of lenses
+    depth = np.full(a.pixels.shape[:2], 500 * GAP)  # beyond all layers
+    depth[:, 36:] = 100 * GAP
+    pixels = a.pixels + np.uint8(2)
+    pixels[:24] += 9
+    q = q_depth(a, a.with_pixels(pixels), depth=depth, mask=mask)
+    assert q.counts[99] == q.outside == 24 and q.counts.sum() == 24
+    assert q.values[99] == pytest.approx(20 * math.log10(255 / 2), rel=1e-14)
+    assert np.isnan(q.error[:4]).all() and (q.layer[:4] == -1).all()
+    with pytest.raises(ValueError, match="mask is float64"):
+        q_depth(a, a, depth=depth, mask=depth)

@@ -1,5 +1,6 @@
 import math
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -8,19 +9,9 @@ from trace_scenes import UNIFORM, WHITE, body, wall
 from ii_core import IICamera, IIPicture, orthoscopic, preset
 from metrics import depth_from_focus, linear_layers, logarithmic_layers, q_depth
 from metrics.depth import virtual_camera_pixels
-from metrics.focus import (
-    BASE,
-    FILTER,
-    REFERENCE,
-    STAR,
-    choose,
-    focus_cost,
-    half_cost,
-    nearest_layer,
-    pixel_tables,
-    weigh,
-    weigh_alike,
-)
+from metrics.focus import BASE, FILTER, NOWHERE, REFERENCE, pixel_tables, pixels_per_lens, star, whole_pixel_steps
+from metrics.focus_kernels import choose, focus_cost, half_cost, pass_on, weigh
+from metrics.layers import nearest_layer
 from raytrace_ii import Scene, render
 from raytrace_ii.texture import Image
 
@@ -196,11 +187,11 @@ def test_cost_is_that_of_the_naive_sum():
     members = np.stack([(lenses[:, None] == p).all(axis=2).any(axis=1) for p in (BASE, REFERENCE)], axis=1)
     across = np.unique(lenses[:, 0])
     cols, rows = pixel_tables(a.camera, LAYERS, across, across)
-    cost = np.zeros((6, 8, 12), np.float32)
+    cost = np.zeros((8, 12, 6), np.float32)
     focus_cost(a.pixels, *cols, *rows, np.searchsorted(across, lenses), members, cost, 0, 8)
     expected = naive_cost(a, LAYERS, BASE, REFERENCE, nearest=False)
     # Kept in float32; sums of 25 values in float64 in another order.
-    np.testing.assert_allclose(cost, expected, rtol=1e-6, atol=1e-4)
+    np.testing.assert_allclose(np.moveaxis(cost, 2, 0), expected, rtol=1e-6, atol=1e-4)
 
 
 def test_kernels_against_their_python():
@@ -212,18 +203,20 @@ def test_kernels_against_their_python():
     where = np.searchsorted(across, lenses)
     results = []
     for kind in ("__call__", "py_func"):
-        cost, smooth = np.zeros((3, 4, 5), np.float32), np.zeros((3, 4, 5), np.float32)
-        halves, alike = np.zeros((3, 4, 5), np.float32), np.zeros((3, 4, 5), np.float32)
+        cost, smooth, halves, total = (np.zeros((4, 5, 3), np.float32) for _ in range(4))
         layer, fit, confidence = np.zeros((4, 5), np.int64), np.zeros((4, 5)), np.zeros((4, 5), np.float32)
         sides, own = np.column_stack([lenses < 0, lenses > 0]), int(np.flatnonzero((lenses == 0).all(axis=1))[0])
+        view = a.pixels[::6, ::6].astype(float)
         getattr(focus_cost, kind)(a.pixels, *cols, *rows, where, members, cost, 0, 4)
-        getattr(weigh, kind)(cost, FILTER, smooth, 0, 4)
         getattr(half_cost, kind)(a.pixels, *cols, *rows, where, sides, own, 90.0, halves, 0, 4)
-        getattr(weigh_alike, kind)(halves, FILTER, a.pixels[::6, ::6].astype(float), 60.0, alike, 0, 4)
-        getattr(choose, kind)(smooth, 1e-4, layer, fit, confidence, 0, 4)
-        results.append((cost, smooth, halves, alike, layer, fit, confidence))
+        getattr(weigh, kind)(halves, FILTER, view, 60.0, smooth, 0, 4)
+        for down, back in product((False, True), repeat=2):
+            lines = 5 if down else 4
+            getattr(pass_on, kind)(smooth, view, np.log(LAYERS[:3]), 60.0, 30.0, 60.0, down, back, total, 0, lines)
+        getattr(choose, kind)(total, 1e-4, layer, fit, confidence, 0, 4)
+        results.append((cost, smooth, halves, total, layer, fit, confidence))
     for compiled, plain in zip(*results, strict=True):
-        np.testing.assert_allclose(compiled, plain, rtol=1e-6)  # one multiply–add may be fused
+        np.testing.assert_allclose(compiled, plain, rtol=1e-5)  # plain Python adds what is kept in float32
 
 
 def test_any_number_of_threads_gives_the_same():
@@ -329,30 +322,92 @@ def test_other_types_give_the_same_depth(dtype):
 
 def test_robust_cost_in_the_open():
     a = picture((9, 9), (5, 5))
-    across = np.unique(STAR[:, 0])
-    cols, rows = pixel_tables(a.camera, LAYERS, across, across)
-    sides, own = np.column_stack([STAR < 0, STAR > 0]), int(np.flatnonzero((STAR == 0).all(axis=1))[0])
-    where = np.searchsorted(across, STAR)
-    cost = np.zeros((6, 9, 9), np.float32)
-    half_cost(a.pixels, *cols, *rows, where, sides, own, 30.0, cost, 0, 9)
+    shift = pixels_per_lens(a.camera, LAYERS) * 5
+    steps = whole_pixel_steps(shift, 5)
+    cols, rows = pixel_tables(a.camera, LAYERS, steps, steps, snap=True)
+    middle = steps.shape[1] // 2
+    where = star(middle, middle)
+    sides = np.column_stack([where < middle, where > middle])
+    cost = np.zeros((9, 9, 6), np.float32)
+    half_cost(a.pixels, *cols, *rows, where, sides, len(where) - 1, 30.0, cost, 0, 9)
     expected = np.full(cost.shape, np.nan)
-    for d, l, k in np.ndindex(cost.shape):
-
-        def pixel(i, j, d=d, l=l, k=k):
-            m, n = cols[0][d, where[i, 0], k], rows[0][d, where[i, 1], l]
-            x, y = cols[1][d, where[i, 0], k], rows[1][d, where[i, 1], l]
-            if min(m, n) < 0:
-                return None
-            p = np.pad(a.pixels.astype(float), ((0, 1), (0, 1), (0, 0)))
-            return (p[n, m] * (1 - x) + p[n, m + 1] * x) * (1 - y) + (p[n + 1, m] * (1 - x) + p[n + 1, m + 1] * x) * y
-
-        mine = pixel(own, 0)
-        found = {tuple(STAR[i]): pixel(i, 0) for i in range(len(STAR)) if i != own}
-        far = {step: min(np.abs(p - mine).sum(), 30) for step, p in found.items() if p is not None}
+    n0, m0 = virtual_camera_pixels(a.camera)
+    for d, l, k in np.ndindex(6, 9, 9):
+        mine = a.pixels[n0[l, 0], m0[0, k]].astype(float)  # the very pixel that is measured
+        far = {}
+        for i, j in (where[:-1] - middle).tolist():
+            right, down = (int(np.sign(x) * steps[d, middle + abs(x)]) for x in (i, j))
+            x, y = m0[0, k] - 5 * k + right * shift[d], n0[l, 0] - 5 * l + down * shift[d]
+            other = k + right, l + down
+            if not (0 <= other[0] < 9 and 0 <= other[1] < 9 and -0.5 <= x < 4.5 and -0.5 <= y < 4.5):
+                continue
+            x, y = min(max(x, 0), 4), min(max(y, 0), 4)
+            ei = np.pad(a.pixels[5 * other[1] : 5 * other[1] + 5, 5 * other[0] : 5 * other[0] + 5].astype(float),
+                        ((0, 1), (0, 1), (0, 0)))  # fmt: skip
+            m, n, x, y = int(x), int(y), x % 1, y % 1
+            p = (ei[n, m] * (1 - x) + ei[n, m + 1] * x) * (1 - y) + (
+                ei[n + 1, m] * (1 - x) + ei[n + 1, m + 1] * x
+            ) * y
+            far[i, j] = min(np.abs(p - mine).sum(), 30)
         halves = [[v for s, v in far.items() if sign * s[axis] > 0] for axis in (0, 1) for sign in (-1, 1)]
         means = [np.mean(half) for half in halves if len(half) >= 2]
-        expected[d, l, k] = min(means) if means else np.nan
+        expected[l, k, d] = min(means) if means else np.nan
+    assert np.isfinite(expected).sum() > 100
     np.testing.assert_allclose(cost, expected, rtol=1e-6)  # kept in float32
+
+
+def test_lenses_are_those_with_the_point_on_whole_pixels():
+    camera = preset("setup1", scale=2)
+    layers = linear_layers(camera)
+    shift = pixels_per_lens(camera, layers) * 16
+    steps = whole_pixel_steps(shift, 16)
+    assert steps.shape == (250, 15) and (steps[:, 7] == 0).all() and (steps == -steps[:, ::-1]).all()
+    real = np.where(steps == NOWHERE, 0, steps)[:, 8:]
+    off = real[4:] * shift[4:, None]
+    assert (np.abs(off - np.rint(off)).max(axis=1)[60:] <= shift[64:] / 2 + 1e-12).all()  # half a lens's step
+    np.testing.assert_array_equal(np.rint(off[60:]), np.tile(np.arange(1, 8), (186, 1)))
+    for row in steps:  # each lens once
+        once = row[(np.abs(row) < NOWHERE)]
+        assert len(set(once)) == len(once)
+    assert whole_pixel_steps(shift, 1).shape == (250, 1)  # one direction a lens: nothing to compare
+    assert whole_pixel_steps(shift, 2).shape == (250, 3)
+
+
+def naive_pass(cost, view, place, slope, leap, alike):
+    """Along rows, left to right: each layer's own cost and the least that the lens before it asks."""
+    rows, cols, layers = cost.shape
+    total = cost.astype(float).copy()
+    for l in range(rows):
+        for k in range(1, cols):
+            w = math.exp(-np.abs(view[l, k] - view[l, k - 1]).sum() / alike)
+            before = total[l, k - 1]
+            asked = [
+                min(before[e] - before.min() + slope * w * abs(place[d] - place[e]) for e in range(layers))
+                for d in range(layers)
+            ]
+            total[l, k] += np.minimum(asked, leap * w)
+    return total
+
+
+def test_passing_on_is_the_least_over_all_changes():
+    rng = np.random.default_rng(3)
+    cost = rng.random((3, 6, 9)).astype(np.float32) * 30
+    view = rng.random((3, 6, 3)) * 40
+    place = np.log(np.arange(2.0, 11))
+    options = place, 60.0, 20.0, 60.0
+    expected = naive_pass(cost, view, *options)
+    for down, back in product((False, True), repeat=2):
+        total = np.zeros(cost.shape, np.float32)
+        turned, seen = cost, view
+        if back:
+            turned, seen = turned[:, ::-1], seen[:, ::-1]
+        if down:
+            turned, seen = turned.transpose(1, 0, 2), seen.transpose(1, 0, 2)
+            total = np.zeros(turned.shape, np.float32)
+        pass_on(np.ascontiguousarray(turned), np.ascontiguousarray(seen), *options, down, back, total, 0, 3)
+        total = total.transpose(1, 0, 2) if down else total
+        total = total[:, ::-1] if back else total
+        np.testing.assert_allclose(total, expected, rtol=1e-6)  # kept in float32
 
 
 def test_the_robust_method_sees_past_edges_and_between_layers():

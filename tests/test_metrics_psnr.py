@@ -6,7 +6,7 @@ from skimage.metrics import peak_signal_noise_ratio
 
 from ii_core import IIPicture, preset
 from metrics import angle_axes, mean_q_angle, q_angle, q_global
-from metrics.psnr import sum_squared_errors
+from metrics.psnr import sum_masked_errors, sum_squared_errors
 
 PEAKS = {"uint8": 255, "uint16": 65535, "float32": 1.0}
 
@@ -121,3 +121,55 @@ def test_angles_are_those_of_the_rays():
     assert u_deg[0] > 0 > v_deg[0]  # the top left pixel looks right and down
     for upright, plain in zip(angle_axes(camera, erect=True), (u_deg, v_deg), strict=True):
         np.testing.assert_array_equal(upright, -plain)
+
+
+@pytest.mark.parametrize("dtype", PEAKS)
+def test_a_mask_counts_what_it_says(dtype):
+    a, b = picture(dtype), picture(dtype, seed=1)
+    mask = np.random.default_rng(2).random((21, 20)) < 0.6
+    squares = np.square(a.pixels.astype(float) - b.pixels)
+    top = PEAKS[dtype] ** 2
+    assert q_global(a, b, mask=mask) == pytest.approx(10 * np.log10(top / squares[mask].mean()), rel=1e-12)
+    field = (slice(2, None, 7), slice(3, None, 4))  # SI_{3,2}
+    assert q_angle(a, b, mask=mask)[2, 3] == pytest.approx(
+        10 * np.log10(top / squares[field][mask[field]].mean()), rel=1e-12
+    )
+    np.testing.assert_allclose(q_angle(a, b, mask=np.ones_like(mask)), q_angle(a, b), rtol=1e-14)
+
+
+def test_where_no_pixel_counts_there_is_no_quality():
+    a, b = picture(), picture(seed=1)
+    mask = np.ones((21, 20), bool)
+    mask[2::7, 3::4] = False
+    q = q_angle(a, b, mask=mask)
+    assert np.isnan(q[2, 3]) and np.isfinite(q).sum() == 27
+    assert mean_q_angle(a, b, mask=mask) == pytest.approx(q[np.isfinite(q)].mean(), rel=1e-14)
+    nothing = np.zeros((21, 20), bool)
+    assert math.isnan(q_global(a, b, mask=nothing)) and math.isnan(mean_q_angle(a, b, mask=nothing))
+
+
+def test_pixels_that_do_not_count_may_be_anything():
+    a = picture("float32")
+    pixels = a.pixels.copy()
+    pixels[4, 9] = np.nan
+    mask = np.ones((21, 20), bool)
+    mask[4, 9] = False
+    assert q_global(a, a.with_pixels(pixels), mask=mask) == math.inf
+    pixels[5, 2, 0] = np.inf
+    with pytest.raises(ValueError, match=r"decoded pixel \(2, 5\)"):
+        q_global(a, a.with_pixels(pixels), mask=mask)
+    for bad in (mask[1:], mask.astype(int), mask[..., None]):
+        with pytest.raises(ValueError, match=r"mask is .*: bool of shape \(21, 20\) is needed"):
+            q_global(a, a, mask=bad)
+
+
+def test_masked_kernel_against_its_python():
+    rng = np.random.default_rng(5)
+    a, b = (rng.integers(0, 255, (2, 3, 4, 5, 3)).astype(np.uint8) for _ in range(2))
+    mask = rng.random((2, 3, 4, 5)) < 0.5
+    outs = []
+    for kernel in (sum_masked_errors, sum_masked_errors.py_func):
+        outs.append((np.zeros((3, 5)), np.zeros((3, 5), np.int64)))
+        kernel(a, b, mask, *outs[-1])
+    np.testing.assert_array_equal(outs[0][0], outs[1][0])  # whole numbers: exact
+    np.testing.assert_array_equal(outs[0][1], outs[1][1])

@@ -102,3 +102,57 @@ def test_smallest_picture_has_one_window():
         x, y, data_range=255, gaussian_weights=True, use_sample_covariance=False, full=True
     )
     assert q_view(a, b).values["front"] == pytest.approx(full[5, 5], rel=1e-12)  # the same number, averaged alone
+
+
+def test_psnr_of_the_views_pooled_and_averaged():
+    a, b = picture(), noisy(picture())
+    q = q_view(a, b)
+    squares = {}
+    for name, viewpoint in five_viewpoints(a.camera).items():
+        x, y = (view_image(p, viewpoint)[0].astype(float) for p in (a, b))
+        squares[name] = np.square(x - y).mean()
+        assert q.psnr[name] == pytest.approx(10 * np.log10(255**2 / squares[name]), rel=1e-12)
+    assert q.pooled_psnr == pytest.approx(10 * np.log10(255**2 / np.mean(list(squares.values()))), rel=1e-12)
+    assert q.mean_psnr == pytest.approx(np.mean(list(q.psnr.values())), rel=1e-12) and q.mean_psnr >= q.pooled_psnr
+    assert q.worst == min(q.values.values()) == q.values[q.worst_view]
+    same = q_view(a, a)
+    assert same.psnr == dict.fromkeys(q.psnr, np.inf) and same.pooled_psnr == np.inf
+
+
+def test_pixels_past_the_picture_do_not_count():
+    a, b = picture(lenses=(32, 14)), noisy(picture(lenses=(32, 14)))
+    front = five_viewpoints(a.camera)["front"]
+    aside = front + np.array([2 * abs(front[2]), 0, 0])  # some lenses look past the picture
+    q = q_view(a, b, viewpoints={"aside": aside})
+    (x, valid), (y, _) = (view_image(p, aside) for p in (a, b))
+    assert 11 <= valid.all(axis=0).sum() < 32
+    columns = np.flatnonzero(valid.all(axis=0))
+    x, y = (image[:, columns[0] : columns[-1] + 1] for image in (x, y))
+    gray = [image @ [0.2989, 0.587, 0.114] for image in (x, y)]
+    alone = structural_similarity(*gray, data_range=255, gaussian_weights=True, use_sample_covariance=False)
+    assert q.values["aside"] == pytest.approx(alone, abs=1e-12)
+    assert q.psnr["aside"] == pytest.approx(10 * np.log10(255**2 / np.square(x.astype(float) - y).mean()), rel=1e-12)
+    past = q_view(a, b, viewpoints={"past": (50 * abs(front[2]), 0, front[2]), "front": front})
+    assert np.isnan(past.values["past"]) and np.isnan(past.psnr["past"])
+    assert past.mean == past.worst == past.values["front"] and past.worst_view == "front"
+
+
+def test_a_mask_takes_out_what_is_interpolated_from_it():
+    a = picture(lenses=(24, 14))
+    mask = np.ones(a.pixels.shape[:2], bool)
+    mask[:, :36] = False  # six lenses
+    b = noisy(a).pixels.copy()
+    other = a.with_pixels(np.where(mask[..., None], b, 255 - a.pixels))
+    q = q_view(a, other, mask=mask)
+    assert q.values == q_view(a, a.with_pixels(b), mask=mask).values
+    assert np.isnan(q_view(a, other, mask=np.zeros_like(mask)).mean)
+    assert q_view(a, other, mask=np.ones_like(mask)).values == q_view(a, other).values
+
+
+@pytest.mark.parametrize("z", [1.2, 5.0])
+def test_viewpoints_that_are_none(z):
+    a = picture()
+    with pytest.raises(ValueError, match=r"viewpoint z .* is not before the lens plane at 1.2 mm"):
+        q_view(a, a, viewpoints={"inside": (0, 0, z)})
+    with pytest.raises(ValueError, match="no viewpoints"):
+        q_view(a, a, viewpoints={})

@@ -1,0 +1,196 @@
+"""The kernels of depth from focus: all in one file, as numba's cache asks for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ii_core.jit import inline_kernel, kernel
+
+# Neighbours that a half needs: one alone agrees too easily. More would keep out wrong near layers, which few lenses
+# see, but also the lenses at the picture's edge.
+FEWEST = 2
+
+
+@inline_kernel
+def _between(pixels, m, n, x, y):
+    """The colour x of the way from pixel (m, n) to its right neighbour and y of the way to the one below."""
+    # A weight of 0 must not reach for a pixel that may be off the picture.
+    right, below = m + (x > 0), n + (y > 0)
+    a, b, c, e = (1 - y) * (1 - x), (1 - y) * x, y * (1 - x), y * x
+    return (
+        a * pixels[n, m, 0] + b * pixels[n, right, 0] + c * pixels[below, m, 0] + e * pixels[below, right, 0],
+        a * pixels[n, m, 1] + b * pixels[n, right, 1] + c * pixels[below, m, 1] + e * pixels[below, right, 1],
+        a * pixels[n, m, 2] + b * pixels[n, right, 2] + c * pixels[below, m, 2] + e * pixels[below, right, 2],
+    )
+
+
+@kernel
+def focus_cost(pixels, cols, col_weights, rows, row_weights, where, members, out, first, last):
+    """out[l, k, d] = Σ_rgb |B_d − R_d|, NaN where nothing can be compared; rows ``first`` to ``last`` of lenses.
+
+    Tables as of `pixel_tables`; ``where`` (n, 2) has the neighbours as rows of the tables, ``members`` (n, 2) says
+    which of B and R each is in.
+    """
+    for l in range(first, last):
+        for d in range(out.shape[2]):
+            for k in range(out.shape[1]):
+                out[l, k, d] = np.nan
+                b0, b1, b2, r0, r1, r2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+                in_b, in_r, in_both = 0, 0, 0
+                for i in range(where.shape[0]):
+                    m, n = cols[d, where[i, 0], k], rows[d, where[i, 1], l]
+                    if m < 0 or n < 0:
+                        continue
+                    x, y = col_weights[d, where[i, 0], k], row_weights[d, where[i, 1], l]
+                    p0, p1, p2 = _between(pixels, m, n, x, y)
+                    if members[i, 0]:
+                        b0, b1, b2 = b0 + p0, b1 + p1, b2 + p2
+                        in_b += 1
+                    if members[i, 1]:
+                        r0, r1, r2 = r0 + p0, r1 + p1, r2 + p2
+                        in_r += 1
+                        in_both += members[i, 0]
+                if in_b == 0 or in_r == 0 or (in_b == in_both and in_r == in_both):
+                    continue
+                out[l, k, d] = abs(b0 / in_b - r0 / in_r) + abs(b1 / in_b - r1 / in_r) + abs(b2 / in_b - r2 / in_r)
+
+
+@kernel
+def half_cost(pixels, cols, col_weights, rows, row_weights, where, sides, own, limit, out, first, last):
+    """out[l, k, d] = min over halves of the mean over their neighbours of min(Σ_rgb |p − p_own|, limit), or NaN.
+
+    As `focus_cost`; ``sides`` (n, 4) says which half each neighbour is in, ``own`` is the neighbour at step 0.
+    """
+    total, count = np.empty(4), np.empty(4)
+    for l in range(first, last):
+        for d in range(out.shape[2]):
+            for k in range(out.shape[1]):
+                out[l, k, d] = np.nan
+                total[:], count[:] = 0.0, 0.0
+                q0, q1, q2 = 0.0, 0.0, 0.0
+                for step in range(-1, where.shape[0]):
+                    i = own if step < 0 else step
+                    m, n = cols[d, where[i, 0], k], rows[d, where[i, 1], l]
+                    if (m < 0 or n < 0) and step < 0:
+                        break
+                    if m < 0 or n < 0 or step == own:
+                        continue
+                    x, y = col_weights[d, where[i, 0], k], row_weights[d, where[i, 1], l]
+                    p0, p1, p2 = _between(pixels, m, n, x, y)
+                    if step < 0:
+                        q0, q1, q2 = p0, p1, p2
+                        continue
+                    difference = min(abs(p0 - q0) + abs(p1 - q1) + abs(p2 - q2), limit)
+                    for s in range(4):
+                        if sides[i, s]:
+                            total[s] += difference
+                            count[s] += 1
+                best = np.inf
+                for s in range(4):
+                    if count[s] >= FEWEST:
+                        best = min(best, total[s] / count[s])
+                if best < np.inf:
+                    out[l, k, d] = best
+
+
+@kernel
+def weigh(cost, h, view, alike, out, first, last):
+    """out = cost ∗ h for rows ``first`` to ``last``, over those neighbours that have a cost.
+
+    A neighbour counts exp(−Σ_rgb |Δview|/alike) times what h says: what looks alike is taken to lie at one depth.
+    """
+    rows, cols, layers = cost.shape
+    up, left = h.shape[0] // 2, h.shape[1] // 2
+    total, weight = np.empty(layers), np.empty(layers)
+    for l in range(first, last):
+        for k in range(cols):
+            total[:], weight[:] = 0.0, 0.0
+            for j in range(max(0, l - up), min(rows, l + up + 1)):
+                for i in range(max(0, k - left), min(cols, k + left + 1)):
+                    difference = 0.0
+                    for c in range(3):
+                        difference += abs(view[j, i, c] - view[l, k, c])
+                    # A convolution mirrors its kernel.
+                    w = h[up - (j - l), left - (i - k)] * math.exp(-difference / alike)
+                    for d in range(layers):
+                        if not np.isnan(cost[j, i, d]):
+                            total[d] += w * cost[j, i, d]
+                            weight[d] += w
+            for d in range(layers):
+                out[l, k, d] = np.nan
+                if weight[d] > 0 and not np.isnan(cost[l, k, d]):
+                    out[l, k, d] = total[d] / weight[d]
+
+
+@kernel
+def pass_on(cost, view, place, slope, leap, alike, down, back, total, first, last):
+    """Add to ``total`` what each lens's layers cost when those of the lenses before it on its row have a say.
+
+    From one lens to the next a layer may change at ``slope`` × the difference of its ``place``, or by any for
+    ``leap``; both weigh less where the view's colour changes, as in `weigh`. With ``down`` along columns, with
+    ``back`` from the far end. Rows (columns) ``first`` to ``last``.
+
+    Where a layer has no cost it counts like the mean of the others: it neither attracts nor repels.
+    """
+    layers = cost.shape[2]
+    count = cost.shape[0] if down else cost.shape[1]
+    before, now = np.zeros(layers), np.zeros(layers)
+    for line in range(first, last):
+        for step in range(count):
+            at = count - 1 - step if back else step
+            l, k = (at, line) if down else (line, at)
+            mean, found = 0.0, 0
+            for d in range(layers):
+                if not np.isnan(cost[l, k, d]):
+                    mean += cost[l, k, d]
+                    found += 1
+            mean /= max(found, 1)
+            now[:] = 0.0
+            if step > 0:
+                was = at + 1 if back else at - 1
+                pl, pk = (was, line) if down else (line, was)
+                difference = 0.0
+                for c in range(3):
+                    difference += abs(view[l, k, c] - view[pl, pk, c])
+                w = math.exp(-difference / alike)
+                low = before.min()
+                for d in range(layers):
+                    now[d] = min(before[d] - low, leap * w)
+                # The lower envelope of a slope from every layer, in two passes.
+                for d in range(1, layers):
+                    now[d] = min(now[d], now[d - 1] + slope * w * (place[d] - place[d - 1]))
+                for d in range(layers - 2, -1, -1):
+                    now[d] = min(now[d], now[d + 1] + slope * w * (place[d + 1] - place[d]))
+            for d in range(layers):
+                before[d] = now[d] + (mean if np.isnan(cost[l, k, d]) else cost[l, k, d])
+                total[l, k, d] += before[d]
+
+
+@kernel
+def choose(cost, tie, layer, fit, confidence, first, last):
+    """The nearest of the cheapest layers, −1 if all cost the same but for ``tie``, for rows ``first`` to ``last``.
+
+    ``fit`` is how many layers farther, −½ to ½, the parabola through it and its neighbours has its bottom.
+    """
+    for l in range(first, last):
+        for k in range(cost.shape[1]):
+            best, low, high, total, count = -1, np.inf, -np.inf, 0.0, 0
+            for d in range(cost.shape[2]):
+                c = np.float64(cost[l, k, d])
+                if np.isnan(c):
+                    continue
+                total += c
+                count += 1
+                high = max(high, c)
+                if c < low:
+                    best, low = d, c
+            layer[l, k], fit[l, k], confidence[l, k] = -1, 0.0, 0.0
+            if high - low > tie:
+                layer[l, k], confidence[l, k] = best, 1 - low * count / total
+                if 0 < best < cost.shape[2] - 1:
+                    before, after = np.float64(cost[l, k, best - 1]), np.float64(cost[l, k, best + 1])
+                    bend = before - 2 * low + after
+                    if bend > 0:  # not NaN, and not three alike
+                        fit[l, k] = (before - after) / (2 * bend)
