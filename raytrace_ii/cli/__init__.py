@@ -6,6 +6,8 @@ The only package that reaches every other; it does so inside its functions, so t
 from __future__ import annotations
 
 import sys
+import warnings
+from typing import Any
 
 import typer
 
@@ -16,7 +18,8 @@ __all__ = ["app", "coding", "evaluate", "main", "pictures", "show", "synthesize"
 
 
 def main() -> None:
-    """Run the command; a bad input is one line on the error stream and exit code 2."""
+    """Run the command; a bad input is one line on the error stream and exit code 2, a warning one line."""
+    warnings.showwarning = _warn
     try:
         code = app(standalone_mode=False)
         sys.exit(code if isinstance(code, int) else 0)
@@ -32,6 +35,10 @@ def main() -> None:
         if not hasattr(error, "format_message"):
             raise
         _fail(error.format_message())
+
+
+def _warn(message: Any, *_: Any) -> None:
+    print(f"warning: {' '.join(str(message).split())}", file=sys.stderr)
 
 
 def _fail(message: str) -> None:
