@@ -86,7 +86,9 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
     if path.suffix != ".toml" and not alone:
         known = scene_names()
         if str(name) not in known:
-            raise ValueError(f"unknown scene {str(name)!r}: known are {', '.join(known)}, or give a .toml or mesh file")
+            raise ValueError(
+                f"unknown scene {str(name)!r}: known are {', '.join(known)}, or give a .toml or mesh file"
+            )
         path = Path(str(files("assets") / "scenes" / f"{name}.toml"))
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist")

@@ -365,7 +365,10 @@ WRONG = {
         ball("colour", "ior = 0\ncolour"),
         "material.m.ior: 0: one number or three are needed, greater than 0",
     ),
-    "background without horizon": ('[background]\nzenith = "#000000"\n' + BALL, "background: neither horizon nor image: one of them is needed"),
+    "background without horizon": (
+        '[background]\nzenith = "#000000"\n' + BALL,
+        "background: neither horizon nor image: one of them is needed",
+    ),
     "no spread": (
         '[background]\nhorizon = "#000000"\nspread_deg = 0\n' + BALL,
         "background.spread_deg: 0: a number greater than 0 is needed",
@@ -440,7 +443,9 @@ def test_broken_files_are_named_with_who_asks_for_them(tmp_path):
 
 
 def test_unknown_and_missing_scenes(tmp_path):
-    with pytest.raises(ValueError, match=r"unknown scene 'appels': known are apples.*, or give a \.toml or mesh file"):
+    with pytest.raises(
+        ValueError, match=r"unknown scene 'appels': known are apples.*, or give a \.toml or mesh file"
+    ):
         load_scene("appels")
     with pytest.raises(FileNotFoundError, match=r"none\.toml does not exist"):
         load_scene(tmp_path / "none.toml")
