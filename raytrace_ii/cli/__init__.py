@@ -37,7 +37,9 @@ def main() -> None:
         _fail(error.format_message())
 
 
-def _warn(message: Any, *_: Any) -> None:
+def _warn(
+    message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None
+) -> None:
     print(f"warning: {' '.join(str(message).split())}", file=sys.stderr)
 
 
