@@ -13,7 +13,6 @@ import json
 import math
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -23,9 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ii_core import IICamera, IIPicture, five_viewpoints, view_image
+from ii_core import IIPicture, five_viewpoints, view_image
+from ii_core.display import ASSUMED_ANGLE_DEG, with_assumed_camera
 from ii_core.files import atomic_path
 from ii_core.picture import codes8
+from ii_core.view import camera_of
 
 from .psnr import q_angle, q_global
 from .view import WINDOW, q_view
@@ -35,7 +36,6 @@ PREVIEW_SIDE = 512
 MOST_LAYERS = 256  # and the most layers
 MAX_EMBEDDED = 256 << 20  # bytes of a page; browsers read no more in reasonable time
 JPEG_QUALITY = 95
-ASSUMED_ANGLE_DEG = 20.0  # of a picture whose camera nobody knows
 FARTHEST = 250  # gaps to the last layer in focus, as in `q_depth`
 
 
@@ -168,7 +168,7 @@ class _Page:
         """What the script must know."""
         picture = self.pictures[0]
         (u, _), assumed = picture.ei_pixels, picture.camera is None
-        camera = picture.camera or _assumed(picture)
+        camera = camera_of(with_assumed_camera(picture))
         front, left, up = (five_viewpoints(camera)[name] for name in ("front", "left", "up"))
         plane = camera.origin_mm[2] + camera.gap_mm
         far = 4.0 if assumed else (FARTHEST - 1) * camera.pixel_pitch_mm / camera.lens_pitch_mm[0]
@@ -249,9 +249,8 @@ class _Page:
 
     def _preview(self) -> bytes:
         """What the viewer sees from the front, where the page starts."""
-        picture = self.pictures[0]
-        camera = picture.camera or _assumed(picture)
-        view, _ = view_image(replace(picture, camera=camera), five_viewpoints(camera)["front"])
+        picture = with_assumed_camera(self.pictures[0])
+        view, _ = view_image(picture, five_viewpoints(camera_of(picture))["front"])
         step = max(1, -(-max(picture.lenses) // PREVIEW_SIDE))
         out = io.BytesIO()
         small = np.ascontiguousarray(view[::step, ::step])
@@ -269,9 +268,3 @@ def depth_view(picture: IIPicture, depth: NDArray[Any]) -> NDArray[np.float32]:
     """The part of a depth map on the lenslet grid that the sub-image in the middle has, (L, K)."""
     u, v = picture.ei_pixels
     return np.asarray(depth[v // 2 :: v, u // 2 :: u], np.float32)
-
-
-def _assumed(picture: IIPicture) -> IICamera:
-    """A camera for a picture that has none: square pixels of 1 mm, so many across as it has, seen at 20°."""
-    gap = picture.ei_pixels[0] / 2 / math.tan(math.radians(ASSUMED_ANGLE_DEG / 2))
-    return IICamera(pixels=picture.size, lenses=picture.lenses, pixel_pitch_mm=1.0, gap_mm=gap, name="assumed")

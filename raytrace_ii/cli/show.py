@@ -1,13 +1,14 @@
-"""Commands that show II-pictures: view."""
+"""Commands that show II-pictures: view in a browser, display for 3-D displays and films."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from .common import Force, app, check_output, load_any, progress_bar
+from .common import Force, app, check_output, check_picture, load_any, progress_bar, spinner
 
 
 @app.command()
@@ -65,3 +66,102 @@ def _serve(folder: str, port: int) -> None:
     with ThreadingHTTPServer(("127.0.0.1", port), partial(Quiet, directory=folder)) as server:
         print(f"http://127.0.0.1:{server.server_port}/ shows it, until Ctrl-C", flush=True)
         server.serve_forever()
+
+
+@app.command()
+def display(
+    picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar.")],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            help="A picture, for parallax .mp4, .gif or .webp.",
+        ),
+    ],
+    kind: Annotated[str, typer.Option("--as", help="quilt, lenticular, simulation or parallax.")] = "parallax",
+    size: Annotated[str, typer.Option(help="Pixels of a tile, the panel, the eye's picture or a frame.")] = "800x400",
+    depth: Annotated[float | None, typer.Option(help="z in mm of what appears in the display's plane.")] = None,
+    cone: Annotated[float, typer.Option(help="Share of the viewing zone that the views span.")] = 0.9,
+    tiles: Annotated[str, typer.Option(help="Quilt: columns x rows.")] = "8x6",
+    pitch: Annotated[float, typer.Option(help="Lenticular: pixels from lens to lens.")] = 5.0,
+    slope: Annotated[float, typer.Option(help="Lenticular: pixels by which lenses lean left a row.")] = 0.0,
+    centre: Annotated[
+        float, typer.Option(help="Lenticular: column of a border between lenses, in the top row.")
+    ] = 0.0,
+    at: Annotated[str | None, typer.Option(help="Simulation: where the eye is, mm: x,y,z.")] = None,
+    fill: Annotated[float, typer.Option(help="Simulation: diameter of a lens as a share of the pitch.")] = 1.0,
+    frames: Annotated[int, typer.Option(help="Parallax: views around the viewing zone.")] = 60,
+    fps: Annotated[int, typer.Option(help="Parallax: frames a second.")] = 25,
+    force: Force = False,
+) -> None:
+    """Make pictures for other displays, and films that show the parallax.
+
+    quilt: tiles for Looking Glass displays; lenticular: views interlaced for slanted cylindrical lenses; simulation:
+    how the integral-imaging display itself looks from one place; parallax: a film around the viewing zone.
+    """
+    from ii_core import IIPicture, display
+    from ii_core.files import write_image
+
+    kinds = ("quilt", "lenticular", "simulation", "parallax")
+    if kind not in kinds:
+        raise ValueError(f"unknown kind {kind!r}: known are {', '.join(kinds)}")
+    pixels, grid = _pair("size", size), _pair("tiles", tiles)
+    if kind == "quilt":
+        output = output.with_name(f"{output.stem}_qs{grid[0]}x{grid[1]}a{pixels[0] / pixels[1]:.4g}{output.suffix}")
+    if kind == "parallax":
+        check_output(output, force)
+        _film(picture, output, pixels, depth, cone, frames, fps)
+        return
+    check_picture(output, "uint8", force)
+    original = display.with_assumed_camera(IIPicture.load(picture))
+    options: dict[str, Any] = {"size": pixels, "depth_mm": depth, "cone": cone}
+    with spinner(f"{kind} of {picture.name}"):
+        if kind == "quilt":
+            made = display.quilt(original, grid, **options)
+        elif kind == "lenticular":
+            made = display.lenticular(original, pitch_px=pitch, slope=slope, centre_px=centre, **options)
+        else:
+            made = display.display_simulation(original, _eye(original, at), size=pixels, fill=fill)
+        write_image(output, made)
+    print(f"{output}: {made.shape[1]}×{made.shape[0]} px")
+
+
+def _film(
+    picture: Path, output: Path, size: tuple[int, int], depth: float | None, cone: float, count: int, fps: int
+) -> None:
+    from codec.animation import write_animation
+    from ii_core import IIPicture, display
+
+    original = display.with_assumed_camera(IIPicture.load(picture))
+    places = display.viewpoints_around(original, count, cone=cone)
+    with progress_bar(f"film {picture.name}") as report:
+
+        def frames() -> Iterator[Any]:
+            for done, place in enumerate(places, 1):
+                yield display.focused_view(original, place, size=size, depth_mm=depth)
+                report(done, count, "")
+
+        write_animation(output, frames(), fps=fps)
+    print(f"{output}: {count} frames of {size[0]}×{size[1]} px")
+
+
+def _pair(name: str, text: str) -> tuple[int, int]:
+    try:
+        first, second = (int(n) for n in text.split("x"))
+    except ValueError:
+        raise ValueError(f"{name} is {text!r}: two whole numbers like 8x6 are needed") from None
+    return first, second
+
+
+def _eye(picture: Any, at: str | None) -> Any:
+    """Where the eye is told to be, or in front."""
+    from ii_core import five_viewpoints
+
+    if at is None:
+        return five_viewpoints(picture.camera)["front"]
+    try:
+        x, y, z = (float(n) for n in at.split(","))
+    except ValueError:
+        raise ValueError(f"at is {at!r}: three numbers x,y,z are needed") from None
+    return x, y, z
