@@ -3,15 +3,20 @@
 from .angle import AngleQuality, q_angle_ssim, q_angle_ycbcr
 from .chart import rd_chart
 from .depth import DepthQuality, q_depth
+from .depth_chart import depth_over_rate, depth_rate_chart
+from .error_plots import error_map, plot_error_layers, plot_error_views
 from .focus import FocusDepth, depth_from_focus
 from .layers import linear_layers, logarithmic_layers
+from .measures import MEASURES, measuring
 from .plots import PLOTS, plot_all, plot_angle, plot_depth, plot_pair, plot_views
 from .psnr import angle_axes, mean_q_angle, q_angle, q_global
 from .rd import bd_psnr, bd_rate, rate_distortion
-from .study import provenance, read_study, summary_table, write_csv, write_study
+from .study import provenance, read_study, write_study
+from .tables import summary_table, write_csv, write_latex
 from .view import ViewQuality, q_view
 
 __all__ = [
+    "MEASURES",
     "PLOTS",
     "AngleQuality",
     "DepthQuality",
@@ -21,12 +26,18 @@ __all__ = [
     "bd_psnr",
     "bd_rate",
     "depth_from_focus",
+    "depth_over_rate",
+    "depth_rate_chart",
+    "error_map",
     "linear_layers",
     "logarithmic_layers",
     "mean_q_angle",
+    "measuring",
     "plot_all",
     "plot_angle",
     "plot_depth",
+    "plot_error_layers",
+    "plot_error_views",
     "plot_pair",
     "plot_views",
     "provenance",
@@ -41,5 +52,6 @@ __all__ = [
     "read_study",
     "summary_table",
     "write_csv",
+    "write_latex",
     "write_study",
 ]

@@ -8,7 +8,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ii_core.files import atomic_path
+
+from .measures import measure_of
+from .tables import check_measured
 
 # Okabe and Ito's colours, told apart by colour-blind readers too; their yellow is too pale on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -17,8 +23,8 @@ LINES = ("-", "--", "-.")
 SUFFIXES = (".png", ".pdf", ".svg")
 
 
-def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
-    """Draw Q_global over rate, a line a scheme.
+def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str], *, measure: str = "q_global") -> None:
+    """Draw a quality over rate, a line a scheme.
 
     Filled markers are targets met, joined. A hollow marker is what a scheme gave for a target it cannot meet, and a
     dotted line marks the rate that it cannot go below (or above). Lossless points sit on the upper edge.
@@ -29,37 +35,62 @@ def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
         From `read_study`.
     path : path
         The suffix says what is written: .png, .pdf or .svg. Replaced, whole.
+    measure : str
+        Which quality, of those that the study has.
 
     Raises
     ------
     ValueError
-        If the suffix is another, or the study has no points.
+        If the suffix is another, or the study has no points or not the measure.
     OSError
         If the file cannot be written.
     """
+    check_suffix(path)
+    save(draw(study, measure), path, dpi=150)
+
+
+def check_suffix(path: str | os.PathLike[str]) -> str:
+    """The kind of chart a path names; ValueError if it is none."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise ValueError(f"{path} is no known chart type: known are {', '.join(SUFFIXES)}")
-    if not study["points"]:
-        raise ValueError("the study has no points: nothing to draw")
-    figure = draw(study)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=150, format=suffix[1:])
+    return suffix[1:]
 
 
-def draw(study: Mapping[str, Any]) -> Any:
-    """The matplotlib Figure of a study with points; see `rd_chart`."""
-    points = study["points"]
+def save(figure: Any, path: str | os.PathLike[str], *, dpi: int = 130) -> None:
+    """Write a figure as its path's suffix says; text in PDF and SVG stays text that can be edited and searched."""
+    import matplotlib
+
+    kind = check_suffix(path)
+    undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {}}[kind]  # the same chart, the same file
+    text: Any = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "raytrace-ii"}
+    with matplotlib.rc_context(text), atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=dpi, format=kind, metadata=undated)
+
+
+def new_figure(width: float, height: float, layout: Any = "constrained") -> Any:
+    """An empty matplotlib Figure, inches, that no window knows of."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8, 5.2), layout="constrained")
+    figure = Figure(figsize=(width, height), layout=layout)
     FigureCanvasAgg(figure)
+    return figure
+
+
+def draw(study: Mapping[str, Any], measure: str = "q_global") -> Any:
+    """The matplotlib Figure of a study; see `rd_chart`."""
+    points = study["points"]
+    if not points:
+        raise ValueError("the study has no points: nothing to draw")
+    check_measured(points, measure)
+    figure = new_figure(8, 5.2)
     axes: Any = figure.add_subplot()
-    _set_axes(axes, points)
+    set_rate_axis(axes, points)
+    axes.set_ylabel(measure_of(measure).axis)
     schemes = list(dict.fromkeys(point["scheme"] for point in points))
     for i, scheme in enumerate(schemes):
-        _draw(axes, [point for point in points if point["scheme"] == scheme], i)
+        _draw(axes, [point for point in points if point["scheme"] == scheme], i, measure)
     if not all(point["reached"] for point in points):
         style = {"color": "0.4", "marker": "o", "linestyle": ":"}
         axes.plot([], [], markerfacecolor="white", label="target out of reach: what came instead", **style)
@@ -69,7 +100,8 @@ def draw(study: Mapping[str, Any]) -> Any:
     return figure
 
 
-def _set_axes(axes: Any, points: Sequence[Mapping[str, Any]]) -> None:
+def set_rate_axis(axes: Any, points: Sequence[Mapping[str, Any]]) -> None:
+    """A logarithmic axis of rates that holds those of all points, and a quiet grid."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     rates = [point["bpp"] for point in points]
@@ -79,20 +111,19 @@ def _set_axes(axes: Any, points: Sequence[Mapping[str, Any]]) -> None:
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlabel("rate [bit/pixel]")
-    axes.set_ylabel(r"$Q_\mathrm{global}$ [dB]")
     axes.grid(True, color="0.9", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _draw(axes: Any, points: Sequence[Mapping[str, Any]], i: int) -> None:
+def _draw(axes: Any, points: Sequence[Mapping[str, Any]], i: int, measure: str) -> None:
     """One scheme, the i-th."""
     colour, marker = COLOURS[i % len(COLOURS)], MARKERS[i % len(MARKERS)]
     line = LINES[i // len(COLOURS) % len(LINES)]
-    finite = [point for point in points if math.isfinite(point["q_global"])]
-    met = sorted({(p["bpp"], p["q_global"]) for p in finite if p["reached"]})
-    missed = sorted({(p["bpp"], p["q_global"]) for p in finite if not p["reached"]} - set(met))
-    lossless = sorted({p["bpp"] for p in points} - {p["bpp"] for p in finite})
+    finite = [point for point in points if math.isfinite(point[measure])]
+    met = sorted({(p["bpp"], p[measure]) for p in finite if p["reached"]})
+    missed = sorted({(p["bpp"], p[measure]) for p in finite if not p["reached"]} - set(met))
+    lossless = sorted({p["bpp"] for p in points if p[measure] == math.inf})
 
     label = points[0]["scheme"]
     floor = min((p["bpp"] for p in points if not p["reached"] and p["bpp"] > p["target_bpp"]), default=None)
@@ -121,3 +152,11 @@ def _draw(axes: Any, points: Sequence[Mapping[str, Any]], i: int) -> None:
 
 def _columns(pairs: Sequence[tuple[float, float]]) -> tuple[list[float], list[float]]:
     return [x for x, _ in pairs], [y for _, y in pairs]
+
+
+def edges(centres: NDArray[np.float64], alone: float) -> NDArray[np.float64]:
+    """Borders half way between centres; ``alone`` is half the width of a single one."""
+    if centres.size == 1:
+        return centres[0] + np.array([-alone, alone])
+    inner = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate([[2 * centres[0] - inner[0]], inner, [2 * centres[-1] - inner[-1]]])

@@ -191,6 +191,12 @@ def virtual_camera_pixels(camera: IICamera, *, erect: bool = False) -> tuple[NDA
     return n, m
 
 
+def view_of(picture: IIPicture) -> NDArray[Any]:
+    """What the virtual camera sees: one pixel of the picture through each lens, (L', K, 3)."""
+    n, m = virtual_camera_pixels(camera_of(picture), erect=picture.erect)
+    return picture.pixels[n, m]
+
+
 def _seen(camera: IICamera, erect: bool) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """As `virtual_camera_pixels`, and the rows of lenses that are left."""
     x, y = view_positions(camera, virtual_viewpoint(camera), erect=erect)

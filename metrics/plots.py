@@ -11,19 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture, five_viewpoints, view_image
-from ii_core.files import atomic_path
 from ii_core.view import camera_of
 
-from .chart import COLOURS, SUFFIXES
+from .chart import COLOURS, edges, new_figure, save
 from .depth import DepthQuality
+from .error_plots import plot_error_layers, plot_error_views
 from .psnr import angle_axes, peak, q_angle
 
-PLOTS = ("q_angle.png", "views.png", "pair_reference.png", "pair_decoded.png", "q_depth.png")
+PLOTS = (
+    "q_angle.png",
+    "views.png",
+    "errors_views.png",
+    "pair_reference.png",
+    "pair_decoded.png",
+    "q_depth.png",
+    "errors_depth.png",
+)
 AMPLIFY = (32, 16, 8, 4, 2, 1)  # of differences: the first that keeps nine values in ten from clipping
 
 
 def plot_angle(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike[str]) -> None:
-    """Draw Q_angle as a heat map over the directions in which rays go, and its value at the centre row and column.
+    """Draw Q_angle as a heat map over the directions in which rays go.
 
     Identical sub-images, of infinite quality, are hatched.
 
@@ -43,11 +51,11 @@ def plot_angle(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike
     ----------
     Olsson 2008, (2.18), Figure 4.6.
     """
-    _save(_angle_figure(reference, q_angle(reference, decoded)), path)
+    save(_angle_figure(reference, q_angle(reference, decoded)), path)
 
 
 def _angle_figure(reference: IIPicture, values: NDArray[np.float64]) -> Any:
-    figure = _figure(6.2, 5.2, "compressed")  # for axes of fixed shape
+    figure = new_figure(6.2, 5.2, "compressed")  # for axes of fixed shape
     axes: Any = figure.add_subplot()
     v, u = values.shape
     across, down = np.arange(u, dtype=float), np.arange(v, dtype=float)
@@ -63,7 +71,9 @@ def _angle_figure(reference: IIPicture, values: NDArray[np.float64]) -> Any:
         low, high = (low + high) / 2 - 0.05, (low + high) / 2 + 0.05
     axes.set_facecolor("0.85")
     shown = np.where(np.isfinite(values), values, np.nan)
-    map_ = axes.pcolormesh(_edges(across), _edges(down), shown, cmap="cividis", vmin=low, vmax=high, rasterized=True)
+    map_ = axes.pcolormesh(
+        edges(across, 0.5), edges(down, 0.5), shown, cmap="cividis", vmin=low, vmax=high, rasterized=True
+    )
     if finite.size < values.size:
         axes.patch.set_hatch("///")
         axes.patch.set_edgecolor("0.6")
@@ -78,14 +88,6 @@ def _angle_figure(reference: IIPicture, values: NDArray[np.float64]) -> Any:
     axes.set_ylabel("vertical viewing angle [°]" if degrees else "row v of the elementary image [px]")
     axes.set_aspect("equal")
     return figure
-
-
-def _edges(centres: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cell borders half way between centres."""
-    if centres.size == 1:
-        return centres[0] + np.array([-0.5, 0.5])
-    inner = (centres[1:] + centres[:-1]) / 2
-    return np.concatenate([[2 * centres[0] - inner[0]], inner, [2 * centres[-1] - inner[-1]]])
 
 
 def plot_depth(quality: DepthQuality, path: str | os.PathLike[str]) -> None:
@@ -109,11 +111,11 @@ def plot_depth(quality: DepthQuality, path: str | os.PathLike[str]) -> None:
     ----------
     Olsson 2008, (4.9), Figure 5.21.
     """
-    _save(_depth_figure(quality), path)
+    save(_depth_figure(quality), path)
 
 
 def _depth_figure(quality: DepthQuality) -> Any:
-    figure = _figure(7.5, 5)
+    figure = new_figure(7.5, 5)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
     z, values = quality.depth_mm, quality.values
     finite = np.isfinite(values)
@@ -179,7 +181,7 @@ def plot_views(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike
     ----------
     Olsson 2008, Figure 5.18.
     """
-    _save(_views_figure(reference, decoded), path)
+    save(_views_figure(reference, decoded), path)
 
 
 def _views_figure(reference: IIPicture, decoded: IIPicture) -> Any:
@@ -192,7 +194,7 @@ def _views_figure(reference: IIPicture, decoded: IIPicture) -> Any:
     most = np.quantile(np.abs(apart), 0.9)
     amplify = next((factor for factor in AMPLIFY if factor * most <= 0.5), 1)
     width = 3.0
-    figure = _figure(width * 5 + 0.3, 3 * width * min(max(l / k, 0.2), 3) + 0.6)
+    figure = new_figure(width * 5 + 0.3, 3 * width * min(max(l / k, 0.2), 3) + 0.6)
     figure.get_layout_engine().set(h_pad=0.02, w_pad=0.02)
     panels = figure.subplots(3, len(views), squeeze=False)
     for column, name, (a, b), difference in zip(panels.T, views, pairs, apart, strict=True):
@@ -225,13 +227,13 @@ def plot_pair(picture: IIPicture, path: str | os.PathLike[str]) -> None:
     ValueError
         If the picture has no camera or is not regular, or if the suffix is another.
     """
-    _save(_pair_figure(picture), path)
+    save(_pair_figure(picture), path)
 
 
 def _pair_figure(picture: IIPicture) -> Any:
     views = five_viewpoints(camera_of(picture))
     k, l = picture.lenses
-    figure = _figure(10, 5 * min(max(l / k, 0.2), 3) + 0.5)
+    figure = new_figure(10, 5 * min(max(l / k, 0.2), 3) + 0.5)
     for axes, eye in zip(figure.subplots(1, 2), ("right", "left"), strict=True):
         image, _ = view_image(picture, (views[eye] + views["front"]) / 2)
         axes.imshow(_shown(image), interpolation="nearest")
@@ -248,8 +250,9 @@ def plot_all(
     Returns
     -------
     list of path
-        ``q_angle.png`` of a regular structure; with a camera also ``views.png``, ``pair_reference.png`` and
-        ``pair_decoded.png``; ``q_depth.png`` if its quality is given.
+        ``q_angle.png`` of a regular structure; with a camera also ``views.png``, ``errors_views.png``,
+        ``pair_reference.png`` and ``pair_decoded.png``; ``q_depth.png`` and ``errors_depth.png`` if their quality
+        is given.
 
     Raises
     ------
@@ -263,9 +266,11 @@ def plot_all(
     works: list[tuple[bool, Callable[[Path], None]]] = [
         (reference.regular, lambda path: plot_angle(reference, decoded, path)),
         (seen, lambda path: plot_views(reference, decoded, path)),
+        (seen, lambda path: plot_error_views(reference, decoded, path)),
         (seen, lambda path: plot_pair(reference, path)),
         (seen, lambda path: plot_pair(other, path)),
         (quality is not None, lambda path: plot_depth(cast(DepthQuality, quality), path)),
+        (quality is not None, lambda path: plot_error_layers(reference, cast(DepthQuality, quality), path)),
     ]
     paths = []
     for name, (possible, draw) in zip(PLOTS, works, strict=True):
@@ -281,20 +286,3 @@ def _shown(pixels: NDArray[Any]) -> NDArray[np.float64]:
     if pixels.dtype.kind != "f":
         return share
     return np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)
-
-
-def _figure(width: float, height: float, layout: Any = "constrained") -> Any:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout=layout)
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def _save(figure: Any, path: str | os.PathLike[str]) -> None:
-    suffix = Path(path).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise ValueError(f"{path} is no known chart type: known are {', '.join(SUFFIXES)}")
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=130, format=suffix[1:])

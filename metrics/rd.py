@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
@@ -42,7 +42,7 @@ def bd_rate(rates_a: ArrayLike, quality_a: ArrayLike, rates_b: ArrayLike, qualit
     Parameters
     ----------
     rates_a, quality_a : array_like, (n,)
-        The anchor: rates in any unit, quality in dB, at least four points in any order.
+        The anchor: rates in any unit, quality by any measure, at least four points in any order.
     rates_b, quality_b : array_like, (m,)
         The curve under test.
 
@@ -69,11 +69,11 @@ def bd_rate(rates_a: ArrayLike, quality_a: ArrayLike, rates_b: ArrayLike, qualit
         if falls.size:
             i = falls[0]
             raise UndefinedDifference(
-                f"quality_{name} goes from {quality[i]:g} to {quality[i + 1]:g} dB between rates {rates[i]:g} and "
+                f"quality_{name} goes from {quality[i]:g} to {quality[i + 1]:g} between rates {rates[i]:g} and "
                 f"{rates[i + 1]:g}: quality that grows with rate is needed",
                 "quality falls",
             )
-    _check_overlap("quality", "dB", a[1], b[1])
+    _check_overlap("quality", a[1], b[1])
     import bjontegaard
 
     # Its own notion of overlap, a share of the union, only warns; ours has been checked.
@@ -94,7 +94,7 @@ def bd_psnr(rates_a: ArrayLike, quality_a: ArrayLike, rates_b: ArrayLike, qualit
     Returns
     -------
     float
-        dB; positive where b is better.
+        In the quality's unit; positive where b is better.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def bd_psnr(rates_a: ArrayLike, quality_a: ArrayLike, rates_b: ArrayLike, qualit
     Bjøntegaard, VCEG-M33, 2001.
     """
     a, b = _curve("a", rates_a, quality_a), _curve("b", rates_b, quality_b)
-    _check_overlap("rate", "", a[0], b[0], np.log10)
+    _check_overlap("rate", a[0], b[0], np.log10)
     import bjontegaard
 
     return float(bjontegaard.bd_psnr(*a, *b, method=METHOD, require_matching_points=False, min_overlap=0))
@@ -139,7 +139,6 @@ def _curve(name: str, rates: ArrayLike, quality: ArrayLike) -> Curve:
 
 def _check_overlap(
     what: str,
-    unit: str,
     a: NDArray[np.float64],
     b: NDArray[np.float64],
     scale: Callable[[Any], Any] = lambda value: value,
@@ -150,7 +149,7 @@ def _check_overlap(
     if share < MIN_OVERLAP:
         raise UndefinedDifference(
             f"{what} of curve a runs from {a.min():.4g} to {a.max():.4g}, of curve b from {b.min():.4g} to "
-            f"{b.max():.4g}{' ' + unit if unit else ''}: they share {share:.0%} of the shorter, at least "
+            f"{b.max():.4g}: they share {share:.0%} of the shorter, at least "
             f"{MIN_OVERLAP:.0%} are needed",
             f"{share:.0%} overlap",
         )
@@ -165,6 +164,7 @@ def rate_distortion(
     decode: Callable[[Any], IIPicture],
     progress: Callable[[int, int, str], None] | None = None,
     workers: int = 2,
+    measure: Callable[[IIPicture], Mapping[str, Any]] | None = None,
 ) -> list[dict[str, Any]]:
     """Code a picture by every scheme at every rate and measure what comes back.
 
@@ -185,6 +185,8 @@ def rate_distortion(
     workers : int
         Points measured at a time, in threads. Everything but the seconds is the same for any number; seconds
         are wall-clock and fit for comparison when taken with one worker.
+    measure : callable, optional
+        ``measure(decoded)`` gives what else to keep of each point, as that of `measuring` does. Q_global always is.
 
     Returns
     -------
@@ -212,7 +214,8 @@ def rate_distortion(
     records: list[dict[str, Any]] = [{} for _ in points]
     with ThreadPoolExecutor(workers) as pool:
         futures = {
-            pool.submit(_measure, picture, scheme, rate, encode, decode): i for i, (scheme, rate) in enumerate(points)
+            pool.submit(_measure, picture, scheme, rate, encode, decode, measure): i
+            for i, (scheme, rate) in enumerate(points)
         }
         try:
             for done, future in enumerate(as_completed(futures), 1):
@@ -226,14 +229,19 @@ def rate_distortion(
 
 
 def _measure(
-    picture: IIPicture, scheme: str, rate: float, encode: Callable[..., Any], decode: Callable[[Any], IIPicture]
+    picture: IIPicture,
+    scheme: str,
+    rate: float,
+    encode: Callable[..., Any],
+    decode: Callable[[Any], IIPicture],
+    measure: Callable[[IIPicture], Mapping[str, Any]] | None,
 ) -> dict[str, Any]:
     try:
         coded = encode(picture, scheme, bpp=rate)
         start = time.perf_counter()
         decoded = decode(coded)
         seconds = time.perf_counter() - start
-        quality = q_global(picture, decoded)
+        quality = {"q_global": q_global(picture, decoded), **(measure(decoded) if measure else {})}
     except Exception as error:
         error.add_note(f"while measuring {scheme} at {rate:g} bpp")
         raise
@@ -243,7 +251,7 @@ def _measure(
         "target_bpp": rate,
         "bpp": float(coded.bpp),
         "reached": bool(coded.reached),
-        "q_global": quality,
+        **quality,
         "encode_seconds": float(coded.encode_seconds),
         "decode_seconds": seconds,
         "nbytes": int(coded.nbytes),

@@ -1,8 +1,7 @@
-"""Rate–distortion studies on disk: what was measured, on what, with what; and as a table."""
+"""Rate–distortion studies on disk: what was measured, on what, with what."""
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
 import math
@@ -17,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from ii_core import IIPicture
-from ii_core.files import atomic_path, write_json
+from ii_core.files import write_json
 
-from .rd import UndefinedDifference, bd_psnr, bd_rate
+from .measures import MEASURES
 
 FORMAT, VERSION = "ii-rd-study", 1
 POOLING = "pooled MSE over R, G and B"
@@ -66,7 +65,7 @@ def write_study(
     OSError
         If the file cannot be written.
     """
-    _check_points(records)
+    check_points(records)
     (width, height) = picture.size
     write_json(
         path,
@@ -83,8 +82,8 @@ def write_study(
             "pooling": POOLING,
             **provenance(),
             "extra": dict(extra or {}),
-            # Infinity is no JSON number: a lossless point says so.
-            "points": [{**record, "lossless": record["q_global"] == math.inf} for record in records],
+            # Infinity is no JSON number: a lossless point says so, other qualities are spelt out.
+            "points": [{**spelt(dict(record)), "lossless": record["q_global"] == math.inf} for record in records],
         },
     )
 
@@ -105,110 +104,40 @@ def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
             raise ValueError(f'not a study: needs "format": "{FORMAT}", "version": {VERSION}')
         if missing := {"picture", "points"} - set(study):
             raise ValueError(f"not a study: {', '.join(sorted(missing))} missing")
-        _check_points(study["points"])
+        check_points(study["points"])
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
     for point in study["points"]:
-        if point.pop("lossless", False):
+        lossless = point.pop("lossless", False)
+        for name in measures_of([point]) + ["q_depth"] * ("q_depth" in point):
+            point[name] = _read(point[name])
+        if lossless:
             point["q_global"] = math.inf
     return study
 
 
-def write_csv(path: str | os.PathLike[str], records: Sequence[Mapping[str, Any]]) -> None:
-    """Write records as a table, one row a point, for spreadsheets.
-
-    Raises
-    ------
-    ValueError
-        If a record lacks a field.
-    OSError
-        If the file cannot be written.
-    """
-    _check_points(records)
-    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, FIELDS, extrasaction="ignore")
-        writer.writeheader()
-        for record in records:
-            options = " ".join(f"{key}={value}" for key, value in record["options"].items())
-            writer.writerow({**record, "options": options})
+def measures_of(points: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Names of the measures that every point has, in the order of MEASURES."""
+    return [name for name in MEASURES if all(name in point for point in points)]
 
 
-def summary_table(study: Mapping[str, Any], *, anchor: str = "jpeg2000") -> list[dict[str, str]]:
-    """A study as rows of text, one a scheme, all with the same columns.
-
-    Parameters
-    ----------
-    study : dict
-        From `read_study`.
-    anchor : str
-        The scheme the others are compared with.
-
-    Returns
-    -------
-    list of dict
-        ``scheme``; a column a target rate with dB, or the floor (or ceiling) of a scheme that cannot reach it;
-        ``gain``, the mean difference in dB to the anchor over the target rates both reach; ``BD-rate`` and
-        ``BD-PSNR`` against it, or why they are not defined.
-    """
-    points = study["points"]
-    schemes = list(dict.fromkeys(point["scheme"] for point in points))
-    targets = sorted({point["target_bpp"] for point in points})
-    by_target = {scheme: {p["target_bpp"]: p for p in points if p["scheme"] == scheme} for scheme in schemes}
-    rows = []
-    for scheme in schemes:
-        row = {"scheme": scheme}
-        for target in targets:
-            row[f"{target:g}"] = _cell(by_target[scheme].get(target))
-        if scheme == anchor:
-            row |= dict.fromkeys(("gain", "BD-rate", "BD-PSNR"), "anchor")
-        elif anchor not in by_target:
-            row |= dict.fromkeys(("gain", "BD-rate", "BD-PSNR"), f"– (no {anchor})")
-        else:
-            row["gain"] = _gain(by_target[anchor], by_target[scheme])
-            a, b = operating_points(points, anchor), operating_points(points, scheme)
-            row["BD-rate"] = _difference(bd_rate, a, b, " %")
-            row["BD-PSNR"] = _difference(bd_psnr, a, b, " dB")
-        rows.append(row)
-    return rows
+def spelt(value: Any) -> Any:
+    """Plain values for JSON: infinities as text; NaN becomes null when it is written."""
+    if isinstance(value, dict):
+        return {key: spelt(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [spelt(item) for item in value]
+    return str(value) if isinstance(value, float) and math.isinf(value) else value
 
 
-def operating_points(points: Sequence[Mapping[str, Any]], scheme: str) -> list[tuple[float, float]]:
-    """The different (bpp, dB) of a scheme by rate, without lossless ones.
-
-    A point beside its target is as true an operating point as any; the same one given for several targets counts
-    once.
-    """
-    return sorted(
-        {(p["bpp"], p["q_global"]) for p in points if p["scheme"] == scheme and math.isfinite(p["q_global"])}
-    )
+def _read(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_read(item) for item in value]
+    return math.nan if value is None else float(value)
 
 
-def _cell(point: Mapping[str, Any] | None) -> str:
-    if point is None:
-        return ""
-    if point["reached"]:
-        return f"{point['q_global']:.2f}"
-    return f"– ({'floor' if point['bpp'] > point['target_bpp'] else 'ceiling'} {point['bpp']:.3g})"
-
-
-def _gain(anchor: Mapping[float, Mapping[str, Any]], tested: Mapping[float, Mapping[str, Any]]) -> str:
-    both = [
-        tested[target]["q_global"] - anchor[target]["q_global"]
-        for target in tested.keys() & anchor.keys()
-        if tested[target]["reached"] and anchor[target]["reached"]
-    ]
-    gains = [gain for gain in both if math.isfinite(gain)]
-    return f"{sum(gains) / len(gains):+.2f} dB at {len(gains)} rates" if gains else "– (no common rate)"
-
-
-def _difference(function: Any, a: list[tuple[float, float]], b: list[tuple[float, float]], unit: str) -> str:
-    try:
-        return f"{function(*zip(*a, strict=True), *zip(*b, strict=True)):+.1f}{unit}"
-    except UndefinedDifference as error:
-        return f"– ({error.short})"
-
-
-def _check_points(records: Any) -> None:
+def check_points(records: Any) -> None:
+    """Raise ValueError unless every record has all FIELDS."""
     for i, record in enumerate(records):
         if missing := set(FIELDS) - set(record):
             raise ValueError(f"points[{i}] has no {', '.join(sorted(missing))}")
