@@ -236,21 +236,30 @@ def add_sensor_noise(picture: IIPicture, sigma: float = 1.0, seed: int = 0) -> I
     source = picture.pixels
     if sigma == 0:
         return picture
-    peak = 1.0 if source.dtype.kind == "f" else float(np.iinfo(source.dtype).max)
     noisy = np.empty_like(source)
 
     def block(top: int) -> None:
         rows = slice(top, top + NOISE_ROWS)
-        sample = np.random.default_rng((seed, top)).standard_normal(source[rows].shape[:2], dtype=np.float32)
-        sample *= np.float32(sigma * peak / 255)
-        if source.dtype.kind == "f":
-            np.add(source[rows], sample[..., None], out=noisy[rows])
-        else:
-            add_code_noise(source[rows], sample, peak, noisy[rows])
+        noisy[rows] = noisy_rows(source[rows], top, sigma, seed)
 
     with ThreadPoolExecutor() as pool:
         list(pool.map(block, range(0, source.shape[0], NOISE_ROWS)))
     return picture.with_pixels(noisy)
+
+
+def noisy_rows(rows: NDArray[Any], top: int, sigma: float, seed: int) -> NDArray[Any]:
+    """Rows ``top``, a multiple of `NOISE_ROWS`, and on, of which there may be many, with their sensor noise."""
+    noisy = np.empty_like(rows)
+    peak = 1.0 if rows.dtype.kind == "f" else float(np.iinfo(rows.dtype).max)
+    for i in range(0, len(rows), NOISE_ROWS):
+        block = rows[i : i + NOISE_ROWS]
+        sample = np.random.default_rng((seed, top + i)).standard_normal(block.shape[:2], dtype=np.float32)
+        sample *= np.float32(sigma * peak / 255)
+        if rows.dtype.kind == "f":
+            np.add(block, sample[..., None], out=noisy[i : i + NOISE_ROWS])
+        else:
+            add_code_noise(block, sample, peak, noisy[i : i + NOISE_ROWS])
+    return noisy
 
 
 NOISE_ROWS = 64  # rows that share a generator: the noise is the same on any number of cores

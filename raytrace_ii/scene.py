@@ -320,6 +320,10 @@ class Scene:
 
         return PackedScene(self)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without Embree's tree, which cannot be sent to another process and is built there anew."""
+        return {name: value for name, value in vars(self).items() if name != "packed"}
+
     @property
     def bounds_mm(self) -> NDArray[np.float64]:
         """(2, 3): least and greatest corner."""

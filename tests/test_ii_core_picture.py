@@ -146,7 +146,7 @@ class FailingOutput:
         self.path = path
         return True
 
-    def write_image(self, pixels):
+    def write_scanlines(self, top, bottom, z, pixels):
         with open(self.path, "wb") as file:
             file.write(b"half a picture")
         return False

@@ -6,7 +6,7 @@ from trace_scenes import UNIFORM, WHITE, body, box, floor, hall, lamp, sphere, s
 
 from ii_core import IICamera, add_sensor_noise, five_viewpoints, preset, view_image
 from ii_core.view import view_positions
-from raytrace_ii import Background, Scene, kernels, load_scene, render, rendering, trace
+from raytrace_ii import Background, Scene, job, kernels, load_scene, render, rendering, trace
 
 SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 OFF_CENTRE = [(3.0, -2.0, -60.0), (40.0, 25.0, -55.0), (-9.0, 7.0, -300.0)]  # the second leaves the picture
@@ -16,7 +16,7 @@ ONE_LENS = IICamera(pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2
 def encoded(radiance, dtype="uint8"):
     """Codes as `render` stores them."""
     out = np.empty(radiance.shape, dtype)
-    kernels.encode_srgb(radiance, 1.0, rendering._CURVES[dtype], out)
+    kernels.encode_srgb(radiance, 1.0, job.CURVES[dtype], out)
     return out
 
 
@@ -75,15 +75,15 @@ def test_same_bits_for_any_workers_and_tiles(samples, hall_scene, monkeypatch):
         assert_same(whole, render(hall_scene, SMALL, workers=workers, **options))
     # 50 splits every row of 128 in three, 700 leaves a remainder, 10**6 is more than the picture
     for tile in (50, 700, 10**6):
-        monkeypatch.setattr(rendering, "TILE_RAYS", tile)
+        monkeypatch.setattr(job, "TILE_RAYS", tile)
         assert_same(whole, render(hall_scene, SMALL, workers=2, **options))
 
 
 def test_tiles_cover_every_pixel_once(monkeypatch):
     for tile in (1, 7, 24, 25, 100, 10**6):
-        monkeypatch.setattr(rendering, "TILE_RAYS", tile)
+        monkeypatch.setattr(job, "TILE_RAYS", tile)
         seen = np.zeros((16, 24), int)
-        for rows, cols in rendering._tiles((24, 16)):
+        for rows, cols in job.blocks((24, 16), (1, 1), tile):
             seen[rows, cols] += 1
             assert seen[rows, cols].size <= tile or tile < 24
         assert (seen == 1).all()
@@ -128,14 +128,14 @@ def test_noise_is_the_picture_s_own(hall_scene):
 
 
 def test_progress_counts_every_tile(monkeypatch):
-    monkeypatch.setattr(rendering, "TILE_RAYS", 48)
+    monkeypatch.setattr(job, "TILE_RAYS", 48)
     calls = []
     render(Scene(bodies=[body(wall(5))]), ONE_LENS, progress=lambda *at: calls.append(at))
     assert calls == [(i, 8) for i in range(1, 9)]
 
 
 def test_an_interrupted_picture_stops(monkeypatch):
-    monkeypatch.setattr(rendering, "TILE_RAYS", 24)
+    monkeypatch.setattr(job, "TILE_RAYS", 24)
 
     def stop(done, tiles):
         raise KeyboardInterrupt

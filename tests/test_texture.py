@@ -10,7 +10,7 @@ from trace_scenes import BLACK, WHITE, body, box, sphere, texture_at, wall
 
 from ii_core.files import read_image
 from raytrace_ii import Scene, kernels, trace
-from raytrace_ii.rendering import _CURVES as CURVES
+from raytrace_ii.job import CURVES
 from raytrace_ii.shapes import rotation
 from raytrace_ii.texture import Checker, Image, Noise, Stripes, TextureTable, image_texture, linear, normal_map
 

@@ -1,0 +1,144 @@
+"""Numba kernels of adaptive supersampling: where samples lie, what they add up to, how sure their mean is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ii_core.jit import inline_kernel, kernel
+
+
+@kernel
+def places(seed, m, n, columns, first, count, pair, out):
+    """Samples ``first`` … ``first + count`` of pixels (m, n), as rows of ``out``, pixel by pixel, in [0, 1)².
+
+    A (0, 2)-sequence, van der Corput's and Sobol''s, Owen-scrambled by a hash of seed and pixel (Owen 1995; hashes
+    of Laine and Karras 2011, Burley 2020): any first 2^k samples lie one in each cell of every grid of 2^k equal
+    cells of sides 2^-i. ``pair`` 0 is the place in the pixel, 1 that on the aperture, which walks through the same
+    sequence in another order so as not to follow the first.
+    """
+    for i in range(m.shape[0]):
+        pixel = np.uint64(n[i]) * np.uint64(columns) + np.uint64(m[i])
+        own = _mix(_mix(np.uint64(seed) ^ _mix(pixel)) + np.uint64(pair))
+        across, down, order = own & _LOW, own >> np.uint64(32), _mix(own) & _LOW
+        for j in range(count):
+            index = np.uint64(first + j)
+            if pair:
+                index = _scrambled(index, order)
+            out[i * count + j, 0] = _scrambled(_reversed(index), across) * (1.0 / 4294967296.0)
+            out[i * count + j, 1] = _scrambled(_sobol(index), down) * (1.0 / 4294967296.0)
+
+
+@kernel
+def merge_quarters(which, quarters):
+    """Make the four sums of each pixel named the first two of twice as many samples."""
+    for i in range(which.shape[0]):
+        pixel = which[i]
+        for c in range(3):
+            quarters[pixel, 0, c] += quarters[pixel, 1, c]
+            quarters[pixel, 1, c] = quarters[pixel, 2, c] + quarters[pixel, 3, c]
+            quarters[pixel, 2, c] = 0.0
+            quarters[pixel, 3, c] = 0.0
+
+
+@kernel
+def add_samples(radiance, which, first, count, quarter, quarters):
+    """Add rows of ``radiance``, ``count`` for each pixel named, from sample ``first``, to its sums of ``quarter`` each."""
+    for i in range(which.shape[0]):
+        pixel = which[i]
+        for j in range(count):
+            part = (first + j) // quarter
+            for c in range(3):
+                quarters[pixel, part, c] += radiance[i * count + j, c]
+
+
+@kernel
+def steps_to_neighbours(mean, lens, top, left, out):
+    """Largest difference, by channel, of each pixel to its eight neighbours under the same lens.
+
+    ``mean`` (h, w, 3) and ``lens`` (h, w) have a rim around the pixels of ``out``, which start at (top, left).
+    """
+    height, width = lens.shape
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            y, x = top + i, left + j
+            for c in range(3):
+                most = 0.0
+                for b in range(max(y - 1, 0), min(y + 2, height)):
+                    for a in range(max(x - 1, 0), min(x + 2, width)):
+                        if lens[b, a] == lens[y, x]:
+                            most = max(most, abs(mean[b, a, c] - mean[y, x, c]))
+                out[i, j, c] = most
+
+
+@kernel
+def standard_errors(quarters, step, n, curve, out):
+    """Standard error of the mean of ``n`` samples, in codes of ``curve``: half of what lies between mean ± error.
+
+    From the means of the four quarters of the samples, and from ``step``, the difference to the neighbours.
+    """
+    for i in range(out.shape[0]):
+        worst = 0.0
+        for c in range(3):
+            mean = (quarters[i, 0, c] + quarters[i, 1, c] + quarters[i, 2, c] + quarters[i, 3, c]) / n
+            square = step[i, c] * step[i, c] / (float(n) * n * n)
+            for part in range(4):
+                square += (quarters[i, part, c] * 4.0 / n - mean) ** 2 / 12.0
+            error = math.sqrt(square)
+            worst = max(worst, 0.5 * (_code(mean + error, curve) - _code(mean - error, curve)))
+        out[i] = worst
+
+
+@inline_kernel
+def _code(x, curve):
+    last = curve.shape[0] - 1
+    at = min(max(x, 0.0), 1.0) * last
+    j = min(int(at), last - 1)
+    return curve[j] + (at - j) * (curve[j + 1] - curve[j])
+
+
+# 32-bit fractions in 64-bit words: numba makes 64 bits of a sum of two 32-bit numbers.
+_LOW = np.uint64(0xFFFFFFFF)
+_ONE = np.uint64(1)
+
+
+@kernel
+def _sobol(index):
+    """The second dimension of Sobol's sequence, as a fraction of 2³²."""
+    bits, direction = np.uint64(0), np.uint64(0x80000000)
+    while index:
+        if index & _ONE:
+            bits ^= direction
+        index >>= _ONE
+        direction ^= direction >> _ONE
+    return bits
+
+
+@inline_kernel
+def _reversed(x):
+    x = ((x & np.uint64(0x55555555)) << np.uint64(1)) | ((x >> np.uint64(1)) & np.uint64(0x55555555))
+    x = ((x & np.uint64(0x33333333)) << np.uint64(2)) | ((x >> np.uint64(2)) & np.uint64(0x33333333))
+    x = ((x & np.uint64(0x0F0F0F0F)) << np.uint64(4)) | ((x >> np.uint64(4)) & np.uint64(0x0F0F0F0F))
+    x = ((x & np.uint64(0x00FF00FF)) << np.uint64(8)) | ((x >> np.uint64(8)) & np.uint64(0x00FF00FF))
+    return ((x & np.uint64(0xFFFF)) << np.uint64(16)) | (x >> np.uint64(16))
+
+
+@kernel
+def _scrambled(x, seed):
+    """Owen's scramble: each bit is flipped or not by a hash of all bits before it."""
+    x = (_reversed(x) + seed) & _LOW
+    x ^= (x * np.uint64(0x6C50B47C)) & _LOW
+    x ^= (x * np.uint64(0xB82F1E52)) & _LOW
+    x ^= (x * np.uint64(0xC7AFE638)) & _LOW
+    x ^= (x * np.uint64(0x8D22F6E6)) & _LOW
+    return _reversed(x)
+
+
+@inline_kernel
+def _mix(h):
+    """splitmix64's finaliser (Steele, Lea, Flood 2014)."""
+    h = h + np.uint64(0x9E3779B97F4A7C15)
+    h = (h ^ (h >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    h = (h ^ (h >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return h ^ (h >> np.uint64(31))
