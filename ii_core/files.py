@@ -193,17 +193,27 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
 def read_channels(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     """The channels of an image by their names, (N, M) each; errors are those of `read_image`."""
     pixels = read_image(path)
-    source = oiio.ImageInput.open(str(path))
-    names = source.spec().channelnames
-    source.close()
+    names = _header(path).channelnames
     return {name: pixels[..., i] for i, name in enumerate(names)}
+
+
+def read_depth(path: str | os.PathLike[str]) -> NDArray[Any]:
+    """The channel depth.Z of an image, or its first if there is none; errors are those of `read_image`."""
+    channels = read_channels(path)
+    return channels.get("depth.Z", next(iter(channels.values())))
 
 
 def read_about(path: str | os.PathLike[str], key: str) -> str | None:
     """A text of an image's header, as `image_writer` puts it there; None if there is none."""
+    text = _header(path).get(key)
+    return None if text is None else str(text)
+
+
+def _header(path: str | os.PathLike[str]) -> Any:
     source = oiio.ImageInput.open(str(path))
     if not source:
         raise OSError(f"cannot read {path}: {oiio.geterror()}")
-    text = source.spec().get(key)
-    source.close()
-    return None if text is None else str(text)
+    try:
+        return source.spec()
+    finally:
+        source.close()

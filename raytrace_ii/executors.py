@@ -14,7 +14,7 @@ import threading
 import uuid
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -44,7 +44,9 @@ def check_executor(executor: Any, workers: int | None) -> None:
         raise ValueError(f"executor is {executor!r}: a concurrent.futures executor or a dask client is needed")
 
 
-def run(job: Job, tiles: Sequence[Tile], *, workers: int | None = None, executor: Any = None) -> Iterator[Block]:
+def run(
+    job: Job, tiles: Sequence[Tile], *, workers: int | None = None, executor: Any = None
+) -> Generator[Block, None, None]:
     """Render blocks and yield them in their order.
 
     Raises

@@ -106,7 +106,7 @@ class Job:
             divisor = 1
         else:
             radiance, divisor = self._fixed(tracer, self.sampling, rows, cols, support), self.sampling
-            samples = np.full(len(radiance), divisor, np.int32) if "samples" in self.support else np.empty(0)
+            samples = np.full(len(radiance), divisor, np.int32)
             histogram = {divisor: len(radiance)}
         arrays = {"pixels": encoded(radiance, divisor, self.dtype).reshape(*shape, 3)}
         for name in self.support:
@@ -128,8 +128,11 @@ class Job:
         tracer.count = RayCount()
         return tracer
 
-    def _support_room(self, shape: tuple[int, int]) -> Support | None:
-        return Support.empty(shape) if set(self.support) - {"samples"} else None
+    def _support_room(self, shape: tuple[int, ...]) -> Support | None:
+        """What the tracer fills, None if nobody asks."""
+        if not set(self.support) - {"samples"}:
+            return None
+        return Support.empty(shape, ray_length="ray_length" in self.support)
 
     def _fixed(
         self, tracer: Tracer, samples: int, rows: slice, cols: slice, support: Support | None
@@ -153,12 +156,13 @@ class Job:
 
         def shoot(L: Any, D: Any, shares: Any, *, first: slice | None) -> NDArray[np.float32]:
             radiance = np.zeros((len(L), 3), np.float32)
-            room = Support.empty((len(L),)) if support is not None and first is not None else None
+            room = self._support_room((len(L),)) if first is not None else None
             tracer.run(L, D, radiance, room, shares)
-            if room is not None and support is not None and first is not None:
+            if room is not None and first is not None:
                 every = len(L) // (first.stop - first.start)
                 for name, array in vars(support).items():
-                    array.reshape(-1, *array.shape[2:])[first] = getattr(room, name)[::every]
+                    if array is not None:
+                        array.reshape(-1, *array.shape[2:])[first] = getattr(room, name)[::every]
             return radiance
 
         codes = CURVES["uint8"]

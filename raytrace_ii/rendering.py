@@ -7,7 +7,7 @@ import math
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from typing import Any
@@ -282,7 +282,7 @@ class _Tally:
 
 def _rendered(
     job: Job, tiles: Sequence[Tile], workers: int | None, executor: Any, progress: Any, tally: _Tally
-) -> Iterator[Block]:
+) -> Generator[Block, None, None]:
     """The blocks in their order, counted and told."""
     with closing(run(job, tiles, workers=workers, executor=executor)) as blocks:
         for done, block in enumerate(blocks, 1):

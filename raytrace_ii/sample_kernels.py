@@ -44,7 +44,7 @@ def merge_quarters(which, quarters):
 
 @kernel
 def add_samples(radiance, which, first, count, quarter, quarters):
-    """Add rows of ``radiance``, ``count`` for each pixel named, from sample ``first``, to its sums of ``quarter`` each."""
+    """Add rows of ``radiance``, ``count`` samples from ``first`` on of each pixel named, to its sums of a quarter."""
     for i in range(which.shape[0]):
         pixel = which[i]
         for j in range(count):

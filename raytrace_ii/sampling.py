@@ -36,6 +36,7 @@ APERTURE_SEED = 1 << 40  # apart from all seeds a person gives
 MOST_SAMPLES = 1 << 16
 
 Floats = NDArray[np.float64]
+Radiance = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -92,12 +93,14 @@ def fixed_places(camera: IICamera, samples: int, seed: int, sample: int, rows: s
 class Shoot(Protocol):
     """Traces rays of a camera; ``first`` says that these begin their pixels."""
 
-    def __call__(self, L: Floats, D: Floats, shares: Floats | None, *, first: slice | None) -> NDArray[np.float32]: ...
+    def __call__(
+        self, L: Floats, D: Floats, shares: Floats | None, *, first: slice | None
+    ) -> NDArray[np.float32]: ...
 
 
 def adaptive_mean(
     camera: IICamera, wanted: Adaptive, seed: int, rows: slice, cols: slice, batch: int, curve: Floats, shoot: Shoot
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+) -> tuple[Radiance, NDArray[np.int32]]:
     """Mean radiance (h·w, 3) of a block of pixels and the number of samples (h·w,) of each.
 
     A pixel's neighbours count wherever the block ends: pixels of a rim around it are shot once, those under lenses
@@ -142,9 +145,7 @@ def adaptive_mean(
     unsure, count = np.arange(len(inside)), wanted.least
     while count < wanted.most:
         error = np.empty(len(unsure))
-        sample_kernels.standard_errors(
-            quarters[inside[unsure]], step.reshape(-1, 3)[unsure], count, curve, error
-        )
+        sample_kernels.standard_errors(quarters[inside[unsure]], step.reshape(-1, 3)[unsure], count, curve, error)
         unsure = unsure[error > wanted.error]
         if not len(unsure):
             break

@@ -11,10 +11,10 @@ from typing import Any
 
 import typer
 
-from . import synthesize, pictures, coding, evaluate, show
+from . import synthesize, render, pictures, coding, evaluate, show
 from .common import app
 
-__all__ = ["app", "coding", "evaluate", "main", "pictures", "show", "synthesize"]
+__all__ = ["app", "coding", "evaluate", "main", "pictures", "render", "show", "synthesize"]
 
 
 def main() -> None:

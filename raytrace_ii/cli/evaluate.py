@@ -76,11 +76,11 @@ def measure(
 
 def _depth_quality(a: IIPicture, b: IIPicture, depth: Path | None) -> Any:
     """Q_depth over a given depth map or, where the structure allows, over one estimated; else None."""
-    from ii_core.files import read_image
+    from ii_core.files import read_depth
     from metrics import q_depth
 
     if depth is not None:
-        return q_depth(a, b, depth=read_image(depth)[..., 0])
+        return q_depth(a, b, depth=read_depth(depth))
     if not a.regular or a.camera is None or a.camera.front:
         return None
     with spinner("find depth"):

@@ -97,7 +97,7 @@ def export(
 ) -> None:
     """Write an II-picture as other light field programs read it."""
     from ii_core import write_hci, write_quilt, write_views
-    from ii_core.files import read_image, write_image
+    from ii_core.files import read_depth, write_image
     from ii_core.formats import quilt_path
 
     if to not in ("views", "hci", "quilt", "mosaic"):
@@ -111,7 +111,7 @@ def export(
             if to == "views":
                 count = write_views(original, output)
             else:
-                z = None if depth is None else read_image(depth)[..., 0]
+                z = None if depth is None else read_depth(depth)
                 count = write_hci(original, output, depth=z)
         print(f"{output}: {count} views of {original.lenses[0]}×{original.lenses[1]} px")
         return

@@ -1,0 +1,230 @@
+"""The command render: one scene, or a set of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .common import Force, Workers, app, check_output, check_picture, progress_bar
+
+if TYPE_CHECKING:
+    from ..rendering import Stats
+
+Exr = Path | None
+
+
+@app.command()
+def render(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help=".png, .tif (8 or 16 bit) or .exr (linear float); a set's folder.")
+    ],
+    scene: Annotated[str, typer.Argument(help="A scene's name, or a .toml file.")] = "",
+    set_name: Annotated[str, typer.Option("--set", help="Render a set of scenes instead: reference.")] = "",
+    camera: Annotated[str, typer.Option(help="A camera's name, a .json file, or a folder of maps.")] = "setup1",
+    scale: Annotated[int, typer.Option(help="Divides the number of lenses, at the same pixels per lens.")] = 1,
+    at: Annotated[str | None, typer.Option(help="Where the camera stands in the scene, mm: x,y,z.")] = None,
+    samples: Annotated[str, typer.Option(help="Rays per pixel; adaptive between two powers of 2: 4..64.")] = "1",
+    error: Annotated[
+        float | None,
+        typer.Option(help="Of adaptive samples: standard error to reach, in 8-bit steps [0.5]."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of samples and noise.")] = 0,
+    noise: Annotated[float, typer.Option(help="σ of sensor noise, in steps of 8 bits.")] = 0.0,
+    bits: Annotated[int, typer.Option(help="8 or 16, for .png and .tif.")] = 8,
+    support: Annotated[Exr, typer.Option(help="Write all support images to this .exr, as named channels.")] = None,
+    depth: Annotated[Exr, typer.Option(help="Write z in mm to this .exr.")] = None,
+    ray_length: Annotated[Exr, typer.Option(help="Write mm along the ray to this .exr.")] = None,
+    disparity: Annotated[Exr, typer.Option(help="Write pixels from lens to lens to this .exr.")] = None,
+    normal: Annotated[Exr, typer.Option(help="Write unit normals to this .exr.")] = None,
+    object_id: Annotated[Exr, typer.Option(help="Write object numbers to this .exr, −1 for none.")] = None,
+    projection: Annotated[Path | None, typer.Option(help="Write what a 2D camera sees to this .png.")] = None,
+    workers: Workers = None,
+    dask: Annotated[str | None, typer.Option(help="Render on the cluster of this dask scheduler: host:port.")] = None,
+    force: Force = False,
+) -> None:
+    """Ray trace a scene, or a set of scenes, through a camera.
+
+    A camera of one lens stands back and gives its picture upright. A camera of several pixel arrays gives as many
+    pictures, numbered. Pictures are written as they come and may be larger than memory. An interrupted set goes on
+    where it was when the same command is given again.
+    """
+    if bool(scene) == bool(set_name):
+        raise ValueError("a scene is needed, or --set and no scene: see raytrace-ii scenes")
+    if bits not in (8, 16):
+        raise ValueError(f"bits is {bits}: 8 or 16 is needed")
+    if dask and workers is not None:
+        raise ValueError("--workers are threads of this machine: with --dask there are none")
+    options = {**_sampling(samples, error), "seed": seed, "noise": noise}
+    wanted = {"depth": depth, "ray_length": ray_length, "disparity": disparity, "normal": normal}
+    wanted |= {"object_id": object_id}
+    extra = {name: path for name, path in wanted.items() if path is not None}
+    arrays = _cameras(camera, scale)
+    poses = [_pose(array, at) for array in arrays]
+    if set_name:
+        if extra or support or projection:
+            raise ValueError("a set has all its support images and projections: none is asked for by name")
+        with _cluster(dask) as executor:
+            _render_set(set_name, output, arrays, poses, options, bits, workers, executor, force)
+        return
+    if support is not None and support.suffix != ".exr":
+        raise ValueError(f"{support}: only .exr has named channels")
+    dtype = "float32" if output.suffix == ".exr" else f"uint{bits}"
+    names = [_numbered(len(arrays), i) for i in range(len(arrays))]
+    for numbered in names:
+        check_picture(numbered(output), dtype, force)
+        for path in (*extra.values(), *([support] if support else [])):
+            check_picture(numbered(path), "float32", force)
+    if projection:
+        check_picture(projection, "uint8", force)
+    _render_scene(scene, output, arrays, poses, names, extra, support, projection, dask, workers, dtype, options)
+
+
+def _render_scene(
+    scene: str, output: Path, arrays: Sequence[Any], poses: Sequence[Any], names: Sequence[Callable[[Path], Path]],
+    extra: dict[str, Path], support: Path | None, projection: Path | None, dask: str | None, workers: int | None,
+    dtype: str, options: dict[str, Any],
+) -> None:  # fmt: skip
+    """One scene through every pixel array, and its projection."""
+    from ..load import load_scene
+
+    loaded = load_scene(scene)
+    with _cluster(dask) as executor:
+        means = {"workers": workers, "executor": executor}
+        for array, pose, numbered in zip(arrays, poses, names, strict=True):
+            files = {name: numbered(path) for name, path in extra.items()}
+            for name in _all_support(array) if support else ():
+                files.setdefault(name, numbered(support))  # type: ignore[arg-type]
+            more = {"pose": pose, "upright": array.lenses == (1, 1), "support": files, "dtype": dtype}
+            _say_stats(_shoot(numbered(output), loaded, array, **more, **options, **means))
+        if projection:
+            _save_projection(loaded, arrays[0], projection, means)
+
+
+def _all_support(array: Any) -> list[str]:
+    from ..reference import support_images
+
+    return support_images(array)
+
+
+def _sampling(samples: str, error: float | None) -> dict[str, Any]:
+    """The number of samples or their range, and the error that ranges have."""
+    least, dots, most = samples.partition("..")
+    try:
+        numbers = (int(least), int(most)) if dots else int(least)
+    except ValueError:
+        raise ValueError(f"samples is {samples!r}: a whole number, or two like 4..64, is needed") from None
+    if error is None:
+        return {"samples": numbers}
+    if not dots:
+        raise ValueError(f"error is {error:g}, but the number of samples is fixed: a range like 4..64 is needed")
+    return {"samples": numbers, "error": error}
+
+
+def _render_set(
+    name: str, folder: Path, arrays: Sequence[Any], poses: Sequence[Any], options: dict[str, Any], bits: int,
+    workers: int | None, executor: Any, force: bool,
+) -> None:  # fmt: skip
+    from ..reference import SETS, render_set
+
+    if name not in SETS:
+        raise ValueError(f"unknown set {name!r}: known are {', '.join(SETS)}")
+    check_output(folder / "manifest.json", True, make_folder=True)
+    with progress_bar(f"render {name}") as report:
+        manifest = render_set(
+            name, folder, arrays, poses=poses, bits=bits, workers=workers, executor=executor, force=force,
+            progress=lambda title, done, total: report(done, total, title), **options,
+        )  # fmt: skip
+    products = [p for entry in manifest["scenes"].values() for p in entry["products"].values()]
+    seconds, rays = sum(p["seconds"] for p in products), sum(sum(p["rays"].values()) for p in products)
+    print(f"{folder}: {len(manifest['scenes'])} scenes, {rays / 1e6:.1f} M rays, rendered in {seconds:.1f} s in all")
+
+
+@contextmanager
+def _cluster(address: str | None) -> Iterator[Any]:
+    """A client of a dask scheduler, closed at the end; None without an address."""
+    if address is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise ValueError("--dask needs dask, which is not installed: pip install 'raytrace-ii[dask]'") from None
+    try:
+        client = Client(address, timeout=5, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise OSError(f"no dask scheduler answers at {address}: {error}") from None
+    try:
+        client.wait_for_workers(1, timeout=30)
+    except TimeoutError:
+        client.close()
+        raise OSError(f"the dask scheduler at {address} has no workers") from None
+    with client:
+        yield client
+
+
+def _cameras(name: str, scale: int) -> Sequence[Any]:
+    """The pixel arrays of a camera: by name, from a file, or from a folder of maps."""
+    from ii_core import preset_cameras, read_maps
+
+    if not Path(name).is_dir():
+        return preset_cameras(name, scale=scale)
+    if scale != 1:
+        raise ValueError(f"scale is {scale}: maps have the size they have")
+    return read_maps(name)
+
+
+def _pose(camera: Any, at: str | None) -> Any:
+    """Where a camera stands: where it is told, or, if it has but one lens, where z = 0 fills its picture."""
+    import numpy as np
+
+    from ii_core import stand_back
+
+    if at is None:
+        return stand_back(camera.model) if camera.lenses == (1, 1) and camera.model else None
+    pose = np.eye(4)
+    try:
+        pose[:3, 3] = [float(x) for x in at.split(",")]
+    except ValueError:
+        raise ValueError(f"at is {at!r}: three numbers x,y,z are needed") from None
+    return pose
+
+
+def _numbered(count: int, i: int) -> Callable[[Path], Path]:
+    return lambda path: path if count == 1 else path.with_name(f"{path.stem}_{i}{path.suffix}")
+
+
+def _shoot(path: Path, scene: Any, camera: Any, **options: Any) -> Stats:
+    from ..rendering import render_to
+
+    with progress_bar(f"render {path.stem}") as report:
+        return render_to(path, scene, camera, progress=lambda done, total: report(done, total, ""), **options)
+
+
+def _save_projection(scene: Any, camera: Any, path: Path, means: dict[str, Any]) -> None:
+    """A plain picture, without a structure beside it."""
+    from ii_core import orthoscopic, projection_camera
+    from ii_core.files import write_image
+
+    from ..rendering import render as shot_of
+
+    if camera.model is None:
+        raise ValueError("the maps do not say what camera they are of: there is no 2D projection to match")
+    pinhole, pose = projection_camera(camera.model, 1024)
+    with progress_bar(f"render {path.stem}") as report:
+        view = shot_of(
+            scene, pinhole, samples=4, pose=pose, support=(), progress=lambda done, total: report(done, total, ""),
+            **means,
+        )  # fmt: skip
+    write_image(path, orthoscopic(view.picture).pixels)
+
+
+def _say_stats(s: Stats) -> None:
+    counts = ", ".join(f"{count / 1e6:.2f} M {kind}" for kind, count in s.rays.items() if count)
+    spread = f" ({s.mean_samples:.1f} per pixel)" if len(s.samples) > 1 else ""
+    print(
+        f"{counts} rays{spread} in {s.seconds:.1f} s, {s.embree_seconds:.1f} s of {s.cpu_seconds:.1f} CPU s in Embree"
+    )

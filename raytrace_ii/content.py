@@ -1,0 +1,57 @@
+"""What a thing is made of as one number: the same content, the same hash, whatever file or process it came from."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Digest = Any
+
+
+def content_hash(*values: Any) -> str:
+    """SHA-256 of numbers, texts, arrays, and whatever dataclasses, lists and mappings hold of them.
+
+    A scene's hash covers what its file says and all that the file uses, meshes, textures and the procedures that
+    model its shapes: it is taken of what came out of them.
+
+    Raises
+    ------
+    TypeError
+        If a value is none of these.
+    """
+    digest = hashlib.sha256()
+    for value in values:
+        _add(digest, value)
+    return digest.hexdigest()
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _add(digest: Digest, value: Any) -> None:
+    # every value is led by its kind and size: no two different ones give the same bytes
+    if value is None or isinstance(value, bool | int | float | str | np.generic):
+        plain = value.item() if isinstance(value, np.generic) else value
+        text = repr(plain).encode()
+        digest.update(f"{type(plain).__name__}:{len(text)}:".encode() + text)
+    elif isinstance(value, np.ndarray):
+        digest.update(f"array:{value.dtype.str}:{value.shape}:".encode())
+        digest.update(np.ascontiguousarray(value).data)
+    elif isinstance(value, list | tuple):
+        digest.update(f"list:{len(value)}:".encode())
+        for item in value:
+            _add(digest, item)
+    elif isinstance(value, Mapping):
+        _add(digest, [[key, value[key]] for key in sorted(value)])
+    elif is_dataclass(value):
+        _add(digest, [type(value).__name__, *([f.name, getattr(value, f.name)] for f in fields(value))])
+    else:
+        raise TypeError(f"{value!r} has no content hash: a {type(value).__name__} is not known")

@@ -1,0 +1,144 @@
+"""Pictures made by threads, processes and a dask cluster: the same to the bit, also when a worker dies."""
+
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from trace_scenes import body, hall, wall
+
+from ii_core import preset
+from raytrace_ii import Scene, executors, job, render
+
+CAMERA = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
+SUPPORT = ("depth", "normal", "object_id", "ray_length", "disparity", "samples")
+OPTIONS = {"samples": (4, 16), "error": 4.0, "seed": 2, "support": SUPPORT}
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return hall()
+
+
+@pytest.fixture(autouse=True)
+def small_tiles(monkeypatch):
+    monkeypatch.setattr(job, "TILE_RAYS", 512)  # 16 blocks of two lenses
+
+
+@pytest.fixture(scope="module")
+def whole(scene):
+    return render(scene, CAMERA, workers=1, **OPTIONS)
+
+
+def assert_same(a, b):
+    np.testing.assert_array_equal(a.picture.pixels, b.picture.pixels)
+    for name in SUPPORT:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+    assert a.stats.rays == b.stats.rays and a.stats.samples == b.stats.samples
+
+
+def test_threads_of_ones_own(scene, whole):
+    with ThreadPoolExecutor(3) as pool:
+        assert_same(whole, render(scene, CAMERA, executor=pool, **OPTIONS))
+        assert pool.submit(int, 1).result() == 1, "the executor stays open"
+
+
+def test_processes_read_the_scene_once_and_a_broken_pool_is_one_line(scene, whole, monkeypatch):
+    # forkserver: what the parent changed does not reach the children, as on other systems
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("forkserver")) as pool:
+        assert_same(whole, render(scene, CAMERA, executor=pool, **OPTIONS))
+        assert pool.submit(_opened).result() == 1
+
+        def kill(done, total):
+            for pid in list(pool._processes):
+                os.kill(pid, signal.SIGKILL)
+
+        with pytest.raises(OSError, match="worker processes died while they rendered"):
+            render(scene, preset("setup1", scale=8), executor=pool, progress=kill)
+
+
+def _opened():
+    return len(executors._opened)
+
+
+def test_a_cluster_of_processes_loses_nothing_when_one_is_killed(scene, whole):
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        pids = list(client.run(os.getpid).values())
+        assert len(set(pids)) == 2 and os.getpid() not in pids
+        killed = []
+
+        def kill(done, total):
+            if done == 1:
+                os.kill(pids[0], signal.SIGKILL)
+                killed.append(done)
+
+        shot = render(scene, CAMERA, executor=client, progress=kill, **OPTIONS)
+        assert killed
+        assert_same(whole, shot)
+        assert_same(whole, render(scene, CAMERA, executor=client.get_executor(), **OPTIONS))
+
+
+def test_a_scene_travels_without_its_trees(scene):
+    assert scene.packed is not None
+    again = pickle.loads(pickle.dumps(scene))
+    assert "packed" not in vars(again)
+    small = preset("setup1", scale=128)
+    np.testing.assert_array_equal(render(scene, small).picture.pixels, render(again, small).picture.pixels)
+
+
+def test_few_blocks_are_under_way_at_a_time(scene):
+    """However large the picture, a slow first block holds up all but a few."""
+
+    class Counting(ThreadPoolExecutor):
+        most = now = 0
+
+        def submit(self, call, *arguments):
+            future = super().submit(call, *arguments)
+            self.now += 1
+            self.most = max(self.most, self.now)
+            result = future.result
+
+            def counted(timeout=None):
+                self.now -= 1
+                return result(timeout)
+
+            future.result = counted
+            return future
+
+    with Counting(2) as pool:
+        render(scene, preset("setup1", scale=32), executor=pool)
+    assert pool.most == 2 * executors.AHEAD
+
+
+def test_an_error_or_an_interrupt_leaves_nothing_running(scene):
+    def stop(done, total):
+        raise KeyboardInterrupt
+
+    with ThreadPoolExecutor(1) as pool:
+        with pytest.raises(KeyboardInterrupt):
+            render(scene, CAMERA, executor=pool, progress=stop)
+        gate = pool.submit(threading.get_ident)
+        assert gate.result(timeout=10), "the pool is free again"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"executor": 4}, "executor is 4: a concurrent.futures executor or a dask client is needed"),
+        ({"executor": Future()}, "a concurrent.futures executor or a dask client"),
+        ({"executor": ThreadPoolExecutor(1), "workers": 2}, "workers is 2: an executor has its own"),
+    ],
+)
+def test_what_renders_nothing_is_refused(wrong, says):
+    with pytest.raises(ValueError, match=says):
+        render(Scene(bodies=[body(wall(5))]), CAMERA, **wrong)
