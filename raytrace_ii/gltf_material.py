@@ -67,7 +67,7 @@ def surface(
     f0 = float(np.mean(metallic * tint + (1 - metallic) * reflectance))
     # Blinn–Phong of the same width (Karis 2013), as strong as normalised D/4 seen head on, none on a matt surface
     shininess = max(2 / max(roughness, 0.05) ** 4 - 2, 1.0)
-    specular = min(f0 * (1 - roughness) * (shininess + 2) / 8, 1.0)
+    specular = min(float(f0 * (1 - roughness) * (shininess + 2) / 8), 1.0)
     return {
         "colour": _vector(diffuse / left if left > 1e-6 else 0 * diffuse),
         "mirror": _vector(mirror),

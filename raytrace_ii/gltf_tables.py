@@ -284,8 +284,10 @@ def left_out(model: BaseModel, place: str = "") -> Iterator[str]:
     for key, value in (model.model_extra or {}).items():
         if key == "extensions" and isinstance(value, dict):
             yield from value
+        elif place.endswith("extensions"):
+            yield key
         elif value not in ([], {}):
-            yield key if place.endswith("extensions") else f"{place}.{key}".lstrip(".")
+            yield f"{place}.{key}".lstrip(".")
     for key in type(model).model_fields:
         value = getattr(model, key)
         for item in value if isinstance(value, list) else [value]:

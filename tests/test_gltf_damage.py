@@ -1,0 +1,178 @@
+"""Damaged glTF files: one line that names the file and the part, and never a traceback or a silent wrong picture."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+from gltf_files import SQUARE, SQUARE_FACES, SQUARE_UV, Gltf, glb
+from hypothesis import given
+from hypothesis import strategies as st
+
+from raytrace_ii import load_scene
+from raytrace_ii.load import read_model
+
+
+def good():
+    gltf = Gltf()
+    picture = gltf.texture(np.full((2, 2, 3), 128), wrapS=10497)
+    material = gltf.material(pbr={"baseColorTexture": {"index": picture}})
+    gltf.node(mesh=gltf.mesh(SQUARE, SQUARE_FACES, material=material, TEXCOORD_0=SQUARE_UV))
+    gltf.node(extensions=gltf.light(type="point"))
+    return gltf
+
+
+def set_at(tables, path, value):
+    """Replace, or with None remove, what stands at a path of keys and rows."""
+    *way, last = path.split(".")
+    for step in way:
+        tables = tables[int(step) if isinstance(tables, list) else step]
+    last = int(last) if isinstance(tables, list) else last
+    if value is None:
+        del tables[last]
+    else:
+        tables[last] = value
+
+
+# Views and accessors of `good`: 0 the image; 1, 2, 3 POSITION, TEXCOORD_0, indices; accessors 0, 1, 2.
+WRONG = [
+    ("scene", 3, "scene: scenes.3 is named, there are 1"),
+    ("scenes.0.nodes", [7], "scenes.0: nodes.7 is named, there are 2"),
+    ("scenes.0.nodes", [0, 0], "scenes.0: nodes.0 is named twice: each node has one parent"),
+    ("nodes.0.children", [0], "nodes.0: nodes.0 is named twice: each node has one parent"),
+    ("nodes.0.mesh", 2, "nodes.0: meshes.2 is named, there are 1"),
+    ("nodes.0.mesh", -1, "nodes.0.mesh: -1: a number of at least 0 is needed"),
+    ("nodes.0.matrix", [1.0] * 15, "nodes.0.matrix: "),
+    ("nodes.0.rotation", [0, 0, 0, 0], "nodes.0.rotation: a quaternion of length 0"),
+    ("nodes.0.translation", [0, "far", 0], "nodes.0.translation.1: 'far': a number is needed"),
+    ("nodes.1.extensions.KHR_lights_punctual.light", 4, "nodes.1: light 4 is named, there are 1"),
+    ("extensions.KHR_lights_punctual.lights.0.type", "lamp", "extensions.KHR_lights_punctual.lights.0.type: unknown"),
+    (
+        "extensions.KHR_lights_punctual.lights.0.intensity",
+        -1,
+        "extensions.KHR_lights_punctual.lights.0.intensity: -1",
+    ),
+    ("meshes.0.primitives", None, "meshes.0.primitives: is missing"),
+    ("meshes.0.primitives.0.mode", 9, "meshes.0.primitives.0.mode: 9: a number of at most 6 is needed"),
+    ("meshes.0.primitives.0.material", 5, "meshes.0.primitives.0: materials.5 is named, there are 1"),
+    ("meshes.0.primitives.0.indices", 8, "meshes.0.primitives.0.indices: accessors.8 is named, there are 3"),
+    ("meshes.0.primitives.0.indices", 0, "meshes.0.primitives.0.indices: unsigned whole numbers are needed"),
+    ("meshes.0.primitives.0.attributes.POSITION", None, "meshes.0.primitives.0: has no POSITION"),
+    (
+        "meshes.0.primitives.0.attributes.POSITION",
+        1,
+        "meshes.0.primitives.0.POSITION: has 2 components: 3 are needed",
+    ),
+    ("meshes.0.primitives.0.attributes.TEXCOORD_0", None, "materials.0 needs TEXCOORD_0, there is none"),
+    ("accessors.1.count", 3, "meshes.0.primitives.0.TEXCOORD_0: has 3 rows, POSITION 4"),
+    ("accessors.2.count", 5, "meshes.0.primitives.0: 5 corners: a multiple of 3 is needed"),
+    ("accessors.2.count", 2, "meshes.0.primitives.0: 2 corners make no triangle"),
+    ("accessors.0.count", 3, "meshes.0.primitives.0.indices: vertex 3 is named, there are 3"),
+    ("accessors.0.count", 5, "accessors.0: bytes up to 60 of bufferViews.1 are named, there are 48"),
+    ("accessors.0.count", 0, "accessors.0.count: 0: a number of at least 1 is needed"),
+    ("accessors.0.byteOffset", 4, "accessors.0: bytes up to 52 of bufferViews.1 are named, there are 48"),
+    ("accessors.0.type", "VEC9", "accessors.0: unknown type 'VEC9': known are SCALAR, VEC2, VEC3, VEC4"),
+    ("accessors.0.componentType", 1, "accessors.0: unknown componentType 1: known are 5120"),
+    ("accessors.0.bufferView", 9, "accessors.0: bufferViews.9 is named, there are 4"),
+    ("bufferViews.1.buffer", 2, "bufferViews.1: buffers.2 is named, there are 1"),
+    ("bufferViews.1.byteStride", 4, "bufferViews.1: byteStride 4 is less than a row, 12"),
+    ("bufferViews.3.byteLength", 99999, "of buffers.0 are named, there are"),
+    ("buffers.0.uri", None, "buffers.0: neither a uri nor a binary chunk of the file holds it"),
+    ("buffers.0.uri", "no.bin", "no.bin does not exist"),
+    ("buffers.0.uri", "http://example.org/a.bin", "buffers.0: uri 'http://example.org/a.bin': data or the relative"),
+    (
+        "buffers.0.uri",
+        "/etc/hostname",
+        "buffers.0: uri '/etc/hostname': data or the relative name of a file is needed",
+    ),
+    ("buffers.0.uri", "file:///etc/hostname", "buffers.0: uri 'file:///etc/hostname': data or the relative name"),
+    ("buffers.0.uri", "data:;base64,AAA", "buffers.0: data uri: Incorrect padding"),
+    ("buffers.0.byteLength", 99999, "buffers.0: 99999 bytes are needed, there are"),
+    ("textures.0.source", 3, "materials.0: images.3 is named, there are 1"),
+    ("textures.0.sampler", 3, "materials.0: samplers.3 is named, there are 1"),
+    ("materials.0.pbrMetallicRoughness.baseColorTexture.index", 9, "materials.0: textures.9 is named, there are 1"),
+    ("materials.0.pbrMetallicRoughness.metallicFactor", 2, "metallicFactor: 2: a number of at most 1 is needed"),
+    ("materials.0.alphaMode", "HALF", "materials.0.alphaMode: unknown 'HALF': known are OPAQUE, MASK or BLEND"),
+    ("images.0.bufferView", 1, "images.0: cannot be read as a picture"),
+    ("images.0.bufferView", None, "images.0: neither a uri nor a bufferView is given"),
+    ("images.0", {"uri": "no.png"}, "no.png does not exist"),
+    ("asset", {"version": "1.0"}, "asset.version '1.0': glTF 2.0 is needed"),
+    ("asset", None, "asset.version '': glTF 2.0 is needed"),
+    (
+        "extensionsRequired",
+        ["KHR_draco_mesh_compression"],
+        "extensionsRequired: KHR_draco_mesh_compression: known are",
+    ),
+    ("nodes", {}, "nodes: {}: a list is needed"),
+    ("meshes.0.primitives.0.attributes", [], "meshes.0.primitives.0.attributes: []: a table of keys is needed"),
+    ("scenes.0.nodes", [1], "holds no triangles"),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "says"), WRONG)
+def test_what_is_wrong_is_named_with_its_place(path, value, says, tmp_path):
+    file = good().save(tmp_path / "m.gltf")
+    tables = json.loads(file.read_text())
+    tables["extensionsRequired"] = []
+    set_at(tables, path, value)
+    file.write_text(json.dumps(tables))
+    with pytest.raises((ValueError, OSError)) as caught:
+        load_scene(file)
+    message = str(caught.value)
+    assert message.startswith("m.gltf: ") and says in message and "\n" not in message, message
+
+
+def test_values_that_are_not_finite_are_refused(tmp_path):
+    gltf = Gltf()
+    gltf.node(mesh=gltf.mesh(np.array(SQUARE) * [np.nan, 1, 1], SQUARE_FACES))
+    with pytest.raises(ValueError, match=r"m\.glb: accessors\.0: holds values that are not finite numbers"):
+        read_model(gltf.save(tmp_path / "m.glb"))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda d: d[:10], "GLB header: 20 bytes are needed, there are 10"),
+        (lambda d: d[:-5], "bytes are announced, there are"),
+        (lambda d: d[:4] + struct.pack("<I", 1) + d[8:], "GLB header: version 1: version 2 is needed"),
+        (
+            lambda d: d[:12] + struct.pack("<I", 10**9) + d[16:],
+            "GLB chunk at byte 12: 1000000000 bytes are announced",
+        ),
+        (lambda d: d[:16] + b"ABCD" + d[20:], "GLB has no JSON chunk"),
+        (lambda d: d[:20] + b"]" + d[21:], "JSON: "),
+        (lambda d: b"PK" + d[2:], "JSON: "),
+        (lambda d: b"", "JSON: "),
+        (lambda d: b"[]", "asset.version '': glTF 2.0 is needed"),
+        (lambda d: b"[" * 100000, "JSON: "),
+        (lambda d: glb({"asset": {"version": "2.0"}, "extras": 1}, b""), "holds no triangles"),
+    ],
+)
+def test_damaged_containers(change, says, tmp_path):
+    file = good().save(tmp_path / "m.glb")
+    file.write_bytes(change(file.read_bytes()))
+    with pytest.raises(ValueError) as caught:
+        read_model(file)
+    assert str(caught.value).startswith("m.glb: ") and says in str(caught.value), str(caught.value)
+
+
+@given(st.data())
+def test_a_file_cut_off_or_with_a_wrong_byte_is_read_or_refused_in_words(tmp_path_factory, data):
+    folder = tmp_path_factory.mktemp("cut")
+    whole = bytearray(good().save(folder / "m.glb").read_bytes())
+    for _ in range(data.draw(st.integers(0, 3))):
+        whole[data.draw(st.integers(0, len(whole) - 1))] = data.draw(st.integers(0, 255))
+    (folder / "m.glb").write_bytes(
+        whole[: data.draw(st.integers(0, len(whole)))] if data.draw(st.booleans()) else whole
+    )
+    try:
+        read_model(folder / "m.glb")
+    except (ValueError, OSError) as error:
+        assert str(error).startswith("m.glb: ") and "\n" not in str(error), str(error)
+
+
+def test_the_command_says_which_object_of_which_scene(run, refused, tmp_path):
+    (tmp_path / "m.glb").write_bytes(good().save(tmp_path / "m.glb").read_bytes()[:300])
+    (tmp_path / "s.toml").write_text('[[object]]\nname = "cow"\nmesh = "m.glb"\n')
+    result = run("render", tmp_path / "s.toml", "-o", tmp_path / "a.png")
+    refused(result, f"{tmp_path}/s.toml: object.0 (cow): m.glb: GLB header: ")

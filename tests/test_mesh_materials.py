@@ -1,0 +1,136 @@
+"""Materials of OBJ, PLY and STL files."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from ii_core.files import write_image
+from raytrace_ii import load_scene, trace
+from raytrace_ii.load import read_model
+from raytrace_ii.texture import VertexColours, linear
+
+OBJ = """
+mtllib a.mtl
+o left
+v 0 0 0
+v 2 0 0
+v 2 1 0
+v 0 1 0
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+usemtl red one
+f 1/1 2/2 3/3
+usemtl glass
+f 1/1 3/3 4/4
+o right
+usemtl glass
+f 1/1 2/2 3/3
+"""
+MTL = """# two
+newmtl red one
+Kd 0.5 0.25 0
+Ks 0.2 0.4 0.6
+Ns 30
+Ke 0 0 2
+illum 2
+newmtl glass
+Ka 1 1 1
+Kd 0 0 1
+Tr 0.8
+Tf 1 0.5 0.25
+Ni 1.45
+"""
+
+
+def saved(tmp_path, obj=OBJ, mtl=MTL):
+    (tmp_path / "a.obj").write_text(obj)
+    (tmp_path / "a.mtl").write_text(mtl)
+    return tmp_path / "a.obj"
+
+
+def test_obj_and_mtl(tmp_path):
+    model = read_model(saved(tmp_path))
+    parts = {part.name: part for part in model.parts}
+    assert list(parts) == ["left", "left_1", "right"] and not model.left_out
+    red = parts["left"].material
+    np.testing.assert_allclose(red.colour, linear([0.5, 0.25, 0]))
+    np.testing.assert_allclose(red.specular, linear([0.2, 0.4, 0.6]).mean())
+    np.testing.assert_allclose(red.emission, [0, 0, 2])
+    assert red.shininess == 30 and not red.transmissive
+    glass = parts["right"].material
+    assert glass is parts["left_1"].material
+    np.testing.assert_allclose(glass.transmission, 0.8 * linear([1, 0.5, 0.25]))
+    assert glass.ior == 1.45 and glass.specular == 0
+
+
+def test_opacity_either_way(tmp_path):
+    for line in ("d 0.25", "Tr 0.75"):
+        path = saved(tmp_path, OBJ, MTL.replace("Tr 0.8", line).replace("Tf 1 0.5 0.25\n", ""))
+        assert read_model(path).parts[-1].material.transmission == (0.75,) * 3
+
+
+def test_a_mirror_of_illum_3(tmp_path):
+    red = read_model(saved(tmp_path, OBJ, MTL.replace("illum 2", "illum 3"))).parts[0].material
+    np.testing.assert_allclose(red.mirror, linear([0.2, 0.4, 0.6]))
+
+
+def test_map_kd_is_seen(tmp_path):
+    pixels = np.zeros((2, 2, 3), np.uint8)
+    pixels[0, 0] = 255, 0, 0
+    (tmp_path / "my maps").mkdir()
+    write_image(tmp_path / "my maps" / "c.png", pixels)
+    saved(tmp_path, OBJ.replace("usemtl glass", "usemtl red one"), "newmtl red one\nmap_Kd my maps\\c.png\n")
+    (tmp_path / "s.toml").write_text('ambient = 1\n[[object]]\nmesh = "a.obj"\n')
+    scene = load_scene(tmp_path / "s.toml")
+    aims = np.array([[0.3, 0.75, -5], [1.5, 0.7, -5], [1.7, 0.25, -5]])
+    seen = trace(scene, aims, np.broadcast_to([0.0, 0, 1], aims.shape)).radiance
+    np.testing.assert_allclose(seen[1:], 0, atol=1e-6)
+    assert seen[0, 0] > 0.5 and seen[0, 1] == 0
+
+
+def test_what_is_not_supported_is_named(tmp_path):
+    model = read_model(saved(tmp_path, OBJ + "l 1 2\n", MTL + "map_Bump a.png\nnorm b.png\n"))
+    assert model.left_out == ["l lines", "MTL map_Bump", "MTL norm"]
+
+
+@pytest.mark.parametrize(
+    ("obj", "mtl", "says"),
+    [
+        (OBJ.replace("a.mtl", "b.mtl"), MTL, "b.mtl does not exist"),
+        (OBJ.replace("usemtl glass", "usemtl glas"), MTL, "usemtl glas: known are red one, glass"),
+        (OBJ, MTL.replace("Kd 0 0 1", "Kd 0 x 1"), "a.mtl: glass: Kd '0 x 1': numbers of at least 0 are needed"),
+        (OBJ, MTL.replace("Kd 0 0 1", "Kd"), "a.mtl: glass: Kd '': numbers of at least 0 are needed"),
+        (OBJ, MTL.replace("Kd 0 0 1", "Kd -1 0 1"), "a.mtl: glass: Kd '-1 0 1': numbers of at least 0 are needed"),
+        (OBJ, MTL.replace("Tr 0.8", "Tr 8"), "glass: d or Tr leaves 8 to go through: a share from 0 to 1"),
+        (OBJ, MTL.replace("Ni 1.45", "map_Kd no.png"), "no.png does not exist"),
+        (OBJ.replace("1/1 2/2 3/3", "1/1 2/2 9/3"), MTL, ""),
+        ("v 0 0 0\n", MTL, ""),
+    ],
+)
+def test_what_is_wrong_is_named(obj, mtl, says, tmp_path):
+    with pytest.raises((ValueError, OSError)) as caught:
+        read_model(saved(tmp_path, obj, mtl))
+    assert str(caught.value).startswith("a.obj: ") and says in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_colours_of_a_plys_vertices(tmp_path):
+    box = trimesh.creation.box((2, 2, 2))
+    box.visual.vertex_colors = np.tile([255, 128, 0, 255], (8, 1))
+    box.export(tmp_path / "b.ply")
+    (part,) = read_model(tmp_path / "b.ply").parts
+    assert isinstance(part.material.texture, VertexColours)
+    np.testing.assert_allclose(part.mesh.colours, np.tile(linear([1, 128 / 255, 0]), (8, 1)))
+    (tmp_path / "s.toml").write_text('ambient = 1\n[[object]]\nname = "b"\nmesh = "b.ply"\n')
+    scene = load_scene(tmp_path / "s.toml")
+    assert scene.bodies[0].name == "b"
+    np.testing.assert_allclose(
+        trace(scene, [(0, 0, -5)], [(0, 0, 1)]).radiance[0], linear([1, 128 / 255, 0]), rtol=1e-5
+    )
+
+
+def test_a_file_that_says_nothing_is_the_default_grey(tmp_path):
+    trimesh.creation.box((2, 2, 2)).export(tmp_path / "b.stl")
+    (tmp_path / "s.toml").write_text('ambient = 1\n[[object]]\nmesh = "b.stl"\n')
+    np.testing.assert_allclose(load_scene(tmp_path / "s.toml").bodies[0].material.colour, 0.8)
