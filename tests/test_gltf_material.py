@@ -50,14 +50,14 @@ def test_known_limits():
 
 
 def test_the_highlight_is_as_wide_as_the_roughness_says():
-    """Blinn–Phong's exponent against the GGX lobe: the half-angle of half height, within a third from 0.3 to 0.7."""
+    """Blinn–Phong's exponent against the GGX lobe: its half angle at half height is up to 1.3 of GGX's, whose tails it lacks."""
     for roughness in (0.3, 0.5, 0.7):
         alpha = roughness**2
         exponent = surface(np.ones(3), 0.0, roughness, np.full(3, 0.04), 0.0)["shininess"]
         phong = math.acos(0.5 ** (1 / exponent))
         # GGX: D ∝ 1/((cos²(α² − 1) + 1)²) is half where cos²(1 − α²) = 1 − √2 α²
         ggx = math.acos(math.sqrt((1 - math.sqrt(2) * alpha**2) / (1 - alpha**2)))
-        assert 0.67 < phong / ggx < 1.9, (roughness, phong, ggx)
+        assert 1.2 < phong / ggx < 1.35, (roughness, phong, ggx)
 
 
 def material_of(tmp_path, gltf, index, **attributes):

@@ -53,14 +53,14 @@ def saved(tmp_path, obj=OBJ, mtl=MTL):
 def test_obj_and_mtl(tmp_path):
     model = read_model(saved(tmp_path))
     parts = {part.name: part for part in model.parts}
-    assert list(parts) == ["left", "left_1", "right"] and not model.left_out
-    red = parts["left"].material
+    assert list(parts) == ["left_red one", "left_glass", "right_glass"] and not model.left_out
+    red = parts["left_red one"].material
     np.testing.assert_allclose(red.colour, linear([0.5, 0.25, 0]))
     np.testing.assert_allclose(red.specular, linear([0.2, 0.4, 0.6]).mean())
     np.testing.assert_allclose(red.emission, [0, 0, 2])
     assert red.shininess == 30 and not red.transmissive
-    glass = parts["right"].material
-    assert glass is parts["left_1"].material
+    glass = parts["right_glass"].material
+    assert glass is parts["left_glass"].material
     np.testing.assert_allclose(glass.transmission, 0.8 * linear([1, 0.5, 0.25]))
     assert glass.ior == 1.45 and glass.specular == 0
 
