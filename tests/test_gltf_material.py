@@ -50,7 +50,7 @@ def test_known_limits():
 
 
 def test_the_highlight_is_as_wide_as_the_roughness_says():
-    """Blinn–Phong's exponent against the GGX lobe: its half angle at half height is up to 1.3 of GGX's, whose tails it lacks."""
+    """Blinn–Phong's exponent against GGX, whose tails it lacks: at half height it is up to 1.3 times as wide."""
     for roughness in (0.3, 0.5, 0.7):
         alpha = roughness**2
         exponent = surface(np.ones(3), 0.0, roughness, np.full(3, 0.04), 0.0)["shininess"]
