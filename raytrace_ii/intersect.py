@@ -47,9 +47,9 @@ class Intersector:
         return found, time.thread_time() - start
 
     def nearest_clear(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], reach: NDArray[np.float32]
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], reach: NDArray[np.float32] | None = None
     ) -> tuple[dict[str, Any], float]:
-        """Nearest hit with a transmissive face within ``reach``; ``primID`` counts from the first of them."""
+        """Nearest hit within ``reach`` with a face that lets light through; ``primID`` counts from their first."""
         assert self._clear is not None
         start = time.thread_time()
         hits = self._clear.run(origins, directions, dists=reach, query="INTERSECT", output=True)

@@ -11,9 +11,9 @@ import numpy as np
 
 from ii_core.jit import inline_kernel, kernel
 
-# A weight this small cannot move a colour by half a step of 8 bits, not even on sRGB's steep foot.
+# A weight this small cannot move a colour by half a step of 8 bits, not even on sRGB's steep foot, of light up to 1.
 LEAST_WEIGHT = 0.5 / 255 / 12.92
-REFLECTION, REFRACTION = 0, 1
+REFLECTION, REFRACTION, WEAK_SHADOW, WEAK_REFLECTION, WEAK_REFRACTION = 0, 1, 2, 3, 4  # what is counted
 IMAGE, CHECKER, NOISE, VERTEX, STRIPES = 0, 1, 2, 3, 4  # kinds of texture
 POINT, DIRECTIONAL, SPOT = 0, 1, 2  # kinds of light
 # Odd multipliers of the noise lattice's hash.
@@ -28,8 +28,8 @@ _GRADIENTS = np.array(
 )
 
 # Columns of the material table and of the light table, as in packing.py.
-_MIRROR, _TRANSMISSION, _ABSORPTION = 3, 6, 9
-_SPECULAR, _SHININESS, _IOR, _LOCAL, _TEXTURE, _LEAST_HALF, _EMISSION = 12, 13, 14, 15, 16, 17, 18
+_MIRROR, _TRANSMISSION, _ABSORPTION, _SPECULAR, _SHININESS, _PRIORITY, _LOCAL = 3, 6, 9, 12, 13, 14, 15
+_TEXTURE, _LEAST_HALF, _EMISSION, _IOR, _CUTOFF, _NORMAL_MAP, _NORMAL_SCALE = 16, 17, 18, 21, 24, 25, 26
 _LIGHT_COLOUR, _CONE_AXIS, _CONE_SCALE, _CONE_OFFSET = 4, 7, 10, 11
 _SKY_IMAGE, _SKY_TURN, _SKY_INTENSITY = 10, 11, 12
 
@@ -67,7 +67,8 @@ def start_rays(
             out_directions[count, c] = (r0 * dx + r1 * dy + r2 * dz) * inverse
             out_weights[count, c] = share
         out_pixels[count] = i
-        out_inside[count] = -1
+        for k in range(out_inside.shape[1]):
+            out_inside[count, k] = -1
         count += 1
     return count, bad
 
@@ -99,15 +100,16 @@ def record_support(
 def shade(
     primitives, u, v, distances, origins, directions, weights, pixels, inside,
     corners, faces, normals, coordinates, object_of_face, materials, textures, texels, lights, background, fog,
-    ambient, radiance, shadow_origins, shadow_directions, shadow_reach, shadow_colours, shadow_pixels,
-    next_origins, next_directions, next_weights, next_pixels, next_inside, next_kinds, spawn,
+    ambient, least, radiance,
+    shadow_origins, shadow_directions, shadow_reach, shadow_colours, shadow_pixels, shadow_inside,
+    next_origins, next_directions, next_weights, next_pixels, next_inside, counts, spawn,
 ):  # fmt: skip
     """Shade one generation of rays.
 
-    Adds background and ambient light to ``radiance``; writes shadow rays with the light they would let through,
-    and, if ``spawn``, reflected and refracted rays. ``inside`` is the object whose body a ray runs in, −1 for none.
-    ``fog`` is its colour and density, of no length if there is none; it lies outside bodies, and before the sky not
-    at all.
+    Adds background, emitted and ambient light to ``radiance``; writes shadow rays with the light they would let
+    through, and, if ``spawn``, reflected and refracted rays; none weaker than ``least``. ``inside`` lists the
+    transmissive bodies that a ray runs in, −1 after the last. ``fog`` is its colour and density, of no length if
+    there is none; it lies outside bodies, and before the sky not at all.
 
     Returns
     -------
@@ -129,40 +131,41 @@ def shade(
         body = object_of_face[f]
         gx, gy, gz, lift = float(faces[f, 0]), float(faces[f, 1]), float(faces[f, 2]), float(faces[f, 3])
         entering = gx * dx + gy * dy + gz * dz < 0.0
-        medium = inside[i]
-        if medium < 0 and not entering:  # the camera stands in the body
-            medium = body
+        clear = max(
+            materials[body, _TRANSMISSION], materials[body, _TRANSMISSION + 1], materials[body, _TRANSMISSION + 2]
+        )
+        medium = -1
+        if inside.shape[1] > 0:
+            if clear > 0.0 and not entering:  # an open body's back: the way to it ran inside
+                _enter(inside, i, body)
+            medium = _medium(inside, i, materials, -1)
         if medium >= 0:  # Beer–Lambert along the way through a body
             t = float(distances[i])
             w0 *= math.exp(-materials[medium, _ABSORPTION] * t)
             w1 *= math.exp(-materials[medium, _ABSORPTION + 1] * t)
             w2 *= math.exp(-materials[medium, _ABSORPTION + 2] * t)
-        # the back of what lets nothing through is seen from outside: a sheet, a hair
-        if fog.shape[0] > 0 and (
-            medium < 0
-            or max(
-                materials[medium, _TRANSMISSION],
-                materials[medium, _TRANSMISSION + 1],
-                materials[medium, _TRANSMISSION + 2],
-            )
-            == 0.0
-        ):
-            clear = math.exp(-fog[3] * float(distances[i]))
-            radiance[pixel, 0] += w0 * (1.0 - clear) * fog[0]
-            radiance[pixel, 1] += w1 * (1.0 - clear) * fog[1]
-            radiance[pixel, 2] += w2 * (1.0 - clear) * fog[2]
-            w0, w1, w2 = w0 * clear, w1 * clear, w2 * clear
+        elif fog.shape[0] > 0:
+            through = math.exp(-fog[3] * float(distances[i]))
+            radiance[pixel, 0] += w0 * (1.0 - through) * fog[0]
+            radiance[pixel, 1] += w1 * (1.0 - through) * fog[1]
+            radiance[pixel, 2] += w2 * (1.0 - through) * fog[2]
+            w0, w1, w2 = w0 * through, w1 * through, w2 * through
         if not entering:
             gx, gy, gz = -gx, -gy, -gz
         nx, ny, nz = gx, gy, gz
         if normals.shape[0] > 0:
             nx, ny, nz = _shading_normal(normals, f, u[i], v[i], gx, gy, gz, dx, dy, dz)
+        if materials[body, _NORMAL_MAP] >= 0:
+            nx, ny, nz = _mapped_normal(
+                corners, coordinates, textures, texels, f, u[i], v[i], int(materials[body, _NORMAL_MAP]),
+                materials[body, _NORMAL_SCALE], entering, nx, ny, nz, dx, dy, dz,
+            )  # fmt: skip
         px, py, pz = _start_point(corners, faces, f, u[i], v[i])
         ox, oy, oz = px + lift * gx, py + lift * gy, pz + lift * gz
 
-        for c in range(3):
-            if materials[body, _EMISSION + c] > 0.0:
-                radiance[pixel, c] += (w0, w1, w2)[c] * materials[body, _EMISSION + c]
+        radiance[pixel, 0] += w0 * materials[body, _EMISSION]
+        radiance[pixel, 1] += w1 * materials[body, _EMISSION + 1]
+        radiance[pixel, 2] += w2 * materials[body, _EMISSION + 2]
         local = materials[body, _LOCAL]
         if local > 0.0 or materials[body, _SPECULAR] > 0.0:
             r, g, b = local * materials[body, 0], local * materials[body, 1], local * materials[body, 2]
@@ -192,12 +195,15 @@ def shade(
                 c1 = (g * cosine + w1 * shine) * cone * lights[k, _LIGHT_COLOUR + 1]
                 c2 = (b * cosine + w2 * shine) * cone * lights[k, _LIGHT_COLOUR + 2]
                 if max(c0, c1, c2) < LEAST_WEIGHT:
+                    counts[WEAK_SHADOW] += 1
                     continue
                 _put(shadow_origins, shadows, ox, oy, oz)
                 _put(shadow_directions, shadows, lx, ly, lz)
                 _put(shadow_colours, shadows, c0, c1, c2)
                 shadow_reach[shadows] = reach
                 shadow_pixels[shadows] = pixel
+                for j in range(inside.shape[1]):
+                    shadow_inside[shadows, j] = inside[i, j]
                 shadows += 1
         if not spawn:
             continue
@@ -208,29 +214,36 @@ def shade(
             w1 * materials[body, _MIRROR + 1],
             w2 * materials[body, _MIRROR + 2],
         )
-        t0, t1, t2 = (
-            w0 * materials[body, _TRANSMISSION],
-            w1 * materials[body, _TRANSMISSION + 1],
-            w2 * materials[body, _TRANSMISSION + 2],
-        )
-        if max(t0, t1, t2) > 0.0:
-            ratio = 1.0 / materials[body, _IOR] if entering else float(materials[body, _IOR])
-            cosine = -(dx * nx + dy * ny + dz * nz)
-            reflected, cosine_t = fresnel(cosine, ratio)
-            m0, m1, m2 = m0 + reflected * t0, m1 + reflected * t1, m2 + reflected * t2
-            t0, t1, t2 = (1 - reflected) * t0, (1 - reflected) * t1, (1 - reflected) * t2
-            if max(t0, t1, t2) >= LEAST_WEIGHT:
+        if clear > 0.0:
+            before, after = _media(inside, i, materials, body, entering)
+            ex, ey, ez = np.float64(dx), np.float64(dy), np.float64(dz)
+            cosine = -(ex * nx + ey * ny + ez * nz)
+            for c in range(3 if _disperses(materials, before) or _disperses(materials, after) else 1):
+                t0 = w0 * materials[body, _TRANSMISSION]
+                t1 = w1 * materials[body, _TRANSMISSION + 1]
+                t2 = w2 * materials[body, _TRANSMISSION + 2]
+                if c > 0 or _disperses(materials, before) or _disperses(materials, after):  # one channel alone
+                    t0, t1, t2 = t0 if c == 0 else 0.0, t1 if c == 1 else 0.0, t2 if c == 2 else 0.0
+                ratio = _index(materials, before, c) / _index(materials, after, c)
+                reflected, cosine_t = fresnel(cosine, ratio)
+                m0, m1, m2 = m0 + reflected * t0, m1 + reflected * t1, m2 + reflected * t2
+                t0, t1, t2 = (1 - reflected) * t0, (1 - reflected) * t1, (1 - reflected) * t2
+                if max(t0, t1, t2) < least:
+                    counts[WEAK_REFRACTION] += max(t0, t1, t2) > 0.0
+                    continue
                 along = ratio * cosine - cosine_t
-                tx, ty, tz = ratio * dx + along * nx, ratio * dy + along * ny, ratio * dz + along * nz
+                tx, ty, tz = ratio * ex + along * nx, ratio * ey + along * ny, ratio * ez + along * nz
                 if tx * gx + ty * gy + tz * gz < 0.0:  # a bent normal must not send it back out
                     _put(next_origins, spawned, px - lift * gx, py - lift * gy, pz - lift * gz)
                     _put(next_directions, spawned, tx, ty, tz)
                     _put(next_weights, spawned, t0, t1, t2)
                     next_pixels[spawned] = pixel
-                    next_inside[spawned] = body if entering else -1
-                    next_kinds[REFRACTION] += 1
+                    for j in range(inside.shape[1]):
+                        next_inside[spawned, j] = inside[i, j]
+                    _cross(next_inside, spawned, body, entering)
+                    counts[REFRACTION] += 1
                     spawned += 1
-        if max(m0, m1, m2) >= LEAST_WEIGHT:
+        if max(m0, m1, m2) >= least:
             twice = 2.0 * (dx * nx + dy * ny + dz * nz)
             rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
             if rx * gx + ry * gy + rz * gz <= 0.0:  # nor may it send a reflection into the face
@@ -240,9 +253,12 @@ def shade(
             _put(next_directions, spawned, rx, ry, rz)
             _put(next_weights, spawned, m0, m1, m2)
             next_pixels[spawned] = pixel
-            next_inside[spawned] = medium
-            next_kinds[REFLECTION] += 1
+            for j in range(inside.shape[1]):
+                next_inside[spawned, j] = inside[i, j]
+            counts[REFLECTION] += 1
             spawned += 1
+        elif max(m0, m1, m2) > 0.0:
+            counts[WEAK_REFLECTION] += 1
     return shadows, spawned
 
 
@@ -256,14 +272,160 @@ def add_unblocked(blocked, colours, pixels, radiance):
 
 
 @kernel
-def pass_clear_face(
-    primitives, u, v, distances, origins, directions, reach, colours, pixels,
-    corners, faces, object_of_face, materials, first_clear, radiance,
+def pass_faces(
+    found, found_u, found_v, found_distances, rows, primitives, u, v, distances, directions, inside,
+    corners, faces, coordinates, object_of_face, materials, textures, alphas,
+    out_origins, out_directions, out_rows,
 ):  # fmt: skip
-    """Take shadow rays through the next transmissive face: coloured shadows.
+    """Let rays pass the faces that are not there: cut out by alpha, or hidden in a body of higher priority.
+
+    ``found`` are hits of the rays ``rows``, or of all if it is of no length; they are entered in the table of hits
+    ``primitives``, ``u``, ``v``, ``distances``, from the ray's start. Rays that pass go into the ``out_`` arrays.
+
+    Returns
+    -------
+    int
+        How many rays pass.
+    """
+    count = 0
+    for j in range(found.shape[0]):
+        i = j
+        if rows.shape[0] > 0:
+            i = rows[j]
+            primitives[i], u[i], v[i] = found[j], found_u[j], found_v[j]
+            distances[i] += found_distances[j]
+        f = primitives[i]
+        if f < 0:
+            continue
+        body = object_of_face[f]
+        dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
+        entering = faces[f, 0] * dx + faces[f, 1] * dy + faces[f, 2] * dz < 0.0
+        if not _cut_out(coordinates, textures, alphas, materials, body, f, u[i], v[i]):
+            if not _transmits(materials, body):
+                continue
+            before, after = _media(inside, i, materials, body, entering)
+            if before != after:
+                continue
+            _cross(inside, i, body, entering)
+        _put_behind(out_origins, count, corners, faces, f, u[i], v[i], entering)
+        _put(out_directions, count, dx, dy, dz)
+        out_rows[count] = i
+        count += 1
+    return count
+
+
+@kernel
+def pass_clear_face(
+    primitives, u, v, distances, origins, directions, reach, colours, pixels, inside,
+    corners, faces, coordinates, object_of_face, materials, textures, alphas, first_clear, radiance,
+):  # fmt: skip
+    """Take shadow rays through the next transmissive or cut-out face: coloured shadows.
 
     A ray that met no face arrives and its light is added; the others are dimmed by Fresnel, colour and absorption,
-    moved behind the face and kept, packed to the front. Light goes straight on: no caustics.
+    moved behind the face and kept, packed to the front. Light goes straight on: no caustics. Its angle in each body
+    is that of Snell's law all the same, from the straight ray's angle to the face in air: parallel faces take what
+    they would take of the bent ray.
+
+    Returns
+    -------
+    int
+        How many rays were kept.
+    """
+    kept = 0
+    for i in range(primitives.shape[0]):
+        dx, dy, dz = np.float64(directions[i, 0]), np.float64(directions[i, 1]), np.float64(directions[i, 2])
+        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        hit = primitives[i] >= 0
+        f = primitives[i] + first_clear
+        body = object_of_face[f] if hit else -1
+        entering = hit and faces[f, 0] * dx + faces[f, 1] * dy + faces[f, 2] * dz < 0.0
+        there = hit and not _cut_out(coordinates, textures, alphas, materials, body, f, u[i], v[i])
+        if there and not _transmits(materials, body):
+            continue
+        if there and not entering:
+            _enter(inside, i, body)
+        way = min(float(distances[i]), reach[i]) if hit else reach[i]
+        medium = _medium(inside, i, materials, -1)
+        if medium >= 0 and way < FAR:
+            for c in range(3):
+                colours[i, c] *= math.exp(-materials[medium, _ABSORPTION + c] * way * length)
+        if not hit:
+            for c in range(3):
+                radiance[pixels[i], c] += colours[i, c]
+            continue
+        strongest = 0.0
+        before, after = -1, -1
+        if there:
+            before, after = _media(inside, i, materials, body, entering)
+        for c in range(3):
+            if before != after:
+                colours[i, c] *= materials[body, _TRANSMISSION + c] * (
+                    1.0 - _straight_reflectance(materials, before, after, c, faces, f, dx, dy, dz, length)
+                )
+            colours[kept, c] = colours[i, c]
+            strongest = max(strongest, colours[kept, c])
+        if strongest < LEAST_WEIGHT:
+            continue
+        for j in range(inside.shape[1]):
+            inside[kept, j] = inside[i, j]
+        if there:
+            _cross(inside, kept, body, entering)
+        _put_behind(origins, kept, corners, faces, f, u[i], v[i], entering)
+        _put(directions, kept, dx, dy, dz)
+        # A point light's direction ends at the light: what is left of it, as a share of the same direction.
+        reach[kept] = reach[i] - distances[i] if reach[i] < FAR else FAR
+        pixels[kept] = pixels[i]
+        kept += 1
+    return kept
+
+
+@kernel
+def _straight_reflectance(materials, before, after, c, faces, f, dx, dy, dz, length):
+    """Fresnel's share at a face between two media for light that goes straight on at its angle in air."""
+    cosine = (faces[f, 0] * dx + faces[f, 1] * dy + faces[f, 2] * dz) / length
+    n1, n2 = _index(materials, before, c), _index(materials, after, c)
+    within = 1.0 - (1.0 - cosine * cosine) / (n1 * n1)
+    return fresnel(math.sqrt(within), n1 / n2)[0] if within > 0.0 else 1.0
+
+
+@kernel
+def start_inside(origins, bounds, first_body, out_rows, out_candidates):
+    """Rays that start within the bounds (B, 2, 3) of bodies, and these bodies, −1 after the last.
+
+    Returns
+    -------
+    int
+        How many rays there are.
+    """
+    count = 0
+    for i in range(origins.shape[0]):
+        x, y, z = origins[i, 0], origins[i, 1], origins[i, 2]
+        found = 0
+        for b in range(bounds.shape[0]):
+            if (
+                bounds[b, 0, 0] <= x <= bounds[b, 1, 0]
+                and bounds[b, 0, 1] <= y <= bounds[b, 1, 1]
+                and bounds[b, 0, 2] <= z <= bounds[b, 1, 2]
+                and found < out_candidates.shape[1]
+            ):
+                out_candidates[count, found] = first_body + b
+                found += 1
+        if found:
+            for j in range(found, out_candidates.shape[1]):
+                out_candidates[count, j] = -1
+            out_rows[count] = i
+            count += 1
+    return count
+
+
+@kernel
+def tell_inside(
+    primitives, u, v, rows, candidates, origins, directions, inside, corners, faces, object_of_face, first_clear
+):
+    """Tell by the first face of each candidate along a ray whether it starts inside: there the ray leaves the body.
+
+    Rays with candidates left are moved behind the face and kept, packed to the front. A body left later was
+    entered earlier: it stands before the others in ``inside``.
 
     Returns
     -------
@@ -273,37 +435,186 @@ def pass_clear_face(
     kept = 0
     for i in range(primitives.shape[0]):
         if primitives[i] < 0:
-            for c in range(3):
-                radiance[pixels[i], c] += colours[i, c]
             continue
         f = primitives[i] + first_clear
         body = object_of_face[f]
-        dx, dy, dz = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        gx, gy, gz, lift = float(faces[f, 0]), float(faces[f, 1]), float(faces[f, 2]), float(faces[f, 3])
-        cosine = -(gx * dx + gy * dy + gz * dz) / length
-        reflected, _ = fresnel(abs(cosine), 1.0 / materials[body, _IOR])  # the same on the way in and, unbent, out
-        through = float(distances[i]) * length if cosine < 0.0 else 0.0
-        strongest = 0.0
-        for c in range(3):
-            share = (
-                (1 - reflected)
-                * materials[body, _TRANSMISSION + c]
-                * math.exp(-materials[body, _ABSORPTION + c] * through)
-            )
-            colours[kept, c] = colours[i, c] * share
-            strongest = max(strongest, colours[kept, c])
-        if strongest < LEAST_WEIGHT:
+        dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
+        entering = faces[f, 0] * dx + faces[f, 1] * dy + faces[f, 2] * dz < 0.0
+        row, was = rows[i], candidates.shape[1]
+        for j in range(candidates.shape[1]):
+            candidates[kept, j] = candidates[i, j]
+            if candidates[kept, j] == body:
+                was = j
+        if was < candidates.shape[1]:
+            _leave(candidates, kept, body)
+            if not entering:
+                for j in range(inside.shape[1] - 1, 0, -1):
+                    inside[row, j] = inside[row, j - 1]
+                inside[row, 0] = body
+        if candidates[kept, 0] < 0:
             continue
-        px, py, pz = _start_point(corners, faces, f, u[i], v[i])
-        side = 1.0 if cosine < 0.0 else -1.0
-        _put(origins, kept, px + side * lift * gx, py + side * lift * gy, pz + side * lift * gz)
+        rows[kept] = row
+        _put_behind(origins, kept, corners, faces, f, u[i], v[i], entering)
         _put(directions, kept, dx, dy, dz)
-        # A point light's direction ends at the light: what is left of it, as a share of the same direction.
-        reach[kept] = reach[i] - distances[i] if reach[i] < FAR else FAR
-        pixels[kept] = pixels[i]
         kept += 1
     return kept
+
+
+@kernel
+def _medium(inside, i, materials, without):
+    """The body of highest priority that a ray is in, of equal ones the first entered; −1 for none.
+
+    ``without`` is left out once.
+    """
+    best = -1
+    for k in range(inside.shape[1]):
+        body = inside[i, k]
+        if body < 0:
+            break
+        if body == without:
+            without = -1
+        elif best < 0 or materials[body, _PRIORITY] > materials[best, _PRIORITY]:
+            best = body
+    return best
+
+
+@kernel
+def _media(inside, i, materials, body, entering):
+    """What is before and behind a face of a body; the same if another body hides the face (Schmidt, Budge 2002)."""
+    if entering:
+        before = _medium(inside, i, materials, -1)
+        hidden = before >= 0 and materials[before, _PRIORITY] >= materials[body, _PRIORITY]
+        return before, before if hidden else body
+    after = _medium(inside, i, materials, body)
+    before = _medium(inside, i, materials, -1)
+    for k in range(inside.shape[1]):
+        if inside[i, k] == body:
+            return before, after
+    # not known to be inside: an open body
+    return body if after < 0 or materials[body, _PRIORITY] > materials[after, _PRIORITY] else after, after
+
+
+@kernel
+def _enter(inside, i, body):
+    """Note that a ray is in a body, if it is not noted yet; a full list forgets."""
+    for k in range(inside.shape[1]):
+        if inside[i, k] == body:
+            return
+        if inside[i, k] < 0:
+            inside[i, k] = body
+            return
+
+
+@kernel
+def _leave(inside, i, body):
+    """Take a body out of a list, once."""
+    last, found = inside.shape[1] - 1, False
+    for k in range(inside.shape[1]):
+        found = found or inside[i, k] == body
+        if found:
+            inside[i, k] = inside[i, k + 1] if k < last else -1
+
+
+@kernel
+def _cross(inside, i, body, entering):
+    if entering:
+        _enter(inside, i, body)
+    else:
+        _leave(inside, i, body)
+
+
+@inline_kernel
+def _index(materials, body, c):
+    """Index of refraction of a body for a channel, 1 outside of all."""
+    return np.float64(materials[body, _IOR + c]) if body >= 0 else 1.0
+
+
+@inline_kernel
+def _disperses(materials, body):
+    return body >= 0 and (
+        materials[body, _IOR] != materials[body, _IOR + 1] or materials[body, _IOR] != materials[body, _IOR + 2]
+    )
+
+
+@inline_kernel
+def _transmits(materials, body):
+    return (
+        max(materials[body, _TRANSMISSION], materials[body, _TRANSMISSION + 1], materials[body, _TRANSMISSION + 2])
+        > 0.0
+    )
+
+
+@kernel
+def _cut_out(coordinates, textures, alphas, materials, body, f, u, v):
+    """Whether the texture's alpha leaves no surface at a place of a face."""
+    if materials[body, _CUTOFF] == 0.0:
+        return False
+    row = int(materials[body, _TEXTURE])
+    x, y, _ = _interpolate(coordinates, f, u, v)
+    a, b, c, d, fx, fy = _texels_at(textures, row, x, y)
+    first = int(textures[row, 4]) - int(textures[row, 1])
+    upper = (1 - fx) * alphas[first + a] + fx * alphas[first + b]
+    lower = (1 - fx) * alphas[first + c] + fx * alphas[first + d]
+    return (1 - fy) * upper + fy * lower < materials[body, _CUTOFF]
+
+
+@kernel
+def _put_behind(out, i, corners, faces, f, u, v, entering):
+    """A place just behind a face, seen along a ray that enters or leaves by it."""
+    px, py, pz = _start_point(corners, faces, f, u, v)
+    lift = -faces[f, 3] if entering else faces[f, 3]
+    _put(out, i, px + lift * faces[f, 0], py + lift * faces[f, 1], pz + lift * faces[f, 2])
+
+
+@kernel
+def _mapped_normal(
+    corners, coordinates, textures, texels, f, u, v, row, scale, entering, nx, ny, nz, dx, dy, dz
+):  # fmt: skip
+    """The shading normal tilted by a normal map; untilted where that would turn it away from the viewer.
+
+    Tangents are those of the face's own (u, v), made square to the shading normal; not MikkTSpace's, which are
+    averaged over a mesh's corners.
+    """
+    s, t, _ = _interpolate(coordinates, f, u, v)
+    x, y, z = _image(textures, row, texels, s, t)
+    x, y, z = scale * (2.0 * x - 1.0), scale * (2.0 * y - 1.0), 2.0 * z - 1.0
+    u1, v1 = coordinates[f, 1, 0] - coordinates[f, 0, 0], coordinates[f, 1, 1] - coordinates[f, 0, 1]
+    u2, v2 = coordinates[f, 2, 0] - coordinates[f, 0, 0], coordinates[f, 2, 1] - coordinates[f, 0, 1]
+    turn = float(u1) * v2 - float(u2) * v1
+    if turn == 0.0 or x * x + y * y < 1e-12:
+        return nx, ny, nz
+    side = (1.0 if entering else -1.0) * (1.0 if turn > 0.0 else -1.0)
+    ax, ay, az = _edge(corners, f, 1)
+    bx, by, bz = _edge(corners, f, 2)
+    # where u grows, and where v grows, up to a positive factor and the side
+    tx, ty, tz = _square(v2 * ax - v1 * bx, v2 * ay - v1 * by, v2 * az - v1 * bz, nx, ny, nz)
+    bx, by, bz = _square(u1 * bx - u2 * ax, u1 * by - u2 * ay, u1 * bz - u2 * az, nx, ny, nz)
+    bx, by, bz = _square(bx, by, bz, tx, ty, tz)
+    mx = side * (x * tx + y * bx) + z * nx
+    my = side * (x * ty + y * by) + z * ny
+    mz = side * (x * tz + y * bz) + z * nz
+    length = math.sqrt(mx * mx + my * my + mz * mz)
+    if length == 0.0 or mx * dx + my * dy + mz * dz >= 0.0:
+        return nx, ny, nz
+    return mx / length, my / length, mz / length
+
+
+@inline_kernel
+def _edge(corners, f, k):
+    return (
+        np.float64(corners[f, k, 0]) - corners[f, 0, 0],
+        np.float64(corners[f, k, 1]) - corners[f, 0, 1],
+        np.float64(corners[f, k, 2]) - corners[f, 0, 2],
+    )
+
+
+@kernel
+def _square(x, y, z, nx, ny, nz):
+    """The part of a vector square to a unit vector, as a unit vector; zero if there is none."""
+    along = x * nx + y * ny + z * nz
+    x, y, z = x - along * nx, y - along * ny, z - along * nz
+    length = math.sqrt(x * x + y * y + z * z)
+    return (x / length, y / length, z / length) if length > 0.0 else (0.0, 0.0, 0.0)
 
 
 @kernel
@@ -507,18 +818,25 @@ def texture_colour(table, row, texels, x, y, z):
 
 @kernel
 def _image(table, row, texels, u, v):
+    """Colour of an image at (u, v), bilinear."""
+    a, b, c, d, fx, fy = _texels_at(table, row, u, v)
+    w00, w10, w01, w11 = (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy
+    red = w00 * texels[a, 0] + w10 * texels[b, 0] + w01 * texels[c, 0] + w11 * texels[d, 0]
+    green = w00 * texels[a, 1] + w10 * texels[b, 1] + w01 * texels[c, 1] + w11 * texels[d, 1]
+    blue = w00 * texels[a, 2] + w10 * texels[b, 2] + w01 * texels[c, 2] + w11 * texels[d, 2]
+    return red, green, blue
+
+
+@kernel
+def _texels_at(table, row, u, v):
+    """The four texels about (u, v): left and right above, left and right below, and how far to right and down."""
     first, width, height = int(table[row, 1]), int(table[row, 2]), int(table[row, 3])
     x = (u - math.floor(u)) * width - 0.5
     y = (1.0 - (v - math.floor(v))) * height - 0.5
     i, j = math.floor(x), math.floor(y)
-    fx, fy = x - i, y - j
     i0, i1 = _wrap(int(i), width), _wrap(int(i) + 1, width)
     a, b = first + _wrap(int(j), height) * width, first + _wrap(int(j) + 1, height) * width
-    w00, w10, w01, w11 = (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy
-    red = w00 * texels[a + i0, 0] + w10 * texels[a + i1, 0] + w01 * texels[b + i0, 0] + w11 * texels[b + i1, 0]
-    green = w00 * texels[a + i0, 1] + w10 * texels[a + i1, 1] + w01 * texels[b + i0, 1] + w11 * texels[b + i1, 1]
-    blue = w00 * texels[a + i0, 2] + w10 * texels[a + i1, 2] + w01 * texels[b + i0, 2] + w11 * texels[b + i1, 2]
-    return red, green, blue
+    return a + i0, a + i1, b + i0, b + i1, x - i, y - j
 
 
 @kernel

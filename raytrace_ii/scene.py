@@ -305,8 +305,9 @@ class Scene:
         if not self.max_depth >= 0:
             raise ValueError(f"max_depth is {self.max_depth}: at least 0 is needed")
         _numbers("ambient", self.ambient, least=0)
-        # Transmissive faces go last, so that opaque ones are a prefix that shadow rays may be tested against alone.
-        ordered = sorted(self.bodies, key=lambda body: body.material.transmissive)
+        # Transmissive bodies go last, before them those with cut-outs: opaque faces are a prefix that shadow rays may
+        # be tested against alone.
+        ordered = sorted(self.bodies, key=lambda b: (b.material.transmissive, b.material.alpha_cutoff > 0))
         object.__setattr__(self, "bodies", tuple(ordered))
 
     def with_depth(self, max_depth: int) -> Scene:

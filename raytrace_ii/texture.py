@@ -91,22 +91,26 @@ Texture = Image | Checker | Stripes | Noise | VertexColours
 
 
 class TextureTable:
-    """Textures as a table (n, COLUMNS) and one array (texels, 3) that holds every image."""
+    """Textures as a table (n, COLUMNS), one array (texels, 3) that holds every image, and one of their alphas."""
 
     def __init__(self, textures: Sequence[Texture | None]) -> None:
         self._rows: dict[int, int] = {}
         rows: list[list[float]] = []
         texels: list[NDArray[np.float32]] = []
-        used = 0
+        alphas: list[NDArray[np.float32]] = []
+        used, clear = 0, 0
         for texture in textures:
             if texture is None or id(texture) in self._rows:
                 continue
             self._rows[id(texture)] = len(rows)
             if isinstance(texture, Image):
                 height, width = texture.pixels.shape[:2]
-                rows.append([IMAGE, used, width, height])
+                rows.append([IMAGE, used, width, height, clear])
                 texels.append(texture.pixels.reshape(-1, 3))
                 used += width * height
+                if texture.alpha is not None:
+                    alphas.append(texture.alpha.reshape(-1))
+                    clear += width * height
             elif isinstance(texture, Checker):
                 rows.append([CHECKER, *(1 / s for s in texture.size), *texture.colours[0], *texture.colours[1]])
             elif isinstance(texture, VertexColours):
@@ -122,6 +126,7 @@ class TextureTable:
         for row, values in zip(self.table, rows, strict=True):
             row[: len(values)] = values
         self.texels = np.concatenate(texels) if texels else np.empty((0, 3), np.float32)
+        self.alphas = np.concatenate(alphas) if alphas else np.empty(0, np.float32)
 
     def index(self, texture: Texture | None) -> int:
         """Row of a texture, −1 for none."""

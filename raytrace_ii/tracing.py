@@ -14,19 +14,24 @@ from .packing import PackedScene
 from .scene import Scene
 
 KINDS = ("primary", "shadow", "reflection", "refraction")
-_NO_LENGTHS = np.empty(0, np.float32)
+_NO_LENGTHS, _NO_ROWS = np.empty(0, np.float32), np.empty(0, np.int32)
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
 
 @dataclass
 class RayCount:
-    """Rays by kind, and CPU seconds inside Embree."""
+    """Rays by kind, those not shot because nobody would see them, and CPU seconds inside Embree.
+
+    Rays that go on behind a face that is not there, or ask which body the camera stands in, are kind ``passed``.
+    """
 
     rays: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(KINDS, 0)))
+    skipped: Counter[str] = field(default_factory=Counter)
     embree_seconds: float = 0.0
 
     def add(self, other: RayCount) -> None:
         self.rays.update(other.rays)
+        self.skipped.update(other.skipped)
         self.embree_seconds += other.embree_seconds
 
 
@@ -125,14 +130,14 @@ class _Rays:
     directions: NDArray[np.float32]
     weights: NDArray[np.float32]
     pixels: NDArray[np.int32]
-    inside: NDArray[np.int32]
+    inside: NDArray[np.int32]  # (n, nested)
 
     @classmethod
-    def room(cls, n: int) -> _Rays:
+    def room(cls, n: int, nested: int) -> _Rays:
         def rows() -> NDArray[np.float32]:
             return np.empty((n, 3), np.float32)
 
-        return cls(rows(), rows(), rows(), np.empty(n, np.int32), np.empty(n, np.int32))
+        return cls(rows(), rows(), rows(), np.empty(n, np.int32), np.empty((n, nested), np.int32))
 
 
 class Tracer:
@@ -143,8 +148,8 @@ class Tracer:
         self.max_depth = scene.max_depth
         self.pose = pose
         self.count = RayCount()
-        self._primary = _Rays.room(capacity)
-        self._shadow = (_Rays.room(0), np.empty(0, np.float32))
+        self._primary = _Rays.room(capacity, self.scene.nested)
+        self._shadow = (_Rays.room(0, self.scene.nested), np.empty(0, np.float32))
 
     def run(
         self,
@@ -176,6 +181,8 @@ class Tracer:
             support.clear()
         rays = _Rays(*(array[:n] for array in vars(room).values()))
         self.count.rays["primary"] += n
+        if self.scene.transmits:
+            self._start_inside(rays)
         for depth in range(self.max_depth + 1):
             rays = self._generation(rays, radiance, support if depth == 0 else None, spawn=depth < self.max_depth)
             if not len(rays.pixels):
@@ -184,33 +191,81 @@ class Tracer:
     def _generation(self, rays: _Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool) -> _Rays:
         """Trace and shade one generation; the next one comes back."""
         s, n = self.scene, len(rays.pixels)
-        hits, seconds = s.intersector.nearest(rays.origins, rays.directions)
-        self.count.embree_seconds += seconds
-        primitives, u, v = hits["primID"], hits["u"], hits["v"]
+        primitives, u, v, distances = self._hits(rays)
         if support is not None:
             kernels.record_support(
-                primitives, u, v, hits["tfar"], rays.pixels, s.corners, s.faces, s.object_of_face,
+                primitives, u, v, distances, rays.pixels, s.corners, s.faces, s.object_of_face,
                 self.pose[:3, 3], self.pose[:3, 2],
                 support.depth.reshape(-1), support.normal.reshape(-1, 3), support.object_id.reshape(-1),
                 _NO_LENGTHS if support.ray_length is None else support.ray_length.reshape(-1),
             )  # fmt: skip
         spawn = spawn and (s.mirrors or s.transmits)
-        following = _Rays.room((1 + s.transmits) * n if spawn else 0)
+        following = _Rays.room((1 + s.transmits + 2 * s.disperses) * n if spawn else 0, s.nested)
         shadow, reach = self._shadow_room(n * len(s.lights))
-        kinds = np.zeros(2, np.int64)
+        counts = np.zeros(5, np.int64)
         shadows, spawned = kernels.shade(
-            primitives, u, v, hits["tfar"], rays.origins, rays.directions, rays.weights, rays.pixels, rays.inside,
+            primitives, u, v, distances, rays.origins, rays.directions, rays.weights, rays.pixels, rays.inside,
             s.corners, s.faces, s.normals, s.coordinates, s.object_of_face, s.materials,
-            s.textures.table, s.textures.texels, s.lights, s.background, s.fog, s.ambient, radiance,
-            shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels,
-            following.origins, following.directions, following.weights, following.pixels, following.inside, kinds,
+            s.textures.table, s.textures.texels, s.lights, s.background, s.fog, s.ambient, s.least, radiance,
+            shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels, shadow.inside,
+            following.origins, following.directions, following.weights, following.pixels, following.inside, counts,
             spawn,
         )  # fmt: skip
-        self.count.rays["reflection"] += int(kinds[kernels.REFLECTION])
-        self.count.rays["refraction"] += int(kinds[kernels.REFRACTION])
+        self.count.rays.update({"reflection": int(counts[0]), "refraction": int(counts[1])})
+        self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[2:]), strict=True)))
         if shadows:
             self._light(_Rays(*(array[:shadows] for array in vars(shadow).values())), reach[:shadows], radiance)
         return _Rays(*(array[:spawned] for array in vars(following).values()))
+
+    def _hits(self, rays: _Rays) -> tuple[NDArray[Any], ...]:
+        """Face, u, v and distance of the nearest face that is there: not cut out, not hidden in another body."""
+        s = self.scene
+        found = self._nearest(rays.origins, rays.directions)
+        if not s.passes:
+            return found
+        table, rows = found, _NO_ROWS
+        n = len(rays.pixels)
+        origins, directions, onward = (
+            np.empty((n, 3), np.float32),
+            np.empty((n, 3), np.float32),
+            np.empty(n, np.int32),
+        )
+        for _ in range(MOST_CLEAR_FACES):
+            count = kernels.pass_faces(
+                *found, rows, *table, rays.directions, rays.inside,
+                s.corners, s.faces, s.coordinates, s.object_of_face, s.materials, s.textures.table, s.textures.alphas,
+                origins, directions, onward,
+            )  # fmt: skip
+            if not count:
+                break
+            self.count.rays["passed"] += count
+            rows = onward[:count].copy()
+            found = self._nearest(origins[:count], directions[:count])
+        return table
+
+    def _nearest(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> tuple[NDArray[Any], ...]:
+        hits, seconds = self.scene.intersector.nearest(origins, directions)
+        self.count.embree_seconds += seconds
+        return hits["primID"], hits["u"], hits["v"], hits["tfar"]
+
+    def _start_inside(self, rays: _Rays) -> None:
+        """Note the transmissive bodies that camera rays start in."""
+        s = self.scene
+        rows = np.empty(len(rays.pixels), np.int32)
+        candidates = np.empty((len(rows), s.nested), np.int32)
+        count = kernels.start_inside(rays.origins, s.clear_bounds, s.first_clear, rows, candidates)
+        rows, candidates = rows[:count], candidates[:count]
+        origins, directions = rays.origins[rows], rays.directions[rows]
+        for _ in range(MOST_CLEAR_FACES):
+            if not count:
+                return
+            self.count.rays["passed"] += count
+            hits, seconds = s.intersector.nearest_clear(origins[:count], directions[:count])
+            self.count.embree_seconds += seconds
+            count = kernels.tell_inside(
+                hits["primID"], hits["u"], hits["v"], rows, candidates, origins, directions, rays.inside,
+                s.corners, s.faces, s.object_of_face, s.opaque_faces,
+            )  # fmt: skip
 
     def _light(self, shadow: _Rays, reach: NDArray[np.float32], radiance: NDArray[np.float32]) -> None:
         """Add the light of the shadow rays that nothing opaque stops, dimmed by what is clear."""
@@ -218,22 +273,22 @@ class Tracer:
         self.count.rays["shadow"] += len(shadow.pixels)
         # embreex overwrites the reach it is given, and clear faces need it once more
         found, seconds = s.intersector.blocked(
-            shadow.origins, shadow.directions, reach.copy() if s.transmits else reach
+            shadow.origins, shadow.directions, reach.copy() if s.lets_through else reach
         )
         self.count.embree_seconds += seconds
-        if not s.transmits:
+        if not s.lets_through:
             kernels.add_unblocked(found, shadow.weights, shadow.pixels, radiance)
             return
         free = np.flatnonzero(found)
-        rays: list[NDArray[Any]]
-        rays = [array[free] for array in (shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels)]
+        rays = [array[free] for array in (shadow.origins, shadow.directions, reach, *list(vars(shadow).values())[2:])]
         for _ in range(MOST_CLEAR_FACES):
-            origins, directions, reach, colours, pixels = rays
+            origins, directions, reach, colours, pixels, inside = rays
             hits, seconds = s.intersector.nearest_clear(origins, directions, reach.copy())
             self.count.embree_seconds += seconds
             kept = kernels.pass_clear_face(
                 hits["primID"], hits["u"], hits["v"], hits["tfar"], origins, directions, reach, colours, pixels,
-                s.corners, s.faces, s.object_of_face, s.materials, s.opaque_faces, radiance,
+                inside, s.corners, s.faces, s.coordinates, s.object_of_face, s.materials,
+                s.textures.table, s.textures.alphas, s.opaque_faces, radiance,
             )  # fmt: skip
             if not kept:
                 return
@@ -242,5 +297,5 @@ class Tracer:
 
     def _shadow_room(self, n: int) -> tuple[_Rays, NDArray[np.float32]]:
         if len(self._shadow[1]) < n:
-            self._shadow = (_Rays.room(n), np.empty(n, np.float32))
+            self._shadow = (_Rays.room(n, self.scene.nested), np.empty(n, np.float32))
         return self._shadow

@@ -40,7 +40,7 @@ def test_start_rays_name_the_first_bad_one():
     directions[4] = 0
     directions[2, 1] = np.nan
     rows = [np.empty((6, 3), np.float32) for _ in range(3)]
-    out = (*rows, np.empty(6, np.int32), np.empty(6, np.int32))
+    out = (*rows, np.empty(6, np.int32), np.empty((6, 2), np.int32))
     all_of_it = np.empty(0)
     for function in (kernels.start_rays, kernels.start_rays.py_func):
         assert function(locations, directions, all_of_it, np.eye(3), np.zeros(3), *out) == (6, 2)
@@ -54,7 +54,7 @@ def test_rays_without_light_are_left_out():
     locations, directions = np.arange(12.0).reshape(4, 3), np.ones((4, 3))
     directions[1] = 0  # blocked: nobody asks where it goes
     rows = [np.empty((4, 3), np.float32) for _ in range(3)]
-    pixels, inside = np.empty(4, np.int32), np.empty(4, np.int32)
+    pixels, inside = np.empty(4, np.int32), np.empty((4, 0), np.int32)
     for function in (kernels.start_rays, kernels.start_rays.py_func):
         shares = np.array([0.25, 0, 0, 1])
         found = function(locations, directions, shares, np.eye(3), np.zeros(3), *rows, pixels, inside)
