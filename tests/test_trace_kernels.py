@@ -4,12 +4,38 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from trace_scenes import hall
+from trace_scenes import WHITE, body, hall, sphere, wall
 
 from ii_core import preset
 from raytrace_ii import kernels, trace
+from raytrace_ii.texture import Image
 
-NAMES = ("start_rays", "record_support", "shade", "add_unblocked", "pass_clear_face")
+NAMES = (
+    "start_rays",
+    "record_support",
+    "shade",
+    "add_unblocked",
+    "pass_faces",
+    "pass_clear_face",
+    "start_inside",
+    "tell_inside",
+)
+
+
+def crowded():
+    """The hall, its camera in water, with more water in the glass, a prism's colours and a wall half cut out."""
+    mesh, alpha = wall(25, 9), np.array([[0, 1], [1, 0]], np.float32)
+    sieve = body(
+        mesh,
+        coordinates=np.column_stack([mesh.uv, np.zeros(4)]),
+        texture=Image(np.ones((2, 2, 3), np.float32), alpha=alpha),
+        normal_map=Image(np.full((1, 1, 3), (0.6, 0.5, 0.9), np.float32)),
+        alpha_cutoff=0.5,
+    )
+    water = body(sphere(6, 24), at=(0, -1, 31), transmission=WHITE, ior=(1.32, 1.33, 1.35), priority=-1)
+    sea = body(sphere(20, 24), transmission=WHITE, ior=1.33, absorption_per_mm=(0.01, 0, 0))
+    scene = hall(max_depth=4)
+    return replace(scene, bodies=[*scene.bodies, sieve, water, sea])
 
 
 @pytest.mark.parametrize("glass", [True, False])
@@ -19,6 +45,16 @@ def test_tracing_in_python_sees_the_same(glass, monkeypatch):
     if not glass:  # without it shadows take the shorter way
         bodies = [body for body in scene.bodies if not body.material.transmissive]
         scene = replace(scene, bodies=bodies)
+    assert (agree(scene, monkeypatch).count.rays["refraction"] > 0) == glass
+
+
+def test_passing_in_python_sees_the_same(monkeypatch):
+    compiled = agree(crowded(), monkeypatch)
+    assert compiled.count.rays["passed"] > 600 and compiled.count.rays["refraction"] > 600
+
+
+def agree(scene, monkeypatch):
+    """Trace with compiled kernels and with their source; the first comes back."""
     camera = preset("setup1", scale=64)
     m, n = np.random.default_rng(0).integers(0, camera.pixels, (600, 2)).T
     compiled = trace(scene, *camera.rays_at(m, n))
@@ -32,7 +68,8 @@ def test_tracing_in_python_sees_the_same(glass, monkeypatch):
         assert abs(count - plain.count.rays[kind]) <= 2 + count // 100
     off = np.abs(compiled.radiance - plain.radiance).max(axis=1)
     assert np.quantile(off, 0.99) < 1e-4 and off.max() < 0.5
-    assert compiled.count.rays["refraction"] > 0 if glass else compiled.count.rays["reflection"] > 0
+    assert compiled.count.rays["reflection"] > 0
+    return compiled
 
 
 def test_start_rays_name_the_first_bad_one():
