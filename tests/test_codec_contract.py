@@ -78,7 +78,7 @@ def subsampled(scheme):
 
 def finest(scheme):
     """What to ask for to get the most a scheme gives."""
-    coder = find(scheme)
+    coder = parse_scheme(scheme)[0]
     if lossless(scheme):
         return {}
     if coder.qp_range is not None:
