@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .load import load_scene, scene_names
-    from .rendering import Shot, Stats, render
+    from .rendering import Shot, Stats, render, render_to
     from .scene import Background, Body, Fog, Light, Material, Scene
     from .tracing import trace
 
@@ -23,12 +23,13 @@ __all__ = [
     "Stats",
     "load_scene",
     "render",
+    "render_to",
     "scene_names",
     "trace",
 ]
 
 _HOMES = {"load_scene": "load", "scene_names": "load", "Shot": "rendering", "Stats": "rendering"}
-_HOMES |= {"render": "rendering", "trace": "tracing"}
+_HOMES |= {"render": "rendering", "render_to": "rendering", "trace": "tracing"}
 
 
 def __getattr__(name: str) -> Any:

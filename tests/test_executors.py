@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 
@@ -11,8 +12,8 @@ import numpy as np
 import pytest
 from trace_scenes import body, hall, wall
 
-from ii_core import preset
-from raytrace_ii import Scene, executors, job, render
+from ii_core import IIPicture, preset
+from raytrace_ii import Scene, executors, job, load_scene, render
 
 CAMERA = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 SUPPORT = ("depth", "normal", "object_id", "ray_length", "disparity", "samples")
@@ -65,7 +66,7 @@ def _opened():
     return len(executors._opened)
 
 
-def test_a_cluster_of_processes_loses_nothing_when_one_is_killed(scene, whole):
+def test_a_cluster_of_processes_loses_nothing_when_one_is_killed(scene, whole, run, tmp_path):
     distributed = pytest.importorskip("distributed")
     with (
         distributed.LocalCluster(
@@ -86,6 +87,11 @@ def test_a_cluster_of_processes_loses_nothing_when_one_is_killed(scene, whole):
         assert killed
         assert_same(whole, shot)
         assert_same(whole, render(scene, CAMERA, executor=client.get_executor(), **OPTIONS))
+        command = ("render", "objects", "--scale", 128, "-o", tmp_path / "p.png", "--dask", cluster.scheduler_address)
+        code, _, error = run(*command)
+        assert code == 0, error
+        expected = render(load_scene("objects"), preset("setup1", scale=128)).picture
+        np.testing.assert_array_equal(IIPicture.load(tmp_path / "p.png").pixels, expected.pixels)
 
 
 def test_a_scene_travels_without_its_trees(scene):
@@ -142,3 +148,15 @@ def test_an_error_or_an_interrupt_leaves_nothing_running(scene):
 def test_what_renders_nothing_is_refused(wrong, says):
     with pytest.raises(ValueError, match=says):
         render(Scene(bodies=[body(wall(5))]), CAMERA, **wrong)
+
+
+def test_a_cluster_that_is_not_there_is_one_line(run, refused, tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    command = ("render", "objects", "--scale", 128, "-o", tmp_path / "p.png", "--dask")
+    refused(run(*command, "127.0.0.1:1"), "no dask scheduler answers at 127.0.0.1:1")
+    refused(run(*command, "127.0.0.1:1", "--workers", 2), "--workers are threads of this machine")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    refused(
+        run(*command, "127.0.0.1:1"), "--dask needs dask, which is not installed: pip install 'raytrace-ii[dask]'"
+    )
+    assert list(tmp_path.iterdir()) == []
