@@ -22,7 +22,7 @@ def render(
     output: Annotated[
         Path, typer.Option("-o", "--output", help=".png, .tif (8 or 16 bit) or .exr (linear float); a set's folder.")
     ],
-    scene: Annotated[str, typer.Argument(help="A scene's name, or a .toml file.")] = "",
+    scene: Annotated[str, typer.Argument(help="A scene's name, or a .toml or mesh file.")] = "",
     set_name: Annotated[str, typer.Option("--set", help="Render a set of scenes instead: reference.")] = "",
     camera: Annotated[str, typer.Option(help="A camera's name, a .json file, or a folder of maps.")] = "setup1",
     scale: Annotated[int, typer.Option(help="Divides the number of lenses, at the same pixels per lens.")] = 1,
