@@ -1,0 +1,415 @@
+"""Speed against accuracy: CPU time and error of every setting, scene by scene, and the setting to take.
+
+    python -m benchmarks.pareto [--scale 16] [--scenes apples,car]
+
+The error is PSNR in 16-bit sRGB against a reference of 64 samples a pixel, 12 bounces and, where the scene's file
+says how finely its shapes are cut, triangles half as large; time is CPU seconds of `render` without support images,
+the least of two or three. Samples a pixel, adaptive sampling to an error, recursion depth and tessellation are swept; settings
+that nothing beats in both are the Pareto front. Numbers and chart go to ``benchmarks/results/pareto.json`` and
+``.png``, tables and chart to ``docs/speed_accuracy.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.readme import filled
+from ii_core import IICamera, IIPicture, preset
+from ii_core.files import atomic_path, write_json
+from metrics import provenance, q_global
+from metrics.chart import COLOURS
+from raytrace_ii import Body, Scene, load_scene, render
+from raytrace_ii.texture import Image
+
+ROOT = Path(__file__).parent.parent
+RESULTS, DOCS = ROOT / "benchmarks" / "results", ROOT / "docs"
+SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
+SAMPLES = (1, 2, 4, 9, 16)
+AT_DEPTHS = (1, 4, 16)  # samples at which other depths are tried
+DEPTHS = (0, 1, 2, 3, 4, 6, 8)
+ERRORS = (8.0, 4.0, 2.0, 1.0, 0.5)  # of adaptive sampling between LEAST and MOST, steps of 8 bits
+LEAST, MOST = 4, 16
+FINER = 2.0  # how much finer the reference's shapes are cut
+CUTS = (0.25, 0.5, 1.0, FINER)
+TRUE = {"samples": 64, "depth": 12}
+SENSOR_DB = 47.5  # PSNR of the sensor's own noise of one 8-bit step
+BASE = 4  # samples at which depth, cut and features are compared
+
+
+def main() -> None:
+    """Measure, print, keep, draw and fill the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=16)
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    arguments = parser.parse_args()
+    camera = preset("setup1", scale=arguments.scale)
+    studies = {}
+    for name in arguments.scenes.split(","):
+        started = time.perf_counter()
+        studies[name] = study(name, camera)
+        best = studies[name]["recommended"]
+        print(f"{name}: {best['setting']}, {best['psnr']:.1f} dB, {time.perf_counter() - started:.0f} s", flush=True)
+    path = RESULTS / "pareto.json"
+    write_json(path, {**provenance(), "scale": arguments.scale, "scenes": studies})
+    if set(studies) == set(SCENES):
+        chart(path, path.with_suffix(".png"))
+        document(path)
+
+
+def study(name: str, camera: IICamera) -> dict[str, Any]:
+    """All settings of one scene."""
+    scenes = {cut: cut_scene(name, cut) for cut in CUTS} if sizes(scene_text(name)) else {1.0: load_scene(name)}
+    finest, scene = scenes[max(scenes)], scenes[1.0]
+    truth = shoot(at_depth(finest, TRUE["depth"]), camera, TRUE["samples"])[0]
+    bounces = scene.packed.mirrors or scene.packed.transmits
+    rows: list[dict[str, Any]] = []
+
+    def add(sweep: str, scene: Scene, samples: int | tuple[int, int], error: float = 0.5, **known: Any) -> None:
+        picture, seconds = shoot(scene, camera, samples, error)
+        most = samples if isinstance(samples, int) else samples[1]
+        setting = {"samples": most, "depth": scene.max_depth if bounces else 0, "error": None, "cut": 1.0, **known}
+        rows.append({"sweep": sweep, **setting, "seconds": seconds, "psnr": q_global(truth, picture)})
+
+    for depth in sorted({*DEPTHS, scene.max_depth}) if bounces else (scene.max_depth,):
+        for samples in SAMPLES if depth == scene.max_depth else AT_DEPTHS:
+            add("samples" if depth == scene.max_depth else "depth", at_depth(scene, depth), samples)
+    for error in ERRORS if 'error' in __import__('inspect').signature(render).parameters else ():
+        add("adaptive", scene, (LEAST, MOST), error, error=error)
+    for cut, other in scenes.items():
+        if cut != 1:
+            add("cut", other, BASE, cut=cut)
+    return {
+        "max_depth": scene.max_depth,
+        "bounces": bounces,
+        "faces": {str(cut): sum(len(body.faces) for body in other.bodies) for cut, other in scenes.items()},
+        "truth_repeats_to": q_global(truth, shoot(at_depth(finest, TRUE["depth"]), camera, 36, seed=1)[0]),
+        "rows": rows,
+        "front": (best := front(rows)),
+        "recommended": recommended([rows[i] for i in best]),
+        "features": features(scene, camera, truth),
+        "least_depth": least_depth(scene, camera) if bounces else 0,
+    }
+
+
+def shoot(
+    scene: Scene, camera: IICamera, samples: int | tuple[int, int], error: float = 0.5, seed: int = 0
+) -> tuple[IIPicture, float]:
+    """The picture and its CPU seconds: the least of two, of three if it is quick, any if it is only to be true."""
+    most = samples if isinstance(samples, int) else samples[1]
+    timed = most <= max(SAMPLES)
+    shots = [
+        render(
+            scene, camera, samples=samples, seed=seed, dtype="uint16", support=(), workers=1 if timed else None
+        )
+        for _ in range((3 if most <= 2 else 2) if timed else 1)
+    ]
+    return shots[0].picture, min(shot.stats.cpu_seconds for shot in shots)
+
+
+def at_depth(scene: Scene, depth: int) -> Scene:
+    """The scene with another recursion depth and the same tree, which does not depend on it."""
+    other = scene.with_depth(depth)
+    vars(other)["packed"] = scene.packed
+    return other
+
+
+def scene_text(name: str) -> str:
+    return Path(str(files("assets") / "scenes" / f"{name}.toml")).read_text(encoding="utf-8")
+
+
+def sizes(text: str) -> list[str]:
+    """The objects of a scene file that say, or may say, how finely they are cut."""
+    return [block for block in re.split(r"(?m)^(?=\[\[object\]\])", text) if _cut(block, 2.0) != block]
+
+
+def _cut(block: str, factor: float) -> str:
+    """One object, ``factor`` times as finely cut."""
+    if re.search(r'(?m)^shape = "(sphere|cylinder|revolve)"', block):
+        if not re.search(r"(?m)^segments", block):
+            block = re.sub(r"(?m)^shape = .*$", r"\g<0>\nsegments = 96", block, count=1)
+        if '"revolve"' in block and not re.search(r"(?m)^steps", block):
+            block = re.sub(r"(?m)^shape = .*$", r"\g<0>\nsteps = 64", block, count=1)
+        block = re.sub(
+            r"(?m)^(segments|steps) = (\d+)", lambda m: f"{m[1]} = {max(4, round(int(m[2]) * factor))}", block
+        )
+    return re.sub(r"(?m)^cell_mm = ([\d.]+)", lambda m: f"cell_mm = {float(m[1]) / factor:g}", block)
+
+
+def cut_scene(name: str, factor: float) -> Scene:
+    """A reference scene with its shapes cut ``factor`` times as finely, where its file says how."""
+    if factor == 1:
+        return load_scene(name)
+    blocks = re.split(r"(?m)^(?=\[\[object\]\])", scene_text(name))
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(Path(str(files("assets") / "textures")), Path(folder) / "textures")
+        (Path(folder) / "scenes").mkdir()
+        path = Path(folder) / "scenes" / f"{name}.toml"
+        path.write_text("".join(_cut(block, factor) for block in blocks), encoding="utf-8")
+        return load_scene(path)
+
+
+def front(rows: Sequence[dict[str, Any]]) -> list[int]:
+    """Rows that no other beats in time and error, by time."""
+    best: list[int] = []
+    for i in sorted(range(len(rows)), key=lambda i: (rows[i]["seconds"], -rows[i]["psnr"])):
+        if not best or rows[i]["psnr"] > rows[best[-1]]["psnr"]:
+            best.append(i)
+    return best
+
+
+def recommended(best: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Of a front, the cheapest setting below the sensor's noise; if there is none, within 1 dB of the best."""
+    good = [row for row in best if row["psnr"] >= SENSOR_DB]
+    near = [row for row in best if row["psnr"] >= best[-1]["psnr"] - 1]
+    pick, rule = (good[0], "below the sensor's noise") if good else (near[0], "within 1 dB of the best")
+    return {**pick, "rule": rule, "setting": setting(pick)}
+
+
+def setting(row: dict[str, Any]) -> str:
+    """In words."""
+    how = f"{LEAST} to {MOST} samples, error {row['error']:g}" if row["error"] else f"{row['samples']} samples"
+    how = how.replace("1 samples", "1 sample") if row["samples"] == 1 else how
+    return how + (f", depth {row['depth']}" if row["depth"] else "") + (f", cut ×{row['cut']:g}" * (row["cut"] != 1))
+
+
+def features(scene: Scene, camera: IICamera, truth: IIPicture) -> list[dict[str, Any]]:
+    """What each thing costs in time and brings in dB at BASE samples: the picture with it against that without."""
+    whole, seconds = shoot(scene, camera, BASE)
+    quality = q_global(truth, whole)
+    rows: list[dict[str, Any]] = []
+
+    def add(name: str, without: IIPicture, spent: float | None) -> None:
+        row = {"feature": name, "time": None if spent is None else seconds / spent - 1}
+        rows.append({**row, "brings": quality - q_global(truth, without)})
+
+    if scene.lights:
+        with lights_unblocked(scene):
+            add("shadows", *shoot(scene, camera, BASE))
+    if scene.packed.mirrors or scene.packed.transmits:
+        add("reflection and refraction", *shoot(at_depth(scene, 0), camera, BASE))
+    if any(body.material.texture is not None for body in scene.bodies):
+        bare = [replace(b, material=replace(b.material, texture=None)) for b in scene.bodies]
+        add("textures", *shoot(replace(scene, bodies=bare), camera, BASE))
+    if any(isinstance(body.material.texture, Image) for body in scene.bodies):
+        nearest = replace(scene, bodies=[_unfiltered(body) for body in scene.bodies])
+        add("bilinear textures", shoot(nearest, camera, BASE)[0], None)  # without it the same kernel runs
+    if any(body.normals is not None for body in scene.bodies):
+        flat = replace(scene, bodies=[replace(body, normals=None) for body in scene.bodies])
+        add("smooth normals", *shoot(flat, camera, BASE))
+    add(f"{BASE} samples instead of 1", *shoot(scene, camera, 1))
+    return rows
+
+
+@contextmanager
+def lights_unblocked(scene: Scene) -> Iterator[None]:
+    """As if nothing cast a shadow: no shadow ray is traced."""
+    intersector = scene.packed.intersector
+    free = {"blocked": lambda o, d, reach: (np.full(len(o), -1, np.int32), 0.0)}
+    if scene.packed.transmits:
+        none = np.empty(0, np.float32)
+        free["nearest_clear"] = lambda o, d, reach: (
+            {"primID": np.full(len(o), -1, np.int32), "u": none, "v": none, "tfar": none}, 0.0,
+        )  # fmt: skip
+    for name, call in free.items():
+        setattr(intersector, name, call)
+    try:
+        yield
+    finally:
+        for name in free:
+            delattr(intersector, name)
+
+
+def _unfiltered(body: Body) -> Body:
+    """Texels repeated 8 × 8: bilinear interpolation is left on an eighth of their width alone."""
+    texture = body.material.texture
+    if not isinstance(texture, Image):
+        return body
+    blocks = replace(texture, pixels=texture.pixels.repeat(8, axis=0).repeat(8, axis=1))
+    return replace(body, material=replace(body.material, texture=blocks))
+
+
+def least_depth(scene: Scene, camera: IICamera) -> int:
+    """The smallest recursion depth whose picture differs from that of 12 by less than the sensor's noise."""
+    deep, _ = shoot(at_depth(scene, TRUE["depth"]), camera, BASE)
+    for depth in range(TRUE["depth"]):
+        if q_global(deep, shoot(at_depth(scene, depth), camera, BASE)[0]) >= SENSOR_DB:
+            return depth
+    return int(TRUE["depth"])
+
+
+SWEEPS = {"samples": "o", "adaptive": "D", "depth": "v", "cut": "s"}
+NAMES = {
+    "samples": "1, 2, 4, 9, 16 samples", "adaptive": f"adaptive, {LEAST} to {MOST} samples",
+    "depth": "other recursion depths", "cut": f"triangles × ¼, ½, {FINER:g}, {BASE} samples",
+}  # fmt: skip
+
+
+def chart(source: Path, target: Path) -> None:
+    """A panel a scene, from what `main` wrote."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    data = json.loads(source.read_text(encoding="utf-8"))["scenes"]
+    figure = Figure(figsize=(14, 7.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    for axes, (name, one) in zip(figure.subplots(2, 4).flat, data.items(), strict=True):
+        rows = one["rows"]
+        best = [rows[i] for i in one["front"]]
+        axes.step(
+            [r["seconds"] for r in best], [r["psnr"] for r in best], where="post", color="0.75", linewidth=4, zorder=1
+        )
+        for i, (sweep, marker) in enumerate(SWEEPS.items()):
+            chosen = [r for r in rows if r["sweep"] == sweep]
+            joined = "-" if sweep in ("samples", "adaptive") else ""
+            axes.plot(
+                [r["seconds"] for r in chosen], [r["psnr"] for r in chosen], marker + joined, color=COLOURS[i],
+                markersize=4 if sweep == "depth" else 6, linewidth=1, label=NAMES[sweep],
+                zorder=2 if sweep == "depth" else 3,
+            )  # fmt: skip
+        pick = one["recommended"]
+        axes.plot(pick["seconds"], pick["psnr"], "*", color="black", markersize=15, zorder=4, label="recommended")
+        axes.axhline(SENSOR_DB, color="0.4", linestyle=":", linewidth=1)
+        axes.set_title(f"{name}: {pick['setting']}", loc="left", fontsize=9)
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(base=10, subs=(1, 2, 5)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.grid(True, color="0.92", linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    for axes in figure.axes[4:]:
+        axes.set_xlabel("CPU time [s]")
+    for axes in (figure.axes[0], figure.axes[4]):
+        axes.set_ylabel("PSNR [dB]")
+    handles = {label: h for axes in figure.axes for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(
+        [*handles.values(), figure.axes[0].plot([], [], color="0.75", linewidth=4)[0]], [*handles, "Pareto front"],
+        loc="outside lower center", ncols=6, frameon=False, fontsize=9,
+    )  # fmt: skip
+    with atomic_path(target) as temporary:
+        figure.savefig(temporary, dpi=120, format="png")
+
+
+def document(source: Path) -> None:
+    """Put chart and tables on the page."""
+    result = json.loads(source.read_text(encoding="utf-8"))
+    data = result["scenes"]
+    shutil.copy(source.with_suffix(".png"), DOCS / "images" / "pareto.png")
+    page = DOCS / "speed_accuracy.md"
+    text = page.read_text(encoding="utf-8")
+    (k, l), (m, n) = (preset("setup1", scale=result["scale"]).lenses, preset("setup1", scale=result["scale"]).pixels)
+    text = filled(text, "size", [f"`setup1` at `scale={result['scale']}`: {m}×{n} pixels, {k}×{l} lenses."])
+    for mark, lines in (
+        ("recommended", recommended_table(data)),
+        ("samples", samples_table(data)),
+        ("depth", depth_table(data)),
+        ("cut", cut_table(data)),
+        ("features", features_table(data)),
+        ("maps", maps_table(json.loads((RESULTS / "map_precision.json").read_text(encoding="utf-8")))),
+    ):
+        text = filled(text, mark, lines)
+    with atomic_path(page) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def recommended_table(data: dict[str, Any]) -> list[str]:
+    """The pick of every scene, beside one sample."""
+    lines = ["| scene | take | PSNR | CPU time | by | one sample |", "|---|---|---|---|---|---|"]
+    for name, one in data.items():
+        pick = one["recommended"]
+        (first,) = [r for r in one["rows"] if r["sweep"] == "samples" and r["samples"] == 1]
+        lines.append(
+            f"| {name} | {pick['setting']} | {pick['psnr']:.1f} dB | {pick['seconds']:.2f} s | {pick['rule']} | "
+            f"{first['psnr']:.1f} dB, {first['seconds']:.2f} s |"
+        )
+    return lines
+
+
+def samples_table(data: dict[str, Any]) -> list[str]:
+    """PSNR over samples, and the nearest adaptive setting to the most of them."""
+    heads = " | ".join(f"{s}" for s in SAMPLES)
+    head = f"| scene | {heads} | adaptive to ½ step | its time / {MOST} samples |"
+    lines = [head, "|---" * (len(SAMPLES) + 3) + "|"]
+    for name, one in data.items():
+        plain = {r["samples"]: r for r in one["rows"] if r["sweep"] == "samples"}
+        (fine,) = [r for r in one["rows"] if r["error"] == min(ERRORS)]
+        cells = " | ".join(f"{plain[s]['psnr']:.1f}" for s in SAMPLES)
+        lines.append(f"| {name} | {cells} | {fine['psnr']:.1f} | {fine['seconds'] / plain[MOST]['seconds']:.2f} |")
+    return lines
+
+
+def depth_table(data: dict[str, Any]) -> list[str]:
+    """Recursion depth at BASE samples: PSNR and time."""
+    lines = [
+        "| scene | " + " | ".join(map(str, DEPTHS)) + " | the scene's | least that shows no difference |",
+        "|---" * (len(DEPTHS) + 3) + "|",
+    ]
+    for name, one in data.items():
+        if not one["bounces"]:
+            lines.append(f"| {name} |" + " |" * len(DEPTHS) + " nothing mirrors | 0 |")
+            continue
+        at = {r["depth"]: r for r in one["rows"] if r["samples"] == BASE and r["sweep"] in ("samples", "depth")}
+        cells = " | ".join(f"{at[d]['psnr']:.1f} dB, {at[d]['seconds']:.2f} s" for d in DEPTHS)
+        lines.append(f"| {name} | {cells} | {one['max_depth']} | {one['least_depth']} |")
+    return lines
+
+
+def cut_table(data: dict[str, Any]) -> list[str]:
+    """Tessellation at BASE samples."""
+    lines = ["| scene | " + " | ".join(f"×{cut:g}" for cut in CUTS) + " |", "|---" * (len(CUTS) + 1) + "|"]
+    for name, one in data.items():
+        if len(one["faces"]) == 1:
+            continue
+        cells = []
+        for cut in CUTS:
+            rows = [r for r in one["rows"] if r["cut"] == cut and r["samples"] == BASE and r["error"] is None]
+            (row,) = [r for r in rows if r["sweep"] in ("samples", "cut")]
+            cells.append(f"{one['faces'][str(cut)] / 1e3:.0f} k faces, {row['psnr']:.1f} dB, {row['seconds']:.2f} s")
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def features_table(data: dict[str, Any]) -> list[str]:
+    """Cost and gain of every feature, a column each."""
+    names = list(dict.fromkeys(row["feature"] for one in data.values() for row in one["features"]))
+    lines = ["| scene | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
+    for name, one in data.items():
+        has = {row["feature"]: row for row in one["features"]}
+        cells = []
+        for feature in names:
+            row = has.get(feature)
+            cost = "" if row is None or row["time"] is None else f", {100 * row['time']:+.0f} % time"
+            cells.append("none" if row is None else f"{row['brings']:+.1f} dB{cost}")
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def maps_table(data: dict[str, Any]) -> list[str]:
+    """What `benchmarks.map_precision` found for setup1."""
+    lines = ["| stored as | bytes a ray | largest angle off | apples | cuboid |", "|---|---|---|---|---|"]
+    for row in (r for r in data["rows"] if r["camera"] == "setup1"):
+        psnr = [
+            "exact" if p is None or not np.isfinite(p) else f"{p:.1f} dB"
+            for p in (row["psnr_apples"], row["psnr_cuboid"])
+        ]
+        cells = f"{row['bytes_per_pixel']:.2f} | {row['angle_max_urad']:.2g} µrad | {psnr[0]} | {psnr[1]}"
+        lines.append(f"| {row['format']} | {cells} |")
+    return lines
+
+
+if __name__ == "__main__":
+    main()

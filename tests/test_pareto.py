@@ -1,0 +1,52 @@
+"""The bookkeeping of speed against accuracy; its figures come from `benchmarks.pareto` itself."""
+
+import numpy as np
+import pytest
+from trace_scenes import WHITE, body, floor, hall, sphere, sun
+
+from benchmarks import pareto
+from raytrace_ii import Scene, load_scene, trace
+
+
+def row(seconds, psnr, **more):
+    return {"seconds": seconds, "psnr": psnr, "samples": 1, "depth": 0, "error": None, "cut": 1.0, **more}
+
+
+def test_the_front_holds_what_nothing_beats():
+    rows = [row(3, 40), row(1, 20), row(2, 30), row(2.5, 29), row(1, 19), row(4, 40)]
+    assert pareto.front(rows) == [1, 2, 0]
+
+
+def test_the_cheapest_below_the_sensors_noise_is_taken_or_the_cheapest_within_1_db():
+    good = [row(1, 20), row(2, 48, samples=4), row(9, 60)]
+    assert pareto.recommended(good)["seconds"] == 2
+    assert pareto.recommended(good)["setting"] == "4 samples"
+    assert pareto.recommended([row(1, 20), row(2, 39.5, depth=2), row(9, 40)])["setting"] == "1 sample, depth 2"
+
+
+def test_shapes_are_cut_as_often_as_asked():
+    """Twice the segments, and cells half as large: four times the faces, a body's outline where it was."""
+    coarse, fine = pareto.cut_scene("apples", 0.5), pareto.cut_scene("apples", 1)
+    faces = [sum(len(b.faces) for b in scene.bodies) for scene in (coarse, fine)]
+    assert faces[1] == pytest.approx(4 * faces[0], rel=0.1)
+    np.testing.assert_allclose(coarse.bounds_mm, fine.bounds_mm, atol=0.5)
+    assert [b.name for b in coarse.bodies] == [b.name for b in fine.bodies]
+    assert not pareto.sizes(pareto.scene_text("cuboid"))
+
+
+def test_without_shadows_all_is_lit_and_afterwards_none_the_less_shaded():
+    ball, ground = body(sphere(1), at=(0, 2, 5)), body(floor(), name="floor", colour=WHITE)
+    for scene in (Scene(bodies=[ball, ground], lights=[sun((0, 1, 0))]), hall()):
+        down = [(0, 0.5, 5)], [(0, -1.0, 0)]
+        shaded = trace(scene, *down).radiance
+        with pareto.lights_unblocked(scene):
+            assert (trace(scene, *down).radiance >= shaded).all()
+        np.testing.assert_array_equal(trace(scene, *down).radiance, shaded)
+    plain = Scene(bodies=[ball, ground], lights=[sun((0, 1, 0))])
+    with pareto.lights_unblocked(plain):
+        assert trace(plain, *down).radiance[0] == pytest.approx([1, 1, 1])
+
+
+def test_another_depth_shares_the_tree():
+    scene = load_scene("objects")
+    assert pareto.at_depth(scene, 2).packed is scene.packed and pareto.at_depth(scene, 2).max_depth == 2
