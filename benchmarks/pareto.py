@@ -86,7 +86,7 @@ def study(name: str, camera: IICamera) -> dict[str, Any]:
     for depth in sorted({*DEPTHS, scene.max_depth}) if bounces else (scene.max_depth,):
         for samples in SAMPLES if depth == scene.max_depth else AT_DEPTHS:
             add("samples" if depth == scene.max_depth else "depth", at_depth(scene, depth), samples)
-    for error in ERRORS if 'error' in __import__('inspect').signature(render).parameters else ():
+    for error in ERRORS:
         add("adaptive", scene, (LEAST, MOST), error, error=error)
     for cut, other in scenes.items():
         if cut != 1:
@@ -112,7 +112,14 @@ def shoot(
     timed = most <= max(SAMPLES)
     shots = [
         render(
-            scene, camera, samples=samples, seed=seed, dtype="uint16", support=(), workers=1 if timed else None
+            scene,
+            camera,
+            samples=samples,
+            error=error,
+            seed=seed,
+            dtype="uint16",
+            support=(),
+            workers=1 if timed else None,
         )
         for _ in range((3 if most <= 2 else 2) if timed else 1)
     ]
