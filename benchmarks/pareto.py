@@ -4,8 +4,8 @@
 
 The error is PSNR in 16-bit sRGB against a reference of 64 samples a pixel, 12 bounces and, where the scene's file
 says how finely its shapes are cut, triangles half as large; time is CPU seconds of `render` without support images,
-the least of two or three. Samples a pixel, adaptive sampling to an error, recursion depth and tessellation are swept; settings
-that nothing beats in both are the Pareto front. Numbers and chart go to ``benchmarks/results/pareto.json`` and
+the least of two or three. Samples a pixel, adaptive sampling to an error, recursion depth and tessellation are swept;
+settings that nothing beats in both are the Pareto front. Numbers and chart go to ``benchmarks/results/pareto.json`` and
 ``.png``, tables and chart to ``docs/speed_accuracy.md``.
 """
 
@@ -77,17 +77,16 @@ def study(name: str, camera: IICamera) -> dict[str, Any]:
     bounces = scene.packed.mirrors or scene.packed.transmits
     rows: list[dict[str, Any]] = []
 
-    def add(sweep: str, scene: Scene, samples: int | tuple[int, int], error: float = 0.5, **known: Any) -> None:
-        picture, seconds = shoot(scene, camera, samples, error)
-        most = samples if isinstance(samples, int) else samples[1]
-        setting = {"samples": most, "depth": scene.max_depth if bounces else 0, "error": None, "cut": 1.0, **known}
+    def add(sweep: str, scene: Scene, samples: int, error: float | None = None, cut: float = 1.0) -> None:
+        picture, seconds = shoot(scene, camera, samples if error is None else (LEAST, samples), error or 0.5)
+        setting = {"samples": samples, "depth": scene.max_depth if bounces else 0, "error": error, "cut": cut}
         rows.append({"sweep": sweep, **setting, "seconds": seconds, "psnr": q_global(truth, picture)})
 
     for depth in sorted({*DEPTHS, scene.max_depth}) if bounces else (scene.max_depth,):
         for samples in SAMPLES if depth == scene.max_depth else AT_DEPTHS:
             add("samples" if depth == scene.max_depth else "depth", at_depth(scene, depth), samples)
     for error in ERRORS:
-        add("adaptive", scene, (LEAST, MOST), error, error=error)
+        add("adaptive", scene, MOST, error)
     for cut, other in scenes.items():
         if cut != 1:
             add("cut", other, BASE, cut=cut)
