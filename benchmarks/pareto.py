@@ -5,8 +5,8 @@
 The error is PSNR in 16-bit sRGB against a reference of 64 samples a pixel, 12 bounces and, where the scene's file
 says how finely its shapes are cut, triangles half as large; time is CPU seconds of `render` without support images,
 the least of two or three. Samples a pixel, adaptive sampling to an error, recursion depth and tessellation are swept;
-settings that nothing beats in both are the Pareto front. Numbers and chart go to ``benchmarks/results/pareto.json`` and
-``.png``, tables and chart to ``docs/speed_accuracy.md``.
+settings that nothing beats in both are the Pareto front. Numbers and chart go to ``benchmarks/results/pareto.json``
+and ``.png``, tables and chart to ``docs/speed_accuracy.md``.
 """
 
 from __future__ import annotations
