@@ -11,6 +11,7 @@ from .measures import MEASURES, measuring
 from .plots import PLOTS, plot_all, plot_angle, plot_depth, plot_pair, plot_views
 from .psnr import angle_axes, mean_q_angle, q_angle, q_global
 from .rd import bd_psnr, bd_rate, rate_distortion
+from .report import Report, report
 from .study import provenance, read_study, write_study
 from .tables import summary_table, write_csv, write_latex
 from .view import ViewQuality, q_view
@@ -21,6 +22,7 @@ __all__ = [
     "AngleQuality",
     "DepthQuality",
     "FocusDepth",
+    "Report",
     "ViewQuality",
     "angle_axes",
     "bd_psnr",
@@ -50,6 +52,7 @@ __all__ = [
     "rate_distortion",
     "rd_chart",
     "read_study",
+    "report",
     "summary_table",
     "write_csv",
     "write_latex",

@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 
 def linear_layers(camera: IICamera, count: int = LAYERS) -> Floats:
     """Layers at z = d·f from the pixel array, d = 1 … count, with f = Λ in the pinhole approximation, mm."""
+    if count < 1:
+        raise ValueError(f"{count} layers: at least 1 is needed")
     return np.arange(1.0, count + 1) * camera.gap_mm + camera.origin_mm[2]
 
 
@@ -27,6 +29,8 @@ def logarithmic_layers(near_mm: float, far_mm: float, count: int = LAYERS) -> Fl
     """Layers from near to far in equal ratios, mm."""
     if not 0 < near_mm < far_mm < math.inf:
         raise ValueError(f"layers from {near_mm} to {far_mm} mm: 0 < near < far is needed")
+    if count < 1:
+        raise ValueError(f"{count} layers: at least 1 is needed")
     return np.geomspace(near_mm, far_mm, count)
 
 

@@ -146,7 +146,7 @@ def test_the_command_draws(run, refused, tmp_path):
 
     write_image(tmp_path / "z.exr", np.full(a.pixels.shape[:2], 15, np.float32))
     code, out, _ = run("measure", tmp_path / "a.png", tmp_path / "b.png", "--depth", tmp_path / "z.exr")
-    assert code == 0 and "over 1 layers; depth: given" in out
+    assert code == 0 and "mean of 1 layers; worst" in out
 
 
 def test_refusals(tmp_path):

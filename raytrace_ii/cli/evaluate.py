@@ -16,23 +16,30 @@ if TYPE_CHECKING:
 
 RATES = (0.02, 0.05, 0.15, 0.4, 1.0)
 SCHEMES = ("si-h264", "ei-h264", "ri-h264", "jpeg2000")
-STUDY_SUFFIXES = ("_rd.json", "_rd.csv", "_rd.png")
+STUDY_ENDS = (".tex", ".png", ".pdf")
+OVER_DEPTH = ("q_depth_min", "q_depth_mean", "q_depth_max")
 
 
 @app.command()
 def measure(
     reference: Annotated[Path, typer.Argument(help="The II-picture as it was.")],
-    decoded: Annotated[Path, typer.Argument(help="The II-picture to judge, or a coded file.")],
+    decoded: Annotated[Path, typer.Argument(help="The II-picture to judge, bare of the same size, or a coded file.")],
     json: Annotated[Path | None, typer.Option(help="Write the numbers here.")] = None,
-    plots: Annotated[Path | None, typer.Option(help="Draw angles, depth and views into this folder.")] = None,
+    plots: Annotated[Path | None, typer.Option(help="Draw angles, depth, views and errors into this folder.")] = None,
     depth: Annotated[Path | None, typer.Option(help="Quality over depth, of this map: z in mm, an .exr.")] = None,
     focus: Annotated[bool, typer.Option("--focus", help="Quality over depth, estimated from focus.")] = False,
+    method: Annotated[str, typer.Option(help="Of depth from focus: dissertation or robust.")] = "dissertation",
+    layers: Annotated[
+        str | None, typer.Option(help="Depth layers: how many, or NEAR:FAR:COUNT in mm, spaced in equal ratios.")
+    ] = None,
+    ssim: Annotated[bool, typer.Option("--ssim", help="Also SSIM and MS-SSIM of every sub-image.")] = False,
+    mask: Annotated[Path | None, typer.Option(help="Only pixels that are white in this picture count.")] = None,
     force: Force = False,
 ) -> None:
     """Compare two II-pictures of the same structure."""
     from ii_core import IIPicture
-    from ii_core.files import write_json
-    from metrics import q_angle, q_global
+    from ii_core.files import read_depth, read_image, write_json
+    from metrics import report
 
     if json:
         check_output(json, force)
@@ -41,50 +48,58 @@ def measure(
 
         for name in PLOTS:
             check_output(plots / name, force, make_folder=True)
-    a, b = IIPicture.load(reference), load_any(decoded)
-    numbers: dict[str, Any] = {
-        "reference": str(reference),
-        "decoded": str(decoded),
-        "q_global": q_global(a, b),
-        "unit": "dB",
-    }
-    rows = {"Q_global": f"{numbers['q_global']:.2f} dB"}
-    if a.regular:
-        angle = q_angle(a, b)
-        numbers["q_angle"] = angle.tolist()
-        rows["Q_angle"] = f"{angle.min():.2f} … {angle.max():.2f} dB over {angle.shape[1]}×{angle.shape[0]} angles"
-    if a.regular and a.camera and min(a.lenses) >= 11:  # SSIM's window
-        from metrics import q_view
-
-        view = q_view(a, b)
-        numbers["q_view"] = {**view.values, "mean": view.mean}
-        rows["Q_view"] = f"{view.mean:.4f} (" + ", ".join(f"{k} {v:.4f}" for k, v in view.values.items()) + ")"
-    layers = _depth_quality(a, b, depth) if depth or focus or plots else None
-    if layers is not None:
-        numbers["q_depth"] = {"depth_mm": layers.depth_mm.tolist(), "values": layers.values.tolist()}
-        numbers["q_depth"] |= {"counts": layers.counts.tolist(), "source": layers.source}
-        held = int((layers.counts > 0).sum())
-        span = f"{layers.min:.2f} … {layers.max:.2f} dB over {held} layers" if held else "no depth found"
-        rows["Q_depth"] = f"{span}; depth: {layers.source}"
+    a = IIPicture.load(reference)
+    b = _judged(decoded, a)
+    made = report(
+        a,
+        b,
+        mask=None if mask is None else read_image(mask).min(axis=2) > 0,
+        ssim=ssim,
+        over_depth=bool(depth or focus or plots),
+        depth=None if depth is None else read_depth(depth),
+        layers_mm=_layers(layers, a),
+        method=method,
+    )
     if plots:
         with spinner(f"draw into {plots}"):
-            plot_all(a, b, layers, plots)
+            plot_all(a, b, made.depth, plots)
     if json:
-        write_json(json, numbers)
-    columns(rows)
+        write_json(json, {"reference": str(reference), "decoded": str(decoded), **made.numbers})
+    columns(made.rows)
 
 
-def _depth_quality(a: IIPicture, b: IIPicture, depth: Path | None) -> Any:
-    """Q_depth over a given depth map or, where the structure allows, over one estimated; else None."""
-    from ii_core.files import read_depth
-    from metrics import q_depth
+def _judged(path: Path, reference: IIPicture) -> IIPicture:
+    """The picture to judge; one without a sidecar, as other tools write, has the structure of the reference."""
+    from ii_core.files import IMAGE_TYPES, read_image
+    from ii_core.picture import sidecar
 
-    if depth is not None:
-        return q_depth(a, b, depth=read_depth(depth))
-    if not a.regular or a.camera is None or a.camera.front:
+    if path.suffix not in IMAGE_TYPES or sidecar(path).exists():
+        return load_any(path)
+    pixels = read_image(path)
+    if pixels.shape != reference.pixels.shape:
+        raise ValueError(
+            f"{path} has no sidecar {sidecar(path).name}, and {pixels.shape[1]}×{pixels.shape[0]} px of "
+            f"{pixels.shape[2]} channels: those of the reference, {reference.size[0]}×{reference.size[1]} of 3, "
+            "are needed"
+        )
+    return reference.with_pixels(pixels)
+
+
+def _layers(text: str | None, picture: IIPicture) -> Any:
+    """Depths of layers, from ``250`` or ``5:200:60``; None for the default."""
+    from ii_core.view import camera_of
+    from metrics import linear_layers, logarithmic_layers
+
+    if text is None:
         return None
-    with spinner("find depth"):
-        return q_depth(a, b)
+    parts = text.split(":")
+    try:
+        if len(parts) == 1:
+            return linear_layers(camera_of(picture), int(parts[0]))
+        near, far, count = parts
+        return logarithmic_layers(float(near), float(far), int(count))
+    except ValueError as error:
+        raise ValueError(f"layers are {text!r}: a number or NEAR:FAR:COUNT is needed ({error})") from None
 
 
 @app.command()
@@ -95,6 +110,10 @@ def study(
         SCHEMES
     ),
     rates: Annotated[str, typer.Option(help="Bits per pixel, parted by commas.")] = ",".join(map(str, RATES)),
+    measures: Annotated[
+        str, typer.Option(help="What to chart, parted by commas: q_global, q_view, q_depth …")
+    ] = "q_global",
+    depth: Annotated[Path | None, typer.Option(help="For q_depth: z in mm, an .exr; else found from focus.")] = None,
     orders: Annotated[
         bool, typer.Option("--orders", help="Code nothing: correlation and residuals of every order instead.")
     ] = False,
@@ -104,6 +123,7 @@ def study(
     """Chart quality against rate for several schemes."""
     from codec import parse_scheme
     from ii_core import IIPicture
+    from ii_core.files import read_depth
 
     if orders:
         study_orders(picture, output, force)
@@ -115,43 +135,99 @@ def study(
         targets = [float(rate) for rate in rates.split(",")]
     except ValueError:
         raise ValueError(f"rates are {rates!r}: numbers parted by commas are needed") from None
-    for suffix in STUDY_SUFFIXES:
-        check_output(output / f"{picture.stem}{suffix}", force, make_folder=True)
+    wanted = _measures(measures)
+    for path in study_files(output, picture.stem, wanted):
+        check_output(path, force, make_folder=True)
     original = IIPicture.load(picture)
-    run_study(original, picture.stem, names, targets, output, workers=workers)
+    z = None if depth is None else read_depth(depth)
+    run_study(original, picture.stem, names, targets, output, workers=workers, measures=wanted, depth=z)
+
+
+def _measures(text: str) -> list[str]:
+    """Names of measures, each once; ``q_depth`` stands for its least, mean and greatest value."""
+    from metrics import MEASURES
+
+    names = dict.fromkeys(
+        name for given in text.split(",") for name in (OVER_DEPTH if given == "q_depth" else (given,))
+    )
+    if unknown := [name for name in names if name not in MEASURES]:
+        raise ValueError(f"unknown measure {unknown[0]!r}: known are q_depth, {', '.join(MEASURES)}")
+    return list(names)
+
+
+def study_files(folder: Path, name: str, measures: Sequence[str]) -> list[Path]:
+    """What `run_study` leaves: numbers, and for each measure a table and charts."""
+    stems = [_stem(name, measure) for measure in measures]
+    files = [f"{name}_rd.json", f"{name}_rd.csv", *(f"{stem}{end}" for stem in stems for end in STUDY_ENDS)]
+    if set(OVER_DEPTH) <= set(measures):
+        files += [f"{name}_q_depth.png", f"{name}_q_depth.pdf"]
+    return [folder / file for file in files]
+
+
+def _stem(name: str, measure: str) -> str:
+    return f"{name}_rd" if measure == "q_global" else f"{name}_{measure}"
 
 
 def run_study(
     picture: IIPicture, name: str, schemes: Sequence[str], rates: Sequence[float], folder: Path, *,
-    workers: int | None = None, extra: dict[str, Any] | None = None,
+    workers: int | None = None, extra: dict[str, Any] | None = None, measures: Sequence[str] = ("q_global",),
+    depth: Any = None,
 ) -> None:  # fmt: skip
-    """Measure; leave name_rd.json, .csv and, drawn from the JSON, .png in a folder; print a table."""
+    """Measure; leave `study_files` in a folder, the charts and tables made from the JSON; print the tables."""
     from codec import decode, encode
-    from metrics import rate_distortion, rd_chart, read_study, write_csv, write_study
+    from metrics import (
+        depth_rate_chart,
+        measuring,
+        rate_distortion,
+        rd_chart,
+        read_study,
+        summary_table,
+        write_csv,
+        write_latex,
+        write_study,
+    )
 
     from ..rendering import cores
 
+    more = measuring(picture, measures, depth=depth) if set(measures) - {"q_global"} else None
     with progress_bar(f"code {name}") as report:
         records = rate_distortion(
-            picture, schemes, rates, encode=encode, decode=decode, progress=report, workers=workers or cores()
-        )
-    numbers, table, chart = (folder / f"{name}{suffix}" for suffix in STUDY_SUFFIXES)
+            picture, schemes, rates, encode=encode, decode=decode, progress=report, workers=workers or cores(),
+            measure=more,
+        )  # fmt: skip
+    numbers = folder / f"{name}_rd.json"
     write_study(numbers, name, records, extra, picture=picture)
-    write_csv(table, records)
+    write_csv(folder / f"{name}_rd.csv", records)
     drawn = read_study(numbers)
-    rd_chart(drawn, chart)
-    print_summary(name, drawn)
+    for measure in measures:
+        table, *charts = (folder / f"{_stem(name, measure)}{end}" for end in STUDY_ENDS)
+        write_latex(table, summary_table(drawn, measure=measure), f"{name}: {about(measure)}")
+        for chart in charts:
+            rd_chart(drawn, chart, measure=measure)
+        print_summary(name, drawn, measure)
+    if set(OVER_DEPTH) <= set(measures):
+        for end in (".png", ".pdf"):
+            depth_rate_chart(drawn, folder / f"{name}_q_depth{end}")
 
 
-def print_summary(name: str, study: dict[str, Any]) -> None:
+def about(measure: str) -> str:
+    """What a table of this measure shows."""
+    from metrics import MEASURES
+
+    kind = MEASURES[measure]
+    unit = f" in {kind.unit}" if kind.unit else ""
+    return f"{kind.text}{unit} at bits per pixel; gain and Bjøntegaard differences against jpeg2000"
+
+
+def print_summary(name: str, study: dict[str, Any], measure: str = "q_global") -> None:
     """The study as a table in the terminal."""
     from rich.console import Console
     from rich.table import Table
 
     from metrics import summary_table
 
-    rows = summary_table(study)
-    table = Table(title=f"{name}: Q_global in dB at bits per pixel; gain, BD-rate and BD-PSNR against jpeg2000")
+    rows = summary_table(study, measure=measure)
+    table = Table(title=f"{name}: {about(measure)}")
     for column in rows[0]:
         table.add_column(column, justify="left" if column == "scheme" else "right", no_wrap=True)
     for row in rows:
