@@ -46,7 +46,7 @@ def write_viewer(
     *,
     depth: NDArray[Any] | None = None,
     title: str = "",
-    lossless: bool = False,
+    quality: int | None = JPEG_QUALITY,
     progress: Callable[[int, int], None] | None = None,
 ) -> int:
     """One self-contained HTML file, which opens from disk in a browser with WebGL2.
@@ -63,8 +63,8 @@ def write_viewer(
         z in mm of every pixel, as `raytrace_ii.render` gives it: clicks focus by it instead of by the picture.
     title : str
         The name shown.
-    lossless : bool
-        Pages as WebP without loss, four times as large, instead of JPEG 4:4:4 of quality 95.
+    quality : int or None
+        Of JPEG pages (4:4:4), 1 to 100; None for WebP without loss, four times as large as 95.
     progress : callable, optional
         Called with pages done and pages in all.
 
@@ -81,7 +81,7 @@ def write_viewer(
     OSError
         If the file cannot be written.
     """
-    page = _Page(picture, decoded, depth, title, lossless)
+    page = _Page(picture, decoded, depth, title, quality)
     used = 0
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         head, tail = page.html("\x00").split("\x00")
@@ -106,11 +106,11 @@ def write_viewer_folder(
     *,
     depth: NDArray[Any] | None = None,
     title: str = "",
-    lossless: bool = False,
+    quality: int | None = JPEG_QUALITY,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
     """The page as index.html with its data in files beside it, for a web server; parameters as `write_viewer`."""
-    page = _Page(picture, decoded, depth, title, lossless)
+    page = _Page(picture, decoded, depth, title, quality)
     order: list[list[Any]] = []
     for number, (kind, where, data) in enumerate(page.parts(progress)):
         name = f"{number}.{kind}"
@@ -125,18 +125,25 @@ class _Page:
     """What one page shows, checked once."""
 
     def __init__(
-        self, picture: IIPicture, decoded: IIPicture | None, depth: NDArray[Any] | None, title: str, lossless: bool
+        self,
+        picture: IIPicture,
+        decoded: IIPicture | None,
+        depth: NDArray[Any] | None,
+        title: str,
+        quality: int | None,
     ) -> None:
         picture.check_regular()
         if decoded is not None:
             picture.check_same_structure(decoded)
+        if quality is not None and not 1 <= quality <= 100:
+            raise ValueError(f"quality is {quality}: a whole number from 1 to 100 is needed")
         if depth is not None and depth.shape != picture.pixels.shape[:2]:
             raise ValueError(
                 f"depth is {depth.shape}, the picture {picture.pixels.shape[:2]}: the same size is needed"
             )
         self.pictures = [picture] if decoded is None else [picture, decoded]
         self.depth = None if depth is None else depth_view(picture, depth)
-        self.title, self.lossless = title or "II-picture", lossless
+        self.title, self.jpeg = title or "II-picture", quality
         (k, l), (u, v) = picture.lenses, picture.ei_pixels
         self.side = min(PAGE_SIDE, max(k * u, l * v))
         self.grid = -(-(k * u) // self.side), -(-(l * v) // self.side)
@@ -241,10 +248,10 @@ class _Page:
 
     def _encoded(self, pixels: NDArray[np.uint8]) -> bytes:
         out = io.BytesIO()
-        if self.lossless:
+        if self.jpeg is None:
             Image.fromarray(pixels).save(out, "WEBP", lossless=True, quality=20, method=2)
         else:
-            Image.fromarray(pixels).save(out, "JPEG", quality=JPEG_QUALITY, subsampling=0)
+            Image.fromarray(pixels).save(out, "JPEG", quality=self.jpeg, subsampling=0)
         return out.getvalue()
 
     def _preview(self) -> bytes:

@@ -76,7 +76,7 @@ PLACES = [(0, 0, 1), (0.7, -0.3, 1), (-1, 1, 1), (1.8, 0, 1), (0.2, 0.1, 0.5)]
 
 
 def test_every_place_shows_its_view_image(show, shot, tmp_path):
-    write_viewer(tmp_path / "v.html", shot.picture, lossless=True)
+    write_viewer(tmp_path / "v.html", shot.picture, quality=None)
     tab = show(tmp_path / "v.html")
     for x, y, r in PLACES:
         shown, viewpoint = snapshot(tab, x=x, y=y, r=r, f=0, a=1)
@@ -97,7 +97,7 @@ def moved(picture, **change):
 
 def test_upright_elementary_images_look_the_other_way(show, shot, tmp_path):
     picture = moved(shot.picture, erect=True)
-    write_viewer(tmp_path / "v.html", picture, lossless=True)
+    write_viewer(tmp_path / "v.html", picture, quality=None)
     shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=0.6, y=-0.4, f=0, a=1)
     assert np.abs(shown - view_image(picture, viewpoint)[0]).max() <= 1
 
@@ -111,7 +111,7 @@ def test_any_structure(show, tmp_path, lenses, ei_pixels, with_camera):
     pixels = np.random.default_rng(1).integers(0, 256, (size[1], size[0], 3), np.uint8)
     camera = IICamera(pixels=size, lenses=lenses, pixel_pitch_mm=0.01, gap_mm=0.3) if with_camera else None
     picture = IIPicture(pixels, lenses, ei_pixels, camera)
-    write_viewer(tmp_path / "v.html", picture, lossless=True)
+    write_viewer(tmp_path / "v.html", picture, quality=None)
     shown, viewpoint = snapshot(show(tmp_path / "v.html"), f=0, a=1)
     if with_camera:
         wanted, valid = view_image(picture, viewpoint)
@@ -122,7 +122,7 @@ def test_any_structure(show, tmp_path, lenses, ei_pixels, with_camera):
 
 def test_a_mosaic_of_several_pages(show, shot, tmp_path, monkeypatch):
     monkeypatch.setattr(viewer, "PAGE_SIDE", 100)  # cuts through sub-images of 32×16 px
-    write_viewer(tmp_path / "v.html", shot.picture, lossless=True)
+    write_viewer(tmp_path / "v.html", shot.picture, quality=None)
     shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=-0.4, y=0.9, f=0, a=1)
     assert np.abs(shown - view_image(shot.picture, viewpoint)[0]).max() <= 1
 
@@ -165,7 +165,7 @@ def test_focus_and_aperture(show, tmp_path, erect):
     rng = np.random.default_rng(2)
     camera = IICamera(pixels=(40, 24), lenses=(10, 6), pixel_pitch_mm=0.01, gap_mm=0.1)
     picture = IIPicture(rng.integers(0, 256, (24, 40, 3), np.uint8), (10, 6), (4, 4), camera, erect)
-    write_viewer(tmp_path / "v.html", picture, lossless=True)
+    write_viewer(tmp_path / "v.html", picture, quality=None)
     tab = show(tmp_path / "v.html")
     shown, viewpoint = snapshot(tab, x=0.3, y=0.2, f=0.7, a=1.8)
     if erect:  # the same formulas with the other sign, which `view_positions` takes
@@ -185,7 +185,7 @@ def test_focus_and_aperture(show, tmp_path, erect):
 
 
 def test_dragging_turns_the_scene(show, shot, tmp_path):
-    write_viewer(tmp_path / "v.html", shot.picture, lossless=True)
+    write_viewer(tmp_path / "v.html", shot.picture, quality=None)
     tab = show(tmp_path / "v.html", "#f=0")
     box = tab.locator("#main").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -244,7 +244,7 @@ def test_a_click_without_a_map_finds_where_views_agree(show, tmp_path):
             c0, t = np.floor(cols).astype(int), (cols % 1)[None, :, None]
             field[:, v, :, h] = top[:, c0] * (1 - t) + top[:, c0 + 1] * t
     picture = IIPicture(field.reshape(l * u, k * u, 3), (k, l), (u, u), camera)
-    write_viewer(tmp_path / "v.html", picture, lossless=True)
+    write_viewer(tmp_path / "v.html", picture, quality=None)
     tab = show(tmp_path / "v.html", "#f=0")
     found = [tab.evaluate("p => ii.viewer.pick(p)", [col, row]) for col in (14, 20, 30, 36) for row in (10, 14)]
     span = tab.evaluate("ii.viewer.meta.focus")
@@ -254,7 +254,7 @@ def test_a_click_without_a_map_finds_where_views_agree(show, tmp_path):
 def test_comparison_shows_the_difference(show, shot, tmp_path):
     a = shot.picture
     b = a.with_pixels(np.minimum(a.pixels, 245) + np.uint8(10))
-    write_viewer(tmp_path / "v.html", a, b, lossless=True)
+    write_viewer(tmp_path / "v.html", a, b, quality=None)
     tab = show(tmp_path / "v.html")
     assert tab.evaluate("ii.viewer.state.mode") == "split"
     first, _ = snapshot(tab, mode="original", f=0)
@@ -312,7 +312,7 @@ def test_without_webgl2_the_page_says_so(show, shot, tmp_path, browser):
 
 def test_the_centre_view_comes_first(show, shot, tmp_path):
     """Served with every page held back: the preview stands for them."""
-    write_viewer_folder(tmp_path, shot.picture, lossless=True)
+    write_viewer_folder(tmp_path, shot.picture, quality=None)
     text = (tmp_path / "index.html").read_text()
     (tmp_path / "early.html").write_text(re.sub(r"<script>ii\.fetch.*</script>", "", text))
     tab = show(tmp_path / "early.html", wait=False)

@@ -43,12 +43,19 @@ class Viewer {
     this.depthMap = new Float32Array(data.buffer, data.byteOffset, data.byteLength / 4);
   }
 
-  // Unless the link says where, what lies in the middle is in focus.
   async finished() {
     await Promise.all(this.work);
     this.say("");
-    if (!/[#&]f=/.test(location.hash)) this.state.f = this.pick(this.cursor);
+    if (!/[#&]f=/.test(location.hash)) this.state.f = this.start();
     this.redraw();
+  }
+
+  // Where the focus is unless the link says it: on the nearer things, or on what lies in the middle; never so far
+  // that neighbouring views have no lens in common.
+  start() {
+    const found = this.depthMap ? [...this.depthMap].filter(Number.isFinite).sort((a, b) => a - b) : [];
+    const f = found.length ? this.focusOf(found[Math.floor(found.length / 4)]) : this.pick(this.cursor);
+    return Math.min(Math.max(f, this.meta.focus[0]), this.meta.focus[1] / 3);
   }
 
   // --- geometry ----------------------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ def view(
     """Look at an II-picture in a browser: parallax, focus, comparison, stereo."""
     from ii_core import IIPicture
     from ii_core.files import read_image
-    from metrics.viewer import write_viewer, write_viewer_folder
+    from metrics.viewer import JPEG_QUALITY, write_viewer, write_viewer_folder
 
     if (output is None) == (not serve):
         raise ValueError("one of --output and --serve is needed")
@@ -35,7 +35,7 @@ def view(
         if output.suffix not in (".html", ".htm"):
             raise ValueError(f"{output} is no page: .html is needed")
         check_output(output, force)
-    options: dict[str, Any] = {"title": picture.stem, "lossless": lossless}
+    options: dict[str, Any] = {"title": picture.stem, "quality": None if lossless else JPEG_QUALITY}
     original = IIPicture.load(picture)
     decoded = load_any(compare) if compare else None
     if depth is not None:

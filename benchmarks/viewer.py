@@ -1,0 +1,166 @@
+"""The viewer measured in a browser without a screen, and the gallery of its pages.
+
+    python -m benchmarks.viewer             the reference scenes as pages, with stills, into docs/gallery
+    python -m benchmarks.viewer --measure   load time and frame rate of full setup1
+
+A browser and playwright are needed. Frame rates are those of the browser's software renderer: they say what a
+machine without any graphics card does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import statistics
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from benchmarks.readme import filled
+from ii_core import preset
+from ii_core.files import write_json
+from metrics import provenance
+from metrics.viewer import write_viewer
+from raytrace_ii import load_scene, render, scene_names
+
+ROOT = Path(__file__).parent.parent
+GALLERY, RESULTS = ROOT / "docs" / "gallery", ROOT / "benchmarks" / "results"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
+STILL = {"width": 1200, "height": 640}
+# State of the page in each still: what a stranger should see first.
+STILLS = {"apples": "#a=3", "cuboid": "#x=0.5&y=0.3", "objects": "#stereo=anaglyph&eyes=0.15", "mountains": "#f=0"}
+QUALITY = 80
+SAMPLES = 4
+SCALE = 4  # 128×64 lenses: pages of a megabyte
+
+
+def main() -> None:
+    """Draw the gallery, or measure."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--measure", action="store_true")
+    if parser.parse_args().measure:
+        measure()
+    else:
+        gallery()
+
+
+@contextmanager
+def tab(size: dict[str, int]) -> Iterator[Any]:
+    """An empty page of a browser without a screen."""
+    from playwright.sync_api import sync_playwright
+
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if path is None:
+        raise SystemExit(f"no browser is installed: one of {', '.join(BROWSERS)} is needed")
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=path, args=FLAGS)
+        yield browser.new_page(viewport=size)
+        browser.close()
+
+
+def gallery() -> None:
+    """The reference scenes as pages of their own, and a still of each."""
+    GALLERY.mkdir(parents=True, exist_ok=True)
+    camera = preset("setup1", scale=SCALE)
+    lines = [INTRODUCTION]
+    with tab(STILL) as page:
+        for name, about in scene_names().items():
+            shot = render(load_scene(name), camera, samples=SAMPLES, support=("depth",))
+            path = GALLERY / f"{name}.html"
+            size = write_viewer(path, shot.picture, depth=shot.depth, title=name, quality=QUALITY)
+            page.goto(f"file://{path}{STILLS.get(name, '#a=1.5')}")
+            page.evaluate("async () => { await ii.ready }")
+            page.wait_for_timeout(1000)
+            page.screenshot(path=GALLERY / f"{name}.jpg", type="jpeg", quality=85)
+            lines.append(f"## [{name}]({name}.html)\n\n{about} {size / 2**20:.1f} MB.\n\n![{name}]({name}.jpg)\n")
+            print(name, flush=True)
+    (GALLERY / "README.md").write_text("\n".join(lines), encoding="utf-8")
+
+
+INTRODUCTION = f"""# Gallery
+
+The reference scenes as pages of `raytrace-ii view`: save one and open it in a browser, no network is needed. Each is
+*setup1* with a quarter of the lenses each way, {SAMPLES} samples a pixel, JPEG of quality {QUALITY}. *Mountains* and
+the ground behind the *Twins* are so far away that each lens sees them whole: no display of this kind can resolve
+them. Made by `python -m benchmarks.viewer`.
+"""
+
+
+def measure() -> None:
+    """Time and frame rates of Apples at full setup1."""
+    picture = render(load_scene("apples"), preset("setup1"), noise=1.0, support=()).picture
+    rows: list[dict[str, Any]] = []
+    with tempfile.TemporaryDirectory() as folder, tab({"width": 1400, "height": 800}) as page:
+        path = Path(folder) / "page.html"
+        started = time.perf_counter()
+        size = write_viewer(path, picture)
+        rows.append({"what": "writing the page", "value": time.perf_counter() - started, "unit": "s"})
+        rows.append({"what": "size of the page", "value": size / 2**20, "unit": "MB"})
+        page.add_init_script(FIRST_FRAME)
+        page.goto(f"file://{path}")
+        page.evaluate("async () => { await ii.ready }")
+        loaded = page.evaluate("performance.now()")
+        rows.append({"what": "first picture on the screen", "value": page.evaluate("first") / 1000, "unit": "s"})
+        rows.append({"what": "all pixels on the card", "value": loaded / 1000, "unit": "s"})
+        for what, state in (
+            ("frames while turning", {"a": 1}),
+            ("frames while turning, aperture 8 px", {"a": 4.5}),
+            ("frames while turning, aperture 15 px", {"a": 8}),
+        ):
+            rates = page.evaluate(TURN, {"f": 4, **state})
+            rows.append({"what": what, "value": statistics.median(rates), "unit": "1/s"})
+        renderer = page.evaluate(RENDERER)
+        version = page.evaluate("navigator.userAgent")
+    for row in rows:
+        print(f"{row['what']:<40} {row['value']:8.2f} {row['unit']}")
+    RESULTS.mkdir(exist_ok=True)
+    write_json(RESULTS / "viewer.json", {**provenance(), "renderer": renderer, "browser": version, "rows": rows})
+    report(ROOT / "docs" / "viewer.md")
+
+
+FIRST_FRAME = """
+window.first = 0;
+const draw = WebGL2RenderingContext.prototype.texImage2D;
+WebGL2RenderingContext.prototype.texImage2D = function (...values) {
+  if (values.length === 6 && !window.first)  // the preview has come; the next frame shows it
+    requestAnimationFrame(() => requestAnimationFrame(() => { window.first = performance.now(); }));
+  return draw.apply(this, values);
+};
+"""
+RENDERER = """() => {
+  const gl = ii.viewer.field.gl, info = gl.getExtension("WEBGL_debug_renderer_info");
+  return info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : gl.getParameter(gl.RENDERER); }"""
+# Each frame is waited for: a pixel is read back, which nothing can put off.
+TURN = """state => {
+  const v = ii.viewer, rates = [];
+  v.set(state);
+  v.quick = true;
+  for (let i = 0; i < 30; i++) {
+    const start = performance.now();
+    v.state.x = Math.sin(i / 5);
+    v.paint();
+    v.field.gl.readPixels(0, 0, 1, 1, v.field.gl.RGBA, v.field.gl.UNSIGNED_BYTE, new Uint8Array(4));
+    rates.push(1000 / (performance.now() - start));
+  }
+  return rates; }"""
+
+
+def report(page: Path) -> None:
+    """Put the numbers into the documentation."""
+    data = json.loads((RESULTS / "viewer.json").read_text(encoding="utf-8"))
+    lines = ["| *Apples*, full `setup1` | |", "|---|---|"]
+    lines += [f"| {row['what']} | {row['value']:.3g} {row['unit']} |" for row in data["rows"]]
+    lines += [
+        "",
+        f"Drawn by {data['renderer']}, on {data['machine']['cpus']} cores, commit {data['git']['commit'][:7]}.",
+    ]
+    page.write_text(filled(page.read_text(encoding="utf-8"), "viewer", lines), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
