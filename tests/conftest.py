@@ -13,6 +13,11 @@ settings.register_profile("here", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("here")
 
 
+def pytest_addoption(parser):
+    """Flags of this suite."""
+    parser.addoption("--make-golden", action="store_true", help="code what tests/golden lacks")
+
+
 @pytest.fixture
 def run(monkeypatch, capsys):
     """Run the command in this process; its exit code, output and error output."""
