@@ -5,8 +5,8 @@
 Every scheme has a process of its own. After a small picture, which pays for imports and compiled kernels, the picture
 is coded and decoded ``runs`` times; medians of CPU time, and the growth of resident memory at its peak over what was
 there with the picture loaded, divided by the picture's own bytes (3 a pixel). Coded in the middle of the scheme's
-quantisers or qualities, in one run without search for a rate. Numbers go to ``benchmarks/results/cost.json``, the table
-into ``docs/structure.md``.
+quantisers or qualities, in one run without search for a rate. Numbers go to ``benchmarks/results/cost.json``, the
+table into ``docs/structure.md``.
 """
 
 from __future__ import annotations
