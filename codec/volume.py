@@ -120,6 +120,11 @@ class Volume(Coder):
 
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
         """Group by group; a codestream is of the size that the structure says, whatever its bytes are."""
+        frames = layout(blank.lenses, blank.ei_pixels, self.kind).frames
+        if (
+            len(payload) < frames
+        ):  # before anything as long as that is laid out; every slice has packets in three planes
+            raise ValueError(f"its JPEG 2000 stream of {len(payload)} bytes cannot hold {frames} slices")
         cut = self._cut(blank, options)
         mode, step, colours, streams = _parts(payload, len(cut.groups))
         pixels = np.empty((0, 3), blank.pixels.dtype)
