@@ -188,7 +188,8 @@ def _checked(text: bytes) -> Gltf:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ValueError(f"JSON: {error}") from None
-    version = str(data.get("asset", {}).get("version", "")) if isinstance(data, dict) else ""
+    asset = data.get("asset") if isinstance(data, dict) else None
+    version = str(asset.get("version", "")) if isinstance(asset, dict) else ""
     if not version.startswith("2."):
         raise ValueError(f"asset.version {version!r}: glTF 2.0 is needed")
     return Gltf.model_validate(data)

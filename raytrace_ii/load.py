@@ -94,7 +94,10 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
         raise FileNotFoundError(f"{path} does not exist")
     if alone:
         model = read_model(path)
-        scene, models = _alone(path, model), {path: model}
+        try:
+            scene, models = _alone(path, model), {path: model}
+        except ValueError as error:
+            raise ValueError(f"{path.name}: {error}") from None
     else:
         loader = _Loader(path)
         try:
@@ -143,6 +146,8 @@ def read_model(path: Path) -> Model:
         raise ValueError(f"{path.name}: {error}") from None
     except OSError as error:
         raise type(error)(f"{path.name}: {error}") from None
+    except MemoryError:
+        raise ValueError(f"{path.name}: needs more memory than there is") from None
 
 
 def _known(names: Iterable[str]) -> str:
@@ -340,6 +345,8 @@ def _alone(path: Path, model: Model) -> Scene:
     """A mesh file as a scene of its own."""
     corners = np.concatenate([part.mesh.vertices for part in model.parts])
     low, high = corners.min(axis=0), corners.max(axis=0)
+    if not max(np.abs(low).max(), np.abs(high).max()) <= np.finfo(np.float32).max:
+        raise ValueError(f"reaches from {low.tolist()} to {high.tolist()}: finite float32 numbers are needed")
     room = WORKING_VOLUME[1] - WORKING_VOLUME[0]
     scale = float(np.min(room / np.maximum(high - low, 1e-12 * room)))
     shift = (WORKING_VOLUME.sum(axis=0) - (low + high) * scale) / 2
@@ -350,9 +357,6 @@ def _alone(path: Path, model: Model) -> Scene:
         Light(kind="directional", vector=(0.5, -1.0, 0.8), colour=(0.7, 0.7, 0.7)),
         Light(kind="directional", vector=(-0.8, -0.2, 0.6), colour=(0.25, 0.25, 0.25)),
     ]
-    try:
-        bodies = list(_bodies(value, model.parts, path.stem))
-    except ValueError as error:
-        raise ValueError(f"{path.name}: {error}") from None
+    bodies = list(_bodies(value, model.parts, path.stem))
     grey = Background(horizon=(0.6, 0.62, 0.65), zenith=(0.25, 0.35, 0.55), nadir=(0.3, 0.29, 0.28), spread_deg=60)
     return Scene(name=path.stem, bodies=bodies, lights=lights, background=grey, ambient=(0.25, 0.25, 0.25))

@@ -2,11 +2,12 @@
 
 import json
 import struct
+import warnings
 
 import numpy as np
 import pytest
 from gltf_files import SQUARE, SQUARE_FACES, SQUARE_UV, Gltf, glb
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from raytrace_ii import load_scene
@@ -129,6 +130,14 @@ def test_values_that_are_not_finite_are_refused(tmp_path):
         read_model(gltf.save(tmp_path / "m.glb"))
 
 
+def test_more_than_memory_holds_is_refused(tmp_path):
+    gltf = good()
+    del gltf.json["accessors"][0]["bufferView"]  # all zero, then, however many
+    gltf.json["accessors"][0]["count"] = 10**15
+    with pytest.raises(ValueError, match=r"m\.glb: needs more memory than there is"):
+        read_model(gltf.save(tmp_path / "m.glb"))
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -169,6 +178,64 @@ def test_a_file_cut_off_or_with_a_wrong_byte_is_read_or_refused_in_words(tmp_pat
         read_model(folder / "m.glb")
     except (ValueError, OSError) as error:
         assert str(error).startswith("m.glb: ") and "\n" not in str(error), str(error)
+
+
+def rich():
+    """A file with every table in it."""
+    gltf = good()
+    extensions = {
+        "KHR_materials_transmission": {"transmissionFactor": 0.5},
+        "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 2, "attenuationColor": [0.1, 0.2, 0.3]},
+        "KHR_materials_ior": {"ior": 1.4},
+        "KHR_materials_dispersion": {"dispersion": 0.2},
+        "KHR_materials_specular": {"specularFactor": 0.5, "specularColorFactor": [1, 1, 1]},
+    }
+    moved = {"index": 0, "extensions": {"KHR_texture_transform": {"scale": [2, 2], "rotation": 1}}}
+    pbr = {"baseColorFactor": [0.5, 0.5, 0.5, 0.5], "metallicFactor": 0.5, "baseColorTexture": moved}
+    index = gltf.material(
+        extensions, pbr=pbr, normalTexture={"index": 0, "scale": 1}, alphaMode="MASK", alphaCutoff=0.3,
+        emissiveFactor=[1, 1, 1], emissiveTexture={"index": 0},
+    )  # fmt: skip
+    mesh = gltf.mesh(SQUARE, SQUARE_FACES, material=index, TEXCOORD_0=SQUARE_UV)
+    gltf.node(mesh=mesh, rotation=[0, 0, 0, 1], scale=[1, 1, 1])
+    spot = gltf.light(type="spot", spot={"innerConeAngle": 0.1, "outerConeAngle": 0.2})
+    gltf.node(extensions=spot, matrix=np.eye(4).reshape(-1).tolist())
+    return gltf
+
+
+def places(tables, way=()):
+    """Every key and row of a file, as the way to it."""
+    rows = tables.items() if isinstance(tables, dict) else enumerate(tables) if isinstance(tables, list) else ()
+    for key, value in rows:
+        yield (*way, key)
+        yield from places(value, (*way, key))
+
+
+STRANGE = [
+    None, True, 0, 1, -1, 3, 10**12, 10**30, 1e308, -1e300, 0.5, "5", [], {}, [1], [1, 2, 3], [None], {"a": 1}, 5125
+]  # fmt: skip
+
+
+@settings(max_examples=300)
+@given(st.data())
+def test_a_file_with_strange_values_is_read_or_refused_in_words(tmp_path_factory, data):
+    folder = tmp_path_factory.getbasetemp() / "strange"
+    folder.mkdir(exist_ok=True)
+    file = rich().save(folder / "m.gltf")
+    tables = json.loads(file.read_text())
+    for _ in range(data.draw(st.integers(1, 3))):
+        *way, last = data.draw(st.sampled_from(list(places(tables))))
+        at = tables
+        for step in way:
+            at = at[step]
+        at[last] = data.draw(st.sampled_from(STRANGE))
+    file.write_text(json.dumps(tables))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            load_scene(file)
+    except (ValueError, OSError) as error:
+        assert str(error).startswith("m.gltf: ") and "\n" not in str(error), str(error)
 
 
 def test_the_command_says_which_object_of_which_scene(run, refused, tmp_path):

@@ -10,7 +10,7 @@ import trimesh
 from ii_core.files import write_image
 from raytrace_ii import load_scene, scene_names, trace
 from raytrace_ii.load import read_model
-from raytrace_ii.texture import Checker, Image, Noise, linear
+from raytrace_ii.texture import Checker, Image, Noise, Stripes, linear
 
 BALL = """
 [material.m]
@@ -37,7 +37,8 @@ def load(tmp_path, text):
 
 
 def test_every_key_does_what_it_says(tmp_path):
-    write_image(tmp_path / "skin.png", np.full((2, 2, 3), (255, 0, 128), np.uint8))
+    write_image(tmp_path / "skin.png", np.full((2, 2, 4), (255, 0, 128, 255), np.uint8))
+    write_image(tmp_path / "bumps.png", np.full((2, 2, 3), (128, 128, 255), np.uint8))
     scene = load(
         tmp_path,
         """
@@ -72,6 +73,21 @@ def test_every_key_does_what_it_says(tmp_path):
         size = 2.5
         on = "surface"
 
+        [[light]]
+        kind = "spot"
+        position_mm = [4, 5, 6]
+        direction = [0, -1, 1]
+        cone_deg = [10, 20.5]
+        colour = "#00ff00"
+        intensity = 3
+
+        [texture.rows]
+        kind = "stripes"
+        colours = ["#000000", "#ffffff"]
+        width = 0.5
+        axis = [0, 1, 0]
+        soft = 0.25
+
         [texture.cloud]
         kind = "noise"
         colours = [[0, 0, 0], [1, 1, 1]]
@@ -96,8 +112,20 @@ def test_every_key_does_what_it_says(tmp_path):
         [material.glass]
         colour = [1, 0, 0.5]
         transmission = [0.9, 0.5, 0.1]
-        ior = 1.7
+        ior = [1.6, 1.7, 1.8]
         absorption_per_mm = [0, 0.1, 0.2]
+        priority = 2
+
+        [material.rows]
+        texture = "rows"
+        emission = "#ff0000"
+        emission_strength = 5
+
+        [material.fence]
+        texture = "skin"
+        alpha_cutoff = 0.5
+        normal_map = "bumps.png"
+        normal_scale = 0.7
 
         [[object]]
         name = "pane"
@@ -118,6 +146,18 @@ def test_every_key_does_what_it_says(tmp_path):
         shape = "plane"
         size_mm = [5, 6]
         material = "board"
+
+        [[object]]
+        name = "fence"
+        shape = "plane"
+        size_mm = [1, 1]
+        material = "fence"
+
+        [[object]]
+        name = "rows"
+        shape = "plane"
+        size_mm = [1, 1]
+        material = "rows"
 
         [[object]]
         shape = "cylinder"
@@ -154,18 +194,26 @@ def test_every_key_does_what_it_says(tmp_path):
     np.testing.assert_allclose(scene.ambient, linear([0.5, 0.5, 1.0]))
     sky = scene.background
     assert (sky.horizon, sky.zenith, sky.nadir, sky.spread_deg) == ((1, 1, 1), (0, 0, 1), (0, 0, 0), 30)
-    point, sun = scene.lights
+    point, sun, spot = scene.lights
     assert (point.kind, point.vector, point.colour) == ("point", (1, 2, 3), (2.5, 0, 0))
     assert (sun.kind, sun.vector, sun.colour) == ("directional", (0, -2, 0), (1, 1, 1))
-    # glass goes last; objects without a name are called by their shape and place in the file
+    assert (spot.kind, spot.vector, spot.direction) == ("spot", (4, 5, 6), (0, -1, 1))
+    assert (spot.cone_deg, spot.colour) == ((10, 20.5), (0, 3, 0))
+    # glass goes last, cut-outs before it; objects without a name are called by their shape and place in the file
     names = [body.name for body in scene.bodies]
-    assert names == ["sphere 1", "plane 2", "cylinder 3", "revolve 4", "box_grid 5", "pane"]
+    assert names == ["sphere 1", "plane 2", "rows", "cylinder 5", "revolve 6", "box_grid 7", "fence", "pane"]
     by_name = dict(zip(names, scene.bodies, strict=True))
 
     pane = by_name["pane"].material
     np.testing.assert_allclose(pane.colour, linear([1, 0, 0.5]))
     np.testing.assert_allclose(pane.transmission, linear([0.9, 0.5, 0.1]))  # a colour is sRGB, a number a share
-    assert (pane.ior, pane.absorption_per_mm) == (1.7, (0, 0.1, 0.2))
+    assert (pane.ior, pane.absorption_per_mm, pane.priority) == ((1.6, 1.7, 1.8), (0, 0.1, 0.2), 2)
+
+    fence, rows = by_name["fence"].material, by_name["rows"].material
+    assert (fence.alpha_cutoff, fence.normal_scale) == (0.5, 0.7)
+    np.testing.assert_allclose(fence.normal_map.pixels[0, 0], [128 / 255, 128 / 255, 1], rtol=1e-6)  # data, not sRGB
+    assert rows.texture == Stripes(((0, 0, 0), (1, 1, 1)), 0.5, (0, 1, 0), 0.25, False)
+    assert rows.emission == (5, 0, 0) and by_name["sphere 1"].material.ior == 1.5
 
     ball = by_name["sphere 1"]
     assert (ball.material.specular, ball.material.shininess) == (0.3, 70)
@@ -187,12 +235,19 @@ def test_every_key_does_what_it_says(tmp_path):
     assert board.material.texture == Checker(((0, 0, 0), (1, 1, 1)), (2.5, 2.5, 2.5), True)
     assert board.material.colour != (1, 1, 1), "its own colour multiplies the texture"
     np.testing.assert_array_equal(np.ptp(board.texture_coordinates, axis=0), [1, 1, 0])
-    cylinder = by_name["cylinder 3"]
+    cylinder = by_name["cylinder 5"]
     assert cylinder.material.texture == Noise(((0, 0, 0), (1, 1, 1)), (1, 2, 3), 4, 0.5, 12, False)
     # a solid texture keeps its size in mm when its body is scaled
     np.testing.assert_allclose(np.ptp(cylinder.texture_coordinates[:, 1]), 8)
-    assert len(by_name["box_grid 5"].faces) == 8 * 12
+    assert len(by_name["box_grid 7"].faces) == 8 * 12
     assert trace(scene, [(0, 0, -50)], [(0, 0, 1)]).object_id[0] >= 0
+
+
+def test_a_sky_from_an_image(tmp_path):
+    write_image(tmp_path / "sky.exr", np.full((2, 4, 3), 3.0, np.float32))
+    sky = load(tmp_path, '[background]\nimage = "sky.exr"\nturn_deg = 90\nintensity = 0.5\n' + BALL).background
+    assert (sky.turn_deg, sky.intensity) == (90, 0.5)
+    np.testing.assert_array_equal(sky.image.pixels, np.full((2, 4, 3), 3.0))  # floats are linear
 
 
 def test_little_needs_to_stand_in_a_file(tmp_path):
@@ -224,6 +279,7 @@ def ball(old, new):
     return BALL.replace(old, new)
 
 
+SPOT = '[[light]]\nkind = "spot"\nposition_mm = [0, 0, 0]\ndirection = [0, 0, 1]\ncone_deg = [10, 20]\n'
 CHECKER = '[texture.t]\nkind = "checker"\ncolours = ["#ffffff", "#000000"]\nsize = 1\n'
 OBJECT_KEYS = "name, material, position_mm, rotate_deg, scale"
 COLOUR = "#rrggbb or three numbers from 0 to 1 are needed"
@@ -372,6 +428,67 @@ WRONG = {
     "no spread": (
         '[background]\nhorizon = "#000000"\nspread_deg = 0\n' + BALL,
         "background.spread_deg: 0: a number greater than 0 is needed",
+    ),
+    "sky of both kinds": (
+        '[background]\nimage = "sky.exr"\nzenith = "#000000"\n' + BALL,
+        "background: zenith: no use with an image",
+    ),
+    "turned gradient": (
+        '[background]\nhorizon = "#000000"\nturn_deg = 5\n' + BALL,
+        "background: turn_deg: no use without an image",
+    ),
+    "cone inside out": (SPOT.replace("[10, 20]", "[20, 10]") + BALL, "light.0: cone_deg is (20.0, 10.0): an inner"),
+    "cone too wide": (
+        SPOT.replace("[10, 20]", "[10, 120]") + BALL,
+        "light.0.cone_deg.1: 120: a number of at most 90 is needed",
+    ),
+    "stripes without width": (
+        CHECKER.replace("checker", "stripes").replace("size", "width").replace("= 1", "= 0") + BALL,
+        "texture.t.width: 0: a number greater than 0 is needed",
+    ),
+    "two indices": (
+        ball("colour", "ior = [1.5, 1.6]\ncolour"),
+        "material.m.ior: [1.5, 1.6]: one number or three are needed",
+    ),
+    "half a priority": (ball("colour", "priority = 0.5\ncolour"), "material.m.priority: 0.5: a whole number is"),
+    "cut-out of no image": (
+        ball("colour", "alpha_cutoff = 0.5\ncolour"),
+        "material.m: alpha_cutoff is 0.5: an image texture with alpha is needed",
+    ),
+    "cut-out beyond": (
+        ball("colour", "alpha_cutoff = 2\ncolour"),
+        "material.m.alpha_cutoff: 2: a number of at most 1 is needed",
+    ),
+    "negative lights of a mesh": (
+        ball('shape = "sphere"\nradius_mm = 1', 'mesh = "a.obj"\nlights = -1'),
+        "object.0: lights: -1: a number of at least 0 is needed",
+    ),
+    "shape of no material": (ball('material = "m"\n', ""), "object.0: material: is missing"),
+    **{
+        f"text for a number: {key}": (
+            ball(old, f'{key} = "{value}"' + ("\n" + old if key != "radius_mm" else "")),
+            f"{place}{key}: '{value}': {what} is needed",
+        )
+        for old, key, value, place, what in (
+            ("radius_mm = 1", "radius_mm", "1", "object.0: ", "a number"),
+            ("radius_mm = 1", "segments", "12", "object.0: ", "a whole number"),
+            ("colour", "specular", "0.5", "material.m.", "a number"),
+            ("colour", "priority", "1", "material.m.", "a whole number"),
+        )
+    },
+    "text in a list of numbers": (BALL + 'position_mm = [0, "1", 0]\n', "object.0.position_mm.1: '1': a number is"),
+    "text for a truth": (
+        ball('shape = "sphere"\nradius_mm = 1', 'mesh = "a.obj"\nsmooth = "yes"'),
+        "object.0: smooth: 'yes': true or false is needed",
+    ),
+    "truth for a number": (
+        ball("radius_mm = 1", "radius_mm = true"),
+        "object.0: radius_mm: True: a number is needed",
+    ),
+    "number for a text": (BALL + "name = 5\n", "object.0.name: 5: a text is needed"),
+    "date for a number": (
+        ball("radius_mm = 1", "radius_mm = 2024-01-01"),
+        "object.0: radius_mm: '2024-01-01': a number",
     ),
     "negative depth": ("max_depth = -1\n" + BALL, "max_depth: -1: a number of at least 0 is needed"),
     "ambient": ("ambient = 1.5\n" + BALL, "ambient: 1.5: a share from 0 to 1 is needed"),
