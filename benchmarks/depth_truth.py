@@ -1,22 +1,20 @@
 """How well depth from focus finds the depth that the renderer knows, and what its errors do to Q_depth.
 
-    python -m benchmarks.depth_truth [--full]
+    python -m benchmarks.depth_truth [--scale 2] [--scenes apples,cuboid]
 
 Errors are counted in depth layers over the view pixels that hit something within the 250 layers. They are also told
-apart by what is seen: ``edge``, one view pixel or less from a step in depth of more than a fifth; else ``flat``,
-without texture to go by (within a pixel of the elementary image luma changes by less than 3 steps of 8 bits); else
-``textured``. Scenes are taken at scale 8, with noise, and at scale 2, where ±14 lenses are a quarter as wide.
-``--full`` times both methods on a picture of full setup1 size. Numbers go to ``benchmarks/results/depth_truth.json``,
-the chart drawn from them beside it.
+apart by what is seen, the first that holds: ``clear``, a body that hands light on; ``mirror``, one that reflects;
+``edge``, one view pixel or less from a step in depth of more than a fifth, where what is seen is hidden from lenses
+nearby; ``flat``, without texture to go by (within a pixel of the elementary image luma changes by less than 3 steps
+of 8 bits); else ``textured``. Sensor noise is that of scale 8, where an array is 64 lenses wide. Numbers go to
+``benchmarks/results/depth_truth.json``, the chart drawn from them to ``docs/images/depth_truth.png``.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import resource
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,153 +23,129 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from codec import decode, encode
-from ii_core import IICamera, IIPicture, add_sensor_noise, preset
-from ii_core.files import atomic_path, write_json
-from metrics import DepthQuality, depth_from_focus, provenance, q_depth
-from metrics.chart import COLOURS
+from ii_core import IIPicture, add_sensor_noise, preset
+from ii_core.files import write_json
+from metrics import DepthQuality, FocusDepth, depth_from_focus, provenance, q_depth
+from metrics.chart import COLOURS, new_figure, save
 from metrics.depth import virtual_camera_pixels
 from metrics.focus import METHODS
-from raytrace_ii import Background, Body, Light, Material, Scene, load_scene, render
-from raytrace_ii.shapes import Plane, Sphere
-from raytrace_ii.texture import Image
+from raytrace_ii import Scene, Shot, load_scene, render
 
-RESULTS = Path(__file__).parent / "results"
-SCALES = (8, 2)
-REFERENCE_SCENES = ("apples", "cuboid")
-KINDS = ("textured", "flat", "edge")
+ROOT = Path(__file__).parent.parent
+RESULTS, CHART = ROOT / "benchmarks/results/depth_truth.json", ROOT / "docs/images/depth_truth.png"
+SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
+KINDS = ("textured", "flat", "edge", "mirror", "clear")
+NOISES = (0, 1, 2, 4, 8)
+NOISE_SCALE = 8
+SURE = 0.5  # confidence
 FEW = 10  # pixels: the PSNR of a layer of fewer is left to chance
 BINS = np.geomspace(2.5, 250.5, 25)  # edges, in layers: what the chart pools
 BPP = 0.35  # of JPEG 2000, the distortion that Q_depth is asked about
+SHADES = {"dissertation": COLOURS[1], "robust": COLOURS[0], "true": "0.15"}
 
 
 def main() -> None:
     """Print a table, keep it, draw it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--full", action="store_true")
+    parser.add_argument("--scale", type=int, default=2, help="divides setup1's lenses")
+    parser.add_argument("--scenes", default=",".join(SCENES))
     arguments = parser.parse_args()
-    at_full_size = full() if arguments.full else None  # first, before anything else has had the memory
     rows, curves = [], []
-    for scale in SCALES:
-        camera = preset("setup1", scale=scale)
-        for name, scene in scenes(camera).items():
-            reference = name in REFERENCE_SCENES
-            if not reference and scale != SCALES[0]:
-                continue
-            shot = render(scene, camera, support=("depth",))
-            assert shot.depth is not None
-            for sigma in (0, 2, 8) if reference and scale == SCALES[0] else (0,):
-                picture = add_sensor_noise(shot.picture, sigma, seed=1)
-                for method in METHODS:
-                    row = {"scene": name, "scale": scale, "noise": sigma, **errors(picture, shot.depth, method)}
-                    rows.append(row)
-                    print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
-            if reference:
-                curves.append({"scene": name, "scale": scale, **quality(shot.picture, shot.depth)})
-    result = {**provenance(), "rows": rows, "q_depth": curves}
-    path = RESULTS / "depth_truth.json"
-    if at_full_size:
-        result["full"] = at_full_size
-    elif path.is_file() and "full" in (old := json.loads(path.read_text())):
-        result["full"] = old["full"]
-    write_json(path, result)
-    draw(path, path.with_suffix(".png"))
+    for name in arguments.scenes.split(","):
+        scene = load_scene(name)
+        for scale in (NOISE_SCALE, arguments.scale):
+            shot = render(scene, preset("setup1", scale=scale), support=("depth", "object_id"))
+            noises = NOISES if scale == NOISE_SCALE else (0,)
+            kinds = tell_apart(scene, shot)
+            for noise in noises:
+                found = estimates(add_sensor_noise(shot.picture, noise, seed=1))
+                for method, (depth, seconds) in found.items():
+                    row = {"scene": name, "scale": scale, "noise": noise, "method": method}
+                    rows.append({**row, **errors(depth, shot, kinds), "cpu_seconds": seconds})
+                    say(rows[-1])
+        curves.append({"scene": name, "scale": scale, **quality(shot, found)})
+    write_json(RESULTS, {**provenance(), "bpp": BPP, "few": FEW, "rows": rows, "q_depth": curves})
+    save(draw(json.loads(RESULTS.read_text(encoding="utf-8"))), CHART)
 
 
-def scenes(camera: IICamera) -> dict[str, Scene]:
-    """Reference scenes, and some made to be easy or impossible."""
-    z, white = 20 * camera.gap_mm, (1.0, 1.0, 1.0)
-    texels = np.random.default_rng(0).random((100, 100, 3)).astype(np.float32)
-    even = Background(horizon=white, zenith=white, nadir=white)
-
-    def wall(texture: Image | None) -> Scene:
-        mesh = Plane(shape="plane", size_mm=(200, 200)).mesh()
-        vertices = mesh.vertices[:, [0, 2, 1]] + [0, 0, z]
-        assert mesh.uv is not None
-        uv = np.column_stack([mesh.uv, np.zeros(4)])
-        paint = Material(colour=white, texture=texture)
-        body = Body(name="wall", vertices=vertices, faces=mesh.faces, material=paint, texture_coordinates=uv)
-        return Scene(bodies=(body,), background=even, ambient=(0.9, 0.9, 0.9))
-
-    mesh = Sphere(shape="sphere", radius_mm=12).mesh()
-    shiny = Material(colour=(0.1, 0.1, 0.1), mirror=(0.8, 0.8, 0.8), specular=0.5)
-    at = mesh.vertices + np.array([0, 0, 30])
-    ball = Body(name="ball", vertices=at, faces=mesh.faces, material=shiny, normals=mesh.normals)
-    behind = wall(Image(texels))
-    sun = Light(kind="directional", vector=(0.5, -0.8, 1.0), colour=(0.8, 0.8, 0.8))
-    return {
-        "apples": load_scene("apples"),
-        "cuboid": load_scene("cuboid"),
-        "textured wall": behind,
-        "even wall": wall(None),
-        "mirror ball": Scene(
-            bodies=(ball, *_moved(behind, 60 - z).bodies),
-            lights=(sun,),
-            background=load_scene("apples").background,
-            ambient=(0.4, 0.4, 0.4),
-        ),
-    }
+def estimates(picture: IIPicture) -> dict[str, tuple[FocusDepth, float]]:
+    """Depth by each method, and the CPU seconds it took."""
+    found = {}
+    for method in METHODS:
+        started = time.process_time()
+        depth = depth_from_focus(picture, method=method)
+        found[method] = depth, time.process_time() - started
+    return found
 
 
-def _moved(scene: Scene, by: float) -> Scene:
-    (body,) = scene.bodies
-    moved = replace(body, vertices=np.asarray(body.vertices) + np.array([0, 0, by]))
-    return replace(scene, bodies=(moved,))
+def say(row: dict[str, Any]) -> None:
+    """The gist of a row."""
+    shown = ("scene", "scale", "noise", "method", "median_layers", "p90_layers", "within_one_layer", "within_10_%")
+    print("  ".join(f"{row[k]:.3g}" if isinstance(row[k], float) else str(row[k]) for k in shown), flush=True)
 
 
-def errors(picture: IIPicture, depth: NDArray[np.float32], method: str) -> dict[str, Any]:
-    """Errors of the estimate in layers."""
-    camera = picture.camera
-    assert camera is not None
-    index = virtual_camera_pixels(camera)
-    z = depth[index] / np.float64(camera.gap_mm)
-    started = time.perf_counter()
-    found = depth_from_focus(picture, method=method)
-    seconds = time.perf_counter() - started
+def errors(found: FocusDepth, shot: Shot, kinds: NDArray[np.int64]) -> dict[str, Any]:
+    """Errors of the estimate in layers, all together, by kind and where it is sure."""
+    camera = shot.picture.camera
+    assert camera is not None and shot.depth is not None
+    z = shot.depth[virtual_camera_pixels(camera)] / np.float64(camera.gap_mm)
     with np.errstate(invalid="ignore"):
         counted = (z >= 0.5) & (z < found.layers_mm.size + 0.5)
     error = np.where(found.layer < 0, np.inf, np.abs(found.layer + 1 - np.floor(z + 0.5)))
+    near = np.abs(found.depth_mm / camera.gap_mm - z) < 0.1 * z
+    sure = counted & (found.confidence > SURE)
     row: dict[str, Any] = {
-        "method": method,
         "median_layers": float(np.median(error[counted])),
         "p90_layers": float(np.quantile(error[counted], 0.9, method="higher")),
-        "within_one_layer": float((error[counted] <= 1).mean()),
-        "without_depth": float((found.layer < 0)[counted].mean()),
-        "sure": float((found.confidence[counted] > 0.5).mean()),
-        "within_one_layer_where_sure": _share(error[counted & (found.confidence > 0.5)] <= 1),
+        "within_one_layer": _share(error[counted] <= 1),
+        "within_10_%": _share(near[counted]),
+        "too_near": _share((found.layer + 2 < np.floor(z + 0.5))[counted]),
+        "without_depth": _share((found.layer < 0)[counted]),
+        "sure": float(sure.sum() / counted.sum()),
+        "within_10_%_where_sure": _share(near[sure]),
     }
-    kinds = tell_apart(picture.pixels, index, z)
     for i, kind in enumerate(KINDS):
         here = counted & (kinds == i)
-        row[f"share_{kind}"] = float(here.sum() / counted.sum())
+        row[f"pixels_{kind}"] = int(here.sum())
         row[f"within_one_layer_{kind}"] = _share(error[here] <= 1)
-    return {**row, "seconds": seconds}
+        row[f"within_10_%_{kind}"] = _share(near[here])
+    return row
 
 
 def _share(right: NDArray[np.bool_]) -> float:
     return float(right.mean()) if right.size else float("nan")
 
 
-def tell_apart(pixels: NDArray[Any], index: Any, z: NDArray[np.float64]) -> NDArray[np.int64]:
+def tell_apart(scene: Scene, shot: Shot) -> NDArray[np.int64]:
     """Which of KINDS each view pixel is."""
+    assert shot.picture.camera is not None and shot.depth is not None and shot.object_id is not None
+    index = virtual_camera_pixels(shot.picture.camera)
+    z = shot.depth[index]
     far = np.where(np.isnan(z), 1e6, z)
     edge = maximum_filter(far, 3) > 1.2 * minimum_filter(far, 3)
-    luma = pixels.astype(np.float32) @ np.float32([0.299, 0.587, 0.114])
+    luma = shot.picture.pixels.astype(np.float32) @ np.float32([0.299, 0.587, 0.114])
     flat = (maximum_filter(luma, 3) - minimum_filter(luma, 3))[index] < 3
-    return np.where(edge, 2, np.where(flat, 1, 0))
+    body = {body.name: body.material for body in scene.bodies}
+    materials = [body[name] for name in shot.object_names]
+    seen = shot.object_id[index]
+    mirror = np.array([max(m.mirror) > 0 for m in materials] + [False])[seen]  # −1, nothing, is the last
+    clear = np.array([max(m.transmission) > 0 for m in materials] + [False])[seen]
+    return np.select([clear, mirror, edge, flat], [4, 3, 2, 1], 0)
 
 
-def quality(picture: IIPicture, depth: NDArray[np.float32]) -> dict[str, Any]:
+def quality(shot: Shot, found: dict[str, tuple[FocusDepth, float]]) -> dict[str, Any]:
     """Q_depth of a coded picture with true and with estimated depth."""
+    picture: IIPicture = shot.picture
     decoded = decode(encode(picture, "jpeg2000", bpp=BPP))
-    true = q_depth(picture, decoded, depth=depth)
-    row: dict[str, Any] = {"layer": [round(float(x), 2) for x in np.sqrt(BINS[1:] * BINS[:-1])], "true": pooled(true)}
-    for method in METHODS:
-        found = q_depth(picture, decoded, method=method)
-        both = (true.counts >= FEW) & (found.counts >= FEW)
-        row[method] = pooled(found)
-        row[f"{method}_mean_difference_db"] = float(np.abs(true.values - found.values)[both].mean())
-        row[f"{method}_layers_compared"] = int(both.sum())
-        print(f"Q_depth {method}: {row[f'{method}_mean_difference_db']:.2f} dB off in {both.sum()} layers")
+    true = q_depth(picture, decoded, depth=shot.depth)
+    at = [round(float(x), 2) for x in np.sqrt(BINS[1:] * BINS[:-1])]
+    row: dict[str, Any] = {"layer": at, "true": pooled(true)}
+    for method, (depth, _) in found.items():
+        row[method] = pooled(q_depth(picture, decoded, depth=depth))
+        pairs = [(a, b) for a, b in zip(row["true"], row[method], strict=True) if a is not None and b is not None]
+        row[f"{method}_off_db"] = float(np.mean([abs(a - b) for a, b in pairs]))
+        row[f"{method}_bins_made_up"] = sum(b is not None for b in row[method]) - len(pairs)
+        print(f"Q_depth {method}: {row[f'{method}_off_db']:.2f} dB off in {len(pairs)} bins")
     return row
 
 
@@ -186,96 +160,79 @@ def pooled(quality: DepthQuality) -> list[float | None]:
     ]
 
 
-def full() -> dict[str, Any]:
-    """Time and memory of 250 layers on a picture of full setup1 size, of noise."""
-    camera = preset("setup1")
-    block = np.random.default_rng(0).integers(0, 256, (256, 512, 3), dtype=np.uint8)
-    picture = IIPicture(np.tile(block, (16, 16, 1)), camera.lenses, camera.ei_pixels, camera)
-    seconds = {}
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    for method in METHODS:
-        started = time.perf_counter()
-        depth_from_focus(picture, method=method)
-        seconds[method] = time.perf_counter() - started
-    more = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 2**20
-    print(f"full setup1, 250 layers: {seconds} s, {more:.2f} GiB more than before")
-    return {"seconds": seconds, "gib_more": more}
-
-
-def draw(source: Path, target: Path) -> None:
-    """The chart of what `main` wrote."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    data = json.loads(source.read_text(encoding="utf-8"))
-    figure = Figure(figsize=(11, 7), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(2, 2)
-    gap = preset("setup1", scale=SCALES[-1]).gap_mm
-    styles = {"true": ("0.15", "o"), "dissertation": (COLOURS[1], "s"), "robust": (COLOURS[0], "^")}
-    curves = [curve for curve in data["q_depth"] if curve["scale"] == SCALES[-1]]
-    for axes, curve in zip(panels[0], curves, strict=True):
-        for name, (colour, marker) in styles.items():
-            label = "true depth" if name == "true" else f"estimated, {name}"
+def draw(data: dict[str, Any]) -> Any:
+    """Above Q_depth with true and estimated depth, scene by scene; below, where depth is right and where not."""
+    figure = new_figure(15, 11)
+    upper, lower = figure.subfigures(2, 1, height_ratios=[3, 2])
+    panels = upper.subplots(2, 4)
+    for axes, curve in zip(panels.flat, data["q_depth"], strict=False):
+        for name, marker in (("true", "o"), ("dissertation", "s"), ("robust", "^")):
             values = np.array([np.nan if v is None else v for v in curve[name]], float)
             here = np.isfinite(values)  # a line goes on over bins that hold nothing
+            label = "true depth" if name == "true" else f"from focus, {name}"
             layer = np.array(curve["layer"])[here]
-            axes.plot(layer, values[here], marker=marker, color=colour, markersize=5, linewidth=1.4, label=label)
+            axes.plot(
+                layer, values[here], marker=marker, color=SHADES[name], markersize=4, linewidth=1.3, label=label
+            )
         axes.set_xscale("log")
         axes.set_xticks([5, 10, 20, 50, 100, 200], ["5", "10", "20", "50", "100", "200"])
         axes.minorticks_off()
-        axes.set_xlabel(f"depth layer d, at z = d · {gap:.2f} mm, in 24 bins")
+        off = ", ".join(f"{curve[f'{method}_off_db']:.1f}" for method in METHODS)
+        axes.set_title(f"{curve['scene']}: {off} dB off", loc="left", fontsize=10)
+    for axes in panels[:, 0]:
         axes.set_ylabel(r"$Q_\mathrm{depth}$ [dB]")
-        axes.set_title(f"{curve['scene']}: JPEG 2000 at {BPP} bit/pixel, scale {SCALES[-1]}", loc="left")
-        axes.legend(frameon=False, fontsize=9)
-    _bars(panels[1, 0], [row for row in data["rows"] if row["scale"] == SCALES[-1]])
-    _all(panels[1, 1], [row for row in data["rows"] if row["scale"] == SCALES[0]])
-    for axes in panels.flat:
+    for axes in panels[-1]:
+        axes.set_xlabel("depth layer d, pooled in 24 bins")
+    upper.suptitle(f"JPEG 2000 at {data['bpp']} bit/pixel, scale {data['q_depth'][0]['scale']}", fontsize=11)
+    handles, names = panels[0, 0].get_legend_handles_labels()
+    upper.legend(handles, names, loc="outside lower right", ncols=3, frameon=False)
+
+    rows = data["rows"]
+    fine = [row for row in rows if row["scale"] != NOISE_SCALE] or rows
+    by_scene, by_kind, by_noise = lower.subplots(1, 3, width_ratios=[8, 5, 5])
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    _bars(by_scene, scenes, lambda name, method: _only(fine, scene=name, method=method)[0]["p90_layers"])
+    by_scene.set_yscale("log")
+    by_scene.set_ylabel("90 % of the errors are below [layers]")
+    kinds = {f"{kind}\n{_part(fine, kind):.0f} %": kind for kind in KINDS}
+    _bars(by_kind, list(kinds), lambda name, method: _pooled(_only(fine, method=method), kinds[name]))
+    by_kind.set_ylabel("depth right within 10 % [%]")
+    by_kind.set_title("all scenes, by what is seen (share of the views)", loc="left", fontsize=10)
+    coarse = [row for row in rows if row["scale"] == NOISE_SCALE]
+    _bars(by_noise, list(NOISES), lambda noise, method: 100 * np.mean(
+        [row["within_10_%"] for row in _only(coarse, noise=noise, method=method)]))  # fmt: skip
+    by_noise.set_xlabel("sensor noise σ [steps of 8 bits]")
+    by_noise.set_ylabel("depth right within 10 % [%]")
+    by_noise.set_title(f"all scenes, scale {NOISE_SCALE}", loc="left", fontsize=10)
+    for axes in (*panels.flat, by_scene, by_kind, by_noise):
         axes.grid(True, axis="y", color="0.9", linewidth=0.8)
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
-    with atomic_path(target) as temporary:
-        figure.savefig(temporary, dpi=130, format=target.suffix[1:])
+    return figure
 
 
-def _bars(axes: Any, rows: list[dict[str, Any]]) -> None:
-    """Where it fails: by what is seen."""
-    groups = [(scene, kind) for scene in REFERENCE_SCENES for kind in KINDS]
-    labels = []
-    for x, (scene, kind) in enumerate(groups):
-        for i, method in enumerate(METHODS):
-            (row,) = [row for row in rows if row["scene"] == scene and row["method"] == method]
-            value = row[f"within_one_layer_{kind}"]
-            _bar(axes, x + 0.4 * i - 0.2, value, method, x == 0)
-        labels.append(f"{scene}\n{kind}\n{100 * row[f'share_{kind}']:.0f} %")
-    axes.set_xticks(range(len(groups)), labels, fontsize=8)
-    _finish(axes, f"where it fails, scale {SCALES[-1]} (and how much of the view that is)")
+def _bars(axes: Any, groups: list[Any], value: Any) -> None:
+    for i, method in enumerate(METHODS):
+        heights = [value(group, method) for group in groups]
+        bars = axes.bar(np.arange(len(groups)) + 0.4 * i - 0.2, heights, 0.38, color=SHADES[method], label=method)
+        axes.bar_label(bars, [f"{height:.0f}" for height in heights], fontsize=8)
+    axes.set_xticks(range(len(groups)), groups, fontsize=9)
 
 
-def _all(axes: Any, rows: list[dict[str, Any]]) -> None:
-    """Scene by scene, noise by noise."""
-    groups = list(dict.fromkeys((row["scene"], row["noise"]) for row in rows))
-    for row in rows:
-        x = groups.index((row["scene"], row["noise"]))
-        _bar(axes, x + 0.4 * METHODS.index(row["method"]) - 0.2, row["within_one_layer"], row["method"], x == 0)
-    names = [scene.replace(" ", "\n") + (f"\nσ = {noise}" if noise else "") for scene, noise in groups]
-    axes.set_xticks(range(len(groups)), names, fontsize=8)
-    _finish(axes, f"all pixels, scale {SCALES[0]}: sensor noise σ, walls, a mirror")
+def _only(rows: list[dict[str, Any]], **wanted: Any) -> list[dict[str, Any]]:
+    return [row for row in rows if all(row[key] == value for key, value in wanted.items())]
 
 
-def _bar(axes: Any, x: float, value: float | None, method: str, named: bool) -> None:
-    colour = {"dissertation": COLOURS[1], "robust": COLOURS[0]}[method]
-    share = 0.0 if value is None else 100 * value
-    axes.bar(x, share, 0.38, color=colour, label=method if named else None)
-    axes.annotate(f"{share:.0f}", (x, share), ha="center", va="bottom", fontsize=8)
+def _part(rows: list[dict[str, Any]], kind: str) -> float:
+    """Percent of all view pixels that are of a kind."""
+    return 100 * sum(row[f"pixels_{kind}"] for row in rows) / sum(row[f"pixels_{k}"] for row in rows for k in KINDS)
 
 
-def _finish(axes: Any, title: str) -> None:
-    axes.set_ylim(0, 110)
-    axes.set_yticks(range(0, 101, 20))
-    axes.set_ylabel("right within one layer [%]")
-    axes.set_title(title, loc="left")
-    axes.legend(frameon=False, fontsize=9)
+def _pooled(rows: list[dict[str, Any]], kind: str) -> float:
+    """Percent right of all pixels of a kind."""
+    held = [row for row in rows if row[f"pixels_{kind}"]]
+    right = sum(row[f"pixels_{kind}"] * row[f"within_10_%_{kind}"] for row in held)
+    return 100 * right / max(sum(row[f"pixels_{kind}"] for row in held), 1)
 
 
 if __name__ == "__main__":
