@@ -42,6 +42,8 @@ def main() -> None:
         ("II → RI / numpy copy, setup1", "≤ 2", lambda: rearrange_ratio("ri")),
         ("encode si-h264 / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("si-h264")),
         ("encode ei-h264 / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("ei-h264")),
+        ("encode si-hevc / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("si-hevc")),
+        ("encode si-av1:fast / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("si-av1:fast")),
         ("peak memory of rendering setup1 at full size, GiB", "≤ 1.5", peak_memory),
     ]
     rows = []

@@ -3,11 +3,19 @@
 from .analysis import analyse_orders
 from .base import options, parse_scheme, register, schemes
 from .coded import Encoded, decode, encode, timed_decode
+from .ffv1 import Ffv1
 from .jpeg2000 import Jpeg2000
-from .video import H264
+from .mpeg2 import Mpeg2
+from .svtav1 import Av1
 from .volume import Separate, Volume
+from .vp9 import Vp9
+from .x264 import H264
+from .x265 import Hevc
 
-for _coder in (H264("ei"), H264("si"), H264("ri"), Jpeg2000()):
+for _kind in ("ei", "si", "ri"):
+    for _video in (H264, Hevc, Av1, Vp9, Ffv1):
+        register(_video(_kind))
+for _coder in (Mpeg2("ei"), Mpeg2("si"), Jpeg2000()):
     register(_coder)
 for _kind in ("ei", "si", "ri"):
     register(Volume(_kind))

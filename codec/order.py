@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Indices = NDArray[np.int64]
+BY = ("rows", "columns")
 
 
-def selection_order(order: str, rows: int, cols: int) -> Indices:
+def selection_order(order: str, rows: int, cols: int, by: str = "rows") -> Indices:
     """Γ(j) for j = 0 … J−1: which component image is frame j.
 
     Parameters
@@ -25,6 +26,8 @@ def selection_order(order: str, rows: int, cols: int) -> Indices:
         down and up, as JPEG scans a block; or in rings around the centre, outward.
     rows, cols : int
         The grid, at least 1 × 1.
+    by : {"rows", "columns"}
+        ``columns`` walks the transposed grid: parallel goes down and up, a row order is a column order.
 
     Returns
     -------
@@ -34,7 +37,7 @@ def selection_order(order: str, rows: int, cols: int) -> Indices:
     Raises
     ------
     ValueError
-        If the order is unknown or the grid is empty.
+        If the order or what it goes by is unknown, or the grid is empty.
 
     References
     ----------
@@ -45,7 +48,10 @@ def selection_order(order: str, rows: int, cols: int) -> Indices:
         raise ValueError(f"unknown order {order!r}: known are {', '.join(ORDERS)}")
     if rows < 1 or cols < 1:
         raise ValueError(f"a grid of {rows}×{cols} component images has no order: at least 1×1 is needed")
-    return np.ascontiguousarray(ORDERS[order](np.arange(rows * cols, dtype=np.int64).reshape(rows, cols)))
+    if by not in BY:
+        raise ValueError(f"unknown way to go {by!r}: known are {', '.join(BY)}")
+    grid = np.arange(rows * cols, dtype=np.int64).reshape(rows, cols)
+    return np.ascontiguousarray(ORDERS[order](grid if by == "rows" else grid.T.copy()))
 
 
 def inverse(permutation: NDArray[Any]) -> Indices:

@@ -1,31 +1,26 @@
-"""II-picture ↔ pseudo video sequence: component images in an order, as planar YCbCr, a batch of frames at a time.
+"""II-picture ↔ pseudo video sequence: component images in an order, as planes, a batch of frames at a time.
 
 The picture is never rearranged as a whole. A batch is gathered straight from the interleaved RGB picture into the
-planes an encoder reads, and scattered straight back from what a decoder wrote.
-
-Colour is ITU-R BT.709, full range, 8 bit, rounded to nearest, at 4:4:4::
-
-    Y  = 0.2126 R + 0.7152 G + 0.0722 B
-    Cb = (B − Y) / 1.8556 + 128
-    Cr = (R − Y) / 1.5748 + 128
-
-There and back changes no value by more than 1: a PSNR of about 52.9 dB, the most a coder behind it can reach.
+planes an encoder reads, and scattered straight back from what a decoder wrote; see `codec.planes` for the colours.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from ii_core.component import KINDS
 
+from . import planes as colour
 from .order import selection_order
+from .planes import Format
 
 Pair = tuple[int, int]
+Planes = list[NDArray[Any]]
 
 # A batch holds about as much as a core's own cache, and no more frames than is worth the objects around them.
 BATCH_BYTES = 8 << 20
@@ -50,15 +45,14 @@ class Layout:
         """J, how many component images there are."""
         return self.rows * self.cols
 
-    def origins(self, order: str) -> NDArray[np.int64]:
+    def origins(self, order: str, by: str = "rows") -> NDArray[np.int64]:
         """The first pixel of each component image, by frame number."""
-        row, col = np.divmod(selection_order(order, self.rows, self.cols), self.cols)
+        row, col = np.divmod(selection_order(order, self.rows, self.cols, by), self.cols)
         return row * self.step_row + col * self.step_col
 
-    def batch(self, stride: int) -> NDArray[np.uint8]:
-        """Room for one batch of frames, (B, 3, height, stride), with ``stride`` ≥ width bytes from row to row."""
-        count = max(1, min(self.frames, BATCH_FRAMES, BATCH_BYTES // (3 * self.height * stride)))
-        return np.zeros((count, 3, self.height, stride), np.uint8)
+    def transposed(self) -> Layout:
+        """The same images in the same grid, each with rows for columns."""
+        return replace(self, height=self.width, width=self.height, step_y=self.step_x, step_x=self.step_y)
 
 
 def layout(lenses: Pair, ei_pixels: Pair, kind: str) -> Layout:
@@ -96,98 +90,75 @@ def layout(lenses: Pair, ei_pixels: Pair, kind: str) -> Layout:
     )
 
 
-def gathered(pixels: NDArray[np.uint8], shape: Layout, order: str, planes: NDArray[np.uint8]) -> Iterator[int]:
-    """Fill ``planes`` with one batch of frames after another.
+@dataclass(frozen=True, kw_only=True)
+class Film:
+    """The frames of a pseudo video sequence: which component images, in what order and colours, how large.
 
-    Parameters
-    ----------
-    pixels : ndarray of uint8, (N, M, 3)
-        The picture, C-contiguous.
-    shape : Layout
-    order : str
-        See `codec.order.selection_order`.
-    planes : ndarray of uint8, (B, 3, height, stride)
-        Overwritten by every batch: use it up before asking for the next.
-
-    Yields
-    ------
-    int
-        How many frames of ``planes`` are filled.
+    ``width`` and ``height`` are those of the frames that are coded, at least those of a component image.
     """
-    flat, origins, size = pixels.reshape(-1, 3), shape.origins(order), len(planes)
-    for first in range(0, shape.frames, size):
-        some = origins[first : first + size]
-        gather_ycbcr(flat, some, shape.step_y, shape.step_x, shape.width, planes)
-        yield len(some)
 
+    layout: Layout
+    order: str
+    by: str
+    format: Format
+    width: int
+    height: int
 
-def scatter(planes: NDArray[np.uint8], origins: NDArray[np.int64], shape: Layout, pixels: NDArray[np.uint8]) -> None:
-    """Put a batch of frames back into the picture: the inverse of one step of `gathered`.
+    @property
+    def frames(self) -> int:
+        """How many."""
+        return self.layout.frames
 
-    Parameters
-    ----------
-    planes : ndarray of uint8, (B, 3, height, stride)
-    origins : ndarray of int64, at most (B,)
-        The part of `Layout.origins` these frames have.
-    pixels : ndarray of uint8, (N, M, 3)
-        C-contiguous; the pixels of these frames are written.
-    """
-    scatter_rgb(planes, origins, shape.step_y, shape.step_x, shape.width, pixels.reshape(-1, 3))
+    def origins(self) -> NDArray[np.int64]:
+        """The first pixel of each frame in the picture."""
+        return self.layout.origins(self.order, self.by)
 
+    def batch(self, strides: list[int] | None = None) -> Planes:
+        """Room for one batch of frames, an array (B, rows, ``stride``) of samples for each plane."""
+        shapes = self.format.planes(self.width, self.height)
+        sizes = [(rows, stride) for (rows, _), stride in zip(shapes, strides or [n for _, n in shapes], strict=True)]
+        nbytes = sum(rows * stride for rows, stride in sizes) * np.dtype(self.format.dtype).itemsize
+        count = max(1, min(self.frames, BATCH_FRAMES, BATCH_BYTES // nbytes))
+        return [np.zeros((count, *size), self.format.dtype) for size in sizes]
 
-# 20 fractional bits: exact enough to round like the real numbers do, small enough for 32-bit lanes.
-BITS = np.int32(20)
-HALF = np.int32(1 << 19)
-MID = np.int32(128)
+    def gathered(self, pixels: NDArray[Any], planes: Planes) -> Iterator[int]:
+        """Fill ``planes`` with one batch of frames after another.
 
+        Parameters
+        ----------
+        pixels : ndarray, (N, M, 3)
+            The picture, C-contiguous.
+        planes : list of ndarray
+            As from `batch`, overwritten every time: use them up before asking for the next.
 
-def _fixed(value: float) -> np.int32:
-    return np.int32(round(value * (1 << 20)))
+        Yields
+        ------
+        int
+            How many frames of ``planes`` are filled.
+        """
+        flat, origins, size = pixels.reshape(-1, 3), self.origins(), len(planes[0])
+        for first in range(0, self.frames, size):
+            some = origins[first : first + size]
+            colour.gather(flat, some, self._steps, (*self._size, self.width), self.format, planes)
+            yield len(some)
 
+    def scatter(self, planes: Planes, origins: NDArray[np.int64], pixels: NDArray[Any]) -> None:
+        """Put a batch of frames back into the picture: the inverse of one step of `gathered`.
 
-YR, YB = _fixed(0.2126), _fixed(0.0722)
-YG = np.int32((1 << 20) - YR - YB)
-BR, BG, BB = _fixed(-0.2126 / 1.8556), _fixed(-0.7152 / 1.8556), _fixed(0.5)
-RR, RG, RB = _fixed(0.5), _fixed(-0.7152 / 1.5748), _fixed(-0.0722 / 1.5748)
-R_CR, B_CB = _fixed(1.5748), _fixed(1.8556)
-G_CB, G_CR = _fixed(-0.0722 * 1.8556 / 0.7152), _fixed(-0.2126 * 1.5748 / 0.7152)
+        Parameters
+        ----------
+        planes : list of ndarray
+        origins : ndarray of int64, at most (B,)
+            The part of `origins` these frames have.
+        pixels : ndarray, (N, M, 3)
+            C-contiguous; the pixels of these frames are written.
+        """
+        colour.scatter(planes, origins, self._steps, self._size, self.format, pixels.reshape(-1, 3))
 
+    @property
+    def _steps(self) -> Pair:
+        return self.layout.step_y, self.layout.step_x
 
-# Both kernels handle one row of a few frames before the next row: neighbouring frames are interleaved in the
-# picture, so that a cache line of it serves several of them while it is at hand.
-TILE = 16
-
-
-@numba.njit(cache=True, nogil=True)
-def gather_ycbcr(pixels, origins, step_y, step_x, width, planes):
-    """planes[b, :, y, x] = YCbCr of pixels[origins[b] + y·step_y + x·step_x]."""
-    top = np.int32(255)
-    for tile in range(0, origins.size, TILE):
-        for y in range(planes.shape[2]):
-            for b in range(tile, min(tile + TILE, origins.size)):
-                line = pixels[origins[b] + y * step_y :]
-                luma, cb, cr = planes[b, 0, y], planes[b, 1, y], planes[b, 2, y]
-                for x in range(width):
-                    p = np.uint64(x) * np.uint64(step_x)  # unsigned: no check for indices from the end
-                    red, green, blue = np.int32(line[p, 0]), np.int32(line[p, 1]), np.int32(line[p, 2])
-                    luma[x] = (YR * red + YG * green + YB * blue + HALF) >> BITS
-                    # Pure blue and pure red round to 256.
-                    cb[x] = min(((BR * red + BG * green + BB * blue + HALF) >> BITS) + MID, top)
-                    cr[x] = min(((RR * red + RG * green + RB * blue + HALF) >> BITS) + MID, top)
-
-
-@numba.njit(cache=True, nogil=True)
-def scatter_rgb(planes, origins, step_y, step_x, width, pixels):
-    """pixels[origins[b] + y·step_y + x·step_x] = RGB of planes[b, :, y, x]."""
-    low, top = np.int32(0), np.int32(255)
-    for tile in range(0, origins.size, TILE):
-        for y in range(planes.shape[2]):
-            for b in range(tile, min(tile + TILE, origins.size)):
-                line = pixels[origins[b] + y * step_y :]
-                for x in range(width):
-                    p = np.uint64(x) * np.uint64(step_x)
-                    luma = (np.int32(planes[b, 0, y, x]) << BITS) + HALF
-                    cb, cr = np.int32(planes[b, 1, y, x]) - MID, np.int32(planes[b, 2, y, x]) - MID
-                    line[p, 0] = min(max((luma + R_CR * cr) >> BITS, low), top)
-                    line[p, 1] = min(max((luma + G_CB * cb + G_CR * cr) >> BITS, low), top)
-                    line[p, 2] = min(max((luma + B_CB * cb) >> BITS, low), top)
+    @property
+    def _size(self) -> Pair:
+        return self.layout.height, self.layout.width

@@ -1,6 +1,6 @@
 import pytest
 
-from codec.rate import Run, nearest_rate
+from codec.rate import Run, nearest, nearest_quantiser, nearest_rate, nearest_share, straddling
 
 
 class Fake:
@@ -67,3 +67,39 @@ def test_a_coder_that_never_obeys_is_left_alone_in_time():
     size, runs = Fake(lambda ask: next(sizes)).search(1000)
     assert size == 950
     assert runs <= 6
+
+
+def search(size_of, target, *, step=0.05, octave=6.0):
+    return nearest_quantiser(
+        lambda q: Run(bytes(round(size_of(q))), 0.0), target, low=0, high=51, step=step, octave=octave
+    )
+
+
+@pytest.mark.parametrize("octave", [3.0, 6.0, 14.0])
+@pytest.mark.parametrize("target", [400, 10_000, 150_000])
+def test_a_quantiser_is_found_whatever_the_slope(octave, target):
+    runs = search(lambda q: 1e4 * 2 ** ((30 - q) / octave), target)
+    if 1e4 * 2 ** (-21 / octave) <= target <= 1e4 * 2 ** (30 / octave):
+        assert len(nearest(runs.values(), target).payload) == pytest.approx(target, rel=0.02)
+    assert len(runs) <= 5
+
+
+def test_a_target_beyond_the_range_takes_the_end_of_it():
+    runs = search(lambda q: 1000 * 2 ** ((30 - q) / 6), 1)
+    assert min(runs, key=lambda q: len(runs[q].payload)) == 51
+    assert len(runs) == 2
+
+
+def test_steps_are_bridged_by_a_share():
+    """The size jumps by a tenth where the quantiser of B pictures is rounded."""
+    runs = search(lambda q: 1e4 * 1.1 ** -round(q - 30), 10_500)
+    fine, coarse = straddling(runs, 10_500)
+    more = nearest_share(
+        lambda share: Run(bytes(round(1e4 + 1e3 * share**1.5)), 0.0), 10_500, none=runs[coarse], all_=runs[fine]
+    )
+    assert len(more[-1].payload) == pytest.approx(10_500, rel=0.02)
+    assert len(more) <= 4
+
+
+def test_no_pair_lies_around_what_is_beyond_all():
+    assert straddling({20: Run(bytes(100), 0.0), 30: Run(bytes(50), 0.0)}, 200) is None

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from codec import encode, options, schemes
-from codec.base import parse_scheme, register
+from codec.base import find, parse_scheme, register
 from codec.jpeg2000 import Jpeg2000
 from ii_core import IIPicture
 
@@ -27,13 +27,23 @@ def test_options_default_and_override():
     assert parse_scheme("jpeg2000")[1] == {}
 
 
+def test_presets_name_options_and_give_way_to_others():
+    fast, found = find("si-av1").presets["fast"], parse_scheme("si-av1:preset=5,fast,gop=32")[1]
+    assert found["gop"] == 32
+    assert found["preset"] == 5 != fast["preset"]
+    assert {**fast, "preset": 5}.items() <= found.items()
+    for name in schemes():
+        for preset in find(name).presets:
+            assert parse_scheme(f"{name}:{preset}")[0].name == name
+
+
 @pytest.mark.parametrize(
     ("scheme", "message"),
     [
         ("si-h26", "unknown scheme 'si-h26': known are ei-"),
         ("", "unknown scheme ''"),
         (None, "scheme is None: a name is needed"),
-        ("si-h264:speed=3", "scheme si-h264 has no option speed: known are order, gop, bframes, merange"),
+        ("si-h264:speed=3", "scheme si-h264 has no option speed: known are order, by, gop, bframes, merange"),
         ("jpeg2000:order=row", "scheme jpeg2000 has no option order: known are none"),
         ("si-h264:order", "'order' is no option=value and no preset: known are"),
         ("si-h264:", "'' is no option=value and no preset"),
@@ -42,7 +52,11 @@ def test_options_default_and_override():
             "si-h264:order=diagonal",
             "option order is 'diagonal': one of row, column, parallel, zigzag, spiral is needed",
         ),
-        ("si-h264:bframes=4", "option bframes is '4': a whole number from 0 to 3 is needed"),
+        ("si-h264:bframes=17", "option bframes is '17': a whole number from 0 to 16 is needed"),
+        ("si-h264:pbratio=5", "option pbratio is '5': a number from 0.5 to 4.0 is needed"),
+        ("si-h264:pbratio=nan", "option pbratio is 'nan'"),
+        ("si-av1:swift", "'swift' is no option=value and no preset: known are fast, balanced, best"),
+        ("si-av1:fast,best", "'best' is a second preset"),
         ("si-h264:gop=-1", "option gop is '-1': a whole number from 0"),
         ("si-h264:merange=8", "option merange is '8': a whole number from 16 to 128 is needed"),
         ("si-h264:gop=2.5", "option gop is '2.5'"),

@@ -1,0 +1,56 @@
+"""Packets in one payload, for the coders whose packets cannot be told apart in a row.
+
+A payload is a table and then the bytes. The table says how many bytes of what the decoder needs first, how many
+packets, and their sizes, each as LEB128 (seven bits a byte, least first, the highest bit set on all but the last).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def pack(first: bytes, packets: Sequence[bytes]) -> bytes:
+    """One payload."""
+    table = bytearray()
+    for number in (len(first), len(packets), *map(len, packets)):
+        while number > 127:
+            table.append(number & 127 | 128)
+            number >>= 7
+        table.append(number)
+    return b"".join([table, first, *packets])
+
+
+def unpack(payload: bytes, count: int) -> tuple[bytes, list[memoryview]]:
+    """What comes first, and the packets.
+
+    Raises
+    ------
+    ValueError
+        Unless there are ``count`` packets and exactly the bytes they need.
+    """
+    at = 0
+    numbers: list[int] = []
+    while len(numbers) < count + 2:
+        number = shift = 0
+        while True:
+            if at >= len(payload) or shift > 28:
+                raise ValueError("its table of packets is broken")
+            byte = payload[at]
+            at += 1
+            number |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                break
+        numbers.append(number)
+        if len(numbers) == 2 and number != count:
+            raise ValueError(f"it has {number} packets, {count} are needed")
+    first, sizes = numbers[0], numbers[2:]
+    if at + first + sum(sizes) != len(payload):
+        raise ValueError(f"its packets have {first + sum(sizes)} bytes, {len(payload) - at} are there")
+    view = memoryview(payload)
+    head, at = bytes(view[at : at + first]), at + first
+    packets = []
+    for size in sizes:
+        packets.append(view[at : at + size])
+        at += size
+    return head, packets
