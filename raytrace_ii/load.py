@@ -290,6 +290,7 @@ def _bodies(value: ObjectTable, parts: list[Part], label: str) -> Iterator[Body]
     size = np.array(value.scale)
     turn = rotation(value.rotate_deg)
     name = value.name or label
+    shared: dict[Any, NDArray[np.float64]] = {}
     for part in parts:
         mesh, material = part.mesh, part.material if part.material is not None else Material()
         if part.material is not None and value.material is None:  # a file's own material counts in its own units
@@ -300,7 +301,7 @@ def _bodies(value: ObjectTable, parts: list[Part], label: str) -> Iterator[Body]
             faces=mesh.faces,
             material=material,
             normals=None if mesh.normals is None else (mesh.normals / size) @ turn.T,
-            texture_coordinates=_coordinates(material, mesh, size),
+            texture_coordinates=_coordinates(material, mesh, size, shared),
         )
 
 
@@ -309,7 +310,8 @@ def _scaled(material: Material, size: float) -> Material:
     return replace(material, absorption_per_mm=(r, g, b)) if max(r, g, b) > 0 else material
 
 
-def _coordinates(material: Material, mesh: Mesh, size: NDArray[np.float64]) -> Any:
+def _coordinates(material: Material, mesh: Mesh, size: NDArray[np.float64], shared: dict[Any, Any]) -> Any:
+    """What a body's textures are read at; ``shared`` keeps what instances have in common."""
     texture = material.texture
     if isinstance(texture, VertexColours):
         if mesh.colours is None:
@@ -323,7 +325,10 @@ def _coordinates(material: Material, mesh: Mesh, size: NDArray[np.float64]) -> A
         what = "texture on the surface" if texture is not None else "normal map"
         raise ValueError(f"a {what} needs texture coordinates, the mesh has none")
     repeat = texture.repeat if isinstance(texture, Image) else (1.0, 1.0)
-    return np.column_stack([mesh.uv * repeat, np.zeros(len(mesh.uv))])
+    key = id(mesh.uv), repeat
+    if key not in shared:
+        shared[key] = np.column_stack([mesh.uv * repeat, np.zeros(len(mesh.uv))])
+    return shared[key]
 
 
 def _placed(light: Light, value: ObjectTable, strength: float) -> Light:

@@ -103,6 +103,7 @@ def test_instances_share_their_arrays(tmp_path):
     first, *others = scene.bodies
     for other in others:
         assert np.shares_memory(first.faces, other.faces)
+        assert first.texture_coordinates is other.texture_coordinates
         assert first.material.texture is other.material.texture
     parts = read_model(tmp_path / "model.glb").parts
     assert parts[0].mesh.uv is parts[1].mesh.uv and parts[0].material is parts[2].material
@@ -213,6 +214,37 @@ def test_buffers_in_files_beside_even_above(tmp_path):
     (tmp_path / "all data.bin").write_bytes(bytes(gltf.blob))
     gltf.save(tmp_path / "models" / "m.gltf", uri="../all%20data.bin")
     assert len(read_model(tmp_path / "models" / "m.gltf").parts) == 1
+
+
+def test_cut_outs_are_holes(tmp_path):
+    pixels = np.full((8, 8, 4), 255)
+    pixels[:4, :, 3] = 0  # the upper half
+    gltf = Gltf()
+    painted(gltf, gltf.texture(pixels), alphaMode="MASK")
+    scene = scene_of(tmp_path, gltf)
+    there = trace(scene, [(0, 0.5, -5), (0, -0.5, -5)], [AHEAD, AHEAD]).object_id
+    assert there.tolist() == [-1, 0]
+
+
+@pytest.mark.parametrize("turn", [0, 90])
+def test_a_normal_map_leans_the_way_it_says(turn, tmp_path):
+    """Red is along growing u, green up the image: 45° to the right, or upwards, is brightest lit from there."""
+    gltf = Gltf()
+    lean = (255 - 37, 128, 255 - 37) if turn == 0 else (128, 255 - 37, 255 - 37)
+    bumps = gltf.texture(np.full((4, 4, 3), lean))
+    extensions = {"KHR_materials_specular": {"specularFactor": 0}}
+    pbr = {"metallicFactor": 0}
+    index = gltf.material(extensions, pbr=pbr, normalTexture={"index": bumps})
+    gltf.node(mesh=gltf.mesh(SQUARE, SQUARE_FACES, material=index, TEXCOORD_0=SQUARE_UV))
+    towards = {"right": (1, 0, -1), "left": (-1, 0, -1), "up": (0, 1, -1), "down": (0, -1, -1)}
+    found = {}
+    for name, (x, y, z) in towards.items():
+        head = f'ambient = 0\n[[light]]\nkind = "directional"\ndirection = [{-x}, {-y}, {-z}]'
+        found[name] = seen(scene_of(tmp_path, gltf, head=head), 0, 0)[0]
+    bright, dark = ("right", "left") if turn == 0 else ("up", "down")
+    # facing the light; at right angles to it; and halfway, cos 60°
+    assert found.pop(bright) == pytest.approx(1, abs=0.01) and found.pop(dark) == pytest.approx(0, abs=0.01)
+    assert list(found.values()) == pytest.approx([0.5, 0.5], abs=0.01)
 
 
 def test_the_set_of_coordinates_that_a_texture_asks_for(tmp_path):
