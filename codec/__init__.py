@@ -6,6 +6,7 @@ from .coded import Encoded, decode, encode, timed_decode
 from .ffv1 import Ffv1
 from .jpeg2000 import Jpeg2000
 from .mpeg2 import Mpeg2
+from .still import Htj2k, Jpeg, JpegXl
 from .svtav1 import Av1
 from .volume import Separate, Volume
 from .vp9 import Vp9
@@ -15,7 +16,7 @@ from .x265 import Hevc
 for _kind in ("ei", "si", "ri"):
     for _video in (H264, Hevc, Av1, Vp9, Ffv1):
         register(_video(_kind))
-for _coder in (Mpeg2("ei"), Mpeg2("si"), Jpeg2000()):
+for _coder in (Mpeg2("ei"), Mpeg2("si"), Jpeg2000(), Jpeg(), JpegXl(), Htj2k()):
     register(_coder)
 for _kind in ("ei", "si", "ri"):
     register(Volume(_kind))

@@ -63,7 +63,7 @@ def encode_planes(planes: NDArray[Any], squared_error: float, *, wavelet: str) -
     stream = bytes(whole)
     if not stream.startswith(head):
         raise RuntimeError(f"OpenJPEG {imagecodecs.jpeg2k_version()} writes another header than was foreseen")
-    return _without_comment(stream[len(head) :])
+    return without_comments(stream[len(head) :])
 
 
 def decode_planes(
@@ -114,8 +114,8 @@ def _head(shape: tuple[int, ...], dtype: str) -> bytes:
     return b"\xff\x4f" + size + bytes((0x80 | (BITS[dtype] - 1), 1, 1)) * count
 
 
-def _without_comment(stream: bytes) -> bytes:
-    """The main header's marker segments but for comments, then the tile."""
+def without_comments(stream: bytes) -> bytes:
+    """Of the main header's marker segments, from any on, those that are no comments; then the tile."""
     parts, at = [], 0
     while (marker := int.from_bytes(stream[at : at + 2])) != SOT:
         end = at + 2 + int.from_bytes(stream[at + 2 : at + 4])

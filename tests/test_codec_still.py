@@ -1,0 +1,96 @@
+"""Coders of single pictures; what every scheme must keep is in test_codec_contract.py."""
+
+import io
+from dataclasses import replace
+
+import imagecodecs
+import numpy as np
+import pytest
+from PIL import Image
+from test_codec_contract import large, psnr, textured
+
+from codec import decode, encode
+from codec.still import jpeg_tables, jpegxl_codestream, jpegxl_distance, jpegxl_size
+from ii_core import IIPicture
+
+
+@pytest.mark.parametrize("quality", [1, 13, 49, 50, 51, 75, 99, 100])
+def test_jpeg_tables_of_whole_qualities_are_libjpegs(quality):
+    out = io.BytesIO()
+    Image.new("RGB", (8, 8)).save(out, "JPEG", quality=quality)
+    with Image.open(out) as image:
+        theirs = image.quantization
+    for ours, table in zip(jpeg_tables(quality), (theirs[0], theirs[1]), strict=True):
+        np.testing.assert_array_equal(ours, table)
+
+
+def test_qualities_in_between_make_sizes_in_between():
+    sizes = [encode(large(), "jpeg", quality=q).nbytes for q in (20, 20.25, 20.5, 20.75, 21)]
+    assert sizes == sorted(sizes)
+    assert len(set(sizes)) == 5
+
+
+@pytest.mark.parametrize("scheme", ["jpeg", "jpeg:chroma=420"])
+def test_the_payload_is_a_jpeg_file(scheme):
+    coded = encode(textured(), scheme, quality=80)
+    with Image.open(io.BytesIO(coded.payload)) as image:
+        np.testing.assert_array_equal(np.array(image), decode(coded).pixels)
+
+
+def test_subsampled_colour_costs_less_and_is_worse():
+    full, less = (encode(large(), f"jpeg:chroma={c}", quality=95) for c in ("444", "420"))
+    assert less.nbytes < 0.8 * full.nbytes
+    assert psnr(large(), decode(less)) < psnr(large(), decode(full)) - 3
+
+
+def test_what_jpeg_cannot_count_is_refused():
+    picture = IIPicture(np.zeros((1, 70_000, 3), np.uint8), (70_000, 1), (1, 1))
+    with pytest.raises(ValueError, match="70000×1 pixels: JPEG takes 65500"):
+        encode(picture, "jpeg", quality=50)
+
+
+def test_jpegxl_distances_are_libjxls():
+    """`JxlEncoderDistanceFromQuality`: 1 at 90, 25 at 0, continuous at 30."""
+    assert jpegxl_distance(90) == pytest.approx(1.0)
+    assert jpegxl_distance(0) == 25
+    assert jpegxl_distance(30) == pytest.approx(jpegxl_distance(29.9999), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "size", [(1, 1), (8, 8), (9, 8), (256, 256), (264, 256), (200, 100), (4096, 3), (70, 1025), (16, 9)]
+)
+def test_jpegxl_says_its_size(size):
+    stream = imagecodecs.jpegxl_encode(np.zeros((size[1], size[0], 3), np.uint8), usecontainer=False, effort=1)
+    assert jpegxl_size(stream) == size
+    assert jpegxl_size(b"\xff\xd8" + stream) is None
+
+
+def test_jpegxl_of_16_bits_loses_its_container():
+    pixels = np.random.default_rng(0).integers(0, 65536, (9, 11, 3), np.uint16)
+    boxed = imagecodecs.jpegxl_encode(pixels, lossless=True, usecontainer=True)
+    bare = jpegxl_codestream(boxed)
+    assert len(bare) < len(boxed)
+    np.testing.assert_array_equal(imagecodecs.jpegxl_decode(bare), pixels)
+
+
+@pytest.mark.parametrize("scheme", ["jpegxl", "htj2k"])
+def test_a_rate_beyond_lossless_is_lossless(scheme):
+    coded = encode(textured(16, 8, 4, 4), scheme, bpp=200)
+    np.testing.assert_array_equal(decode(coded).pixels, textured(16, 8, 4, 4).pixels)
+
+
+@pytest.mark.parametrize(("qp", "step"), [(12, 2.5), (24, 10.0)])
+def test_htj2k_quantises_with_the_step_it_says(qp, step):
+    """The noise of a uniform quantiser, Δ²/12 at most: zeros are better where the picture is smooth."""
+    noise = IIPicture(np.random.default_rng(1).integers(0, 256, (64, 64, 3), np.uint8), (8, 8), (8, 8))
+    error = np.mean((decode(encode(noise, "htj2k", qp=qp)).pixels.astype(float) - noise.pixels) ** 2)
+    # A dead zone costs some, clipping and the colour transform, whose axes are not orthogonal, some more.
+    assert 0.5 < error / (step**2 / 12) < 2
+
+
+@pytest.mark.parametrize("scheme", ["jpeg", "jpegxl", "htj2k"])
+def test_another_size_than_the_structures_is_refused(scheme):
+    coded = encode(textured(16, 8, 4, 4), scheme, bpp=3)
+    other = encode(textured(8, 16, 4, 4), scheme, bpp=3)
+    with pytest.raises(ValueError, match="is damaged"):
+        decode(replace(coded, payload=other.payload))
