@@ -102,8 +102,7 @@ CHROMINANCE = np.array([
 class Jpeg(Still):
     """Progressive baseline JPEG with Huffman tables of its own, by libjpeg-turbo through Pillow.
 
-    Qualities are those of libjpeg and whole ones give its very tables; those in between give tables in between, so
-    that rates can be met.
+    Qualities are those of libjpeg, and those between whole ones give tables in between, so that rates can be met.
     """
 
     name = "jpeg"
@@ -150,7 +149,7 @@ class Jpeg(Still):
 
 
 def jpeg_tables(quality: float) -> list[list[int]]:
-    """libjpeg's quantiser tables of a quality from 1 to 100, row by row."""
+    """libjpeg's quantiser tables of a quality from 1 to 100, row by row; libjpeg itself rounds the scale."""
     scale = 50 / quality if quality < 50 else 2 - quality / 50
     return [np.clip(np.floor(table * scale + 0.5), 1, 255).astype(int).tolist() for table in (LUMINANCE, CHROMINANCE)]
 
@@ -247,7 +246,7 @@ class Htj2k(Still):
     dtypes: ClassVar[tuple[str, ...]] = ("uint8", "uint16")
     options: ClassVar[Mapping[str, Option]] = {"lossless": LOSSLESS}
     qp_range: ClassVar[tuple[int, int] | None] = (0, 60)
-    scale_about = "quantiser step of 0.625·2^(qp/6) 8-bit codes, as in H.264"
+    scale_about = "OpenJPH's base step is 0.625·2^(qp/6) 8-bit codes"
     search: ClassVar[dict[str, Any]] = {"low": 6.0, "high": 60.0, "start": 40.0, "octave": -5.0}
     levels = 5
 
