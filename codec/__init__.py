@@ -1,5 +1,6 @@
 """Coding: II-pictures to bitstreams and back, by pseudo video sequences and by JPEG 2000."""
 
+from .access import decode_component, decode_frame
 from .analysis import analyse_orders
 from .base import options, parse_scheme, register, schemes
 from .coded import Encoded, decode, encode, timed_decode
@@ -7,6 +8,7 @@ from .ffv1 import Ffv1
 from .jpeg2000 import Jpeg2000
 from .mpeg2 import Mpeg2
 from .still import Htj2k, Jpeg, JpegXl
+from .streams import extract
 from .svtav1 import Av1
 from .volume import Separate, Volume
 from .vp9 import Vp9
@@ -22,4 +24,16 @@ for _kind in ("ei", "si", "ri"):
     register(Volume(_kind))
 register(Separate("si"))
 
-__all__ = ["Encoded", "analyse_orders", "decode", "encode", "options", "parse_scheme", "schemes", "timed_decode"]
+__all__ = [
+    "Encoded",
+    "analyse_orders",
+    "decode",
+    "decode_component",
+    "decode_frame",
+    "encode",
+    "extract",
+    "options",
+    "parse_scheme",
+    "schemes",
+    "timed_decode",
+]

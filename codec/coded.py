@@ -132,7 +132,7 @@ def _from_header(header: dict[str, Any], payload: bytes) -> Encoded:
     options = checked_options(coder, header["options"])
     if header["dtype"] not in coder.dtypes:
         raise ValueError(f"its pixels are {header['dtype']!r}: scheme {coder.name} takes {', '.join(coder.dtypes)}")
-    structure = _blank(header["structure"], header["dtype"]).structure_json()
+    structure = blank_picture(header["structure"], header["dtype"]).structure_json()
     return Encoded(**{**header, "options": options, "structure": structure}, payload=payload)
 
 
@@ -221,7 +221,7 @@ def timed_decode(coded: Encoded | str | os.PathLike[str]) -> Decoding:
     if not isinstance(coded, Encoded):
         path, coded = os.fspath(coded), Encoded.load(coded)
     coder = find(coded.scheme)
-    blank = _blank(coded.structure, coded.dtype)
+    blank = blank_picture(coded.structure, coded.dtype)
     try:
         pixels, codec_seconds = coder.decode(coded.payload, blank, coded.options)
     except ValueError as error:
@@ -230,7 +230,7 @@ def timed_decode(coded: Encoded | str | os.PathLike[str]) -> Decoding:
     return Decoding(picture=picture, seconds=cpu_seconds() - started, codec_seconds=codec_seconds)
 
 
-def _blank(structure: Any, dtype: str) -> IIPicture:
+def blank_picture(structure: Any, dtype: str) -> IIPicture:
     """A picture of that structure whose pixels take no memory, all zero and read-only."""
     lenses, ei_pixels = (
         structure.get(key) if isinstance(structure, Mapping) else None for key in ("lenses", "ei_pixels")

@@ -61,6 +61,7 @@ def _settings(options: Options, rate: Mapping[str, str], bit_rate: int | None = 
         "g": str(options["gop"] or 600),
         "bf": str(options["bframes"]),
         "sc_threshold": "1000000000",
+        "flags": "+cgop",  # no B picture looks over the end of its group
         **rate,
     }
     return Settings(parameters=parameters, bit_rate=bit_rate)

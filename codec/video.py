@@ -223,9 +223,9 @@ class Video(Coder):
         return packet
 
 
-def open_encoder(coder: Video, film: Film, settings: Settings) -> Any:
-    """The encoder, ready for frames."""
-    context: Any = av.CodecContext.create(coder.encoder, "w")
+def open_encoder(coder: Video, film: Film, settings: Settings, context: Any = None) -> Any:
+    """The encoder, or the one given, ready for frames."""
+    context = context or av.CodecContext.create(coder.encoder, "w")
     context.width, context.height, context.pix_fmt = film.width, film.height, film.format.name
     if film.format.chroma in ("444", "420"):
         context.color_range = av.video.reformatter.ColorRange.JPEG
@@ -279,10 +279,15 @@ def encoded(coder: Video, pixels: NDArray[Any], film: Film, settings: Settings) 
 def _decode(coder: Video, payload: bytes, film: Film, blank: NDArray[Any]) -> tuple[Pixels, float]:
     if len(payload) < coder.min_coded_frame * film.frames:  # before anything as long as the sequence is laid out
         raise ValueError(f"its {coder.standard} stream of {len(payload)} bytes cannot hold {film.frames} frames")
-    origins, planes = film.origins(), film.batch()
-    frames = _frames(coder, payload, film)
+    frames = decoded_frames(coder, payload, film)
+    started = cpu_seconds()
+    first = next(frames, None)
+    seconds, done = cpu_seconds() - started, 0
+    if first is None:
+        raise ValueError(f"its {coder.standard} stream holds no frames")
+    # Only now that a frame of that size is there is memory taken for more of them.
+    frames, origins, planes = itertools.chain([first], frames), film.origins(), film.batch()
     pixels = np.empty((0, 0, 3), blank.dtype)
-    seconds, done = 0.0, 0
     while True:
         started = cpu_seconds()
         batch = list(itertools.islice(frames, len(planes[0])))
@@ -295,7 +300,7 @@ def _decode(coder: Video, payload: bytes, film: Film, blank: NDArray[Any]) -> tu
             raise ValueError(f"its {coder.standard} stream has more than {film.frames} frames")
         for index, frame in enumerate(batch):
             for plane, target in zip(frame.planes, planes, strict=True):
-                _copy_plane(plane, target[index])
+                copy_plane(plane, target[index])
         film.scatter(planes, origins[done : done + len(batch)], pixels)
         done += len(batch)
     if done < film.frames:
@@ -303,14 +308,22 @@ def _decode(coder: Video, payload: bytes, film: Film, blank: NDArray[Any]) -> tu
     return pixels, seconds
 
 
-def _frames(coder: Video, payload: bytes, film: Film) -> Iterator[Any]:
-    """The frames of a stream in display order, each checked for its size."""
+def decoder_of(coder: Video, film: Film) -> Any:
+    """The decoder, ready for packets."""
     context: Any = av.CodecContext.create(coder.decoder, "r")
     context.thread_count = 1
     # A stream of larger frames is refused before they take memory. The decoder counts what it would allocate: whole
     # blocks, rows padded for its vector instructions.
     coded = (-(-film.width // 128) * 128) * (-(-film.height // 128) * 128)
     context.options = {"max_pixels": str(coded), "err_detect": "explode"}
+    if coder.framed:  # nothing in the packets says it
+        context.width, context.height = film.width, film.height
+    return context
+
+
+def decoded_frames(coder: Video, payload: bytes, film: Film) -> Iterator[Any]:
+    """The frames of a stream in display order, each checked for its size."""
+    context = decoder_of(coder, film)
     for packet in _packets(coder, context, payload, film):
         yield from _checked(coder, context.decode(packet), film)
     yield from _checked(coder, context.decode(None), film)
@@ -323,7 +336,6 @@ def _packets(coder: Video, context: Any, payload: bytes, film: Film) -> Iterator
         return
     if coder.framed:
         first, packets = framing.unpack(payload, film.frames)
-        context.width, context.height = film.width, film.height
         if first:
             context.extradata = first
         for packet in packets:
@@ -344,7 +356,8 @@ def _checked(coder: Video, frames: list[Any], film: Film) -> list[Any]:
     return frames
 
 
-def _copy_plane(plane: Any, target: NDArray[Any]) -> None:
+def copy_plane(plane: Any, target: NDArray[Any]) -> None:
+    """The samples of a decoded plane, without the padding of its lines."""
     rows, samples = target.shape
     lines = np.frombuffer(plane, target.dtype, rows * plane.line_size // target.itemsize).reshape(rows, -1)
     target[:] = lines[:, :samples]

@@ -1,4 +1,4 @@
-"""Commands that code: schemes, encode, decode."""
+"""Commands that code: schemes, encode, decode, extract."""
 
 from __future__ import annotations
 
@@ -56,15 +56,49 @@ def encode(
 def decode(
     coded: Annotated[Path, typer.Argument(help="A file that `encode` wrote.")],
     output: Annotated[Path, typer.Option("-o", "--output", help=".png or .tif.")],
+    component: Annotated[
+        str | None,
+        typer.Option(help="Only one component image, without the rest: u,v of SIs, k,l of EIs, v,l of RIs."),
+    ] = None,
     force: Force = False,
 ) -> None:
-    """Decode an II-picture."""
-    from codec import decode
+    """Decode an II-picture, or one component image of it."""
+    from codec import Encoded, decode, decode_component
+    from ii_core.files import write_image
 
-    check_picture(output, "uint8", force)
+    stream = Encoded.load(coded)
+    check_picture(output, stream.dtype, force)
     with spinner(f"decode {coded.name}"):
-        picture = decode(coded)
-    picture.save(output)
+        if component is None:
+            decode(stream).save(output)
+        else:
+            write_image(output, decode_component(stream, _place(component)))
+
+
+@app.command()
+def extract(
+    coded: Annotated[Path, typer.Argument(help="A file that `encode` wrote.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="A video or picture file: .mkv, .mp4, .obu, .jp2, … by the scheme.")
+    ],
+    force: Force = False,
+) -> None:
+    """Take the coded stream out as a file that other programs open, without coding it again."""
+    from codec import Encoded, extract
+
+    stream = Encoded.load(coded)
+    check_output(output, force)
+    with spinner(f"extract {coded.name}"):
+        extract(stream, output)
+    print(f"{output}: {output.stat().st_size} bytes around {stream.nbytes} of {stream.scheme}")
+
+
+def _place(text: str) -> tuple[int, int]:
+    try:
+        a, b = (int(part) for part in text.split(","))
+    except ValueError:
+        raise ValueError(f"component is {text!r}: two whole numbers as in 3,4 are needed") from None
+    return a, b
 
 
 def study_orders(path: Path, folder: Path, force: bool) -> None:

@@ -1,0 +1,206 @@
+"""One frame without the rest, and streams as files of their own."""
+
+import io
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from functools import cache
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+from codec import Encoded, decode, decode_component, decode_frame, encode, schemes
+from codec.access import sequence
+from codec.base import find
+from codec.order import selection_order
+from codec.streams import extract, suffixes
+from codec.video import Video
+from ii_core import IIPicture, component_images
+
+VIDEOS = sorted(name for name in schemes() if isinstance(find(name), Video))
+STILLS = sorted(set(schemes()) - set(VIDEOS))
+FFPROBE = shutil.which("ffprobe")
+
+
+@cache
+def picture(k=20, l=18, u=4, v=3):
+    """Smooth, with disparity and noise; frames of every kind at odd sizes."""
+    y, x = np.mgrid[:l, :k]
+    field = np.empty((l, v, k, u, 3))
+    for row in range(v):
+        for col in range(u):
+            shade = 128 + 80 * np.sin((x + col) / 4) * np.cos((y + row) / 5)
+            field[:, row, :, col] = np.stack([shade, 255 - shade, shade / 2], axis=-1)
+    field += np.random.default_rng(0).standard_normal(field.shape[:4])[..., None]
+    return IIPicture(np.clip(field, 0, 255).astype(np.uint8).reshape(l * v, k * u, 3), (k, l), (u, v))
+
+
+@cache
+def coded(scheme):
+    name = scheme.partition(":")[0]
+    coder = find(name)
+    if coder.lossless({key: option.default for key, option in coder.options.items()}):
+        return encode(picture(), scheme)
+    if coder.qp_range:
+        return encode(picture(), scheme, qp=coder.qp_range[1] // 2)
+    if coder.rate_control:
+        return encode(picture(), scheme, bpp=2)
+    low, high = coder.quality_range
+    return encode(picture(), scheme, quality=type(low)((low + high) / 2))
+
+
+@pytest.mark.parametrize("scheme", VIDEOS)
+@pytest.mark.parametrize("gop", [1, 5, 0])
+def test_one_component_is_that_of_the_whole(scheme, gop):
+    """To the bit: a group decodes alone to what it is among the others."""
+    stream = coded(f"{scheme}:gop={gop}")
+    kind = scheme.partition("-")[0]
+    whole = component_images(decode(stream), kind)
+    rows, cols = whole.shape[:2]
+    for row, col in ((0, 0), (rows - 1, cols - 1), (rows // 2, cols // 2), (0, cols - 1)):
+        place = (row, col) if kind == "ri" else (col, row)
+        np.testing.assert_array_equal(decode_component(stream, place), whole[row, col])
+    taken = sequence(stream)
+    count = len(taken.packets)
+    groups = sum(packet.key for packet in taken.packets)
+    needed = 1 if gop == 0 else -(-count // gop)
+    # MPEG-2 ends a group early rather than with B pictures that look ahead.
+    assert groups >= needed if scheme.endswith("mpeg2") else groups == needed
+    flat = whole.reshape(count, *whole.shape[2:])[selection_order("parallel", rows, cols)]
+    for index in {0, min(4, count - 1), min(5, count - 1), count - 1}:
+        np.testing.assert_array_equal(decode_frame(stream, index), flat[index])
+
+
+def test_b_pictures_and_other_orders():
+    stream = coded("si-h264:gop=6,bframes=3,order=spiral")
+    whole = component_images(decode(stream), "si")
+    for v, u in np.ndindex(3, 4):
+        np.testing.assert_array_equal(decode_component(stream, (u, v)), whole[v, u])
+
+
+def test_only_its_own_group_is_read():
+    """The rest may be anything: here every other group's slices are zeros."""
+    stream = coded("si-h264:gop=4")
+    taken = sequence(stream)
+    data = [packet.data for packet in taken.packets]
+    for i in (*range(0, 4), *range(8, 12)):
+        data[i] = data[i][:-8] + bytes(range(1, 9))
+    broken = replace(stream, payload=b"".join(data))
+    np.testing.assert_array_equal(decode_frame(broken, 6), decode_frame(stream, 6))
+
+
+def test_refused():
+    stream = coded("si-h264:gop=4")
+    for index in (-1, 12, True):
+        with pytest.raises(ValueError, match="is asked for: there are 12, from 0"):
+            decode_frame(stream, index)
+    with pytest.raises(ValueError, match=r"component image \(4, 0\) is asked for: there are 4×3"):
+        decode_component(stream, (4, 0))
+    with pytest.raises(ValueError, match="codes the picture as a whole"):
+        decode_frame(coded("jpeg2000"), 0)
+    for payload in (b"", b"nothing at all", stream.payload[:-200]):
+        with pytest.raises(ValueError, match="is damaged"):
+            decode_frame(replace(stream, payload=payload), 11)
+
+
+def frames_of(data, count):
+    """Planes of all frames, as FFmpeg decodes them."""
+    with av.open(data) as container:
+        frames = list(container.decode(video=0))
+    assert len(frames) == count
+    return [[bytes(plane)[:0] + _samples(plane, frame) for plane in frame.planes] for frame in frames]
+
+
+def _samples(plane, frame):
+    size = max(1, plane.line_size // max(plane.width, 1)) if plane.width else 1
+    size = 2 if "10" in frame.format.name or "16" in frame.format.name else 4 if "bgr0" in frame.format.name else 1
+    rows = np.frombuffer(plane, np.uint8, plane.height * plane.line_size).reshape(plane.height, -1)
+    return rows[:, : plane.width * size].tobytes()
+
+
+@pytest.mark.parametrize("scheme", VIDEOS)
+def test_streams_are_files_that_ffmpeg_decodes_to_the_same(scheme, tmp_path):
+    """Every frame of every container is the one that our own decoding puts into the picture."""
+    from codec import video
+
+    stream = coded(f"{scheme}:gop=5")
+    taken = sequence(stream)
+    own = list(video.decoded_frames(taken.coder, stream.payload, taken.film))
+    expected = [[_samples(plane, frame) for plane in frame.planes] for frame in own]
+    for suffix in suffixes(stream):
+        path = tmp_path / f"out{suffix}"
+        extract(stream, path)
+        assert frames_of(str(path), len(expected)) == expected, suffix
+        if FFPROBE and suffix in (".mkv", ".mp4", ".ivf", ".obu"):
+            shown = probe(path)
+            assert int(shown["nb_read_frames"]) == len(expected)
+            if taken.film.format.chroma in ("444", "420") and not scheme.endswith("mpeg2"):
+                # MPEG-2 has no full range, and its decoders say so whatever the container does.
+                assert (shown["color_range"], shown["color_space"]) == ("pc", "bt709")
+
+
+def probe(path):
+    command = [FFPROBE, "-v", "error", "-count_frames", "-show_streams", "-of", "json", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    return json.loads(done.stdout)["streams"][0]
+
+
+def test_frames_of_b_pictures_are_shown_in_order(tmp_path):
+    stream = coded("si-h264:bframes=3")
+    extract(stream, tmp_path / "x.mp4")
+    with av.open(str(tmp_path / "x.mp4")) as container:
+        times = [frame.pts for frame in container.decode(video=0)]
+    assert len(set(np.diff(times))) == 1
+
+
+@pytest.mark.parametrize("scheme", STILLS)
+def test_whole_pictures_are_files_that_open(scheme, tmp_path):
+    stream = coded(scheme)
+    for suffix in suffixes(stream):
+        path = tmp_path / f"out{suffix}"
+        extract(stream, path)
+        assert path.stat().st_size - stream.nbytes in (0, 85)
+        if suffix in (".jp2", ".j2k", ".jpg"):
+            with Image.open(path) as image:
+                assert image.size == picture().size
+                off = np.asarray(image).astype(int) - decode(stream).pixels
+                assert np.abs(off).max() <= (2 if suffix == ".jpg" else 0)
+        if FFPROBE and suffix in (".jp2", ".j2k", ".jpg"):
+            assert (probe(path)["width"], probe(path)["height"]) == picture().size
+
+
+def test_files_it_does_not_go_into(tmp_path):
+    stream = coded("si-h264")
+    with pytest.raises(ValueError, match=r"does not go into x\.webm: possible are \.mkv, \.mp4"):
+        extract(stream, tmp_path / "x.webm")
+    with pytest.raises(ValueError, match="is damaged"):
+        extract(replace(stream, payload=stream.payload[:-200]), tmp_path / "x.mkv")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_command(run, refused, tmp_path):
+    stream = coded("si-h264:gop=4")
+    stream.save(tmp_path / "x.ii")
+    code, out, _ = run("extract", tmp_path / "x.ii", "-o", tmp_path / "x.mkv")
+    assert code == 0 and "si-h264" in out
+    assert run("decode", tmp_path / "x.ii", "--component", "2,1", "-o", tmp_path / "c.png")[0] == 0
+    with Image.open(tmp_path / "c.png") as image:
+        np.testing.assert_array_equal(np.asarray(image), component_images(decode(stream), "si")[1, 2])
+    refused(run("decode", tmp_path / "x.ii", "--component", "2", "-o", tmp_path / "d.png"), "component is '2'")
+    refused(run("decode", tmp_path / "x.ii", "--component", "4,0", "-o", tmp_path / "d.png"), "there are 4×3")
+    refused(run("extract", tmp_path / "x.ii", "-o", tmp_path / "x.png"), "does not go into x.png")
+    refused(run("extract", tmp_path / "x.ii", "-o", tmp_path / "x.mkv"), "is there already")
+
+
+def test_the_bare_payload_is_a_stream(tmp_path):
+    """What stands in the file needs no more than to be cut out."""
+    stream = coded("si-h264")
+    stream.save(tmp_path / "x.ii")
+    payload = (tmp_path / "x.ii").read_bytes()[-stream.nbytes :]
+    assert Encoded.load(tmp_path / "x.ii").payload == payload
+    with av.open(io.BytesIO(payload), format="h264") as container:
+        assert sum(1 for _ in container.decode(video=0)) == 12
