@@ -171,6 +171,7 @@ def _record(product: _Product, stats: Stats) -> dict[str, Any]:
         "seconds": round(stats.seconds, 3),
         "cpu_seconds": round(stats.cpu_seconds, 3),
         "rays": stats.rays,
+        "skipped": stats.skipped,
         "samples": {str(n): pixels for n, pixels in stats.samples.items()},
     }
 

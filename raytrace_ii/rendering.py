@@ -46,12 +46,14 @@ UNITS = (
 class Stats:
     """What a picture cost.
 
-    ``rays`` by kind (primary, shadow, reflection, refraction); ``seconds`` by the clock; ``embree_seconds`` and
+    ``rays`` by kind (primary, shadow, reflection, refraction), and those ``skipped`` because no 8-bit pixel would
+    show them; ``seconds`` by the clock; ``embree_seconds`` and
     ``cpu_seconds`` summed over all threads and processes that rendered; ``samples`` says how many pixels got how
     many.
     """
 
     rays: dict[str, int]
+    skipped: dict[str, int]
     seconds: float
     embree_seconds: float
     cpu_seconds: float
@@ -273,6 +275,7 @@ class _Tally:
     def stats(self) -> Stats:
         return Stats(
             rays=dict(self.count.rays),
+            skipped=dict(self.count.skipped),
             seconds=time.perf_counter() - self.started,
             embree_seconds=self.count.embree_seconds,
             cpu_seconds=self.block_seconds + time.thread_time() - self.cpu,

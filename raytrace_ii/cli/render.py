@@ -224,6 +224,8 @@ def _save_projection(scene: Any, camera: Any, path: Path, means: dict[str, Any])
 
 def _say_stats(s: Stats) -> None:
     counts = ", ".join(f"{count / 1e6:.2f} M {kind}" for kind, count in s.rays.items() if count)
+    if sum(s.skipped.values()):
+        counts += f", {sum(s.skipped.values()) / 1e6:.2f} M too weak to shoot,"
     spread = f" ({s.mean_samples:.1f} per pixel)" if len(s.samples) > 1 else ""
     print(
         f"{counts} rays{spread} in {s.seconds:.1f} s, {s.embree_seconds:.1f} s of {s.cpu_seconds:.1f} CPU s in Embree"
