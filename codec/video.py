@@ -36,7 +36,7 @@ COMMON: dict[str, Option] = {
     "by": Option(about="whether the order goes by rows or by columns", default="rows", choices=BY),
     "gop": Option(about="frames from I picture to I picture, 0 for only one", default=0, low=0, high=1 << 30),
 }
-DEPTH = Option(about="bits of a sample inside the coder", default=10, low=8, high=10)
+DEPTH = Option(about="bits of a sample inside the coder", default="10", choices=("8", "10"))
 THREADS = Option(about="threads of the encoder; the bytes depend on it", default=1, low=1, high=16)
 
 

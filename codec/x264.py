@@ -60,25 +60,26 @@ class H264(Video):
         "pbratio": Option(about="quantiser step of B over that of P pictures", default=1.3, low=0.5, high=4.0),
         "preset": Option(about="x264's, the effort", default="medium", choices=SPEEDS),
         "chroma": chroma("444"),
-        "depth": Option(about="bits of a sample inside the coder", default=8, low=8, high=10),
+        "depth": Option(about="bits of a sample inside the coder", default="8", choices=("8", "10")),
         "threads": THREADS,
     }
 
     presets: ClassVar[Mapping[str, Options]] = {
-        "fast": {"bframes": 3, "pyramid": 1, "rate": "crf", "preset": "veryfast"},
-        "balanced": {"bframes": 7, "pyramid": 1, "rate": "crf"},
-        "best": {"bframes": 16, "pyramid": 1, "rate": "crf", "preset": "veryslow"},
+        "fast": {"bframes": 3, "pyramid": 1, "rate": "crf"},
+        "balanced": {"bframes": 3, "pyramid": 1, "rate": "crf", "preset": "slow"},
+        "best": {"bframes": 7, "pyramid": 1, "rate": "crf", "preset": "veryslow", "depth": "10"},
     }
 
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
         """A constant quantiser, or rate factor."""
-        rate = f"crf={quantiser:g}" if options["rate"] == "crf" else f"qp={round(quantiser)}"
-        return _settings(options, film, rate)
+        if options["rate"] == "crf":
+            return _settings(options, film, f"crf={quantiser:g}")
+        return _settings(options, film, f"qp={_fixed(quantiser, options)}")
 
     def mixed(self, fine: float, coarse: float, frames: int, film: Film, options: Options) -> Settings:
         """By a zone of its own for the first frames."""
         settings = self.constant(coarse, film, options)
-        finer = f"q={fine:g}" if options["rate"] == "cq" else f"b={2 ** ((coarse - fine) / 6):.4f}"
+        finer = f"q={_fixed(fine, options)}" if options["rate"] == "cq" else f"b={2 ** ((coarse - fine) / 6):.4f}"
         parameters = settings.parameters["x264-params"] + f":zones=0,{max(0, frames - 1)},{finer}"
         return replace(settings, parameters={**settings.parameters, "x264-params": parameters})
 
@@ -117,7 +118,7 @@ def _settings(options: Options, film: Film, rate: str, frame_rate: int = 25) -> 
         f"weightp=0:psy=0:mbtree={int(tree)}",
         *(["rc-lookahead=250:aq-mode=0"] if options["rate"] == "crf" else []),
         # To hold a rate x264 would go beyond the standard's coarsest quantiser, and drop residuals altogether.
-        f"qpmax={COARSEST}",
+        f"qpmax={_fixed(COARSEST, options)}",
         rate,
     ]
     return Settings(
@@ -125,6 +126,11 @@ def _settings(options: Options, film: Film, rate: str, frame_rate: int = 25) -> 
         frame_rate=frame_rate,
         threads=int(options["threads"]),
     )
+
+
+def _fixed(quantiser: float, options: Options) -> int:
+    """x264's own number for it, which at 10 bit begins 12 further; 0 stays lossless."""
+    return round(quantiser) + (12 if options["depth"] == "10" and quantiser > 0 else 0)
 
 
 def _constant_rate(size: float, film: Film) -> tuple[str, int]:

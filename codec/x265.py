@@ -33,23 +33,23 @@ class Hevc(Video):
     scale_about = "x265's constant rate factor, or a constant quantiser with rate=cq"
     options: ClassVar[Mapping[str, Option]] = {
         **COMMON,
-        "bframes": Option(about="B pictures between P pictures, always as many", default=8, low=0, high=16),
+        "bframes": Option(about="B pictures between P pictures, always as many", default=4, low=0, high=16),
         "merange": Option(about="motion range in pixels", default=57, low=16, high=128),
         "rate": Option(
             about="how a rate is met: constant rate factor, constant quantiser, two passes",
             default="crf",
             choices=("crf", "cq", "2pass"),
         ),
-        "preset": Option(about="x265's, the effort", default="medium", choices=SPEEDS),
+        "preset": Option(about="x265's, the effort", default="slow", choices=SPEEDS),
         "chroma": chroma("444"),
         "depth": DEPTH,
         "threads": THREADS,
     }
 
     presets: ClassVar[Mapping[str, Options]] = {
-        "fast": {"preset": "veryfast"},
-        "balanced": {"preset": "medium"},
-        "best": {"preset": "slower", "bframes": 16},
+        "fast": {"preset": "medium"},
+        "balanced": {"preset": "slow"},
+        "best": {"preset": "slower"},
     }
 
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:

@@ -1,0 +1,94 @@
+"""Why B pictures hurt in the dissertation's Table 5.5 and help elsewhere: one thing changed at a time.
+
+``python -m benchmarks.bframes --scale 4`` codes sub-images of two scenes with 0 to 3 and 7 B pictures between P
+pictures under several conditions. What is kept is the Bjøntegaard difference in PSNR to the same condition without
+B pictures, in ``benchmarks/results/bframes.json``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from benchmarks.coders import climbing
+from codec import decode, encode
+from ii_core import IIPicture, preset
+from ii_core.files import write_json
+from metrics import bd_psnr, provenance, q_global
+from metrics.rd import UndefinedDifference
+from raytrace_ii import load_scene, render
+
+RESULTS = Path(__file__).parent / "results"
+COUNTS = (1, 2, 3, 7)
+QUANTISERS = (21, 27, 33, 39, 45)
+RATES = (0.1, 0.2, 0.4, 0.8, 1.6)
+CQ = [{"qp": quantiser} for quantiser in QUANTISERS]
+# What is changed, the scheme, what it is asked for.
+CONDITIONS: list[tuple[str, str, list[dict[str, Any]]]] = [
+    ("constant quantiser, B coarser by 1.3, 4:2:0", "si-h264:rate=cq,chroma=420", CQ),
+    ("the same at 4:4:4", "si-h264:rate=cq", CQ),
+    ("B as fine as P", "si-h264:rate=cq,chroma=420,pbratio=1", CQ),
+    ("B coarser by 2", "si-h264:rate=cq,chroma=420,pbratio=2", CQ),
+    ("B predict B", "si-h264:rate=cq,chroma=420,pyramid=1", CQ),
+    ("B predict B, as fine as P", "si-h264:rate=cq,chroma=420,pyramid=1,pbratio=1", CQ),
+    ("GOP of 32", "si-h264:rate=cq,chroma=420,gop=32", CQ),
+    ("order row, not parallel", "si-h264:rate=cq,chroma=420,order=row", CQ),
+    ("an encoder in haste (veryfast)", "si-h264:rate=cq,chroma=420,preset=veryfast", CQ),
+    ("constant bit rate", "si-h264:chroma=420", [{"bpp": bpp} for bpp in RATES]),
+    ("rate factor, macroblock tree, B predict B", "si-h264:rate=crf,chroma=420,pyramid=1", CQ),
+    ("MPEG-2", "si-mpeg2", [{"qp": quantiser} for quantiser in (2, 4, 8, 14, 22)]),
+    ("HEVC, constant quantiser", "si-hevc:rate=cq,preset=medium,chroma=420", CQ),
+]
+
+
+def main() -> None:
+    """Measure, print and keep."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
+    parser.add_argument("--scenes", default="apples,cuboid")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--output", type=Path, default=RESULTS / "bframes.json")
+    asked = parser.parse_args()
+    rows: list[dict[str, Any]] = []
+    for scene in asked.scenes.split(","):
+        picture = render(load_scene(scene), preset("setup1", scale=asked.scale), noise=1.0, support=()).picture
+        with ThreadPoolExecutor(asked.workers) as pool:
+            found = pool.map(lambda condition, p=picture: differences(p, *condition[1:]), CONDITIONS)
+            for (name, scheme, _), psnr in zip(CONDITIONS, found, strict=True):
+                rows.append({"scene": scene, "condition": name, "scheme": scheme, "psnr": psnr})
+                print(f"{scene:<8} {name:<44} {psnr}", flush=True)
+        asked.output.parent.mkdir(parents=True, exist_ok=True)
+        write_json(asked.output, {**provenance(), "scale": asked.scale, "rows": rows})
+
+
+def differences(picture: IIPicture, scheme: str, asked: list[dict[str, Any]]) -> dict[str, float | None]:
+    """Number of B pictures to the mean difference in dB against none; None where the curves cannot be compared."""
+    most = 3 if "mpeg2" in scheme else max(COUNTS)
+    without = curve(picture, scheme, 0, asked)
+    out: dict[str, float | None] = {}
+    for count in COUNTS:
+        if count <= most:
+            try:
+                out[str(count)] = round(bd_psnr(*without, *curve(picture, scheme, count, asked)), 2)
+            except UndefinedDifference:
+                out[str(count)] = None
+    return out
+
+
+def curve(
+    picture: IIPicture, scheme: str, count: int, asked: list[dict[str, Any]]
+) -> tuple[list[float], list[float]]:
+    """Rates and PSNR with so many B pictures."""
+    comma = "," if ":" in scheme else ":"
+    points = []
+    for goal in asked:
+        coded = encode(picture, f"{scheme}{comma}bframes={count}", **goal)
+        points.append({"bpp": coded.bpp, "psnr": q_global(picture, decode(coded))})
+    kept = climbing(points)
+    return [point["bpp"] for point in kept], [point["psnr"] for point in kept]
+
+
+if __name__ == "__main__":
+    main()

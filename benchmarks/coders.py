@@ -1,0 +1,217 @@
+"""Every scheme and named setting against the dissertation's: rate at equal quality, and what it costs.
+
+``python -m benchmarks.coders --scale 4`` renders the four coding scenes, codes them with everything that is
+registered and with the trials below, and leaves ``coders.json`` and ``coders.png`` in ``benchmarks/results``. The
+anchor is the dissertation's SI-PVS: H.264, one I picture and P pictures, 4:2:0, constant quantiser, parallel order.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from codec import decode, encode, parse_scheme, schemes
+from codec.base import find
+from ii_core import IIPicture, preset
+from ii_core.files import write_json
+from metrics import bd_rate, provenance, q_global
+from metrics.rd import UndefinedDifference
+from raytrace_ii import load_scene, render
+
+RESULTS = Path(__file__).parent / "results"
+SCENES = ("apples", "twins", "car", "cuboid")
+ANCHOR = "si-h264:chroma=420,rate=cq"
+RATES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
+# Quantisers, by coder, that spread over the qualities of the anchor's.
+QUANTISERS = {
+    "h264": (16, 21, 26, 31, 36, 41, 46),
+    "hevc": (14, 19, 24, 29, 34, 39, 44),
+    "av1": (8, 18, 28, 38, 46, 54, 62),
+    "vp9": (8, 18, 28, 38, 46, 54, 62),
+    "mpeg2": (1, 2, 4, 7, 12, 20, 31),
+}
+# One thing changed at a time: what the defaults and presets were found by.
+TRIALS = (
+    "si-h264:rate=cq",
+    "si-h264:rate=cq,depth=10",
+    "si-h264:rate=crf",
+    "si-h264:rate=cq,bframes=3",
+    "si-h264:rate=cq,bframes=7,pyramid=1",
+    "si-h264:rate=crf,bframes=7,pyramid=1",
+    "si-h264:rate=crf,bframes=16,pyramid=1",
+    *(f"si-h264:rate=cq,order={order},by={by}" for order in ("row", "parallel", "zigzag", "spiral") for by in (
+        "rows", "columns") if (order, by) != ("parallel", "rows")),
+    "si-hevc:rate=cq",
+    "si-hevc:depth=8",
+    "si-hevc:chroma=420",
+    "si-hevc:bframes=0",
+    "si-hevc:bframes=8",
+    "si-hevc:preset=veryslow",
+    "si-hevc:by=columns",
+    "si-av1:rate=cq",
+    "si-av1:depth=8",
+    "si-av1:by=columns",
+    "si-av1:preset=5",
+    "si-vp9:chroma=420",
+)  # fmt: skip
+
+
+def main() -> None:
+    """Code, compare, keep and draw."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    parser.add_argument("--schemes", default="", help="only those that begin like one of these")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--output", type=Path, default=RESULTS / "coders.json")
+    asked = parser.parse_args()
+    names = [name for name in candidates() if name == ANCHOR or name.startswith(tuple(asked.schemes.split(",")))]
+    rows: list[dict[str, Any]] = []
+    for scene in asked.scenes.split(","):
+        picture = render(load_scene(scene), preset("setup1", scale=asked.scale), noise=1.0, support=()).picture
+        with ThreadPoolExecutor(asked.workers) as pool:
+            curves = dict(zip(names, pool.map(lambda name, p=picture: curve(p, name), names), strict=True))
+        for name, points in curves.items():
+            rows.append({"scene": scene, "scheme": name, **compared(curves[ANCHOR], points), "points": points})
+        asked.output.parent.mkdir(parents=True, exist_ok=True)
+        write_json(asked.output, {**provenance(), "scale": asked.scale, "anchor": ANCHOR, "rows": rows})
+        print(f"{scene}: {len(names)} curves", flush=True)
+    for line in table(rows):
+        print(line)
+    chart(rows, asked.scale, asked.output.with_suffix(".png"))
+
+
+def candidates() -> list[str]:
+    """The anchor, every scheme that can trade rate for quality, its presets, and the trials."""
+    lossy = [name for name in schemes() if qualities(name)]
+    named = [f"{name}:{setting}" for name in lossy for setting in find(name).presets]
+    return list(dict.fromkeys([ANCHOR, *lossy, *named, *TRIALS]))
+
+
+def qualities(scheme: str) -> list[dict[str, Any]]:
+    """What to ask a scheme for, point by point; nothing of what is lossless."""
+    coder, options = parse_scheme(scheme)
+    if coder.lossless(options):
+        return []
+    standard = coder.name.partition("-")[2]
+    if standard in QUANTISERS:
+        return [{"qp": qp} for qp in QUANTISERS[standard]]
+    if coder.rate_control:
+        return [{"bpp": bpp} for bpp in RATES]
+    for key, bounds in (("qp", coder.qp_range), ("quality", coder.quality_range)):
+        if bounds is not None:
+            low, high = bounds
+            return [{key: type(low)(low + (high - low) * part)} for part in np.linspace(0.05, 0.95, len(RATES))]
+    return []
+
+
+def curve(picture: IIPicture, scheme: str) -> list[dict[str, float]]:
+    """Rate, PSNR and CPU seconds of one run of the coder, at every quality."""
+    points = []
+    for asked in qualities(scheme):
+        coded = encode(picture, scheme, **asked)
+        started = time.thread_time()
+        quality = q_global(picture, decode(coded))
+        points.append(
+            {
+                "bpp": coded.bpp,
+                "psnr": quality,
+                "codec_seconds": coded.codec_seconds or 0.0,
+                "encode_seconds": coded.encode_seconds or 0.0,
+                "decode_seconds": time.thread_time() - started,
+                "runs": coded.runs,
+            }
+        )
+    return points
+
+
+def compared(anchor: list[dict[str, float]], points: list[dict[str, float]]) -> dict[str, Any]:
+    """Bjøntegaard rate against the anchor in percent, or why there is none; mean CPU seconds of a run."""
+    seconds = statistics.mean(point["codec_seconds"] for point in points)
+    pairs = [[(p["bpp"], p["psnr"]) for p in climbing(some)] for some in (anchor, points)]
+    try:
+        rate = bd_rate(*zip(*pairs[0], strict=True), *zip(*pairs[1], strict=True))
+        return {"bd_rate": round(rate, 2), "seconds": seconds}
+    except UndefinedDifference as error:
+        return {"bd_rate": None, "why": error.short, "seconds": seconds}
+
+
+def climbing(points: list[dict[str, float]]) -> list[dict[str, float]]:
+    """Points by rate, without those that more bits made no better: 4:2:0 ends the climb before the bits end."""
+    kept: list[dict[str, float]] = []
+    for point in sorted(points, key=lambda p: p["bpp"]):
+        if not kept or (point["psnr"] > kept[-1]["psnr"] + 1e-3 and point["bpp"] > kept[-1]["bpp"]):
+            kept.append(point)
+    return kept
+
+
+def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Per scheme: the rate of every scene, their mean where all have one, and the mean seconds; best first."""
+    out = []
+    for scheme in dict.fromkeys(row["scheme"] for row in rows):
+        own = [row for row in rows if row["scheme"] == scheme]
+        rates = {row["scene"]: row["bd_rate"] for row in own}
+        known = [rate for rate in rates.values() if rate is not None]
+        mean = statistics.mean(known) if len(known) == len(own) else None
+        seconds = statistics.mean(row["seconds"] for row in own)
+        out.append({"scheme": scheme, "rates": rates, "mean": mean, "seconds": seconds})
+    return sorted(out, key=lambda row: (row["mean"] is None, row["mean"] or 0.0))
+
+
+def table(rows: list[dict[str, Any]]) -> list[str]:
+    """Lines of a Markdown table."""
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    lines = [f"| scheme | {' | '.join(scenes)} | mean | CPU s |", "|---" * (len(scenes) + 3) + "|"]
+    for row in summary(rows):
+        cells = [_percent(row["rates"][scene]) for scene in scenes]
+        lines.append(f"| `{row['scheme']}` | {' | '.join(cells)} | {_percent(row['mean'])} | {row['seconds']:.2f} |")
+    return lines
+
+
+def _percent(rate: float | None) -> str:
+    return "–" if rate is None else f"{rate:+.0f} %"
+
+
+def front(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Those that nothing as quick is better than."""
+    best: list[dict[str, Any]] = []
+    for row in sorted((r for r in summary(rows) if r["mean"] is not None), key=lambda r: r["seconds"]):
+        if not best or row["mean"] < best[-1]["mean"]:
+            best.append(row)
+    return best
+
+
+def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
+    """Encode time against rate, with the front of what is worth its time."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(11, 7), constrained_layout=True)
+    colours = {"h264": "C0", "hevc": "C1", "av1": "C2", "vp9": "C4", "mpeg2": "C5"}
+    shapes = {"ei": "s", "ri": "^", "si": "o"}
+    shown = [row for row in summary(rows) if row["mean"] is not None and row["scheme"] not in TRIALS]
+    for row in shown:
+        kind, _, coder = row["scheme"].partition(":")[0].partition("-")
+        factor = 1 + row["mean"] / 100
+        axes.plot(row["seconds"], factor, shapes.get(kind, "D"), color=colours.get(coder, "0.5"))
+        axes.annotate(row["scheme"], (row["seconds"], factor), (4, 3), textcoords="offset points", fontsize=7)
+    edge = front([row for row in rows if row["scheme"] not in TRIALS])
+    axes.step([r["seconds"] for r in edge], [1 + r["mean"] / 100 for r in edge], "k-", lw=0.8, where="post")
+    axes.set(xscale="log", yscale="log", xlabel="CPU seconds of one encoder run, mean over rates and scenes")
+    axes.set_ylabel("rate at equal PSNR, relative to the dissertation's SI-PVS")
+    axes.set_title(f"Speed against accuracy, setup1 at scale {scale}; the line joins what nothing quicker beats")
+    axes.grid(alpha=0.3, which="both")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+if __name__ == "__main__":
+    main()
