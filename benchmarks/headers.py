@@ -1,17 +1,19 @@
 """What structure alone costs: header portions measured, taken apart and predicted, and who codes better for it.
 
-    python -m benchmarks.headers [--scale 4] [--scene apples]
+    python -m benchmarks.headers [--scale 4] [--scene apples] [--schemes si-hevc,...] [--sides 16,64]
 
 The pictures of ``setup2`` with fewer lenses, elementary images of 16² to 256² pixels. For every scheme and structure:
 a black picture and the scene at the coarsest quantiser, and where the stream can be taken apart the bits of its
 parameter sets and slice headers. For H.264 besides: PSNR of sub-, elementary and ray-space images at the same rates,
-beside what (5.14) and (5.15) predict. Numbers go to ``benchmarks/results/headers.json``, tables into
+beside what (5.14) and (5.15) predict. With ``--schemes`` and ``--sides`` only those are measured and the rest is kept
+from before. Numbers go to ``benchmarks/results/headers.json``, tables into
 ``docs/structure.md``.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -38,18 +40,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, default=4)
     parser.add_argument("--scene", default="apples")
+    parser.add_argument("--schemes", default="")
+    parser.add_argument("--sides", default=",".join(map(str, SIDES)))
     arguments = parser.parse_args()
     scene = load_scene(arguments.scene)
-    floors: list[dict[str, Any]] = []
-    duels: list[dict[str, Any]] = []
-    for side in SIDES:
+    known = RESULTS / "headers.json"
+    before = json.loads(known.read_text(encoding="utf-8")) if arguments.schemes and known.exists() else {}
+    floors: list[dict[str, Any]] = before.get("floors", [])
+    duels: list[dict[str, Any]] = before.get("duels", [])
+    for side in map(int, arguments.sides.split(",")):
         camera = preset(f"setup2-{side}", scale=arguments.scale)
         picture = render(scene, camera, support=(), noise=1.0).picture
-        for scheme in schemes():
-            floors.append({"side": side, **lowest(scheme, picture)})
-            print(floors[-1], flush=True)
-        duels.append({"side": side, **duel(picture)})
-        print(duels[-1], flush=True)
+        for scheme in arguments.schemes.split(",") if arguments.schemes else schemes():
+            row = {"side": side, **lowest(scheme, picture)}
+            print(row, flush=True)
+            floors = [r for r in floors if (r["side"], r["scheme"]) != (side, scheme)] + [row]
+        if not arguments.schemes:
+            duels.append({"side": side, **duel(picture)})
+            print(duels[-1], flush=True)
+    floors.sort(key=lambda row: (row["scheme"], row["side"]))
     result = {**provenance(), "scale": arguments.scale, "scene": arguments.scene, "floors": floors, "duels": duels}
     write_json(RESULTS / "headers.json", result)
     text = DOCS.read_text(encoding="utf-8")
@@ -108,12 +117,14 @@ def floor_table(rows: list[dict[str, Any]]) -> list[str]:
     lines = ["| scheme | " + " | ".join(f"{side}²" for side in SIDES) + " |", "|---|" + "---|" * len(SIDES)]
     for scheme in dict.fromkeys(row["scheme"] for row in rows):
         those = {row["side"]: row for row in rows if row["scheme"] == scheme}
-        cells = [
-            "–" if "refused" in r else f"{r['black_bpp']:.2g} / {r['floor_bpp']:.2g} ({r['floor_db']:.1f})"
-            for r in (those[side] for side in SIDES)
-        ]
+        cells = [floor_cell(those[side]) if side in those else "" for side in SIDES]
         lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
     return lines
+
+
+def floor_cell(row: dict[str, Any]) -> str:
+    """Black / scene, and its PSNR."""
+    return "–" if "refused" in row else f"{row['black_bpp']:.2g} / {row['floor_bpp']:.2g} ({row['floor_db']:.1f})"
 
 
 def part_table(rows: list[dict[str, Any]]) -> list[str]:

@@ -33,6 +33,16 @@ def test_bits_add_up_and_every_slice_is_found(kind, setting):
     assert found.headers % 8 == 0  # arithmetic coding starts on a byte
 
 
+@pytest.mark.parametrize("scheme", ["si-hevc", "ei-hevc", "si-av1", "ei-av1"])
+def test_units_of_other_streams_add_up(scheme):
+    """HEVC and AV1 by units: all bytes accounted for, at least a slice or frame for each picture."""
+    coded = encode(picture(), f"{scheme}:gop=8", qp=40)
+    found = parts(coded)
+    assert found.total == 8 * coded.nbytes and found.headers is None
+    assert found.units >= frames(scheme[:2], (12, 8), (4, 4))
+    assert found.parameters > 0 and found.framing > 0 and found.data > 0
+
+
 def traced_header_bits(stream, path):
     """Bits of all slice headers, alignment included, as FFmpeg's trace_headers prints them."""
     path.write_bytes(stream)
