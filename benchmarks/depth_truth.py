@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
+from benchmarks.readme import fill
 from codec import decode, encode
 from ii_core import IIPicture, add_sensor_noise, preset
 from ii_core.files import write_json
@@ -33,6 +34,7 @@ from raytrace_ii import Scene, Shot, load_scene, render
 
 ROOT = Path(__file__).parent.parent
 RESULTS, CHART = ROOT / "benchmarks/results/depth_truth.json", ROOT / "docs/images/depth_truth.png"
+DOC = ROOT / "docs/metrics.md"
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
 KINDS = ("textured", "flat", "edge", "mirror", "clear")
 NOISES = (0, 1, 2, 4, 8)
@@ -65,7 +67,37 @@ def main() -> None:
                     say(rows[-1])
         curves.append({"scene": name, "scale": scale, **quality(shot, found)})
     write_json(RESULTS, {**provenance(), "bpp": BPP, "few": FEW, "rows": rows, "q_depth": curves})
-    save(draw(json.loads(RESULTS.read_text(encoding="utf-8"))), CHART)
+    write_up()
+
+
+def write_up() -> None:
+    """Chart and table of what is kept."""
+    data = json.loads(RESULTS.read_text(encoding="utf-8"))
+    save(draw(data), CHART)
+    fill(DOC, "depth-truth", table(data))
+
+
+def table(data: dict[str, Any]) -> list[str]:
+    """Both methods, scene by scene, without noise."""
+    head = ("scene", "scale", "median", "90 %", "within 1 layer", "within 10 %", "Q_depth off")
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    for row in data["rows"]:
+        if row["noise"] or row["method"] != METHODS[0]:
+            continue
+        both = [_only(data["rows"], **{**_key(row), "method": method})[0] for method in METHODS]
+        curve = _only(data["q_depth"], scene=row["scene"], scale=row["scale"])
+        off = [f"{curve[0][f'{method}_off_db']:.1f}" for method in METHODS] if curve else ["–", "–"]
+        cells = [
+            *(" → ".join(f"{r[key]:.0f}" for r in both) for key in ("median_layers", "p90_layers")),
+            *(" → ".join(f"{r[key]:.0%}" for r in both) for key in ("within_one_layer", "within_10_%")),
+            " → ".join(off) + (" dB" if curve else ""),
+        ]
+        lines.append(f"| {row['scene']} | {row['scale']} | " + " | ".join(cells) + " |")
+    return [*lines, "", "Each cell: the dissertation's method → the robust one. Errors are in layers."]
+
+
+def _key(row: dict[str, Any]) -> dict[str, Any]:
+    return {name: row[name] for name in ("scene", "scale", "noise")}
 
 
 def estimates(picture: IIPicture) -> dict[str, tuple[FocusDepth, float]]:

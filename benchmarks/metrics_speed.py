@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
+from benchmarks.readme import fill
 from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, preset
 from ii_core.files import write_json
@@ -35,6 +36,7 @@ from raytrace_ii import Shot, load_scene, render
 
 ROOT = Path(__file__).parent.parent
 RESULTS, CHART = ROOT / "benchmarks/results/metrics_speed.json", ROOT / "docs/images/depth_cost.png"
+DOC = ROOT / "docs/metrics.md"
 REPEATS = 7
 SCENES, SCALE, BPP = ("apples", "twins"), 4, 0.35  # of the accuracy chart
 FARTHEST = 250  # layers of z = d·f, whatever their number
@@ -57,7 +59,15 @@ def main() -> None:
     del a, b
     points = [point for name in SCENES for point in accuracy(name)]
     write_json(RESULTS, {**provenance(), "rows": rows, "accuracy": points, "scale": SCALE, "bpp": BPP})
-    save(draw(json.loads(RESULTS.read_text(encoding="utf-8"))), CHART)
+    write_up()
+
+
+def write_up() -> None:
+    """Chart and table of what is kept."""
+    data = json.loads(RESULTS.read_text(encoding="utf-8"))
+    save(draw(data), CHART)
+    lines = [f"| {row['what']} | {row['target']} | {row['value']:.3g} |" for row in data["rows"]]
+    fill(DOC, "speed", ["| | target | measured |", "|---|---|---|", *lines])
 
 
 def full_size() -> tuple[IIPicture, IIPicture]:

@@ -43,6 +43,11 @@ def filled(text: str, mark: str, lines: list[str]) -> str:
     return "\n".join([text[:before], *lines, "", text[after:]])
 
 
+def fill(path: Path, mark: str, lines: list[str]) -> None:
+    """Put lines between the marks of a document on disk."""
+    path.write_text(filled(path.read_text(encoding="utf-8"), mark, lines), encoding="utf-8")
+
+
 def gain_table() -> list[str]:
     """Gain of the pseudo video sequences over JPEG 2000, by scene and size."""
     lines = ["| scene | picture | SI-PVS | RI-PVS | EI-PVS |", "|---|---|---|---|---|"]

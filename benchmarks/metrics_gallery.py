@@ -1,0 +1,53 @@
+"""Draw the pictures of docs/metrics.md that show what `measure` and `study` leave.
+
+    python -m benchmarks.metrics_gallery
+
+*Apples* with sensor noise at a quarter of setup 1's lenses: SI-PVS at 0.15 bit per pixel for the pictures of one
+coded picture, three schemes at five rates for Q_depth over rate; true depth. The numbers are kept in
+``benchmarks/results/metrics_study.json``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from benchmarks.focus_patterns import main as draw_patterns
+from codec import decode, encode
+from ii_core import preset
+from metrics import (
+    depth_rate_chart,
+    measuring,
+    plot_angle,
+    plot_error_layers,
+    plot_error_views,
+    plot_views,
+    q_depth,
+    rate_distortion,
+    read_study,
+    write_study,
+)
+from raytrace_ii import load_scene, render
+
+ROOT = Path(__file__).parent.parent
+IMAGES, STUDY = ROOT / "docs/images/metrics", ROOT / "benchmarks/results/metrics_study.json"
+SCHEMES, RATES = ("si-h264", "ei-h264", "jpeg2000"), (0.08, 0.15, 0.4, 1.0, 2.0)
+
+
+def main() -> None:
+    """Render, code, measure and draw."""
+    IMAGES.mkdir(parents=True, exist_ok=True)
+    draw_patterns()
+    shot = render(load_scene("apples"), preset("setup1", scale=4), noise=1.0, support=("depth",))
+    picture, decoded = shot.picture, decode(encode(shot.picture, "si-h264", bpp=0.15))
+    plot_angle(picture, decoded, IMAGES / "q_angle.png")
+    plot_views(picture, decoded, IMAGES / "views.png")
+    plot_error_views(picture, decoded, IMAGES / "errors_views.png")
+    plot_error_layers(picture, q_depth(picture, decoded, depth=shot.depth), IMAGES / "errors_depth.png")
+    measure = measuring(picture, ["q_depth_min", "q_depth_mean", "q_depth_max", "q_view"], depth=shot.depth)
+    records = rate_distortion(picture, SCHEMES, RATES, encode=encode, decode=decode, measure=measure)
+    write_study(STUDY, "Apples", records, {"scale": 4, "noise": 1.0}, picture=picture)
+    depth_rate_chart(read_study(STUDY), IMAGES / "q_depth_rate.png")
+
+
+if __name__ == "__main__":
+    main()
