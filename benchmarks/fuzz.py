@@ -58,11 +58,11 @@ def main() -> None:
     names = arguments.schemes.split(",")
     each = -(-arguments.mutations // len(names))
     started = time.monotonic()
+    rows = []
     with ThreadPoolExecutor(arguments.workers) as pool:
-        outcomes = list(pool.map(lambda name: watched(name, arguments.seed, each), names))
-    rows = [{"scheme": name, **outcome} for name, outcome in zip(names, outcomes, strict=True)]
-    for row in rows:
-        print(row)
+        for name, outcome in zip(names, pool.map(lambda n: watched(n, arguments.seed, each), names), strict=True):
+            rows.append({"scheme": name, **outcome})
+            print(rows[-1], flush=True)
     total = sum(sum(row["counts"].values()) for row in rows)
     print(f"{total} mutations in {time.monotonic() - started:.0f} s")
     write_json(RESULTS / "fuzz.json", {**provenance(), "seed": arguments.seed, "mutations": total, "rows": rows})
