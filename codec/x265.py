@@ -11,10 +11,11 @@ from typing import ClassVar
 from .base import Option, Options
 from .rate import Run, nearest_rate
 from .sequence import Film
-from .video import COMMON, DEPTH, THREADS, Settings, Video, chroma, fine_rate
+from .video import COMMON, DEPTH, MAX_KBIT, THREADS, Settings, Video, chroma
 from .x264 import SPEEDS
 
 FINEST, COARSEST = 0, 51
+FRAME_RATE = 250  # it takes no more than a few hundred
 
 
 class Hevc(Video):
@@ -69,11 +70,11 @@ class Hevc(Video):
             return super().meet(target, film, options, run)
 
         def at_rate(size: float) -> Run:
-            kilobits, frame_rate = fine_rate(size, film)
+            kilobits = max(1, round(min(8 * size / film.frames * FRAME_RATE / 1000, MAX_KBIT)))
             with tempfile.TemporaryDirectory() as folder:
                 rate = f"bitrate={kilobits}:stats={Path(folder) / 'notes'}"
                 first, second = (
-                    run(_settings(options, film, f"{rate}:pass={number}", frame_rate)) for number in (1, 2)
+                    run(_settings(options, film, f"{rate}:pass={number}", FRAME_RATE)) for number in (1, 2)
                 )
             return Run(second.payload, first.codec_seconds + second.codec_seconds)
 
