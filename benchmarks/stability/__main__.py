@@ -1,0 +1,209 @@
+"""Hunt for where methods fail: ``python -m benchmarks.stability``.
+
+Every case sweeps one thing until it breaks. Numbers go to ``benchmarks/results/stability.json``, a chart and a strip
+of pictures beside it, and between the marks of ``docs/stability.md``, with those of ``benchmarks.convergence``.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.analytic import still_life
+from benchmarks.readme import filled
+from benchmarks.stability import geometry, light, picture
+from benchmarks.stability.geometry import Row
+from ii_core.files import atomic_path, write_image, write_json
+from metrics import provenance
+from metrics.chart import COLOURS
+from raytrace_ii import Body, Scene, trace
+from raytrace_ii.shapes import rotation
+
+ROOT = Path(__file__).parent.parent.parent
+RESULTS, DOCS = ROOT / "benchmarks" / "results", ROOT / "docs"
+CASES: dict[str, Callable[[], list[Row]]] = {
+    case.__name__: case
+    for case in (
+        geometry.lift, geometry.scales, geometry.coplanar, geometry.contact_shadow, geometry.bad_faces,
+        geometry.huge_beside_tiny, light.terminator, light.grazing, light.camera_in_glass, light.camera_in_body,
+        light.lamp_at_surface, light.bounces, picture.pitches, picture.view_borders, picture.rate_ends,
+        picture.tiny_frames, picture.quantised_maps, picture.depth_from_focus,
+    )
+}  # fmt: skip
+# Tables with a column for every value of something: row heads, that column, and what a cell holds.
+PIVOTS = {
+    "rate_ends": (("asked, bit/pixel",), "scheme", ("got, bit/pixel", "PSNR, dB", "said reached")),
+    "tiny_frames": (("lenses", "pixels a lens"), "scheme", ("got, bit/pixel", "PSNR, dB")),
+    "quantised_maps": (("stored as",), "camera", ("direction off, µrad", "apples, dB", "cuboid, dB")),
+    "depth_from_focus": (("scene", "noise, steps"), "method", ("within one layer", "without depth")),
+}
+
+
+def main() -> None:
+    """Run every case, keep, draw, fill the page."""
+    cases = {}
+    for name, case in CASES.items():
+        started = time.perf_counter()
+        cases[name] = case()
+        print(f"{name}: {time.perf_counter() - started:.0f} s", flush=True)
+    path = RESULTS / "stability.json"
+    write_json(path, {**provenance(), "cases": cases})
+    write_image(RESULTS / "stability_pictures.png", strip())
+    chart(path, path.with_suffix(".png"))
+    document(path)
+
+
+def document(path: Path) -> None:
+    """Fill ``docs/stability.md`` from what is kept."""
+    cases = json.loads(path.read_text(encoding="utf-8"))["cases"]
+    for name in ("stability.png", "stability_pictures.png", "convergence.png"):
+        shutil.copy(RESULTS / name, DOCS / "images" / name)
+    page = DOCS / "stability.md"
+    text = page.read_text(encoding="utf-8")
+    for name, rows in cases.items():
+        text = filled(text, name, table(rows, PIVOTS.get(name)))
+    text = filled(text, "convergence", convergence())
+    with atomic_path(page) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def convergence() -> list[str]:
+    """Fitted orders beside those expected, and the lens images."""
+    found = json.loads((RESULTS / "convergence.json").read_text(encoding="utf-8"))
+    first, last = found["rows"][0], found["rows"][-1]
+    heads = ["error", f"{first['segments']} segments", f"{last['segments']} segments", "order", "expected"]
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    for name, expected in found["expected"].items():
+        values = [name.replace("_", ", "), *map(number, (first[name], last[name], found["orders"][name])), expected]
+        lines.append(f"| {' | '.join(map(str, values))} |")
+    for lens, orders in found["lens_orders"].items():
+        rows = [row for row in found["lenses"] if row["lens"] == lens]
+        for kind, expected in (("flat", 1), ("smooth", 2)):
+            ends = number(rows[0][kind]), number(rows[-1][kind])
+            text = f"{lens} lens, {kind}, mm at the focus"
+            lines.append(f"| {text} | {ends[0]} (coarsest) | {ends[1]} | {number(orders[kind])} | {expected} |")
+    worst = max(abs(row["off"]) for row in found["images"])
+    return [*lines, "", f"Images of a ball lens lie where Gauss puts them to {worst:.1g} of their distance."]
+
+
+def table(rows: list[Row], pivot: Any = None) -> list[str]:
+    """Rows as Markdown: all of them, or one cell for every value of a column."""
+    if pivot is None:
+        heads = list(rows[0])
+        body = [[number(row.get(head)) for head in heads] for row in rows]
+    else:
+        index, column, shown = pivot
+        columns = list(dict.fromkeys(row[column] for row in rows))
+        heads = [*index, *(f"{name}: {', '.join(shown)}" if i == 0 else name for i, name in enumerate(columns))]
+        grid: dict[tuple[Any, ...], dict[Any, str]] = {}
+        for row in rows:
+            cell = " · ".join(number(row[key]) for key in shown)
+            grid.setdefault(tuple(row[key] for key in index), {})[row[column]] = cell
+        body = [[*map(number, key), *(cells.get(name, "") for name in columns)] for key, cells in grid.items()]
+    return [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|", *(f"| {' | '.join(cells)} |" for cells in body)]
+
+
+def number(value: Any) -> str:
+    """A value as the tables show it."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    return str(value)
+
+
+def strip() -> NDArray[np.uint8]:
+    """Six small pictures of what goes wrong, from left to right; the page says what they are."""
+    corners = np.array([[-1.5, -1.5, 0], [1.5, -1.5, 0], [1.5, 1.5, 0], [-1.5, 1.5, 0.0]]) @ rotation((17, 29, 5)).T
+    away = rotation((17, 29, 5)) @ [0, 0, 1]
+    red, blue = (replace(geometry.WHITE, colour=colour) for colour in ((0.8, 0.1, 0.1), (0.1, 0.2, 0.8)))
+
+    def walls(gap: float) -> Scene:
+        faces = np.array([[0, 2, 1], [0, 3, 2]])
+        both = [
+            Body(name="wall", vertices=corners + np.array([0, 0, 10]) + by * away, faces=faces, material=material)
+            for by, material in ((10 * gap, red), (0.0, blue))
+        ]
+        return Scene(bodies=both, ambient=(1, 1, 1))
+
+    still, generator = still_life().scene(96), np.random.default_rng(0)
+    scenes = [light.terminator_scene(12), light.terminator_scene(48), walls(6e-8), walls(1e-7)]
+    pictures = [_seen(scene, (0, 0, 10), 0.16) for scene in scenes]
+    for change in (geometry._turned, geometry._missing):
+        broken = [
+            replace(b, faces=change(np.asarray(b.faces), 0.1, generator)) if b.name == "glass" else b
+            for b in still.bodies
+        ]
+        pictures.append(_seen(replace(still, bodies=broken), (4, -4, 26), 0.2))
+    gap = np.full((pictures[0].shape[0], 6, 3), 255, np.uint8)
+    return np.concatenate([part for one in pictures for part in (one, gap)][:-1], axis=1)
+
+
+def _seen(scene: Scene, towards: tuple[float, float, float], half: float, size: int = 200) -> NDArray[np.uint8]:
+    """A pinhole's picture from the origin, 8-bit sRGB."""
+    across = (np.arange(size) + 0.5) / size * 2 - 1
+    x, y = np.meshgrid(across, -across)
+    d = np.stack([x * half, y * half, np.ones_like(x)], axis=-1) + np.asarray(towards) / towards[2] - [0, 0, 1]
+    seen = np.clip(trace(scene, np.zeros_like(d), d).radiance.reshape(size, size, 3), 0, 1)
+    return np.rint(255 * np.where(seen < 0.0031308, 12.92 * seen, 1.055 * seen ** (1 / 2.4) - 0.055)).astype(np.uint8)
+
+
+# What the chart shows: case, across, up, logarithmic, title.
+PANELS: list[tuple[str, str, list[str], str, str]] = [
+    ("lift", "lift", ["0 radii off", "10 radii off", "1000 radii off"], "x", "lit points that a ball shades itself"),
+    ("scales", "radii off", ["form off, radii"], "xy", "form error of a ball far off"),
+    ("coplanar", "gap / distance", ["far wall seen"], "x", "rays that take the wrong of two walls"),
+    ("bad_faces", "share of faces", ["glass, turned", "glass, missing", "mirror, missing"], "x", "broken meshes, dB"),
+    ("huge_beside_tiny", "floor, mm", ["shadows there"], "x", "shadows of 0.02 mm grains on a floor"),
+    ("terminator", "segments", ["band, degrees"], "xy", "dark band at the shadow terminator"),
+    ("grazing", "angle, rad", ["place off by, mm"], "xy", "hits at grazing angles, mm off"),
+    ("view_borders", "of half the viewing angle", ["PSNR of linear light, dB"], "", "views from aside, dB"),
+]
+
+
+def chart(source: Path, target: Path) -> None:
+    """A panel a sweep."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    cases = json.loads(source.read_text(encoding="utf-8"))["cases"]
+    figure = Figure(figsize=(14, 6), layout="constrained")
+    FigureCanvasAgg(figure)
+    for axes, (case, across, names, logarithmic, title) in zip(figure.subplots(2, 4).flat, PANELS, strict=True):
+        rows = [row for row in cases[case] if row[across] is not None]
+        smallest = min(row[across] for row in rows if row[across] > 0)
+        for i, name in enumerate(names):
+            chosen = [row for row in rows if row.get(name) is not None]
+            # a logarithmic axis has no 0: it stands a third of a decade before the rest
+            x = [row[across] if row[across] > 0 or "x" not in logarithmic else smallest / 3 for row in chosen]
+            axes.plot(x, [row[name] for row in chosen], "os^"[i] + "-", color=COLOURS[i], markersize=5, label=name)
+        if "x" in logarithmic:
+            axes.set_xscale("log")
+        if "y" in logarithmic:
+            axes.set_yscale("log")
+        if across == "segments":
+            axes.set_xticks([row[across] for row in rows], [str(row[across]) for row in rows])
+            axes.minorticks_off()
+        axes.set_title(title, loc="left", fontsize=10)
+        axes.set_xlabel(across)
+        axes.grid(True, color="0.92", linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+        if len(names) > 1:
+            axes.legend(frameon=False, fontsize=8)
+    with atomic_path(target) as temporary:
+        figure.savefig(temporary, dpi=110, format="png")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,147 @@
+"""Where pictures fail: non-integer pitch, the border of the viewing zone, the ends of rate control, tiny frames."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.analytic import still_life
+from benchmarks.stability.geometry import Row
+from codec import decode, encode
+from ii_core import IICamera, IIPicture, preset, view_image
+from ii_core.regular import resampled
+from metrics import q_global
+from raytrace_ii import load_scene, render, trace
+
+RESULTS = Path(__file__).parent.parent / "results"
+
+
+def quantised_maps() -> list[Row]:
+    """What `benchmarks.map_precision` measured."""
+    rows = _kept("map_precision.json")["rows"]
+    return [
+        {
+            "camera": row["camera"], "stored as": row["format"], "direction off, µrad": row["angle_max_urad"],
+            "place off, µm": row["place_max_um"], "apples, dB": _finite(row["psnr_apples"]),
+            "cuboid, dB": _finite(row["psnr_cuboid"]),
+        }
+        for row in rows
+    ]  # fmt: skip
+
+
+def depth_from_focus() -> list[Row]:
+    """What `benchmarks.depth_truth` measured: share of pixels right within a layer, by what is looked at."""
+    rows = _kept("depth_truth.json")["rows"]
+    return [
+        {
+            "scene": row["scene"], "noise, steps": row["noise"], "method": row["method"],
+            "within one layer": row["within_one_layer"], "median error, layers": _finite(row["median_layers"]),
+            "without depth": row["without_depth"],
+        }
+        for row in rows if row["scale"] == 8
+    ]  # fmt: skip
+
+
+def _kept(name: str) -> Any:
+    return json.loads((RESULTS / name).read_text(encoding="utf-8"))
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and np.isfinite(value) else None
+
+
+def pitches() -> list[Row]:
+    """Lenses of 16 and a bit pixels: the resampled picture against one rendered through the regular camera itself."""
+    scene = still_life().scene(192)
+    lenses = (32, 16)
+    usual = preset("setup1", scale=16)
+    rows = []
+    for pitch in (16.0, 16.05, 16.1, 16.25, 16.5, 16.75, 17.0):
+        pixels = tuple(int(np.ceil(n * pitch)) for n in lenses)
+        camera = IICamera(
+            pixels=pixels, lenses=lenses, pixel_pitch_mm=usual.lens_pitch_mm[0] / pitch, gap_mm=usual.gap_mm,
+            lens_pitch_mm=usual.lens_pitch_mm[0],
+        )  # fmt: skip
+        taken = render(scene, camera, samples=4, support=()).picture
+        regular, valid = resampled(taken)
+        assert isinstance(regular.camera, IICamera)
+        direct = render(scene, regular.camera, samples=4, support=()).picture
+        error = (regular.pixels.astype(float) - direct.pixels)[valid]
+        mse = float(np.mean(error**2))
+        rows.append(
+            {
+                "pixels a lens": pitch, "brought to": regular.ei_pixels[0],
+                "PSNR, dB": float(10 * np.log10(255**2 / mse)) if mse > 0 else None,
+                "without a sample": float(1 - valid.mean()),
+            }
+        )  # fmt: skip
+    return rows
+
+
+def view_borders() -> list[Row]:
+    """View images from ever farther aside against the scene seen from there through each lens, ray by ray."""
+    scene = still_life().scene(192)
+    camera = preset("setup1", scale=8)
+    picture = render(scene, camera, dtype="float32", support=()).picture
+    k, l = (c.ravel() for c in np.meshgrid(np.arange(camera.lenses[0]), np.arange(camera.lenses[1])))
+    cx, cy = camera.lens_lattice.centres(k, l)
+    width, height = camera.size_mm
+    centres = np.column_stack(
+        [cx * camera.pixel_pitch_mm - width / 2, height / 2 - cy * camera.pixel_pitch_mm, 0 * cx + camera.gap_mm]
+    )
+    far, half = 40 * width, camera.view_angle_deg / 2  # far enough that every lens sees the viewer at one angle
+    rows = []
+    for share in (0.0, 0.5, 0.8, 0.9, 0.95, 1.0, 1.05, 1.2, 1.5):
+        eye = np.array([far * np.tan(np.radians(share * half)), 0, camera.gap_mm - far])
+        seen, valid = view_image(picture, eye)
+        true = trace(scene, centres, centres - eye).radiance.reshape(seen.shape)
+        mse = float(np.mean((seen - true)[valid] ** 2))
+        rows.append(
+            {
+                "of half the viewing angle": share, "degrees": share * half,
+                "PSNR of linear light, dB": float(-10 * np.log10(mse)), "without a pixel": float(1 - valid.mean()),
+            }
+        )  # fmt: skip
+    return rows
+
+
+RATES = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 4.0, 12.0, 24.0, 60.0)
+
+
+def rate_ends() -> list[Row]:
+    """Rates from far too low to more than the picture itself holds: what comes out, and what it says of itself."""
+    picture = render(load_scene("apples"), preset("setup1", scale=16), noise=1.0, support=()).picture
+    return [
+        {"scheme": scheme, "asked, bit/pixel": bpp, **_coded(picture, scheme, bpp)}
+        for scheme in ("si-h264", "ei-h264", "jpeg2000")
+        for bpp in RATES
+    ]
+
+
+def tiny_frames() -> list[Row]:
+    """Pictures of hardly any lenses and pixels, at a third of a bit a pixel."""
+    generator = np.random.default_rng(0)
+    rows = []
+    for lenses, ei in (((1, 1), (1, 1)), ((1, 1), (16, 16)), ((2, 2), (2, 2)), ((2, 2), (16, 16)), ((5, 3), (7, 9))):
+        size = (lenses[1] * ei[1], lenses[0] * ei[0], 3)
+        picture = IIPicture(generator.integers(0, 256, size, dtype=np.uint8), lenses, ei)
+        for scheme in ("si-h264", "ei-h264", "ri-h264", "jpeg2000"):
+            row = {"lenses": f"{lenses[0]}×{lenses[1]}", "pixels a lens": f"{ei[0]}×{ei[1]}", "scheme": scheme}
+            rows.append({**row, **_coded(picture, scheme, 0.33)})
+    return rows
+
+
+def _coded(picture: IIPicture, scheme: str, bpp: float) -> Row:
+    try:
+        coded = encode(picture, scheme, bpp=bpp)
+        decoded = decode(coded)
+    except ValueError as error:
+        return {"got, bit/pixel": None, "said reached": None, "PSNR, dB": None, "refused": str(error)}
+    quality = q_global(picture, decoded)
+    return {
+        "got, bit/pixel": float(coded.bpp), "said reached": bool(coded.reached), "PSNR, dB": _finite(quality),
+        "refused": "",
+    }  # fmt: skip

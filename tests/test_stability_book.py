@@ -1,0 +1,85 @@
+"""The limits that docs/stability.md states, at small size; its figures come from `benchmarks.stability` itself."""
+
+import pytest
+
+from benchmarks.stability import __main__ as book
+from benchmarks.stability import geometry, light, picture
+from raytrace_ii.packing import LIFT
+
+
+def test_without_a_lift_half_of_all_lit_points_shade_themselves():
+    with geometry.lifted(0.0):
+        assert 0.4 < geometry.own_shadow(1.0, 0, 2000)[0] < 0.6
+    with geometry.lifted(1e-6):  # a quarter of ours is still enough
+        assert geometry.own_shadow(1.0, 10, 2000)[:2] == (0, 0)
+    assert geometry.own_shadow(1.0, 1e6, 2000)[:2] == (0, 0)
+
+
+def test_far_from_the_origin_the_form_goes():
+    near, far = (geometry.own_shadow(1.0, offset, 2000)[2] for offset in (0, 1e6))
+    assert near < 1e-3 and 5e-3 < far < 5e-2, "single precision steps by 6e-8 of a million radii"
+
+
+def test_two_walls_are_told_apart_from_a_millionth_of_their_distance_on():
+    rows = {row["gap / distance"]: row["far wall seen"] for row in geometry.coplanar()}
+    assert rows[0.0] > 0.9 and rows[1e-6] == rows[1e-5] == 0
+
+
+def test_a_contact_shadow_begins_at_one_lift():
+    assert [row["in shadow"] for row in geometry.contact_shadow()] == [0, 0, 0, 1, 1, 1]
+
+
+def test_small_things_lose_their_shadows_on_huge_faces_alone():
+    rows = {row["floor, mm"]: row for row in geometry.huge_beside_tiny(balls=40, segments=12)}
+    assert rows[1e4]["shadows there"] == 1 and rows[2e7]["shadows there"] == 0
+    assert len({row["grains seen"] for row in rows.values()}) == 1, "they are seen as before"
+
+
+def test_the_terminators_band_shrinks_with_the_triangles():
+    rows = light.terminator()
+    bands = [row["band, degrees"] for row in rows]
+    assert all(row["band, degrees"] < 1.2 * 360 / row["segments"] for row in rows)
+    assert bands[0] > 4 and bands[-1] < 1
+
+
+def test_grazing_light_stays_right_and_hits_drift():
+    rows = light.grazing()
+    assert all(row["of them lit"] == 1 and row["light off by"] < 1e-3 for row in rows)
+    assert rows[0]["place off by, mm"] < 1e-4 < rows[-1]["place off by, mm"]
+
+
+def test_a_camera_in_glass_is_in_glass_up_to_the_mesh():
+    """96 segments leave up to 2e-3 mm between them."""
+    rows = light.camera_in_glass(segments=96, n=500)
+    right = {row["depth in the glass, mm"]: row["rays off by more than 0.02"] for row in rows}
+    assert max(right[4.0], right[1.0], right[0.1]) < 0.02
+    assert right[1e-5] > 0.5, "between mesh and sphere: outside of the mesh"
+
+
+def test_lamps_light_a_floor_from_one_lift_on():
+    for row in light.lamp_at_surface():
+        assert row["lit"] == float(row["height / lift"] > 1), row
+    assert {row["scene"]: row["lit"] for row in light.camera_in_body()} == {"lamp outside": 0, "lamp within": 1}
+
+
+def test_missing_bounces_are_the_rest_of_the_series():
+    assert max(row["largest difference"] for row in light.bounces()) < 1e-6
+
+
+def test_tiny_pictures_are_coded_and_say_that_the_rate_was_missed():
+    for row in picture.tiny_frames():
+        assert not row["refused"] and not row["said reached"] and row["got, bit/pixel"] > 0.33
+
+
+def test_tables_hold_every_row():
+    rows = [{"a": 1, "b": name, "c": value} for name, value in (("x", 0.5), ("y", None))]
+    assert book.table(rows) == ["| a | b | c |", "|---|---|---|", "| 1 | x | 0.5 |", "| 1 | y | – |"]
+    assert book.table(rows, (("a",), "b", ("c",))) == ["| a | x: c | y |", "|---|---|---|", "| 1 | 0.5 | – |"]
+
+
+def test_every_case_has_its_place_on_the_page():
+    page = (book.DOCS / "stability.md").read_text(encoding="utf-8")
+    for name in [*book.CASES, "convergence"]:
+        assert page.count(f"<!-- {name} -->\n") == page.count(f"<!-- /{name} -->") == 1, name
+    assert {case for case, *_ in book.PANELS} <= set(book.CASES)
+    assert pytest.approx(4e-6) == LIFT, "the page says 4·10⁻⁶"
