@@ -2,6 +2,7 @@
 
 from .access import decode_component, decode_frame
 from .analysis import analyse_orders
+from .aom import Avif
 from .base import options, parse_scheme, register, schemes
 from .coded import Encoded, decode, encode, timed_decode
 from .ffv1 import Ffv1
@@ -23,6 +24,7 @@ for _coder in (Mpeg2("ei"), Mpeg2("si"), Jpeg2000(), Jpeg(), JpegXl(), Htj2k()):
 for _kind in ("ei", "si", "ri"):
     register(Volume(_kind))
 register(Separate("si"))
+register(Avif("si"))
 
 __all__ = [
     "Encoded",

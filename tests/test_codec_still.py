@@ -10,6 +10,7 @@ from PIL import Image
 from test_codec_contract import large, psnr, textured
 
 from codec import decode, encode
+from codec.aom import samples
 from codec.still import jpeg_tables, jpegxl_codestream, jpegxl_distance, jpegxl_size
 from ii_core import IIPicture
 
@@ -91,3 +92,23 @@ def test_another_size_than_the_structures_is_refused(scheme):
     other = encode(textured(8, 16, 4, 4), scheme, bpp=3)
     with pytest.raises(ValueError, match="is damaged"):
         decode(replace(coded, payload=other.payload))
+
+
+def test_an_av1_stream_is_taken_out_of_its_boxes_whole():
+    frames = np.random.default_rng(0).integers(0, 256, (5, 16, 24, 3), np.uint8)
+    for some in (frames, frames[:1]):
+        boxes = bytes(imagecodecs.avif_encode(some, 60, codec="aom", numthreads=1))
+        found = samples(boxes)
+        assert len(found) == len(some)
+        assert b"".join(found) in boxes
+
+
+def test_libaom_keeps_all_of_the_colour():
+    """Against SVT-AV1, which subsamples it, on a picture of saturated noise."""
+    pixels = np.random.default_rng(5).integers(0, 256, (32, 64, 3), np.uint8)
+    picture = IIPicture(pixels, (16, 8), (4, 4))
+    full, less = (
+        decode(encode(picture, scheme, qp=low)) for scheme, low in (("si-avif:fast", 0), ("si-av1:fast", 1))
+    )
+    assert np.abs(full.pixels.astype(int) - pixels).max() <= 1
+    assert psnr(picture, less) < 25
