@@ -36,7 +36,7 @@ from metrics import provenance
 RESULTS = Path(__file__).parent / "results"
 LENSES, EI = (16, 8), (4, 4)
 SLOW = 1.0  # seconds of CPU time that a refusal may take
-STUCK = 60  # seconds after which a worker is taken for stuck, however loaded the machine
+STUCK = 300  # seconds after which a worker is taken for stuck, however loaded the machine
 HEADROOM = 1 << 30  # bytes of address space beyond what a worker has after its first decoding
 
 
