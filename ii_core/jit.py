@@ -14,11 +14,11 @@ import numba
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile on first call and keep the result, or just compile where nothing can be kept."""
     try:
-        return numba.njit(cache=True, nogil=True)(function)
+        return numba.njit(cache=True, nogil=True, _nrt=False)(function)
     except RuntimeError:  # no folder to keep it in can be written
-        return numba.njit(nogil=True)(function)
+        return numba.njit(nogil=True, _nrt=False)(function)
 
 
 def inline_kernel(function: Callable[..., Any]) -> Any:
     """A kernel's own helper, copied into its caller."""
-    return numba.njit(nogil=True, inline="always")(function)
+    return numba.njit(nogil=True, inline="always", _nrt=False)(function)

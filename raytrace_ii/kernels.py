@@ -27,6 +27,10 @@ _GRADIENTS = np.array(
     dtype=np.float64,
 )
 
+_CODES = np.arange(256) / 255
+# sRGB codes of 8 bits as linear light (IEC 61966-2-1).
+LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
 # Columns of the material table and of the light table, as in packing.py.
 _MIRROR, _TRANSMISSION, _ABSORPTION, _SPECULAR, _SHININESS, _PRIORITY, _LOCAL = 3, 6, 9, 12, 13, 14, 15
 _TEXTURE, _LEAST_HALF, _EMISSION, _IOR, _CUTOFF, _NORMAL_MAP, _NORMAL_SCALE = 16, 17, 18, 21, 24, 25, 26
@@ -647,8 +651,13 @@ def background_colour(background, dy):
 @inline_kernel
 def _sky(background, textures, texels, dx, dy, dz):
     """Colour of the surroundings for a unit direction: of the equirectangular image, or of the gradient."""
-    if background[_SKY_IMAGE] < 0.0:
-        return background_colour(background, dy)
+    if background[_SKY_IMAGE] >= 0.0:
+        return _sky_image(background, textures, texels, dx, dy, dz)
+    return background_colour(background, dy)
+
+
+@kernel
+def _sky_image(background, textures, texels, dx, dy, dz):
     row = int(background[_SKY_IMAGE])
     half = 0.5 / textures[row, 3]  # of a texel: the top row does not run into the bottom one
     u = 0.5 + math.atan2(np.float64(dx), np.float64(dz)) / (2.0 * math.pi) - background[_SKY_TURN]
@@ -776,8 +785,8 @@ def _cone(lights, k, lx, ly, lz, norm):
 
 @inline_kernel
 def _wrap(i, n):
-    i %= n
-    return i + n if i < 0 else i
+    """Texel i and the next one, for i from −1 on; without a division."""
+    return i if i >= 0 else n - 1, i + 1 if 0 < i + 1 < n else 0
 
 
 @kernel
@@ -821,9 +830,18 @@ def _image(table, row, texels, u, v):
     """Colour of an image at (u, v), bilinear."""
     a, b, c, d, fx, fy = _texels_at(table, row, u, v)
     w00, w10, w01, w11 = (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy
-    red = w00 * texels[a, 0] + w10 * texels[b, 0] + w01 * texels[c, 0] + w11 * texels[d, 0]
-    green = w00 * texels[a, 1] + w10 * texels[b, 1] + w01 * texels[c, 1] + w11 * texels[d, 1]
-    blue = w00 * texels[a, 2] + w10 * texels[b, 2] + w01 * texels[c, 2] + w11 * texels[d, 2]
+    pixels, codes = texels
+    if table[row, 5] != 0.0:
+        k, m, n, o = codes[a, 0], codes[b, 0], codes[c, 0], codes[d, 0]
+        red = w00 * LINEAR[k] + w10 * LINEAR[m] + w01 * LINEAR[n] + w11 * LINEAR[o]
+        k, m, n, o = codes[a, 1], codes[b, 1], codes[c, 1], codes[d, 1]
+        green = w00 * LINEAR[k] + w10 * LINEAR[m] + w01 * LINEAR[n] + w11 * LINEAR[o]
+        k, m, n, o = codes[a, 2], codes[b, 2], codes[c, 2], codes[d, 2]
+        blue = w00 * LINEAR[k] + w10 * LINEAR[m] + w01 * LINEAR[n] + w11 * LINEAR[o]
+    else:
+        red = w00 * pixels[a, 0] + w10 * pixels[b, 0] + w01 * pixels[c, 0] + w11 * pixels[d, 0]
+        green = w00 * pixels[a, 1] + w10 * pixels[b, 1] + w01 * pixels[c, 1] + w11 * pixels[d, 1]
+        blue = w00 * pixels[a, 2] + w10 * pixels[b, 2] + w01 * pixels[c, 2] + w11 * pixels[d, 2]
     return red, green, blue
 
 
@@ -834,8 +852,9 @@ def _texels_at(table, row, u, v):
     x = (u - math.floor(u)) * width - 0.5
     y = (1.0 - (v - math.floor(v))) * height - 0.5
     i, j = math.floor(x), math.floor(y)
-    i0, i1 = _wrap(int(i), width), _wrap(int(i) + 1, width)
-    a, b = first + _wrap(int(j), height) * width, first + _wrap(int(j) + 1, height) * width
+    i0, i1 = _wrap(int(i), width)
+    j0, j1 = _wrap(int(j), height)
+    a, b = first + j0 * width, first + j1 * width
     return a + i0, a + i1, b + i0, b + i1, x - i, y - j
 
 
