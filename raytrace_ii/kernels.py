@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel, kernel
+from ii_core.jit import inline_kernel
+from ii_core.jit import lean_kernel as kernel
 
 # A weight this small cannot move a colour by half a step of 8 bits, not even on sRGB's steep foot, of light up to 1.
 LEAST_WEIGHT = 0.5 / 255 / 12.92
