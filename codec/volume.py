@@ -32,7 +32,7 @@ from . import lifting
 from .base import Coder, Coding, Goal, Option, Options, Pixels
 from .clock import cpu_seconds
 from .components import MAX_COMPONENTS, decode_planes, encode_planes
-from .order import ORDERS
+from .order import BY, ORDERS
 from .rate import Run
 from .search import nearest_setting
 from .sequence import Layout, layout
@@ -77,6 +77,7 @@ class Volume(Coder):
     scale_about = "PSNR over all colours in dB, nearly met"
     options: ClassVar[Mapping[str, Option]] = {
         "order": Option(about="of the component images", default="parallel", choices=tuple(ORDERS)),
+        "by": Option(about="whether the order goes by rows or by columns", default="rows", choices=BY),
         "wavelet": Option(about="CDF 9/7 or 5/3, in all directions", default="97", choices=("97", "53")),
         "levels": Option(about="of the wavelet along the slices", default=5, low=0, high=8),
         "lossless": Option(about="1 to code to the bit, with the reversible 5/3", default=0, low=0, high=1),
@@ -148,7 +149,7 @@ class Volume(Coder):
 
     def _cut(self, picture: IIPicture, options: Options) -> _Cut:
         shape = layout(picture.lenses, picture.ei_pixels, self.kind)
-        origins = shape.origins(str(options.get("order", "row")))
+        origins = shape.origins(str(options.get("order", "row")), str(options.get("by", "rows")))
         size = GROUP if shape.frames > MAX_SLICES else shape.frames
         return _Cut(
             shape=shape,
