@@ -141,6 +141,7 @@ def test_an_interrupt_from_outside(tmp_path):
     finally:
         process.kill()
     assert process.returncode == 130 and "Traceback" not in error
+    assert error.endswith("interrupted\n")
     manifest = json.loads((out / "manifest.json").read_text())
     assert "picture" in manifest["scenes"]["apples"]["products"] and "twins" not in manifest["scenes"]
     assert not [name for name in os.listdir(out) if name.startswith(".")]

@@ -16,20 +16,22 @@ from .common import app
 
 __all__ = ["app", "coding", "evaluate", "main", "pictures", "render", "show", "synthesize"]
 
+INTERRUPTED = 130  # the exit code of a command that Ctrl-C ended
+
 
 def main() -> None:
     """Run the command; a bad input is one line on the error stream and exit code 2, a warning one line."""
     warnings.showwarning = _warn
     try:
         code = app(standalone_mode=False)
+        if code == INTERRUPTED:  # what typer makes of Ctrl-C
+            print("interrupted", file=sys.stderr)
         sys.exit(code if isinstance(code, int) else 0)
     except (ValueError, OSError, MemoryError) as error:
         _fail(str(error) or type(error).__name__)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, typer.Abort):
         print("interrupted", file=sys.stderr)
-        sys.exit(130)
-    except typer.Abort:
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
     except Exception as error:
         # A wrong option or argument: typer's own complaint, without its frame.
         if not hasattr(error, "format_message"):
