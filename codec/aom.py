@@ -45,7 +45,7 @@ class Avif(Video):
         "order": COMMON["order"],
         "by": COMMON["by"],
         "speed": Option(about="libaom's cpu-used, 0 is the greatest effort", default=6, low=0, high=9),
-        "depth": Option(about=DEPTH.about, default=8, low=8, high=10),
+        "depth": Option(about=DEPTH.about, default="8", choices=("8", "10")),
     }
     presets: ClassVar[Mapping[str, Options]] = {"fast": {"speed": 8}, "balanced": {"speed": 6}, "best": {"speed": 4}}
 
