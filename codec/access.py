@@ -76,7 +76,7 @@ def sequence(coded: Encoded) -> Sequence:
         If the scheme codes no pseudo video sequence, or the stream does not hold as many packets as frames.
     """
     coder = find(coded.scheme)
-    if not isinstance(coder, Video):
+    if not isinstance(coder, Video) or "gop" not in coder.options:
         raise ValueError(f"scheme {coded.scheme} codes the picture as a whole: it has no frames to be had alone")
     film = coder.film(blank_picture(coded.structure, coded.dtype), coded.options)
     first = b""

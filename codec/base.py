@@ -43,7 +43,8 @@ class Option:
         """The value of text or of JSON, or a ValueError that says what is allowed."""
         bounds = self.low, self.high
         if self.choices:
-            found = value if value in self.choices else None
+            # A number is as good as its text: options have become choices that were numbers in older files.
+            found = str(value) if str(value) in self.choices else None
         else:
             found = _within(_number(value, bounds) if isinstance(value, str) else value, bounds)
         if found is None:

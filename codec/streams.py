@@ -23,7 +23,7 @@ import struct
 from collections.abc import Sequence as Many
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import av
 import numpy as np
@@ -31,7 +31,7 @@ import numpy as np
 from ii_core.files import atomic_path
 
 from .access import DEMUXERS, Sequence, sequence
-from .base import find
+from .base import Coder, find
 from .coded import Encoded
 from .video import Video, decoder_of, open_encoder
 
@@ -80,7 +80,7 @@ def extract(coded: Encoded, path: str | os.PathLike[str]) -> None:
         raise ValueError(f"the stream of scheme {coded.scheme} does not go into {path.name}: possible are {known}")
     coder = find(coded.scheme)
     with atomic_path(path) as temporary:
-        if not isinstance(coder, Video):
+        if not _is_stream(coder):
             boxed = suffix in (".jp2", ".jph") and coded.payload[:2] == b"\xff\x4f"
             temporary.write_bytes(_jp2(coded) if boxed else coded.payload)
         elif suffix in BARE.get(coder.standard, ()):
@@ -96,7 +96,7 @@ def extract(coded: Encoded, path: str | os.PathLike[str]) -> None:
 def suffixes(coded: Encoded) -> tuple[str, ...]:
     """Endings of the files that `extract` can make of a coded picture, the usual one first."""
     coder = find(coded.scheme)
-    if isinstance(coder, Video):
+    if _is_stream(coder):
         return CONTAINERS[coder.standard] + BARE.get(coder.standard, ())
     for magic, names in STILLS:
         if coded.payload.startswith(magic):
@@ -104,6 +104,11 @@ def suffixes(coded: Encoded) -> tuple[str, ...]:
                 return (".jph", ".j2c")
             return names
     return (".avif",) if coded.payload[4:8] == b"ftyp" and coded.payload[8:11] == b"avi" else ()
+
+
+def _is_stream(coder: Coder) -> TypeGuard[Video]:
+    """Whether the payload is a video stream, and not an image sequence in boxes of its own."""
+    return isinstance(coder, Video) and "gop" in coder.options
 
 
 def _mux(stream: Sequence, path: Path) -> None:

@@ -20,7 +20,7 @@ from codec.streams import extract, suffixes
 from codec.video import Video
 from ii_core import IIPicture, component_images
 
-VIDEOS = sorted(name for name in schemes() if isinstance(find(name), Video))
+VIDEOS = sorted(n for n in schemes() if isinstance(find(n), Video) and "gop" in find(n).options)
 STILLS = sorted(set(schemes()) - set(VIDEOS))
 FFPROBE = shutil.which("ffprobe")
 
