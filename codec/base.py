@@ -44,7 +44,7 @@ class Option:
         bounds = self.low, self.high
         if self.choices:
             # A number is as good as its text: options have become choices that were numbers in older files.
-            found = str(value) if str(value) in self.choices else None
+            found: Value | None = str(value) if str(value) in self.choices else None
         else:
             found = _within(_number(value, bounds) if isinstance(value, str) else value, bounds)
         if found is None:
