@@ -1,6 +1,6 @@
 """Speed against accuracy: CPU time and error of every setting, scene by scene, and the setting to take.
 
-    python -m benchmarks.pareto [--scale 16] [--scenes apples,car]
+    python -m benchmarks.pareto [--scale 32] [--scenes apples,car]
 
 The error is PSNR in 16-bit sRGB against a reference of 64 samples a pixel, 12 bounces and, where the scene's file
 says how finely its shapes are cut, triangles half as large; time is CPU seconds of `render` without support images,
@@ -52,7 +52,7 @@ BASE = 4  # samples at which depth, cut and features are compared
 def main() -> None:
     """Measure, print, keep, draw and fill the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=16)
+    parser.add_argument("--scale", type=int, default=32)
     parser.add_argument("--scenes", default=",".join(SCENES))
     arguments = parser.parse_args()
     camera = preset("setup1", scale=arguments.scale)
