@@ -56,6 +56,7 @@ MEASURES = {
     "q_depth_mean": Measure(_named("depth", "mean"), "dB", 2, "mean of the depth layers' PSNRs"),
     "q_depth_max": Measure(_named("depth", "max"), "dB", 2, "PSNR of the best depth layer"),
 }
+"""The qualities that studies and charts know, by name."""
 
 
 def measure_of(name: str) -> Measure:

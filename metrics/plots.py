@@ -27,6 +27,7 @@ PLOTS = (
     "q_depth.png",
     "errors_depth.png",
 )
+"""The pictures that `plot_all` writes."""
 AMPLIFY = (32, 16, 8, 4, 2, 1)  # of differences: the first that keeps nine values in ten from clipping
 
 

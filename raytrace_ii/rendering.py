@@ -196,6 +196,8 @@ def render_to(
 
     The files hold to the bit what `render` gives. They appear when all is done, or not at all.
 
+    Parameters that are not named here are those of `render`, and so are errors.
+
     Parameters
     ----------
     picture : path or None
@@ -205,8 +207,6 @@ def render_to(
         objects stand in its header.
     upright : bool
         Turn the picture of a camera of one lens, which stands on its head.
-
-    Other parameters and errors are those of `render`.
 
     Raises
     ------

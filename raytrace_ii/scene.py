@@ -39,6 +39,8 @@ def _number(what: str, value: float, least: float, *, above: bool = False) -> No
 class Material:
     """How a surface answers light, in Whitted's terms. Colours are linear.
 
+    The matt share is what ``mirror`` and ``transmission`` leave: energy stays in bounds.
+
     Parameters
     ----------
     colour : (3,)
@@ -66,8 +68,6 @@ class Material:
     priority : int
         Where transmissive bodies overlap the one of higher priority is there (Schmidt and Budge 2002); of equal
         ones the one entered first.
-
-    The matt share is what ``mirror`` and ``transmission`` leave: energy stays in bounds.
 
     Raises
     ------
