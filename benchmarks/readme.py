@@ -1,7 +1,8 @@
 """Put measured pictures and figures where the README shows them: ``python -m benchmarks.readme``.
 
 Takes the studies of ``make demo`` (out/demo) and of ``python -m benchmarks.demo --scale 1 -o out/full``, keeps their
-numbers in ``benchmarks/results`` and fills the tables between the README's marks from what is kept there.
+numbers in ``benchmarks/results`` and fills the tables between the marks of README and docs/study.md from what is
+kept there.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ def main() -> None:
     for mark, lines in (("gain", gain_table()), ("disparity", disparity_table()), ("speed", speed_table())):
         text = filled(text, mark, lines)
     readme.write_text(text, encoding="utf-8")
+    fill(ROOT / "docs" / "study.md", "gain", gain_table())
 
 
 def filled(text: str, mark: str, lines: list[str]) -> str:
