@@ -1,4 +1,4 @@
-"""README and docs/: links lead somewhere, command lines parse, Python runs, names exist.
+"""README, CHANGELOG and docs/: links lead somewhere, command lines parse, Python runs, names exist.
 
 Every block of ```python runs, top to bottom of its page with one set of names, in a folder that holds a small
 ``apples.png``, its coding ``apples.ii`` and ``decoded.png``. Python that is not to run is written without the word.
@@ -23,7 +23,7 @@ from raytrace_ii.cli import app
 ROOT = Path(__file__).parent.parent
 PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
-    for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+    for path in (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md")))
 }
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.M | re.S)
 COMMANDS = typer.main.get_command(app).commands
@@ -156,7 +156,7 @@ def test_scripts_and_targets_exist(page):
 
 def test_every_page_is_in_the_site():
     config = (ROOT / "docs" / "site" / "mkdocs.yml").read_text(encoding="utf-8")
-    pages = {os.path.relpath(page, "docs") for page in PAGES if page != "README.md"}
+    pages = {os.path.relpath(page, "docs") for page in PAGES if page.startswith("docs/")}
     assert set(re.findall(r": (\S+\.md)$", config, re.M)) == pages
 
 
