@@ -96,6 +96,8 @@ def _settings(options: Options, film: Film, rate: str, frame_rate: int = 25) -> 
         f"keyint={options['gop'] or -1}:min-keyint=1:scenecut=0:open-gop=0",
         f"bframes={options['bframes']}:b-adapt=0:rc-lookahead=40",
         f"merange={options['merange']}:ctu={block}",
+        # To weigh pictures against each other it reads memory that nobody wrote: other bytes every time.
+        "weightp=0:weightb=0",
         f"psy-rd=0:psy-rdoq=0:aq-mode=0:cutree={int(tree)}:pools={pools}:wpp={int(pools != 'none')}:frame-threads=1",
         "info=0:log-level=none",
         rate,
