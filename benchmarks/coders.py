@@ -11,6 +11,7 @@ import argparse
 import statistics
 import time
 from concurrent.futures import ThreadPoolExecutor
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -67,11 +68,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
     parser.add_argument("--scenes", default=",".join(SCENES))
-    parser.add_argument("--schemes", default="", help="only those that begin like one of these")
+    parser.add_argument("--schemes", default="*", help="only these, * for anything: si-h264,si-av1*")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--output", type=Path, default=RESULTS / "coders.json")
     asked = parser.parse_args()
-    names = [name for name in candidates() if name == ANCHOR or name.startswith(tuple(asked.schemes.split(",")))]
+    chosen = asked.schemes.split(",")
+    names = [name for name in candidates() if name == ANCHOR or any(fnmatch(name, one) for one in chosen)]
     rows: list[dict[str, Any]] = []
     for scene in asked.scenes.split(","):
         picture = render(load_scene(scene), preset("setup1", scale=asked.scale), noise=1.0, support=()).picture
