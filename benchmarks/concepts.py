@@ -124,7 +124,7 @@ def draw_pixels(picture: IIPicture) -> Any:
     masks[1, v // 2 :: v, u // 2 :: u] = True
     masks[2, v + v // 2] = True
     titles = ("elementary image: all under one lens", "sub-image: one under each lens", "ray-space image: one row")
-    figure, axes = panels(1, 4, (13, 2.2))
+    figure, axes = panels(2, 2, (9, 5))
     show(axes[0], detail, f"II-picture: {across}×{down} lenses")
     for axis, mask, title in zip(axes[1:], masks, titles, strict=True):
         show(axis, np.where(mask[..., None], detail, 255 - (255 - detail) // 5), title)

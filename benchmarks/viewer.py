@@ -77,7 +77,7 @@ def gallery() -> None:
             page.evaluate("async () => { await ii.ready }")
             page.wait_for_timeout(1000)
             page.screenshot(path=GALLERY / f"{name}.jpg", type="jpeg", quality=85)
-            lines.append(f"## [{name}]({name}.html)\n\n{about} {size / 2**20:.1f} MB.\n\n![{name}]({name}.jpg)\n")
+            lines.append(f"## [{name}]({name}.html)\n\n{about}; {size / 2**20:.1f} MB.\n\n![{name}]({name}.jpg)\n")
             print(name, flush=True)
     (GALLERY / "README.md").write_text("\n".join(lines), encoding="utf-8")
 

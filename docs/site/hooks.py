@@ -1,10 +1,13 @@
 """What the site does to the pages of docs/, so that the same pages read well in the repository.
 
-A link out of docs/, to a script or to measured numbers, leads to that file: the site carries it along.
+A link out of docs/, to a script or to measured numbers, leads to that file: the site carries it along. A public name
+that the reference lacks is a warning.
 """
 
 from __future__ import annotations
 
+import ast
+import logging
 import re
 from pathlib import Path
 from typing import Any
@@ -14,6 +17,7 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 OUTWARD = re.compile(r"\]\((?P<path>(?:\.\./)+[^)#\s]+)")
+log = logging.getLogger("mkdocs.hooks.docs")
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
@@ -29,3 +33,15 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         return f"]({'../' * page.file.src_uri.count('/')}{uri}"
 
     return OUTWARD.sub(inside, markdown)
+
+
+def on_page_content(html: str, page: Any, config: Any, files: Files) -> None:
+    """See that a page of the reference has all that its package's ``__all__`` names."""
+    folder, _, package = page.file.src_uri.removesuffix(".md").rpartition("/")
+    if folder != "api":
+        return
+    for node in ast.parse((ROOT / package / "__init__.py").read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+            shown = {anchor.rpartition(".")[2] for anchor in re.findall(r'<h\d id="([\w.]+)"', html)}
+            if lost := set(ast.literal_eval(node.value)) - shown:
+                log.warning("%s: not in the reference: %s", page.file.src_uri, ", ".join(sorted(lost)))
