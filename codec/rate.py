@@ -111,8 +111,8 @@ def nearest_quantiser(
     """Runs that close in on a target, by quantiser, for a coder that takes a quantiser and no rate.
 
     The logarithm of the size is taken to fall straight with the quantiser, by half every ``octave``, until two runs
-    on either side of the target tell better. It ends within `TOLERANCE`, where the next quantiser has been tried
-    already, or after `SEARCH_RUNS`.
+    on either side of the target tell better. It ends within `TOLERANCE`, with neighbours on either side of it, or
+    after `SEARCH_RUNS`.
 
     Parameters
     ----------
@@ -128,12 +128,17 @@ def nearest_quantiser(
         Quantisers per halving of the size, about.
     """
     runs: dict[float, Run] = {}
-    quantiser = low + round((high - low) * 0.6 / step) * step
+    steps = round((high - low) * 0.6 / step)
+    quantiser = low + steps * step
     while quantiser not in runs and len(runs) < SEARCH_RUNS:
         runs[quantiser] = run = encode_at(quantiser)
         if within(len(run.payload), target):
             break
-        quantiser = low + round((_aimed(runs, target, octave, low, high) - low) / step) * step
+        steps = round((_aimed(runs, target, octave, low, high) - low) / step)
+        if (tried := runs.get(low + steps * step)) is not None:
+            # The target lies within a step of it, and the neighbour is the other end.
+            steps += 1 if len(tried.payload) > target else -1
+        quantiser = min(max(low + steps * step, low), high)
     return runs
 
 

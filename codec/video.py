@@ -94,7 +94,7 @@ class Video(Coder):
     octave : float
         Quantiser steps that about halve the rate; where the search starts from.
     quantiser_step : float
-        Finest step of the quantiser.
+        Finest step of the quantiser; 1 with ``rate=cq``.
 
     References
     ----------
@@ -127,6 +127,10 @@ class Video(Coder):
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
         """The settings for a quantiser, on the coder's own scale."""
 
+    def step(self, options: Options) -> float:
+        """Between quantisers that differ."""
+        return self.quantiser_step
+
     def meet(self, target: float, film: Film, options: Options, run: Callable[[Settings], Run]) -> tuple[Run, int]:
         """The run whose bytes come nearest to a target, and how many runs there were: by the quantiser, if not
         otherwise."""
@@ -137,7 +141,7 @@ class Video(Coder):
             target,
             low=low,
             high=high,
-            step=self.quantiser_step,
+            step=self.step(options),
             octave=self.octave,
         )
         return self.between(runs, target, film, options, run)

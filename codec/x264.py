@@ -70,6 +70,10 @@ class H264(Video):
         "best": {"bframes": 7, "pyramid": 1, "rate": "crf", "preset": "veryslow", "depth": "10"},
     }
 
+    def step(self, options: Options) -> float:
+        """A constant quantiser is a whole number."""
+        return 1.0 if options["rate"] == "cq" else self.quantiser_step
+
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
         """A constant quantiser, or rate factor."""
         if options["rate"] == "crf":

@@ -53,6 +53,10 @@ class Hevc(Video):
         "best": {"preset": "slower"},
     }
 
+    def step(self, options: Options) -> float:
+        """A constant quantiser is a whole number."""
+        return 1.0 if options["rate"] == "cq" else self.quantiser_step
+
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
         """A constant rate factor, or quantiser."""
         return _settings(options, film, f"qp={round(quantiser)}" if options["rate"] == "cq" else f"crf={quantiser:g}")

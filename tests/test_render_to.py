@@ -187,19 +187,22 @@ def whole(rows):
     return render(scene, camera(rows), dtype="float32", workers=2)
 banded(256), whole(256)  # compile, and start every pool of threads there is
 used = int(next(l for l in open("/proc/self/status") if l.startswith("VmData")).split()[1]) * 1024
-resource.setrlimit(resource.RLIMIT_DATA, (used + 48 * 2**20,) * 2)
-{"banded": banded, "whole": whole}[sys.argv[1]](2560)
+resource.setrlimit(resource.RLIMIT_DATA, (used + 96 * 2**20,) * 2)
+{"banded": banded, "whole": whole}[sys.argv[1]](5120)
 print("done")
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="RLIMIT_DATA holds for all memory on Linux only")
 def test_a_picture_larger_than_memory(tmp_path):
-    """2.6 million pixels of 32 bytes, 84 MB, written with 48 MB to spare; in memory they do not fit."""
+    """5.2 million pixels of 32 bytes, 168 MB, written with 96 MB to spare; in memory they do not fit.
+
+    Less would not do for sure: a thread that starts late takes 8 MB for its stack and its own heap.
+    """
     runs = {
         how: subprocess.run([sys.executable, "-c", LIMITED, how], capture_output=True, text=True, cwd=tmp_path)
         for how in ("whole", "banded")
     }
     assert runs["banded"].stdout == "done\n", runs["banded"].stderr
     assert runs["whole"].returncode and "MemoryError" in runs["whole"].stderr
-    assert read_image(tmp_path / "p.exr").shape == (2560, 1024, 3)
+    assert read_image(tmp_path / "p.exr").shape == (5120, 1024, 3)

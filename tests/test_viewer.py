@@ -17,7 +17,12 @@ from metrics.viewer import depth_view, write_viewer, write_viewer_folder
 from raytrace_ii import load_scene, render
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
+# Its usual shared memory, /dev/shm, is 64 MB in many a container: too little for a large picture.
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]
+FLAGS += [f"--disable-{what}" for what in ("background-networking", "component-update", "sync", "quic")]
+READY = """() => Promise.race([
+    ii.ready,
+    new Promise((_, reject) => setTimeout(() => reject(new Error("the page does not get ready")), 60000))])"""
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +47,10 @@ def show(browser):
         opened.append(tab)
         tab.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
         tab.on("pageerror", lambda error: complaints.append(str(error)))
+        tab.on("crash", lambda _: complaints.append("the page crashed"))
         tab.goto(path if "://" in str(path) else f"file://{path}{fragment}")
         if wait:
-            tab.evaluate("async () => { await ii.ready }")
+            tab.evaluate(READY)
         return tab
 
     yield call
@@ -308,6 +314,15 @@ def test_without_webgl2_the_page_says_so(show, shot, tmp_path, browser):
     tab.goto(f"file://{tmp_path / 'v.html'}")
     assert "WebGL2" in tab.locator("#failure").inner_text()
     tab.close()
+
+
+def test_a_lost_card_is_told(show, shot, tmp_path):
+    write_viewer(tmp_path / "v.html", shot.picture)
+    tab = show(tmp_path / "v.html")
+    assert not tab.locator("#failure").is_visible()
+    tab.evaluate("ii.viewer.field.gl.getExtension('WEBGL_lose_context').loseContext()")
+    tab.locator("#failure").wait_for(state="visible")
+    assert "graphics card" in tab.locator("#failure").inner_text()
 
 
 def test_the_centre_view_comes_first(show, shot, tmp_path):

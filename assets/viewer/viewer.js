@@ -18,6 +18,8 @@ class Viewer {
     this.work = [];
     this.fromLink();
     this.bind();
+    this.canvas.addEventListener("webglcontextlost", () =>
+      ii.failed("The graphics card gave the picture up, perhaps for want of memory. Reload the page to try again."));
     new ResizeObserver(() => this.redraw()).observe(document.body);
     this.redraw();
   }
@@ -369,9 +371,12 @@ const ii = {
     try {
       ii.viewer = new Viewer(meta);
     } catch (error) {
-      document.getElementById("failure").textContent = error.message;
-      document.getElementById("failure").hidden = false;
+      ii.failed(error.message);
     }
+  },
+  failed(message) {
+    document.getElementById("failure").textContent = message;
+    document.getElementById("failure").hidden = false;
   },
   preview: (text) => ii.viewer?.preview(ii.viewer.bytes(text)),
   page: (picture, layer, text) => ii.viewer?.page(picture, layer, ii.viewer.bytes(text)),
