@@ -17,6 +17,7 @@ from pydantic import ValidationError
 
 from ii_core.files import read_image
 
+from .closed import flaw
 from .complaints import line, words
 from .model import Model, Part
 from .scene import Background, Body, Fog, Light, Material, Scene, Vector
@@ -79,7 +80,8 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
     Warns
     -----
     UserWarning
-        Once for each mesh file that holds something unsupported, naming all of it.
+        Once for each mesh file that holds something unsupported, naming all of it; and once if glass is not closed
+        or looks inwards, naming the objects.
     """
     path = Path(name)
     alone = path.suffix.lower() in MESH_TYPES
@@ -109,6 +111,10 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
     for file, model in models.items():
         if model.left_out:
             warnings.warn(f"{file}: not supported and left out: {', '.join(model.left_out)}", stacklevel=2)
+    glass = [body for body in scene.bodies if body.material.fills]
+    if hollow := [f"{body.name!r} ({why})" for body in glass if (why := flaw(body.vertices, body.faces))]:
+        needed = "closed meshes whose faces look outwards are needed, or ior = 1 without absorption for a sheet"
+        warnings.warn(f"{path}: glass without an inside: {', '.join(hollow)}: {needed}", stacklevel=2)
     return scene
 
 

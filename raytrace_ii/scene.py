@@ -124,6 +124,11 @@ class Material:
     def transmissive(self) -> bool:
         return max(self.transmission) > 0
 
+    @property
+    def fills(self) -> bool:
+        """Whether light is another within the body, so that its mesh must have an inside."""
+        return self.transmissive and (set(self.iors) != {1.0} or max(self.absorption_per_mm) > 0)
+
 
 LIGHTS = ("point", "directional", "spot")
 

@@ -1,0 +1,53 @@
+"""Whether a mesh has an inside. Glass needs one: a ray is in it from the face it enters by to that it leaves by."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+SAME = 1e-6  # of the largest coordinate: corners nearer than this are one, as single precision places them
+
+
+def flaw(vertices: NDArray[Any], faces: NDArray[Any]) -> str | None:
+    """Why a mesh has no inside, in a few words; None if it has one and its faces look out of it.
+
+    Closed is what runs through every edge as often one way as the other, so that bodies may touch along an edge.
+    Corners in one place are one corner, whatever their numbers: seams of texture coordinates do no harm.
+    """
+    vertices, faces = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
+    open_edges = _open_edges(faces)
+    if len(open_edges):
+        faces = _merged(vertices, np.unique(open_edges))[faces]
+        open_edges = _open_edges(faces)
+    if len(open_edges):
+        return f"{len(open_edges)} of its edges are open, or between a face and one that is turned over"
+    a, b, c = (vertices[faces[:, i]] - vertices.mean(axis=0) for i in range(3))
+    return "its faces look inwards" if np.einsum("ij,ij->", a, np.cross(b, c)) < 0 else None
+
+
+def _open_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n, 2) edges, low corner first, that are not run through as often one way as the other."""
+    start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
+    span = int(faces.max()) + 1
+    up, ups = np.unique((start * span + end)[start < end], return_counts=True)
+    down, downs = np.unique((end * span + start)[end < start], return_counts=True)  # start = end: a face of no area
+    _, i, j = np.intersect1d(up, down, assume_unique=True, return_indices=True)
+    paired = ups[i] == downs[j]
+    return np.column_stack(np.divmod(np.union1d(np.delete(up, i[paired]), np.delete(down, j[paired])), span))
+
+
+def _merged(vertices: NDArray[np.float64], loose: NDArray[np.int64]) -> NDArray[np.int64]:
+    """A number for every vertex, the same for those of ``loose`` that lie in one place."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    points, row = np.unique(vertices[loose] + 0.0, axis=0, return_inverse=True)  # of soup, a sixth
+    pairs = cKDTree(points).query_pairs(SAME * np.abs(vertices).max(), output_type="ndarray")
+    linked = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+    place = connected_components(linked)[1][row.reshape(-1)]
+    number = np.arange(len(vertices))
+    number[loose] = loose[np.unique(place, return_index=True)[1]][place]
+    return number
