@@ -3,10 +3,13 @@ PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint bench docs clean
+.PHONY: demo study test lint bench docs clean
 
 demo: $(VENV)/.installed
 	$(BIN)/python -m benchmarks.demo
+
+study: $(VENV)/.installed
+	$(BIN)/python -m benchmarks.study --publish
 
 test: lint
 	$(BIN)/python -m pytest -n 2

@@ -33,6 +33,8 @@ FIELDS = (
     "decode_seconds",
     "nbytes",
 )
+PACKAGES = ("ii_core", "raytrace_ii", "codec", "metrics", "assets", "benchmarks")
+CODE = (*(f":(top){package}" for package in PACKAGES), ":(top)pyproject.toml", ":(top,exclude)benchmarks/results")
 LIBRARIES = ("numpy", "numba", "OpenImageIO", "scikit-image", "av", "pillow", "glymur", "bjontegaard")
 
 
@@ -153,7 +155,10 @@ def provenance() -> dict[str, Any]:
 
 
 def _git() -> dict[str, Any] | None:
-    """Commit of the checkout this code runs from, and whether tracked files were changed; None outside of one."""
+    """Commit of the checkout this code runs from, and whether its code was changed; None outside of one.
+
+    Numbers and pages that a study has just written are not code: what is measured next still is of the commit.
+    """
     folder = Path(__file__).parent
 
     def git(*args: str) -> str:
@@ -162,7 +167,7 @@ def _git() -> dict[str, Any] | None:
 
     try:
         git("ls-files", "--error-unmatch", __file__)  # installed into somebody else's checkout is not ours
-        return {"commit": git("rev-parse", "HEAD"), "dirty": bool(git("status", "--porcelain", "-uno"))}
+        return {"commit": git("rev-parse", "HEAD"), "dirty": bool(git("status", "--porcelain", "--", *CODE))}
     except (OSError, subprocess.SubprocessError):
         return None
 

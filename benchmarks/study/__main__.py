@@ -1,0 +1,52 @@
+"""The command: see the package."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from fnmatch import fnmatch
+from pathlib import Path
+
+from . import __doc__ as about
+from .page import publish
+from .runner import perform
+from .steps import all_steps
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Choose steps, do them, publish them."""
+    parser = argparse.ArgumentParser(
+        prog="benchmarks.study", description=about, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--scale", type=int, default=1, help="divides the lenses of all setups; 16 for a look")
+    parser.add_argument("--only", default="*", help="steps, * for anything: rates-apples,views-*")
+    parser.add_argument("--out", type=Path, default=None, help="where records and pictures go; out/study/scale-N")
+    parser.add_argument("--force", action="store_true", help="do again what is done, and compare")
+    parser.add_argument("--list", action="store_true", help="name the steps and do nothing")
+    parser.add_argument("--publish", action="store_true", help="fill docs/study.md from what is there afterwards")
+    asked = parser.parse_args(arguments)
+    try:
+        steps = all_steps(asked.scale)
+    except ValueError as error:
+        parser.error(str(error))
+    wanted = asked.only.split(",")
+    if unknown := [one for one in wanted if not any(fnmatch(step.name, one) for step in steps)]:
+        parser.error(f"no step {unknown[0]!r}: known are {', '.join(step.name for step in steps)}")
+    chosen = [step for step in steps if any(fnmatch(step.name, one) for one in wanted)]
+    if asked.list:
+        for step in chosen:
+            print(f"{step.name:<24} {step.shows}")
+        return
+    folder = asked.out or Path("out/study") / f"scale-{asked.scale}"
+    started = time.perf_counter()
+    made = perform(chosen, folder, force=asked.force)
+    print(f"{len(made)} of {len(chosen)} steps in {time.perf_counter() - started:.0f} s: {folder}/")
+    if asked.publish:
+        publish(folder)
+    if broken := [record["step"] for record in made if record.get("repeats") is False]:
+        sys.exit(f"not the same as before: {', '.join(broken)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,333 @@
+"""Ours beside theirs: numbers out of the records, and whether they agree."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import fmean
+from typing import Any
+
+import numpy as np
+
+from . import theirs
+from .coding import SCENES
+from .rates import BFRAMES, CONTROLS, GOPS, RANGES, REFERENCE, SI, VOLUME, types
+from .runner import number
+from .theirs import Verdict, compare
+
+Points = Sequence[Mapping[str, Any]]
+Results = Mapping[str, Mapping[str, Any]]
+NAMES = {
+    REFERENCE: "JPEG 2000",
+    VOLUME: "PVI",
+    "si-h264:chroma=420": "SI",
+    "ei-h264:chroma=420": "EI",
+    "ri-h264:chroma=420": "RI",
+}
+EVEN_VIEW = 0.02  # of MSSIM: what the dissertation's chart shows as one point
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One finding of the dissertation and ours."""
+
+    figure: str
+    what: str
+    theirs: str
+    ours: str
+    verdict: Verdict
+
+
+def claims(results: Results) -> list[Claim]:
+    """Everything that the results at hand allow to compare, in the order of the dissertation."""
+    found: list[Claim] = []
+    for part in (gains, floors, factors, orders, duels, picture_types, ranges, controls, times, views, depths):
+        found += part(results)
+    return found
+
+
+def of_scenes(results: Results, step: str) -> dict[str, Mapping[str, Any]]:
+    """Scene to result of a step that there is for several."""
+    return {scene: results[f"{step}-{scene}"] for scene in SCENES if f"{step}-{scene}" in results}
+
+
+def gain(points: Points, scheme: str, other: str, quality: str = "q_global") -> float | None:
+    """Mean difference in quality over the target rates that both reach; None if there are none."""
+    mine, its = (at_targets(points, name, quality) for name in (scheme, other))
+    both = mine.keys() & its.keys()
+    return fmean(mine[rate] - its[rate] for rate in sorted(both)) if both else None
+
+
+def at_targets(points: Points, scheme: str, quality: str = "q_global") -> dict[float, float]:
+    """Target rate to quality, where the target was met."""
+    return {p["target_bpp"]: number(p[quality]) for p in points if p["scheme"] == scheme and p["reached"]}
+
+
+def gains(results: Results) -> Iterator[Claim]:
+    """Figure 5.10: SI-PVS over the others, 4:2:0 and 4:4:4."""
+    made = of_scenes(results, "rates")
+    for what, numbers, other in (
+        ("JPEG 2000", theirs.GAIN_JPEG2000, (REFERENCE, REFERENCE)),
+        ("SI-PVI", theirs.GAIN_VOLUME, (VOLUME, VOLUME)),
+        ("EI-PVS", theirs.GAIN_EI, ("ei-h264:chroma=420", "ei-h264")),
+    ):
+        for chroma, scheme, against in zip(("4:2:0", "4:4:4"), (SI, "si-h264"), other, strict=True):
+            ours = {scene: gain(result["points"], scheme, against) for scene, result in made.items()}
+            if ours:
+                yield claim("5.10", f"SI-PVS over {what}, {chroma}, dB", numbers, ours, "+.1f")
+
+
+def claim(
+    figure: str, what: str, numbers: Mapping[str, float], ours: Mapping[str, float | None], form: str, **rules: Any
+) -> Claim:
+    """A row from numbers under names; only those that ours has are compared."""
+    numbers = {name: value for name, value in numbers.items() if name in ours}
+    return Claim(figure, what, listed(numbers, form), listed(ours, form), compare(numbers, ours, **rules))
+
+
+def listed(numbers: Mapping[str, float | None], form: str) -> str:
+    """Names and numbers in a cell."""
+    return " · ".join(f"{name} {shown(value, form)}" for name, value in numbers.items())
+
+
+def shown(value: float | None, form: str) -> str:
+    """A number, or a dash where there is none, with a true minus."""
+    return "–" if value is None or math.isnan(value) else format(value, form).replace("-", "−")
+
+
+def floors(results: Results) -> Iterator[Claim]:
+    """The lowest rate of EI-PVS, of a black picture."""
+    if "floors" in results:
+        ours = {"EI-PVS": results["floors"]["bpp"]["ei-h264:chroma=420"]}
+        yield claim("5.10", "lowest rate of a black picture, bpp", theirs.EI_FLOOR, ours, ".2f", only="size")
+
+
+def factors(results: Results) -> Iterator[Claim]:
+    """How many times the rate of SI-PVS others need for the same quality."""
+    made = of_scenes(results, "rates")
+    ours = {s: rate_ratio(made[s]["points"], SI, REFERENCE, None) for s in theirs.RATE_JPEG2000 if s in made}
+    if ours:
+        what = "JPEG 2000's rate over SI-PVS's, at the best quality of JPEG 2000 up to 1 bpp that SI-PVS has too"
+        yield claim("5.10", what, theirs.RATE_JPEG2000, ours, ".0f", only="size")
+    ours = {s: rate_ratio(made[s]["points"], SI, VOLUME, 30.0) for s in made}
+    if ours:
+        yield claim("5.10", "SI-PVI's rate over SI-PVS's at 30 dB", theirs.RATE_VOLUME, ours, ".1f", only="size")
+
+
+def rate_ratio(points: Points, scheme: str, other: str, quality: float | None) -> float | None:
+    """Rate of another over that of a scheme at one quality: the one given, or the other's at 1 bpp.
+
+    The scheme's own lowest point stands for it where it is better than that already: the ratio is then a bound from
+    below. None where either curve ends before.
+    """
+    mine, its = (rising([p for p in points if p["scheme"] == name]) for name in (scheme, other))
+    if len(mine) < 2 or len(its) < 2:
+        return None
+    if quality is None:
+        quality = float(np.interp(0.0, *zip(*((math.log(r), q) for r, q in its), strict=True)))
+        if mine[0][1] > quality:
+            return 1.0 / mine[0][0]
+    rates = [log_rate_at(curve, quality) for curve in (mine, its)]
+    return None if None in rates else math.exp(rates[1] - rates[0])  # type: ignore[operator]
+
+
+def rising(points: Points) -> list[tuple[float, float]]:
+    """(rate, quality) by rate, without those that more bits made no better."""
+    kept: list[tuple[float, float]] = []
+    for rate, quality in sorted({(p["bpp"], number(p["q_global"])) for p in points}):
+        if not kept or quality > kept[-1][1]:
+            kept.append((rate, quality))
+    return kept
+
+
+def log_rate_at(curve: Sequence[tuple[float, float]], quality: float) -> float | None:
+    """Logarithm of the rate at a quality; None beyond the curve's ends."""
+    if not curve[0][1] <= quality <= curve[-1][1]:
+        return None
+    return float(np.interp(quality, [q for _, q in curve], [math.log(r) for r, _ in curve]))
+
+
+def orders(results: Results) -> Iterator[Claim]:
+    """Figure 5.11: orders of sub-images."""
+    for scene, result in of_scenes(results, "orders").items():
+        ours = {
+            order: gain(result["points"], f"{SI},order={order}", f"{SI},order=parallel") for order in theirs.ORDERS
+        }
+        verdict = compare(theirs.ORDERS, ours, only="order")
+        best = "parallel > row > zigzag, spiral > column"
+        yield Claim("5.11", f"orders, {scene}, dB against parallel", best, listed(ours, "+.2f"), verdict)
+
+
+def duels(results: Results) -> Iterator[Claim]:
+    """Figure 5.12: who wins, by size of elementary image."""
+    for scene in ("apples", "car"):
+        if f"plane-{scene}-1" not in results:
+            continue
+        made = results[f"plane-{scene}-1"]["duels"]
+        ours = {str(duel["side"]): advantage(duel) for duel in made}
+        lead = [side for side, value in theirs.DUELS.items() if value > 0]
+        found = Claim(
+            "5.12",
+            f"SI-PVS over EI-PVS by pixels of an EI, {scene}, dB",
+            "+ for " + ", ".join(lead) + ", − for the rest",
+            " · ".join(f"{duel['side']} {words(duel)}" for duel in made),
+            compare({side: theirs.DUELS[side] for side in ours}, ours, only="sign"),
+        )
+        yield found
+
+
+def advantage(duel: Mapping[str, Any], other: str = "ei") -> float | None:
+    """Mean gain of SI in dB; where there is no rate that both reach, the sign of who reaches the lower one."""
+    if duel[other]["gain_db"] is not None:
+        return float(duel[other]["gain_db"])
+    lowest = duel[other]["lowest"]
+    mine, its = (lowest[kind] if lowest[kind] is not None else math.inf for kind in ("si", other))
+    return None if mine == its else math.copysign(1.0, its - mine)
+
+
+def words(duel: Mapping[str, Any]) -> str:
+    """The gain, or who alone is there."""
+    if duel["ei"]["gain_db"] is not None:
+        return shown(duel["ei"]["gain_db"], "+.1f")
+    value = advantage(duel)
+    return "–" if value is None else "SI alone" if value > 0 else "EI alone"
+
+
+def type_table(result: Mapping[str, Any], *more: str) -> list[list[float | None]]:
+    """Our Table 5.5."""
+    flat = [gain(result["points"], scheme, types()[0]) for scheme in types(*more)]
+    return [flat[i : i + len(BFRAMES)] for i in range(0, len(flat), len(BFRAMES))]
+
+
+def picture_types(results: Results) -> Iterator[Claim]:
+    """Table 5.5, as it is and with B pictures as references."""
+    numbers = {f"{i}{j}": theirs.TYPES[i][j] for i in range(len(GOPS)) for j in range(len(BFRAMES))}
+    for step, what, more in (
+        ("types-apples", "picture types and GOP, dB", ()),
+        ("types-as-references-apples", "the same, B predict B, dB", ("pyramid=1",)),
+    ):
+        if step not in results:
+            continue
+        table = type_table(results[step], *more)
+        ours = {f"{i}{j}": table[i][j] for i in range(len(GOPS)) for j in range(len(BFRAMES))}
+        cells = [" ".join(shown(value, "+.2f") for value in row) for row in (theirs.TYPES[0], table[0])]
+        yield Claim("Table 5.5", f"{what} (row J)", cells[0], cells[1], compare(numbers, ours))
+
+
+def ranges(results: Results) -> Iterator[Claim]:
+    """Table 5.6."""
+    schemes = [f"{SI},merange={r}" for r in RANGES]
+    for scene in ("apples", "twins"):
+        if f"ranges-{scene}" not in results:
+            continue
+        points = results[f"ranges-{scene}"]["points"]
+        names = [str(r) for r in RANGES]
+        ours = {n: gain(points, scheme, schemes[0]) for n, scheme in zip(names, schemes, strict=True)}
+        numbers = dict(zip(names, theirs.RANGE_DB[scene], strict=True))
+        yield claim("Table 5.6", f"motion range, {scene}, dB", numbers, ours, "+.2f")
+        took = {
+            n: seconds(points, scheme) / seconds(points, schemes[0]) for n, scheme in zip(names, schemes, strict=True)
+        }
+        numbers = dict(zip(names, theirs.RANGE_TIME[scene], strict=True))
+        yield claim("Table 5.6", f"motion range, {scene}, times", numbers, took, ".1f", only="order size")
+
+
+def seconds(points: Points, scheme: str, what: str = "encode_seconds") -> float:
+    """Mean CPU seconds over the rates met."""
+    own = [p[what] for p in points if p["scheme"] == scheme and p["reached"]]
+    return fmean(own) if own else math.nan
+
+
+def controls(results: Results) -> Iterator[Claim]:
+    """Table 5.7."""
+    for scene in ("apples", "twins"):
+        if f"control-{scene}" not in results:
+            continue
+        points = results[f"control-{scene}"]["points"]
+        first = f"{SI},rate={CONTROLS[0]}"
+        schemes = {name: f"{SI},rate={name}" for name in CONTROLS[1:]}
+        better = {name: gain(points, scheme, first) for name, scheme in schemes.items()}
+        yield claim("Table 5.7", f"rate control against CBR, {scene}, dB", theirs.CONTROL_DB[scene], better, "+.2f")
+        took = {name: seconds(points, scheme) / seconds(points, first) for name, scheme in schemes.items()}
+        numbers = theirs.CONTROL_TIME[scene]
+        yield claim("Table 5.7", f"rate control, {scene}, times", numbers, took, ".2f", only="order size")
+
+
+TIMED = {
+    "SI-PVS": SI,
+    "JPEG 2000": REFERENCE,
+    "SI-PVI": VOLUME,
+    "EI-PVS": "ei-h264:chroma=420",
+    "RI-PVS": "ri-h264:chroma=420",
+}
+
+
+def times(results: Results) -> Iterator[Claim]:
+    """Table 5.8: encoding, against SI-PVS."""
+    for scene, result in of_scenes(results, "rates").items():
+        own = {name: seconds(result["points"], scheme) for name, scheme in TIMED.items()}
+        ours = {name: value / own["SI-PVS"] for name, value in own.items() if name != "SI-PVS"}
+        column = list(SCENES).index(scene)
+        numbers = {name: theirs.ENCODE[name][column] / theirs.ENCODE["SI-PVS"][column] for name in ours}
+        what = f"time of encoding over SI-PVS's, {scene}"
+        yield claim("Table 5.8", what, numbers, ours, ".3g", only="order size")
+
+
+def views(results: Results) -> Iterator[Claim]:
+    """Figure 5.19 at 0.15 bpp: places."""
+    for scene, result in of_scenes(results, "artefacts").items():
+        places = theirs.VIEW_PLACES[scene]
+        ranks = {name: float(-place) for place, names in enumerate(places) for name in names}
+        ours = {NAMES[p["scheme"]]: p["q_view"] for p in result["points"] if p["reached"]}
+        yield Claim(
+            "5.19",
+            f"Q_view at 0.15 bpp, {scene}",
+            " > ".join(" = ".join(names) for names in places),
+            listed(dict(sorted(ours.items(), key=lambda item: -item[1])), ".3f"),
+            compare(ranks, ours, only="order", even=EVEN_VIEW),
+        )
+
+
+def depths(results: Results) -> Iterator[Claim]:
+    """Figures 5.20 to 5.23."""
+    for scene, result in of_scenes(results, "equal").items():
+        rows = {NAMES[row["scheme"]]: row for row in result["rows"]}
+        if scene == "apples":
+            ours = {name: rows[name]["bpp"] for name in theirs.RATE_28_DB}
+            quality = listed({name: row["q_global"] for name, row in rows.items()}, ".1f")
+            what = f"bpp for 28 dB, {scene} (ours have {quality})"
+            yield claim("5.20", what, theirs.RATE_28_DB, ours, ".2f", only="order size")
+        pixels = np.array(result["depth_pixels"])
+        layers = {name: np.array([number(v) for v in row["q_depth"]]) for name, row in rows.items()}
+        lost = {name: decline(layers[name], pixels) for name in theirs.DECLINE}
+        what = f"decline of Q_depth from near to far at equal Q_global, {scene}, dB"
+        words = "EI, JPEG 2000 > SI"
+        yield Claim("5.21", what, words, listed(lost, "+.1f"), compare(theirs.DECLINE, lost, only="order"))
+        spread = {name: fluctuation(layers[name], pixels) for name in theirs.FLUCTUATION}
+        what = f"fluctuation of Q_depth at equal Q_global, {scene}, dB"
+        words = "EI, JPEG 2000 > SI > PVI"
+        yield Claim("5.21", what, words, listed(spread, ".1f"), compare(theirs.FLUCTUATION, spread, only="order"))
+    for scene, result in of_scenes(results, "views").items():
+        for quality, word in (("q_depth_mean", "mean"), ("q_depth_min", "least")):
+            value = gain(result["points"], SI, REFERENCE, quality)
+            verdict = compare({"x": 1.0}, {"x": value}, only="sign")
+            what = f"{word} Q_depth of SI-PVS over JPEG 2000's, {scene}, dB"
+            yield Claim("5.23", what, "+", shown(value, "+.1f"), verdict)
+
+
+def pooled(values: np.ndarray, pixels: np.ndarray) -> float:
+    """PSNR of the errors of several layers together; layers without pixels are none."""
+    held = (pixels > 0) & np.isfinite(values)
+    return float(-10 * np.log10(np.sum(pixels[held] * 10 ** (-values[held] / 10)) / pixels[held].sum()))
+
+
+def decline(values: np.ndarray, pixels: np.ndarray) -> float:
+    """PSNR of the nearer half of the pixels less that of the farther half."""
+    near = np.cumsum(pixels) <= pixels.sum() / 2
+    return pooled(values, np.where(near, pixels, 0)) - pooled(values, np.where(near, 0, pixels))
+
+
+def fluctuation(values: np.ndarray, pixels: np.ndarray) -> float:
+    """Standard deviation over the layers that have pixels, each of which counts the same."""
+    return float(np.std(values[(pixels > 0) & np.isfinite(values)]))

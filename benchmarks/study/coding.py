@@ -1,0 +1,83 @@
+"""Pictures of the setups, and curves of what coders make of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from typing import Any
+
+from benchmarks.coders import qualities
+from codec import encode, timed_decode
+from ii_core import IIPicture, preset
+from metrics import q_global
+from raytrace_ii import Shot, load_scene, render
+from raytrace_ii.rendering import cores
+
+SCENES = ("apples", "twins", "car", "cuboid")
+RATES = (0.015, 0.03, 0.06, 0.15, 0.3, 0.63, 1.0, 1.5)  # bit per pixel, the range of Olsson 2008, §5.7.3
+BY_QUANTISER = ("si-hevc", "ei-hevc", "si-av1", "ei-av1", "si-vp9")
+# Modules that every coded point comes from, for `Step.uses`.
+CODED = ("benchmarks.study.coding", "benchmarks.coders")
+# Missed by as much, a rate lies below what the scheme can reach; by less it only fell between two quantisers.
+FLOOR = 1.1
+# Setup 3 has 64×64 lenses; with fewer than 16×16 its views are too small for the window of MSSIM.
+COARSEST_SETUP3 = 4
+
+Measure = Callable[[IIPicture], Mapping[str, Any]]
+
+
+@lru_cache(maxsize=2)
+def shot(scene: str, camera: str, scale: int) -> Shot:
+    """A scene through a coding setup, with the sensor's noise and true depth."""
+    return render(load_scene(scene), preset(camera, scale=scale), noise=1.0, support=("depth",))
+
+
+def setup3_scale(scale: int) -> int:
+    """How much of a scale setup 3 bears."""
+    return min(scale, COARSEST_SETUP3)
+
+
+def point(picture: IIPicture, scheme: str, goal: Mapping[str, Any], measure: Measure | None = None) -> dict[str, Any]:
+    """One operating point: rate, quality, and CPU seconds of one run inside encoder and decoder."""
+    coded = encode(picture, scheme, **goal)
+    decoded = timed_decode(coded)
+    return {
+        "scheme": scheme,
+        "target_bpp": goal.get("bpp", coded.bpp),
+        "bpp": coded.bpp,
+        "reached": coded.reached,
+        "runs": coded.runs,
+        "q_global": q_global(picture, decoded.picture),
+        **(measure(decoded.picture) if measure else {}),
+        "encode_seconds": coded.codec_seconds,
+        "decode_seconds": decoded.codec_seconds,
+    }
+
+
+def curve(
+    picture: IIPicture, scheme: str, goals: Sequence[Mapping[str, Any]], measure: Measure | None = None
+) -> list[dict[str, Any]]:
+    """Points from the highest rate down to the first that the scheme cannot go down to, in the order of rates."""
+    points: list[dict[str, Any]] = []
+    for goal in reversed(goals):
+        points.insert(0, point(picture, scheme, goal, measure))
+        if points[0]["bpp"] > FLOOR * points[0]["target_bpp"]:
+            break
+    return points
+
+
+def goals_of(scheme: str) -> list[dict[str, Any]]:
+    """What a scheme is asked for: the dissertation's rates, or quantisers if it would search long for rates."""
+    if scheme.startswith(BY_QUANTISER):
+        return sorted(qualities(scheme), key=lambda goal: -goal["qp"])
+    return [{"bpp": rate} for rate in RATES]
+
+
+def curves(
+    picture: IIPicture, schemes: Sequence[str], measure: Measure | None = None, workers: int | None = None
+) -> list[dict[str, Any]]:
+    """The curves of all schemes one after another, coded ``workers`` at a time, as many as cores if not given."""
+    with ThreadPoolExecutor(workers or cores()) as pool:
+        found = pool.map(lambda scheme: curve(picture, scheme, goals_of(scheme), measure), schemes)
+        return [point for points in found for point in points]

@@ -1,0 +1,214 @@
+"""Fill docs/study.md: what was found, beside what the dissertation found."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.coders import climbing
+from benchmarks.readme import filled
+from ii_core.files import atomic_path
+from metrics import bd_psnr, bd_rate
+from metrics.rd import UndefinedDifference
+
+from . import theirs
+from .charts import LABELS, draw_all
+from .claims import Claim, Results, claims, of_scenes, shown, type_table
+from .coding import SCENES
+from .rates import BFRAMES, GOPS, MODERN, PVS, REFERENCE, SI, VOLUME
+from .runner import ROOT, records
+from .theirs import said
+
+PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
+CODERS = ROOT / "benchmarks" / "results" / "coders.json"
+# Which part of the page shows which figures.
+SECTIONS = {
+    "rates": ("5.10",),
+    "orders": ("5.11",),
+    "structures": ("5.12",),
+    "types": ("Table 5.5",),
+    "settings": ("Table 5.6", "Table 5.7"),
+    "times": ("Table 5.8",),
+    "views": ("5.19",),
+    "depths": ("5.20", "5.21", "5.23"),
+}
+
+
+def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Path = KEPT) -> None:
+    """Keep the records of a folder with those kept before, copy its pictures, draw the charts and fill the page."""
+    for place in (images, kept):
+        place.mkdir(parents=True, exist_ok=True)
+    for path in sorted(folder.glob("*.jsonl")):
+        keep(path, kept / path.name)
+    for path in sorted(folder.glob("*.png")):
+        shutil.copy(path, images / path.name)
+    last = {path.stem: records(kept, path.stem)[-1] for path in sorted(kept.glob("*.jsonl"))}
+    results = {name: record["result"] for name, record in last.items()}
+    draw_all(results, images)
+    text = page.read_text(encoding="utf-8")
+    for mark, lines in tables(results, last).items():
+        text = filled(text, mark, lines)
+    with atomic_path(page) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def keep(new: Path, old: Path) -> None:
+    """Add the lines of one file that another does not have yet."""
+    there = old.read_text(encoding="utf-8").splitlines() if old.exists() else []
+    lines = [line for line in new.read_text(encoding="utf-8").splitlines() if line not in there]
+    with atomic_path(old) as temporary:
+        temporary.write_text("".join(f"{line}\n" for line in [*there, *lines]), encoding="utf-8")
+
+
+def tables(results: Results, last: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
+    """Lines for each mark of the page."""
+    made = claims(results)
+    parts = {
+        f"claims-{name}": claim_table(claim for claim in made if claim.figure in figures)
+        for name, figures in SECTIONS.items()
+    }
+    return {
+        "agreement": summary(made),
+        **parts,
+        "gains-modern": gains_modern(results),
+        "table-types": types_beside(results),
+        "artefact-rates": artefact_table(results),
+        "bjontegaard": bjontegaard(json.loads(CODERS.read_text(encoding="utf-8"))) if CODERS.exists() else [],
+        "records": record_table(last),
+    }
+
+
+def claim_table(made: Iterable[Claim]) -> list[str]:
+    """A row a claim."""
+    lines = ["| Olsson 2008 | what | theirs | ours | sign | order | size |", "|---|---|---|---|---|---|---|"]
+    return lines + [
+        f"| {called(c.figure)} | {c.what} | {c.theirs} | {c.ours} | " + " | ".join(c.verdict.cells()) + " |"
+        for c in made
+    ]
+
+
+def called(figure: str) -> str:
+    """Fig. 5.10, or a table by its own name."""
+    return figure if figure.startswith("Table") else f"Fig. {figure}"
+
+
+def summary(made: Sequence[Claim]) -> list[str]:
+    """A row a figure: how much of it agrees."""
+    lines = ["| Olsson 2008 | sign | order | size |", "|---|---|---|---|"]
+    for figure in dict.fromkeys(claim.figure for claim in made):
+        own = [claim.verdict for claim in made if claim.figure == figure]
+        totals = [
+            tuple(sum(numbers) for numbers in zip(*(getattr(v, kind) for v in own), strict=True))
+            for kind in ("sign", "order", "size")
+        ]
+        lines.append(f"| {called(figure)} | " + " | ".join(said(good, of) for good, of in totals) + " |")
+    return lines
+
+
+def types_beside(results: Results) -> list[str]:
+    """Table 5.5, theirs and ours."""
+    if "types-apples" not in results:
+        return []
+    head = "| GOP | " + " | ".join(f"I{'B' * count}P" for count in BFRAMES) + " |"
+    lines = [head, "|---" * (len(BFRAMES) + 1) + "|"]
+    ours = type_table(results["types-apples"])
+    referenced = results.get("types-as-references-apples")
+    refs = type_table(referenced, "pyramid=1") if referenced else [[None] * len(BFRAMES)] * len(GOPS)
+    for i, gop in enumerate(GOPS):
+        cells = []
+        for j in range(len(BFRAMES)):
+            cell = f"{shown(theirs.TYPES[i][j], '+.2f')} · {shown(ours[i][j], '+.2f')}"
+            cells.append(cell + (f" · {shown(refs[i][j], '+.2f')}" if j else ""))
+        lines.append(f"| {gop or 'J'} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def artefact_table(results: Results) -> list[str]:
+    """Rate and quality of the pictures of Figures 5.13 to 5.18."""
+    steps = {"setup 1, apples": "artefacts-setup1", **{f"setup 3, {s}": f"artefacts-{s}" for s in SCENES}}
+    there = {what: results[step] for what, step in steps.items() if step in results}
+    if not there:
+        return []
+    schemes = [p["scheme"] for p in next(iter(there.values()))["points"]]
+    lines = ["| | " + " | ".join(LABELS[s] for s in schemes) + " |", "|---" * (len(schemes) + 1) + "|"]
+    for what, result in there.items():
+        cells = [f"{p['bpp']:.2f} bpp, {p['front_db']:.1f} dB, {p['q_view']:.3f}" for p in result["points"]]
+        lines.append(f"| {what} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def gains_modern(results: Results) -> list[str]:
+    """Bjøntegaard rate of what the study itself coded, against the dissertation's SI-PVS and JPEG 2000."""
+    made = of_scenes(results, "rates")
+    schemes = (SI, *PVS[1:], *MODERN, VOLUME, REFERENCE)
+    curves = {
+        scene: {s: pairs([p for p in result["points"] if p["scheme"] == s]) for s in schemes}
+        for scene, result in made.items()
+    }
+    lines = ["| scheme | " + " | ".join(made) + " |", "|---" * (len(made) + 1) + "|"]
+    for scheme in schemes:
+        cells = [
+            f"{rate_cell(curves[scene][SI], curves[scene][scheme])} · "
+            f"{rate_cell(curves[scene][REFERENCE], curves[scene][scheme])}"
+            for scene in made
+        ]
+        lines.append(f"| {LABELS.get(scheme, scheme)} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def bjontegaard(study: Mapping[str, Any]) -> list[str]:
+    """All schemes of `benchmarks.coders`: rate against the dissertation's SI-PVS and JPEG 2000, and gain in dB."""
+    scenes = list(dict.fromkeys(row["scene"] for row in study["rows"]))
+    curves = {(row["scene"], row["scheme"]): pairs(row["points"]) for row in study["rows"]}
+    lines = [
+        f"Setup 1 at scale {study['scale']}: rate at equal quality against `{study['anchor']}` · against `jpeg2000`, "
+        "and mean gain over JPEG 2000 at equal rate.",
+        "",
+        "| scheme | " + " | ".join(scenes) + " |",
+        "|---" * (len(scenes) + 1) + "|",
+    ]
+    for scheme in dict.fromkeys(row["scheme"] for row in study["rows"] if ":" not in row["scheme"]):
+        cells = []
+        for scene in scenes:
+            own = curves.get((scene, scheme), [])
+            first, second = (curves.get((scene, anchor), []) for anchor in (study["anchor"], REFERENCE))
+            cells.append(f"{rate_cell(first, own)} · {rate_cell(second, own)} · {gain_cell(second, own)}")
+        lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
+    return lines
+
+
+def pairs(points: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
+    """(rate, PSNR) of a rising curve; of points by either of their names for quality."""
+    same = [{"bpp": p["bpp"], "psnr": p["psnr"] if "psnr" in p else float(p["q_global"])} for p in points]
+    return [(p["bpp"], p["psnr"]) for p in climbing(same)]
+
+
+def rate_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float, float]]) -> str:
+    """Bjøntegaard rate, or a dash where there is none."""
+    try:
+        return f"{bd_rate(*zip(*anchor, strict=True), *zip(*curve, strict=True)):+.0f} %".replace("-", "−")
+    except (UndefinedDifference, TypeError):
+        return "–"
+
+
+def gain_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float, float]]) -> str:
+    """Bjøntegaard gain in dB, or a dash."""
+    try:
+        return f"{bd_psnr(*zip(*anchor, strict=True), *zip(*curve, strict=True)):+.1f} dB".replace("-", "−")
+    except (UndefinedDifference, TypeError):
+        return "–"
+
+
+def record_table(last: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Where the numbers come from: step, scale, commit, time."""
+    lines = ["| step | shows | scale | commit | seconds | again |", "|---|---|---|---|---|---|"]
+    for name, record in last.items():
+        git = record["git"] or {"commit": "none", "dirty": False}
+        commit = git["commit"][:10] + (", dirty" if git["dirty"] else "")
+        again = {True: "the same to the bit", False: "**not the same**", None: ""}[record.get("repeats")]
+        scale = record["parameters"].get("scale", "")
+        lines.append(f"| `{name}` | {record['shows']} | {scale} | {commit} | {record['seconds']:.0f} | {again} |")
+    return lines

@@ -1,0 +1,112 @@
+"""Pictures that show no measurement: component images, II-pictures through other cameras, five views."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from ii_core import (
+    IIPicture,
+    elementary_images,
+    five_viewpoints,
+    preset,
+    ray_space_images,
+    sub_images,
+    view_image,
+)
+from ii_core.files import write_image
+from raytrace_ii import load_scene, render
+
+from .coding import setup3_scale, shot
+from .runner import Step
+from .sheets import GAP, enlarged, sheet
+
+PANEL = (380, 190)  # pixels, of Figure 2.25 and Figure 3.8
+USES = ("benchmarks.study.coding", "benchmarks.study.sheets")
+CLOSE = 12  # lenses across a detail of Figure 3.8
+
+
+def steps(scale: int) -> list[Step]:
+    """All of them."""
+    coarse = {"scale": max(scale, 4)}  # finer ones are not seen at this size
+    return [
+        Step(name="component-images", shows="Figure 2.25", run=components, parameters=coarse, uses=USES),
+        Step(name="other-cameras", shows="Figure 3.8", run=cameras, parameters={"scale": max(scale, 8)}, uses=USES),
+        Step(
+            name="five-views",
+            shows="Figure 4.3",
+            run=five_views,
+            parameters={"scale": setup3_scale(scale)},
+            uses=USES,
+        ),
+    ]
+
+
+def components(folder: Path, *, scale: int) -> dict[str, Any]:
+    """*Twins* as elementary, sub- and ray-space images: all of them, and the middlemost 4×4."""
+    picture = shot("twins", "setup1", scale).picture
+    stacks = {
+        "ei": elementary_images(picture),
+        "si": sub_images(picture),
+        "ri": ray_space_images(picture),
+    }
+    whole, close = [], []
+    for stack in stacks.values():
+        rows, columns = stack.shape[:2]
+        top, left = max(rows // 2 - 2, 0), max(columns // 2 - 2, 0)
+        whole.append(fitted(laid_out(stack)))
+        close.append(fitted(laid_out(stack[top : top + 4, left : left + 4], gap=1)))
+    write_image(folder / "component-images.png", sheet([*whole, *close], 3))
+    return {"shapes": {kind: list(stack.shape[:4]) for kind, stack in stacks.items()}}
+
+
+def laid_out(stack: NDArray[np.uint8], gap: int = 0) -> NDArray[np.uint8]:
+    """Component images beside and below one another, with white lines between them."""
+    stack = np.pad(stack, ((0, 0), (0, 0), (0, gap), (0, gap), (0, 0)), constant_values=255)
+    rows, columns, height, width, _ = stack.shape
+    return np.ascontiguousarray(stack.transpose(0, 2, 1, 3, 4)).reshape(rows * height, columns * width, 3)
+
+
+def fitted(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Stretched over a panel; mean colours where pixels are smaller than its own."""
+    down = pixels.shape[0] > PANEL[1] or pixels.shape[1] > PANEL[0]
+    image = Image.fromarray(pixels).resize(PANEL, Image.Resampling.BOX if down else Image.Resampling.NEAREST)
+    return np.asarray(image)
+
+
+def cameras(folder: Path, *, scale: int) -> dict[str, Any]:
+    """*Objects* and *Hairdo* through lenticulars (HPO) and gradient-index lenses (GRIN): the picture and a detail."""
+    panels = []
+    for scene in ("objects", "hairdo"):
+        loaded = load_scene(scene)
+        for name in ("hpo", "grin"):
+            picture = render(loaded, preset(name, scale=scale), samples=4, support=()).picture
+            panels += [fitted(picture.pixels), fitted(detail(picture))]
+    write_image(folder / "other-cameras.png", sheet(panels, 4))
+    return {}
+
+
+def detail(picture: IIPicture) -> NDArray[np.uint8]:
+    """Some lenses in the middle."""
+    (u, v), (k, l) = picture.ei_pixels, picture.lenses
+    across, down = min(CLOSE, k), max(1, min(CLOSE * u // 2 // v, l))
+    left, top = (k - across) // 2 * u, (l - down) // 2 * v
+    return picture.pixels[top : top + down * v, left : left + across * u]
+
+
+def five_views(folder: Path, *, scale: int) -> dict[str, Any]:
+    """*Twins* from above, the left, the front, the right and below, as in a cross."""
+    picture = shot("twins", "setup3", scale).picture
+    assert picture.camera is not None
+    views = {
+        name: enlarged(view_image(picture, viewpoint)[0], 3)
+        for name, viewpoint in five_viewpoints(picture.camera).items()
+    }
+    blank = np.full_like(views["front"], 255)
+    order = (blank, views["up"], blank, views["left"], views["front"], views["right"], blank, views["down"], blank)
+    write_image(folder / "five-views.png", sheet(order, 3))
+    return {"gap": GAP, "viewpoints_mm": {n: p.tolist() for n, p in five_viewpoints(picture.camera).items()}}

@@ -1,0 +1,70 @@
+"""Setup 1: rate–distortion of all schemes, orders, picture types, motion range and rate control (§5.8.1–5.8.4)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from codec.header import floor
+from codec.order import ORDERS
+
+from .coding import CODED, SCENES, curves, shot
+from .runner import Step
+
+# The dissertation coded 4:2:0, as every H.264 encoder of its time; 4:4:4 shows what that decides.
+PVS = tuple(f"{kind}-h264{chroma}" for chroma in (":chroma=420", "") for kind in ("si", "ei", "ri"))
+VOLUME = "si-jp3d:wavelet=53"  # CDF 5/3, as the dissertation's
+REFERENCE = "jpeg2000"
+MODERN = ("si-hevc", "si-av1", "si-jp3d")
+SI = "si-h264:chroma=420"
+GOPS = (0, 128, 32, 16)  # 0: one I picture for all
+BFRAMES = (0, 1, 2, 3)
+RANGES = (16, 32, 64, 128)
+CONTROLS = ("cbr", "cq", "2pass", "crf")
+
+
+def steps(scale: int) -> list[Step]:
+    """All of them at this scale of setup 1."""
+    each = [
+        Step(
+            name=f"{name}-{scene}",
+            shows=f"{shows}, {scene}",
+            run=code,
+            parameters={"scene": scene, "scale": scale, "schemes": schemes, **more},
+            uses=CODED,
+        )
+        for name, shows, schemes, scenes, more in (
+            ("rates", "Figure 5.10, Table 5.8", (*PVS, VOLUME, REFERENCE, *MODERN), SCENES, {}),
+            ("orders", "Figure 5.11", tuple(f"{SI},order={order}" for order in ORDERS), SCENES, {}),
+            ("types", "Table 5.5", types(), ("apples",), {}),
+            ("types-as-references", "Table 5.5 with B pictures as references", types("pyramid=1"), ("apples",), {}),
+            ("ranges", "Table 5.6", tuple(f"{SI},merange={r}" for r in RANGES), ("apples", "twins"), {"workers": 1}),
+            ("control", "Table 5.7", tuple(f"{SI},rate={c}" for c in CONTROLS), ("apples", "twins"), {"workers": 1}),
+        )
+        for scene in scenes
+    ]
+    shows = "the lowest rates of Figure 5.10"
+    return [*each, Step(name="floors", shows=shows, run=floors, parameters={"scale": scale}, uses=CODED)]
+
+
+def types(*more: str) -> tuple[str, ...]:
+    """Schemes of Table 5.5, row by row."""
+    return tuple(
+        ",".join([SI, f"gop={gop}", f"bframes={count}", *(more if count else ())])
+        for gop in GOPS
+        for count in BFRAMES
+    )
+
+
+def code(
+    _folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...], workers: int | None = None
+) -> dict[str, Any]:
+    """Curves of Q_global."""
+    return {"points": curves(shot(scene, "setup1", scale).picture, schemes, workers=workers)}
+
+
+def floors(_folder: Path, *, scale: int) -> dict[str, Any]:
+    """The lowest rate of every kind of pseudo video sequence: a black picture at the coarsest quantiser."""
+    picture = shot("apples", "setup1", scale).picture
+    kinds = [scheme for scheme in PVS if "chroma=420" in scheme]
+    return {"bpp": {scheme: floor(scheme, picture.lenses, picture.ei_pixels).bpp for scheme in kinds}}

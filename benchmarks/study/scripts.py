@@ -1,0 +1,54 @@
+"""Experiments that have a script and a page of their own, run as they stand there."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from .runner import ROOT, Step
+
+# Script, what it is for, arguments. In this order: `readme` and `coding_docs` put on pages what others found.
+SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("gallery", "Figures 3.6, 3.7, 5.9: every camera with its maps, all scenes", ()),
+    ("concepts", "Figures 2.24, 5.4: component images, orders", ()),
+    ("camera_in_scene", "Table 3.2: a camera of glass inside the scene", ()),
+    ("demo", "the README's chart", ()),
+    ("demo", "the same at full size", ("--scale", "1", "-o", "out/full")),
+    ("disparity", "why a scene codes well or not", ("--scenes", "apples,twins,car,cuboid")),
+    ("readme", "tables of the README", ()),
+    ("orders", "Table 5.4", ()),
+    ("headers", "(5.11) to (5.15): header portions", ()),
+    ("cost", "(5.16), Table 5.8: time and memory of every scheme", ()),
+    ("coders", "every scheme and setting at equal quality", ("--workers", "2")),
+    ("bframes", "why B pictures hurt in Table 5.5", ("--workers", "2")),
+    ("coding_docs", "tables of docs/coding.md", ()),
+    ("volume", "what the volume gains", ("--scenes", "apples", "twins", "car", "cuboid")),
+    ("metrics_gallery", "Figure 4.9; Q_angle, views and Q_depth of one picture", ()),
+    ("depth_truth", "Figure 4.6 ff.: depth from focus against true depth", ()),
+)
+
+
+def steps(scale: int) -> list[Step]:
+    """All of them as part of the full study, none of a smaller one: they fill pages at the sizes given there."""
+    if scale != 1:
+        return []
+    names = [name for name, *_ in SCRIPTS]
+    return [
+        Step(
+            name=f"script-{name}" + ("-full" if names[:i].count(name) else ""),
+            shows=shows,
+            run=script,
+            parameters={"script": name, "arguments": arguments},
+            uses=(f"benchmarks.{name}",),
+        )
+        for i, (name, shows, arguments) in enumerate(SCRIPTS)
+    ]
+
+
+def script(_folder: Path, *, script: str, arguments: tuple[str, ...]) -> dict[str, Any]:
+    """Run it; what it found stands in its own file and on its own page."""
+    command = ["-m", f"benchmarks.{script}", *arguments]
+    subprocess.run([sys.executable, *command], cwd=ROOT, check=True)
+    return {"command": " ".join(["python", *command])}

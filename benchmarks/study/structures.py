@@ -1,0 +1,60 @@
+"""Setup 2 and beyond: which component image wins, over elementary images and pictures of all sizes (§5.8.3)."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from benchmarks.headers import SIDES, duel
+from ii_core import preset
+from raytrace_ii import load_scene, render
+from raytrace_ii.rendering import cores
+
+from .runner import Step
+
+SCENES = ("apples", "car")  # those of Figure 5.12
+SMALLER = (1, 2, 4, 8)  # the plane's pictures: setup 2 with as many times fewer lenses each way
+FEWEST = (4, 2)  # lenses
+
+
+def steps(scale: int) -> list[Step]:
+    """Figure 5.12 at this scale, and the smaller pictures of the plane."""
+    found = []
+    for scene in SCENES:
+        for smaller in SMALLER:
+            if scene != SCENES[0] and smaller > 1:
+                continue  # one scene for the plane
+            sides = [side for side in SIDES if fits(side, scale * smaller)]
+            if sides:
+                found.append(
+                    Step(
+                        name=f"plane-{scene}-{smaller}",
+                        shows="Figure 5.12" if smaller == 1 else "(5.14), (5.15) for smaller pictures",
+                        run=duels,
+                        parameters={"scene": scene, "scale": scale * smaller, "sides": sides},
+                        uses=("benchmarks.headers",),
+                    )
+                )
+    return found
+
+
+def fits(side: int, scale: int) -> bool:
+    """Whether setup 2 has enough lenses left with elementary images of that size."""
+    try:
+        camera = preset(f"setup2-{side}", scale=scale)
+    except ValueError:
+        return False
+    return camera.lenses[0] >= FEWEST[0] and camera.lenses[1] >= FEWEST[1]
+
+
+def duels(_folder: Path, *, scene: str, scale: int, sides: list[int]) -> dict[str, Any]:
+    """SI, EI and RI at the same rates, for every size of elementary image."""
+    loaded = load_scene(scene)
+
+    def one(side: int) -> dict[str, Any]:
+        picture = render(loaded, preset(f"setup2-{side}", scale=scale), support=(), noise=1.0).picture
+        return {"side": side, "pixels": list(picture.size), "lenses": list(picture.lenses), **duel(picture)}
+
+    with ThreadPoolExecutor(cores()) as pool:
+        return {"duels": list(pool.map(one, sides))}

@@ -1,0 +1,182 @@
+"""Setup 3: what coding does to views and depths (§4.3, §5.8.5), over rate and at equal quality."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codec import decode, encode
+from ii_core import IIPicture, five_viewpoints, view_image
+from ii_core.files import write_image
+from metrics import angle_axes, measuring, q_angle, q_depth, q_global, q_view
+from raytrace_ii import Shot
+from raytrace_ii.rendering import cores
+
+from .coding import CODED, SCENES, curves, setup3_scale, shot
+from .rates import REFERENCE, VOLUME
+from .runner import Step
+from .sheets import enlarged, sheet
+
+PVS = ("si-h264:chroma=420", "ei-h264:chroma=420", "ri-h264:chroma=420")
+SHOWN = (REFERENCE, VOLUME, *PVS)  # the order of Figures 5.13 to 5.18
+BEYOND = ("si-h264", "ei-h264", "si-hevc", "ei-hevc:fast", "si-av1", "ei-av1:fast", "si-jp3d")
+MEASURES = ("q_view", "q_view_min", "q_depth_min", "q_depth_mean", "q_depth_max")
+ARTEFACT_RATE = 0.15  # bit per pixel
+EQUAL_DB = 28.0
+TRIES = 6
+CLOSE_DB = 0.05
+USES = (*CODED, "benchmarks.study.sheets")
+
+
+def steps(scale: int) -> list[Step]:
+    """All of them, setup 3 at as much of the scale as it bears."""
+    small = setup3_scale(scale)
+    found = []
+    for figure, scene in enumerate(SCENES, 15):
+        for name, shows, run, parameters in (
+            ("views", "Figures 5.19, 5.22, 5.23", over_rate, {"schemes": (*SHOWN, *BEYOND)}),
+            ("artefacts", f"Figure 5.{figure}", artefacts, {"camera": "setup3", "crop": None, "zoom": 4}),
+            ("equal", "Figures 4.5, 4.6, 5.20, 5.21", equal, {"schemes": SHOWN}),
+        ):
+            given = {"scene": scene, "scale": small, **parameters}
+            shown = f"{shows}, {scene}"
+            found.append(Step(name=f"{name}-{scene}", shows=shown, run=run, parameters=given, uses=USES))
+    given = {"scene": "apples", "scale": scale, "camera": "setup1", "crop": 3, "zoom": 2}
+    shown = "Figures 5.13, 5.14"
+    return [*found, Step(name="artefacts-setup1", shows=shown, run=artefacts, parameters=given, uses=USES)]
+
+
+def over_rate(_folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> dict[str, Any]:
+    """Q_view and Q_depth of all schemes over rate, with true depth."""
+    made = shot(scene, "setup3", scale)
+    points = curves(made.picture, schemes, measure=measuring(made.picture, MEASURES, depth=made.depth))
+    depth_mm = points[0]["depth_mm"]
+    for point in points:
+        del point["depth_mm"]  # the same for all
+        point["q_depth"] = rounded(point["q_depth"])
+    return {"points": points, "depth_mm": rounded(depth_mm)}
+
+
+def artefacts(folder: Path, *, scene: str, scale: int, camera: str, crop: int | None, zoom: int) -> dict[str, Any]:
+    """Front views coded at one rate, and how they differ from the uncoded one: white is no difference.
+
+    ``crop`` is the part of the view that is shown, one in so many each way around the middle.
+    """
+    picture = shot(scene, camera, scale).picture
+    with ThreadPoolExecutor(cores()) as pool:
+        coded = list(pool.map(lambda scheme: encode(picture, scheme, bpp=ARTEFACT_RATE), SHOWN))
+        decoded = list(pool.map(decode, coded))
+    views = [front(one) for one in (picture, *decoded)]
+    apart = [255 - np.abs(view.astype(np.int16) - views[0]).astype(np.uint8) for view in views]
+    name = "artefacts-setup1" if camera == "setup1" else f"artefacts-{scene}"
+    for kind, images in (("views", views), ("differences", apart)):
+        shown = [enlarged(middle(image, crop), zoom) for image in images]
+        write_image(folder / f"{name}_{kind}.png", sheet(shown, 3))
+    points = [
+        {
+            "scheme": scheme,
+            "bpp": one.bpp,
+            "reached": one.reached,
+            "q_global": q_global(picture, back),
+            "front_db": psnr(views[0], view),
+            "q_view": q_view(picture, back).mean,
+        }
+        for scheme, one, back, view in zip(SHOWN, coded, decoded, views[1:], strict=True)
+    ]
+    return {"points": points}
+
+
+def equal(folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> dict[str, Any]:
+    """All schemes at one Q_global: what rate they need, their views, Q_angle across and Q_depth."""
+    made = shot(scene, "setup3", scale)
+    assert made.picture.camera is not None
+    with ThreadPoolExecutor(cores()) as pool:
+        found = list(pool.map(lambda scheme: at_quality(made.picture, scheme, EQUAL_DB), schemes))
+    views = [front(made.picture), *(front(decoded) for _, decoded in found)]
+    write_image(folder / f"equal-{scene}_views.png", sheet([enlarged(view, 4) for view in views], 3))
+    rows = [judged(made, decoded, coded) | {"scheme": s} for s, (coded, decoded) in zip(schemes, found, strict=True)]
+    degrees, _ = angle_axes(made.picture.camera)
+    layers = q_depth(made.picture, made.picture, depth=made.depth)
+    return {
+        "rows": rows,
+        "angle_deg": rounded(degrees.tolist()),
+        "depth_mm": rounded(layers.depth_mm.tolist()),
+        "depth_pixels": layers.counts.tolist(),
+    }
+
+
+def judged(made: Shot, decoded: IIPicture, coded: Any) -> dict[str, Any]:
+    """Every quality of one decoded picture."""
+    angle = q_angle(made.picture, decoded)
+    layers = q_depth(made.picture, decoded, depth=made.depth)
+    return {
+        "bpp": coded.bpp,
+        "q_global": q_global(made.picture, decoded),
+        "q_view": q_view(made.picture, decoded).mean,
+        "q_angle": rounded(angle[angle.shape[0] // 2].tolist()),
+        "q_depth": rounded(layers.values.tolist()),
+    }
+
+
+def at_quality(picture: IIPicture, scheme: str, quality: float) -> tuple[Any, IIPicture]:
+    """The coding whose Q_global is nearest to what is asked, within 0.05 dB if a scheme can."""
+
+    def coding(rate: float) -> tuple[Any, IIPicture, float]:
+        coded = encode(picture, scheme, bpp=rate)
+        decoded = decode(coded)
+        return coded, decoded, q_global(picture, decoded)
+
+    tried = [coding(ARTEFACT_RATE)]
+    asked = {ARTEFACT_RATE}
+    for _ in range(TRIES):
+        if min(abs(q - quality) for *_, q in tried) <= CLOSE_DB:
+            break
+        rate = towards([(coded.bpp, q) for coded, _, q in tried], quality)
+        if rate in asked:
+            break
+        asked.add(rate)
+        tried.append(coding(rate))
+    coded, decoded, _ = min(tried, key=lambda one: abs(one[2] - quality))
+    return coded, decoded
+
+
+def towards(points: list[tuple[float, float]], quality: float) -> float:
+    """The rate to try next, from rates and qualities so far: on a line over log rate, first 3 dB a doubling."""
+    below = max((p for p in points if p[1] < quality), key=lambda p: p[1], default=None)
+    above = min((p for p in points if p[1] >= quality), key=lambda p: p[1], default=None)
+    if below is None or above is None:
+        rate, found = min(points, key=lambda p: abs(p[1] - quality))
+        return rate * 2 ** min(max((quality - found) / 3, -3), 3)
+    part = (quality - below[1]) / (above[1] - below[1])
+    return math.exp(math.log(below[0]) + part * (math.log(above[0]) - math.log(below[0])))
+
+
+def front(picture: IIPicture) -> NDArray[np.uint8]:
+    """What a viewer in front sees."""
+    assert picture.camera is not None
+    return view_image(picture, five_viewpoints(picture.camera)["front"])[0]
+
+
+def psnr(a: NDArray[Any], b: NDArray[Any]) -> float:
+    """Of two images of 8 bits, dB."""
+    error = float(np.square(a.astype(float) - b).mean())
+    return 10 * math.log10(255**2 / error) if error else math.inf
+
+
+def middle(image: NDArray[Any], part: int | None) -> NDArray[Any]:
+    """A third, say, of an image each way, around its middle; all of it if there is no part."""
+    if part is None:
+        return image
+    (height, width) = (n // part for n in image.shape[:2])
+    top, left = (image.shape[0] - height) // 2, (image.shape[1] - width) // 2
+    return image[top : top + height, left : left + width]
+
+
+def rounded(values: list[float]) -> list[float]:
+    """To a thousandth, which no chart shows and no eye sees."""
+    return [round(value, 3) for value in values]
