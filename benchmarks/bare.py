@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,14 @@ from codec.video import Video, new_frame, open_encoder
 from ii_core import IIPicture
 
 
-def bare_encoder(picture: IIPicture, scheme: str, qp: int) -> Callable[[], int]:
-    """A call that encodes ready frames with PyAV and returns the bytes it made."""
+def bare_encoder(picture: IIPicture, scheme: str, qp: int, *, search: str = "umh") -> Callable[[], int]:
+    """A call that encodes ready frames with PyAV and returns the bytes it made; x264 may search motion otherwise."""
     coder, options = parse_scheme(scheme)
     assert isinstance(coder, Video)
     film = coder.film(picture, options)
     settings = coder.constant(qp, film, options)
+    parameters = {key: value.replace("me=umh", f"me={search}") for key, value in settings.parameters.items()}
+    settings = replace(settings, parameters=parameters)
     context = open_encoder(coder, film, settings)
     frames: list[Any] = []
     size = np.dtype(film.format.dtype).itemsize

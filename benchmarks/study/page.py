@@ -18,7 +18,7 @@ from . import theirs
 from .charts import LABELS, draw_all
 from .claims import Claim, Results, claims, of_scenes, shown, type_table
 from .coding import SCENES
-from .rates import BFRAMES, GOPS, MODERN, PVS, REFERENCE, SI, VOLUME
+from .rates import BFRAMES, GOPS, MODERN, PVS, RANGES, REFERENCE, SI, VOLUME
 from .runner import ROOT, records
 from .theirs import said
 
@@ -75,6 +75,8 @@ def tables(results: Results, last: Mapping[str, Mapping[str, Any]]) -> dict[str,
         **parts,
         "gains-modern": gains_modern(results),
         "table-types": types_beside(results),
+        "framing": framing_table(results),
+        "search": search_table(results),
         "artefact-rates": artefact_table(results),
         "bjontegaard": bjontegaard(json.loads(CODERS.read_text(encoding="utf-8"))) if CODERS.exists() else [],
         "records": record_table(last),
@@ -123,6 +125,34 @@ def types_beside(results: Results) -> list[str]:
             cell = f"{shown(theirs.TYPES[i][j], '+.2f')} · {shown(ours[i][j], '+.2f')}"
             cells.append(cell + (f" · {shown(refs[i][j], '+.2f')}" if j else ""))
         lines.append(f"| {gop or 'J'} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def framing_table(results: Results) -> list[str]:
+    """Lowest rate of EI-PVS by what the stream is kept in."""
+    if "framing" not in results:
+        return []
+    lines = ["| file | bytes a frame | bpp | with delimiters | bpp |", "|---|---|---|---|---|"]
+    rows = results["framing"]["rows"]
+    for container in dict.fromkeys(row["container"] for row in rows):
+        cells = [f"{row['bytes']:.1f} | {row['bpp']:.2f}" for row in rows if row["container"] == container]
+        name = "the stream alone" if container == "h264" else container.upper()
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def search_table(results: Results) -> list[str]:
+    """Time and rate against a range of 16, for both ways to search."""
+    lines = ["| | search | " + " | ".join(str(r) for r in RANGES) + " |", "|---" * (len(RANGES) + 2) + "|"]
+    for scene in SCENES:
+        rows = results.get(f"search-{scene}", {}).get("rows", [])
+        for search in dict.fromkeys(row["search"] for row in rows):
+            own = [row for row in rows if row["search"] == search]
+            cells = [
+                f"×{row['seconds'] / own[0]['seconds']:.1f}, {100 * (row['bytes'] / own[0]['bytes'] - 1):+.1f} %"
+                for row in own
+            ]
+            lines.append(f"| {scene} | {search} | " + " | ".join(cells).replace("-", "−") + " |")
     return lines
 
 

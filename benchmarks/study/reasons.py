@@ -1,0 +1,80 @@
+"""Tests of why numbers are not the dissertation's: how a stream is framed, how motion is searched."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+
+from benchmarks.bare import bare_encoder
+
+from .coding import CODED, shot
+from .rates import RANGES, SI
+from .runner import Step
+
+FRAMES = 4096
+SIDE = 16  # pixels of an elementary image of setup 1
+CONTAINERS = ("h264", "mkv", "mp4", "avi")
+SEARCHES = ("umh", "esa")  # x264's uneven hexagons, ours; exhaustive
+QUANTISER = 30
+
+
+def steps(scale: int) -> list[Step]:
+    """All of them."""
+    searched = [
+        Step(
+            name=f"search-{scene}",
+            shows=f"Table 5.6 with exhaustive search, {scene}",
+            run=searches,
+            parameters={"scene": scene, "scale": scale},
+            uses=(*CODED, "benchmarks.bare"),
+        )
+        for scene in ("apples", "twins")
+    ]
+    return [Step(name="framing", shows="the lowest rate of EI-PVS in Figure 5.10", run=framing), *searched]
+
+
+def framing(_folder: Path) -> dict[str, Any]:
+    """Bytes a frame of black elementary images at the coarsest quantiser, in files of several kinds."""
+    rows = []
+    for container in CONTAINERS:
+        for delimiters in (0, 1):
+            size = file_size(container, delimiters) / FRAMES
+            rows.append({"container": container, "delimiters": delimiters, "bytes": size, "bpp": 8 * size / SIDE**2})
+    return {"rows": rows}
+
+
+def file_size(container: str, delimiters: int) -> int:
+    """Bytes of a file of black frames by x264, with or without access unit delimiters."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"black.{container}"
+        with av.open(str(path), "w") as output:
+            stream = output.add_stream("libx264", rate=25)
+            stream.width = stream.height = SIDE
+            stream.pix_fmt = "yuv420p"
+            stream.codec_context.thread_count = 1
+            parameters = f"qp=51:keyint=infinite:scenecut=0:bframes=0:weightp=0:aud={delimiters}"
+            stream.options = {"x264-params": parameters}
+            black = av.VideoFrame.from_ndarray(np.zeros((SIDE * 3 // 2, SIDE), np.uint8), format="yuv420p")
+            for i in range(FRAMES):
+                black.pts = i
+                output.mux(stream.encode(black))
+            output.mux(stream.encode(None))
+        return path.stat().st_size
+
+
+def searches(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
+    """Bytes and CPU seconds of SI-PVS at one quantiser, by motion range, for both kinds of search."""
+    picture = shot(scene, "setup1", scale).picture
+    rows = []
+    for search in SEARCHES:
+        for reach in RANGES:
+            encode = bare_encoder(picture, f"{SI},rate=cq,merange={reach}", QUANTISER, search=search)
+            started = time.thread_time()
+            size = encode()
+            rows.append({"search": search, "range": reach, "bytes": size, "seconds": time.thread_time() - started})
+    return {"rows": rows}

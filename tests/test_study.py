@@ -1,0 +1,174 @@
+"""The study: steps are done once, come out the same again, and are compared with the dissertation as it is said."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.study import claims, theirs
+from benchmarks.study.__main__ import main
+from benchmarks.study.page import PAGE, publish, tables
+from benchmarks.study.runner import Step, code_of, known, perform, records, timeless
+from benchmarks.study.scripts import SCRIPTS
+from benchmarks.study.steps import all_steps
+from benchmarks.study.views import towards
+from ii_core.files import read_image, write_image
+
+calls = []
+
+
+def counted(folder, *, value, drift=0):
+    """A step that counts its runs, with a time that differs and, if asked, a number and a picture that do."""
+    calls.append(value)
+    run = len(calls) * drift
+    write_image(folder / "toy.png", np.full((2, 2, 3), value + run, np.uint8))
+    return {"number": value + run, "pair": (1, math.inf), "nothing": math.nan, "encode_seconds": len(calls)}
+
+
+def toy(**parameters):
+    return Step(name="toy", shows="Figure 0", run=counted, parameters=parameters)
+
+
+def test_a_step_is_done_once_and_all_its_records_are_kept(tmp_path):
+    calls.clear()
+    (first,) = perform([toy(value=1)], tmp_path)
+    assert first["result"] == {"number": 1, "pair": [1, "inf"], "nothing": None, "encode_seconds": 1}
+    assert {"git", "machine", "versions", "code", "parameters", "seconds", "when"} <= first.keys()
+    assert perform([toy(value=1)], tmp_path) == [] and calls == [1]
+    perform([toy(value=2)], tmp_path)  # other parameters: done, and the older picture is no longer there
+    assert [r["parameters"]["value"] for r in records(tmp_path, "toy")] == [1, 2]
+    assert known(toy(value=2), tmp_path) and not known(toy(value=1), tmp_path)
+    (tmp_path / "toy.png").unlink()
+    assert len(perform([toy(value=2)], tmp_path)) == 1
+    assert len((tmp_path / "toy.jsonl").read_text().splitlines()) == 3
+
+
+def test_a_forced_run_says_whether_it_was_the_same(tmp_path):
+    calls.clear()
+    perform([toy(value=1)], tmp_path)
+    (again,) = perform([toy(value=1)], tmp_path, force=True)
+    assert again["repeats"] is True and again["result"]["encode_seconds"] == 2
+    perform([toy(value=1, drift=1)], tmp_path)
+    (other,) = perform([toy(value=1, drift=1)], tmp_path, force=True)
+    assert other["repeats"] is False
+
+
+def test_other_code_is_another_step(tmp_path):
+    step = toy(value=1)
+    perform([step], tmp_path)
+    path = tmp_path / "toy.jsonl"
+    path.write_text(path.read_text().replace(code_of(step), "0" * 64))
+    assert known(step, tmp_path) is None
+
+
+@pytest.mark.parametrize("line", ["{", "[]", '{"format": "other"}'])
+def test_a_file_that_holds_no_records_is_named(tmp_path, line):
+    (tmp_path / "toy.jsonl").write_text(line + "\n")
+    with pytest.raises(ValueError, match=r"toy\.jsonl, line 1"):
+        perform([toy(value=1)], tmp_path)
+
+
+def test_times_do_not_count():
+    assert timeless({"a": [{"codec_seconds": 1, "b": 2}]}) == {"a": [{"b": 2}]}
+
+
+def test_a_small_study_resumes_repeats_and_fills_the_page(tmp_path, capsys):
+    only = ["--scale", "16", "--only", "artefacts-setup1,floors", "--out", str(tmp_path / "out")]
+    main(only)
+    main(only)
+    assert "0 of 2 steps" in capsys.readouterr().out
+    main([*only, "--force"])
+    assert capsys.readouterr().out.count("the same to the bit") == 2
+    differences = read_image(tmp_path / "out" / "artefacts-setup1_differences.png")
+    assert differences.std() > 1 and (differences[:10, :20] == 255).all()  # the uncoded view, by itself
+    page = tmp_path / "study.md"
+    page.write_text("".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in tables({}, {})))
+    for _ in range(2):  # published again, nothing is kept twice
+        publish(tmp_path / "out", page=page, images=tmp_path / "images", kept=tmp_path / "kept")
+        lines = (tmp_path / "kept" / "floors.jsonl").read_text().splitlines()
+        assert [json.loads(line).get("repeats") for line in lines] == [None, True]
+    assert (tmp_path / "images" / "artefacts-setup1_views.png").exists()
+    assert (
+        "| Fig. 5.10 | lowest rate of a black picture, bpp | EI-PVS 0.63 | EI-PVS 0.31 |  |  | no |"
+        in page.read_text()
+    )
+
+
+def test_steps_have_names_of_their_own_and_code_that_is_there():
+    for scale in (1, 2, 4, 8, 16):
+        steps = all_steps(scale)
+        assert len({step.name for step in steps}) == len(steps)
+        assert all(len(code_of(step)) == 64 for step in steps)
+    for name, *_ in SCRIPTS:
+        assert (PAGE.parents[1] / "benchmarks" / f"{name}.py").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"), [(["--only", "rate"], "no step 'rate'"), (["--scale", "3"], "scale is 3")]
+)
+def test_wrong_arguments_are_named(arguments, said, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2 and said in capsys.readouterr().err
+
+
+def test_agreement_is_counted():
+    numbers = {"a": 4.0, "b": -1.0, "c": 0.0, "d": 2.0}
+    same = theirs.compare(numbers, numbers)
+    assert (same.sign, same.order, same.size) == ((3, 3), (6, 6), (3, 3))
+    other = theirs.compare(numbers, {"a": 1.9, "b": 1.0, "c": 0.5, "d": None})
+    assert other.sign == (1, 3) and other.size == (0, 3)
+    assert other.order == (2, 6)  # a over b and a over c; b is no longer below c, nothing can be said of d
+    ranks = theirs.compare({"x": 0.0, "y": 0.0, "z": -1.0}, {"x": 0.90, "y": 0.91, "z": 0.5}, only="order", even=0.02)
+    assert ranks.order == (3, 3) and ranks.sign == (0, 0)
+    assert [theirs.said(*pair) for pair in ((0, 0), (0, 2), (1, 2), (2, 2))] == ["", "no", "1 of 2", "yes"]
+
+
+def points(scheme, first, rates=(0.125, 0.25, 0.5, 1.0)):
+    """3 dB for every doubling of the rate."""
+    return [
+        {"scheme": scheme, "target_bpp": r, "bpp": r, "reached": True, "q_global": first + 3 * math.log2(r / 0.125)}
+        for r in rates
+    ]
+
+
+def test_gain_and_rate_ratio_of_straight_curves():
+    both = [*points("a", 29.0), *points("b", 23.0)]  # 6 dB apart: a quarter of the rate
+    assert claims.gain(both, "a", "b") == pytest.approx(6)
+    assert claims.gain(both, "a", "nothing") is None
+    assert claims.rate_ratio(both, "a", "b", 30.0) == pytest.approx(4)
+    assert claims.rate_ratio(both, "a", "b", None) == pytest.approx(4)  # at b's 32 dB
+    assert claims.rate_ratio(both, "a", "b", 60.0) is None
+    # where the better one's worst point is better still, its rate is a bound
+    assert claims.rate_ratio([*points("a", 40.0), *points("b", 23.0)], "a", "b", None) == pytest.approx(8)
+
+
+def test_unmet_targets_are_no_gain():
+    missed = points("b", 23.0)
+    missed[0] = {**missed[0], "reached": False, "q_global": 99.0}
+    assert claims.gain([*points("a", 29.0), *missed], "a", "b") == pytest.approx(6)
+
+
+def test_who_gets_lower_wins_where_there_is_no_common_rate():
+    def duel(gain, si, ei):
+        return {"ei": {"gain_db": gain, "lowest": {"si": si, "ei": ei}}}
+
+    assert claims.advantage(duel(2.5, 0.1, 0.4)) == 2.5
+    assert claims.advantage(duel(None, 0.1, None)) == 1 and claims.words(duel(None, 0.1, None)) == "SI alone"
+    assert claims.advantage(duel(None, None, 0.05)) == -1
+    assert claims.advantage(duel(None, None, None)) is None
+
+
+def test_decline_and_fluctuation_over_depth():
+    values, pixels = np.array([40.0, 40.0, np.nan, 30.0, 30.0]), np.array([10, 10, 0, 10, 10])
+    assert claims.decline(values, pixels) == pytest.approx(10)
+    assert claims.fluctuation(values, pixels) == pytest.approx(5)
+    assert claims.decline(np.full(5, 33.0), pixels) == pytest.approx(0)
+
+
+def test_the_search_for_a_quality_goes_straight_to_it():
+    line = [(0.1, 20.0), (0.4, 26.0)]
+    assert towards(line, 23.0) == pytest.approx(0.2)
+    assert towards(line[:1], 23.0) == pytest.approx(0.2)  # 3 dB for a doubling, to begin with
+    assert towards(line, 32.0) == pytest.approx(1.6)
