@@ -8,6 +8,7 @@ from .coded import Encoded, decode, encode, timed_decode
 from .ffv1 import Ffv1
 from .jpeg2000 import Jpeg2000
 from .mpeg2 import Mpeg2
+from .sperr import Sperr
 from .still import Htj2k, Jpeg, JpegXl
 from .streams import extract
 from .svtav1 import Av1
@@ -24,6 +25,7 @@ for _coder in (Mpeg2("ei"), Mpeg2("si"), Jpeg2000(), Jpeg(), JpegXl(), Htj2k()):
 for _kind in ("ei", "si", "ri"):
     register(Volume(_kind))
 register(Separate("si"))
+register(Sperr("si"))
 register(Avif("si"))
 
 __all__ = [

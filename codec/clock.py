@@ -18,6 +18,11 @@ def cpu_seconds() -> float:
     return time.thread_time() + getattr(_elsewhere, "seconds", 0.0)
 
 
+def spent_elsewhere(seconds: float) -> None:
+    """Count CPU seconds that something else took for the calling thread."""
+    _elsewhere.seconds = getattr(_elsewhere, "seconds", 0.0) + seconds
+
+
 class OwnThreads:
     """The threads that an encoder starts when it is opened, watched for the CPU time they take.
 
@@ -44,7 +49,7 @@ class OwnThreads:
             seconds = sum(time.clock_gettime(~number << 3 | 6) for number in self._ids)
         else:
             seconds = time.process_time() - time.thread_time() - self._process
-        _elsewhere.seconds = getattr(_elsewhere, "seconds", 0.0) + seconds
+        spent_elsewhere(seconds)
 
 
 def _threads() -> set[int]:
