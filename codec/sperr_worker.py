@@ -1,11 +1,10 @@
-"""Decode SPERR streams in a process of their own: a program that `codec.sperr` starts, by its path.
+"""Decode SPERR streams in a process of their own: a program that `codec.sperr_stream` starts, by its path.
 
 The library ends the process with an uncaught exception where a stream is not to its liking, and may read what is not
 its own. Here that costs nobody more than this process, which has an end to its memory and time.
 
 Standard input holds slices, rows, columns and the number of streams, then each stream behind its length. To standard
-output go the volumes as whole numbers of 16 bits, in units of 1/128 of an 8-bit code, and the CPU seconds of decoding
-and of the whole process.
+output go a word that all is ready, the volumes as float32, and the CPU seconds of decoding and of the whole process.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import time
 from pathlib import Path
 
 HEAD, LENGTH, TIMES = struct.Struct("<4I"), struct.Struct("<Q"), struct.Struct("<2d")
-UNIT = 128
+READY = b"here"
 BYTES_A_SAMPLE, BYTES = 64, 256 << 20  # 3 to 4 times what a stream of ours takes
 SECONDS, SECONDS_A_SAMPLE = 10.0, 1e-5  # 50 times
 
@@ -26,20 +25,21 @@ def main() -> None:
     import numpy as np
     from imagecodecs import sperr_decode
 
-    *shape, count = HEAD.unpack(sys.stdin.buffer.read(HEAD.size))
+    source, sink = sys.stdin.buffer, sys.stdout.buffer
+    *shape, count = HEAD.unpack(source.read(HEAD.size))
     samples = shape[0] * shape[1] * shape[2]
     bound(BYTES + BYTES_A_SAMPLE * samples, SECONDS + SECONDS_A_SAMPLE * count * samples)
+    sink.write(READY)
+    sink.flush()
     seconds = 0.0
     for _ in range(count):
-        (length,) = LENGTH.unpack(sys.stdin.buffer.read(LENGTH.size))
-        stream = sys.stdin.buffer.read(length)
+        (length,) = LENGTH.unpack(source.read(LENGTH.size))
+        stream = source.read(length)
         started = time.process_time()
         volume = sperr_decode(stream, shape=tuple(shape), dtype=np.float32, numthreads=1)
         seconds += time.process_time() - started
-        volume *= UNIT
-        np.clip(np.rint(volume, out=volume), -32768, 32767, out=volume)
-        sys.stdout.buffer.write(volume.astype("<i2").data)
-    sys.stdout.buffer.write(TIMES.pack(seconds, time.process_time()))
+        sink.write(volume.data)
+    sink.write(TIMES.pack(seconds, time.process_time()))
 
 
 def bound(more_bytes: int, seconds: float) -> None:

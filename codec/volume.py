@@ -215,7 +215,7 @@ def _encode_lossless(pixels: NDArray[Any], cut: _Cut) -> Run:
     streams, seconds = [], 0.0
     for origins in cut.groups:
         planes = np.empty((3, len(origins), cut.shape.height, cut.shape.width), cut.whole_dtype)
-        for y, first in _lines(cut.shape):
+        for y, first in lines(cut.shape):
             rows = np.empty((len(origins), 3 * cut.shape.width), np.int32)
             gather_whole(pixels, origins + first, cut.shape.step_x, 1 << (cut.bits - 1), rows)
             lifting.forward_reversible(rows, cut.levels)
@@ -236,7 +236,7 @@ def _encode_lossy(pixels: NDArray[Any], cut: _Cut, colours: NDArray[np.int16], q
         planes = np.empty((3, len(origins), cut.shape.height, cut.shape.width), np.int16)
         scales = cut.scales(len(origins), step)
         rows = np.empty((len(origins), 3 * cut.shape.width), np.float32)
-        for y, first in _lines(cut.shape):
+        for y, first in lines(cut.shape):
             gather_real(pixels, origins + first, cut.shape.step_x, 1 << (cut.bits - 1), matrix, rows)
             lifting.forward(rows, factors, cut.levels)
             to_whole(rows, scales, planes, y)
@@ -247,7 +247,7 @@ def _encode_lossy(pixels: NDArray[Any], cut: _Cut, colours: NDArray[np.int16], q
 
 
 def _from_whole(planes: NDArray[Any], cut: _Cut, origins: NDArray[np.int64], pixels: NDArray[Any]) -> None:
-    for y, first in _lines(cut.shape):
+    for y, first in lines(cut.shape):
         rows = np.ascontiguousarray(planes[:, :, y].swapaxes(0, 1), np.int32).reshape(len(origins), -1)
         lifting.backward_reversible(rows, cut.levels)
         scatter_whole(rows, origins + first, cut.shape.step_x, 1 << (cut.bits - 1), pixels)
@@ -264,13 +264,13 @@ def _from_real(
     matrix, factors = colours.astype(np.float32) / _UNIT, lifting.steps(cut.wavelet)
     scales = cut.scales(len(origins), step)
     rows = np.empty((len(origins), 3 * cut.shape.width), np.float32)
-    for y, first in _lines(cut.shape):
+    for y, first in lines(cut.shape):
         to_real(planes, scales, y, rows)
         lifting.backward(rows, factors, cut.levels)
         scatter_real(rows, origins + first, cut.shape.step_x, 1 << (cut.bits - 1), matrix, pixels)
 
 
-def _lines(shape: Layout) -> Iterator[tuple[int, int]]:
+def lines(shape: Layout) -> Iterator[tuple[int, int]]:
     """Each line of the slices, and how far its first pixel is from that of its slice."""
     return ((y, y * shape.step_y) for y in range(shape.height))
 
