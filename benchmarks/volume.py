@@ -1,6 +1,6 @@
 """What the volume gains: SI-PVI against sub-images coded apart, JPEG 2000 on the plain picture and SI-PVS.
 
-    python -m benchmarks.volume [--scale 8] [--scenes apples cuboid]
+    python -m benchmarks.volume [--scale 4] [--scenes apples cuboid]
 
 Rates against the dissertation's video setting (x264 IPPP, 4:2:0, constant quantiser, parallel order) are Bjøntegaard
 differences by RGB PSNR, over the qualities that both curves reach. Goes to ``benchmarks/results/volume.json`` and
@@ -31,6 +31,7 @@ ANCHOR = "si-h264:rate=cq,chroma=420"
 CURVES: dict[str, list[dict[str, Any]]] = {
     ANCHOR: [{"qp": qp} for qp in (20, 29, 38, 47)],
     "si-jp3d": [{"quality": q} for q in (17, 22, 27, 33)],
+    "si-sperr": [{"quality": q} for q in (17, 22, 27, 33)],
     "si-jp3d:wavelet=53": [{"quality": q} for q in (17, 22, 27, 33)],
     "si-jp3d:order=row": [{"quality": q} for q in (17, 22, 27, 33)],
     "si-jpeg2000": [{"quality": q} for q in (17, 22, 27, 33)],
@@ -47,7 +48,7 @@ LOSSLESS = ("si-jp3d", "si-jp3d:levels=1", "ri-jp3d", "ei-jp3d", "si-jpeg2000", 
 def main() -> None:
     """Measure, print and keep."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scale", type=int, default=8)
+    parser.add_argument("--scale", type=int, default=4)
     parser.add_argument("--scenes", nargs="+", default=["apples", "cuboid"])
     arguments = parser.parse_args()
     scenes = {}
