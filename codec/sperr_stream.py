@@ -1,8 +1,8 @@
 """Volumes to SPECK streams and back, by SPERR.
 
 How long a stream is to be is asked of the library's quantiser: so long as it is at a step. To this length SPECK's
-embedded stream is then cut, since what is cut has a wider zero than what is rounded to a step. Where steps are wide
-that is worth up to half a dB; beyond 40 dB it costs a little.
+embedded stream is then cut, since what is cut has a wider zero than what is rounded to a step: a smaller error where
+steps are wide, a slightly larger one where they are fine and few coefficients are zero.
 
 The library trusts its input and ends the process where that is wrong. Its streams are therefore kept without their
 headers, which are made again from what is known, and are decoded in a process of their own: `codec.sperr_worker`.
