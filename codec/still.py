@@ -8,8 +8,11 @@ from __future__ import annotations
 import io
 import re
 import struct
+import sys
+import threading
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, ClassVar
 
@@ -266,9 +269,35 @@ class Htj2k(Still):
         if not _htj2k_head(blank).match(payload) or not payload.endswith(b"\xff\xd9"):
             raise ValueError(f"its HTJ2K stream is no whole one of ours for {blank.size} {blank.pixels.dtype}")
         try:
-            return imagecodecs.htj2k_decode(payload, planar=False)
+            with _heard():
+                return imagecodecs.htj2k_decode(payload, planar=False)
         except (RuntimeError, ValueError) as error:
             raise ValueError(f"its HTJ2K stream does not decode ({error})") from None
+
+
+_hearing = threading.Lock()
+
+
+@contextmanager
+def _heard() -> Iterator[None]:
+    """Raise what OpenJPH throws while pixels are copied out, which its binding only prints, by two hooks."""
+    thrown: list[BaseException | None] = []
+
+    def hear(args: Any) -> None:
+        if "_htj2k" in str(args.object):
+            thrown.append(args.exc_value)
+        else:
+            unraisable(args)
+
+    with _hearing:  # hooks are the whole process's
+        printing, unraisable = sys.excepthook, sys.unraisablehook
+        sys.excepthook, sys.unraisablehook = lambda *_: None, hear
+        try:
+            yield
+        finally:
+            sys.excepthook, sys.unraisablehook = printing, unraisable
+    if thrown:
+        raise RuntimeError(thrown[0])
 
 
 def _htj2k_head(blank: IIPicture) -> re.Pattern[bytes]:

@@ -112,3 +112,19 @@ def test_libaom_keeps_all_of_the_colour():
     )
     assert np.abs(full.pixels.astype(int) - pixels).max() <= 1
     assert psnr(picture, less) < 25
+
+
+def test_what_openjph_only_prints_is_an_error(capfd):
+    """Its binding would print twice and hand out a picture with whatever the memory held."""
+    coded, rng = encode(textured(16, 8, 4, 4), "htj2k", qp=20), np.random.default_rng(0)
+    refused = 0
+    for _ in range(60):
+        payload = bytearray(coded.payload)
+        for at in rng.integers(150, len(payload), 3):
+            payload[at] ^= 1 << rng.integers(8)
+        try:
+            decode(replace(coded, payload=bytes(payload)))
+        except ValueError as error:
+            refused += "(ojph error)" in str(error)
+    assert refused > 5
+    assert "ojph" not in capfd.readouterr().err
