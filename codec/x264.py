@@ -11,15 +11,20 @@ import re
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import ClassVar
 
 from .base import Option, Options
-from .rate import Run, nearest_rate
+from .rate import TOLERANCE, Run, nearest_rate
 from .sequence import Film
 from .video import COMMON, MAX_KBIT, THREADS, Settings, Video, chroma, fine_rate
 
 COARSEST, LOSSLESS = 51, 0  # quantisers; at 4:4:4 and 8 bit x264 takes 0 for lossless coding of YCbCr
+
+# From here on lossless coding is tried first: where it takes what is asked, or less, quantisers from 1 up take more
+# bytes for a worse picture, and rate control would choose among them.
+NEARLY_LOSSLESS_BPP = 2.0
 
 # Constant bit rate: at the frame rate of `fine_rate` the sequence is over before x264's long-term control wakes. The
 # buffer alone rules, and frames count in it, not seconds. x264 keeps it between half and 0.8 full: started between
@@ -98,12 +103,14 @@ class H264(Video):
             with tempfile.TemporaryDirectory() as folder:
                 return _two_passes(size, film, options, run, Path(folder) / "notes")
 
-        return nearest_rate(
-            at_rate,
-            target,
-            coarsest=lambda: run(self.constant(COARSEST, film, options)),
-            finest=lambda: run(self.constant(LOSSLESS, film, options)),
-        )
+        finest = cache(lambda: run(self.constant(LOSSLESS, film, options)))
+        pixels = film.frames * film.layout.height * film.layout.width
+        near = 8 * target >= NEARLY_LOSSLESS_BPP * pixels
+        if near and len(finest().payload) <= (1 + TOLERANCE) * target:
+            return finest(), 1
+        coarsest = partial(run, self.constant(COARSEST, film, options))
+        kept, runs = nearest_rate(at_rate, target, coarsest=coarsest, finest=finest)
+        return kept, runs + near
 
     def trimmed(self, packet: bytes) -> bytes:
         """The packet without x264's message to the reader: over 600 bytes of settings that no decoder needs."""

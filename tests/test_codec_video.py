@@ -116,3 +116,14 @@ def test_the_message_is_cut_out_and_nothing_else():
     assert without_sei(sps + pps + b"\0\0\1\x06x264" + idr) == sps + pps + idr
     assert without_sei(b"\0\0\0\1\x06x264" + idr) == idr
     assert without_sei(sps + pps + idr) == sps + pps + idr
+
+
+@pytest.mark.parametrize("more", [1.0, 1.2, 1.4])
+def test_rate_control_buys_nothing_worse_than_lossless_for_more_bytes(more):
+    """At 4:4:4 the quantisers from 1 up take more than lossless coding does."""
+    lossless = encode(large(), "ei-h264", qp=0)
+    coded = encode(large(), "ei-h264", bpp=more * lossless.bpp)
+    assert encode(large(), "ei-h264", qp=1).nbytes > more * 0.95 * lossless.nbytes
+    assert coded.payload == lossless.payload
+    assert coded.runs == 1
+    assert coded.reached == (more == 1.0)
