@@ -242,6 +242,27 @@ class IICamera:
             D[..., axis] = towards
         return L, D, None if rays.weight is None else np.broadcast_to(rays.weight, shape).copy()
 
+    def separable_rays(self, rows: slice = slice(None), cols: slice = slice(None)) -> tuple[Floats, ...] | None:
+        """Rays of pixel centres if x hangs on the column alone, y on the row alone and z on neither, else None.
+
+        Returns
+        -------
+        x, y, z : ndarray, (w, 2), (h, 2), (2,)
+            Coordinates of L and of D, the same to the bit as those of `rays`.
+        """
+        centre = np.full(2, 0.5)
+        m, n = self._block(rows, cols)
+        rays = self._bundle(m, n, centre, centre)
+        shapes = ((1, m.size), (n.size, 1), ())
+        coordinates = []
+        for axis, (place_mm, towards) in enumerate(zip(rays[:3], rays[3:6], strict=True)):
+            pair = np.empty((*shapes[axis], 2))
+            if any(np.broadcast_shapes(np.shape(a), shapes[axis]) != shapes[axis] for a in (place_mm, towards)):
+                return None
+            pair[..., 0], pair[..., 1] = place_mm + self.origin_mm[axis], towards
+            coordinates.append(pair.reshape(-1, 2))
+        return None if rays.weight is not None else (coordinates[0], coordinates[1], coordinates[2][0])
+
     def _block(self, rows: slice, cols: slice) -> tuple[NDArray[Any], NDArray[Any]]:
         return np.arange(self.pixels[0])[None, cols], np.arange(self.pixels[1])[rows, None]
 

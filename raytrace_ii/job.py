@@ -132,13 +132,17 @@ class Job:
         """What the tracer fills, None if nobody asks."""
         if not set(self.support) - {"samples"}:
             return None
-        return Support.empty(shape, ray_length="ray_length" in self.support)
+        return Support.empty(shape, {"depth" if name == "disparity" else name for name in self.support})
 
     def _fixed(
         self, tracer: Tracer, samples: int, rows: slice, cols: slice, support: Support | None
     ) -> NDArray[np.float32]:
         """Summed radiance of a block whose pixels all have the same number of samples."""
         radiance = np.zeros(((rows.stop - rows.start) * (cols.stop - cols.start), 3), np.float32)
+        if samples == 1 and isinstance(self.camera, IICamera):
+            rays = self.camera.separable_rays(rows, cols)
+            if rays is not None and tracer.run_separable(rays, radiance, support):
+                return radiance
         for sample in range(samples):
             if isinstance(self.camera, MapCamera):
                 L, D, shares = self.camera.stored_rays(sample, rows, cols)

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel
+from ii_core.jit import inline_kernel, inner_kernel
 from ii_core.jit import lean_kernel as kernel
 
 # A weight this small cannot move a colour by half a step of 8 bits, not even on sRGB's steep foot, of light up to 1.
@@ -79,26 +79,37 @@ def start_rays(
 
 
 @kernel
-def record_support(
-    primitives, u, v, distances, pixels, corners, faces, object_of_face, eye, axis, depth, normal, object_id,
-    ray_length,
-):  # fmt: skip
-    """Depth along the camera's axis, face normal and object of every primary ray, and its length if there is room."""
-    for i in range(primitives.shape[0]):
-        f, pixel = primitives[i], pixels[i]
-        if ray_length.shape[0] > 0:
-            ray_length[pixel] = distances[i] if f >= 0 else math.nan
-        if f < 0:
-            depth[pixel] = math.nan
-            object_id[pixel] = -1
+def start_separable_rays(x, y, z, rotation, shift, out_origins, out_directions, out_weights, out_pixels, out_inside):
+    """As `start_rays` for a block of pixels whose rays all carry all light, from `IICamera.separable_rays`.
+
+    Returns
+    -------
+    bool
+        Whether all rays are usable.
+    """
+    usable = True
+    columns = x.shape[0]
+    lz, dz = z[0], z[1]
+    for i in range(y.shape[0]):
+        ly, dy = y[i, 0], y[i, 1]
+        for j in range(columns):
+            lx, dx = x[j, 0], x[j, 1]
+            row = i * columns + j
+            length = math.sqrt(dx * dx + dy * dy + dz * dz)
+            inverse = 1.0 / length
+            usable &= 0.0 < length < math.inf
             for c in range(3):
-                normal[pixel, c] = 0.0
-            continue
-        object_id[pixel] = object_of_face[f]
-        px, py, pz = _hit_point(corners, f, u[i], v[i])
-        depth[pixel] = (px - eye[0]) * axis[0] + (py - eye[1]) * axis[1] + (pz - eye[2]) * axis[2]
-        for c in range(3):
-            normal[pixel, c] = faces[f, c]
+                r0, r1, r2 = rotation[c, 0], rotation[c, 1], rotation[c, 2]
+                place = r0 * lx + r1 * ly + r2 * lz + shift[c]
+                usable &= abs(place) < math.inf
+                out_origins[row, c] = place
+                out_directions[row, c] = (r0 * dx + r1 * dy + r2 * dz) * inverse
+    for row in range(y.shape[0] * columns):
+        out_weights[row, 0] = out_weights[row, 1] = out_weights[row, 2] = 1.0
+        out_pixels[row] = row
+        for k in range(out_inside.shape[1]):
+            out_inside[row, k] = -1
+    return usable
 
 
 @kernel
@@ -108,13 +119,15 @@ def shade(
     ambient, least, radiance,
     shadow_origins, shadow_directions, shadow_reach, shadow_colours, shadow_pixels, shadow_inside,
     next_origins, next_directions, next_weights, next_pixels, next_inside, counts, spawn,
+    eye, axis, depth, normal, object_id, ray_length,
 ):  # fmt: skip
     """Shade one generation of rays.
 
     Adds background, emitted and ambient light to ``radiance``; writes shadow rays with the light they would let
     through, and, if ``spawn``, reflected and refracted rays; none weaker than ``least``. ``inside`` lists the
     transmissive bodies that a ray runs in, −1 after the last. ``fog`` is its colour and density, of no length if
-    there is none; it lies outside bodies, and before the sky not at all.
+    there is none; it lies outside bodies, and before the sky not at all. Of each ray are noted, where there is room,
+    the depth from ``eye`` along the camera's ``axis``, the face's normal, the object and the ray's length.
 
     Returns
     -------
@@ -127,12 +140,24 @@ def shade(
         dx, dy, dz = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
         w0, w1, w2 = float(weights[i, 0]), float(weights[i, 1]), float(weights[i, 2])
         f = primitives[i]
+        if ray_length.shape[0] > 0:
+            ray_length[pixel] = distances[i] if f >= 0 else math.nan
+        if object_id.shape[0] > 0:
+            object_id[pixel] = object_of_face[f] if f >= 0 else -1
+        if normal.shape[0] > 0:
+            for c in range(3):
+                normal[pixel, c] = faces[f, c] if f >= 0 else 0.0
         if f < 0:
+            if depth.shape[0] > 0:
+                depth[pixel] = math.nan
             b0, b1, b2 = _sky(background, textures, texels, dx, dy, dz)
             radiance[pixel, 0] += w0 * b0
             radiance[pixel, 1] += w1 * b1
             radiance[pixel, 2] += w2 * b2
             continue
+        if depth.shape[0] > 0:
+            px, py, pz = _hit_point(corners, f, u[i], v[i])
+            depth[pixel] = (px - eye[0]) * axis[0] + (py - eye[1]) * axis[1] + (pz - eye[2]) * axis[2]
         body = object_of_face[f]
         gx, gy, gz, lift = float(faces[f, 0]), float(faces[f, 1]), float(faces[f, 2]), float(faces[f, 3])
         entering = gx * dx + gy * dy + gz * dz < 0.0
@@ -790,7 +815,7 @@ def _wrap(i, n):
     return i if i >= 0 else n - 1, i + 1 if 0 < i + 1 < n else 0
 
 
-@kernel
+@inner_kernel
 def texture_colour(table, row, texels, x, y, z):
     """Linear colour of a texture at a texture coordinate."""
     kind = table[row, 0]
@@ -826,7 +851,7 @@ def texture_colour(table, row, texels, x, y, z):
     )
 
 
-@kernel
+@inner_kernel
 def _image(table, row, texels, u, v):
     """Colour of an image at (u, v), bilinear."""
     a, b, c, d, fx, fy = _texels_at(table, row, u, v)
@@ -846,7 +871,7 @@ def _image(table, row, texels, u, v):
     return red, green, blue
 
 
-@kernel
+@inner_kernel
 def _texels_at(table, row, u, v):
     """The four texels about (u, v): left and right above, left and right below, and how far to right and down."""
     first, width, height = int(table[row, 1]), int(table[row, 2]), int(table[row, 3])
@@ -859,7 +884,7 @@ def _texels_at(table, row, u, v):
     return a + i0, a + i1, b + i0, b + i1, x - i, y - j
 
 
-@kernel
+@inner_kernel
 def _fractal(x, y, z, packed):
     """Octaves of gradient noise, each of half the size and strength."""
     octaves, seed = packed % 16, packed // 16
@@ -870,7 +895,7 @@ def _fractal(x, y, z, packed):
     return total
 
 
-@kernel
+@inner_kernel
 def gradient_noise(x, y, z, seed):
     """Perlin's improved gradient noise (2002) with hashed lattice gradients; about −1…1, 0 on the lattice."""
     fx, fy, fz = math.floor(x), math.floor(y), math.floor(z)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +15,9 @@ from .packing import PackedScene
 from .scene import Scene
 
 KINDS = ("primary", "shadow", "reflection", "refraction")
-_NO_LENGTHS, _NO_ROWS = np.empty(0, np.float32), np.empty(0, np.int32)
+_NO_ROWS = np.empty(0, np.int32)
+# Support images that the tracer fills: type and how many numbers a ray.
+RECORDED = {"depth": ("f4", ()), "normal": ("f4", (3,)), "object_id": ("i4", ()), "ray_length": ("f4", ())}
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
 
@@ -76,36 +79,38 @@ def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: Array
         )
     n = locations.size // 3
     tracer = Tracer(scene, n, rigid(pose))
-    support = Support.empty((n,), ray_length=True)
-    assert support.ray_length is not None
+    seen = {name: np.empty((n, *shape), dtype) for name, (dtype, shape) in RECORDED.items()}
     radiance = np.zeros((n, 3), np.float32)
-    tracer.run(locations, directions, radiance, support)
-    return Traced(radiance, support.depth, support.normal, support.object_id, support.ray_length, tracer.count)
+    tracer.run(locations, directions, radiance, Support(**seen))
+    return Traced(radiance=radiance, count=tracer.count, **seen)
 
 
 @dataclass(frozen=True)
 class Support:
-    """Depth, normal, object id and, if wanted, ray length arrays of one block."""
+    """Depth, normal, object id and ray length arrays of one block, as far as they are wanted."""
 
-    depth: NDArray[np.float32]
-    normal: NDArray[np.float32]
-    object_id: NDArray[np.int32]
+    depth: NDArray[np.float32] | None = None
+    normal: NDArray[np.float32] | None = None
+    object_id: NDArray[np.int32] | None = None
     ray_length: NDArray[np.float32] | None = None
 
     @classmethod
-    def empty(cls, shape: tuple[int, ...], *, ray_length: bool = False) -> Support:
-        return cls(
-            np.empty(shape, np.float32),
-            np.empty((*shape, 3), np.float32),
-            np.empty(shape, np.int32),
-            np.empty(shape, np.float32) if ray_length else None,
-        )
+    def empty(cls, shape: tuple[int, ...], names: Collection[str]) -> Support:
+        return cls(**{n: np.empty((*shape, *RECORDED[n][1]), RECORDED[n][0]) for n in RECORDED if n in names})
 
     def clear(self) -> None:
         """As if no ray hit anything."""
-        self.depth[...], self.normal[...], self.object_id[...] = np.nan, 0, -1
-        if self.ray_length is not None:
-            self.ray_length[...] = np.nan
+        nothing = {"depth": np.nan, "normal": 0, "object_id": -1, "ray_length": np.nan}
+        for name, array in vars(self).items():
+            if array is not None:
+                array[...] = nothing[name]
+
+    def rows(self) -> list[NDArray[Any]]:
+        """One row per ray; arrays of no rows are not wanted."""
+        return [
+            np.empty((0, *shape), dtype) if (array := getattr(self, name)) is None else array.reshape(-1, *shape)
+            for name, (dtype, shape) in RECORDED.items()
+        ]
 
 
 def rigid(pose: ArrayLike | None) -> NDArray[np.float64]:
@@ -179,7 +184,24 @@ class Tracer:
             )
         if support is not None and n < len(locations):
             support.clear()
-        rays = _Rays(*(array[:n] for array in vars(room).values()))
+        self._trace(n, radiance, support)
+
+    def run_separable(
+        self, rays: tuple[NDArray[np.float64], ...], radiance: NDArray[np.float32], support: Support | None
+    ) -> bool:
+        """`run` for rays of `IICamera.separable_rays`; if some are unusable, nothing is done and False comes back."""
+        room, n = self._primary, len(rays[0]) * len(rays[1])
+        usable = kernels.start_separable_rays(
+            *rays, self.pose[:3, :3], self.pose[:3, 3],
+            room.origins, room.directions, room.weights, room.pixels, room.inside,
+        )  # fmt: skip
+        if usable:
+            self._trace(n, radiance, support)
+        return bool(usable)
+
+    def _trace(self, n: int, radiance: NDArray[np.float32], support: Support | None) -> None:
+        """Trace the first n of the primary rays."""
+        rays = _Rays(*(array[:n] for array in vars(self._primary).values()))
         self.count.rays["primary"] += n
         if self.scene.transmits:
             self._start_inside(rays)
@@ -192,13 +214,6 @@ class Tracer:
         """Trace and shade one generation; the next one comes back."""
         s, n = self.scene, len(rays.pixels)
         primitives, u, v, distances = self._hits(rays)
-        if support is not None:
-            kernels.record_support(
-                primitives, u, v, distances, rays.pixels, s.corners, s.faces, s.object_of_face,
-                self.pose[:3, 3], self.pose[:3, 2],
-                support.depth.reshape(-1), support.normal.reshape(-1, 3), support.object_id.reshape(-1),
-                _NO_LENGTHS if support.ray_length is None else support.ray_length.reshape(-1),
-            )  # fmt: skip
         spawn = spawn and (s.mirrors or s.transmits)
         following = _Rays.room((1 + s.transmits + 2 * s.disperses) * n if spawn else 0, s.nested)
         shadow, reach = self._shadow_room(n * len(s.lights))
@@ -209,7 +224,7 @@ class Tracer:
             s.textures.table, s.textures.texels, s.lights, s.background, s.fog, s.ambient, s.least, radiance,
             shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels, shadow.inside,
             following.origins, following.directions, following.weights, following.pixels, following.inside, counts,
-            spawn,
+            spawn, self.pose[:3, 3], self.pose[:3, 2], *(support or Support()).rows(),
         )  # fmt: skip
         self.count.rays.update({"reflection": int(counts[0]), "refraction": int(counts[1])})
         self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[2:]), strict=True)))

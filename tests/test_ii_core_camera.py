@@ -212,3 +212,17 @@ def test_json_that_is_no_object_or_lacks_a_key():
     for data in (None, [], {"kind": "lenslet-array"}):
         with pytest.raises(ValueError, match=r"no camera|gap_mm, lenses, pixel_pitch_mm, pixels missing"):
             IICamera.from_json(data)
+
+
+@pytest.mark.parametrize("name", ["setup1", "plenoptic", "hpo", "grin", "depth-control", "resolution-priority"])
+def test_separable_rays_are_the_rays_to_the_bit(name):
+    camera, block = preset(name), (slice(300, 341), slice(501, 577))
+    x, y, z = camera.separable_rays(*block)
+    for part, wanted in enumerate(camera.rays(*block)):
+        found = np.broadcast_arrays(x[None, :, part], y[:, None, part], z[part])
+        np.testing.assert_array_equal(np.stack(found, axis=-1), wanted)
+
+
+@pytest.mark.parametrize("name", ["hexagonal", "spherical", "plenoptic1", "multi-focus"])
+def test_rays_that_mix_rows_and_columns_are_not_separable(name):
+    assert preset(name).separable_rays(slice(3, 40), slice(5, 77)) is None

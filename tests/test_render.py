@@ -166,6 +166,19 @@ def test_parameters_out_of_range_are_refused(wrong, says):
         render(Scene(bodies=[body(wall(5))]), ONE_LENS, **wrong)
 
 
+def test_rays_by_row_and_column_make_the_same_picture(monkeypatch):
+    scene, camera, pose = hall(), preset("setup1", scale=64), np.eye(4)
+    pose[:3, :3] = [[0.96, 0, 0.28], [0, 1, 0], [-0.28, 0, 0.96]]
+    pose[:3, 3] = 1, -2, 0.5
+    by_row = render(scene, camera, pose=pose, support=tuple(rendering.SUPPORT_IMAGES))
+    monkeypatch.setattr(IICamera, "separable_rays", lambda *block: None)
+    one_by_one = render(scene, camera, pose=pose, support=tuple(rendering.SUPPORT_IMAGES))
+    np.testing.assert_array_equal(by_row.picture.pixels, one_by_one.picture.pixels)
+    for name in rendering.SUPPORT_IMAGES:
+        np.testing.assert_array_equal(getattr(by_row, name), getattr(one_by_one, name))
+    assert len(np.unique(by_row.picture.pixels)) > 20
+
+
 # Supersampling
 
 
@@ -173,6 +186,9 @@ class Watched(IICamera):
     """A camera that keeps what it is asked for."""
 
     asked = None
+
+    def separable_rays(self, rows=slice(None), cols=slice(None)):
+        return None
 
     def weighted_rays(self, rows=slice(None), cols=slice(None), sample=(0.5, 0.5), place=(0.5, 0.5)):
         L, D, weight = super().weighted_rays(rows, cols, sample, place)

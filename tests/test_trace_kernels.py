@@ -12,7 +12,6 @@ from raytrace_ii.texture import Image
 
 NAMES = (
     "start_rays",
-    "record_support",
     "shade",
     "add_unblocked",
     "pass_faces",
