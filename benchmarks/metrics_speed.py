@@ -36,7 +36,8 @@ from raytrace_ii import Shot, load_scene, render
 
 ROOT = Path(__file__).parent.parent
 RESULTS, CHART = ROOT / "benchmarks/results/metrics_speed.json", ROOT / "docs/images/depth_cost.png"
-DOC = ROOT / "docs/metrics.md"
+DOC, SPEED, FRONT = ROOT / "docs/metrics.md", ROOT / "docs/speed_accuracy.md", ROOT / "docs/images/depth_pareto.png"
+NEAR = 0.05  # of the depths right: what the recommended setting may have fewer than the best
 REPEATS = 7
 SCENES, SCALE, BPP = ("apples", "twins"), 4, 0.35  # of the accuracy chart
 FARTHEST = 250  # layers of z = d·f, whatever their number
@@ -63,9 +64,11 @@ def main() -> None:
 
 
 def write_up() -> None:
-    """Chart and table of what is kept."""
+    """Charts and tables of what is kept."""
     data = json.loads(RESULTS.read_text(encoding="utf-8"))
     save(draw(data), CHART)
+    save(draw_front(data["accuracy"]), FRONT)
+    fill(SPEED, "evaluation", front_table(data))
     lines = [f"| {row['what']} | {row['target']} | {row['value']:.3g} |" for row in data["rows"]]
     fill(DOC, "speed", ["| | target | measured |", "|---|---|---|", *lines])
 
@@ -213,6 +216,74 @@ def draw(data: dict[str, Any]) -> Any:
         axes.spines[["top", "right"]].set_visible(False)
     handles, names = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=len(lines), frameon=False)
+    return figure
+
+
+def fronts(points: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
+    """Scene by scene the settings that none beats in time and depths right, by time."""
+    found: dict[str, list[dict[str, Any]]] = {point["scene"]: [] for point in points}
+    for point in sorted(points, key=lambda p: (p["cpu_seconds"], -p["right"])):
+        best = found[point["scene"]]
+        if not best or point["right"] > best[-1]["right"]:
+            best.append(point)
+    return found
+
+
+def recommended(best: list[dict[str, Any]]) -> dict[str, Any]:
+    """Of a front, the quickest with nearly as many depths right as the best."""
+    return next(point for point in best if point["right"] >= best[-1]["right"] - NEAR)
+
+
+def setting(point: dict[str, Any]) -> str:
+    """In words: what was changed, the rest as by default."""
+    number = point["number"]
+    changed = f"filter of {number}×{number}" if point["what"] == "filter" else f"{number} {point['what']}"
+    return f"{point['method']}, {changed}"
+
+
+def front_table(data: dict[str, Any]) -> list[str]:
+    """The fronts, the recommended setting in bold."""
+    lines = ["| scene | take | depths right | Q_depth off | CPU time |", "|---|---|---|---|---|"]
+    for scene, best in fronts(data["accuracy"]).items():
+        pick = recommended(best)
+        for point in best:
+            name = f"**{setting(point)}**" if point is pick else setting(point)
+            cells = f"{point['right']:.0%} | {point['off_db']:.1f} dB | {point['cpu_seconds']:.2f} s"
+            lines.append(f"| {scene} | {name} | {cells} |")
+    size = f"`setup1` at `scale={data['scale']}`, JPEG 2000 at {data['bpp']} bit/pixel."
+    return [size, "", *lines, "", f"In bold the quickest within {100 * NEAR:.0f} of a hundred depths of the best."]
+
+
+def draw_front(points: list[dict[str, Any]]) -> Any:
+    """All settings of depth from focus, a panel a scene, with the front and the recommended one."""
+    figure = new_figure(11, 4.8)
+    best = fronts(points)
+    kinds = list(dict.fromkeys((p["what"], p["method"]) for p in points))
+    for axes, (scene, edge) in zip(figure.subplots(1, len(best), squeeze=False).flat, best.items(), strict=True):
+        x, y = [p["cpu_seconds"] for p in edge], [p["right"] for p in edge]
+        axes.step(x, y, where="post", color="0.75", linewidth=4, zorder=1, label="Pareto front")
+        for what, method in kinds:
+            line = [p for p in points if (p["scene"], p["what"], p["method"]) == (scene, what, method)]
+            colour = COLOURS[["layers", "EIs", "filter"].index(what)]
+            marker = MARKERS[0] if method == "robust" else MARKERS[1]
+            axes.plot([p["cpu_seconds"] for p in line], [p["right"] for p in line], marker, color=colour,
+                      label=f"{what}, {method}", zorder=3)  # fmt: skip
+            for p in line:
+                axes.annotate(
+                    p["number"], (p["cpu_seconds"], p["right"]), (4, 4), textcoords="offset points", fontsize=7
+                )
+        pick = recommended(edge)
+        axes.plot(
+            pick["cpu_seconds"], pick["right"], "*", color="black", markersize=18, zorder=2, label="recommended"
+        )
+        axes.set(title=scene, xscale="log", xlabel="CPU time [s]", ylabel="depths right within 10 % [share]")
+        axes.set_xticks([0.1, 0.2, 0.5, 1, 2], ["0.1", "0.2", "0.5", "1", "2"])
+        axes.minorticks_off()
+        axes.grid(True, color="0.92", linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    handles, names = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     return figure
 
 

@@ -17,9 +17,7 @@ import re
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -31,8 +29,7 @@ from ii_core import IICamera, IIPicture, preset
 from ii_core.files import atomic_path, write_json
 from metrics import provenance, q_global
 from metrics.chart import COLOURS
-from raytrace_ii import Body, Scene, load_scene, render
-from raytrace_ii.texture import Image
+from raytrace_ii import Scene, load_scene, render
 
 ROOT = Path(__file__).parent.parent
 RESULTS, DOCS = ROOT / "benchmarks" / "results", ROOT / "docs"
@@ -46,7 +43,7 @@ FINER = 2.0  # how much finer the reference's shapes are cut
 CUTS = (0.25, 0.5, 1.0, FINER)
 TRUE = {"samples": 64, "depth": 12}
 SENSOR_DB = 47.5  # PSNR of the sensor's own noise of one 8-bit step
-BASE = 4  # samples at which depth, cut and features are compared
+BASE = 4  # samples at which depth and cut are compared
 
 
 def main() -> None:
@@ -98,8 +95,6 @@ def study(name: str, camera: IICamera) -> dict[str, Any]:
         "rows": rows,
         "front": (best := front(rows)),
         "recommended": recommended([rows[i] for i in best]),
-        "features": features(scene, camera, truth),
-        "least_depth": least_depth(scene, camera) if bounces else 0,
     }
 
 
@@ -191,71 +186,6 @@ def setting(row: dict[str, Any]) -> str:
     return how + (f", depth {row['depth']}" if row["depth"] else "") + (f", cut ×{row['cut']:g}" * (row["cut"] != 1))
 
 
-def features(scene: Scene, camera: IICamera, truth: IIPicture) -> list[dict[str, Any]]:
-    """What each thing costs in time and brings in dB at BASE samples: the picture with it against that without."""
-    whole, seconds = shoot(scene, camera, BASE)
-    quality = q_global(truth, whole)
-    rows: list[dict[str, Any]] = []
-
-    def add(name: str, without: IIPicture, spent: float | None) -> None:
-        row = {"feature": name, "time": None if spent is None else seconds / spent - 1}
-        rows.append({**row, "brings": quality - q_global(truth, without)})
-
-    if scene.lights:
-        with lights_unblocked(scene):
-            add("shadows", *shoot(scene, camera, BASE))
-    if scene.packed.mirrors or scene.packed.transmits:
-        add("reflection and refraction", *shoot(at_depth(scene, 0), camera, BASE))
-    if any(body.material.texture is not None for body in scene.bodies):
-        bare = [replace(b, material=replace(b.material, texture=None)) for b in scene.bodies]
-        add("textures", *shoot(replace(scene, bodies=bare), camera, BASE))
-    if any(isinstance(body.material.texture, Image) for body in scene.bodies):
-        nearest = replace(scene, bodies=[_unfiltered(body) for body in scene.bodies])
-        add("bilinear textures", shoot(nearest, camera, BASE)[0], None)  # without it the same kernel runs
-    if any(body.normals is not None for body in scene.bodies):
-        flat = replace(scene, bodies=[replace(body, normals=None) for body in scene.bodies])
-        add("smooth normals", *shoot(flat, camera, BASE))
-    add(f"{BASE} samples instead of 1", *shoot(scene, camera, 1))
-    return rows
-
-
-@contextmanager
-def lights_unblocked(scene: Scene) -> Iterator[None]:
-    """As if nothing cast a shadow: no shadow ray is traced."""
-    intersector = scene.packed.intersector
-    free = {"blocked": lambda o, d, reach: (np.full(len(o), -1, np.int32), 0.0)}
-    if scene.packed.transmits:
-        none = np.empty(0, np.float32)
-        free["nearest_clear"] = lambda o, d, reach: (
-            {"primID": np.full(len(o), -1, np.int32), "u": none, "v": none, "tfar": none}, 0.0,
-        )  # fmt: skip
-    for name, call in free.items():
-        setattr(intersector, name, call)
-    try:
-        yield
-    finally:
-        for name in free:
-            delattr(intersector, name)
-
-
-def _unfiltered(body: Body) -> Body:
-    """Texels repeated 8 × 8: bilinear interpolation is left on an eighth of their width alone."""
-    texture = body.material.texture
-    if not isinstance(texture, Image):
-        return body
-    blocks = replace(texture, pixels=texture.pixels.repeat(8, axis=0).repeat(8, axis=1))
-    return replace(body, material=replace(body.material, texture=blocks))
-
-
-def least_depth(scene: Scene, camera: IICamera) -> int:
-    """The smallest recursion depth whose picture differs from that of 12 by less than the sensor's noise."""
-    deep, _ = shoot(at_depth(scene, TRUE["depth"]), camera, BASE)
-    for depth in range(TRUE["depth"]):
-        if q_global(deep, shoot(at_depth(scene, depth), camera, BASE)[0]) >= SENSOR_DB:
-            return depth
-    return int(TRUE["depth"])
-
-
 SWEEPS = {"samples": "o", "adaptive": "D", "depth": "v", "cut": "s"}
 NAMES = {
     "samples": "1, 2, 4, 9, 16 samples", "adaptive": f"adaptive, {LEAST} to {MOST} samples",
@@ -324,7 +254,6 @@ def document(source: Path) -> None:
         ("samples", samples_table(data)),
         ("depth", depth_table(data)),
         ("cut", cut_table(data)),
-        ("features", features_table(data)),
         ("maps", maps_table(json.loads((RESULTS / "map_precision.json").read_text(encoding="utf-8")))),
     ):
         text = filled(text, mark, lines)
@@ -361,16 +290,16 @@ def samples_table(data: dict[str, Any]) -> list[str]:
 def depth_table(data: dict[str, Any]) -> list[str]:
     """Recursion depth at BASE samples: PSNR and time."""
     lines = [
-        "| scene | " + " | ".join(map(str, DEPTHS)) + " | the scene's | least that shows no difference |",
-        "|---" * (len(DEPTHS) + 3) + "|",
+        "| scene | " + " | ".join(map(str, DEPTHS)) + " | the scene's |",
+        "|---" * (len(DEPTHS) + 2) + "|",
     ]
     for name, one in data.items():
         if not one["bounces"]:
-            lines.append(f"| {name} |" + " |" * len(DEPTHS) + " nothing mirrors | 0 |")
+            lines.append(f"| {name} |" + " |" * len(DEPTHS) + " nothing mirrors |")
             continue
         at = {r["depth"]: r for r in one["rows"] if r["samples"] == BASE and r["sweep"] in ("samples", "depth")}
         cells = " | ".join(f"{at[d]['psnr']:.1f} dB, {at[d]['seconds']:.2f} s" for d in DEPTHS)
-        lines.append(f"| {name} | {cells} | {one['max_depth']} | {one['least_depth']} |")
+        lines.append(f"| {name} | {cells} | {one['max_depth']} |")
     return lines
 
 
@@ -385,21 +314,6 @@ def cut_table(data: dict[str, Any]) -> list[str]:
             rows = [r for r in one["rows"] if r["cut"] == cut and r["samples"] == BASE and r["error"] is None]
             (row,) = [r for r in rows if r["sweep"] in ("samples", "cut")]
             cells.append(f"{one['faces'][str(cut)] / 1e3:.0f} k faces, {row['psnr']:.1f} dB, {row['seconds']:.2f} s")
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return lines
-
-
-def features_table(data: dict[str, Any]) -> list[str]:
-    """Cost and gain of every feature, a column each."""
-    names = list(dict.fromkeys(row["feature"] for one in data.values() for row in one["features"]))
-    lines = ["| scene | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
-    for name, one in data.items():
-        has = {row["feature"]: row for row in one["features"]}
-        cells = []
-        for feature in names:
-            row = has.get(feature)
-            cost = "" if row is None or row["time"] is None else f", {100 * row['time']:+.0f} % time"
-            cells.append("none" if row is None else f"{row['brings']:+.1f} dB{cost}")
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return lines
 

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from trace_scenes import WHITE, body, floor, hall, sphere, sun
 
 from benchmarks import pareto
-from raytrace_ii import Scene, load_scene, trace
+from raytrace_ii import load_scene
 
 
 def row(seconds, psnr, **more):
@@ -32,19 +31,6 @@ def test_shapes_are_cut_as_often_as_asked():
     np.testing.assert_allclose(coarse.bounds_mm, fine.bounds_mm, atol=0.5)
     assert [b.name for b in coarse.bodies] == [b.name for b in fine.bodies]
     assert not pareto.sizes(pareto.scene_text("cuboid"))
-
-
-def test_without_shadows_all_is_lit_and_afterwards_none_the_less_shaded():
-    ball, ground = body(sphere(1), at=(0, 2, 5)), body(floor(), name="floor", colour=WHITE)
-    for scene in (Scene(bodies=[ball, ground], lights=[sun((0, 1, 0))]), hall()):
-        down = [(0, 0.5, 5)], [(0, -1.0, 0)]
-        shaded = trace(scene, *down).radiance
-        with pareto.lights_unblocked(scene):
-            assert (trace(scene, *down).radiance >= shaded).all()
-        np.testing.assert_array_equal(trace(scene, *down).radiance, shaded)
-    plain = Scene(bodies=[ball, ground], lights=[sun((0, 1, 0))])
-    with pareto.lights_unblocked(plain):
-        assert trace(plain, *down).radiance[0] == pytest.approx([1, 1, 1])
 
 
 def test_another_depth_shares_the_tree():

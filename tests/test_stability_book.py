@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.stability import __main__ as book
-from benchmarks.stability import geometry, light, picture
+from benchmarks.stability import curves, depth, geometry, light, picture
 from raytrace_ii.packing import LIFT
 
 
@@ -71,10 +71,45 @@ def test_tiny_pictures_are_coded_and_say_that_the_rate_was_missed():
         assert not row["refused"] and not row["said reached"] and row["got, bit/pixel"] > 0.33
 
 
+def test_the_rate_difference_is_right_about_what_is_shared_and_says_less_about_the_rest():
+    whole, half, little = (row for row in curves.bd_overlap() if row["curves share"] in (1, 0.5, 0.1))
+    assert half["at most"] < 1 < 10 < half["most"], (
+        "percentage points; the worst pair gains much more at its other end"
+    )
+    assert whole["given"] == half["given"] == f"{len(curves.pairs())} of {len(curves.pairs())}"
+    assert little["given"].startswith("0 of")
+
+
+def test_a_dent_moves_the_rate_until_it_is_refused():
+    rows = {row["point too low by, dB"]: row for row in curves.bd_dents()}
+    assert rows[0.0]["rate off, most"] == 0 < rows[0.1]["rate off, most"] < 2 < rows[1.0]["rate off, most"]
+    assert rows[3.0]["rate given"].startswith("0 of") and rows[3.0]["PSNR off, dB, most"] < 1
+
+
+def test_more_points_come_nearer():
+    rows = {row["points a curve"]: row["akima, most"] for row in curves.bd_points()}
+    assert rows[4] > rows[6] > rows[12] and rows[6] < 1
+
+
+def test_depth_from_focus_needs_texture_above_the_noise():
+    (none,) = depth.depth_contrast((0,))
+    assert none["robust, σ 0"] == none["dissertation, σ 0"] == 0 and none["dissertation, σ 1"] < 0.1
+    assert none["robust, σ 1, sure"] > 0.9 and none["robust, σ 1"] < 0.01, (
+        "sure of what is not there, as the page says"
+    )
+
+
+def test_a_mirrors_picture_takes_the_mirrors_depth():
+    (whole,) = depth.depth_two_layers((0.9,))
+    for kind in ("mirror", "clear"):
+        assert whole[f"{kind}, robust: wall"] < 0.05 and whole[f"{kind}, robust: behind"] > 0.95
+
+
 def test_tables_hold_every_row():
     rows = [{"a": 1, "b": name, "c": value} for name, value in (("x", 0.5), ("y", None))]
     assert book.table(rows) == ["| a | b | c |", "|---|---|---|", "| 1 | x | 0.5 |", "| 1 | y | – |"]
     assert book.table(rows, (("a",), "b", ("c",))) == ["| a | x: c | y |", "|---|---|---|", "| 1 | 0.5 | – |"]
+    assert book.table(rows, (("b",), "a", ("c",)))[0] == "| b | 1: c |", "columns of numbers"
 
 
 def test_every_case_has_its_place_on_the_page():

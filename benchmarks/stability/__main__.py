@@ -1,31 +1,27 @@
-"""Hunt for where methods fail: ``python -m benchmarks.stability``.
+"""Hunt for where methods fail: ``python -m benchmarks.stability [case ...]``.
 
-Every case sweeps one thing until it breaks. Numbers go to ``benchmarks/results/stability.json``, a chart and a strip
-of pictures beside it, and between the marks of ``docs/stability.md``, with those of ``benchmarks.convergence``.
+Every case sweeps one thing until it breaks; cases can be run one by one. Numbers go to
+``benchmarks/results/stability.json``, a chart and two strips of pictures beside it, and between the marks of
+``docs/stability.md``, with those of ``benchmarks.convergence``.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from benchmarks.analytic import still_life
 from benchmarks.readme import filled
-from benchmarks.stability import geometry, light, picture
+from benchmarks.stability import curves, depth, geometry, light, picture, pictures
 from benchmarks.stability.geometry import Row
 from ii_core.files import atomic_path, write_image, write_json
 from metrics import provenance
 from metrics.chart import COLOURS
-from raytrace_ii import Body, Scene, trace
-from raytrace_ii.shapes import rotation
+from metrics.focus import METHODS
 
 ROOT = Path(__file__).parent.parent.parent
 RESULTS, DOCS = ROOT / "benchmarks" / "results", ROOT / "docs"
@@ -35,7 +31,9 @@ CASES: dict[str, Callable[[], list[Row]]] = {
         geometry.lift, geometry.scales, geometry.coplanar, geometry.contact_shadow, geometry.bad_faces,
         geometry.huge_beside_tiny, light.terminator, light.grazing, light.camera_in_glass, light.camera_in_body,
         light.lamp_at_surface, light.bounces, picture.pitches, picture.view_borders, picture.rate_ends,
-        picture.tiny_frames, picture.quantised_maps, picture.depth_from_focus,
+        picture.tiny_frames, picture.quantised_maps, picture.map_bits, depth.depth_contrast, depth.depth_noise,
+        depth.depth_kinds, depth.depth_two_layers, depth.depth_highlight, curves.bd_overlap, curves.bd_dents,
+        curves.bd_points,
     )
 }  # fmt: skip
 # Tables with a column for every value of something: row heads, that column, and what a cell holds.
@@ -43,20 +41,32 @@ PIVOTS = {
     "rate_ends": (("asked, bit/pixel",), "scheme", ("got, bit/pixel", "PSNR, dB", "said reached")),
     "tiny_frames": (("lenses", "pixels a lens"), "scheme", ("got, bit/pixel", "PSNR, dB")),
     "quantised_maps": (("stored as",), "camera", ("direction off, µrad", "apples, dB", "cuboid, dB")),
-    "depth_from_focus": (("scene", "noise, steps"), "method", ("within one layer", "without depth")),
+    "depth_noise": (("scene",), "noise, steps", ("dissertation", "robust")),
+    "depth_kinds": (("seen", "pixels"), "noise, steps", ("dissertation", "robust")),
 }
 
 
 def main() -> None:
-    """Run every case, keep, draw, fill the page."""
-    cases = {}
-    for name, case in CASES.items():
-        started = time.perf_counter()
-        cases[name] = case()
-        print(f"{name}: {time.perf_counter() - started:.0f} s", flush=True)
+    """Run every case or those asked for, keep, draw, fill the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", metavar="case", help=f"all, or some of: {', '.join(CASES)}")
+    asked = parser.parse_args().cases or list(CASES)
+    if unknown := set(asked) - set(CASES):
+        parser.error(f"unknown case {', '.join(sorted(unknown))}: known are {', '.join(CASES)}")
     path = RESULTS / "stability.json"
-    write_json(path, {**provenance(), "cases": cases})
-    write_image(RESULTS / "stability_pictures.png", strip())
+    kept = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    cases, origin = kept.get("cases", {}), kept.get("measured", {})
+    for name in asked:
+        started = time.perf_counter()
+        cases[name], origin[name] = CASES[name](), provenance()["git"]
+        print(f"{name}: {time.perf_counter() - started:.0f} s", flush=True)
+    cases = {name: cases[name] for name in CASES if name in cases}
+    write_json(path, {**provenance(), "measured": origin, "cases": cases})
+    write_image(RESULTS / "stability_pictures.png", pictures.rendering())
+    write_image(RESULTS / "stability_pictures_2.png", pictures.coding_and_depth())
+    if missing := set(CASES) - set(cases):
+        print(f"the page waits for {', '.join(sorted(missing))}")
+        return
     chart(path, path.with_suffix(".png"))
     document(path)
 
@@ -64,7 +74,7 @@ def main() -> None:
 def document(path: Path) -> None:
     """Fill ``docs/stability.md`` from what is kept."""
     cases = json.loads(path.read_text(encoding="utf-8"))["cases"]
-    for name in ("stability.png", "stability_pictures.png", "convergence.png"):
+    for name in ("stability.png", "stability_pictures.png", "stability_pictures_2.png", "convergence.png"):
         shutil.copy(RESULTS / name, DOCS / "images" / name)
     page = DOCS / "stability.md"
     text = page.read_text(encoding="utf-8")
@@ -108,7 +118,11 @@ def table(rows: list[Row], pivot: Any = None) -> list[str]:
             cell = " · ".join(number(row[key]) for key in shown)
             grid.setdefault(tuple(row[key] for key in index), {})[row[column]] = cell
         body = [[*map(number, key), *(cells.get(name, "") for name in columns)] for key, cells in grid.items()]
-    return [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|", *(f"| {' | '.join(cells)} |" for cells in body)]
+    return [
+        f"| {' | '.join(map(str, heads))} |",
+        "|---" * len(heads) + "|",
+        *(f"| {' | '.join(row)} |" for row in body),
+    ]
 
 
 def number(value: Any) -> str:
@@ -122,42 +136,6 @@ def number(value: Any) -> str:
     return str(value)
 
 
-def strip() -> NDArray[np.uint8]:
-    """Six small pictures of what goes wrong, from left to right; the page says what they are."""
-    corners = np.array([[-1.5, -1.5, 0], [1.5, -1.5, 0], [1.5, 1.5, 0], [-1.5, 1.5, 0.0]]) @ rotation((17, 29, 5)).T
-    away = rotation((17, 29, 5)) @ [0, 0, 1]
-    red, blue = (replace(geometry.WHITE, colour=colour) for colour in ((0.8, 0.1, 0.1), (0.1, 0.2, 0.8)))
-
-    def walls(gap: float) -> Scene:
-        faces = np.array([[0, 2, 1], [0, 3, 2]])
-        both = [
-            Body(name="wall", vertices=corners + np.array([0, 0, 10]) + by * away, faces=faces, material=material)
-            for by, material in ((10 * gap, red), (0.0, blue))
-        ]
-        return Scene(bodies=both, ambient=(1, 1, 1))
-
-    still, generator = still_life().scene(96), np.random.default_rng(0)
-    scenes = [light.terminator_scene(12), light.terminator_scene(48), walls(6e-8), walls(1e-7)]
-    pictures = [_seen(scene, (0, 0, 10), 0.16) for scene in scenes]
-    for change in (geometry._turned, geometry._missing):
-        broken = [
-            replace(b, faces=change(np.asarray(b.faces), 0.1, generator)) if b.name == "glass" else b
-            for b in still.bodies
-        ]
-        pictures.append(_seen(replace(still, bodies=broken), (4, -4, 26), 0.2))
-    gap = np.full((pictures[0].shape[0], 6, 3), 255, np.uint8)
-    return np.concatenate([part for one in pictures for part in (one, gap)][:-1], axis=1)
-
-
-def _seen(scene: Scene, towards: tuple[float, float, float], half: float, size: int = 200) -> NDArray[np.uint8]:
-    """A pinhole's picture from the origin, 8-bit sRGB."""
-    across = (np.arange(size) + 0.5) / size * 2 - 1
-    x, y = np.meshgrid(across, -across)
-    d = np.stack([x * half, y * half, np.ones_like(x)], axis=-1) + np.asarray(towards) / towards[2] - [0, 0, 1]
-    seen = np.clip(trace(scene, np.zeros_like(d), d).radiance.reshape(size, size, 3), 0, 1)
-    return np.rint(255 * np.where(seen < 0.0031308, 12.92 * seen, 1.055 * seen ** (1 / 2.4) - 0.055)).astype(np.uint8)
-
-
 # What the chart shows: case, across, up, logarithmic, title.
 PANELS: list[tuple[str, str, list[str], str, str]] = [
     ("lift", "lift", ["0 radii off", "10 radii off", "1000 radii off"], "x", "lit points that a ball shades itself"),
@@ -168,6 +146,32 @@ PANELS: list[tuple[str, str, list[str], str, str]] = [
     ("terminator", "segments", ["band, degrees"], "xy", "dark band at the shadow terminator"),
     ("grazing", "angle, rad", ["place off by, mm"], "xy", "hits at grazing angles, mm off"),
     ("view_borders", "of half the viewing angle", ["PSNR of linear light, dB"], "", "views from aside, dB"),
+    ("bounces", "depth", ["light missing"], "y", "light missing in a room of mirrors"),
+    ("pitches", "pixels a lens", ["PSNR, dB"], "", "resampled lenses, dB"),
+    ("map_bits", "bits", ["apples, dB", "cuboid, dB"], "", "stored directions, dB"),
+    (
+        "depth_contrast",
+        "contrast, steps",
+        [f"{method}, σ {sigma}" for method in METHODS for sigma in (0, 1)],
+        "x",
+        "depth of a wall found, share",
+    ),
+    (
+        "depth_two_layers",
+        "of the light from behind",
+        [f"mirror, robust: {what}" for what in ("wall", "behind")],
+        "",
+        "depth in a half mirror, share",
+    ),
+    ("depth_highlight", "strength", ["dissertation", "robust"], "", "depth under a highlight, share"),
+    (
+        "bd_overlap",
+        "curves share",
+        ["off the whole curves', median", "off what they share, median"],
+        "y",
+        "BD-rate of curves cut apart, % off",
+    ),
+    ("bd_points", "points a curve", ["akima, most", "cubic, most"], "y", "BD-rate by points, % off"),
 ]
 
 
@@ -177,16 +181,16 @@ def chart(source: Path, target: Path) -> None:
     from matplotlib.figure import Figure
 
     cases = json.loads(source.read_text(encoding="utf-8"))["cases"]
-    figure = Figure(figsize=(14, 6), layout="constrained")
+    figure = Figure(figsize=(14, 11.5), layout="constrained")
     FigureCanvasAgg(figure)
-    for axes, (case, across, names, logarithmic, title) in zip(figure.subplots(2, 4).flat, PANELS, strict=True):
+    for axes, (case, across, names, logarithmic, title) in zip(figure.subplots(4, 4).flat, PANELS, strict=True):
         rows = [row for row in cases[case] if row[across] is not None]
         smallest = min(row[across] for row in rows if row[across] > 0)
         for i, name in enumerate(names):
             chosen = [row for row in rows if row.get(name) is not None]
             # a logarithmic axis has no 0: it stands a third of a decade before the rest
             x = [row[across] if row[across] > 0 or "x" not in logarithmic else smallest / 3 for row in chosen]
-            axes.plot(x, [row[name] for row in chosen], "os^"[i] + "-", color=COLOURS[i], markersize=5, label=name)
+            axes.plot(x, [row[name] for row in chosen], "os^D"[i] + "-", color=COLOURS[i], markersize=5, label=name)
         if "x" in logarithmic:
             axes.set_xscale("log")
         if "y" in logarithmic:

@@ -32,17 +32,33 @@ def quantised_maps() -> list[Row]:
     ]  # fmt: skip
 
 
-def depth_from_focus() -> list[Row]:
-    """What `benchmarks.depth_truth` measured: share of pixels right within a layer, by what is looked at."""
-    rows = _kept("depth_truth.json")["rows"]
-    return [
-        {
-            "scene": row["scene"], "noise, steps": row["noise"], "method": row["method"],
-            "within one layer": row["within_one_layer"], "median error, layers": _finite(row["median_layers"]),
-            "without depth": row["without_depth"],
-        }
-        for row in rows if row["scale"] == 8
-    ]  # fmt: skip
+def map_bits() -> list[Row]:
+    """Unit directions of so many bits a component, over −1…1: what the picture loses."""
+    camera = preset("setup1", scale=16)
+    L, D = camera.rays()
+    scenes = {name: load_scene(name) for name in ("apples", "cuboid")}
+    exact = {name: _srgb(trace(scene, L, D).radiance) for name, scene in scenes.items()}
+    D = _unit(D)
+    rows = []
+    for bits in (6, 8, 10, 12, 14, 16, 20):
+        step = 2 / (2**bits - 1)
+        coarse = step * np.rint((D + 1) / step) - 1
+        off = np.linalg.norm(np.cross(D, _unit(coarse)), axis=-1).max()
+        row: Row = {"bits": bits, "direction off, µrad": float(1e6 * off)}
+        for name, scene in scenes.items():
+            mse = float(np.mean((_srgb(trace(scene, L, coarse).radiance) - exact[name]) ** 2))
+            row[f"{name}, dB"] = float(-10 * np.log10(mse)) if mse > 0 else None
+        rows.append(row)
+    return rows
+
+
+def _unit(vectors: Any) -> Any:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _srgb(light: Any) -> Any:
+    c = np.clip(light.astype(np.float64), 0, 1)
+    return np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
 
 
 def _kept(name: str) -> Any:

@@ -1,0 +1,165 @@
+"""Where depth from focus fails: less to see than noise, two things in one line, highlights that wander."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.stability.geometry import Row
+from ii_core import IIPicture, add_sensor_noise, preset
+from metrics import FocusDepth, depth_from_focus
+from metrics.focus import METHODS
+from raytrace_ii import Body, Light, Material, Scene, render
+from raytrace_ii.texture import Image, linear
+
+RESULTS = Path(__file__).parent.parent / "results"
+CAMERA = preset("setup1", scale=8)
+LAYER, BEHIND = 20, 60  # of the wall, and of what is seen in or through it; of 250
+SHARES = (0.0, 0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0)
+KINDS = ("textured", "flat", "edge", "mirror", "clear")
+
+
+def wall(layer: float, steps: float, seed: int = 0, facing: float = 1.0, **material: Any) -> Body:
+    """A wall on one layer, before the camera or, ``facing`` −1, behind it, of random grey blots.
+
+    ``steps`` of 8-bit sRGB stand between the darkest and the brightest of them, about the middle grey.
+    """
+    z = layer * CAMERA.gap_mm
+    half = 2 * z  # more than is seen
+    corners = np.array(
+        [[-half, -half, facing * z], [half, -half, facing * z], [half, half, facing * z], [-half, half, facing * z]]
+    )
+    cells = round(2 * half / (2 * z * CAMERA.pixel_pitch_mm / CAMERA.gap_mm))  # two of a lens's pixels each
+    codes = 127.5 + steps * (np.random.default_rng(seed).random((cells, cells, 1)) - 0.5)
+    texture = Image(np.repeat(linear(codes / 255), 3, axis=2).astype(np.float32))
+    return Body(
+        name="wall", vertices=corners, faces=np.array([[0, 2, 1], [0, 3, 2]]),
+        texture_coordinates=np.column_stack([(corners[:, :2] + half) / (2 * half), np.zeros(4)]),
+        material=Material(colour=(1.0, 1.0, 1.0), texture=texture, **material),
+    )  # fmt: skip
+
+
+def seen(*bodies: Body, lights: tuple[Light, ...] = (), ambient: float = 1.0) -> IIPicture:
+    scene = Scene(bodies=list(bodies), lights=lights, ambient=(ambient,) * 3)
+    return render(scene, CAMERA, samples=4, support=()).picture
+
+
+def depth_contrast(sizes: tuple[float, ...] = (0, 1, 2, 4, 8, 16, 32, 64, 128)) -> list[Row]:
+    """A wall of ever less contrast under ever more noise: share of pixels within a tenth of its depth."""
+    rows = []
+    for steps in sizes:
+        sharp = seen(wall(LAYER, steps))
+        row: Row = {"contrast, steps": steps}
+        for method in METHODS:
+            for sigma in (0, 1, 4):
+                found = depth_from_focus(add_sensor_noise(sharp, sigma, seed=1), method=method)
+                row[f"{method}, σ {sigma}"] = near(found, LAYER)
+                if sigma == 1:
+                    row[f"{method}, σ 1, sure"] = float((found.confidence > 0.5).mean())
+        rows.append(row)
+    return rows
+
+
+def near(found: FocusDepth, layer: int) -> float:
+    """Share of pixels within a tenth of a layer's depth."""
+    z = layer * CAMERA.gap_mm
+    with np.errstate(invalid="ignore"):
+        return float((np.abs(found.depth_mm - z) < 0.1 * z).mean())
+
+
+def depth_two_layers(shares: tuple[float, ...] = SHARES) -> list[Row]:
+    """A wall that is ever more a mirror, or ever clearer: where what is seen in it takes its depth.
+
+    The mirror shows a wall behind the camera, which appears as far behind the mirror as it stands before it; the
+    clear one bends nothing. Both walls have the same contrast.
+    """
+    rows = []
+    for share in shares:
+        row: Row = {"of the light from behind": share}
+        kinds = {
+            "mirror": (wall(LAYER, 128, mirror=(share,) * 3), mirrored()),
+            "clear": (wall(LAYER, 128, transmission=(share,) * 3, ior=1.0), wall(BEHIND, 128, seed=1)),
+        }
+        for kind, bodies in kinds.items():
+            picture = seen(*bodies)
+            for method in METHODS:
+                found = depth_from_focus(picture, method=method)
+                row[f"{kind}, {method}: wall"] = near(found, LAYER)
+                row[f"{kind}, {method}: behind"] = near(found, BEHIND)
+        rows.append(row)
+    return rows
+
+
+def mirrored() -> Body:
+    """The wall behind the camera that a mirror on LAYER shows on the layer BEHIND."""
+    return wall(BEHIND - 2 * LAYER, 128, seed=1, facing=-1.0)
+
+
+def depth_highlight() -> list[Row]:
+    """A wall of little contrast with a highlight that every lens sees elsewhere, ever stronger."""
+    lamp = Light(kind="point", vector=(6.0, 4.0, -20.0), colour=(1.0, 1.0, 1.0))
+    rows = []
+    plain = wall(LAYER, 16)
+    for strength in (0.0, 0.125, 0.25, 0.5, 1.0, 2.0):
+        shiny = replace(plain, material=replace(plain.material, specular=strength, shininess=400.0))
+        picture = seen(shiny, lights=(lamp,), ambient=0.2)
+        without = seen(plain, lights=(lamp,), ambient=0.2)
+        row: Row = {
+            "strength": strength,
+            "pixels brighter": float((picture.pixels != without.pixels).any(axis=2).mean()),
+        }
+        for method in METHODS:
+            row[method] = near(depth_from_focus(picture, method=method), LAYER)
+        rows.append(row)
+    return rows
+
+
+def depth_noise() -> list[Row]:
+    """What `benchmarks.depth_truth` measured: pixels within a tenth of their depth, over noise, scene by scene."""
+    rows = [row for row in _kept() if row["scale"] == 8]
+    return [
+        {
+            "scene": scene,
+            "noise, steps": noise,
+            **{method: _only(rows, scene, noise, method)["within_10_%"] for method in METHODS},
+        }
+        for scene in dict.fromkeys(row["scene"] for row in rows)
+        for noise in sorted({row["noise"] for row in rows})
+    ]
+
+
+def depth_kinds() -> list[Row]:
+    """The same by what is seen, over all scenes."""
+    rows = [row for row in _kept() if row["scale"] == 8]
+    out = []
+    for kind in KINDS:
+        for noise in sorted({row["noise"] for row in rows}):
+            cells = {}
+            for method in METHODS:
+                held = [
+                    row for row in rows if (row["noise"], row["method"]) == (noise, method) and row[f"pixels_{kind}"]
+                ]
+                pixels = sum(row[f"pixels_{kind}"] for row in held)
+                cells[method] = sum(row[f"pixels_{kind}"] * row[f"within_10_%_{kind}"] for row in held) / pixels
+            out.append({"seen": kind, "pixels": pixels, "noise, steps": noise, **cells})
+    return out
+
+
+def _kept() -> list[dict[str, Any]]:
+    return list(json.loads((RESULTS / "depth_truth.json").read_text(encoding="utf-8"))["rows"])
+
+
+def _only(rows: list[dict[str, Any]], scene: str, noise: float, method: str) -> dict[str, Any]:
+    (row,) = (r for r in rows if (r["scene"], r["noise"], r["method"]) == (scene, noise, method))
+    return row
+
+
+def shown(found: FocusDepth) -> NDArray[np.uint8]:
+    """A depth map as grey levels, near bright, none black."""
+    z = found.layer + 1.0
+    return np.where(found.layer < 0, 0, np.clip(300 - 55 * np.log(np.maximum(z, 1)), 20, 255)).astype(np.uint8)
