@@ -33,7 +33,7 @@ def main() -> None:
     PAGE.write_text(text, encoding="utf-8")
     for picture in (RESULTS / "coders.png", DOCS / "images" / "coders.png"):
         chart(coders["rows"], coders["scale"], picture)
-    fill(SPEED, "coding", [size, "", *front_table(coders["rows"])])
+    fill(SPEED, "coding", [size(coders), "", *front_table(coders["rows"])])
 
 
 def front_table(rows: list[dict[str, Any]]) -> list[str]:

@@ -1,9 +1,11 @@
 """The bookkeeping of speed against accuracy; its figures come from `benchmarks.pareto` itself."""
 
+import json
+
 import numpy as np
 import pytest
 
-from benchmarks import pareto
+from benchmarks import coding_docs, metrics_speed, pareto
 from raytrace_ii import load_scene
 
 
@@ -36,3 +38,15 @@ def test_shapes_are_cut_as_often_as_asked():
 def test_another_depth_shares_the_tree():
     scene = load_scene("objects")
     assert pareto.at_depth(scene, 2).packed is scene.packed and pareto.at_depth(scene, 2).max_depth == 2
+
+
+def test_coding_and_evaluation_on_the_page_are_what_was_measured():
+    page = (pareto.DOCS / "speed_accuracy.md").read_text(encoding="utf-8")
+    coders = json.loads((pareto.RESULTS / "coders.json").read_text(encoding="utf-8"))
+    depth = json.loads(metrics_speed.RESULTS.read_text(encoding="utf-8"))
+    for mark, lines in (
+        ("coding", [coding_docs.size(coders), "", *coding_docs.front_table(coders["rows"])]),
+        ("evaluation", metrics_speed.front_table(depth)),
+    ):
+        assert page == pareto.filled(page, mark, ["", *lines]) or page == pareto.filled(page, mark, lines), mark
+        assert sum("**" in line for line in lines) >= 1, "one is recommended"
