@@ -77,6 +77,8 @@ def tables(results: Results, last: Mapping[str, Mapping[str, Any]]) -> dict[str,
         "table-types": types_beside(results),
         "framing": framing_table(results),
         "search": search_table(results),
+        "types-2008": table_2008(results),
+        "times-by-rate": time_table(results),
         "artefact-rates": artefact_table(results),
         "bjontegaard": bjontegaard(json.loads(CODERS.read_text(encoding="utf-8"))) if CODERS.exists() else [],
         "records": record_table(last),
@@ -153,6 +155,34 @@ def search_table(results: Results) -> list[str]:
                 for row in own
             ]
             lines.append(f"| {scene} | {search} | " + " | ".join(cells).replace("-", "−") + " |")
+    return lines
+
+
+def table_2008(results: Results) -> list[str]:
+    """What B pictures bring with x264 as it is and as it was."""
+    if "types-2008" not in results:
+        return []
+    lines = ["| x264 set as | | " + " | ".join(f"I{'B' * n}P" for n in BFRAMES[1:]) + " |", "|---" * 5 + "|"]
+    return lines + [
+        f"| {row['set']} | {row['b']} | " + " | ".join(shown(value, "+.2f") for value in row["db"]) + " |"
+        for row in results["types-2008"]["rows"]
+    ]
+
+
+def time_table(results: Results) -> list[str]:
+    """CPU seconds by rate of SI-PVS and JPEG 2000: encoding, decoding."""
+    made = of_scenes(results, "rates")
+    if not made:
+        return []
+    points = next(iter(made.values()))["points"]
+    rates = sorted({p["target_bpp"] for p in points if p["scheme"] == REFERENCE})
+    lines = ["| | " + " | ".join(f"{rate:g} bpp" for rate in rates) + " |", "|---" * (len(rates) + 1) + "|"]
+    for scheme in (SI, REFERENCE):
+        own = {p["target_bpp"]: p for p in points if p["scheme"] == scheme}
+        cells = [
+            f"{own[r]['encode_seconds']:.2f} · {own[r]['decode_seconds']:.2f}" if r in own else "" for r in rates
+        ]
+        lines.append(f"| {LABELS[scheme]} | " + " | ".join(cells) + " |")
     return lines
 
 

@@ -1,9 +1,10 @@
-"""Tests of why numbers are not the dissertation's: how a stream is framed, how motion is searched."""
+"""Tests of why numbers are not the dissertation's: how streams are framed, motion is searched, x264 was set in 2008."""
 
 from __future__ import annotations
 
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,16 @@ import av
 import numpy as np
 
 from benchmarks.bare import bare_encoder
+from benchmarks.bframes import QUANTISERS, curve
+from codec import register, schemes
+from codec.base import Options
+from codec.sequence import Film
+from codec.video import Settings
+from codec.x264 import H264
+from metrics import bd_psnr
 
 from .coding import CODED, shot
-from .rates import RANGES, SI
+from .rates import BFRAMES, RANGES, SI
 from .runner import Step
 
 FRAMES = 4096
@@ -35,7 +43,25 @@ def steps(scale: int) -> list[Step]:
         )
         for scene in ("apples", "twins")
     ]
-    return [Step(name="framing", shows="the lowest rate of EI-PVS in Figure 5.10", run=framing), *searched]
+    uses = (*CODED, "benchmarks.bframes")
+    given = {"scene": "apples", "scale": scale}
+    return [
+        Step(name="framing", shows="the lowest rate of EI-PVS in Figure 5.10", run=framing),
+        *searched,
+        Step(name="types-2008", shows="Table 5.5, x264 set as in 2008", run=types_2008, parameters=given, uses=uses),
+    ]
+
+
+class H264of2008(H264):
+    """x264 with what it could do, and did unasked, at the beginning of 2008."""
+
+    SET = "ref=1:subme=5:trellis=0:8x8dct=0:mixed-refs=0:aq-mode=0:weightb=0"
+
+    def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
+        """One reference, no trellis, no 8×8 transform, no adaptive quantiser, hexagonal search."""
+        settings = super().constant(quantiser, film, options)
+        parameters = settings.parameters["x264-params"].replace("me=umh", "me=hex") + f":{self.SET}"
+        return replace(settings, parameters={**settings.parameters, "x264-params": parameters})
 
 
 def framing(_folder: Path) -> dict[str, Any]:
@@ -77,4 +103,18 @@ def searches(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
             started = time.thread_time()
             size = encode()
             rows.append({"search": search, "range": reach, "bytes": size, "seconds": time.thread_time() - started})
+    return {"rows": rows}
+
+
+def types_2008(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
+    """Bjøntegaard difference in dB of one, two and three B pictures to none, at constant quantisers."""
+    if "si-h264of2008" not in schemes():
+        register(H264of2008("si"))
+    picture = shot(scene, "setup1", scale).picture
+    goals = [{"qp": quantiser} for quantiser in QUANTISERS]
+    rows = []
+    for what, scheme in (("today", "si-h264"), ("2008", "si-h264of2008")):
+        for fine, more in (("B coarser by 1.3", ""), ("B as fine as P", ",pbratio=1")):
+            curves = [curve(picture, f"{scheme}:rate=cq,chroma=420{more}", count, goals) for count in BFRAMES]
+            rows.append({"set": what, "b": fine, "db": [bd_psnr(*curves[0], *one) for one in curves[1:]]})
     return {"rows": rows}

@@ -30,6 +30,7 @@ ARTEFACT_RATE = 0.15  # bit per pixel
 EQUAL_DB = 28.0
 TRIES = 6
 CLOSE_DB = 0.05
+PANEL = 256  # pixels across
 USES = (*CODED, "benchmarks.study.sheets")
 
 
@@ -40,13 +41,13 @@ def steps(scale: int) -> list[Step]:
     for figure, scene in enumerate(SCENES, 15):
         for name, shows, run, parameters in (
             ("views", "Figures 5.19, 5.22, 5.23", over_rate, {"schemes": (*SHOWN, *BEYOND)}),
-            ("artefacts", f"Figure 5.{figure}", artefacts, {"camera": "setup3", "crop": None, "zoom": 4}),
+            ("artefacts", f"Figure 5.{figure}", artefacts, {"camera": "setup3", "crop": None}),
             ("equal", "Figures 4.5, 4.6, 5.20, 5.21", equal, {"schemes": SHOWN}),
         ):
             given = {"scene": scene, "scale": small, **parameters}
             shown = f"{shows}, {scene}"
             found.append(Step(name=f"{name}-{scene}", shows=shown, run=run, parameters=given, uses=USES))
-    given = {"scene": "apples", "scale": scale, "camera": "setup1", "crop": 3, "zoom": 2}
+    given = {"scene": "apples", "scale": scale, "camera": "setup1", "crop": 2}
     shown = "Figures 5.13, 5.14"
     return [*found, Step(name="artefacts-setup1", shows=shown, run=artefacts, parameters=given, uses=USES)]
 
@@ -62,7 +63,7 @@ def over_rate(_folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]
     return {"points": points, "depth_mm": rounded(depth_mm)}
 
 
-def artefacts(folder: Path, *, scene: str, scale: int, camera: str, crop: int | None, zoom: int) -> dict[str, Any]:
+def artefacts(folder: Path, *, scene: str, scale: int, camera: str, crop: int | None) -> dict[str, Any]:
     """Front views coded at one rate, and how they differ from the uncoded one: white is no difference.
 
     ``crop`` is the part of the view that is shown, one in so many each way around the middle.
@@ -75,8 +76,7 @@ def artefacts(folder: Path, *, scene: str, scale: int, camera: str, crop: int | 
     apart = [255 - np.abs(view.astype(np.int16) - views[0]).astype(np.uint8) for view in views]
     name = "artefacts-setup1" if camera == "setup1" else f"artefacts-{scene}"
     for kind, images in (("views", views), ("differences", apart)):
-        shown = [enlarged(middle(image, crop), zoom) for image in images]
-        write_image(folder / f"{name}_{kind}.png", sheet(shown, 3))
+        write_image(folder / f"{name}_{kind}.png", sheet([large(middle(image, crop)) for image in images], 3))
     points = [
         {
             "scheme": scheme,
@@ -98,7 +98,7 @@ def equal(folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> 
     with ThreadPoolExecutor(cores()) as pool:
         found = list(pool.map(lambda scheme: at_quality(made.picture, scheme, EQUAL_DB), schemes))
     views = [front(made.picture), *(front(decoded) for _, decoded in found)]
-    write_image(folder / f"equal-{scene}_views.png", sheet([enlarged(view, 4) for view in views], 3))
+    write_image(folder / f"equal-{scene}_views.png", sheet([large(view) for view in views], 3))
     rows = [judged(made, decoded, coded) | {"scheme": s} for s, (coded, decoded) in zip(schemes, found, strict=True)]
     degrees, _ = angle_axes(made.picture.camera)
     layers = q_depth(made.picture, made.picture, depth=made.depth)
@@ -175,6 +175,11 @@ def middle(image: NDArray[Any], part: int | None) -> NDArray[Any]:
     (height, width) = (n // part for n in image.shape[:2])
     top, left = (image.shape[0] - height) // 2, (image.shape[1] - width) // 2
     return image[top : top + height, left : left + width]
+
+
+def large(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """As large as a panel of a sheet takes."""
+    return enlarged(image, max(1, PANEL // image.shape[1]))
 
 
 def rounded(values: list[float]) -> list[float]:
