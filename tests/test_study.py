@@ -6,9 +6,10 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.readme import filled
 from benchmarks.study import claims, theirs
 from benchmarks.study.__main__ import main
-from benchmarks.study.page import PAGE, publish, tables
+from benchmarks.study.page import PAGE, largest, publish, tables
 from benchmarks.study.runner import Step, code_of, known, perform, records, timeless
 from benchmarks.study.scripts import SCRIPTS
 from benchmarks.study.steps import all_steps
@@ -83,7 +84,7 @@ def test_a_small_study_resumes_repeats_and_fills_the_page(tmp_path, capsys):
     differences = read_image(tmp_path / "out" / "artefacts-setup1_differences.png")
     assert differences.std() > 1 and (differences[:10, :20] == 255).all()  # the uncoded view, by itself
     page = tmp_path / "study.md"
-    page.write_text("".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in tables({}, {})))
+    page.write_text("".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in [*tables({}, {}), "gain-by-size"]))
     for _ in range(2):  # published again, nothing is kept twice
         publish(tmp_path / "out", page=page, images=tmp_path / "images", kept=tmp_path / "kept")
         lines = (tmp_path / "kept" / "floors.jsonl").read_text().splitlines()
@@ -93,6 +94,18 @@ def test_a_small_study_resumes_repeats_and_fills_the_page(tmp_path, capsys):
         "| Fig. 5.10 | lowest rate of a black picture, bpp | EI-PVS 0.63 | EI-PVS 0.31 |  |  | no |"
         in page.read_text()
     )
+
+
+def test_a_small_study_does_not_replace_a_large_one():
+    some = [{"parameters": {"scale": scale}, "when": when} for when, scale in enumerate((2, 1, 1, 16))]
+    assert largest(some)["when"] == 2
+    assert largest([{"parameters": {}, "when": 0}, {"parameters": {}, "when": 1}])["when"] == 1
+
+
+def test_the_page_has_a_place_for_every_table():
+    text = PAGE.read_text(encoding="utf-8")
+    for mark in [*tables({}, {}), "gain-by-size", "gain"]:
+        assert filled(text, mark, ["| new |"]).count("| new |") == 1
 
 
 def test_steps_have_names_of_their_own_and_code_that_is_there():

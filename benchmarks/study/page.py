@@ -16,7 +16,7 @@ from metrics.rd import UndefinedDifference
 
 from . import theirs
 from .charts import LABELS, draw_all
-from .claims import Claim, Results, claims, of_scenes, shown, type_table
+from .claims import Claim, Results, claims, gain, of_scenes, shown, type_table
 from .coding import SCENES
 from .rates import BFRAMES, GOPS, MODERN, PVS, RANGES, REFERENCE, SI, VOLUME
 from .runner import ROOT, records
@@ -45,11 +45,12 @@ def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Pat
         keep(path, kept / path.name)
     for path in sorted(folder.glob("*.png")):
         shutil.copy(path, images / path.name)
-    last = {path.stem: records(kept, path.stem)[-1] for path in sorted(kept.glob("*.jsonl"))}
-    results = {name: record["result"] for name, record in last.items()}
+    everything = {path.stem: records(kept, path.stem) for path in sorted(kept.glob("*.jsonl"))}
+    best = {name: largest(some) for name, some in everything.items()}
+    results = {name: record["result"] for name, record in best.items()}
     draw_all(results, images)
     text = page.read_text(encoding="utf-8")
-    for mark, lines in tables(results, last).items():
+    for mark, lines in {**tables(results, best), "gain-by-size": sizes(everything)}.items():
         text = filled(text, mark, lines)
     with atomic_path(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -63,7 +64,29 @@ def keep(new: Path, old: Path) -> None:
         temporary.write_text("".join(f"{line}\n" for line in [*there, *lines]), encoding="utf-8")
 
 
-def tables(results: Results, last: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
+def largest(some: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Of all records of a step the last one of the largest pictures: a small study does not replace a large one."""
+    scales = [record["parameters"].get("scale", 1) for record in some]
+    return [record for record, scale in zip(some, scales, strict=True) if scale == min(scales)][-1]
+
+
+def sizes(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
+    """Gain of SI-PVS over JPEG 2000 by number of lenses, from all sizes that were ever measured."""
+    found: dict[tuple[str, int], str] = {}
+    for scene in SCENES:
+        for record in everything.get(f"rates-{scene}", ()):
+            points = record["result"]["points"]
+            pair = (gain(points, scheme, REFERENCE) for scheme in (SI, "si-h264"))
+            found[scene, record["parameters"]["scale"]] = " · ".join(shown(value, "+.1f") for value in pair)
+    scales = sorted({scale for _, scale in found}, reverse=True)
+    lines = ["| lenses | " + " | ".join(SCENES) + " |", "|---" * (len(SCENES) + 1) + "|"]
+    for scale in scales:
+        cells = [found.get((scene, scale), "") for scene in SCENES]
+        lines.append(f"| {512 // scale}×{256 // scale} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
     """Lines for each mark of the page."""
     made = claims(results)
     parts = {
@@ -81,7 +104,7 @@ def tables(results: Results, last: Mapping[str, Mapping[str, Any]]) -> dict[str,
         "times-by-rate": time_table(results),
         "artefact-rates": artefact_table(results),
         "bjontegaard": bjontegaard(json.loads(CODERS.read_text(encoding="utf-8"))) if CODERS.exists() else [],
-        "records": record_table(last),
+        "records": record_table(best),
     }
 
 
@@ -262,10 +285,10 @@ def gain_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float
         return "–"
 
 
-def record_table(last: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def record_table(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Where the numbers come from: step, scale, commit, time."""
     lines = ["| step | shows | scale | commit | seconds | again |", "|---|---|---|---|---|---|"]
-    for name, record in last.items():
+    for name, record in best.items():
         git = record["git"] or {"commit": "none", "dirty": False}
         commit = git["commit"][:10] + (", dirty" if git["dirty"] else "")
         again = {True: "the same to the bit", False: "**not the same**", None: ""}[record.get("repeats")]

@@ -1,4 +1,4 @@
-"""Tests of why numbers are not the dissertation's: how streams are framed, motion is searched, x264 was set in 2008."""
+"""Tests of why numbers are not the dissertation's: framing, search for motion, x264 set as in 2008."""
 
 from __future__ import annotations
 
