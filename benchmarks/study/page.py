@@ -287,11 +287,14 @@ def gain_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float
 
 def record_table(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Where the numbers come from: step, scale, commit, time."""
-    lines = ["| step | shows | scale | commit | seconds | again |", "|---|---|---|---|---|---|"]
+    lines = ["| step | shows | scale | commit | CPU s | again |", "|---|---|---|---|---|---|"]
     for name, record in best.items():
         git = record["git"] or {"commit": "none", "dirty": False}
         commit = git["commit"][:10] + (", dirty" if git["dirty"] else "")
         again = {True: "the same to the bit", False: "**not the same**", None: ""}[record.get("repeats")]
         scale = record["parameters"].get("scale", "")
-        lines.append(f"| `{name}` | {record['shows']} | {scale} | {commit} | {record['seconds']:.0f} | {again} |")
+        link = f"[{name}](../benchmarks/results/study/{name}.jsonl)"
+        lines.append(
+            f"| {link} | {record['shows']} | {scale} | {commit} | {record.get('cpu_seconds', '')} | {again} |"
+        )
     return lines

@@ -6,6 +6,7 @@ import hashlib
 import importlib.util
 import json
 import math
+import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -75,7 +76,7 @@ def perform(steps: Iterable[Step], folder: Path, *, force: bool = False) -> list
 
 def performed(step: Step, folder: Path) -> dict[str, Any]:
     """Run a step; its record."""
-    started, when = time.perf_counter(), datetime.now(UTC).isoformat(timespec="seconds")
+    started, cpu, when = time.perf_counter(), cpu_seconds(), datetime.now(UTC).isoformat(timespec="seconds")
     for path in pictures_of(step, folder):
         path.unlink()  # what an earlier version left is not this one's
     result = step.run(folder, **step.parameters)
@@ -89,9 +90,15 @@ def performed(step: Step, folder: Path) -> dict[str, Any]:
         **provenance(),
         "when": when,
         "seconds": round(time.perf_counter() - started, 1),
+        "cpu_seconds": round(cpu_seconds() - cpu, 1),
         "pictures": {path.name: digest_of(path) for path in pictures_of(step, folder)},
         "result": plain(result),
     }
+
+
+def cpu_seconds() -> float:
+    """Of this process and of those it has waited for."""
+    return sum(os.times()[:4])
 
 
 def pictures_of(step: Step, folder: Path) -> list[Path]:
