@@ -19,7 +19,7 @@ from .charts import LABELS, draw_all
 from .claims import Claim, Results, claims, gain, of_scenes, shown, type_table
 from .coding import SCENES
 from .rates import BFRAMES, GOPS, MODERN, PVS, RANGES, REFERENCE, SI, VOLUME
-from .runner import ROOT, records
+from .runner import ROOT, digest_of, records
 from .theirs import said
 
 PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
@@ -43,17 +43,24 @@ def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Pat
         place.mkdir(parents=True, exist_ok=True)
     for path in sorted(folder.glob("*.jsonl")):
         keep(path, kept / path.name)
-    for path in sorted(folder.glob("*.png")):
-        shutil.copy(path, images / path.name)
     everything = {path.stem: records(kept, path.stem) for path in sorted(kept.glob("*.jsonl"))}
     best = {name: largest(some) for name, some in everything.items()}
     results = {name: record["result"] for name, record in best.items()}
+    copy_pictures(folder, images, best)
     draw_all(results, images)
     text = page.read_text(encoding="utf-8")
     for mark, lines in {**tables(results, best), "gain-by-size": sizes(everything)}.items():
         text = filled(text, mark, lines)
     with atomic_path(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def copy_pictures(folder: Path, images: Path, best: Mapping[str, Mapping[str, Any]]) -> None:
+    """Pictures of the records that are shown, as far as they are in this folder."""
+    for record in best.values():
+        for name, digest in record["pictures"].items():
+            if (folder / name).exists() and digest_of(folder / name) == digest:
+                shutil.copy(folder / name, images / name)
 
 
 def keep(new: Path, old: Path) -> None:
