@@ -25,9 +25,9 @@ from .coding import setup3_scale, shot
 from .runner import Step
 from .sheets import GAP, enlarged, sheet
 
-PANEL = (380, 190)  # pixels, of Figure 2.25 and Figure 3.8
+PANEL = (208, 104)  # pixels, of Figure 2.25 and Figure 3.8
 USES = ("benchmarks.study.coding", "benchmarks.study.sheets")
-CLOSE = 12  # lenses across a detail of Figure 3.8
+CLOSE = 8  # lenses across a detail of Figure 3.8
 
 
 def steps(scale: int) -> list[Step]:
