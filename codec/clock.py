@@ -45,11 +45,21 @@ class OwnThreads:
     def end(self) -> None:
         """Count what they took; to be called while they still live, that is before the encoder is closed."""
         if os.path.isdir(TASKS):
-            # The identity of a Linux thread's CPU clock: its complemented number, "per thread", "scheduler's".
-            seconds = sum(time.clock_gettime(~number << 3 | 6) for number in self._ids)
+            # A Python thread that was just starting then had no number yet to know it by.
+            ours = self._ids - {thread.native_id for thread in threading.enumerate()}
+            seconds = sum(_seconds_of(number) for number in ours)
         else:
             seconds = time.process_time() - time.thread_time() - self._process
         spent_elsewhere(seconds)
+
+
+def _seconds_of(number: int) -> float:
+    """CPU seconds of a thread; none of one that has ended, which was not the encoder's then."""
+    try:
+        # The identity of a Linux thread's CPU clock: its complemented number, "per thread", "scheduler's".
+        return time.clock_gettime(~number << 3 | 6)
+    except OSError:
+        return 0.0
 
 
 def _threads() -> set[int]:
