@@ -104,7 +104,9 @@ def finished(figure: Any, panels: Sequence[Any], axis: str) -> Any:
         if axes.get_subplotspec().is_first_col():
             axes.set_ylabel(axis)
     handles, names = panels[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower left", ncols=5, frameon=False, fontsize=8)
+    figure.legend(
+        handles, names, loc="outside lower left", ncols=5 if len(panels) > 1 else 3, frameon=False, fontsize=8
+    )
     return figure
 
 
