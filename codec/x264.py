@@ -15,6 +15,8 @@ from functools import cache, partial
 from pathlib import Path
 from typing import ClassVar
 
+import av
+
 from .base import Option, Options
 from .rate import TOLERANCE, Run, nearest_rate
 from .sequence import Film
@@ -101,7 +103,10 @@ class H264(Video):
             if options["rate"] == "cbr":
                 return run(_settings(options, film, *_constant_rate(size, film)))
             with tempfile.TemporaryDirectory() as folder:
-                return _two_passes(size, film, options, run, Path(folder) / "notes")
+                try:
+                    return _two_passes(size, film, options, run, Path(folder) / "notes")
+                except av.error.ExternalError:  # x264 knows after the first pass that the rate is too low for it
+                    return run(self.constant(COARSEST, film, options))
 
         finest = cache(lambda: run(self.constant(LOSSLESS, film, options)))
         pixels = film.frames * film.layout.height * film.layout.width

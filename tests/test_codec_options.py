@@ -47,6 +47,14 @@ def test_every_rate_control_of_x264_meets_a_rate(rate):
     assert coded.payload == encode(textured(), f"si-h264:rate={rate},bframes=1", bpp=1.2).payload
 
 
+@pytest.mark.parametrize("rate", ["cbr", "cq", "crf", "2pass"])
+def test_a_rate_too_low_for_x264_gives_its_least(rate):
+    """After a first pass x264 refuses to open for a rate that it knows to be too low."""
+    least = encode(textured(), "si-h264:rate=cq", qp=51)
+    coded = encode(textured(), f"si-h264:rate={rate}", bpp=0.1 * least.bpp)
+    assert not coded.reached and coded.bpp <= 1.1 * least.bpp
+
+
 @pytest.mark.parametrize("rate", ["cq", "2pass"])
 def test_every_rate_control_of_x265_meets_a_rate(rate):
     assert encode(textured(), f"si-hevc:preset=medium,rate={rate}", bpp=1.2).reached
