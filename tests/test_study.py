@@ -84,7 +84,9 @@ def test_a_small_study_resumes_repeats_and_fills_the_page(tmp_path, capsys):
     differences = read_image(tmp_path / "out" / "artefacts-setup1_differences.png")
     assert differences.std() > 1 and (differences[:10, :20] == 255).all()  # the uncoded view, by itself
     page = tmp_path / "study.md"
-    page.write_text("".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in [*tables({}, {}), "gain-by-size"]))
+    page.write_text(
+        "".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in [*tables({}, {}), "gain-by-size", "view-by-size"])
+    )
     for _ in range(2):  # published again, nothing is kept twice
         publish(tmp_path / "out", page=page, images=tmp_path / "images", kept=tmp_path / "kept")
         lines = (tmp_path / "kept" / "floors.jsonl").read_text().splitlines()
@@ -104,7 +106,7 @@ def test_a_small_study_does_not_replace_a_large_one():
 
 def test_the_page_has_a_place_for_every_table():
     text = PAGE.read_text(encoding="utf-8")
-    for mark in [*tables({}, {}), "gain-by-size", "gain"]:
+    for mark in [*tables({}, {}), "gain-by-size", "view-by-size", "gain"]:
         assert filled(text, mark, ["| new |"]).count("| new |") == 1
 
 

@@ -49,7 +49,8 @@ def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Pat
     copy_pictures(folder, images, best)
     draw_all(results, images)
     text = page.read_text(encoding="utf-8")
-    for mark, lines in {**tables(results, best), "gain-by-size": sizes(everything)}.items():
+    by_size = {"gain-by-size": sizes(everything), "view-by-size": views_by_size(everything)}
+    for mark, lines in {**tables(results, best), **by_size}.items():
         text = filled(text, mark, lines)
     with atomic_path(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -93,6 +94,38 @@ def sizes(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
     return lines
 
 
+def views_by_size(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
+    """Q_view at 0.15 bpp of sub- and elementary images by number of lenses of setup 3."""
+    found: dict[tuple[str, int], str] = {}
+    for scene in SCENES:
+        for record in everything.get(f"artefacts-{scene}", ()):
+            points = {p["scheme"]: p for p in record["result"]["points"]}
+            pair = (points[scheme] for scheme in (SI, "ei-h264:chroma=420"))
+            cell = " · ".join(f"{p['q_view']:.3f}" + ("" if p["reached"] else f" ({p['bpp']:.2f} bpp)") for p in pair)
+            found[scene, record["parameters"]["scale"]] = cell
+    lines = ["| lenses | " + " | ".join(SCENES) + " |", "|---" * (len(SCENES) + 1) + "|"]
+    for scale in sorted({scale for _, scale in found}, reverse=True):
+        cells = [found.get((scene, scale), "") for scene in SCENES]
+        lines.append(f"| {64 // scale}×{64 // scale} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def smaller(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Which steps have not been done at full size."""
+    found: dict[int, list[str]] = {}
+    for name, record in best.items():
+        scale = record["parameters"].get("scale", 1)
+        if scale > 1 and not name.startswith(("plane-", "component-images", "other-cameras")):
+            found.setdefault(scale, []).append(name)
+    plane = best.get("plane-apples-1", {"parameters": {"scale": 1}})["parameters"]["scale"]
+    if plane > 1:
+        found.setdefault(plane, []).append("plane-*")
+    if not found:
+        return ["All at full size."]
+    lists = [f"at scale {scale} " + ", ".join(f"`{n}`" for n in names) for scale, names in sorted(found.items())]
+    return ["Not at full size yet: " + "; ".join(lists) + ". What disagrees there may be no more than that."]
+
+
 def tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
     """Lines for each mark of the page."""
     made = claims(results)
@@ -101,6 +134,7 @@ def tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str,
         for name, figures in SECTIONS.items()
     }
     return {
+        "smaller": smaller(best),
         "agreement": summary(made),
         **parts,
         "gains-modern": gains_modern(results),
