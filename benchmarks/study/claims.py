@@ -299,16 +299,22 @@ def depths(results: Results) -> Iterator[Claim]:
             quality = listed({name: row["q_global"] for name, row in rows.items()}, ".1f")
             what = f"bpp for 28 dB, {scene} (ours have {quality})"
             yield claim("5.20", what, theirs.RATE_28_DB, ours, ".2f", only="order size")
-        pixels = np.array(result["depth_pixels"])
-        layers = {name: np.array([number(v) for v in row["q_depth"]]) for name, row in rows.items()}
-        lost = {name: decline(layers[name], pixels) for name in theirs.DECLINE}
-        what = f"decline of Q_depth from near to far at equal Q_global, {scene}, dB"
-        words = f"EI, JPEG 2000 > SI{but}"
-        yield Claim("5.21", what, words, listed(lost, "+.1f"), compare(theirs.DECLINE, lost, only="order"))
-        spread = {name: fluctuation(layers[name], pixels) for name in theirs.FLUCTUATION}
-        what = f"fluctuation of Q_depth at equal Q_global, {scene}, dB"
-        words = f"EI, JPEG 2000 > SI > PVI{but}"
-        yield Claim("5.21", what, words, listed(spread, ".1f"), compare(theirs.FLUCTUATION, spread, only="order"))
+        for key, held, how in (
+            ("q_depth", "depth_pixels", ""),
+            ("q_depth_focus", "focus_pixels", ", depth by focus"),
+        ):
+            if held not in result:
+                continue
+            pixels = np.array(result[held])
+            layers = {name: np.array([number(v) for v in row[key]]) for name, row in rows.items()}
+            lost = {name: decline(layers[name], pixels) for name in theirs.DECLINE}
+            what = f"decline of Q_depth from near to far at equal Q_global, {scene}{how}, dB"
+            words = f"EI, JPEG 2000 > SI{but}"
+            yield Claim("5.21", what, words, listed(lost, "+.1f"), compare(theirs.DECLINE, lost, only="order"))
+            spread = {name: fluctuation(layers[name], pixels) for name in theirs.FLUCTUATION}
+            what = f"fluctuation of Q_depth at equal Q_global, {scene}{how}, dB"
+            words = f"EI, JPEG 2000 > SI > PVI{but}"
+            yield Claim("5.21", what, words, listed(spread, ".1f"), compare(theirs.FLUCTUATION, spread, only="order"))
     for scene, result in of_scenes(results, "views").items():
         for quality, word in (("q_depth_mean", "mean"), ("q_depth_min", "least")):
             value = gain(result["points"], SI, REFERENCE, quality)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, view_image
 from ii_core.files import write_image
-from metrics import angle_axes, measuring, q_angle, q_depth, q_global, q_view
+from metrics import FocusDepth, angle_axes, depth_from_focus, measuring, q_angle, q_depth, q_global, q_view
 from raytrace_ii import Shot
 from raytrace_ii.rendering import cores
 
@@ -99,27 +99,33 @@ def equal(folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> 
         found = list(pool.map(lambda scheme: at_quality(made.picture, scheme, EQUAL_DB), schemes))
     views = [front(made.picture), *(front(decoded) for _, decoded in found)]
     write_image(folder / f"equal-{scene}_views.png", sheet([large(view) for view in views], 3))
-    rows = [judged(made, decoded, coded) | {"scheme": s} for s, (coded, decoded) in zip(schemes, found, strict=True)]
+    focus = depth_from_focus(made.picture)
+    rows = [
+        judged(made, focus, decoded, coded) | {"scheme": scheme}
+        for scheme, (coded, decoded) in zip(schemes, found, strict=True)
+    ]
     degrees, _ = angle_axes(made.picture.camera)
-    layers = q_depth(made.picture, made.picture, depth=made.depth)
+    layers, guessed = (q_depth(made.picture, made.picture, depth=depth) for depth in (made.depth, focus))
     return {
         "rows": rows,
         "angle_deg": rounded(degrees.tolist()),
         "depth_mm": rounded(layers.depth_mm.tolist()),
         "depth_pixels": layers.counts.tolist(),
+        "focus_pixels": guessed.counts.tolist(),
     }
 
 
-def judged(made: Shot, decoded: IIPicture, coded: Any) -> dict[str, Any]:
-    """Every quality of one decoded picture."""
+def judged(made: Shot, focus: FocusDepth, decoded: IIPicture, coded: Any) -> dict[str, Any]:
+    """Every quality of one decoded picture; over depth by the renderer's and by what focus tells."""
     angle = q_angle(made.picture, decoded)
-    layers = q_depth(made.picture, decoded, depth=made.depth)
+    layers, guessed = (q_depth(made.picture, decoded, depth=depth) for depth in (made.depth, focus))
     return {
         "bpp": coded.bpp,
         "q_global": q_global(made.picture, decoded),
         "q_view": q_view(made.picture, decoded).mean,
         "q_angle": rounded(angle[angle.shape[0] // 2].tolist()),
         "q_depth": rounded(layers.values.tolist()),
+        "q_depth_focus": rounded(guessed.values.tolist()),
     }
 
 
