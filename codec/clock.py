@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 TASKS = "/proc/self/task"
 
@@ -28,6 +29,9 @@ class OwnThreads:
 
     Linux tells the time of each thread. Elsewhere the process, less the calling thread, is taken for it.
 
+    SVT-AV1, if it may, as root may, makes its threads and the one that calls it real-time tasks of the highest
+    priority, for good: whatever else the machine does starves. They are put back.
+
     Parameters
     ----------
     start : callable
@@ -36,11 +40,12 @@ class OwnThreads:
 
     def __init__(self, start: Callable[[], object]) -> None:
         self._process = time.process_time() - time.thread_time()
-        with _opening:
+        with _opening, _usual_priority() as raised:
             before = _threads()
             start()
             python = {thread.native_id for thread in threading.enumerate()}
             self._ids = _threads() - before - python
+            raised |= self._ids
 
     def end(self) -> None:
         """Count what they took; to be called while they still live, that is before the encoder is closed."""
@@ -51,6 +56,22 @@ class OwnThreads:
         else:
             seconds = time.process_time() - time.thread_time() - self._process
         spent_elsewhere(seconds)
+
+
+@contextmanager
+def _usual_priority() -> Iterator[set[int]]:
+    """Give the calling thread, and those whose numbers are put in, the priority back that it has now."""
+    if not hasattr(os, "sched_setscheduler"):
+        yield set()
+        return
+    usual = os.sched_getscheduler(0), os.sched_getparam(0)
+    others: set[int] = set()
+    try:
+        yield others
+    finally:
+        for number in {0, *others}:
+            with suppress(ProcessLookupError):
+                os.sched_setscheduler(number, *usual)
 
 
 def _seconds_of(number: int) -> float:

@@ -4,9 +4,13 @@ import os
 import threading
 import time
 
+import numpy as np
 import pytest
 
+from codec import parse_scheme
 from codec.clock import TASKS, OwnThreads, cpu_seconds
+from codec.video import open_encoder
+from ii_core import IIPicture
 
 pytestmark = pytest.mark.skipif(not os.path.isdir(TASKS), reason="only Linux tells the time of each thread")
 
@@ -32,3 +36,13 @@ def test_threads_that_are_not_the_encoders_count_nothing():
     assert cpu_seconds() - before < 0.02
     stop.set()
     python.join()
+
+
+def test_no_encoder_makes_the_process_a_real_time_task():
+    """SVT-AV1 does, where it is run by root: beside a browser, or another of its kind, nothing else came on."""
+    coder, options = parse_scheme("si-av1:fast")
+    film = coder.film(IIPicture(np.zeros((64, 128, 3), np.uint8), (8, 4), (16, 16)), options)
+    context = open_encoder(coder, film, coder.constant(30, film, options))
+    usual = os.sched_getscheduler(0)
+    OwnThreads(context.open)
+    assert {os.sched_getscheduler(int(number)) for number in os.listdir(TASKS)} == {usual}
