@@ -122,7 +122,7 @@ def view_seconds(a: IIPicture, b: IIPicture) -> float:
 def q_depth_at_full_size(method: str) -> tuple[float, float]:
     """CPU seconds, and GiB by which a process grows, of the second q_depth: the first one compiles."""
     script = f"""
-import resource, time
+import time
 from benchmarks.metrics_speed import full_size
 from metrics import linear_layers, q_depth
 from ii_core import IIPicture, preset
@@ -130,9 +130,11 @@ small = preset("setup1", scale=32)
 a, b = full_size()
 tiny = IIPicture(a.pixels[: small.pixels[1], : small.pixels[0]].copy(), small.lenses, small.ei_pixels, small)
 q_depth(tiny, tiny, method={method!r})
-before, started = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+def most():  # not `getrusage`, which would begin with what the process that started this one holds
+    return int(dict(line.split(":") for line in open("/proc/self/status"))["VmHWM"].split()[0])
+before, started = most(), time.process_time()
 q_depth(a, b, method={method!r})
-print(time.process_time() - started, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 2**20)
+print(time.process_time() - started, (most() - before) / 2**20)
 """
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT)
     seconds, gib = map(float, run.stdout.split())
