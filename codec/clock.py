@@ -70,7 +70,7 @@ def _usual_priority() -> Iterator[set[int]]:
         yield others
     finally:
         for number in {0, *others}:
-            with suppress(ProcessLookupError):
+            with suppress(ProcessLookupError, PermissionError):  # it has ended; a sandbox allows no such call at all
                 os.sched_setscheduler(number, *usual)
 
 

@@ -94,7 +94,7 @@ class Video(Coder):
     octave : float
         Quantiser steps that about halve the rate; where the search starts from.
     quantiser_step : float
-        Finest step of the quantiser; 1 with ``rate=cq``.
+        Finest step of the quantiser, where `step` says nothing else.
 
     References
     ----------
