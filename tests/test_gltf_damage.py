@@ -3,6 +3,7 @@
 import json
 import struct
 import warnings
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -228,7 +229,7 @@ def test_a_file_with_strange_values_is_read_or_refused_in_words(tmp_path_factory
         at = tables
         for step in way:
             at = at[step]
-        at[last] = data.draw(st.sampled_from(STRANGE))
+        at[last] = deepcopy(data.draw(st.sampled_from(STRANGE)))  # the next step may change it in turn
     file.write_text(json.dumps(tables))
     try:
         with warnings.catch_warnings():
