@@ -152,7 +152,6 @@ def smooth_normal_error(world: World, segments: int, o: Array, d: Array) -> floa
         t, _, normal = alone.nearest(o, d)
         seen = trace(alone.scene(segments), o, d)
         on = np.isfinite(t) & (seen.object_id >= 0) & (normal @ towards.T > LIT).all(axis=1)
-        on &= (seen.radiance > 0).all(axis=1)  # a coarse face may turn its back to a light: see the shadow terminator
         found = np.linalg.solve(towards, seen.radiance[on].astype(float).T).T
         errors.append(_angle(found, normal[on]))
     return _rms(np.concatenate(errors))

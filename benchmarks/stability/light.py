@@ -24,7 +24,7 @@ def terminator_scene(segments: int) -> Scene:
 
 
 def terminator() -> list[Row]:
-    """Points of a smooth ball that look towards the light and are dark, for their face turns away from it."""
+    """Points of a smooth ball that look towards the light and are dark, and how far the light is off at all."""
     towards = TERMINATOR / np.linalg.norm(TERMINATOR)
     x, y = np.random.default_rng(0).uniform(-0.9, 0.9, (2, 60_000))
     o = np.column_stack([x, y, np.zeros_like(x)])
@@ -34,13 +34,15 @@ def terminator() -> list[Row]:
         seen = trace(terminator_scene(segments), o, d)
         at = np.column_stack([x, y, seen.depth - 10.0])
         cosine = at @ towards / np.linalg.norm(at, axis=1)
-        lit = (seen.object_id == 0) & (cosine > 0)
+        hit = seen.object_id == 0
+        lit = hit & (cosine > 0)
         dark = lit & (seen.radiance[:, 0] == 0)
         rows.append(
             {
                 "segments": segments, "lit points dark": float(dark.sum() / lit.sum()),
                 "light lost there, most": float(cosine[dark].max(initial=0)),
                 "band, degrees": float(np.degrees(np.arcsin(cosine[dark].max(initial=0)))),
+                "light off by, rms": float(np.sqrt(np.mean((seen.radiance[hit, 0] - cosine[hit].clip(0)) ** 2))),
             }
         )  # fmt: skip
     return rows
