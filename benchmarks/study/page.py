@@ -143,6 +143,7 @@ def tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str,
         "search": search_table(results),
         "types-2008": table_2008(results),
         "times-by-rate": time_table(results),
+        "frames": frame_table(results),
         "artefact-rates": artefact_table(results),
         "bjontegaard": bjontegaard(json.loads(CODERS.read_text(encoding="utf-8"))) if CODERS.exists() else [],
         "records": record_table(best),
@@ -248,6 +249,18 @@ def time_table(results: Results) -> list[str]:
         ]
         lines.append(f"| {LABELS[scheme]} | " + " | ".join(cells) + " |")
     return lines
+
+
+def frame_table(results: Results) -> list[str]:
+    """What an elementary image takes to code, by how many there are."""
+    if "frames" not in results:
+        return []
+    rows = results["frames"]["rows"]
+    return [
+        "| frames | " + " | ".join(f"{row['frames']}" for row in rows) + " |",
+        "|---" * (len(rows) + 1) + "|",
+        "| µs a frame | " + " | ".join(f"{1e6 * row['seconds'] / row['frames']:.0f}" for row in rows) + " |",
+    ]
 
 
 def artefact_table(results: Results) -> list[str]:

@@ -1,4 +1,4 @@
-"""Tests of why numbers are not the dissertation's: framing, search for motion, x264 set as in 2008."""
+"""Tests of why numbers are not the dissertation's: framing, search for motion, x264 set as in 2008, many frames."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ import numpy as np
 
 from benchmarks.bare import bare_encoder
 from benchmarks.bframes import QUANTISERS, curve
-from codec import register, schemes
+from codec import encode, register, schemes
 from codec.base import Options
 from codec.sequence import Film
 from codec.video import Settings
 from codec.x264 import H264
+from ii_core import IIPicture
 from metrics import bd_psnr
 
 from .coding import CODED, shot
@@ -49,6 +50,7 @@ def steps(scale: int) -> list[Step]:
         Step(name="framing", shows="the lowest rate of EI-PVS in Figure 5.10", run=framing),
         *searched,
         Step(name="types-2008", shows="Table 5.5, x264 set as in 2008", run=types_2008, parameters=given, uses=uses),
+        Step(name="frames", shows="Table 5.8, time by number of frames", run=frames, parameters=given, uses=CODED),
     ]
 
 
@@ -62,6 +64,12 @@ class H264of2008(H264):
         settings = super().constant(quantiser, film, options)
         parameters = settings.parameters["x264-params"].replace("me=umh", "me=hex") + f":{self.SET}"
         return replace(settings, parameters={**settings.parameters, "x264-params": parameters})
+
+
+class PlainH264(H264of2008):
+    """The same with macroblocks of the plainest: none predicted from its neighbours' motion, divided or refined."""
+
+    SET = H264of2008.SET.replace("subme=5", "subme=1") + ":direct=none:partitions=none:chroma-me=0:cabac=0"
 
 
 def framing(_folder: Path) -> dict[str, Any]:
@@ -108,13 +116,32 @@ def searches(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
 
 def types_2008(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
     """Bjøntegaard difference in dB of one, two and three B pictures to none, at constant quantisers."""
-    if "si-h264of2008" not in schemes():
-        register(H264of2008("si"))
+    for encoder in (H264of2008("si"), PlainH264("si")):
+        if encoder.name not in schemes():
+            register(encoder)
     picture = shot(scene, "setup1", scale).picture
     goals = [{"qp": quantiser} for quantiser in QUANTISERS]
     rows = []
-    for what, scheme in (("today", "si-h264"), ("2008", "si-h264of2008")):
+    for what, scheme in (("today", "si-h264"), ("2008", "si-h264of2008"), ("2008, plain", "si-plainh264")):
         for fine, more in (("B coarser by 1.3", ""), ("B as fine as P", ",pbratio=1")):
             curves = [curve(picture, f"{scheme}:rate=cq,chroma=420{more}", count, goals) for count in BFRAMES]
             rows.append({"set": what, "b": fine, "db": [bd_psnr(*curves[0], *one) for one in curves[1:]]})
     return {"rows": rows}
+
+
+def frames(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
+    """CPU seconds of EI-PVS by the number of elementary images: the upper rows of lenses of one picture."""
+    picture = shot(scene, "setup1", scale).picture
+    columns, rows = picture.lenses
+    found = []
+    for part in (
+        rows,
+        *(part for part in (64, 16, 4, 1) if part <= rows),
+    ):  # the first pays for loading and compiling
+        some = rows // part
+        pixels = picture.pixels[: some * picture.ei_pixels[1]]
+        upper = IIPicture(pixels, (columns, some), picture.ei_pixels)
+        started = time.thread_time()
+        encode(upper, "ei-h264:chroma=420", qp=QUANTISER)
+        found.append({"frames": columns * some, "seconds": time.thread_time() - started})
+    return {"rows": found[1:]}
