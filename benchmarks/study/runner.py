@@ -176,7 +176,9 @@ def code_of(step: Step) -> str:
         found = importlib.util.find_spec(module)
         if found is None or found.origin is None:
             raise ValueError(f"step {step.name} comes from {module}, which is not there")
-        digest.update(Path(found.origin).read_bytes())
+        origin = Path(found.origin)
+        for path in sorted(origin.parent.glob("*.py")) if origin.name == "__init__.py" else [origin]:
+            digest.update(path.read_bytes())
     return digest.hexdigest()
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from .runner import ROOT, Step
 
-# Script, what it is for, arguments. In this order: `readme` and `coding_docs` put on pages what others found.
+# Script, what it is for, arguments. In this order: `coding_docs` and `readme` put on pages what others found.
 SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("gallery", "Figures 3.6, 3.7, 5.9: every camera with its maps, all scenes", ()),
     ("concepts", "Figures 2.24, 5.4: component images, orders", ()),
@@ -17,7 +17,6 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("demo", "the README's chart", ()),
     ("demo", "the same at full size", ("--scale", "1", "-o", "out/full")),
     ("disparity", "why a scene codes well or not", ("--scenes", "apples,twins,car,cuboid")),
-    ("readme", "tables of the README", ()),
     ("orders", "Table 5.4", ()),
     ("headers", "(5.11) to (5.15): header portions", ()),
     ("cost", "(5.16), Table 5.8: time and memory of every scheme", ()),
@@ -27,6 +26,14 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("volume", "what the volume gains", ("--scenes", "apples", "twins", "car", "cuboid")),
     ("metrics_gallery", "Figure 4.9; Q_angle, views and Q_depth of one picture", ()),
     ("depth_truth", "Figure 4.6 ff.: depth from focus against true depth", ()),
+    ("map_precision", "(3.11), (3.12): storing a camera as pictures", ()),
+    ("convergence", "how meshes approach the truth", ()),
+    ("stability", "where methods fail", ()),
+    ("pareto", "speed against accuracy of rendering", ()),
+    ("needs", "what each scene needs", ()),
+    ("metrics_speed", "what metrics cost", ()),
+    ("speed", "ratios to bare libraries", ()),
+    ("readme", "tables of the README", ()),
 )
 
 
