@@ -24,6 +24,7 @@ from .theirs import said
 
 PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
 CODERS = ROOT / "benchmarks" / "results" / "coders.json"
+OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
 # Which part of the page shows which figures.
 SECTIONS = {
     "rates": ("5.10",),
@@ -115,7 +116,7 @@ def smaller(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
     found: dict[int, list[str]] = {}
     for name, record in best.items():
         scale = record["parameters"].get("scale", 1)
-        if scale > 1 and not name.startswith(("plane-", "component-images", "other-cameras")):
+        if scale > 1 and not name.startswith(("plane-", "types-2008-", "component-images", "other-cameras")):
             found.setdefault(scale, []).append(name)
     plane = best.get("plane-apples-1", {"parameters": {"scale": 1}})["parameters"]["scale"]
     if plane > 1:
@@ -224,14 +225,14 @@ def search_table(results: Results) -> list[str]:
 
 
 def table_2008(results: Results) -> list[str]:
-    """What B pictures bring with x264 as it is and as it was."""
-    if "types-2008" not in results:
-        return []
-    lines = ["| x264 set as | | " + " | ".join(f"I{'B' * n}P" for n in BFRAMES[1:]) + " |", "|---" * 5 + "|"]
-    return lines + [
-        f"| {row['set']} | {row['b']} | " + " | ".join(shown(value, "+.2f") for value in row["db"]) + " |"
-        for row in results["types-2008"]["rows"]
-    ]
+    """What B pictures bring with x264 as it is and as it was, by size of the picture."""
+    there = [results[name] for name in OLDER if name in results]
+    lines = ["| x264 set as | | " + " | ".join("{}×{} lenses".format(*one["lenses"]) for one in there) + " |"]
+    lines.append("|---" * (2 + len(there)) + "|")
+    for rows in zip(*(one["rows"] for one in there), strict=True):
+        cells = [" · ".join(shown(value, "+.2f") for value in row["db"]) for row in rows]
+        lines.append(f"| {rows[0]['set']} | {rows[0]['b']} | " + " | ".join(cells) + " |")
+    return lines if there else []
 
 
 def time_table(results: Results) -> list[str]:

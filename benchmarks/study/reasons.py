@@ -30,6 +30,7 @@ SIDE = 16  # pixels of an elementary image of setup 1
 CONTAINERS = ("h264", "mkv", "mp4", "avi")
 SEARCHES = ("umh", "esa")  # x264's uneven hexagons, ours; exhaustive
 QUANTISER = 30
+SIZES = (1, 2, 4)  # pictures of so many times fewer lenses each way
 
 
 def steps(scale: int) -> list[Step]:
@@ -46,10 +47,21 @@ def steps(scale: int) -> list[Step]:
     ]
     uses = (*CODED, "benchmarks.bframes")
     given = {"scene": "apples", "scale": scale}
+    older = [
+        Step(
+            name="types-2008" + (f"-{part}" if part > 1 else ""),
+            shows="Table 5.5, x264 set as in 2008",
+            run=types_2008,
+            parameters={**given, "scale": scale * part},
+            uses=uses,
+        )
+        for part in SIZES
+        if scale * part <= 16
+    ]
     return [
         Step(name="framing", shows="the lowest rate of EI-PVS in Figure 5.10", run=framing),
         *searched,
-        Step(name="types-2008", shows="Table 5.5, x264 set as in 2008", run=types_2008, parameters=given, uses=uses),
+        *older,
         Step(name="frames", shows="Table 5.8, time by number of frames", run=frames, parameters=given, uses=CODED),
     ]
 
@@ -60,9 +72,9 @@ class H264of2008(H264):
     SET = "ref=1:subme=5:trellis=0:8x8dct=0:mixed-refs=0:aq-mode=0:weightb=0"
 
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
-        """One reference, no trellis, no 8×8 transform, no adaptive quantiser, hexagonal search."""
+        """One reference, no trellis, no 8×8 transform, no adaptive quantiser, exhaustive search (Table 5.6)."""
         settings = super().constant(quantiser, film, options)
-        parameters = settings.parameters["x264-params"].replace("me=umh", "me=hex") + f":{self.SET}"
+        parameters = settings.parameters["x264-params"].replace("me=umh", "me=esa") + f":{self.SET}"
         return replace(settings, parameters={**settings.parameters, "x264-params": parameters})
 
 
@@ -122,11 +134,17 @@ def types_2008(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
     picture = shot(scene, "setup1", scale).picture
     goals = [{"qp": quantiser} for quantiser in QUANTISERS]
     rows = []
-    for what, scheme in (("today", "si-h264"), ("2008", "si-h264of2008"), ("2008, plain", "si-plainh264")):
-        for fine, more in (("B coarser by 1.3", ""), ("B as fine as P", ",pbratio=1")):
-            curves = [curve(picture, f"{scheme}:rate=cq,chroma=420{more}", count, goals) for count in BFRAMES]
+    for what, scheme, reach in (
+        ("today, range 128", "si-h264", 128),
+        ("today", "si-h264", 16),
+        ("2008", "si-h264of2008", 16),
+        ("2008, plain", "si-plainh264", 16),
+    ):
+        for fine, ratio in (("B coarser by 1.3", 1.3), ("B as fine as P", 1)):
+            named = f"{scheme}:rate=cq,chroma=420,merange={reach},pbratio={ratio}"
+            curves = [curve(picture, named, count, goals) for count in BFRAMES]
             rows.append({"set": what, "b": fine, "db": [bd_psnr(*curves[0], *one) for one in curves[1:]]})
-    return {"rows": rows}
+    return {"lenses": picture.lenses, "rows": rows}
 
 
 def frames(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
