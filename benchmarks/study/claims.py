@@ -335,6 +335,15 @@ def decline(values: np.ndarray, pixels: np.ndarray) -> float:
     return pooled(values, np.where(near, pixels, 0)) - pooled(values, np.where(near, 0, pixels))
 
 
+def by_detail(row: Sequence[Any], depth_mm: Sequence[float], detail: Mapping[str, Any]) -> tuple[float, float, float]:
+    """Fluctuation of Q_depth, its correlation with the detail of the layers, and what a line on that leaves."""
+    value = dict(zip(depth_mm, (number(v) for v in row), strict=True))
+    pairs = [(-10 * np.log10(1 + d), value[z]) for z, d in zip(detail["depth_mm"], detail["detail"], strict=True)]
+    x, y = np.array([pair for pair in pairs if np.isfinite(pair[1])]).T
+    left = y - np.polyval(np.polyfit(x, y, 1), x)
+    return float(y.std()), float(np.corrcoef(x, y)[0, 1]), float(left.std())
+
+
 def fluctuation(values: np.ndarray, pixels: np.ndarray) -> float:
     """Standard deviation over the layers that have pixels, each of which counts the same."""
     return float(np.std(values[(pixels > 0) & np.isfinite(values)]))

@@ -16,7 +16,7 @@ from metrics.rd import UndefinedDifference
 
 from . import theirs
 from .charts import LABELS, draw_all
-from .claims import Claim, Results, claims, gain, of_scenes, shown, type_table
+from .claims import Claim, Results, by_detail, claims, gain, of_scenes, shown, type_table
 from .coding import SCENES
 from .rates import BFRAMES, GOPS, MODERN, PVS, RANGES, REFERENCE, SI, VOLUME
 from .runner import ROOT, digest_of, records
@@ -145,6 +145,7 @@ def tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str,
         "types-2008": table_2008(results),
         "times-by-rate": time_table(results),
         "frames": frame_table(results),
+        "detail": detail_table(results),
         "artefact-rates": artefact_table(results),
         "bjontegaard": bjontegaard(json.loads(CODERS.read_text(encoding="utf-8"))) if CODERS.exists() else [],
         "records": record_table(best),
@@ -262,6 +263,22 @@ def frame_table(results: Results) -> list[str]:
         "|---" * (len(rows) + 1) + "|",
         "| µs a frame | " + " | ".join(f"{1e6 * row['seconds'] / row['frames']:.0f}" for row in rows) + " |",
     ]
+
+
+def detail_table(results: Results) -> list[str]:
+    """How far Q_depth follows the detail of the layers."""
+    judged, detail = of_scenes(results, "equal"), of_scenes(results, "detail")
+    scenes = [scene for scene in judged if scene in detail]
+    if not scenes:
+        return []
+    lines = ["| | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"]
+    for place, first in enumerate(judged[scenes[0]]["rows"]):
+        cells = []
+        for scene in scenes:
+            row, depth_mm = judged[scene]["rows"][place]["q_depth"], judged[scene]["depth_mm"]
+            cells.append("{:.1f} · {:.2f} · {:.1f}".format(*by_detail(row, depth_mm, detail[scene])))
+        lines.append(f"| {LABELS[first['scheme']]} | " + " | ".join(cells).replace("-", "−") + " |")
+    return lines
 
 
 def artefact_table(results: Results) -> list[str]:
