@@ -37,6 +37,7 @@ _MIRROR, _TRANSMISSION, _ABSORPTION, _SPECULAR, _SHININESS, _PRIORITY, _LOCAL = 
 _TEXTURE, _LEAST_HALF, _EMISSION, _IOR, _CUTOFF, _NORMAL_MAP, _NORMAL_SCALE = 16, 17, 18, 21, 24, 25, 26
 _LIGHT_COLOUR, _CONE_AXIS, _CONE_SCALE, _CONE_OFFSET = 4, 7, 10, 11
 _SKY_IMAGE, _SKY_TURN, _SKY_INTENSITY = 10, 11, 12
+_LEAST, _MOST = 1e-150, 1e150  # between them squares and their sums neither vanish nor overflow
 
 
 @kernel
@@ -79,37 +80,37 @@ def start_rays(
 
 
 @kernel
-def start_separable_rays(x, y, z, rotation, shift, out_origins, out_directions, out_weights, out_pixels, out_inside):
+def start_separable_rays(x, y, z, rotation, shift, out_origins, out_directions):
     """As `start_rays` for a block of pixels whose rays all carry all light, from `IICamera.separable_rays`.
 
     Returns
     -------
     bool
-        Whether all rays are usable.
+        Whether all rays are usable for sure: told of rows and columns, not of rays.
     """
-    usable = True
-    columns = x.shape[0]
+    r00, r01, r02 = rotation[0, 0], rotation[0, 1], rotation[0, 2]
+    r10, r11, r12 = rotation[1, 0], rotation[1, 1], rotation[1, 2]
+    r20, r21, r22 = rotation[2, 0], rotation[2, 1], rotation[2, 2]
+    s0, s1, s2 = shift[0], shift[1], shift[2]
     lz, dz = z[0], z[1]
+    sure = (_LEAST < abs(dz) < _MOST) & (abs(lz) < _MOST)
+    for rays in (x, y):
+        for i in range(rays.shape[0]):
+            sure &= (abs(rays[i, 0]) < _MOST) & (abs(rays[i, 1]) < _MOST)
+    columns = x.shape[0]
     for i in range(y.shape[0]):
         ly, dy = y[i, 0], y[i, 1]
         for j in range(columns):
             lx, dx = x[j, 0], x[j, 1]
+            inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
             row = i * columns + j
-            length = math.sqrt(dx * dx + dy * dy + dz * dz)
-            inverse = 1.0 / length
-            usable &= 0.0 < length < math.inf
-            for c in range(3):
-                r0, r1, r2 = rotation[c, 0], rotation[c, 1], rotation[c, 2]
-                place = r0 * lx + r1 * ly + r2 * lz + shift[c]
-                usable &= abs(place) < math.inf
-                out_origins[row, c] = place
-                out_directions[row, c] = (r0 * dx + r1 * dy + r2 * dz) * inverse
-    for row in range(y.shape[0] * columns):
-        out_weights[row, 0] = out_weights[row, 1] = out_weights[row, 2] = 1.0
-        out_pixels[row] = row
-        for k in range(out_inside.shape[1]):
-            out_inside[row, k] = -1
-    return usable
+            out_origins[row, 0] = r00 * lx + r01 * ly + r02 * lz + s0
+            out_origins[row, 1] = r10 * lx + r11 * ly + r12 * lz + s1
+            out_origins[row, 2] = r20 * lx + r21 * ly + r22 * lz + s2
+            out_directions[row, 0] = (r00 * dx + r01 * dy + r02 * dz) * inverse
+            out_directions[row, 1] = (r10 * dx + r11 * dy + r12 * dz) * inverse
+            out_directions[row, 2] = (r20 * dx + r21 * dy + r22 * dz) * inverse
+    return sure
 
 
 @kernel
@@ -155,9 +156,10 @@ def shade(
             radiance[pixel, 1] += w1 * b1
             radiance[pixel, 2] += w2 * b2
             continue
+        px, py, pz = _start_point(corners, faces, f, u[i], v[i])
         if depth.shape[0] > 0:
-            px, py, pz = _hit_point(corners, f, u[i], v[i])
-            depth[pixel] = (px - eye[0]) * axis[0] + (py - eye[1]) * axis[1] + (pz - eye[2]) * axis[2]
+            hx, hy, hz = _hit_point(corners, f, u[i], v[i])
+            depth[pixel] = (hx - eye[0]) * axis[0] + (hy - eye[1]) * axis[1] + (hz - eye[2]) * axis[2]
         body = object_of_face[f]
         gx, gy, gz, lift = float(faces[f, 0]), float(faces[f, 1]), float(faces[f, 2]), float(faces[f, 3])
         entering = gx * dx + gy * dy + gz * dz < 0.0
@@ -190,7 +192,6 @@ def shade(
                 corners, coordinates, textures, texels, f, u[i], v[i], int(materials[body, _NORMAL_MAP]),
                 materials[body, _NORMAL_SCALE], entering, nx, ny, nz, dx, dy, dz,
             )  # fmt: skip
-        px, py, pz = _start_point(corners, faces, f, u[i], v[i])
         ox, oy, oz = px + lift * gx, py + lift * gy, pz + lift * gz
         smooth = normals.shape[0] > 0 and (
             normals[f, 0, 0] != 0.0 or normals[f, 0, 1] != 0.0 or normals[f, 0, 2] != 0.0
@@ -327,6 +328,28 @@ def add_unblocked(blocked, colours, pixels, radiance):
         if blocked[i] != 0:
             for c in range(3):
                 radiance[pixels[i], c] += colours[i, c]
+
+
+@kernel
+def keep_unblocked(blocked, origins, directions, reach, colours, pixels, inside):
+    """Pack the shadow rays that nothing opaque stops to the front.
+
+    Returns
+    -------
+    int
+        How many there are.
+    """
+    kept = 0
+    for i in range(blocked.shape[0]):
+        if blocked[i] != 0:
+            for c in range(3):
+                origins[kept, c], directions[kept, c] = origins[i, c], directions[i, c]
+                colours[kept, c] = colours[i, c]
+            reach[kept], pixels[kept] = reach[i], pixels[i]
+            for j in range(inside.shape[1]):
+                inside[kept, j] = inside[i, j]
+            kept += 1
+    return kept
 
 
 @kernel

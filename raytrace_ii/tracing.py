@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -154,6 +154,8 @@ class Tracer:
         self.pose = pose
         self.count = RayCount()
         self._primary = _Rays.room(capacity, self.scene.nested)
+        # weights and pixels of rays that carry all light, one a pixel: read only
+        self._whole = np.ones((capacity, 3), np.float32), np.arange(capacity, dtype=np.int32)
         self._shadow = (_Rays.room(0, self.scene.nested), np.empty(0, np.float32))
 
     def run(
@@ -184,7 +186,7 @@ class Tracer:
             )
         if support is not None and n < len(locations):
             support.clear()
-        self._trace(n, radiance, support)
+        self._trace(room, n, radiance, support)
 
     def run_separable(
         self, rays: tuple[NDArray[np.float64], ...], radiance: NDArray[np.float32], support: Support | None
@@ -192,16 +194,16 @@ class Tracer:
         """`run` for rays of `IICamera.separable_rays`; if some are unusable, nothing is done and False comes back."""
         room, n = self._primary, len(rays[0]) * len(rays[1])
         usable = kernels.start_separable_rays(
-            *rays, self.pose[:3, :3], self.pose[:3, 3],
-            room.origins, room.directions, room.weights, room.pixels, room.inside,
-        )  # fmt: skip
+            *rays, self.pose[:3, :3], self.pose[:3, 3], room.origins, room.directions
+        )
         if usable:
-            self._trace(n, radiance, support)
+            room.inside.fill(-1)
+            self._trace(replace(room, weights=self._whole[0], pixels=self._whole[1]), n, radiance, support)
         return bool(usable)
 
-    def _trace(self, n: int, radiance: NDArray[np.float32], support: Support | None) -> None:
+    def _trace(self, primary: _Rays, n: int, radiance: NDArray[np.float32], support: Support | None) -> None:
         """Trace the first n of the primary rays."""
-        rays = _Rays(*(array[:n] for array in vars(self._primary).values()))
+        rays = _Rays(*(array[:n] for array in vars(primary).values()))
         self.count.rays["primary"] += n
         if self.scene.transmits:
             self._start_inside(rays)
@@ -294,10 +296,10 @@ class Tracer:
         if not s.lets_through:
             kernels.add_unblocked(found, shadow.weights, shadow.pixels, radiance)
             return
-        free = np.flatnonzero(found)
-        rays = [array[free] for array in (shadow.origins, shadow.directions, reach, *list(vars(shadow).values())[2:])]
+        rays = [shadow.origins, shadow.directions, reach, *list(vars(shadow).values())[2:]]
+        kept = kernels.keep_unblocked(found, *rays)
         for _ in range(MOST_CLEAR_FACES):
-            origins, directions, reach, colours, pixels, inside = rays
+            origins, directions, reach, colours, pixels, inside = rays = [array[:kept] for array in rays]
             hits, seconds = s.intersector.nearest_clear(origins, directions, reach.copy())
             self.count.embree_seconds += seconds
             kept = kernels.pass_clear_face(
@@ -308,7 +310,6 @@ class Tracer:
             if not kept:
                 return
             self.count.rays["shadow"] += kept
-            rays = [array[:kept] for array in rays]
 
     def _shadow_room(self, n: int) -> tuple[_Rays, NDArray[np.float32]]:
         if len(self._shadow[1]) < n:

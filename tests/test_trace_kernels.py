@@ -98,3 +98,45 @@ def test_rays_without_light_are_left_out():
         assert pixels[:2].tolist() == [0, 3]
         np.testing.assert_array_equal(rows[0][:2], locations[[0, 3]])
         np.testing.assert_array_equal(rows[2][:2, 0], [0.25, 1])
+
+
+def test_rays_by_row_and_column_are_those_one_by_one():
+    rng = np.random.default_rng(0)
+    x, y, z = rng.normal(size=(5, 2)), rng.normal(size=(3, 2)), np.array([1.0, 4.0])
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    grid = np.empty((2, 3, 5, 3))
+    for k in range(2):
+        grid[k, ..., 0], grid[k, ..., 1], grid[k, ..., 2] = x[:, k], y[:, k, None], z[k]
+    expected = [np.empty((15, 3), np.float32) for _ in range(3)]
+    pixels, inside = np.empty(15, np.int32), np.empty((15, 0), np.int32)
+    kernels.start_rays(*grid.reshape(2, 15, 3), np.empty(0), turn, np.arange(3.0), *expected, pixels, inside)
+    for function in (kernels.start_separable_rays, kernels.start_separable_rays.py_func):
+        found = [np.empty((15, 3), np.float32) for _ in range(2)]
+        assert function(x, y, z, turn, np.arange(3.0), *found)
+        np.testing.assert_array_equal(found, expected[:2])
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e200])
+def test_rows_and_columns_of_unusable_rays_are_told(wrong):
+    room = [np.empty((15, 3), np.float32) for _ in range(2)]
+    sizes = (10, 6, 2)
+    for where in range(18):
+        flat = np.ones(18)
+        flat[where] = wrong
+        x, y, z = np.split(flat, np.cumsum(sizes)[:-1])
+        assert not kernels.start_separable_rays(x.reshape(5, 2), y.reshape(3, 2), z, np.eye(3), np.zeros(3), *room)
+    nowhere = np.zeros((5, 2)), np.zeros((3, 2)), np.zeros(2)
+    assert not kernels.start_separable_rays(*nowhere, np.eye(3), np.zeros(3), *room), "no direction"
+
+
+def test_shadow_rays_that_arrive_are_packed_to_the_front():
+    rng = np.random.default_rng(0)
+    blocked = rng.choice(np.array([0, -1], np.int32), 50)
+    rows = [rng.normal(size=shape).astype(np.float32) for shape in ((50, 3), (50, 3), (50,), (50, 3))]
+    rows += [rng.integers(0, 99, 50).astype(np.int32), rng.integers(-1, 9, (50, 2)).astype(np.int32)]
+    for function in (kernels.keep_unblocked, kernels.keep_unblocked.py_func):
+        packed = [row.copy() for row in rows]
+        kept = function(blocked, *packed)
+        assert kept == (blocked == -1).sum()
+        for row, array in zip(rows, packed, strict=True):
+            np.testing.assert_array_equal(array[:kept], row[blocked == -1])
