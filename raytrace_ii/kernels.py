@@ -197,9 +197,9 @@ def shade(
             normals[f, 0, 0] != 0.0 or normals[f, 0, 1] != 0.0 or normals[f, 0, 2] != 0.0
         )
 
-        radiance[pixel, 0] += w0 * materials[body, _EMISSION]
-        radiance[pixel, 1] += w1 * materials[body, _EMISSION + 1]
-        radiance[pixel, 2] += w2 * materials[body, _EMISSION + 2]
+        own0 = w0 * materials[body, _EMISSION]
+        own1 = w1 * materials[body, _EMISSION + 1]
+        own2 = w2 * materials[body, _EMISSION + 2]
         local = materials[body, _LOCAL]
         if local > 0.0 or materials[body, _SPECULAR] > 0.0:
             r, g, b = local * materials[body, 0], local * materials[body, 1], local * materials[body, 2]
@@ -208,9 +208,7 @@ def shade(
                 t0, t1, t2 = texture_colour(textures, int(materials[body, _TEXTURE]), texels, s0, s1, s2)
                 r, g, b = r * t0, g * t1, b * t2
             r, g, b = w0 * r, w1 * g, w2 * b
-            radiance[pixel, 0] += r * ambient[0]
-            radiance[pixel, 1] += g * ambient[1]
-            radiance[pixel, 2] += b * ambient[2]
+            own0, own1, own2 = own0 + r * ambient[0], own1 + g * ambient[1], own2 + b * ambient[2]
             for k in range(lights.shape[0]):
                 lx, ly, lz, reach = _towards_light(lights, k, ox, oy, oz)
                 norm = 1.0 if reach == FAR else 1.0 / math.sqrt(lx * lx + ly * ly + lz * lz)
@@ -245,6 +243,9 @@ def shade(
                 for j in range(inside.shape[1]):
                     shadow_inside[shadows, j] = inside[i, j]
                 shadows += 1
+        radiance[pixel, 0] += own0
+        radiance[pixel, 1] += own1
+        radiance[pixel, 2] += own2
         if not spawn:
             continue
 
@@ -313,11 +314,10 @@ def _up_to_smooth(corners, normals, f, u, v, px, py, pz, gx, gy, gz):
     for c in range(3):
         share = 1.0 - u - v if c == 0 else (u if c == 1 else v)
         nx, ny, nz = float(normals[f, c, 0]), float(normals[f, c, 1]), float(normals[f, c, 2])
-        if nx * gx + ny * gy + nz * gz < 0.0:  # of a face seen from behind
-            nx, ny, nz = -nx, -ny, -nz
-        below = (px - corners[f, c, 0]) * nx + (py - corners[f, c, 1]) * ny + (pz - corners[f, c, 2]) * nz
-        if below < 0.0:
-            x, y, z = x - share * below * nx, y - share * below * ny, z - share * below * nz
+        side = -1.0 if nx * gx + ny * gy + nz * gz < 0.0 else 1.0  # of a face seen from behind
+        above = (px - corners[f, c, 0]) * nx + (py - corners[f, c, 1]) * ny + (pz - corners[f, c, 2]) * nz
+        up = share * side * min(side * above, 0.0)
+        x, y, z = x - up * nx, y - up * ny, z - up * nz
     return x, y, z
 
 

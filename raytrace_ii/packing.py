@@ -58,7 +58,9 @@ class PackedScene:
         sky = scene.background
         images = [image for b in bodies for image in (b.material.texture, b.material.normal_map)]
         self.textures = TextureTable([*images, sky.image])
-        self.materials = np.array([_material_row(body.material, self.textures) for body in bodies], np.float32)
+        # float32's values in float64's place: the kernels reckon in float64, and need not convert
+        rows = np.array([_material_row(body.material, self.textures) for body in bodies], np.float32)
+        self.materials = rows.astype(np.float64)
         self.lights = np.array([_light_row(light) for light in scene.lights], np.float64).reshape(-1, 12)
         self.background = np.array(
             [
