@@ -41,6 +41,12 @@ def test_smooth_balls_have_no_band_at_the_terminator():
     assert all(row["band, degrees"] < 0.012 and row["light off by, rms"] < 2e-6 for row in rows)
 
 
+def test_sheets_throw_whole_shadows_from_two_sagittas_on():
+    """At the corners of a face its smooth surface is the face: shadows begin there."""
+    dark = {row["height, sagittas"]: row["in shadow"] for row in light.covered()}
+    assert list(dark.values()) == sorted(dark.values()) and dark[0.25] < 0.03 and dark[2.5] == 1
+
+
 def test_grazing_light_stays_right_and_hits_drift():
     rows = light.grazing()
     assert all(row["of them lit"] == 1 and row["light off by"] < 1e-3 for row in rows)

@@ -29,10 +29,11 @@ CASES: dict[str, Callable[[], list[Row]]] = {
     case.__name__: case
     for case in (
         geometry.lift, geometry.scales, geometry.coplanar, geometry.contact_shadow, geometry.bad_faces,
-        geometry.huge_beside_tiny, light.terminator, light.grazing, light.camera_in_glass, light.camera_in_body,
-        light.lamp_at_surface, light.bounces, picture.pitches, picture.view_borders, picture.rate_ends,
-        picture.tiny_frames, picture.quantised_maps, picture.map_bits, depth.depth_contrast, depth.depth_noise,
-        depth.depth_kinds, depth.depth_two_layers, depth.depth_highlight, curves.bd_overlap, curves.bd_dents,
+        geometry.huge_beside_tiny, light.terminator, light.covered, light.grazing, light.camera_in_glass,
+        light.camera_in_body, light.lamp_at_surface, light.bounces, picture.pitches, picture.view_borders,
+        picture.rate_ends, picture.tiny_frames, picture.quantised_maps, picture.map_bits, depth.depth_contrast,
+        depth.depth_noise, depth.depth_kinds, depth.depth_two_layers, depth.depth_highlight, curves.bd_overlap,
+        curves.bd_dents,
         curves.bd_points,
     )
 }  # fmt: skip
@@ -143,7 +144,7 @@ PANELS: list[tuple[str, str, list[str], str, str]] = [
     ("coplanar", "gap / distance", ["far wall seen"], "x", "rays that take the wrong of two walls"),
     ("bad_faces", "share of faces", ["glass, turned", "glass, missing", "mirror, missing"], "x", "broken meshes, dB"),
     ("huge_beside_tiny", "floor, mm", ["shadows there"], "x", "shadows of 0.02 mm grains on a floor"),
-    ("terminator", "segments", ["band, degrees"], "xy", "dark band at the shadow terminator"),
+    ("covered", "height, sagittas", ["in shadow"], "", "shadow of a sheet over a smooth face"),
     ("grazing", "angle, rad", ["place off by, mm"], "xy", "hits at grazing angles, mm off"),
     ("view_borders", "of half the viewing angle", ["PSNR of linear light, dB"], "", "views from aside, dB"),
     ("bounces", "depth", ["light missing"], "y", "light missing in a room of mirrors"),

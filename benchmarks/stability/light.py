@@ -11,7 +11,7 @@ from benchmarks.analytic import still_life
 from benchmarks.stability.geometry import Row, ball, body, ground
 from raytrace_ii import Background, Light, Material, Scene, trace
 from raytrace_ii.packing import LIFT
-from raytrace_ii.shapes import Box
+from raytrace_ii.shapes import Box, Mesh
 
 ONES = (1.0, 1.0, 1.0)
 TERMINATOR = np.array([1.0, 0.37, -0.43])  # towards a light that no ring of a ball's vertices is aligned with
@@ -45,6 +45,24 @@ def terminator() -> list[Row]:
                 "light off by, rms": float(np.sqrt(np.mean((seen.radiance[hit, 0] - cosine[hit].clip(0)) ** 2))),
             }
         )  # fmt: skip
+    return rows
+
+
+def covered() -> list[Row]:
+    """A face of a smooth ball of 12 segments right under a sheet: the share in shadow, by the height of the sheet."""
+    mesh = ball(1.0, 12)
+    face = mesh.vertices[mesh.faces[len(mesh.faces) // 2]]
+    middle = face.mean(axis=0)
+    away = np.linalg.norm(middle)
+    up, sagitta = middle / away, 1.0 - away
+    points = np.random.default_rng(0).dirichlet((1, 1, 1), 4000) @ face
+    light = Light(kind="directional", vector=tuple(-up), colour=ONES)
+    rows = []
+    for height in (0.25, 0.5, 1.0, 1.5, 1.75, 2.0, 2.5):
+        sheet = Mesh(middle + 3 * (face - middle) + height * sagitta * up, np.array([[0, 1, 2]]))
+        scene = Scene(bodies=[body(mesh, smooth=True), body(sheet, name="sheet")], lights=[light])
+        seen = trace(scene, points + 0.1 * sagitta * up, np.broadcast_to(-up, points.shape))
+        rows.append({"height, sagittas": height, "in shadow": float((seen.radiance[:, 0] == 0).mean())})
     return rows
 
 
