@@ -76,9 +76,10 @@ def disparity_table() -> list[str]:
 
 def speed_table() -> list[str]:
     """The ratios of `benchmarks.speed` beside their targets."""
-    lines = ["| | target | measured |", "|---|---|---|"]
+    lines = ["| | target | median | from … to |", "|---|---|---|---|"]
     return lines + [
-        f"| {row['what']} | {row['target']} | {row['median']:.2f} |" for row in _load("speed.json")["rows"]
+        f"| {row['what']} | {row['target']} | {row['median']:.2f} | {min(row['all']):.2f} … {max(row['all']):.2f} |"
+        for row in _load("speed.json")["rows"]
     ]
 
 
