@@ -362,6 +362,4 @@ def _checked(coder: Video, frames: list[Any], film: Film) -> list[Any]:
 
 def copy_plane(plane: Any, target: NDArray[Any]) -> None:
     """The samples of a decoded plane, without the padding of its lines."""
-    rows, samples = target.shape
-    lines = np.frombuffer(plane, target.dtype, rows * plane.line_size // target.itemsize).reshape(rows, -1)
-    target[:] = lines[:, :samples]
+    target[:] = np.ndarray(target.shape, target.dtype, plane, strides=(plane.line_size, target.itemsize))
