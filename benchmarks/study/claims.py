@@ -317,10 +317,12 @@ def depths(results: Results) -> Iterator[Claim]:
             yield Claim("5.21", what, words, listed(spread, ".1f"), compare(theirs.FLUCTUATION, spread, only="order"))
     for scene, result in of_scenes(results, "views").items():
         for quality, word in (("q_depth_mean", "mean"), ("q_depth_min", "least")):
-            value = gain(result["points"], SI, REFERENCE, quality)
-            verdict = compare({"x": 1.0}, {"x": value}, only="sign")
-            what = f"{word} Q_depth of SI-PVS over JPEG 2000's, {scene}, dB"
-            yield Claim("5.23", what, f"+{'' if scene == 'apples' else ' (Apples)'}", shown(value, "+.1f"), verdict)
+            for chroma, scheme in (("4:2:0", SI), ("4:4:4", "si-h264")):
+                value = gain(result["points"], scheme, REFERENCE, quality)
+                verdict = compare({"x": 1.0}, {"x": value}, only="sign")
+                what = f"{word} Q_depth of SI-PVS over JPEG 2000's, {scene}, {chroma}, dB"
+                words = "+" if scene == "apples" else "+ (Apples)"
+                yield Claim("5.23", what, words, shown(value, "+.1f"), verdict)
 
 
 def pooled(values: np.ndarray, pixels: np.ndarray) -> float:
