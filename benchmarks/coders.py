@@ -50,11 +50,13 @@ TRIALS = (
     "si-h264:rate=crf,bframes=16,pyramid=1",
     *(f"si-h264:rate=cq,order={order},by={by}" for order in ("row", "parallel", "zigzag", "spiral") for by in (
         "rows", "columns") if (order, by) != ("parallel", "rows")),
+    "si-h264:balanced,merange=64",
     "si-hevc:rate=cq",
     "si-hevc:depth=8",
     "si-hevc:chroma=420",
     "si-hevc:bframes=0",
     "si-hevc:bframes=8",
+    "si-hevc:merange=128",
     "si-hevc:preset=veryslow",
     "si-hevc:by=columns",
     "si-av1:rate=cq",

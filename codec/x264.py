@@ -74,7 +74,7 @@ class H264(Video):
     presets: ClassVar[Mapping[str, Options]] = {
         "fast": {"bframes": 3, "pyramid": 1, "rate": "crf"},
         "balanced": {"bframes": 3, "pyramid": 1, "rate": "crf", "preset": "slow"},
-        "best": {"bframes": 7, "pyramid": 1, "rate": "crf", "preset": "veryslow", "depth": "10"},
+        "best": {"bframes": 7, "pyramid": 1, "rate": "crf", "preset": "veryslow", "merange": 64, "depth": "10"},
     }
 
     def step(self, options: Options) -> float:

@@ -50,7 +50,7 @@ class Hevc(Video):
     presets: ClassVar[Mapping[str, Options]] = {
         "fast": {"preset": "medium"},
         "balanced": {"preset": "slow"},
-        "best": {"preset": "slower"},
+        "best": {"preset": "slower", "merange": 128},
     }
 
     def step(self, options: Options) -> float:
