@@ -36,6 +36,7 @@ QUANTISERS = {
     "hevc": (14, 19, 24, 29, 34, 39, 44),
     "av1": (8, 18, 28, 38, 46, 54, 62),
     "vp9": (8, 18, 28, 38, 46, 54, 62),
+    "avif": (8, 18, 28, 38, 46, 54, 62),
     "mpeg2": (1, 2, 4, 7, 12, 20, 31),
 }
 NEAR = 0.1  # of the least rate: what the recommended setting may cost more
@@ -160,11 +161,12 @@ def climbing(points: list[dict[str, float]]) -> list[dict[str, float]]:
 def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Per scheme: the rate of every scene, their mean where all have one, and the mean seconds; best first."""
     out = []
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
     for scheme in dict.fromkeys(row["scheme"] for row in rows):
         own = [row for row in rows if row["scheme"] == scheme]
-        rates = {row["scene"]: row["bd_rate"] for row in own}
+        rates = {**dict.fromkeys(scenes), **{row["scene"]: row["bd_rate"] for row in own}}
         known = [rate for rate in rates.values() if rate is not None]
-        mean = statistics.mean(known) if len(known) == len(own) else None
+        mean = statistics.mean(known) if len(known) == len(scenes) else None
         seconds = statistics.mean(row["seconds"] for row in own)
         out.append({"scheme": scheme, "rates": rates, "mean": mean, "seconds": seconds})
     return sorted(out, key=lambda row: (row["mean"] is None, row["mean"] or 0.0))
