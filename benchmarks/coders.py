@@ -220,7 +220,7 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
-    from matplotlib.ticker import NullFormatter
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     figure, axes = plt.subplots(figsize=(11, 7), constrained_layout=True)
     colours = {"h264": "C0", "hevc": "C1", "av1": "C2", "vp9": "C4", "mpeg2": "C5"}
@@ -248,7 +248,9 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
     axes.set_yticks([tick for tick in ticks if low < tick < high])
     axes.yaxis.set_major_formatter("{x:g} ×")
     axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.grid(alpha=0.3, which="both")
     figure.savefig(path, dpi=110)
     plt.close(figure)
