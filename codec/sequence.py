@@ -24,7 +24,7 @@ Planes = list[NDArray[Any]]
 
 # A batch holds about as much as a core's own cache, and no more frames than is worth the objects around them.
 BATCH_BYTES = 8 << 20
-BATCH_FRAMES = 1024
+BATCH_FRAMES = 128
 
 
 @dataclass(frozen=True, kw_only=True)
