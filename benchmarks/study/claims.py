@@ -15,6 +15,7 @@ from .coding import SCENES
 from .rates import BFRAMES, CONTROLS, GOPS, RANGES, REFERENCE, SI, VOLUME, types
 from .runner import number
 from .theirs import Verdict, compare
+from .volume_model import APART, MODEL
 
 Points = Sequence[Mapping[str, Any]]
 Results = Mapping[str, Mapping[str, Any]]
@@ -41,8 +42,9 @@ class Claim:
 
 def claims(results: Results) -> list[Claim]:
     """Everything that the results at hand allow to compare, in the order of the dissertation."""
+    coding = (gains, models, floors, factors, orders, duels, picture_types, ranges, controls, times)
     found: list[Claim] = []
-    for part in (gains, floors, factors, orders, duels, picture_types, ranges, controls, times, views, depths):
+    for part in (*coding, views, depths):
         found += part(results)
     return found
 
@@ -76,6 +78,32 @@ def gains(results: Results) -> Iterator[Claim]:
             ours = {scene: gain(result["points"], scheme, against) for scene, result in made.items()}
             if ours:
                 yield claim("5.10", f"SI-PVS over {what}, {chroma}, dB", numbers, ours, "+.1f")
+
+
+def models(results: Results) -> Iterator[Claim]:
+    """Figure 5.10: SI-PVS over the volume coded by the verification model, and over ours as that is fed."""
+    made, coded = of_scenes(results, "rates"), of_scenes(results, "volume")
+    for how, volume in (("by the verification model", MODEL), ("of ours, each colour alone", APART)):
+        for chroma, scheme in (("4:2:0", SI), ("4:4:4", "si-h264")):
+            ours = {s: lead(made[s]["points"], scheme, coded[s]["points"], volume) for s in made if s in coded}
+            if ours:
+                yield claim("5.10", f"SI-PVS over SI-PVI {how}, {chroma}, dB", theirs.GAIN_VOLUME, ours, "+.1f")
+
+
+def lead(points: Points, scheme: str, others: Points, other: str) -> float | None:
+    """Mean difference in quality at the rates of the other, which misses its targets, within those of the scheme."""
+    rates, quality = zip(*((math.log(p["bpp"]), number(p["q_global"])) for p in by_rate(points, scheme)), strict=True)
+    found = [
+        float(np.interp(math.log(p["bpp"]), rates, quality)) - number(p["q_global"])
+        for p in by_rate(others, other)
+        if rates[0] <= math.log(p["bpp"]) <= rates[-1]
+    ]
+    return fmean(found) if found else None
+
+
+def by_rate(points: Points, scheme: str) -> list[Mapping[str, Any]]:
+    """A scheme's points, the lowest rate first."""
+    return sorted((p for p in points if p["scheme"] == scheme), key=lambda p: p["bpp"])
 
 
 def claim(
