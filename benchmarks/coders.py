@@ -8,7 +8,6 @@ anchor is the dissertation's SI-PVS: H.264, one I picture and P pictures, 4:2:0,
 from __future__ import annotations
 
 import argparse
-import math
 import statistics
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -39,6 +38,7 @@ QUANTISERS = {
     "avif": (8, 18, 28, 38, 46, 54, 62),
     "mpeg2": (1, 2, 4, 7, 12, 20, 31),
 }
+LETTERS = 7  # points high, of labels in the chart
 NEAR = 0.1  # of the least rate: what the recommended setting may cost more
 # One thing changed at a time: what the defaults and presets were found by.
 TRIALS = (
@@ -222,20 +222,15 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
     import matplotlib.pyplot as plt
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    figure, axes = plt.subplots(figsize=(11, 7), constrained_layout=True)
+    figure, axes = plt.subplots(figsize=(13, 10), constrained_layout=True)
     colours = {"h264": "C0", "hevc": "C1", "av1": "C2", "vp9": "C4", "mpeg2": "C5"}
     shapes = {"ei": "s", "ri": "^", "si": "o"}
     shown = [row for row in summary(rows) if row["mean"] is not None and row["scheme"] not in TRIALS]
     edge, pick = front([row for row in rows if row["scheme"] not in TRIALS]), recommended(rows)
-    labelled: list[tuple[float, float]] = []
-    for names, row in together(shown):
-        kind, _, coder = row["scheme"].partition(":")[0].partition("-")
-        at = row["seconds"], 1 + row["mean"] / 100
+    named = [(names, (row["seconds"], 1 + row["mean"] / 100), row["scheme"]) for names, row in together(shown)]
+    for _, at, scheme in named:
+        kind, _, coder = scheme.partition(":")[0].partition("-")
         axes.plot(*at, shapes.get(kind, "D"), color=colours.get(coder, "0.5"))
-        near = sum(abs(math.log(at[0] / x)) < 0.5 and abs(math.log(at[1] / y)) < 0.025 for x, y in labelled)
-        offset = (4, (4, -10, 14, -20)[near % 4])  # labels of neighbours stand one above the other
-        axes.annotate(names, at, offset, textcoords="offset points", fontsize=7)
-        labelled.append(at)
     axes.plot(pick["seconds"], 1 + pick["mean"] / 100, "*k", markersize=16, zorder=0, label="recommended")
     axes.legend(frameon=False)
     axes.margins(x=0.12)
@@ -243,7 +238,7 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
     axes.set(xscale="log", yscale="log", xlabel="CPU seconds of one encoder run, mean over rates and scenes")
     axes.set_ylabel("rate at equal PSNR, relative to the dissertation's SI-PVS")
     axes.set_title(f"Speed against accuracy, setup1 at scale {scale}; the line joins what nothing quicker beats")
-    ticks = [0.5, 0.6, 0.7, 0.8, 0.9, 1, 1.2, 1.5, 2, 3, 4, 6, 8]
+    ticks = [0.5, 0.6, 0.8, 1, 1.5, 2, 3, 5, 8, 12, 20, 30]
     low, high = axes.get_ylim()
     axes.set_yticks([tick for tick in ticks if low < tick < high])
     axes.yaxis.set_major_formatter("{x:g} ×")
@@ -252,8 +247,33 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.grid(alpha=0.3, which="both")
+    figure.canvas.draw()  # only now is it known where points lie
+    for (names, at, _), offset in zip(named, offsets(named, axes), strict=True):
+        axes.annotate(names, at, offset, textcoords="offset points", fontsize=LETTERS)
     figure.savefig(path, dpi=110)
     plt.close(figure)
+
+
+def offsets(named: list[tuple[str, tuple[float, float], str]], axes: Any) -> list[tuple[float, float]]:
+    """Where labels stand, in typographic points from theirs: the first place that nothing else takes."""
+    per_point = axes.figure.dpi / 72
+    spots = [axes.transData.transform(at) / per_point for _, at, _ in named]
+    taken = [(x - 4, y - 4, x + 4, y + 4) for x, y in spots]
+    found = []
+    for (names, _, _), (x, y) in zip(named, spots, strict=True):
+        width, height = 0.55 * LETTERS * len(names), 1.1 * LETTERS
+        places = [(side, 3 + step * height) for step in (0, -1.5, 1, -2.5, 2, -3.5) for side in (5, -5 - width)]
+        boxes = [(x + dx, y + dy, x + dx + width, y + dy + height) for dx, dy in places]
+        free = [not any(touch(box, other) for other in taken) for box in boxes]
+        best = free.index(True) if any(free) else 0
+        taken.append(boxes[best])
+        found.append(places[best])
+    return found
+
+
+def touch(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    """Whether two boxes (left, bottom, right, top) overlap."""
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 if __name__ == "__main__":
