@@ -255,14 +255,13 @@ def time_table(results: Results) -> list[str]:
 
 def frame_table(results: Results) -> list[str]:
     """What an elementary image takes to code, by how many there are."""
-    if "frames" not in results:
-        return []
-    rows = results["frames"]["rows"]
-    return [
-        "| frames | " + " | ".join(f"{row['frames']}" for row in rows) + " |",
-        "|---" * (len(rows) + 1) + "|",
-        "| µs a frame | " + " | ".join(f"{1e6 * row['seconds'] / row['frames']:.0f}" for row in rows) + " |",
-    ]
+    rows = results.get("frames", {}).get("rows", [])
+    counts = sorted({row["frames"] for row in rows})
+    lines = ["| frames | " + " | ".join(map(str, counts)) + " |", "|---" * (len(counts) + 1) + "|"]
+    for what in dict.fromkeys(row["set"] for row in rows):
+        own = {row["frames"]: 1e6 * row["seconds"] / row["frames"] for row in rows if row["set"] == what}
+        lines.append(f"| {what} | " + " | ".join(f"{own[count]:.0f}" for count in counts) + " |")
+    return lines if rows else []
 
 
 def detail_table(results: Results) -> list[str]:

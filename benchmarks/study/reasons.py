@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +96,7 @@ def framing(_folder: Path) -> dict[str, Any]:
     return {"rows": rows}
 
 
-def file_size(container: str, delimiters: int) -> int:
+def file_size(container: str, delimiters: int, frames: int = FRAMES) -> int:
     """Bytes of a file of black frames by x264, with or without access unit delimiters."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"black.{container}"
@@ -106,7 +108,7 @@ def file_size(container: str, delimiters: int) -> int:
             parameters = f"qp=51:keyint=infinite:scenecut=0:bframes=0:weightp=0:aud={delimiters}"
             stream.options = {"x264-params": parameters}
             black = av.VideoFrame.from_ndarray(np.zeros((SIDE * 3 // 2, SIDE), np.uint8), format="yuv420p")
-            for i in range(FRAMES):
+            for i in range(frames):
                 black.pts = i
                 output.mux(stream.encode(black))
             output.mux(stream.encode(None))
@@ -128,9 +130,7 @@ def searches(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
 
 def types_2008(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
     """Bjøntegaard difference in dB of one, two and three B pictures to none, at constant quantisers."""
-    for encoder in (H264of2008("si"), PlainH264("si")):
-        if encoder.name not in schemes():
-            register(encoder)
+    register_older("si")
     picture = shot(scene, "setup1", scale).picture
     goals = [{"qp": quantiser} for quantiser in QUANTISERS]
     rows = []
@@ -149,15 +149,45 @@ def types_2008(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
 
 def frames(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
     """CPU seconds of EI-PVS by the number of elementary images: the upper rows of lenses of one picture."""
+    register_older("ei")
     picture = shot(scene, "setup1", scale).picture
     columns, rows = picture.lenses
     parts = [part for part in (64, 16, 4, 1) if part <= rows]
     found = []
-    for part in (parts[0], *parts):  # the first pays for loading and compiling, and is left out
-        some = rows // part
-        pixels = picture.pixels[: some * picture.ei_pixels[1]]
-        upper = IIPicture(pixels, (columns, some), picture.ei_pixels)
-        started = time.thread_time()
-        encode(upper, "ei-h264:chroma=420", qp=QUANTISER)
-        found.append({"frames": columns * some, "seconds": time.thread_time() - started})
-    return {"rows": found[1:]}
+    for what, run in counted(picture):
+        run(rows // parts[0])  # pays for loading and compiling
+        for part in parts:
+            started = time.thread_time()
+            runs = run(rows // part)
+            seconds = (time.thread_time() - started) / runs
+            found.append({"set": what, "frames": columns * (rows // part), "seconds": seconds})
+    return {"rows": found}
+
+
+def counted(picture: IIPicture) -> Iterator[tuple[str, Callable[[int], int]]]:
+    """What may take a time that grows with the number of frames: each codes so many rows of lenses, and how often."""
+
+    def coded(rows: int, scheme: str, goal: Mapping[str, Any]) -> int:
+        upper = IIPicture(picture.pixels[: rows * picture.ei_pixels[1]], (picture.lenses[0], rows), picture.ei_pixels)
+        return encode(upper, f"ei-{scheme}", **goal).runs
+
+    def filed(rows: int, container: str) -> int:
+        file_size(container, 0, picture.lenses[0] * rows)
+        return 1
+
+    for what, scheme, goal in (
+        ("constant quantiser", "h264:chroma=420", {"qp": QUANTISER}),
+        ("constant bit rate", "h264:chroma=420", {"bpp": 1.0}),
+        ("two passes", "h264:chroma=420,rate=2pass", {"bpp": 1.0}),
+        ("2008, range 128", "h264of2008:chroma=420,rate=cq,merange=128", {"qp": QUANTISER}),
+    ):
+        yield what, partial(coded, scheme=scheme, goal=goal)
+    for container in ("avi", "mp4"):
+        yield f"black, into {container.upper()}", partial(filed, container=container)
+
+
+def register_older(kind: str) -> None:
+    """The encoders of 2008 as schemes."""
+    for encoder in (H264of2008(kind), PlainH264(kind)):
+        if encoder.name not in schemes():
+            register(encoder)
