@@ -21,6 +21,7 @@ from .coding import SCENES
 from .rates import BFRAMES, GOPS, MODERN, PVS, RANGES, REFERENCE, SI, VOLUME
 from .runner import ROOT, digest_of, records
 from .theirs import said
+from .volume_model import APART, MODEL
 
 PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
 CODERS = ROOT / "benchmarks" / "results" / "coders.json"
@@ -140,6 +141,7 @@ def tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str,
         **parts,
         "gains-modern": gains_modern(results),
         "table-types": types_beside(results),
+        "volume-model": volume_table(results),
         "framing": framing_table(results),
         "search": search_table(results),
         "types-2008": table_2008(results),
@@ -195,6 +197,21 @@ def types_beside(results: Results) -> list[str]:
             cells.append(cell + (f" · {shown(refs[i][j], '+.2f')}" if j else ""))
         lines.append(f"| {gop or 'J'} | " + " | ".join(cells) + " |")
     return lines
+
+
+def volume_table(results: Results) -> list[str]:
+    """Bjøntegaard rate of our volume against the verification model's, which codes each colour alone."""
+    coded, made = of_scenes(results, "volume"), of_scenes(results, "rates")
+    scenes = [scene for scene in coded if scene in made]
+    lines = ["| our volume | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"]
+    for what, source, scheme in (("each colour alone", coded, APART), ("colours turned", made, VOLUME)):
+        cells = []
+        for scene in scenes:
+            model = [p for p in coded[scene]["points"] if p["scheme"] == MODEL]
+            own = [p for p in source[scene]["points"] if p["scheme"] == scheme]
+            cells.append(rate_cell(pairs(model), pairs(own)))
+        lines.append(f"| {what} | " + " | ".join(cells) + " |")
+    return lines if scenes else []
 
 
 def framing_table(results: Results) -> list[str]:
