@@ -1,8 +1,11 @@
-"""What the table of coders says of curves, some of which were not measured on every scene."""
+"""What the table and the chart of coders say of curves, some of which were not measured on every scene."""
+
+from itertools import combinations
 
 import pytest
+from matplotlib.figure import Figure
 
-from benchmarks.coders import summary, table
+from benchmarks.coders import LETTERS, offsets, summary, table, touch
 
 ROWS = [
     {"scene": scene, "scheme": scheme, "bd_rate": rate, "seconds": seconds}
@@ -26,3 +29,15 @@ def test_a_mean_is_of_all_scenes_or_there_is_none():
 
 def test_a_scene_that_was_not_measured_is_a_dash():
     assert "| `once` | -90 % | – | – | 2.00 |" in table(ROWS)
+
+
+def test_labels_of_neighbours_stand_apart():
+    """Eight points on one spot and one far off: no label lies over another, nor over a point."""
+    figure = Figure(figsize=(6, 6), dpi=90)
+    axes = figure.add_subplot(xscale="log", yscale="log", xlim=(0.1, 10), ylim=(0.1, 10))
+    named = [(f"si-coder{i}", (1.0, 1.0), "") for i in range(8)] + [("si-far", (5.0, 5.0), "")]
+    found = offsets(named, axes)
+    assert found[-1] == (5, 3)  # nothing in the way
+    boxes = [(x, y, x + 0.55 * LETTERS * 9, y + 1.1 * LETTERS) for x, y in found[:-1]]
+    assert not any(touch(a, b) for a, b in combinations(boxes, 2))
+    assert not any(touch(box, (-4, -4, 4, 4)) for box in boxes)
