@@ -1,6 +1,6 @@
 """Why B pictures hurt in the dissertation's Table 5.5 and help elsewhere: one thing changed at a time.
 
-``python -m benchmarks.bframes --scale 4`` codes sub-images of two scenes with 0 to 3 and 7 B pictures between P
+``python -m benchmarks.bframes --scale 4`` codes sub-images of four scenes with 0 to 3 and 7 B pictures between P
 pictures under several conditions. What is kept is the Bjøntegaard difference in PSNR to the same condition without
 B pictures, in ``benchmarks/results/bframes.json``.
 """
@@ -47,7 +47,7 @@ def main() -> None:
     """Measure, print and keep."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
-    parser.add_argument("--scenes", default="apples,cuboid")
+    parser.add_argument("--scenes", default="apples,twins,car,cuboid")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--output", type=Path, default=RESULTS / "bframes.json")
     asked = parser.parse_args()
