@@ -31,8 +31,9 @@ def main() -> None:
     ):
         text = filled(text, mark, lines)
     PAGE.write_text(text, encoding="utf-8")
-    for picture in (RESULTS / "coders.png", DOCS / "images" / "coders.png"):
-        chart(coders["rows"], coders["scale"], picture)
+    for study, name in ((coders, "coders.png"), (full, "coders_full.png")):
+        for folder in (RESULTS, DOCS / "images"):
+            chart(study["rows"], study["scale"], folder / name)
     fill(SPEED, "coding", [size(coders), "", *front_table(coders["rows"])])
 
 
