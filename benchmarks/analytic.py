@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raytrace_ii import Background, Body, Light, Material, Scene
-from raytrace_ii.shapes import Plane, Sphere
+from raytrace_ii.shapes.primitives import Plane, Sphere
 
 Array = NDArray[np.float64]
 NEAR = 1e-9  # mm: nearer than this a ray meets the surface that it starts on

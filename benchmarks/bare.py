@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from codec import parse_scheme
-from codec.video import Video, new_frame, open_encoder
+from codec.coders.video import Video, new_frame, open_encoder
 from ii_core import IIPicture
 
 

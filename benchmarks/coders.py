@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from codec import decode, encode, parse_scheme, schemes
-from codec.base import find
+from codec.contract import find
 from ii_core import IIPicture, preset
 from ii_core.files import write_json
 from metrics import bd_rate, provenance, q_global

@@ -24,9 +24,9 @@ from ii_core import IICamera, preset
 from ii_core.files import atomic_path, write_json
 from ii_core.optics import SphericalLenslet
 from metrics import provenance
-from metrics.chart import COLOURS
+from metrics.plots.rd_chart import COLOURS
 from raytrace_ii import Body, Light, Material, Scene, trace
-from raytrace_ii.texture import Image
+from raytrace_ii.scene.textures import Image
 
 RESULTS = Path(__file__).parent / "results"
 COARSEST = 12

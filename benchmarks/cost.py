@@ -23,7 +23,7 @@ from typing import Any
 from benchmarks.fuzz import sample
 from benchmarks.readme import filled
 from codec import Encoded, encode, schemes, timed_decode
-from codec.base import find
+from codec.contract import find
 from ii_core import IIPicture, preset
 from ii_core.files import write_json
 from metrics import provenance, q_global

@@ -27,9 +27,9 @@ from codec import decode, encode
 from ii_core import IIPicture, add_sensor_noise, preset
 from ii_core.files import write_json
 from metrics import DepthQuality, FocusDepth, depth_from_focus, provenance, q_depth
-from metrics.chart import COLOURS, new_figure, save
-from metrics.depth import virtual_camera_pixels
-from metrics.focus import METHODS
+from metrics.depth.focus import METHODS
+from metrics.depth.q_depth import virtual_camera_pixels
+from metrics.plots.rd_chart import COLOURS, new_figure, save
 from raytrace_ii import Scene, Shot, load_scene, render
 
 ROOT = Path(__file__).parent.parent

@@ -14,8 +14,8 @@ import numpy as np
 
 from ii_core import preset
 from metrics import linear_layers
-from metrics.chart import COLOURS, new_figure, save
-from metrics.focus import BASE, FILTER, NOWHERE, REFERENCE, pixels_per_lens, whole_pixel_steps
+from metrics.depth.focus import BASE, FILTER, NOWHERE, REFERENCE, pixels_per_lens, whole_pixel_steps
+from metrics.plots.rd_chart import COLOURS, new_figure, save
 
 CHART = Path(__file__).parent.parent / "docs/images/focus_patterns.png"
 

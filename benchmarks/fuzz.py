@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from codec import Encoded, decode, encode, schemes
-from codec.base import find
+from codec.contract import find
 from ii_core import IIPicture
 from ii_core.files import write_json
 from metrics import provenance

@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks.readme import filled
 from codec import decode, encode, schemes
-from codec.header import coarsest, floor, frames, parts, si_below_ei, si_below_ri
+from codec.inspect.header import coarsest, floor, frames, parts, si_below_ei, si_below_ri
 from ii_core import IIPicture, preset
 from ii_core.files import write_json
 from metrics import provenance, q_global

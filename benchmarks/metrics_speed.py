@@ -29,8 +29,8 @@ from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, preset
 from ii_core.files import write_json
 from metrics import depth_from_focus, linear_layers, provenance, q_angle, q_depth, q_global, q_view
-from metrics.chart import COLOURS, MARKERS, new_figure, save
-from metrics.depth import virtual_camera_pixels
+from metrics.depth.q_depth import virtual_camera_pixels
+from metrics.plots.rd_chart import COLOURS, MARKERS, new_figure, save
 from metrics.view import LUMA, view_pair
 from raytrace_ii import Shot, load_scene, render
 

@@ -33,9 +33,9 @@ from ii_core import IICamera, IIPicture, add_sensor_noise, preset
 from ii_core.component import light_field
 from ii_core.files import atomic_path, write_json
 from metrics import provenance, q_global, q_view
-from metrics.chart import COLOURS, new_figure, save
+from metrics.plots.rd_chart import COLOURS, new_figure, save
 from raytrace_ii import Body, Scene, Shot, render
-from raytrace_ii.texture import Checker, Image, Noise, Stripes, VertexColours
+from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, VertexColours
 
 ROOT = Path(__file__).parent.parent
 RESULTS, CHART = ROOT / "benchmarks/results/needs.json", ROOT / "docs/images/needs.png"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.readme import filled
-from codec.analysis import analyse_orders
+from codec.inspect.order_analysis import analyse_orders
 from codec.order import ORDERS
 from ii_core import preset
 from ii_core.files import write_json

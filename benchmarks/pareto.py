@@ -28,7 +28,7 @@ from benchmarks.readme import filled
 from ii_core import IICamera, IIPicture, preset
 from ii_core.files import atomic_path, write_json
 from metrics import provenance, q_global
-from metrics.chart import COLOURS
+from metrics.plots.rd_chart import COLOURS
 from raytrace_ii import Scene, load_scene, render
 
 ROOT = Path(__file__).parent.parent

@@ -24,8 +24,8 @@ from ii_core import IIPicture, component_images, preset
 from ii_core.files import write_json
 from metrics import provenance
 from raytrace_ii import Scene, load_scene, render, scene_names
-from raytrace_ii.intersect import Intersector
-from raytrace_ii.rendering import SUPPORT
+from raytrace_ii.rendering.render import SUPPORT
+from raytrace_ii.trace.intersect import Intersector
 
 RESULTS = Path(__file__).parent / "results"
 REPEATS = 7

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from codec import decode, encode
-from codec.components import decode_planes, encode_planes, whole_codestream
-from codec.sequence import layout
+from codec.bitstream.jpeg2000 import decode_planes, encode_planes, whole_codestream
+from codec.frames import layout
 from ii_core import IIPicture, component_images, preset
 from ii_core.files import write_json
 from metrics import bd_rate, provenance, q_global

@@ -1,21 +1,21 @@
 """Coding: II-pictures to bitstreams and back, by pseudo video sequences and by JPEG 2000."""
 
-from .access import decode_component, decode_frame
-from .analysis import analyse_orders
-from .aom import Avif
-from .base import options, parse_scheme, register, schemes
-from .coded import Encoded, decode, encode, timed_decode
-from .ffv1 import Ffv1
-from .jpeg2000 import Jpeg2000
-from .mpeg2 import Mpeg2
-from .sperr import Sperr
-from .still import Htj2k, Jpeg, JpegXl
-from .streams import extract
-from .svtav1 import Av1
-from .volume import Separate, Volume
-from .vp9 import Vp9
-from .x264 import H264
-from .x265 import Hevc
+from .api import Encoded, decode, encode, timed_decode
+from .coders.ffv1 import Ffv1
+from .coders.jpeg2000 import Jpeg2000
+from .coders.libaom import Avif
+from .coders.mpeg2 import Mpeg2
+from .coders.sperr.coder import Sperr
+from .coders.stills import Htj2k, Jpeg, JpegXl
+from .coders.svtav1 import Av1
+from .coders.volume import Separate, Volume
+from .coders.vp9 import Vp9
+from .coders.x264 import H264
+from .coders.x265 import Hevc
+from .contract import options, parse_scheme, register, schemes
+from .inspect.extract import extract
+from .inspect.order_analysis import analyse_orders
+from .inspect.random_access import decode_component, decode_frame
 
 for _kind in ("ei", "si", "ri"):
     for _video in (H264, Hevc, Av1, Vp9, Ffv1):

@@ -1,6 +1,6 @@
 """Γ: the order in which the component images of a picture become frames (5.2).
 
-A component image has a place in a grid of ``rows`` × ``cols`` (see `codec.sequence.layout` for which grid), and is
+A component image has a place in a grid of ``rows`` × ``cols`` (see `codec.frames.layout` for which grid), and is
 named by its flat index ``row * cols + col``. An order is the permutation that lists these indices frame by frame.
 """
 

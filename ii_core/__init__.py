@@ -2,7 +2,7 @@
 
 from .camera import IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
-from .formats import find_views, load_mosaic, picture_of, write_hci, write_quilt, write_views
+from .formats.formats import find_views, load_mosaic, picture_of, write_hci, write_quilt, write_views
 from .maps import MapCamera, read_maps, write_maps
 from .picture import IIPicture, add_sensor_noise
 from .presets import camera_names, preset, preset_cameras

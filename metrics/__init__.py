@@ -1,19 +1,19 @@
 """How much of a picture survives coding: quality, rate–distortion, and charts of it."""
 
 from .angle import AngleQuality, q_angle_ssim, q_angle_ycbcr
-from .chart import rd_chart
-from .depth import DepthQuality, q_depth
-from .depth_chart import depth_over_rate, depth_rate_chart
-from .error_plots import error_map, plot_error_layers, plot_error_views
-from .focus import FocusDepth, depth_from_focus
-from .layers import linear_layers, logarithmic_layers
+from .depth.focus import FocusDepth, depth_from_focus
+from .depth.layers import linear_layers, logarithmic_layers
+from .depth.q_depth import DepthQuality, q_depth
+from .global_angle import angle_axes, mean_q_angle, q_angle, q_global
 from .measures import MEASURES, measuring
-from .plots import PLOTS, plot_all, plot_angle, plot_depth, plot_pair, plot_views
-from .psnr import angle_axes, mean_q_angle, q_angle, q_global
+from .plots.depth_chart import depth_over_rate, depth_rate_chart
+from .plots.error_maps import error_map, plot_error_layers, plot_error_views
+from .plots.overview import PLOTS, plot_all, plot_angle, plot_depth, plot_pair, plot_views
+from .plots.rd_chart import rd_chart
+from .plots.tables import summary_table, write_csv, write_latex
 from .rd import bd_psnr, bd_rate, rate_distortion
 from .report import Report, report
 from .study import provenance, read_study, write_study
-from .tables import summary_table, write_csv, write_latex
 from .view import ViewQuality, q_view
 
 __all__ = [

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ii_core import IIPicture
 from ii_core.component import light_field
 
-from .psnr import check_finite, check_pair, peak
+from .global_angle import check_finite, check_pair, peak
 from .view import LUMA, WINDOW
 
 Floats = NDArray[np.float64]

@@ -12,9 +12,9 @@ from ii_core import IIPicture
 from ii_core.view import camera_of
 
 from .angle import q_angle_ssim, q_angle_ycbcr
-from .depth import q_depth
-from .focus import FocusDepth, depth_from_focus
-from .psnr import q_angle, q_global
+from .depth.focus import FocusDepth, depth_from_focus
+from .depth.q_depth import q_depth
+from .global_angle import q_angle, q_global
 from .view import WINDOW, q_view
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IIPicture
 
-from .psnr import q_global
+from .global_angle import q_global
 
 MIN_POINTS = 4
 # Share of the shorter curve's extent that both must cover: below it the mean is about a corner of the curves.

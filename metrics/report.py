@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from ii_core import IIPicture
 
 from .angle import SCALES, q_angle_ssim, q_angle_ycbcr
-from .depth import DepthQuality, q_depth
-from .psnr import angle_axes, mean_q_angle, q_angle, q_global
+from .depth.q_depth import DepthQuality, q_depth
+from .global_angle import angle_axes, mean_q_angle, q_angle, q_global
 from .study import spelt
 from .view import WINDOW, q_view
 

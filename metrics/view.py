@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IIPicture, five_viewpoints, view_image
 from ii_core.view import camera_of
 
-from .psnr import check_finite, check_mask, check_pair, peak, psnr
+from .global_angle import check_finite, check_mask, check_pair, peak, psnr
 
 WINDOW = 11  # pixels across the Gaussian of Wang 2004
 # BT.601, as MATLAB's rgb2gray, with which Wang's ssim.m is used.

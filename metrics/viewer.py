@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ii_core import IIPicture, five_viewpoints, view_image
-from ii_core.display import ASSUMED_ANGLE_DEG, with_assumed_camera
+from ii_core.display.panel import ASSUMED_ANGLE_DEG, with_assumed_camera
 from ii_core.files import atomic_path
 from ii_core.picture import codes8
 from ii_core.view import camera_of
 
-from .psnr import q_angle, q_global
+from .global_angle import q_angle, q_global
 from .view import WINDOW, q_view
 
 PAGE_SIDE = 2048  # the largest texture every WebGL2 takes

@@ -7,10 +7,10 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .load import load_scene, scene_names
-    from .rendering import Shot, Stats, render, render_to
-    from .scene import Background, Body, Fog, Light, Material, Scene
-    from .tracing import trace
+    from .files.load import load_scene, scene_names
+    from .rendering.render import Shot, Stats, render, render_to
+    from .scene.scene import Background, Body, Fog, Light, Material, Scene
+    from .trace.tracer import trace
 
 __all__ = [
     "Background",
@@ -28,14 +28,14 @@ __all__ = [
     "trace",
 ]
 
-_HOMES = {"load_scene": "load", "scene_names": "load", "Shot": "rendering", "Stats": "rendering"}
-_HOMES |= {"render": "rendering", "render_to": "rendering", "trace": "tracing"}
+_HOMES = {"load_scene": "files.load", "scene_names": "files.load", "trace": "trace.tracer"}
+_HOMES |= dict.fromkeys(["Shot", "Stats", "render", "render_to"], "rendering.render")
 
 
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(f".{_HOMES.get(name, 'scene')}", __name__), name)
+    value = getattr(importlib.import_module(f".{_HOMES.get(name, 'scene.scene')}", __name__), name)
     globals()[name] = value
     return value
 

@@ -5,7 +5,7 @@ import pytest
 
 from ii_core import IIPicture, preset, sub_images
 from ii_core.files import read_image
-from ii_core.formats import read_pfm
+from ii_core.formats.formats import read_pfm
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 from trace_scenes import box, sphere, wall
 
 from raytrace_ii import load_scene
-from raytrace_ii.closed import flaw
+from raytrace_ii.shapes.watertight import flaw
 
 
 def pieces(mesh):

@@ -13,11 +13,11 @@ import pytest
 from PIL import Image
 
 from codec import Encoded, decode, decode_component, decode_frame, encode, schemes
-from codec.access import sequence
-from codec.base import find
+from codec.coders.video import Video
+from codec.contract import find
+from codec.inspect.extract import extract, suffixes
+from codec.inspect.random_access import sequence
 from codec.order import selection_order
-from codec.streams import extract, suffixes
-from codec.video import Video
 from ii_core import IIPicture, component_images
 
 VIDEOS = sorted(n for n in schemes() if isinstance(find(n), Video) and "gop" in find(n).options)
@@ -127,7 +127,7 @@ def samples(frame):
 @pytest.mark.parametrize("scheme", VIDEOS)
 def test_streams_are_files_that_ffmpeg_decodes_to_the_same(scheme, tmp_path):
     """Every frame of every container is the one that our own decoding puts into the picture."""
-    from codec import video
+    from codec.coders import video
 
     stream = coded(f"{scheme}:gop=5")
     taken = sequence(stream)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from codec.analysis import analyse_orders
+from codec.inspect.order_analysis import analyse_orders
 from codec.order import ORDERS, selection_order
 from ii_core import IIPicture, component_images
 from ii_core.component import KINDS

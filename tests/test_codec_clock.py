@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from codec import parse_scheme
-from codec.clock import TASKS, OwnThreads, cpu_seconds
-from codec.video import open_encoder
+from codec.coders.clock import TASKS, OwnThreads, cpu_seconds
+from codec.coders.video import open_encoder
 from ii_core import IIPicture
 
 pytestmark = pytest.mark.skipif(not os.path.isdir(TASKS), reason="only Linux tells the time of each thread")

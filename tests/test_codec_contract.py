@@ -1,4 +1,4 @@
-"""What every registered scheme must keep; see `codec.base.Coder`."""
+"""What every registered scheme must keep; see `codec.contract.Coder`."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from codec import decode, encode, schemes, timed_decode
-from codec.base import find, parse_scheme
+from codec.contract import find, parse_scheme
 from ii_core import IICamera, IIPicture
 
 SCHEMES = sorted(schemes())

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from codec import lifting
+from codec.coders import lifting
 
 # Synthesis filters of JPEG 2000 Part 1, Annex F.
 LOW = {

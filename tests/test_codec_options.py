@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from test_codec_contract import finest, psnr, quick, textured
 
-from codec import decode, encode, framing, schemes
-from codec.base import find, parse_scheme
-from codec.obu import temporal_units
-from codec.video import Video, _packets
+from codec import decode, encode, schemes
+from codec.bitstream import framing
+from codec.bitstream.obu import temporal_units
+from codec.coders.video import Video, _packets
+from codec.contract import find, parse_scheme
 from ii_core import IIPicture
 
 VIDEO = [name for name in schemes() if isinstance(find(name), Video)]

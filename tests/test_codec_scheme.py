@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from codec import encode, options, schemes
-from codec.base import find, parse_scheme, register
-from codec.jpeg2000 import Jpeg2000
+from codec.coders.jpeg2000 import Jpeg2000
+from codec.contract import find, parse_scheme, register
 from ii_core import IIPicture
 
 PICTURE = IIPicture(np.zeros((4, 4, 3), np.uint8), (2, 2), (2, 2))

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from codec import planes as colour
+from codec import colour
+from codec.colour import RGB8, RGB16, ycbcr
+from codec.frames import Film, layout
 from codec.order import BY, ORDERS, selection_order
-from codec.planes import RGB8, RGB16, ycbcr
-from codec.sequence import Film, layout
 from ii_core import IIPicture, component_images
 
 KINDS = ("ei", "si", "ri")
@@ -108,7 +108,7 @@ def test_frames_filled_up_repeat_their_edge_and_come_back(form, more, ei_pixels)
 
 
 def test_many_batches_join_up(monkeypatch):
-    monkeypatch.setattr("codec.sequence.BATCH_FRAMES", 7)
+    monkeypatch.setattr("codec.frames.BATCH_FRAMES", 7)
     pixels = np.random.default_rng(0).integers(0, 256, (40, 60, 3), np.uint8)
     film = film_of(IIPicture(pixels, (12, 8), (5, 5)), "ei", order="spiral")
     frames = to_planes(pixels, film)

@@ -13,7 +13,10 @@ import numpy as np
 import pytest
 from test_codec_contract import large, psnr, textured
 
-from codec import decode, decode_frame, encode, sperr, sperr_stream, sperr_worker, timed_decode
+from codec import decode, decode_frame, encode, timed_decode
+from codec.coders.sperr import coder as sperr
+from codec.coders.sperr import stream as sperr_stream
+from codec.coders.sperr import worker as sperr_worker
 from ii_core import IIPicture
 
 CONSTANT = 54  # bytes of the header

@@ -10,8 +10,8 @@ from PIL import Image
 from test_codec_contract import large, psnr, textured
 
 from codec import decode, encode
-from codec.aom import samples
-from codec.still import jpeg_tables, jpegxl_codestream, jpegxl_distance, jpegxl_size
+from codec.coders.libaom import samples
+from codec.coders.stills import jpeg_tables, jpegxl_codestream, jpegxl_distance, jpegxl_size
 from ii_core import IIPicture
 
 

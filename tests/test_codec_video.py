@@ -6,9 +6,9 @@ import pytest
 from test_codec_contract import large, psnr, textured
 
 from codec import decode, encode
-from codec.base import parse_scheme
+from codec.coders.x264 import START_CODE, without_sei
+from codec.contract import parse_scheme
 from codec.order import ORDERS
-from codec.x264 import START_CODE, without_sei
 
 
 def slices(payload):

@@ -8,9 +8,9 @@ import pytest
 from test_codec_contract import large, psnr, textured
 
 from codec import decode, encode
-from codec.components import decode_planes, encode_planes, whole_codestream
-from codec.sequence import layout
-from codec.volume import GROUP, MAX_SLICES, principal_axes
+from codec.bitstream.jpeg2000 import decode_planes, encode_planes, whole_codestream
+from codec.coders.volume import GROUP, MAX_SLICES, principal_axes
+from codec.frames import layout
 from ii_core import IIPicture
 
 

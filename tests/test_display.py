@@ -3,9 +3,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from codec.animation import write_animation
 from ii_core import IICamera, IIPicture, five_viewpoints, preset, view_image
-from ii_core.display import (
+from ii_core.display.film import write_animation
+from ii_core.display.panel import (
     display_simulation,
     focused_view,
     lenticular,

@@ -12,8 +12,7 @@ from pydantic_core import PydanticUndefined
 
 from ii_core.files import write_image
 from raytrace_ii import load_scene, trace
-from raytrace_ii.modelling import _Part
-from raytrace_ii.scene_file import (
+from raytrace_ii.files.toml_schema import (  # fmt: skip
     LIGHTS,
     SHAPE_PARTS,
     SHAPES,
@@ -24,7 +23,8 @@ from raytrace_ii.scene_file import (
     MeshFile,
     ObjectTable,
     SceneFile,
-)  # fmt: skip
+)
+from raytrace_ii.shapes.modelling import _Part
 
 DOCS = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text(encoding="utf-8")
 MODELS = {

@@ -13,7 +13,8 @@ import pytest
 from trace_scenes import body, hall, wall
 
 from ii_core import IIPicture, preset
-from raytrace_ii import Scene, executors, job, load_scene, render
+from raytrace_ii import Scene, load_scene, render
+from raytrace_ii.rendering import executors, job
 
 CAMERA = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 SUPPORT = ("depth", "normal", "object_id", "ray_length", "disparity", "samples")

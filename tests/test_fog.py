@@ -7,7 +7,7 @@ import pytest
 from trace_scenes import BLACK, UNIFORM, WHITE, body, box, wall
 
 from raytrace_ii import Background, Fog, Scene, load_scene, trace
-from raytrace_ii.texture import VertexColours
+from raytrace_ii.scene.textures import VertexColours
 
 HAZE, DENSITY = (0.5, 0.6, 0.9), 0.03
 FOG = Fog(colour=HAZE, density_per_mm=DENSITY)

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset, sub_images, view_image
-from ii_core.arrangement import Arrangement, estimate
 from ii_core.files import read_image, write_image
-from ii_core.formats import camera_views, read_pfm, view_disparity, write_hci, write_quilt, write_views
+from ii_core.formats.formats import camera_views, read_pfm, view_disparity, write_hci, write_quilt, write_views
+from ii_core.formats.view_order import Arrangement, estimate
 from raytrace_ii import load_scene, render
 
 counts = st.integers(1, 5)

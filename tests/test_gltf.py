@@ -8,7 +8,7 @@ import trimesh
 from gltf_files import SQUARE, SQUARE_FACES, SQUARE_UV, Gltf, png
 
 from raytrace_ii import load_scene, trace
-from raytrace_ii.load import read_model
+from raytrace_ii.files.load import read_model
 
 AHEAD = (0.0, 0.0, 1.0)
 # Corner 0 at the origin, edges of 1, 2, 3 along +x, +y and +z of the file; outward faces.

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from raytrace_ii import load_scene
-from raytrace_ii.load import read_model
+from raytrace_ii.files.load import read_model
 
 
 def good():

@@ -12,10 +12,10 @@ from test_gltf import look, scene_of
 from ii_core import preset
 from ii_core.files import write_image
 from raytrace_ii import load_scene, render
-from raytrace_ii.gltf_material import surface
-from raytrace_ii.load import read_model
-from raytrace_ii.shapes import Box, Plane, Sphere
-from raytrace_ii.texture import Image, VertexColours, linear
+from raytrace_ii.files.gltf.materials import surface
+from raytrace_ii.files.load import read_model
+from raytrace_ii.scene.textures import Image, VertexColours, linear
+from raytrace_ii.shapes.primitives import Box, Plane, Sphere
 
 share = st.floats(0, 1)
 three = st.tuples(share, share, share).map(np.array)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from codec import Encoded, decode, encode, schemes
-from codec.base import find
+from codec.contract import find
 from ii_core import IICamera, IIPicture
 from ii_core.files import read_image, write_image
 

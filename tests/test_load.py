@@ -5,7 +5,7 @@ import pytest
 
 from ii_core.files import write_image
 from raytrace_ii import load_scene, scene_names, trace
-from raytrace_ii.texture import Checker, Image, Noise, Stripes, linear
+from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, linear
 
 BALL = """
 [material.m]

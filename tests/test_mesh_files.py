@@ -10,7 +10,7 @@ from test_load import CHECKER, ball, load
 
 from ii_core.files import write_image
 from raytrace_ii import trace
-from raytrace_ii.load import read_model
+from raytrace_ii.files.load import read_model
 
 # A foot with four toes of different lengths: like none of its mirror images. Right-handed, as files are.
 CORNERS = np.array([[0, 0, 0], [3, 0, 0], [0, 2, 0], [0, 0, 1.0]])

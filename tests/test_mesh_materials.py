@@ -6,8 +6,8 @@ import trimesh
 
 from ii_core.files import write_image
 from raytrace_ii import load_scene, trace
-from raytrace_ii.load import read_model
-from raytrace_ii.texture import VertexColours, linear
+from raytrace_ii.files.load import read_model
+from raytrace_ii.scene.textures import VertexColours, linear
 
 OBJ = """
 mtllib a.mtl

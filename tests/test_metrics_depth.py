@@ -5,7 +5,7 @@ import pytest
 
 from ii_core import IICamera, IIPicture, orthoscopic, view_image
 from metrics import depth_from_focus, logarithmic_layers, q_depth
-from metrics.depth import virtual_camera_pixels
+from metrics.depth.q_depth import virtual_camera_pixels
 
 GAP = 1.5
 

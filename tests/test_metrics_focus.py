@@ -8,12 +8,21 @@ from trace_scenes import UNIFORM, WHITE, body, wall
 
 from ii_core import IICamera, IIPicture, orthoscopic, preset
 from metrics import depth_from_focus, linear_layers, logarithmic_layers, q_depth
-from metrics.depth import virtual_camera_pixels
-from metrics.focus import BASE, FILTER, NOWHERE, REFERENCE, pixel_tables, pixels_per_lens, star, whole_pixel_steps
-from metrics.focus_kernels import choose, focus_cost, half_cost, pass_on, weigh
-from metrics.layers import nearest_layer
+from metrics.depth.focus import (
+    BASE,
+    FILTER,
+    NOWHERE,
+    REFERENCE,
+    pixel_tables,
+    pixels_per_lens,
+    star,
+    whole_pixel_steps,
+)
+from metrics.depth.kernels import choose, focus_cost, half_cost, pass_on, weigh
+from metrics.depth.layers import nearest_layer
+from metrics.depth.q_depth import virtual_camera_pixels
 from raytrace_ii import Scene, render
-from raytrace_ii.texture import Image
+from raytrace_ii.scene.textures import Image
 
 GAP = 1.5
 PEAKS = {"uint8": 255, "uint16": 65535, "float32": 1.0}

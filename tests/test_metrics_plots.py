@@ -7,7 +7,7 @@ import pytest
 from ii_core import IICamera, IIPicture, five_viewpoints, view_image
 from ii_core.files import read_image, write_image
 from metrics import angle_axes, q_angle, q_depth
-from metrics.plots import (
+from metrics.plots.overview import (
     PLOTS,
     _angle_figure,
     _depth_figure,

@@ -11,7 +11,7 @@ import pytest
 from ii_core import IIPicture
 from metrics import bd_psnr, bd_rate, q_global, rate_distortion, rd_chart, read_study, summary_table, write_csv
 from metrics import write_study as _write_study
-from metrics.chart import draw
+from metrics.plots.rd_chart import draw
 
 RATES = np.array([0.02, 0.05, 0.1, 0.35, 1.0])
 

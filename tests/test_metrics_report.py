@@ -9,7 +9,7 @@ import pytest
 from ii_core import IICamera, IIPicture, five_viewpoints, resampled, view_image
 from ii_core.files import read_image, write_image
 from metrics import DepthQuality, error_map, q_angle, q_depth, q_global, q_view, report
-from metrics.error_plots import _error_layers_figure, _error_views_figure, layer_groups
+from metrics.plots.error_maps import _error_layers_figure, _error_views_figure, layer_groups
 
 PEAKS = {"uint8": 255, "uint16": 65535, "float32": 1.0}
 

@@ -27,9 +27,9 @@ from metrics import (
     write_latex,
     write_study,
 )
-from metrics.chart import draw
-from metrics.depth_chart import draw_depth_rate
-from metrics.tables import latex_text
+from metrics.plots.depth_chart import draw_depth_rate
+from metrics.plots.rd_chart import draw
+from metrics.plots.tables import latex_text
 
 SCHEMES, RATES = ["fine", "coarse"], [3, 6, 9, 12, 15, 24]
 

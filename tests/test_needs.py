@@ -10,7 +10,7 @@ from trace_scenes import WHITE, body, floor, hall, sphere, sun
 from benchmarks import needs
 from ii_core import IIPicture, preset
 from raytrace_ii import Scene, trace
-from raytrace_ii.texture import Checker, Image, VertexColours
+from raytrace_ii.scene.textures import Checker, Image, VertexColours
 
 CAMERA = preset("setup1", scale=16)
 

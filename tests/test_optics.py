@@ -14,7 +14,7 @@ from ii_core.optics import element as element_of
 from ii_core.presets import preset_cameras, scaled
 from ii_core.view import view_positions
 from raytrace_ii import Background, Scene, render
-from raytrace_ii.shapes import Mesh
+from raytrace_ii.shapes.primitives import Mesh
 
 GAP = 0.75
 # Rays of millimetres in float64, a few operations each: 1e-12 is thousands of roundings.

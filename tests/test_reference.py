@@ -14,8 +14,9 @@ from trace_scenes import body, hall, sphere, wall
 
 from ii_core import IIPicture, preset
 from ii_core.files import read_channels, read_image
-from raytrace_ii import Scene, load_scene, reference, render
-from raytrace_ii.content import content_hash
+from raytrace_ii import Scene, load_scene, render
+from raytrace_ii.rendering import render_sets as reference
+from raytrace_ii.scene.hashing import content_hash
 
 CAMERA = preset("setup1", scale=64)
 NAMES = ("one", "two", "three")

@@ -10,7 +10,9 @@ from trace_scenes import body, hall, wall
 
 from ii_core import IICamera, IIPicture, orthoscopic, preset, stand_back
 from ii_core.files import read_about, read_channels, read_depth, read_image
-from raytrace_ii import Scene, job, render, render_to, rendering
+from raytrace_ii import Scene, render, render_to
+from raytrace_ii.rendering import job
+from raytrace_ii.rendering import render as rendering
 
 SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 TALL = IICamera(pixels=(40, 150), lenses=(4, 15), pixel_pitch_mm=0.4, gap_mm=6.0)  # two bands of noise and a piece
@@ -174,7 +176,7 @@ import resource, sys
 import numpy as np
 from ii_core import IICamera
 from raytrace_ii import Body, Material, Scene, render, render_to
-from raytrace_ii.rendering import SUPPORT
+from raytrace_ii.rendering.render import SUPPORT
 
 corners = np.array([[-9e3, -9e3, 50], [9e3, -9e3, 50], [0, 9e3, 50]])
 scene = Scene(bodies=[Body(name="wall", vertices=corners, faces=np.array([[0, 2, 1]]), material=Material())])

@@ -5,8 +5,10 @@ import pytest
 from trace_scenes import BLACK, UNIFORM, WHITE, body, hall, sphere, wall
 
 from ii_core import IICamera, optics, preset
-from raytrace_ii import Scene, job, render, sample_kernels, trace
-from raytrace_ii.texture import Checker, Noise
+from raytrace_ii import Scene, render, trace
+from raytrace_ii.rendering import job
+from raytrace_ii.scene.textures import Checker, Noise
+from raytrace_ii.trace.kernels import sampling as sample_kernels
 
 SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 ONE_LENS = IICamera(pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0)

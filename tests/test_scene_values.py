@@ -7,7 +7,7 @@ import pytest
 from trace_scenes import BLACK, WHITE, body, wall
 
 from raytrace_ii import Background, Body, Fog, Light, Material, Scene
-from raytrace_ii.texture import Checker, Image, VertexColours
+from raytrace_ii.scene.textures import Checker, Image, VertexColours
 
 PLAIN = Image(np.ones((2, 2, 3), np.float32))
 CUT = Image(np.ones((2, 2, 3), np.float32), alpha=np.ones((2, 2), np.float32))

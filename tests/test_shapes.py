@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from raytrace_ii.shapes import Box, BoxGrid, Cylinder, Plane, Revolve, Sphere, boxes, rotation, smooth_curve
+from raytrace_ii.shapes.primitives import (
+    Box,
+    BoxGrid,
+    Cylinder,
+    Plane,
+    Revolve,
+    Sphere,
+    boxes,
+    rotation,
+    smooth_curve,
+)
 
 VASE = [(0, 0), (3, 0), (2, 4), (4, 7), (0, 9)]
 SHAPES = {

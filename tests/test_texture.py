@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from trace_scenes import BLACK, WHITE, body, box, sphere, texture_at, wall
 
 from ii_core.files import read_image
-from raytrace_ii import Scene, kernels, trace
-from raytrace_ii.job import CURVES
-from raytrace_ii.shapes import rotation
-from raytrace_ii.texture import Checker, Image, Noise, Stripes, TextureTable, image_texture, linear, normal_map
+from raytrace_ii import Scene, trace
+from raytrace_ii.rendering.job import CURVES
+from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, TextureTable, image_texture, linear, normal_map
+from raytrace_ii.shapes.primitives import rotation
+from raytrace_ii.trace.kernels import shade as kernels
 
 BOARD = Checker((WHITE, BLACK), (2.0, 2.0, 2.0))
 CLOUD = Noise((BLACK, WHITE), (1.0, 1.0, 1.0), contrast=1.0)

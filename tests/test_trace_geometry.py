@@ -8,8 +8,8 @@ from trace_scenes import UNIFORM, WHITE, body, box, lamp, sphere, spread, sun, t
 
 from ii_core import IICamera, elementary_images, preset, refocus, sub_images
 from raytrace_ii import Scene, load_scene, render, trace
-from raytrace_ii.shapes import Mesh, rotation
-from raytrace_ii.texture import Noise
+from raytrace_ii.scene.textures import Noise
+from raytrace_ii.shapes.primitives import Mesh, rotation
 
 # float32 keeps 6e-8 of a coordinate; a hit is put together from three vertices and (u, v): ten roundings at most.
 FLOAT32 = 1e-6

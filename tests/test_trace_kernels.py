@@ -7,8 +7,9 @@ import pytest
 from trace_scenes import WHITE, body, hall, sphere, wall
 
 from ii_core import preset
-from raytrace_ii import kernels, trace
-from raytrace_ii.texture import Image
+from raytrace_ii import trace
+from raytrace_ii.scene.textures import Image
+from raytrace_ii.trace.kernels import shade as kernels
 
 NAMES = (
     "start_rays",

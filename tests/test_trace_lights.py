@@ -7,7 +7,7 @@ import pytest
 from trace_scenes import BLACK, UNIFORM, WHITE, body, floor, sphere, spread, wall
 
 from raytrace_ii import Background, Light, Scene, trace
-from raytrace_ii.texture import Image
+from raytrace_ii.scene.textures import Image
 
 
 def spot_on_floor(x, *, cone_deg=(20, 30), colour=WHITE):

@@ -7,8 +7,8 @@ import pytest
 from trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, lamp, reflectance, sphere, spread, sun, wall
 
 from raytrace_ii import Scene, trace
-from raytrace_ii.shapes import Mesh
-from raytrace_ii.texture import Image
+from raytrace_ii.scene.textures import Image
+from raytrace_ii.shapes.primitives import Mesh
 
 GLASS, WATER, ICE = 1.5, 1.33, 1.31
 

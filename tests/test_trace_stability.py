@@ -7,8 +7,8 @@ import pytest
 from trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, lamp, sphere, spread, sun, wall
 
 from raytrace_ii import Background, Body, Light, Material, Scene, trace
-from raytrace_ii.packing import LIFT
-from raytrace_ii.shapes import Mesh, rotation
+from raytrace_ii.shapes.primitives import Mesh, rotation
+from raytrace_ii.trace.packing import LIFT
 
 LIGHT = np.array([0.5, 0.7, -0.4]) / np.linalg.norm([0.5, 0.7, -0.4])
 ROOM = Mesh(*(lambda m: (m.vertices, m.faces))(box(2, 2, 2)))  # no textures, half extent 1

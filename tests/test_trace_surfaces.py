@@ -7,8 +7,8 @@ import pytest
 from trace_scenes import BLACK, UNIFORM, WHITE, body, floor, hall, lamp, sphere, sun, wall
 
 from raytrace_ii import Background, Scene, trace
-from raytrace_ii.shapes import Mesh, rotation
-from raytrace_ii.texture import Image, normal_map
+from raytrace_ii.scene.textures import Image, normal_map
+from raytrace_ii.shapes.primitives import Mesh, rotation
 
 FLAT = Image(np.full((2, 2, 3), (0.5, 0.5, 1.0), np.float32))
 

@@ -20,8 +20,8 @@ from benchmarks.stability import curves, depth, geometry, light, picture, pictur
 from benchmarks.stability.geometry import Row
 from ii_core.files import atomic_path, write_image, write_json
 from metrics import provenance
-from metrics.chart import COLOURS
-from metrics.focus import METHODS
+from metrics.depth.focus import METHODS
+from metrics.plots.rd_chart import COLOURS
 
 ROOT = Path(__file__).parent.parent.parent
 RESULTS, DOCS = ROOT / "benchmarks" / "results", ROOT / "docs"

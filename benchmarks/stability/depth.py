@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from benchmarks.stability.geometry import Row
 from ii_core import IIPicture, add_sensor_noise, preset
 from metrics import FocusDepth, depth_from_focus
-from metrics.focus import METHODS
+from metrics.depth.focus import METHODS
 from raytrace_ii import Body, Light, Material, Scene, render
-from raytrace_ii.texture import Image, linear
+from raytrace_ii.scene.textures import Image, linear
 
 RESULTS = Path(__file__).parent.parent / "results"
 CAMERA = preset("setup1", scale=8)

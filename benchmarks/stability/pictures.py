@@ -13,9 +13,9 @@ from benchmarks.stability import depth, geometry, light
 from codec import decode, encode
 from ii_core import add_sensor_noise, preset, read_maps, view_image, write_maps
 from metrics import depth_from_focus
-from metrics.focus import METHODS
+from metrics.depth.focus import METHODS
 from raytrace_ii import Body, Scene, load_scene, render, trace
-from raytrace_ii.shapes import rotation
+from raytrace_ii.shapes.primitives import rotation
 
 
 def rendering() -> NDArray[np.uint8]:

@@ -12,7 +12,7 @@ from codec import encode, timed_decode
 from ii_core import IIPicture, preset
 from metrics import q_global
 from raytrace_ii import Shot, load_scene, render
-from raytrace_ii.rendering import cores
+from raytrace_ii.rendering.render import cores
 
 SCENES = ("apples", "twins", "car", "cuboid")
 RATES = (0.015, 0.03, 0.06, 0.15, 0.3, 0.63, 1.0, 1.5)  # bit per pixel, the range of Olsson 2008, §5.7.3

@@ -16,10 +16,10 @@ import numpy as np
 from benchmarks.bare import bare_encoder
 from benchmarks.bframes import QUANTISERS, curve
 from codec import encode, register, schemes
-from codec.base import Options
-from codec.sequence import Film
-from codec.video import Settings
-from codec.x264 import H264
+from codec.coders.video import Settings
+from codec.coders.x264 import H264
+from codec.contract import Options
+from codec.frames import Film
 from ii_core import IIPicture
 from metrics import bd_psnr
 

@@ -9,7 +9,7 @@ from typing import Any
 from benchmarks.headers import SIDES, duel
 from ii_core import preset
 from raytrace_ii import load_scene, render
-from raytrace_ii.rendering import cores
+from raytrace_ii.rendering.render import cores
 
 from .runner import Step
 

@@ -14,9 +14,9 @@ from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, view_image
 from ii_core.files import write_image
 from metrics import FocusDepth, angle_axes, depth_from_focus, measuring, q_angle, q_depth, q_global, q_view
-from metrics.layers import virtual_viewpoint
+from metrics.depth.layers import virtual_viewpoint
 from raytrace_ii import Shot
-from raytrace_ii.rendering import cores
+from raytrace_ii.rendering.render import cores
 
 from .coding import CODED, SCENES, curves, setup3_scale, shot
 from .rates import REFERENCE, VOLUME

@@ -187,7 +187,7 @@ def run_study(
         write_study,
     )
 
-    from ..rendering import cores
+    from ..rendering.render import cores
 
     more = measuring(picture, measures, depth=depth) if set(measures) - {"q_global"} else None
     with progress_bar(f"code {name}") as report:

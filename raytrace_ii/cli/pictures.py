@@ -98,7 +98,7 @@ def export(
     """Write an II-picture as other light field programs read it."""
     from ii_core import write_hci, write_quilt, write_views
     from ii_core.files import read_depth, write_image
-    from ii_core.formats import quilt_path
+    from ii_core.formats.formats import quilt_path
 
     if to not in ("views", "hci", "quilt", "mosaic"):
         raise ValueError(f"unknown layout {to!r}: known are views, hci, quilt, mosaic")

@@ -12,7 +12,7 @@ import typer
 from .common import Force, Workers, app, check_output, check_picture, progress_bar
 
 if TYPE_CHECKING:
-    from ..rendering import Stats
+    from ..rendering.render import Stats
 
 Exr = Path | None
 
@@ -89,7 +89,7 @@ def _render_scene(
     dtype: str, options: dict[str, Any],
 ) -> None:  # fmt: skip
     """One scene through every pixel array, and its projection."""
-    from ..load import load_scene
+    from ..files.load import load_scene
 
     loaded = load_scene(scene)
     with _cluster(dask) as executor:
@@ -105,7 +105,7 @@ def _render_scene(
 
 
 def _all_support(array: Any) -> list[str]:
-    from ..reference import support_images
+    from ..rendering.render_sets import support_images
 
     return support_images(array)
 
@@ -128,7 +128,7 @@ def _render_set(
     name: str, folder: Path, arrays: Sequence[Any], poses: Sequence[Any], options: dict[str, Any], bits: int,
     workers: int | None, executor: Any, force: bool,
 ) -> None:  # fmt: skip
-    from ..reference import SETS, render_set
+    from ..rendering.render_sets import SETS, render_set
 
     if name not in SETS:
         raise ValueError(f"unknown set {name!r}: known are {', '.join(SETS)}")
@@ -198,7 +198,7 @@ def _numbered(count: int, i: int) -> Callable[[Path], Path]:
 
 
 def _shoot(path: Path, scene: Any, camera: Any, **options: Any) -> Stats:
-    from ..rendering import render_to
+    from ..rendering.render import render_to
 
     with progress_bar(f"render {path.stem}") as report:
         return render_to(path, scene, camera, progress=lambda done, total: report(done, total, ""), **options)
@@ -209,7 +209,7 @@ def _save_projection(scene: Any, camera: Any, path: Path, means: dict[str, Any])
     from ii_core import orthoscopic, projection_camera
     from ii_core.files import write_image
 
-    from ..rendering import render as shot_of
+    from ..rendering.render import render as shot_of
 
     if camera.model is None:
         raise ValueError("the maps do not say what camera they are of: there is no 2D projection to match")

@@ -100,7 +100,8 @@ def display(
     quilt: tiles for Looking Glass displays; lenticular: views interlaced for slanted cylindrical lenses; simulation:
     how the integral-imaging display itself looks from one place; parallax: a film around the viewing zone.
     """
-    from ii_core import IIPicture, display
+    from ii_core import IIPicture
+    from ii_core.display import panel as display
     from ii_core.files import write_image
 
     kinds = ("quilt", "lenticular", "simulation", "parallax")
@@ -130,8 +131,9 @@ def display(
 def _film(
     picture: Path, output: Path, size: tuple[int, int], depth: float | None, cone: float, count: int, fps: int
 ) -> None:
-    from codec.animation import write_animation
-    from ii_core import IIPicture, display
+    from ii_core import IIPicture
+    from ii_core.display import panel as display
+    from ii_core.display.film import write_animation
 
     original = display.with_assumed_camera(IIPicture.load(picture))
     places = display.viewpoints_around(original, count, cone=cone)

@@ -13,7 +13,7 @@ from .common import Force, app, check_output, columns, progress_bar
 @app.command()
 def scenes() -> None:
     """List the scenes that come with the package."""
-    from ..load import scene_names
+    from ..files.load import scene_names
 
     columns(scene_names())
 

@@ -1,0 +1,1 @@
+"""Bitstream parsing and framing; nothing here encodes or decodes."""

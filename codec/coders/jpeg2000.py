@@ -1,0 +1,94 @@
+"""JPEG 2000 Part 1 on the II-picture as it lies: the reference everything is compared with."""
+
+from __future__ import annotations
+
+import io
+import math
+import time
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+import PIL
+from numpy.typing import NDArray
+from PIL import Image, features
+from PIL.Jpeg2KImagePlugin import Jpeg2KImageFile
+
+from ii_core import IIPicture
+
+from ..contract import Coder, Coding, Goal, Options
+from ..rate import Run, nearest_rate
+
+LEVELS = 5
+RAW_BPP = 24
+LOSSLESS = 0.0  # the compression ratio that OpenJPEG takes for none
+COARSEST = 1e9
+
+
+class Jpeg2000(Coder):
+    """CDF 5/3, five levels, one tile, one layer, reversible colour transform, by OpenJPEG through Pillow.
+
+    The payload is the raw codestream. Pillow has no 16-bit RGB there, so that only 8 bit are taken.
+
+    References
+    ----------
+    Olsson 2008, §5.7.
+    """
+
+    name = "jpeg2000"
+    about = "The II-picture itself, JPEG 2000 (CDF 5/3, 5 levels, one tile) by OpenJPEG"
+    dtypes: ClassVar[tuple[str, ...]] = ("uint8",)
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Pillow and its OpenJPEG."""
+        return {"pillow": PIL.__version__, "openjpeg": str(features.version("jpg_2000"))}
+
+    def check(self, picture: IIPicture, options: Options) -> None:
+        """Any size will do."""
+
+    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> Coding:
+        """A rate at or above that of lossless coding gives the lossless picture."""
+        assert goal.bpp is not None
+        width, height = picture.size
+        raw_bytes = width * height * RAW_BPP / 8
+        at_ratio = partial(_encode, picture.pixels)
+        run, runs = nearest_rate(
+            lambda size: at_ratio(min(raw_bytes / size, COARSEST)),
+            width * height * goal.bpp / 8,
+            coarsest=lambda: at_ratio(COARSEST),
+            finest=lambda: at_ratio(LOSSLESS),
+        )
+        return Coding(run=run, runs=runs)
+
+    def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[NDArray[np.uint8], float]:
+        """Refuses a stream of another size before it takes memory."""
+        started = time.thread_time()
+        try:
+            # The file class itself, since `Image.open` refuses large pictures by a limit global to the process.
+            with Jpeg2KImageFile(io.BytesIO(payload)) as image:
+                if image.size != blank.size or image.mode != "RGB":
+                    raise ValueError(f"its JPEG 2000 stream is {image.size} {image.mode}, {blank.size} RGB is needed")
+                pixels = np.array(image)
+        except (OSError, SyntaxError) as error:
+            raise ValueError(f"its JPEG 2000 stream does not decode ({error})") from None
+        return pixels, time.thread_time() - started
+
+
+def _encode(pixels: NDArray[np.uint8], ratio: float) -> Run:
+    """One run of the encoder at a compression ratio against 24 bit per pixel."""
+    image = Image.fromarray(pixels)
+    started = time.thread_time()
+    out = io.BytesIO()
+    image.save(
+        out,
+        "JPEG2000",
+        no_jp2=True,
+        quality_mode="rates",
+        quality_layers=[ratio],
+        # OpenJPEG refuses to halve a side of one pixel.
+        num_resolutions=min(LEVELS, int(math.log2(min(image.size)))) + 1,
+        irreversible=False,
+        mct=1,
+    )
+    return Run(out.getvalue(), time.thread_time() - started)

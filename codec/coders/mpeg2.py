@@ -1,0 +1,67 @@
+"""MPEG-2 by FFmpeg, as the first coders of integral images used it (Yeom et al. 2004)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import ClassVar
+
+from ..contract import Option, Options
+from ..frames import Film
+from ..rate import Run, nearest_rate
+from .video import COMMON, Settings, Video
+
+FINEST, COARSEST = 1, 31
+FRAME_RATE = 25  # the standard knows few
+MAX_BIT_RATE = 1 << 30
+
+
+class Mpeg2(Video):
+    """Component images of one kind as an MPEG-2 pseudo video sequence, 4:2:0."""
+
+    standard = "MPEG-2"
+    encoder = "mpeg2video"
+    decoder = "mpeg2video"
+    min_side = 16
+    max_side = 4095
+    min_coded_frame = 8
+    min_frame_bytes = 12
+    qp_range = (FINEST, COARSEST)
+    scale_about = "constant quantiser"
+    options: ClassVar[Mapping[str, Option]] = {
+        **COMMON,
+        "gop": Option(
+            about="frames from I picture to I picture, 0 for as many as FFmpeg allows", default=0, low=0, high=600
+        ),
+        "bframes": Option(about="B pictures between P pictures", default=2, low=0, high=3),
+    }
+
+    def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
+        """The same quantiser in every macroblock."""
+        scale = f"{quantiser:g}"
+        return _settings(options, {"qmin": scale, "qmax": scale, "mbqmin": scale})
+
+    def meet(self, target: float, film: Film, options: Options, run: Callable[[Settings], Run]) -> tuple[Run, int]:
+        """By FFmpeg's rate control."""
+
+        def at_rate(size: float) -> Run:
+            bits = round(min(max(8 * size / film.frames * FRAME_RATE, 1), MAX_BIT_RATE))
+            return run(_settings(options, {"qmin": str(FINEST), "qmax": str(COARSEST)}, bits))
+
+        return nearest_rate(
+            at_rate,
+            target,
+            coarsest=lambda: run(self.constant(COARSEST, film, options)),
+            finest=lambda: run(self.constant(FINEST, film, options)),
+            reruns=10,
+        )
+
+
+def _settings(options: Options, rate: Mapping[str, str], bit_rate: int | None = None) -> Settings:
+    parameters = {
+        "g": str(options["gop"] or 600),
+        "bf": str(options["bframes"]),
+        "sc_threshold": "1000000000",
+        "flags": "+cgop",  # no B picture looks over the end of its group
+        **rate,
+    }
+    return Settings(parameters=parameters, bit_rate=bit_rate)

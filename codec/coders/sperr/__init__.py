@@ -1,0 +1,1 @@
+"""SPERR volume coder, decoded in a process with limits."""

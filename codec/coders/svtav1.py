@@ -1,0 +1,58 @@
+"""AV1 by SVT-AV1, which takes 4:2:0 only."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ..contract import Option, Options
+from ..frames import Film
+from .video import COMMON, DEPTH, Settings, Video
+
+# It would tell its settings on the error stream at every start: errors only.
+os.environ.setdefault("SVT_LOG", "1")
+
+
+class Av1(Video):
+    """Component images of one kind as an AV1 pseudo video sequence."""
+
+    standard = "AV1"
+    encoder = "libsvtav1"
+    decoder = "libdav1d"
+    # It takes 4, and then runs out of room for what noise needs.
+    min_side = 8
+    max_side = 8192
+    min_coded_frame = 4
+    min_frame_bytes = 5
+    quantiser_step = 0.25
+    octave = 9.0
+    qp_range = (1, 63)
+    scale_about = "SVT-AV1's constant rate factor, or a constant quantiser with rate=cq"
+    options: ClassVar[Mapping[str, Option]] = {
+        **COMMON,
+        "rate": Option(
+            about="what is kept constant: a rate factor, by which pictures that predict others are finer, or the "
+            "quantiser of each level of the hierarchy",
+            default="crf",
+            choices=("crf", "cq"),
+        ),
+        # From 8 on it fails small frames of noise: errors beyond 100 at the finest factor.
+        "preset": Option(about="SVT-AV1's, 0 is the greatest effort", default=4, low=0, high=7),
+        "depth": DEPTH,
+        "threads": Option(about="levels of parallelism; the bytes do not depend on it", default=1, low=1, high=6),
+    }
+
+    presets: ClassVar[Mapping[str, Options]] = {
+        "fast": {"preset": 7},
+        "balanced": {"preset": 4},
+        "best": {"preset": 2},
+    }
+
+    def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
+        """A constant rate factor, or quantiser."""
+        parameters = [
+            f"crf={quantiser:g}:keyint={options['gop'] or -1}:lp={options['threads']}:scd=0",
+            *(["aq-mode=0"] if options["rate"] == "cq" else []),
+        ]
+        return Settings(parameters={"preset": str(options["preset"]), "svtav1-params": ":".join(parameters)})

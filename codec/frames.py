@@ -1,0 +1,164 @@
+"""II-picture ↔ pseudo video sequence: component images in an order, as planes, a batch of frames at a time.
+
+The picture is never rearranged as a whole. A batch is gathered straight from the interleaved RGB picture into the
+planes an encoder reads, and scattered straight back from what a decoder wrote; see `codec.colour` for the colours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ii_core.component import KINDS
+
+from . import colour
+from .colour import Format
+from .order import selection_order
+
+Pair = tuple[int, int]
+Planes = list[NDArray[Any]]
+
+# A batch holds about as much as a core's own cache, and no more frames than is worth the objects around them.
+BATCH_BYTES = 8 << 20
+BATCH_FRAMES = 128
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """Where the pixels of each component image lie in the picture; steps count pixels in row-major order."""
+
+    rows: int
+    cols: int
+    height: int
+    width: int
+    step_row: int
+    step_col: int
+    step_y: int
+    step_x: int
+
+    @property
+    def frames(self) -> int:
+        """J, how many component images there are."""
+        return self.rows * self.cols
+
+    def origins(self, order: str, by: str = "rows") -> NDArray[np.int64]:
+        """The first pixel of each component image, by frame number."""
+        row, col = np.divmod(selection_order(order, self.rows, self.cols, by), self.cols)
+        return row * self.step_row + col * self.step_col
+
+    def transposed(self) -> Layout:
+        """The same images in the same grid, each with rows for columns."""
+        return replace(self, height=self.width, width=self.height, step_y=self.step_x, step_x=self.step_y)
+
+
+def layout(lenses: Pair, ei_pixels: Pair, kind: str) -> Layout:
+    """Grid, frame size and steps of one kind of component image.
+
+    =====  ============  =================  ==============
+    kind   frame (T×S)   grid (rows×cols)   (2.12)–(2.14)
+    =====  ============  =================  ==============
+    ei     V × U         L × K              one lens
+    si     L × K         V × U              one direction
+    ri     K × U         V × L              one picture row
+    =====  ============  =================  ==============
+
+    Raises
+    ------
+    ValueError
+        If the kind is unknown.
+    """
+    if kind not in KINDS:
+        raise ValueError(f"unknown component image {kind!r}: known are {', '.join(KINDS)}")
+    (k, l), (u, v) = lenses, ei_pixels
+    # One step along each axis of the light field [l, v, k, u], in pixels.
+    size = {"l": l, "v": v, "k": k, "u": u}
+    step = {"l": v * k * u, "v": k * u, "k": u, "u": 1}
+    row, col, y, x = tuple({"ei": "lkvu", "si": "vulk", "ri": "vlku"}[kind])
+    return Layout(
+        rows=size[row],
+        cols=size[col],
+        height=size[y],
+        width=size[x],
+        step_row=step[row],
+        step_col=step[col],
+        step_y=step[y],
+        step_x=step[x],
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Film:
+    """The frames of a pseudo video sequence: which component images, in what order and colours, how large.
+
+    ``width`` and ``height`` are those of the frames that are coded, at least those of a component image.
+    """
+
+    layout: Layout
+    order: str
+    by: str
+    format: Format
+    width: int
+    height: int
+
+    @property
+    def frames(self) -> int:
+        """How many."""
+        return self.layout.frames
+
+    def origins(self) -> NDArray[np.int64]:
+        """The first pixel of each frame in the picture."""
+        return self.layout.origins(self.order, self.by)
+
+    def batch(self, strides: list[int] | None = None) -> Planes:
+        """Room for one batch of frames, an array (B, rows, ``stride``) of samples for each plane."""
+        shapes = self.format.planes(self.width, self.height)
+        sizes = [(rows, stride) for (rows, _), stride in zip(shapes, strides or [n for _, n in shapes], strict=True)]
+        nbytes = sum(rows * stride for rows, stride in sizes) * np.dtype(self.format.dtype).itemsize
+        count = max(1, min(self.frames, BATCH_FRAMES, BATCH_BYTES // nbytes))
+        return [np.zeros((count, *size), self.format.dtype) for size in sizes]
+
+    def gathered(self, pixels: NDArray[Any], planes: Planes) -> Iterator[int]:
+        """Fill ``planes`` with one batch of frames after another.
+
+        Parameters
+        ----------
+        pixels : ndarray, (N, M, 3)
+            The picture, C-contiguous.
+        planes : list of ndarray
+            As from `batch`, overwritten every time: use them up before asking for the next.
+
+        Yields
+        ------
+        int
+            How many frames of ``planes`` are filled.
+        """
+        flat, origins, size = pixels.reshape(-1, 3), self.origins(), len(planes[0])
+        for first in range(0, self.frames, size):
+            some = origins[first : first + size]
+            colour.gather(flat, some, self._steps, (*self._size, self.width), self.format, planes)
+            yield len(some)
+
+    def scatter(self, planes: Planes, origins: NDArray[np.int64], pixels: NDArray[Any]) -> None:
+        """Put a batch of frames back into the picture: the inverse of one step of `gathered`.
+
+        Parameters
+        ----------
+        planes : list of ndarray
+        origins : ndarray of int64, at most (B,)
+            The part of `origins` these frames have.
+        pixels : ndarray, (N, M, 3)
+            C-contiguous; the pixels of these frames are written.
+        """
+        colour.scatter(planes, origins, self._steps, self._size, self.format, pixels.reshape(-1, 3))
+
+    @property
+    def _steps(self) -> Pair:
+        return self.layout.step_y, self.layout.step_x
+
+    @property
+    def _size(self) -> Pair:
+        return self.layout.height, self.layout.width

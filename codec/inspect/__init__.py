@@ -1,0 +1,1 @@
+"""Analysis of coded pictures: header portion, random access, extraction, orders of frames."""

@@ -1,0 +1,206 @@
+"""Out of the ``.ii`` file: the coded stream as a file that other players and viewers open, without coding it again.
+
+=================  ===========================================================================================
+schemes            files
+=================  ===========================================================================================
+``*-h264``         ``.mkv``, ``.mp4``, ``.mov``, ``.h264`` (the payload as it is)
+``*-hevc``         ``.mkv``, ``.mp4``, ``.mov``, ``.hevc`` (the payload as it is)
+``*-av1``          ``.mkv``, ``.mp4``, ``.ivf``, ``.obu`` (the payload as it is)
+``*-vp9``          ``.mkv``, ``.mp4``, ``.webm``, ``.ivf``
+``*-ffv1``         ``.mkv``, ``.avi``
+``*-mpeg2``        ``.mkv``, ``.mp4``, ``.m2v`` (the payload as it is)
+whole pictures     what their payload is: ``.j2k`` or, in its boxes, ``.jp2``; ``.jpg``, ``.jxl``, ``.jph``, ``.avif``
+=================  ===========================================================================================
+
+Frames are component images in the order of the sequence, 25 a second, which means nothing.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import struct
+from collections.abc import Sequence as Many
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, TypeGuard
+
+import av
+import numpy as np
+
+from ii_core.files import atomic_path
+
+from ..api import Encoded
+from ..coders.video import Video, decoder_of, open_encoder
+from ..contract import Coder, find
+from .random_access import DEMUXERS, Sequence, sequence
+
+RATE = 25
+CONTAINERS = {
+    "H.264": (".mkv", ".mp4", ".mov"),
+    "HEVC": (".mkv", ".mp4", ".mov"),
+    "AV1": (".mkv", ".mp4", ".ivf"),
+    "VP9": (".mkv", ".mp4", ".webm", ".ivf"),
+    "FFV1": (".mkv", ".avi"),
+    "MPEG-2": (".mkv", ".mp4"),
+}
+BARE = {"H.264": (".h264", ".264"), "HEVC": (".hevc", ".265"), "AV1": (".obu",), "MPEG-2": (".m2v",)}
+FOURCC = {"AV1": b"AV01", "VP9": b"VP90"}
+# How the payload of a whole picture starts, and what such a file is called.
+STILLS: tuple[tuple[bytes, tuple[str, ...]], ...] = (
+    (b"\xff\x4f\xff\x51", (".j2k", ".j2c", ".jp2")),
+    (b"\xff\xd8\xff", (".jpg", ".jpeg")),
+    (b"\xff\x0a", (".jxl",)),
+    (b"\0\0\0\x0cJXL ", (".jxl",)),
+    (b"\0\0\0\x0cjP  ", (".jp2", ".jph")),
+)
+HIGH_THROUGHPUT = b"\xff\x50"  # the extended capabilities of Part 15 stand among the first markers
+
+
+def extract(coded: Encoded, path: str | os.PathLike[str]) -> None:
+    """Write the stream of a coded picture as a file of its own kind, whole or not at all.
+
+    Parameters
+    ----------
+    coded : Encoded
+    path : path
+        Its ending says what it becomes; see `suffixes`.
+
+    Raises
+    ------
+    ValueError
+        If the scheme's stream does not go into such a file, or is damaged.
+    OSError
+        If it cannot be written.
+    """
+    path = Path(path)
+    suffix, allowed = path.suffix.lower(), suffixes(coded)
+    if suffix not in allowed:
+        known = ", ".join(allowed) or "none that others read"
+        raise ValueError(f"the stream of scheme {coded.scheme} does not go into {path.name}: possible are {known}")
+    coder = find(coded.scheme)
+    with atomic_path(path) as temporary:
+        if not _is_stream(coder):
+            boxed = suffix in (".jp2", ".jph") and coded.payload[:2] == b"\xff\x4f"
+            temporary.write_bytes(_jp2(coded) if boxed else coded.payload)
+        elif suffix in BARE.get(coder.standard, ()):
+            temporary.write_bytes(coded.payload)
+        else:
+            stream = sequence(coded)
+            if suffix == ".ivf":
+                temporary.write_bytes(_ivf(stream))
+            else:
+                _mux(stream, temporary)
+
+
+def suffixes(coded: Encoded) -> tuple[str, ...]:
+    """Endings of the files that `extract` can make of a coded picture, the usual one first."""
+    coder = find(coded.scheme)
+    if _is_stream(coder):
+        return CONTAINERS[coder.standard] + BARE.get(coder.standard, ())
+    for magic, names in STILLS:
+        if coded.payload.startswith(magic):
+            if names[0] == ".j2k" and HIGH_THROUGHPUT in coded.payload[:128]:
+                return (".jph", ".j2c")
+            return names
+    return (".avif",) if coded.payload[4:8] == b"ftyp" and coded.payload[8:11] == b"avi" else ()
+
+
+def _is_stream(coder: Coder) -> TypeGuard[Video]:
+    """Whether the payload is a video stream, and not an image sequence in boxes of its own."""
+    return isinstance(coder, Video) and "gop" in coder.options
+
+
+def _mux(stream: Sequence, path: Path) -> None:
+    """Packets into a container, each with the time at which its frame is shown."""
+    shown = _display_order(stream)
+    # A packet is read before it is shown by as much as any runs ahead.
+    ahead = max(i - shown[i] for i in range(len(shown)))
+    with av.open(str(path), "w") as out:
+        target, keep = _stream(stream, out)
+        target.time_base = Fraction(1, RATE)
+        for i, packet in enumerate(stream.packets):
+            moved = av.Packet(packet.data)
+            moved.stream, moved.time_base = target, Fraction(1, RATE)
+            moved.pts, moved.dts, moved.duration = int(shown[i]), int(i - ahead), 1
+            moved.is_keyframe = packet.key
+            out.mux(moved)
+        del keep
+
+
+def _stream(stream: Sequence, out: Any) -> tuple[Any, Any]:
+    """An output stream that describes the packets, and what must outlive it."""
+    coder = stream.coder
+    if coder.standard == "FFV1":
+        # No file to copy the description from: the encoder that made the packets makes it again.
+        target: Any = out.add_stream(coder.encoder, rate=RATE)
+        settings = coder.constant(0, stream.film, stream.options)
+        open_encoder(coder, stream.film, settings, target.codec_context)
+        out.start_encoding()
+        if bytes(target.codec_context.extradata or b"") != stream.first:
+            raise ValueError("the coded picture was made by another version of FFV1 than this program writes")
+        return target, None
+    if coder.standard in FOURCC:
+        source: Any = av.open(io.BytesIO(_ivf(stream)), format="ivf")
+    else:
+        data = b"".join(packet.data for packet in stream.packets)
+        source = av.open(io.BytesIO(data), format=DEMUXERS[coder.standard])
+    # Described by what it is and not by who decodes it: dav1d writes nothing.
+    target = out.add_stream_from_template(source.streams.video[0], opaque=True)
+    context = target.codec_context
+    # MPEG-2 has no word for full range, and old streams none for the matrix: the container says it.
+    context.color_range = av.video.reformatter.ColorRange.JPEG
+    context.colorspace = av.video.reformatter.Colorspace.ITU709
+    return target, source
+
+
+def _display_order(stream: Sequence) -> Many[int]:
+    """When each packet's frame is shown, by asking the decoder."""
+    context = decoder_of(stream.coder, stream.film)
+    if stream.first:
+        context.extradata = stream.first
+    order: list[int] = []
+    try:
+        for i, packet in enumerate(stream.packets):
+            numbered = av.Packet(packet.data)
+            numbered.pts = i
+            order += [frame.pts for frame in context.decode(numbered)]
+        order += [frame.pts for frame in context.decode(None)]
+    except av.FFmpegError as error:
+        raise ValueError(f"the coded picture is damaged: {error.strerror}") from None
+    if sorted(order) != list(range(len(stream.packets))):
+        raise ValueError(f"the coded picture is damaged: of {len(stream.packets)} packets {len(order)} decode")
+    return np.argsort(order).tolist()
+
+
+def _ivf(stream: Sequence) -> bytes:
+    """The container of the VP8 and AV1 reference coders: a header, then a size and a time before every packet."""
+    film = stream.film
+    fourcc = FOURCC[stream.coder.standard]
+    size = film.width, film.height
+    parts = [struct.pack("<4sHH4sHHIIII", b"DKIF", 0, 32, fourcc, *size, RATE, 1, len(stream.packets), 0)]
+    for i, packet in enumerate(stream.packets):
+        parts += [struct.pack("<IQ", len(packet.data), i), packet.data]
+    return b"".join(parts)
+
+
+def _jp2(coded: Encoded) -> bytes:
+    """A codestream in the boxes of a JP2 file: three components of 8 or 16 bit, sRGB (ISO/IEC 15444-1, Annex I)."""
+    width, height = coded.size
+    bits = 15 if coded.dtype == "uint16" else 7
+    high = HIGH_THROUGHPUT in coded.payload[:128]
+    brand = b"jph " if high else b"jp2 "
+    image = _box(b"ihdr", struct.pack(">IIHBBBB", height, width, 3, bits, 7, 0, 0))
+    colour = _box(b"colr", struct.pack(">BBBI", 1, 0, 0, 16))
+    return b"".join(
+        [
+            _box(b"jP  ", b"\r\n\x87\n"),
+            _box(b"ftyp", brand + bytes(4) + brand),
+            _box(b"jp2h", image + colour),
+            _box(b"jp2c", coded.payload),
+        ]
+    )
+
+
+def _box(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I4s", 8 + len(content), kind) + content

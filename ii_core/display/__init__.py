@@ -1,0 +1,1 @@
+"""Display: views, quilts, lenticular panels, films and the viewer page."""

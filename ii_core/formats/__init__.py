@@ -1,0 +1,1 @@
+"""Light-field formats: readers beside writers."""

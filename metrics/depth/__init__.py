@@ -1,0 +1,1 @@
+"""Depth from focus and quality over depth, Q_depth."""

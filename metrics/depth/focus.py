@@ -1,0 +1,377 @@
+"""Depth from focus: which layer of the scene each lens's pixel shows, estimated from the picture alone."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ii_core import IICamera, IIPicture
+from ii_core.view import camera_of, view_image, view_positions
+
+from ..global_angle import peak
+from . import kernels
+from .layers import Floats, check_layers, virtual_viewpoint
+
+
+def _square(step: int) -> NDArray[np.int64]:
+    """25 lens positions (right, down) on a square grid around (0, 0)."""
+    side = step * np.arange(-2, 3)
+    return np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+
+
+BASE = _square(1)
+REFERENCE = _square(7)
+FILTER = np.ones((5, 5))
+METHODS = ("dissertation", "robust")
+# The robust method: lenses in each direction, at most; a step to no lens.
+RINGS, NOWHERE = 7, 1 << 24
+# In steps of 8 bits, summed over R, G and B: from where on a difference is that of another surface, however large;
+# by how much a neighbour's colour differs when it counts e times less; what a depth e times as great costs from one
+# lens to the next, and a leap to any depth.
+OTHER_SURFACE, ALIKE, SLOPE, LEAP = 30.0, 60.0, 60.0, 30.0
+# Costs that differ less, in shares of the peak, differ by rounding: an even picture must not have a depth.
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class FocusDepth:
+    """The depth of what the virtual camera sees through each lens, estimated.
+
+    Attributes
+    ----------
+    depth_mm : ndarray of float64, (L, K)
+        z in camera coordinates; NaN where nothing tells one depth from another. That of the layer, or, of the
+        robust method, of the bottom of the parabola through its cost and those of both neighbours.
+    layer : ndarray of int64, (L, K)
+        Row of ``layers_mm``, −1 where the depth is NaN.
+    confidence : ndarray of float32, (L, K)
+        1 − (cost of the chosen layer)/(mean cost of all): 1 where one layer fits exactly and others do not, near
+        0 where all fit alike, 0 where the depth is NaN.
+    layers_mm : ndarray of float64, (layers,)
+    method : str
+    """
+
+    depth_mm: Floats
+    layer: NDArray[np.int64]
+    confidence: NDArray[np.float32]
+    layers_mm: Floats
+    method: str
+
+
+def depth_from_focus(
+    picture: IIPicture,
+    *,
+    layers_mm: ArrayLike | None = None,
+    method: str = "dissertation",
+    base: ArrayLike = BASE,
+    reference: ArrayLike = REFERENCE,
+    weights: ArrayLike = FILTER,
+    interpolation: str = "linear",
+    workers: int | None = None,
+) -> FocusDepth:
+    """Depth of what the virtual camera of `q_depth` sees, from how alike near and far lenses see each layer.
+
+    The line from the virtual camera V = (0, 0, Λ − K·Λ) through the centre of lens (k, l) meets the layer z in a
+    point. The base image B takes there the mean of the pixels that see this point through the lenses around
+    (k, l), the reference image R the mean of those through lenses farther apart. Where the layer is that of the
+    surface, all show the same piece of it and B = R; where it is not, B and R mix different surroundings::
+
+                −14  ·  ·  −7  ·  ·   0   ·  ·   7  ·  ·  14      lenses to the right
+         −14      R         R         R          R        R
+          −7      R         R         R          R        R       R: 5 × 5 lenses, every seventh
+                                    B B B B B
+                                    B B B B B                     B: 5 × 5 lenses, every one;
+           0      R         R       B B B B B    R        R          (0, 0) belongs to both
+                                    B B B B B
+                                    B B B B B
+           7      R         R         R          R        R
+          14      R         R         R          R        R
+
+    Then D = argmin_d (Σ_rgb |B_d − R_d| ∗ h). With z' = z − Λ the pixel under lens (k + i, l + j) stands off the
+    centre of its elementary image by
+
+        Δu = +i·U·Λ/z' − L_x/(K·δP),   Δv = +j·V·Λ/z' + L_y/(K·δP)
+
+    with (L_x, L_y) the centre of lens (k, l); erect elementary images flip both signs. A lens that does not see the
+    point in its own elementary image, or that is not there, is left out of the mean: the pixel across the border
+    belongs to another lens and looks elsewhere.
+
+    Parameters
+    ----------
+    picture : IIPicture
+        Regular, with its camera.
+    layers_mm : array_like, (layers,), optional
+        Depths to try, increasing; `linear_layers` if not given. See also `logarithmic_layers`. None but those
+        beyond the lens plane can be chosen.
+    method : {"dissertation", "robust"}
+        How alike the lenses see a layer. ``robust`` follows the ray of the very pixel that `q_depth` measures,
+        compares its colour with that of lenses in which the ray's point falls on whole pixels (`whole_pixel_steps`,
+        eight directions), sums |Δ| over colours, counts none above 30 steps of 8 bits (another surface covers the
+        point), and takes the mean over the left, right, upper or lower half of the neighbours, whichever is least:
+        behind an edge one half still sees the point. h counts those view pixels less whose colour differs. Then
+        costs are passed on along rows and columns, both ways, so that even areas take the depth of what bounds
+        them: from lens to lens a depth e times as great costs 60 steps of 8 bits, any other 30, less where the
+        view's colour changes.
+    base, reference : array_like of int, (n, 2)
+        Lenses of B and R, to the right and down from the one looked through; of the dissertation's method alone.
+    weights : array_like, (odd, odd)
+        h, not negative; each layer's cost becomes the weighted mean over those neighbours that have one. 5×5 equal
+        weights by default: the size of B.
+    interpolation : {"linear", "nearest"}
+        Between the pixels of one elementary image.
+    workers : int, optional
+        Threads; as many as cores if not given. The result is the same for any number.
+
+    Returns
+    -------
+    FocusDepth
+        Of two layers that cost the same the nearer is chosen. There is no depth (NaN) where all layers cost the
+        same, as in an even picture, or where none lets B and R be compared: lenses so few, or layers so near, that
+        both are one and the same lens.
+
+    Raises
+    ------
+    ValueError
+        If the picture has no camera, is not regular or holds a pixel that is not finite, if optics before the
+        lens array bend the lines of sight, or if a parameter is unknown, of the wrong shape or out of range.
+
+    Notes
+    -----
+    The text does not say what h is, what becomes of lenses that do not see the point, and whether B and R are
+    interpolated. It wants the nearest pixel in the views that are measured, so that artefacts stay as they are; B
+    and R are none of these. There the nearest pixel favours layers whose lines fall on whole pixels, and moves an
+    even, textured wall by several layers: so linear is the default.
+
+    Between layers d and d + 1 the pixel under a lens i away moves U·i/d² px: 14 lenses away, with 16 px, less than
+    one from d = 15 on, and a tenth from d = 47 on.
+
+    It works in 8·layers·K·L bytes beside the picture.
+
+    References
+    ----------
+    Olsson 2008, (4.4), (4.5), Figures 4.8 and 4.9. Passing costs on: Hirschmüller, Stereo processing by semiglobal
+    matching, PAMI 2008, along four paths, with a slope that is that of the logarithm of z'.
+    """
+    if interpolation not in ("linear", "nearest"):
+        raise ValueError(f"unknown interpolation {interpolation!r}: known are linear, nearest")
+    if method not in METHODS:
+        raise ValueError(f"unknown method {method!r}: known are {', '.join(METHODS)}")
+    camera = camera_of(picture)
+    picture.check_regular()
+    if camera.front:
+        raise ValueError(f"{camera.front[0].kind} before the lens array bends lines of sight: give depth=")
+    layers = check_layers(layers_mm, camera)
+    b, r = _pattern("base", base), _pattern("reference", reference)
+    h = np.asarray(weights, dtype=np.float64)
+    if h.ndim != 2 or not (h.shape[0] % 2 and h.shape[1] % 2) or not (np.isfinite(h) & (h >= 0)).all() or not h.any():
+        raise ValueError("weights must be of two odd sides, finite, not negative and not all 0")
+    _check_finite(picture)
+
+    workers = cores() if workers is None else workers
+    nearest = interpolation == "nearest"
+    if method == "dissertation":
+        cost = _dissertation(picture, layers, b, r, h, nearest, workers)
+    else:
+        cost = _robust(picture, layers, h, nearest, workers)
+    (k, l) = picture.lenses
+    layer, fit, confidence = np.empty((l, k), np.int64), np.empty((l, k)), np.empty((l, k), np.float32)
+    _by_rows(workers, l, kernels.choose, cost, ROUNDING * peak(picture.pixels.dtype), layer, fit, confidence)
+    place = layer + (fit if method == "robust" else 0.0)
+    depth = np.where(layer < 0, np.nan, np.interp(place, np.arange(layers.size), layers))
+    return FocusDepth(depth, layer, confidence, layers, method)
+
+
+def _dissertation(
+    picture: IIPicture, layers: Floats, base: Steps, reference: Steps, h: Floats, nearest: bool, workers: int
+) -> Costs:
+    """Σ_rgb |B_d − R_d| ∗ h, (L, K, layers)."""
+    camera = camera_of(picture)
+    (k, l) = picture.lenses
+    lenses = np.unique(np.concatenate([base, reference]), axis=0)
+    across, down = np.unique(lenses[:, 0]), np.unique(lenses[:, 1])
+    cols, rows = pixel_tables(camera, layers, across, down, erect=picture.erect, nearest=nearest)
+    where = np.column_stack([np.searchsorted(across, lenses[:, 0]), np.searchsorted(down, lenses[:, 1])])
+    members = np.stack([(lenses[:, None] == p).all(axis=2).any(axis=1) for p in (base, reference)], axis=1)
+    cost, smooth = (np.empty((l, k, layers.size), np.float32) for _ in range(2))
+    _by_rows(workers, l, kernels.focus_cost, picture.pixels, *cols, *rows, where, members, cost)
+    _by_rows(workers, l, kernels.weigh, cost, h, np.zeros((l, k, 3)), np.inf, smooth)
+    return smooth
+
+
+def _robust(picture: IIPicture, layers: Floats, h: Floats, nearest: bool, workers: int) -> Costs:
+    """Halves of neighbours ∗ h by likeness, passed on along rows and columns; (L, K, layers)."""
+    camera = camera_of(picture)
+    (k, l), (u, v) = picture.lenses, picture.ei_pixels
+    shift = pixels_per_lens(camera, layers)
+    across, down = whole_pixel_steps(shift * u, u), whole_pixel_steps(shift * v, v)
+    cols, rows = pixel_tables(camera, layers, across, down, erect=picture.erect, nearest=nearest, snap=True)
+    middle = across.shape[1] // 2, down.shape[1] // 2
+    where = star(*middle)
+    sides = np.column_stack([where < middle, where > middle])
+    step = peak(picture.pixels.dtype) / 255
+    cost, smooth = (np.empty((l, k, layers.size), np.float32) for _ in range(2))
+    partners, limit = (where, sides, len(where) - 1), OTHER_SURFACE * step
+    _by_rows(workers, l, kernels.half_cost, picture.pixels, *cols, *rows, *partners, limit, cost)
+    view = view_image(picture, virtual_viewpoint(camera), interpolation="nearest")[0].astype(np.float64)
+    _by_rows(workers, l, kernels.weigh, cost, h, view, ALIKE * step, smooth)
+    total = cost  # its memory
+    total[:] = 0
+    place = np.log(np.maximum(layers - camera.origin_mm[2] - camera.gap_mm, camera.gap_mm / 1e9))
+    prices = place, SLOPE * step, LEAP * step, ALIKE * step
+    for columns, back in product((False, True), repeat=2):
+        _by_rows(workers, k if columns else l, kernels.pass_on, smooth, view, *prices, columns, back, total)
+    total[np.isnan(smooth)] = np.nan
+    return total
+
+
+def whole_pixel_steps(shift: Floats, ei: int) -> NDArray[np.int64]:
+    """Steps to lenses in which the points of each layer fall on whole pixels, as nearly as lenses stand.
+
+    Where a picture has detail finer than its pixels, a value between two pixels is that of neither: only whole
+    pixels can be compared. So the farther a layer, the farther the lenses.
+
+    Parameters
+    ----------
+    shift : ndarray of float64, (layers,)
+        Pixels that a point moves in its elementary image from one lens to the next.
+    ei : int
+        The side of the elementary image, in pixels.
+
+    Returns
+    -------
+    ndarray of int64, (layers, 2·n + 1)
+        To the left, 0, to the right; n is up to RINGS, fewer for small elementary images. A lens that stands for
+        two of them counts once: the other step leads nowhere.
+    """
+    half = max((ei - 1) // 2, min(ei - 1, 1))
+    pixels = np.unique(np.rint(np.linspace(1, half, RINGS))) if half else np.empty(0)
+    steps = np.maximum(np.rint(pixels / shift[:, None]), 1).astype(np.int64)
+    again = np.zeros(steps.shape, bool)
+    again[:, 1:] = steps[:, 1:] == steps[:, :-1]
+    steps[again] = NOWHERE
+    return np.concatenate([-steps[:, ::-1], np.zeros((len(shift), 1), np.int64), steps], axis=1)
+
+
+def star(middle_x: int, middle_y: int) -> NDArray[np.int64]:
+    """Columns of two tables of steps, (n, 2): in eight directions from their middles, which come last."""
+    rings = max(middle_x, middle_y)
+    found = [
+        (middle_x + i * r, middle_y + j * r)
+        for r in range(1, rings + 1)
+        for i in (-1, 0, 1)
+        for j in (-1, 0, 1)
+        if (i or j) and abs(i) * r <= middle_x and abs(j) * r <= middle_y
+    ]
+    return np.array([*found, (middle_x, middle_y)])
+
+
+Table = tuple[NDArray[np.int32], Floats]
+Steps = NDArray[np.int64]
+Costs = NDArray[np.float32]
+
+
+def pixel_tables(
+    camera: IICamera,
+    layers_mm: Floats,
+    across: NDArray[Any],
+    down: NDArray[Any],
+    *,
+    erect: bool = False,
+    nearest: bool = False,
+    snap: bool = False,
+) -> tuple[Table, Table]:
+    """Which pixel under each neighbour sees the point of each layer that the virtual camera sees through a lens.
+
+    Parameters
+    ----------
+    across, down : ndarray of int, (n,) or (layers, n)
+        Neighbours' steps i to the right and j down.
+    nearest : bool
+        Take the pixel in whose square the line ends, instead of going between pixels.
+    snap : bool
+        Follow the ray of the very pixel that `q_depth` measures rather than the line through the lens centre.
+
+    Returns
+    -------
+    cols : (ndarray of int32, ndarray of float64), (layers, n, K)
+        The pixel left of where the line ends, −1 if the neighbour does not see the point, and the weight of the
+        pixel right of it; with ``nearest`` the weight is 0.
+    rows : likewise, (layers, n, L)
+        The pixel above, and the weight of the one below.
+    """
+    (u, v) = camera.ei_pixels
+    per_lens = pixels_per_lens(camera, layers_mm)
+    x, y = view_positions(camera, virtual_viewpoint(camera), erect=erect)
+    if snap:
+        x, y = np.floor(x + 0.5), np.floor(y + 0.5)
+    sign = -1.0 if erect else 1.0
+    # Without vertical parallax one row of pixels, under whatever lens, sees one row of the scene.
+    vertical = sign * per_lens if camera.lens_model.vertical_parallax else np.full_like(per_lens, -1.0)
+    return _table(x, u, sign * per_lens * u, across, nearest), _table(y, v, vertical * v, down, nearest)
+
+
+def pixels_per_lens(camera: IICamera, layers_mm: Floats) -> Floats:
+    """How far a point of each layer moves from lens to lens in its elementary image, in sides of that: Λ/z'."""
+    beyond = np.asarray(layers_mm) - camera.origin_mm[2] - camera.gap_mm
+    with np.errstate(divide="ignore"):
+        # At the lens plane and before it nothing is in focus: infinitely far off through all but the own lens.
+        return np.where(beyond > 0, camera.gap_mm / beyond, np.inf)
+
+
+def _table(position: Floats, ei: int, per_step: Floats, steps: NDArray[Any], nearest: bool) -> Table:
+    """Along one axis: own lens's pixel position, EI side, pixels a step by layer → pixel by layer, step and lens."""
+    lens = np.arange(position.size)
+    step = np.atleast_2d(steps)[:, :, None]
+    with np.errstate(invalid="ignore"):
+        moved = np.where(step == 0, 0.0, step * per_step[:, None, None])
+    inside = position - lens * ei + moved
+    centre = np.floor(inside + 0.5)
+    other = lens + step
+    seen = (centre >= 0) & (centre < ei) & (other >= 0) & (other < position.size)
+    if nearest:
+        low, weight = centre, np.zeros(seen.shape)
+    else:
+        inside = np.where(seen, np.clip(inside, 0, ei - 1), 0.0)
+        low = np.floor(inside)
+        weight = inside - low
+    return np.where(seen, other * ei + np.where(seen, low, 0), -1).astype(np.int32), weight
+
+
+def _pattern(name: str, value: ArrayLike) -> Steps:
+    given = np.asarray(value)
+    if given.ndim != 2 or given.shape[1] != 2 or not len(given) or given.dtype.kind not in "iu":
+        raise ValueError(f"{name} is {given.dtype} of shape {given.shape}: whole lens steps (n, 2) are needed")
+    return given.astype(np.int64)
+
+
+def _check_finite(picture: IIPicture) -> None:
+    if picture.pixels.dtype.kind != "f":
+        return
+    for n, row in enumerate(picture.pixels):
+        bad = np.flatnonzero(~np.isfinite(row).all(axis=1))
+        if bad.size:
+            raise ValueError(f"picture pixel ({bad[0]}, {n}) is {row[bad[0]]}: finite values are needed")
+
+
+def cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _by_rows(workers: int, rows: int, work: Callable[..., None], *arguments: Any) -> None:
+    """Call a kernel with its first and last row, on plain threads: those of numba may abort when two callers meet."""
+    count = max(1, min(workers, rows))
+    bounds = np.linspace(0, rows, count + 1).astype(int)
+    if count == 1:
+        work(*arguments, 0, rows)
+        return
+    with ThreadPoolExecutor(count) as pool:
+        for done in [pool.submit(work, *arguments, a, b) for a, b in pairwise(bounds)]:
+            done.result()

@@ -1,0 +1,1 @@
+"""Charts and tables of measured quality; no measure is computed here."""

@@ -1,0 +1,150 @@
+"""Pictures of errors: where in each view, and where in each depth layer."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ii_core import IIPicture, five_viewpoints
+from ii_core.view import camera_of
+
+from ..depth.q_depth import DepthQuality, view_of
+from ..global_angle import peak
+from ..view import view_pair
+from .rd_chart import new_figure, save
+
+COLOURS_OF_ERRORS = "magma"
+PANELS = 12  # of a sheet of layers: more would be too small to see anything in
+Floats = NDArray[np.float64]
+
+
+def error_map(reference: IIPicture, decoded: IIPicture, viewpoint_mm: Any) -> Floats:
+    """Root of the mean squared error over R, G and B at each pixel of a view image.
+
+    Returns
+    -------
+    ndarray of float64, (L, K)
+        In shares of the peak; NaN where the line of sight leaves the pixel array.
+
+    Raises
+    ------
+    ValueError
+        If the pictures differ in structure or type, the reference has no camera, or the viewpoint is none.
+    """
+    reference.check_same_structure(decoded)
+    a, b, valid = view_pair(reference, decoded, viewpoint_mm)
+    error = np.sqrt(np.square(a.astype(np.float64) - b).mean(axis=-1)) / peak(a.dtype)
+    return np.where(valid, error, np.nan)
+
+
+def plot_error_views(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike[str]) -> None:
+    """Draw the error map of each of the five views, all in one scale, up to the 99th percentile.
+
+    Parameters
+    ----------
+    reference, decoded : IIPicture
+        Of the same structure and type; the reference has a camera.
+    path : path
+        .png, .pdf or .svg. Replaced, whole.
+
+    Raises
+    ------
+    ValueError
+        As `error_map`, or if the suffix is another.
+    """
+    save(_error_views_figure(reference, decoded), path)
+
+
+def _error_views_figure(reference: IIPicture, decoded: IIPicture) -> Any:
+    maps = {
+        name: 255 * error_map(reference, decoded, at) for name, at in five_viewpoints(camera_of(reference)).items()
+    }
+    k, l = reference.lenses
+    figure = new_figure(3 * len(maps) + 1, 3 * min(max(l / k, 0.2), 3) + 0.6)
+    panels = figure.subplots(1, len(maps))
+    top = _top(np.concatenate([m.ravel() for m in maps.values()]))
+    for axes, (name, values) in zip(panels, maps.items(), strict=True):
+        shown = axes.imshow(values, cmap=COLOURS_OF_ERRORS, vmin=0, vmax=top, interpolation="nearest")
+        mean = np.sqrt(np.nanmean(np.square(values))) if np.isfinite(values).any() else np.nan
+        axes.set_title(f"{name}: RMS {mean:.2f}", fontsize=10)
+        _bare(axes)
+    figure.colorbar(shown, ax=panels.tolist(), label="RMS error [steps of 8 bits]", extend="max")
+    return figure
+
+
+def plot_error_layers(reference: IIPicture, quality: DepthQuality, path: str | os.PathLike[str]) -> None:
+    """Draw where in each depth layer the errors are: a panel a layer, over the virtual camera's view in grey.
+
+    Where there are more than 12 layers with pixels, neighbours are put together so that each panel has about as many
+    pixels.
+
+    Parameters
+    ----------
+    reference : IIPicture
+    quality : DepthQuality
+        Of that picture, from `q_depth`.
+    path : path
+        .png, .pdf or .svg. Replaced, whole.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is another, or the quality is that of a picture of another size.
+    """
+    save(_error_layers_figure(reference, quality), path)
+
+
+def _error_layers_figure(reference: IIPicture, quality: DepthQuality) -> Any:
+    view = view_of(reference)
+    if view.shape[:2] != quality.layer.shape:
+        raise ValueError(f"the quality is that of a view of {quality.layer.shape}, the picture's is {view.shape[:2]}")
+    groups = layer_groups(quality.counts)
+    grey = 0.25 + 0.5 * (view / peak(view.dtype)).mean(axis=-1)
+    columns = min(4, max(len(groups), 1))
+    rows = max(-(-len(groups) // columns), 1)
+    shape = min(max(view.shape[0] / view.shape[1], 0.2), 3)
+    figure = new_figure(3.2 * columns + 1, rows * (3.2 * shape + 0.4) + 0.3)
+    panels = figure.subplots(rows, columns, squeeze=False)
+    error = 255 * quality.error
+    top = _top(error[quality.layer >= 0])
+    for axes in panels.flat:
+        axes.axis("off")
+    for axes, (first, last) in zip(panels.flat, groups, strict=False):
+        here = (quality.layer >= first) & (quality.layer <= last)
+        axes.imshow(grey, cmap="gray", vmin=0, vmax=1, interpolation="nearest")
+        shown = axes.imshow(
+            np.where(here, error, np.nan), cmap=COLOURS_OF_ERRORS, vmin=0, vmax=top, interpolation="nearest"
+        )
+        rms = np.sqrt(np.square(error[here]).mean())
+        z = quality.depth_mm[[first, last]]
+        span = f"{z[0]:.4g} mm" if first == last else f"{z[0]:.4g} to {z[1]:.4g} mm"
+        axes.set_title(f"z {span}: RMS {rms:.2f}", fontsize=9)
+    if groups:
+        figure.colorbar(shown, ax=panels.ravel().tolist(), label="RMS error [steps of 8 bits]", extend="max")
+    else:
+        panels[0, 0].text(0.5, 0.5, "no pixel has a depth", ha="center")
+    return figure
+
+
+def layer_groups(counts: NDArray[np.int64], groups: int = PANELS) -> list[tuple[int, int]]:
+    """First and last layer of up to ``groups`` runs of layers with about as many pixels each; none of empty ones."""
+    held = np.flatnonzero(counts)
+    if held.size <= groups:
+        return [(int(d), int(d)) for d in held]
+    before = np.cumsum(counts[held]) - counts[held] / 2
+    label = np.minimum((before * groups / counts.sum()).astype(int), groups - 1)
+    runs = [held[label == i] for i in range(groups)]
+    return [(int(run[0]), int(run[-1])) for run in runs if run.size]
+
+
+def _top(values: Floats) -> float:
+    known = values[np.isfinite(values)]
+    return max(float(np.quantile(known, 0.99)), 1e-3) if known.size else 1.0
+
+
+def _bare(axes: Any) -> None:
+    axes.set_xticks([])
+    axes.set_yticks([])

@@ -1,0 +1,162 @@
+"""Rate–distortion charts, drawn from a study on disk and nothing else."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ii_core.files import atomic_path
+
+from ..measures import measure_of
+from .tables import check_measured
+
+# Okabe and Ito's colours, told apart by colour-blind readers too; their yellow is too pale on white.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+LINES = ("-", "--", "-.")
+SUFFIXES = (".png", ".pdf", ".svg")
+
+
+def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str], *, measure: str = "q_global") -> None:
+    """Draw a quality over rate, a line a scheme.
+
+    Filled markers are targets met, joined. A hollow marker is what a scheme gave for a target it cannot meet, and a
+    dotted line marks the rate that it cannot go below (or above). Lossless points sit on the upper edge.
+
+    Parameters
+    ----------
+    study : dict
+        From `read_study`.
+    path : path
+        The suffix says what is written: .png, .pdf or .svg. Replaced, whole.
+    measure : str
+        Which quality, of those that the study has.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is another, or the study has no points or not the measure.
+    OSError
+        If the file cannot be written.
+    """
+    check_suffix(path)
+    save(draw(study, measure), path, dpi=150)
+
+
+def check_suffix(path: str | os.PathLike[str]) -> str:
+    """The kind of chart a path names; ValueError if it is none."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ValueError(f"{path} is no known chart type: known are {', '.join(SUFFIXES)}")
+    return suffix[1:]
+
+
+def save(figure: Any, path: str | os.PathLike[str], *, dpi: int = 130) -> None:
+    """Write a figure as its path's suffix says; text in PDF and SVG stays text that can be edited and searched."""
+    import matplotlib
+
+    kind = check_suffix(path)
+    undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {}}[kind]  # the same chart, the same file
+    text: Any = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "raytrace-ii"}
+    with matplotlib.rc_context(text), atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=dpi, format=kind, metadata=undated)
+
+
+def new_figure(width: float, height: float, layout: Any = "constrained") -> Any:
+    """An empty matplotlib Figure, inches, that no window knows of."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def draw(study: Mapping[str, Any], measure: str = "q_global") -> Any:
+    """The matplotlib Figure of a study; see `rd_chart`."""
+    points = study["points"]
+    if not points:
+        raise ValueError("the study has no points: nothing to draw")
+    check_measured(points, measure)
+    figure = new_figure(8, 5.2)
+    axes: Any = figure.add_subplot()
+    set_rate_axis(axes, points)
+    axes.set_ylabel(measure_of(measure).axis)
+    schemes = list(dict.fromkeys(point["scheme"] for point in points))
+    for i, scheme in enumerate(schemes):
+        _draw(axes, [point for point in points if point["scheme"] == scheme], i, measure)
+    if not all(point["reached"] for point in points):
+        style = {"color": "0.4", "marker": "o", "linestyle": ":"}
+        axes.plot([], [], markerfacecolor="white", label="target out of reach: what came instead", **style)
+    axes.set_title(study["picture"]["name"], loc="left")
+    # Below the axes, where no curve can hide it and long scheme names have room.
+    figure.legend(loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3)
+    return figure
+
+
+def set_rate_axis(axes: Any, points: Sequence[Mapping[str, Any]]) -> None:
+    """A logarithmic axis of rates that holds those of all points, and a quiet grid."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    rates = [point["bpp"] for point in points]
+    axes.set_xscale("log")
+    axes.set_xlim(min(rates) / 1.3, max(rates) * 1.3)
+    axes.xaxis.set_major_locator(LogLocator(base=10, subs=(1, 2, 5), numticks=50))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xlabel("rate [bit/pixel]")
+    axes.grid(True, color="0.9", linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _draw(axes: Any, points: Sequence[Mapping[str, Any]], i: int, measure: str) -> None:
+    """One scheme, the i-th."""
+    colour, marker = COLOURS[i % len(COLOURS)], MARKERS[i % len(MARKERS)]
+    line = LINES[i // len(COLOURS) % len(LINES)]
+    finite = [point for point in points if math.isfinite(point[measure])]
+    met = sorted({(p["bpp"], p[measure]) for p in finite if p["reached"]})
+    missed = sorted({(p["bpp"], p[measure]) for p in finite if not p["reached"]} - set(met))
+    lossless = sorted({p["bpp"] for p in points if p[measure] == math.inf})
+
+    label = points[0]["scheme"]
+    floor = min((p["bpp"] for p in points if not p["reached"] and p["bpp"] > p["target_bpp"]), default=None)
+    ceiling = max((p["bpp"] for p in points if not p["reached"] and p["bpp"] <= p["target_bpp"]), default=None)
+    for limit, words in ((floor, "not below"), (ceiling, "not above")):
+        if limit is not None:
+            label += f"  ({words} {limit:.2g} bpp)"
+            axes.axvline(limit, color=colour, linewidth=1.2, linestyle=":", zorder=1.5)
+    style = {"color": colour, "marker": marker, "markersize": 6}
+    axes.plot(*_columns(met), linestyle=line, linewidth=1.8, label=label, **style)
+    axes.plot(*_columns(missed), linestyle="none", markerfacecolor="white", markeredgewidth=1.6, zorder=3, **style)
+    for rate in lossless:
+        top = axes.get_xaxis_transform()  # x in bpp, y as a share of the axes
+        axes.plot(rate, 1, transform=top, clip_on=False, linestyle="none", **style)
+        axes.annotate(
+            "lossless",
+            (rate, 1),
+            xycoords=top,
+            xytext=(0, 6),
+            textcoords="offset points",
+            ha="center",
+            fontsize=8,
+            color=colour,
+        )
+
+
+def _columns(pairs: Sequence[tuple[float, float]]) -> tuple[list[float], list[float]]:
+    return [x for x, _ in pairs], [y for _, y in pairs]
+
+
+def edges(centres: NDArray[np.float64], alone: float) -> NDArray[np.float64]:
+    """Borders half way between centres; ``alone`` is half the width of a single one."""
+    if centres.size == 1:
+        return centres[0] + np.array([-alone, alone])
+    inner = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate([[2 * centres[0] - inner[0]], inner, [2 * centres[-1] - inner[-1]]])

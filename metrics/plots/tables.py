@@ -1,0 +1,186 @@
+"""Rate–distortion studies as tables: for the terminal, for spreadsheets, for papers."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ii_core.files import atomic_path
+
+from ..measures import measure_of
+from ..rd import UndefinedDifference, bd_psnr, bd_rate
+from ..study import FIELDS, check_points, measures_of
+
+Points = list[tuple[float, float]]
+
+
+def write_csv(path: str | os.PathLike[str], records: Sequence[Mapping[str, Any]]) -> None:
+    """Write records as a table, one row a point, for spreadsheets. Qualities of single layers are left to the JSON.
+
+    Raises
+    ------
+    ValueError
+        If a record lacks a field.
+    OSError
+        If the file cannot be written.
+    """
+    check_points(records)
+    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        more = [name for name in measures_of(records) if name not in FIELDS]
+        writer = csv.DictWriter(file, [*FIELDS, *more], extrasaction="ignore")
+        writer.writeheader()
+        for record in records:
+            options = " ".join(f"{key}={value}" for key, value in record["options"].items())
+            writer.writerow({**record, "options": options})
+
+
+def summary_table(
+    study: Mapping[str, Any], *, anchor: str = "jpeg2000", measure: str = "q_global"
+) -> list[dict[str, str]]:
+    """A study as rows of text, one a scheme, all with the same columns.
+
+    Parameters
+    ----------
+    study : dict
+        From `read_study`.
+    anchor : str
+        The scheme the others are compared with.
+    measure : str
+        Which quality, of those that the study has.
+
+    Returns
+    -------
+    list of dict
+        ``scheme``; a column a target rate with the quality, or the floor (or ceiling) of a scheme that cannot reach
+        it; ``gain``, the mean difference to the anchor over the target rates both reach; ``BD-rate`` and the
+        difference in quality at equal rate against it, or why they are not defined. That one is called ``BD-PSNR``
+        if the quality is in dB, else ``BD-quality``.
+
+    Raises
+    ------
+    ValueError
+        If the study does not have the measure.
+    """
+    points, kind = study["points"], measure_of(measure)
+    check_measured(points, measure)
+    bd_quality = "BD-PSNR" if kind.unit == "dB" else "BD-quality"
+    schemes = list(dict.fromkeys(point["scheme"] for point in points))
+    targets = sorted({point["target_bpp"] for point in points})
+    by_target = {scheme: {p["target_bpp"]: p for p in points if p["scheme"] == scheme} for scheme in schemes}
+    rows = []
+    for scheme in schemes:
+        row = {"scheme": scheme}
+        for target in targets:
+            row[f"{target:g}"] = _cell(by_target[scheme].get(target), measure)
+        if scheme == anchor:
+            row |= dict.fromkeys(("gain", "BD-rate", bd_quality), "anchor")
+        elif anchor not in by_target:
+            row |= dict.fromkeys(("gain", "BD-rate", bd_quality), f"– (no {anchor})")
+        else:
+            row["gain"] = _gain(by_target[anchor], by_target[scheme], measure)
+            a, b = (operating_points(points, name, measure) for name in (anchor, scheme))
+            row["BD-rate"] = _difference(bd_rate, a, b, 1, "%")
+            row[bd_quality] = _difference(bd_psnr, a, b, max(kind.digits - 1, 1), kind.unit)
+        rows.append(row)
+    return rows
+
+
+def check_measured(points: Sequence[Mapping[str, Any]], measure: str) -> None:
+    """Raise ValueError unless all points have the measure."""
+    if measure not in measures_of(points):
+        raise ValueError(f"the study has no {measure}: it has {', '.join(measures_of(points))}")
+
+
+def operating_points(points: Sequence[Mapping[str, Any]], scheme: str, measure: str = "q_global") -> Points:
+    """The different (bpp, quality) of a scheme by rate, without infinite and missing qualities.
+
+    A point beside its target is as true an operating point as any; the same one given for several targets counts
+    once.
+    """
+    return sorted({(p["bpp"], p[measure]) for p in points if p["scheme"] == scheme and math.isfinite(p[measure])})
+
+
+def _cell(point: Mapping[str, Any] | None, measure: str) -> str:
+    if point is None:
+        return ""
+    if point["reached"]:
+        return measure_of(measure).shown(point[measure])
+    return f"– ({'floor' if point['bpp'] > point['target_bpp'] else 'ceiling'} {point['bpp']:.3g})"
+
+
+def _gain(anchor: Mapping[float, Mapping[str, Any]], tested: Mapping[float, Mapping[str, Any]], measure: str) -> str:
+    both = [
+        tested[target][measure] - anchor[target][measure]
+        for target in tested.keys() & anchor.keys()
+        if tested[target]["reached"] and anchor[target]["reached"]
+    ]
+    gains = [gain for gain in both if math.isfinite(gain)]
+    if not gains:
+        return "– (no common rate)"
+    kind = measure_of(measure)
+    return f"{_signed(sum(gains) / len(gains), kind.digits, kind.unit)} at {len(gains)} rates"
+
+
+def _signed(value: float, digits: int, unit: str) -> str:
+    return f"{value:+.{digits}f}" + (f" {unit}" if unit else "")
+
+
+def _difference(
+    function: Any, a: list[tuple[float, float]], b: list[tuple[float, float]], digits: int, unit: str
+) -> str:
+    if not (a and b):
+        return "– (no points)"
+    try:
+        return _signed(function(*zip(*a, strict=True), *zip(*b, strict=True)), digits, unit)
+    except UndefinedDifference as error:
+        return f"– ({error.short})"
+
+
+# What means something to LaTeX, and what its default fonts do not have as such.
+LATEX = {
+    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "_": r"\_", "%": r"\%",
+    "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "<": r"\textless{}", ">": r"\textgreater{}",
+    "|": r"\textbar{}", '"': "''", "–": "--", "−": "$-$", "×": r"$\times$", "±": r"$\pm$", "°": r"$^\circ$",
+    "µ": r"$\mu$", "σ": r"$\sigma$", "≤": r"$\le$", "≥": r"$\ge$", "…": r"\dots{}", "→": r"$\to$",
+}  # fmt: skip
+
+
+def latex_text(text: str) -> str:
+    """Text as LaTeX prints it to the letter."""
+    return "".join(LATEX.get(letter, letter) for letter in text)
+
+
+def write_latex(path: str | os.PathLike[str], rows: Sequence[Mapping[str, str]], caption: str = "") -> None:
+    """Write rows of text as a LaTeX table, of nothing but what LaTeX itself has.
+
+    Parameters
+    ----------
+    path : path
+        Replaced, whole.
+    rows : sequence of dict
+        All with the same columns, as from `summary_table`. The first column is set left, others right.
+    caption : str
+
+    Raises
+    ------
+    ValueError
+        If there are no rows, or they differ in columns.
+    OSError
+        If the file cannot be written.
+    """
+    if not rows or any(list(row) != list(rows[0]) for row in rows):
+        raise ValueError("rows of one or more columns, the same in all, are needed")
+
+    def line(cells: Sequence[str]) -> str:
+        return " & ".join(map(latex_text, cells)) + r" \\"
+
+    width = len(rows[0])
+    body = [line(list(rows[0])), r"\hline", *(line(list(row.values())) for row in rows)]
+    lines = [r"\begin{table}", r"\centering", rf"\begin{{tabular}}{{l{'r' * (width - 1)}}}", r"\hline", *body]
+    lines += [r"\hline", r"\end{tabular}"]
+    lines += [rf"\caption{{{latex_text(caption)}}}"] if caption else []
+    with atomic_path(path) as temporary:
+        temporary.write_text("\n".join([*lines, r"\end{table}"]) + "\n", encoding="utf-8")

@@ -1,0 +1,1 @@
+"""Scene and mesh files: TOML, glTF, OBJ, PLY, STL."""

@@ -1,0 +1,373 @@
+"""Scenes from files: TOML, or a mesh file alone."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+import warnings
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from ii_core.files import read_image
+
+from ..scene.scene import Background, Body, Fog, Light, Material, Scene, Vector
+from ..scene.textures import Checker, Image, Noise, Stripes, Texture, VertexColours, image_texture, normal_map
+from ..shapes.primitives import Mesh, rotation
+from ..shapes.watertight import flaw
+from .mesh_model import Model, Part
+from .toml_schema import (  # fmt: skip
+    AnyLight,
+    AnyTexture,
+    BackgroundTable,
+    CheckerTexture,
+    ImageTexture,
+    MaterialTable,
+    NoiseTexture,
+    ObjectTable,
+    PointLight,
+    SceneFile,
+    SpotLight,
+    StripesTexture,
+    VertexTexture,
+    parse,
+    parse_mesh,
+    parse_shape,
+)
+from .validation_messages import line, words
+
+GLTF_TYPES = (".glb", ".gltf")
+MESH_TYPES = (*GLTF_TYPES, ".obj", ".ply", ".stl")
+# Where a mesh file alone is put, mm: as large as fits, its front at the near side; setup1 sees all of it.
+WORKING_VOLUME = np.array([[-20.0, -10.0, 20.0], [20.0, 10.0, 80.0]])
+
+
+def scene_names() -> dict[str, str]:
+    """Names of the scenes that come with the package, each with its line of description."""
+    found = {}
+    for file in sorted(Path(str(files("assets") / "scenes")).glob("*.toml")):
+        found[file.stem] = str(tomllib.loads(file.read_text(encoding="utf-8")).get("about", ""))
+    return found
+
+
+def load_scene(name: str | os.PathLike[str]) -> Scene:
+    """A scene by its name, from a TOML file, or of a mesh file alone.
+
+    Parameters
+    ----------
+    name : str or path
+        One of `scene_names`, a file that ends in ``.toml``, or a mesh file (.glb, .gltf, .obj, .ply, .stl), which is
+        scaled and placed to fill `WORKING_VOLUME` and lit by its own lights or, without any, by two. Other files
+        named in a file are looked for beside it.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    ValueError
+        If the name is unknown, the file is wrong, or a mesh or texture is.
+    OSError
+        If a file is missing.
+
+    Warns
+    -----
+    UserWarning
+        Once for each mesh file that holds something unsupported, naming all of it; and once if glass is not closed
+        or looks inwards, naming the objects.
+    """
+    path = Path(name)
+    alone = path.suffix.lower() in MESH_TYPES
+    if path.suffix != ".toml" and not alone:
+        known = scene_names()
+        if str(name) not in known:
+            raise ValueError(
+                f"unknown scene {str(name)!r}: known are {', '.join(known)}, or give a .toml or mesh file"
+            )
+        path = Path(str(files("assets") / "scenes" / f"{name}.toml"))
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist")
+    if alone:
+        model = read_model(path)
+        try:
+            scene, models = _alone(path, model), {path: model}
+        except ValueError as error:
+            raise ValueError(f"{path.name}: {error}") from None
+    else:
+        loader = _Loader(path)
+        try:
+            scene, models = loader.scene(parse(path.read_text(encoding="utf-8"))), loader.models
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
+        except OSError as error:
+            raise type(error)(f"{path}: {error}") from None
+    for file, model in models.items():
+        if model.left_out:
+            warnings.warn(f"{file}: not supported and left out: {', '.join(model.left_out)}", stacklevel=2)
+    glass = [body for body in scene.bodies if body.material.fills]
+    if hollow := [f"{body.name!r} ({why})" for body in glass if (why := flaw(body.vertices, body.faces))]:
+        needed = "closed meshes whose faces look outwards are needed, or ior = 1 without absorption for a sheet"
+        warnings.warn(f"{path}: glass without an inside: {', '.join(hollow)}: {needed}", stacklevel=2)
+    return scene
+
+
+def read_model(path: Path) -> Model:
+    """Meshes, materials and lights of a file, brought to the scene's left-handed frame by z → −z.
+
+    Raises
+    ------
+    ValueError
+        If the file holds no triangles, is damaged, or is of no known type.
+    OSError
+        If it, or a file that it names, does not exist.
+    """
+    kind = path.suffix.lower()
+    if kind not in MESH_TYPES:
+        raise ValueError(f"{path.name} is no known mesh type: known are {', '.join(MESH_TYPES)}")
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist")
+    try:
+        if kind in GLTF_TYPES:
+            from .gltf.nodes import read_gltf
+
+            model = read_gltf(path)
+        else:
+            from .obj_ply_stl import read_mesh_file
+
+            model = read_mesh_file(path)
+        if not model.parts:
+            raise ValueError("holds no triangles")
+        return model
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ValueError(f"{path.name}: {line(error, first['loc'], words(first))}") from None
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from None
+    except OSError as error:
+        raise type(error)(f"{path.name}: {error}") from None
+    except MemoryError:
+        raise ValueError(f"{path.name}: needs more memory than there is") from None
+
+
+def _known(names: Iterable[str]) -> str:
+    return ", ".join(names) or "none"
+
+
+class _Loader:
+    """Makes a scene of one file's tables; every mesh file is read once."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.models: dict[Path, Model] = {}
+
+    def scene(self, file: SceneFile) -> Scene:
+        textures = {name: self._texture(name, value) for name, value in file.texture.items()}
+        materials = {name: self._material(name, value, textures) for name, value in file.material.items()}
+        if not file.object:
+            raise ValueError("no geometry: at least one [[object]] is needed")
+        bodies: list[Body] = []
+        lights = [_light(i, value) for i, value in enumerate(file.light)]
+        for i, value in enumerate(file.object):
+            where = f"object.{i} ({value.name})" if value.name else f"object.{i}"
+            try:
+                model, label, strength = self._model(value, materials)
+                bodies += _bodies(value, model.parts, f"{label} {i}")
+                lights += [_placed(light, value, strength) for light in model.lights if strength > 0]
+            except ValueError as error:
+                raise ValueError(f"{where}: {error}") from None
+            except OSError as error:
+                raise type(error)(f"{where}: {error}") from None
+        return Scene(
+            name=self.path.stem,
+            bodies=bodies,
+            lights=lights,
+            background=self._background(file.background),
+            fog=Fog(colour=file.fog.colour, density_per_mm=file.fog.density_per_mm) if file.fog else None,
+            ambient=file.ambient,
+            max_depth=file.max_depth,
+        )
+
+    def _model(self, value: ObjectTable, materials: dict[str, Material]) -> tuple[Model, str, float]:
+        """What an object shows, with the material it names; what to call it; and how strong its lights are."""
+        parameters = value.model_extra or {}
+        if value.material is not None and value.material not in materials:
+            raise ValueError(f"unknown material {value.material!r}: known are {_known(materials)}")
+        material = materials[value.material] if value.material is not None else None
+        if "mesh" not in parameters:
+            mesh, label = parse_shape(parameters)
+            if material is None:
+                raise ValueError("material: is missing")
+            return Model([Part("", mesh, material)]), label, 0.0
+        if "shape" in parameters:
+            raise ValueError("both mesh and shape: one of them is needed")
+        file = parse_mesh(parameters)
+        path = self.path.parent / file.mesh
+        if path not in self.models:
+            self.models[path] = read_model(path)
+        parts = self.models[path].parts
+        if material is not None:
+            parts = [replace(part, material=material) for part in parts]
+        if not file.smooth:
+            parts = [replace(part, mesh=replace(part.mesh, normals=None)) for part in parts]
+        return Model(parts, self.models[path].lights), path.stem, file.lights
+
+    def _image(self, where: str, name: str, make: Any = image_texture) -> Image:
+        try:
+            image: Image = make(read_image(self.path.parent / name))
+        except OSError as error:
+            raise type(error)(f"{where}: {error}") from None
+        except ValueError as error:
+            raise ValueError(f"{where}: {name}: {error}") from None
+        return image
+
+    def _background(self, sky: BackgroundTable) -> Background:
+        if sky.image is not None:
+            image = self._image("background.image", sky.image)
+            return Background(image=image, turn_deg=sky.turn_deg, intensity=sky.intensity)
+        horizon = sky.horizon if sky.horizon is not None else (0.0, 0.0, 0.0)
+        return Background(
+            horizon=horizon,
+            zenith=sky.zenith if sky.zenith is not None else horizon,
+            nadir=sky.nadir if sky.nadir is not None else horizon,
+            spread_deg=sky.spread_deg,
+        )
+
+    def _texture(self, name: str, value: AnyTexture) -> Texture:
+        try:
+            if isinstance(value, ImageTexture):
+                return replace(self._image("file", value.file), repeat=value.repeat)
+            return _pattern(value)
+        except OSError as error:
+            raise type(error)(f"texture.{name}.{error}") from None
+        except ValueError as error:
+            dot = "." if isinstance(value, ImageTexture) else ": "
+            raise ValueError(f"texture.{name}{dot}{error}") from None
+
+    def _material(self, name: str, value: MaterialTable, textures: dict[str, Texture]) -> Material:
+        if value.texture is not None and value.texture not in textures:
+            raise ValueError(f"material.{name}: unknown texture {value.texture!r}: known are {_known(textures)}")
+        values = value.model_dump(exclude={"emission_strength"})
+        values["texture"] = textures[value.texture] if value.texture is not None else None
+        if value.texture is not None and "colour" not in value.model_fields_set:
+            values["colour"] = (1.0, 1.0, 1.0)
+        values["emission"] = tuple(e * value.emission_strength for e in value.emission)
+        if len(set(value.ior)) == 1:
+            values["ior"] = value.ior[0]
+        if value.normal_map is not None:
+            values["normal_map"] = self._image(f"material.{name}.normal_map", value.normal_map, normal_map)
+        try:
+            return Material(**values)
+        except ValueError as error:
+            raise ValueError(f"material.{name}: {error}") from None
+
+
+def _pattern(value: CheckerTexture | StripesTexture | NoiseTexture | VertexTexture) -> Texture:
+    if isinstance(value, VertexTexture):
+        return VertexColours()
+    on_surface = value.on == "surface"
+    if isinstance(value, NoiseTexture):
+        return Noise(value.colours, value.size, value.octaves, value.contrast, value.seed, on_surface)
+    if isinstance(value, StripesTexture):
+        return Stripes(value.colours, value.width, value.axis, value.soft, on_surface)
+    return Checker(value.colours, value.size, on_surface)
+
+
+def _light(index: int, value: AnyLight) -> Light:
+    r, g, b = (c * value.intensity for c in value.colour)
+    more: dict[str, Any] = {}
+    if isinstance(value, SpotLight):
+        more = {"direction": value.direction, "cone_deg": value.cone_deg}
+    vector = value.position_mm if isinstance(value, PointLight | SpotLight) else value.direction
+    try:
+        return Light(kind=value.kind, vector=vector, colour=(r, g, b), **more)
+    except ValueError as error:
+        raise ValueError(f"light.{index}: {error}") from None
+
+
+def _bodies(value: ObjectTable, parts: list[Part], label: str) -> Iterator[Body]:
+    """An object's parts where it stands."""
+    size = np.array(value.scale)
+    turn = rotation(value.rotate_deg)
+    name = value.name or label
+    shared: dict[Any, NDArray[np.float64]] = {}
+    for part in parts:
+        mesh, material = part.mesh, part.material if part.material is not None else Material()
+        if part.material is not None and value.material is None:  # a file's own material counts in its own units
+            material = _scaled(material, float(np.prod(size) ** (1 / 3)))
+        yield Body(
+            name=f"{name}/{part.name}" if part.name else name,
+            vertices=(mesh.vertices * size) @ turn.T + value.position_mm,
+            faces=mesh.faces,
+            material=material,
+            normals=None if mesh.normals is None else (mesh.normals / size) @ turn.T,
+            texture_coordinates=_coordinates(material, mesh, size, shared),
+        )
+
+
+def _scaled(material: Material, size: float) -> Material:
+    r, g, b = (a / size for a in material.absorption_per_mm)
+    return replace(material, absorption_per_mm=(r, g, b)) if max(r, g, b) > 0 else material
+
+
+def _coordinates(material: Material, mesh: Mesh, size: NDArray[np.float64], shared: dict[Any, Any]) -> Any:
+    """What a body's textures are read at; ``shared`` keeps what instances have in common."""
+    texture = material.texture
+    if isinstance(texture, VertexColours):
+        if mesh.colours is None:
+            raise ValueError("a texture of vertex colours needs them, the mesh has none")
+        return mesh.colours
+    if texture is None and material.normal_map is None:
+        return None
+    if texture is not None and not texture.on_surface:
+        return mesh.vertices * size
+    if mesh.uv is None:
+        what = "texture on the surface" if texture is not None else "normal map"
+        raise ValueError(f"a {what} needs texture coordinates, the mesh has none")
+    repeat = texture.repeat if isinstance(texture, Image) else (1.0, 1.0)
+    key = id(mesh.uv), repeat
+    if key not in shared:
+        shared[key] = np.column_stack([mesh.uv * repeat, np.zeros(len(mesh.uv))])
+    return shared[key]
+
+
+def _placed(light: Light, value: ObjectTable, strength: float) -> Light:
+    """A file's light where its object stands."""
+    turn = rotation(value.rotate_deg) * value.scale
+
+    def vector(values: Any) -> Vector:
+        x, y, z = (float(v) for v in values)
+        return x, y, z
+
+    colour = vector(c * strength for c in light.colour)
+    along = vector(turn @ light.direction)
+    if light.kind == "directional":
+        return replace(light, vector=vector(turn @ light.vector), colour=colour)
+    return replace(light, vector=vector(turn @ light.vector + value.position_mm), direction=along, colour=colour)
+
+
+def _alone(path: Path, model: Model) -> Scene:
+    """A mesh file as a scene of its own."""
+    corners = np.concatenate([part.mesh.vertices for part in model.parts])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    if not max(np.abs(low).max(), np.abs(high).max()) <= np.finfo(np.float32).max:
+        raise ValueError(f"reaches from {low.tolist()} to {high.tolist()}: finite float32 numbers are needed")
+    room = WORKING_VOLUME[1] - WORKING_VOLUME[0]
+    scale = float(np.min(room / np.maximum(high - low, 1e-12 * room)))
+    shift = (WORKING_VOLUME.sum(axis=0) - (low + high) * scale) / 2
+    shift[2] = WORKING_VOLUME[0, 2] - low[2] * scale
+    x, y, z = (float(s) for s in shift)
+    value = ObjectTable(name=path.stem, position_mm=(x, y, z), scale=(scale, scale, scale))
+    lights = [_placed(light, value, 1.0) for light in model.lights] or [
+        Light(kind="directional", vector=(0.5, -1.0, 0.8), colour=(0.7, 0.7, 0.7)),
+        Light(kind="directional", vector=(-0.8, -0.2, 0.6), colour=(0.25, 0.25, 0.25)),
+    ]
+    bodies = list(_bodies(value, model.parts, path.stem))
+    grey = Background(horizon=(0.6, 0.62, 0.65), zenith=(0.25, 0.35, 0.55), nadir=(0.3, 0.29, 0.28), spread_deg=60)
+    return Scene(name=path.stem, bodies=bodies, lights=lights, background=grey, ambient=(0.25, 0.25, 0.25))

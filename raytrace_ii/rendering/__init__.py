@@ -1,0 +1,1 @@
+"""Rendering: jobs, executors, pictures written as they come, render sets, contact sheets."""

@@ -1,0 +1,210 @@
+"""One picture as a job: what a worker needs to render any block of it, and what comes back."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ii_core import IICamera, MapCamera
+
+from ..scene.scene import Scene
+from ..trace.kernels import shade as kernels
+from ..trace.sampling import Adaptive, Sampling, adaptive_mean, fixed_places
+from ..trace.tracer import RayCount, Support, Tracer
+
+TILE_RAYS = 65536  # enough that numpy's overhead vanishes, few enough that work arrays stay in cache
+
+# Support images: name, type and how many numbers a pixel.
+SUPPORT_IMAGES = {
+    "depth": ("f4", ()),
+    "normal": ("f4", (3,)),
+    "object_id": ("i4", ()),
+    "ray_length": ("f4", ()),
+    "disparity": ("f4", ()),
+    "samples": ("i4", ()),
+}
+_building = threading.Lock()  # Embree's tree is built once, however many threads come first
+
+
+def _curve(peak: int, samples: int) -> NDArray[np.float64]:
+    """Integer sRGB codes, not yet rounded, at even steps of linear light (IEC 61966-2-1)."""
+    x = np.linspace(0, 1, samples)
+    return peak * np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+
+
+# Straight lines between the samples are off by less than 0.01 of a code.
+CURVES = {"uint8": _curve(255, 4097), "uint16": _curve(65535, 65537), "float32": None}
+
+
+def encoded(radiance: NDArray[np.float32], divisor: int, dtype: str) -> NDArray[Any]:
+    """Summed radiance (n, 3) as pixels: integers are sRGB, floats linear light."""
+    out = np.empty(radiance.shape, dtype)
+    curve = CURVES[dtype]
+    if curve is None:
+        np.divide(radiance, divisor, out=out)
+    else:
+        kernels.encode_srgb(radiance, 1 / divisor, curve, out)
+    return out
+
+
+@dataclass(frozen=True)
+class Block:
+    """A rendered block: ``pixels`` and support images by name, and what they cost."""
+
+    rows: slice
+    cols: slice
+    arrays: dict[str, NDArray[Any]]
+    count: RayCount
+    samples: dict[int, int]
+    cpu_seconds: float
+
+
+@dataclass(frozen=True)
+class Job:
+    """One picture to be rendered; `tile` runs on any thread of any process. Pickles without its working arrays."""
+
+    scene: Scene
+    camera: IICamera | MapCamera
+    sampling: Sampling
+    seed: int
+    pose: NDArray[np.float64]
+    dtype: str
+    support: tuple[str, ...]
+    _local: threading.local = field(default_factory=threading.local, compare=False, repr=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (
+            self.scene, self.camera, self.sampling, self.seed, self.pose, self.dtype, self.support
+        )  # fmt: skip
+
+    def tiles(self) -> list[tuple[slice, slice]]:
+        """Blocks that cover the picture, in rows of blocks, the same whatever the workers."""
+        if not isinstance(self.sampling, Adaptive):
+            return list(blocks(self.camera.pixels, (1, 1), TILE_RAYS))
+        assert isinstance(self.camera, IICamera)
+        if self.camera.regular and self.camera.lenses != (1, 1):
+            return list(blocks(self.camera.pixels, self.camera.ei_pixels, TILE_RAYS))
+        side = max(1, int(TILE_RAYS**0.5))  # a small rim
+        return list(blocks(self.camera.pixels, (side, side), TILE_RAYS))
+
+    def tile(self, rows: slice, cols: slice) -> Block:
+        """Render one block."""
+        started = time.thread_time()
+        tracer = self._tracer()
+        shape = rows.stop - rows.start, cols.stop - cols.start
+        support = self._support_room(shape)
+        if isinstance(self.sampling, Adaptive):
+            radiance, samples = self._adaptive(tracer, self.sampling, rows, cols, support)
+            found, times = np.unique(samples, return_counts=True)
+            histogram = dict(zip(found.tolist(), times.tolist(), strict=True))
+            divisor = 1
+        else:
+            radiance, divisor = self._fixed(tracer, self.sampling, rows, cols, support), self.sampling
+            samples = np.full(len(radiance), divisor, np.int32)
+            histogram = {divisor: len(radiance)}
+        arrays = {"pixels": encoded(radiance, divisor, self.dtype).reshape(*shape, 3)}
+        for name in self.support:
+            if name == "samples":
+                arrays[name] = samples.reshape(shape)
+            elif name == "disparity":
+                arrays[name] = disparity(self.camera, vars(support)["depth"])
+            else:
+                arrays[name] = vars(support)[name]
+        return Block(rows, cols, arrays, tracer.count, histogram, time.thread_time() - started)
+
+    def _tracer(self) -> Tracer:
+        """This thread's own, counting from 0."""
+        tracer: Tracer | None = getattr(self._local, "tracer", None)
+        if tracer is None:
+            with _building:
+                _ = self.scene.packed
+            tracer = self._local.tracer = Tracer(self.scene, TILE_RAYS, self.pose)
+        tracer.count = RayCount()
+        return tracer
+
+    def _support_room(self, shape: tuple[int, ...]) -> Support | None:
+        """What the tracer fills, None if nobody asks."""
+        if not set(self.support) - {"samples"}:
+            return None
+        return Support.empty(shape, {"depth" if name == "disparity" else name for name in self.support})
+
+    def _fixed(
+        self, tracer: Tracer, samples: int, rows: slice, cols: slice, support: Support | None
+    ) -> NDArray[np.float32]:
+        """Summed radiance of a block whose pixels all have the same number of samples."""
+        radiance = np.zeros(((rows.stop - rows.start) * (cols.stop - cols.start), 3), np.float32)
+        if samples == 1 and isinstance(self.camera, IICamera):
+            rays = self.camera.separable_rays(rows, cols)
+            if rays is not None and tracer.run_separable(rays, radiance, support):
+                return radiance
+        for sample in range(samples):
+            if isinstance(self.camera, MapCamera):
+                L, D, shares = self.camera.stored_rays(sample, rows, cols)
+            else:
+                where = fixed_places(self.camera, samples, self.seed, sample, rows, cols)
+                L, D, shares = self.camera.weighted_rays(rows, cols, *where)
+            tracer.run(L, D, radiance, support if sample == 0 else None, shares)
+        return radiance
+
+    def _adaptive(
+        self, tracer: Tracer, wanted: Adaptive, rows: slice, cols: slice, support: Support | None
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Mean radiance of a block, and how many samples each pixel took."""
+        assert isinstance(self.camera, IICamera)
+
+        def shoot(L: Any, D: Any, shares: Any, *, first: slice | None) -> NDArray[np.float32]:
+            radiance = np.zeros((len(L), 3), np.float32)
+            room = self._support_room((len(L),)) if first is not None else None
+            tracer.run(L, D, radiance, room, shares)
+            if room is not None and first is not None:
+                every = len(L) // (first.stop - first.start)
+                for name, array in vars(support).items():
+                    if array is not None:
+                        array.reshape(-1, *array.shape[2:])[first] = getattr(room, name)[::every]
+            return radiance
+
+        codes = CURVES["uint8"]
+        assert codes is not None
+        return adaptive_mean(self.camera, wanted, self.seed, rows, cols, TILE_RAYS, codes, shoot)
+
+
+def blocks(pixels: tuple[int, int], unit: tuple[int, int], most: int) -> Iterator[tuple[slice, slice]]:
+    """Blocks of whole units that cover a picture, about ``most`` pixels each, as wide as can be."""
+    columns, rows = pixels
+    across, down = unit
+    width = min(columns, max(1, most // (across * down)) * across)
+    height = max(1, most // (width * down)) * down
+    for top in range(0, rows, height):
+        for left in range(0, columns, width):
+            yield slice(top, min(top + height, rows)), slice(left, min(left + width, columns))
+
+
+def check_disparity(camera: IICamera | MapCamera) -> None:
+    """Raise ValueError unless neighbouring lenses of a camera see a point at a known distance from each other."""
+    model, named = camera.model, f"camera {camera.name!r}"
+    if model is None:
+        raise ValueError(f"disparity: the maps of {named} do not say what camera they are of")
+    if model.lenses[0] < 2:
+        raise ValueError(f"disparity: {named} has no neighbouring lenses: at least 2 across are needed")
+    if model.front:
+        raise ValueError(f"disparity: {named} has a lens before its array: pixels per lens do not follow from depth")
+
+
+def disparity(camera: IICamera | MapCamera, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    """How far a point at depth z moves from one elementary image to the next on the right, in pixels to the right.
+
+    ±Λ·δL / ((z − z₀ − Λ)·δP), negative if elementary images are erect; z₀ is where the pixel array stands. Downwards
+    it moves as far per lens pitch. NaN where depth is.
+    """
+    model = camera.model
+    assert model is not None
+    ahead = depth.astype(np.float64) - (model.gap_mm + model.origin_mm[2])
+    per_lens = model.gap_mm * model.lens_pitch_mm[0] / model.pixel_pitch_mm * (-1 if model.erect else 1)
+    with np.errstate(divide="ignore"):
+        return (per_lens / ahead).astype(np.float32)

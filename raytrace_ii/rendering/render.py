@@ -1,0 +1,365 @@
+"""Pictures: a scene through a camera, kept in memory or written band by band."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise
+from ii_core.files import atomic_path, image_writer, write_json
+from ii_core.picture import NOISE_ROWS, noisy_rows, sidecar
+
+from ..scene.scene import Scene
+from ..trace.sampling import sampling
+from ..trace.tracer import RayCount, rigid
+from .executors import Tile, check_executor, cores, run
+from .job import CURVES, SUPPORT_IMAGES, Block, Job, check_disparity
+
+SUPPORT = ("depth", "normal", "object_id")  # those kept unless others are asked for
+# What the channels of support images are called in an EXR file that holds several.
+CHANNELS = {
+    "depth": ("depth.Z",),
+    "normal": ("normal.X", "normal.Y", "normal.Z"),
+    "object_id": ("objectId",),
+    "ray_length": ("rayLength",),
+    "disparity": ("disparity",),
+    "samples": ("samples",),
+}
+UNITS = (
+    "depth.Z: z in mm in the camera's frame; rayLength: mm; normal: unit vectors, outward, in the scene's frame; "
+    "disparity: pixels to the right from one elementary image to the next on the right; nothing hit: NaN, normal 0, "
+    "objectId -1; objectId is a place in objectNames"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stats:
+    """What a picture cost.
+
+    ``rays`` by kind (primary, shadow, reflection, refraction), and those ``skipped`` because no 8-bit pixel would
+    show them; ``seconds`` by the clock; ``embree_seconds`` and
+    ``cpu_seconds`` summed over all threads and processes that rendered; ``samples`` says how many pixels got how
+    many.
+    """
+
+    rays: dict[str, int]
+    skipped: dict[str, int]
+    seconds: float
+    embree_seconds: float
+    cpu_seconds: float
+    samples: dict[int, int]
+
+    @property
+    def mean_samples(self) -> float:
+        """Samples per pixel."""
+        return sum(n * pixels for n, pixels in self.samples.items()) / sum(self.samples.values())
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shot:
+    """A rendered picture and its support images, of the first sample of each pixel. Those not asked for are None.
+
+    Parameters
+    ----------
+    depth : ndarray, (N, M)
+        z in mm in the camera's frame, NaN where nothing is hit.
+    normal : ndarray, (N, M, 3)
+        The faces' outward unit normals in the scene's frame, 0 where nothing is hit.
+    object_id : ndarray of int, (N, M)
+        The row of ``object_names``, −1 where nothing is hit.
+    ray_length : ndarray, (N, M)
+        mm from where the ray leaves the camera to the hit, NaN where nothing is hit.
+    disparity : ndarray, (N, M)
+        How far the point moves from one elementary image to the next on the right, in pixels to the right; see
+        `job.disparity`.
+    samples : ndarray of int, (N, M)
+        How many samples the pixel got.
+    """
+
+    picture: IIPicture
+    depth: NDArray[np.float32] | None
+    normal: NDArray[np.float32] | None
+    object_id: NDArray[np.int32] | None
+    ray_length: NDArray[np.float32] | None
+    disparity: NDArray[np.float32] | None
+    samples: NDArray[np.int32] | None
+    object_names: list[str]
+    stats: Stats
+
+
+def render(
+    scene: Scene,
+    camera: IICamera | MapCamera,
+    *,
+    samples: int | tuple[int, int] = 1,
+    error: float = 0.5,
+    seed: int = 0,
+    noise: float = 0.0,
+    dtype: str = "uint8",
+    workers: int | None = None,
+    executor: Any = None,
+    pose: ArrayLike | None = None,
+    support: tuple[str, ...] = SUPPORT,
+    progress: Callable[[int, int], None] | None = None,
+) -> Shot:
+    """Ray trace a scene through a camera.
+
+    The picture is the same to the bit whatever renders it.
+
+    Parameters
+    ----------
+    samples : int or (least, most)
+        Rays per pixel: 1 goes through the pixel's centre, more are spread over the pixel, one in each cell of a
+        grid, by a hash of ``seed`` and the pixel. They stay under the pixel's own lens. Over an aperture they are
+        spread likewise. Of a pair, pixels get the least and then more, up to the most, until they are within
+        ``error``. Stored maps have their own number.
+    error : float
+        Target of adaptive sampling: standard error of a pixel, in steps of 8 bits, estimated from its samples and
+        its neighbours under the same lens; see `sampling` for how, and for what that does not see.
+    seed : int
+        For samples and noise.
+    noise : float
+        σ of monochromatic sensor noise, in steps of 8 bits; see `add_sensor_noise`.
+    dtype : {"uint8", "uint16", "float32"}
+        Integers are sRGB, floats linear light.
+    workers : int, optional
+        Threads; as many as cores if not given.
+    executor : concurrent.futures.Executor or dask.distributed.Client, optional
+        What renders instead: threads, processes that share this machine's files, or a cluster. It stays open.
+    pose : array_like, (4, 4), optional
+        Rigid transform from the camera's frame to the scene's.
+    support : tuple of str
+        Which of depth, normal, object_id, ray_length, disparity and samples to keep.
+    progress : callable, optional
+        Called with blocks done and blocks in all, from the calling thread.
+
+    Returns
+    -------
+    Shot
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range.
+    OSError
+        If worker processes die and are not replaced.
+    """
+    tally = _Tally()
+    job = _job(scene, camera, samples, error, seed, noise, dtype, pose, support)
+    _check_workers(workers, executor)
+    columns, rows = camera.pixels
+    out: dict[str, NDArray[Any]] = {"pixels": np.empty((rows, columns, 3), dtype)}
+    for name in support:
+        kind, shape = SUPPORT_IMAGES[name]
+        out[name] = np.empty((rows, columns, *shape), kind)
+    with closing(_rendered(job, job.tiles(), workers, executor, progress, tally)) as blocks:
+        for block in blocks:
+            for name, array in block.arrays.items():
+                out[name][block.rows, block.cols] = array
+    picture = IIPicture(out["pixels"], camera.lenses, camera.ei_pixels, camera.model, camera.erect)
+    return Shot(
+        picture=add_sensor_noise(picture, noise, seed) if noise else picture,
+        **{name: out.get(name) for name in SUPPORT_IMAGES},
+        object_names=[body.name for body in scene.bodies],
+        stats=tally.stats(),
+    )
+
+
+def render_to(
+    picture: str | os.PathLike[str] | None,
+    scene: Scene,
+    camera: IICamera | MapCamera,
+    *,
+    support: Mapping[str, str | os.PathLike[str]] | None = None,
+    upright: bool = False,
+    samples: int | tuple[int, int] = 1,
+    error: float = 0.5,
+    seed: int = 0,
+    noise: float = 0.0,
+    dtype: str = "uint8",
+    workers: int | None = None,
+    executor: Any = None,
+    pose: ArrayLike | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Stats:
+    """Ray trace into files band by band: pictures may be larger than memory.
+
+    The files hold to the bit what `render` gives. They appear when all is done, or not at all.
+
+    Parameters that are not named here are those of `render`, and so are errors.
+
+    Parameters
+    ----------
+    picture : path or None
+        PNG, TIFF or EXR; its structure stands beside it as with `IIPicture.save`. None for support images alone.
+    support : mapping of str to path, optional
+        Files of support images by name. Several may name one EXR, which then has named channels; the names of
+        objects stand in its header.
+    upright : bool
+        Turn the picture of a camera of one lens, which stands on its head.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written.
+    """
+    tally = _Tally()
+    files = {name: os.fspath(path) for name, path in (support or {}).items()}
+    job = _job(scene, camera, samples, error, seed, noise, dtype, pose, tuple(files))
+    _check_workers(workers, executor)
+    if upright and camera.lenses != (1, 1):
+        raise ValueError(f"only the picture of one lens is turned upright: this camera has {camera.lenses} lenses")
+    strips = _strips(job.tiles())
+    tiles = [tile for strip in (reversed(strips) if upright else strips) for tile in strip]
+    with ExitStack() as stack:
+        writers = _writers(stack, job, picture, files, upright)
+        blocks = stack.enter_context(closing(_rendered(job, tiles, workers, executor, progress, tally)))
+        for top, band in _bands(blocks, camera.pixels, upright):
+            if noise:
+                band["pixels"] = noisy_rows(band["pixels"], top, noise, seed)
+            for write, names in writers:
+                rows = [np.atleast_3d(band[name]) for name in names]
+                joined = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2, dtype=np.float32)
+                joined = joined.astype(np.float32) if joined.dtype == np.int32 else joined
+                write(joined[::-1, ::-1] if upright else joined)
+    return tally.stats()
+
+
+def _writers(
+    stack: ExitStack, job: Job, picture: Any, files: dict[str, str], upright: bool
+) -> list[tuple[Callable[[NDArray[Any]], None], list[str]]]:
+    """Open all files; what to call with rows of which images."""
+    camera = job.camera
+    out: list[tuple[Callable[[NDArray[Any]], None], list[str]]] = []
+    if picture is not None:
+        nothing = np.broadcast_to(np.zeros(1, job.dtype), (*camera.pixels[::-1], 3))
+        structure = IIPicture(nothing, camera.lenses, camera.ei_pixels, camera.model, camera.erect != upright)
+        write_json(stack.enter_context(atomic_path(sidecar(picture))), structure.structure_json())
+        out.append((stack.enter_context(image_writer(picture, camera.pixels, 3, job.dtype)), ["pixels"]))
+    about = {"objectNames": json.dumps([body.name for body in job.scene.bodies]), "units": UNITS}
+    for file in dict.fromkeys(files.values()):
+        names = [name for name in files if files[name] == file]
+        channels = [channel for name in names for channel in CHANNELS[name]]
+        writer = image_writer(
+            file, camera.pixels, len(channels), "float32", names=channels if len(names) > 1 else (), about=about
+        )
+        out.append((stack.enter_context(writer), names))
+    return out
+
+
+@dataclass
+class _Tally:
+    """Sums up what the blocks of a picture cost."""
+
+    started: float = field(default_factory=time.perf_counter)
+    cpu: float = field(default_factory=time.thread_time)
+    count: RayCount = field(default_factory=RayCount)
+    samples: Counter[int] = field(default_factory=Counter)
+    block_seconds: float = 0.0
+
+    def add(self, block: Block) -> None:
+        self.count.add(block.count)
+        self.samples.update(block.samples)
+        self.block_seconds += block.cpu_seconds
+
+    def stats(self) -> Stats:
+        return Stats(
+            rays=dict(self.count.rays),
+            skipped=dict(self.count.skipped),
+            seconds=time.perf_counter() - self.started,
+            embree_seconds=self.count.embree_seconds,
+            cpu_seconds=self.block_seconds + time.thread_time() - self.cpu,
+            samples=dict(sorted(self.samples.items())),
+        )
+
+
+def _rendered(
+    job: Job, tiles: Sequence[Tile], workers: int | None, executor: Any, progress: Any, tally: _Tally
+) -> Generator[Block, None, None]:
+    """The blocks in their order, counted and told."""
+    with closing(run(job, tiles, workers=workers, executor=executor)) as blocks:
+        for done, block in enumerate(blocks, 1):
+            tally.add(block)
+            yield block
+            if progress:
+                progress(done, len(tiles))
+
+
+def _strips(tiles: Sequence[Tile]) -> list[list[Tile]]:
+    """Tiles by the rows that they cover."""
+    strips: dict[int, list[Tile]] = {}
+    for tile in tiles:
+        strips.setdefault(tile[0].start, []).append(tile)
+    return list(strips.values())
+
+
+def _bands(
+    blocks: Iterator[Block], pixels: tuple[int, int], backwards: bool
+) -> Iterator[tuple[int, dict[str, NDArray[Any]]]]:
+    """Whole rows as soon as they are complete, with the number of the first: always whole blocks of noise.
+
+    The blocks come by strips, from the top or from the bottom.
+    """
+    columns, rows = pixels
+    strip: list[Block] = []
+    held: list[tuple[int, dict[str, NDArray[Any]]]] = []
+    for block in blocks:
+        strip.append(block)
+        if block.cols.stop < columns:
+            continue
+        whole = {name: np.concatenate([b.arrays[name] for b in strip], axis=1) for name in block.arrays}
+        held.insert(0 if backwards else len(held), (block.rows.start, whole))
+        strip = []
+        first, last = held[0][0], held[-1][0] + len(held[-1][1]["pixels"])
+        cut = -(-first // NOISE_ROWS) * NOISE_ROWS if backwards else last // NOISE_ROWS * NOISE_ROWS
+        cut = last if last == rows and not backwards else cut
+        if not first < cut < last and cut != (first if backwards else last):
+            continue
+        joined = {name: np.concatenate([part[name] for _, part in held]) for name in whole}
+        top, bottom = (cut, last) if backwards else (first, cut)
+        yield top, {name: array[top - first : bottom - first] for name, array in joined.items()}
+        rest = slice(0, cut - first) if backwards else slice(cut - first, None)
+        left = {name: array[rest].copy() for name, array in joined.items()}
+        held = [(first if backwards else cut, left)] if len(left["pixels"]) else []
+
+
+def _job(
+    scene: Scene, camera: IICamera | MapCamera, samples: Any, error: float, seed: int, noise: float, dtype: str,
+    pose: ArrayLike | None, support: tuple[str, ...],
+) -> Job:  # fmt: skip
+    """A picture to be rendered, all of it checked."""
+    if isinstance(camera, MapCamera):
+        if samples not in (1, camera.stored_samples):
+            raise ValueError(f"samples is {samples}: the maps hold {camera.stored_samples} for each pixel")
+        samples = camera.stored_samples
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise ValueError(f"seed is {seed!r}: a whole number of at least 0 is needed")
+    if not 0 <= noise < math.inf:
+        raise ValueError(f"noise sigma is {noise}: at least 0 is needed")
+    if dtype not in CURVES:
+        raise ValueError(f"unknown pixel type {dtype!r}: known are {', '.join(CURVES)}")
+    if unknown := set(support) - set(SUPPORT_IMAGES):
+        known = ", ".join(SUPPORT_IMAGES)
+        raise ValueError(f"unknown support image {', '.join(sorted(unknown))}: known are {known}")
+    if "disparity" in support:
+        check_disparity(camera)
+    return Job(scene, camera, sampling(samples, error), int(seed), rigid(pose), dtype, support)
+
+
+def _check_workers(workers: int | None, executor: Any) -> None:
+    if workers is not None and (not isinstance(workers, int | np.integer) or workers < 1):
+        raise ValueError(f"workers is {workers!r}: a whole number of at least 1 is needed")
+    check_executor(executor, workers)
+
+
+__all__ = ["CHANNELS", "SUPPORT", "SUPPORT_IMAGES", "Shot", "Stats", "cores", "render", "render_to"]

@@ -1,0 +1,260 @@
+"""Sets of scenes rendered into a folder: pictures, support images, projections, a contact sheet and a manifest.
+
+The manifest says of every file what it was made of, as a hash, and what it is, as another. What is there already, of
+the same scene, camera, options and version, is not made again, so that an interrupted set goes on where it was.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from ii_core import IICamera, MapCamera, projection_camera
+from ii_core.files import write_json
+
+from ..files.load import load_scene
+from ..scene.hashing import content_hash, file_hash
+from ..scene.scene import Scene
+from .contact_sheet import contact_sheet
+from .job import SUPPORT_IMAGES, check_disparity
+from .render import Stats, render_to
+
+SETS = {"reference": ("apples", "car", "cuboid", "dolphin", "hairdo", "mountains", "objects", "twins")}
+MANIFEST, CONTACT = "manifest.json", "contact.png"
+FLAT_PIXELS, FLAT_SAMPLES = 1024, 4  # across, and a pixel
+FLAT_SUPPORT = ("depth", "normal", "object_id")
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class _Product:
+    """Files that are made together, and all that they depend on."""
+
+    files: tuple[Path, ...]
+    key: str
+    make: Callable[..., Stats]
+
+
+def render_set(
+    name: str,
+    folder: Path,
+    cameras: Sequence[IICamera | MapCamera],
+    *,
+    poses: Sequence[ArrayLike | None],
+    samples: int | tuple[int, int] = 1,
+    error: float = 0.5,
+    seed: int = 0,
+    noise: float = 0.0,
+    bits: int = 8,
+    workers: int | None = None,
+    executor: Any = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Render a set of scenes, or what is left of it.
+
+    Of every scene there are NAME.png, the II-picture; NAME_support.exr, depth, ray length, disparity where the camera
+    has it, normals and object ids through the pixels' centres; NAME_flat.png and NAME_flat_support.exr, what a 2D
+    camera sees; of several pixel arrays, pictures and support images are numbered.
+
+    Parameters
+    ----------
+    name : str
+        One of `SETS`.
+    cameras : sequence
+        The pixel arrays of one camera.
+    poses : sequence
+        Where each stands.
+    bits : {8, 16}
+        Of the pictures.
+    force : bool
+        Replace files of these names that no manifest accounts for.
+    progress : callable, optional
+        Called with the file being made, blocks done and blocks in all.
+
+    Other parameters are those of `render`.
+
+    Returns
+    -------
+    dict
+        The manifest, which also lies in the folder.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range, or the manifest of another set is there.
+    OSError
+        If a file cannot be written, or one of its name is there that this did not make.
+    """
+    if name not in SETS:
+        raise ValueError(f"unknown set {name!r}: known are {', '.join(SETS)}")
+    if cameras[0].model is None:
+        raise ValueError("the maps do not say what camera they are of: there is no 2D projection to match")
+    options = {"samples": samples, "error": error, "seed": seed, "noise": noise, "dtype": f"uint{bits}"}
+    old = _read_manifest(folder, name)
+    claims = _claims(folder, name, len(cameras), old, force)
+    manifest = {**_header(name, cameras, options), "claims": claims, "scenes": {}, CONTACT: old.get(CONTACT)}
+    means = {"workers": workers, "executor": executor}
+    _write_manifest(folder, manifest, old)
+    for title in SETS[name]:
+        scene = load_scene(title)
+        scene_hash = content_hash(scene)
+        entry: dict[str, Any] = {"hash": scene_hash, "products": {}}
+        known = old.get("scenes", {}).get(title, {}).get("products", {})
+        manifest["scenes"][title] = entry
+        for kind, product in _products(folder, title, scene, scene_hash, cameras, poses, options, means):
+            if not _is_done(product, known.get(kind)):
+                report = _reporter(progress, product.files[0].name)
+                entry["products"][kind] = _record(product, product.make(progress=report))
+            else:
+                entry["products"][kind] = known[kind]
+            _write_manifest(folder, manifest, old)
+    _draw_contact(folder, name, manifest)
+    write_json(folder / MANIFEST, manifest)
+    return manifest
+
+
+def _products(
+    folder: Path, title: str, scene: Scene, scene_hash: str, cameras: Sequence[Any], poses: Sequence[Any],
+    options: dict[str, Any], means: dict[str, Any],
+) -> Iterator[tuple[str, _Product]]:  # fmt: skip
+    """What there is to make of a scene."""
+    release = version("raytrace-ii")
+    for i, (camera, pose) in enumerate(zip(cameras, poses, strict=True)):
+        number = "" if len(cameras) == 1 else f"_{i}"
+        seen = [release, scene_hash, camera, pose]
+        picture, support = folder / f"{title}{number}.png", folder / f"{title}{number}_support.exr"
+        images = dict.fromkeys(support_images(camera), support)
+
+        common = {"pose": pose, "upright": camera.lenses == (1, 1), **means}
+        shoot = partial(render_to, picture, scene, camera, **options, **common)
+        # one ray through every pixel's centre, and no light
+        survey = partial(render_to, None, replace(scene, lights=()), camera, support=images, **common)
+        yield f"picture{number}", _Product((picture,), content_hash("picture", *seen, options), shoot)
+        yield f"support{number}", _Product((support,), content_hash("support", *seen, list(images)), survey)
+    pinhole, pose = projection_camera(cameras[0].model, FLAT_PIXELS)
+    flat, behind = folder / f"{title}_flat.png", folder / f"{title}_flat_support.exr"
+    images = dict.fromkeys(FLAT_SUPPORT, behind)
+    project = partial(
+        render_to, flat, scene, pinhole, pose=pose, upright=True, support=images, samples=FLAT_SAMPLES, **means
+    )
+    yield "flat", _Product((flat, behind), content_hash("flat", release, scene_hash, pinhole, pose), project)
+
+
+def support_images(camera: IICamera | MapCamera) -> list[str]:
+    """All support images that a camera has, but for the number of samples."""
+    names = [name for name in SUPPORT_IMAGES if name != "samples"]
+    try:
+        check_disparity(camera)
+    except ValueError:
+        names.remove("disparity")
+    return names
+
+
+def _reporter(progress: Progress | None, title: str) -> Callable[[int, int], None]:
+    return lambda done, total: progress(title, done, total) if progress else None
+
+
+def _record(product: _Product, stats: Stats) -> dict[str, Any]:
+    return {
+        "key": product.key,
+        "files": {path.name: _fingerprint(path) for path in product.files},
+        "seconds": round(stats.seconds, 3),
+        "cpu_seconds": round(stats.cpu_seconds, 3),
+        "rays": stats.rays,
+        "skipped": stats.skipped,
+        "samples": {str(n): pixels for n, pixels in stats.samples.items()},
+    }
+
+
+def _fingerprint(path: Path) -> dict[str, Any]:
+    return {"bytes": path.stat().st_size, "sha256": file_hash(path)}
+
+
+def _is_done(product: _Product, record: dict[str, Any] | None) -> bool:
+    """Whether all files are there, the very ones, made of the very same."""
+    if record is None or record.get("key") != product.key:
+        return False
+    return all(_is_same(path, record["files"].get(path.name)) for path in product.files)
+
+
+def _is_same(path: Path, fingerprint: Any) -> bool:
+    if not fingerprint or not path.is_file() or path.stat().st_size != fingerprint["bytes"]:
+        return False
+    return file_hash(path) == fingerprint["sha256"]
+
+
+def _header(name: str, cameras: Sequence[Any], options: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "format": "ii-picture-set",
+        "set": name,
+        "raytrace_ii": version("raytrace-ii"),
+        "commit": _commit(),
+        "camera": [camera.model.to_json() for camera in cameras if camera.model],
+        "options": options,
+    }
+
+
+def _commit() -> str | None:
+    """The commit of the source that runs; None if it was installed."""
+    root = Path(__file__).parent.parent
+    if not (root / ".git").exists():
+        return None
+    try:
+        found = subprocess.run(["git", "-C", root, "rev-parse", "HEAD"], capture_output=True, text=True)
+    except OSError:
+        return None
+    return found.stdout.strip() or None
+
+
+def _read_manifest(folder: Path, name: str) -> dict[str, Any]:
+    """What the folder's manifest says, nothing if there is none."""
+    path = folder / MANIFEST
+    if not path.is_file():
+        return {}
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    if not isinstance(manifest, dict) or manifest.get("format") != "ii-picture-set" or manifest.get("set") != name:
+        raise ValueError(f"{path} is not the manifest of the set {name!r}: another folder is needed")
+    return manifest
+
+
+def _write_manifest(folder: Path, manifest: dict[str, Any], old: dict[str, Any]) -> None:
+    """The manifest so far; scenes and products not come to yet stay as they were."""
+    scenes = dict(old.get("scenes", {}))
+    for title, entry in manifest["scenes"].items():
+        before = scenes.get(title, {}).get("products", {})
+        scenes[title] = {**entry, "products": {**before, **entry["products"]}}
+    write_json(folder / MANIFEST, {**manifest, "scenes": scenes})
+
+
+def _claims(folder: Path, name: str, arrays: int, old: dict[str, Any], force: bool) -> list[str]:
+    """Names of all files of the set; FileExistsError if one is there that no manifest has claimed."""
+    numbers = [""] if arrays == 1 else [f"_{i}" for i in range(arrays)]
+    ends = [f"{number}{end}" for number in numbers for end in (".png", "_support.exr")]
+    ours = [f"{title}{end}" for title in SETS[name] for end in (*ends, "_flat.png", "_flat_support.exr")] + [CONTACT]
+    strange = [file for file in ours if (folder / file).exists() and file not in old.get("claims", ())]
+    if strange and not force:
+        raise FileExistsError(f"{folder / strange[0]} is there already and not of this set: --force replaces it")
+    return ours
+
+
+def _draw_contact(folder: Path, name: str, manifest: dict[str, Any]) -> None:
+    flats = [manifest["scenes"][title]["products"]["flat"] for title in SETS[name]]
+    key = content_hash(manifest["raytrace_ii"], [[f["sha256"] for f in flat["files"].values()] for flat in flats])
+    record, path = manifest[CONTACT], folder / CONTACT
+    if record and record["key"] == key and _is_same(path, record["files"].get(CONTACT)):
+        return
+    contact_sheet(path, [(t, folder / f"{t}_flat.png", folder / f"{t}_flat_support.exr") for t in SETS[name]])
+    manifest[CONTACT] = {"key": key, "files": {CONTACT: _fingerprint(path)}}

@@ -1,0 +1,1 @@
+"""Scene: bodies, materials, lights, textures. Nothing here depends on Embree."""

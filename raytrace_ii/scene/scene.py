@@ -1,0 +1,337 @@
+"""A scene: bodies with materials, lights and surroundings, checked when they are made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .textures import Image, Texture, VertexColours
+
+if TYPE_CHECKING:
+    from ..trace.packing import PackedScene
+
+Vector = tuple[float, float, float]
+
+
+def _numbers(what: str, value: Any, count: int = 3, least: float = -math.inf) -> None:
+    """Refuse anything but ``count`` finite numbers of at least ``least``."""
+    numbers = np.asarray(value, np.float64) if np.ndim(value) == 1 else np.empty(0)
+    if numbers.shape != (count,) or not (np.isfinite(numbers).all() and (numbers >= least).all()):
+        floor = f" of at least {least:g}" if least > -math.inf else ""
+        raise ValueError(f"{what} is {value}: {count} finite numbers{floor} are needed")
+
+
+def _number(what: str, value: float, least: float, *, above: bool = False) -> None:
+    """Refuse a number that is not finite or too small; ``above`` refuses the least itself."""
+    if not (least < value < math.inf or (value == least and not above)):
+        raise ValueError(
+            f"{what} is {value}: a finite number {'above' if above else 'of at least'} {least:g} is needed"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """How a surface answers light, in Whitted's terms. Colours are linear.
+
+    The matt share is what ``mirror`` and ``transmission`` leave: energy stays in bounds.
+
+    Parameters
+    ----------
+    colour : (3,)
+        Diffuse and ambient reflectance, multiplied by the texture.
+    specular, shininess : float
+        Strength and exponent of the Blinn–Phong highlight.
+    mirror : (3,)
+        Share of light reflected as by a mirror.
+    transmission : (3,)
+        Share of light that each face of the body hands on, split by Fresnel into reflected and refracted: a pane
+        takes it twice.
+    ior : float or (3,)
+        Index of refraction of the body; three for red, green and blue disperse.
+    absorption_per_mm : (3,)
+        Beer–Lambert coefficient inside the body.
+    texture : Texture, optional
+    emission : (3,)
+        Light that the surface gives off on both sides, whatever falls on it; of any strength. It lights nothing else.
+    normal_map : Image, optional
+        As `texture.normal_map` reads it; over (u, v), so that the texture, if any, must lie on the surface too.
+    normal_scale : float
+        Factor of the map's x and y.
+    alpha_cutoff : float
+        Where the texture's alpha is below it there is no surface; 0 for no cut-outs.
+    priority : int
+        Where transmissive bodies overlap the one of higher priority is there (Schmidt and Budge 2002); of equal
+        ones the one entered first.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range, or cut-outs have no alpha.
+    """
+
+    colour: Vector = (0.8, 0.8, 0.8)
+    specular: float = 0.0
+    shininess: float = 50.0
+    mirror: Vector = (0.0, 0.0, 0.0)
+    transmission: Vector = (0.0, 0.0, 0.0)
+    ior: float | Vector = 1.5
+    absorption_per_mm: Vector = (0.0, 0.0, 0.0)
+    texture: Texture | None = None
+    emission: Vector = (0.0, 0.0, 0.0)
+    normal_map: Image | None = None
+    normal_scale: float = 1.0
+    alpha_cutoff: float = 0.0
+    priority: int = 0
+
+    def __post_init__(self) -> None:
+        for what in ("colour", "mirror", "transmission", "absorption_per_mm", "emission"):
+            _numbers(what, getattr(self, what), least=0)
+        _number("specular", self.specular, 0)
+        _number("shininess", self.shininess, 0, above=True)
+        for ior in self.iors:
+            _number("ior", ior, 0, above=True)
+        if max(self.mirror) + max(self.transmission) > 1 + 1e-9:
+            raise ValueError(
+                f"mirror {max(self.mirror):g} and transmission {max(self.transmission):g} "
+                "are more than all the light: at most 1 together is needed"
+            )
+        _number("normal_scale", self.normal_scale, 0)
+        if not 0 <= self.alpha_cutoff <= 1:
+            raise ValueError(f"alpha_cutoff is {self.alpha_cutoff}: a number from 0 to 1 is needed")
+        if self.alpha_cutoff > 0 and (not isinstance(self.texture, Image) or self.texture.alpha is None):
+            raise ValueError(f"alpha_cutoff is {self.alpha_cutoff}: an image texture with alpha is needed")
+        if not isinstance(self.priority, int | np.integer):
+            raise ValueError(f"priority is {self.priority!r}: a whole number is needed")
+        shares = self.texture is None or (self.texture.on_surface and not isinstance(self.texture, VertexColours))
+        if self.normal_map is not None and not shares:
+            raise ValueError("a normal map needs a texture on the surface or none: they share (u, v)")
+
+    @property
+    def iors(self) -> Vector:
+        """Index of refraction for red, green and blue."""
+        if np.ndim(self.ior) == 0:
+            return (self.ior,) * 3  # type: ignore[return-value]
+        _numbers("ior", self.ior)
+        return self.ior  # type: ignore[return-value]
+
+    @property
+    def transmissive(self) -> bool:
+        return max(self.transmission) > 0
+
+    @property
+    def fills(self) -> bool:
+        """Whether light is another within the body, so that its mesh must have an inside."""
+        return self.transmissive and (set(self.iors) != {1.0} or max(self.absorption_per_mm) > 0)
+
+
+LIGHTS = ("point", "directional", "spot")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Light:
+    """A light in the scene's frame, mm. None falls off with distance.
+
+    Parameters
+    ----------
+    kind : {"point", "directional", "spot"}
+    vector : (3,)
+        Where a point or a spot light stands, or along which direction a directional one shines.
+    colour : (3,)
+        Linear.
+    direction : (3,)
+        Along which a spot light shines.
+    cone_deg : (inner, outer)
+        Half angles of a spot light: all its light within the inner cone, none outside the outer one, between them
+        ((cos θ − cos outer)/(cos inner − cos outer))², as in glTF's KHR_lights_punctual.
+
+    Raises
+    ------
+    ValueError
+        If the kind is unknown or a value is out of range.
+    """
+
+    kind: str
+    vector: Vector
+    colour: Vector
+    direction: Vector = (0.0, 0.0, 1.0)
+    cone_deg: tuple[float, float] = (0.0, 45.0)
+
+    def __post_init__(self) -> None:
+        if self.kind not in LIGHTS:
+            raise ValueError(f"unknown light {self.kind!r}: known are {', '.join(LIGHTS)}")
+        _numbers(f"vector of a {self.kind} light", self.vector)
+        _numbers(f"colour of a {self.kind} light", self.colour, least=0)
+        _numbers(f"direction of a {self.kind} light", self.direction)
+        if self.kind == "directional" and not math.hypot(*self.vector) > 0:
+            raise ValueError("a directional light has the direction zero: a direction is needed")
+        if self.kind == "spot" and not math.hypot(*self.direction) > 0:
+            raise ValueError("a spot light has the direction zero: a direction is needed")
+        _numbers("cone_deg", self.cone_deg, 2, least=0)
+        if not self.cone_deg[0] < self.cone_deg[1] <= 90:
+            raise ValueError(f"cone_deg is {self.cone_deg}: an inner angle below the outer, at most 90, is needed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Background:
+    """Sky: a gradient, or an image of all directions. Linear colours.
+
+    Parameters
+    ----------
+    horizon, zenith, nadir : (3,)
+        The gradient runs from horizon to zenith and nadir at ``spread_deg`` above and below it, as the sine.
+    image : Image, optional
+        Equirectangular, in place of the gradient. Its centre lies towards +z, straight ahead of a camera; right of
+        it +x, its top row up at +y, its left and right edges meet behind at −z.
+    turn_deg : float
+        Turns the image about y, +z towards +x: by 90 its centre lies towards +x.
+    intensity : float
+        Factor of the image.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range.
+    """
+
+    horizon: Vector = (0.0, 0.0, 0.0)
+    zenith: Vector = (0.0, 0.0, 0.0)
+    nadir: Vector = (0.0, 0.0, 0.0)
+    spread_deg: float = 90.0
+    image: Image | None = None
+    turn_deg: float = 0.0
+    intensity: float = 1.0
+
+    def __post_init__(self) -> None:
+        for what in ("horizon", "zenith", "nadir"):
+            _numbers(f"{what} of the background", getattr(self, what), least=0)
+        if not 0 < self.spread_deg <= 90:
+            raise ValueError(f"spread_deg of the background is {self.spread_deg}: above 0, at most 90 is needed")
+        if not math.isfinite(self.turn_deg):
+            raise ValueError(f"turn_deg of the background is {self.turn_deg}: a finite number is needed")
+        _number("intensity of the background", self.intensity, 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fog:
+    """Air perspective: what lies at a distance t keeps the share exp(−density·t), ``colour`` (linear) comes in.
+
+    It fills all space outside transmissive bodies, along reflected and refracted ways too; lights and the sky
+    shine through it: the sky's colours are taken as they are seen. Give the fog the horizon's colour and far
+    things fade into it.
+    """
+
+    colour: Vector
+    density_per_mm: float
+
+    def __post_init__(self) -> None:
+        _numbers("colour of the fog", self.colour, least=0)
+        if not 0 < self.density_per_mm < math.inf:
+            raise ValueError(f"fog has a density of {self.density_per_mm} per mm: more than 0 is needed")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Body:
+    """One object: a triangle mesh in scene coordinates (mm) with its material.
+
+    Parameters
+    ----------
+    vertices : ndarray, (V, 3)
+    faces : ndarray of int, (F, 3)
+        Counter-clockwise about the outward normal: (v1 − v0) × (v2 − v0) points out.
+    normals : ndarray, (V, 3), optional
+        Vertex normals for smooth shading; None shades flat.
+    texture_coordinates : ndarray, (V, 3), optional
+        (u, v, 0) for textures on the surface and normal maps, positions in the body's own frame for solid ones,
+        linear colours for those of the vertices.
+
+    Raises
+    ------
+    ValueError
+        If there is no geometry, it does not fit together, or the material needs coordinates that are not there.
+    """
+
+    name: str
+    vertices: NDArray[Any]
+    faces: NDArray[Any]
+    material: Material
+    normals: NDArray[Any] | None = None
+    texture_coordinates: NDArray[Any] | None = None
+
+    def __post_init__(self) -> None:
+        vertices, faces = np.asarray(self.vertices), np.asarray(self.faces)
+        if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
+            raise ValueError(f"object {self.name!r} has no geometry: triangles are needed")
+        bad = ~(np.abs(vertices) <= np.finfo(np.float32).max).all(axis=1)
+        if bad.any():
+            at = int(np.argmax(bad))
+            raise ValueError(
+                f"object {self.name!r}: vertex {at} is {vertices[at].tolist()}: finite float32 numbers are needed"
+            )
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise ValueError(
+                f"object {self.name!r}: a face names vertex {faces.max() if faces.min() >= 0 else faces.min()}, "
+                f"there are {len(vertices)}"
+            )
+        for what in ("normals", "texture_coordinates"):
+            value = getattr(self, what)
+            if value is not None and np.shape(value) != vertices.shape:
+                raise ValueError(f"object {self.name!r}: {what} are {np.shape(value)}, vertices {vertices.shape}")
+        if self.material.normal_map is not None and self.texture_coordinates is None:
+            raise ValueError(f"object {self.name!r}: a normal map needs texture coordinates, there are none")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scene:
+    """Bodies, lights and surroundings, in millimetres in the camera's frame (x right, y up, z away).
+
+    Raises
+    ------
+    ValueError
+        If there is no body, ``max_depth`` is negative or ``ambient`` is no colour.
+    """
+
+    bodies: Sequence[Body]
+    lights: Sequence[Light] = ()
+    background: Background = field(default_factory=Background)
+    fog: Fog | None = None
+    ambient: Vector = (0.0, 0.0, 0.0)
+    max_depth: int = 6
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.bodies:
+            raise ValueError(f"scene {self.name!r} has no geometry: at least one object is needed")
+        if not self.max_depth >= 0:
+            raise ValueError(f"max_depth is {self.max_depth}: at least 0 is needed")
+        _numbers("ambient", self.ambient, least=0)
+        # Transmissive bodies go last, before them those with cut-outs: opaque faces are a prefix that shadow rays may
+        # be tested against alone.
+        ordered = sorted(self.bodies, key=lambda b: (b.material.transmissive, b.material.alpha_cutoff > 0))
+        object.__setattr__(self, "bodies", tuple(ordered))
+
+    def with_depth(self, max_depth: int) -> Scene:
+        """The same scene with another recursion depth."""
+        return replace(self, max_depth=max_depth)
+
+    @cached_property
+    def packed(self) -> PackedScene:
+        """The arrays that kernels read, and Embree's tree, built on first use."""
+        from ..trace.packing import PackedScene
+
+        return PackedScene(self)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without Embree's tree, which cannot be sent to another process and is built there anew."""
+        return {name: value for name, value in vars(self).items() if name != "packed"}
+
+    @property
+    def bounds_mm(self) -> NDArray[np.float64]:
+        """(2, 3): least and greatest corner."""
+        every = np.concatenate([np.asarray(b.vertices, np.float64) for b in self.bodies])
+        return np.stack([every.min(axis=0), every.max(axis=0)])

@@ -1,0 +1,215 @@
+"""Textures: images on (u, v), checkers, stripes and noise in space; packed into arrays for the kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator
+
+from ..trace.kernels.shade import CHECKER, IMAGE, LINEAR, NOISE, STRIPES, VERTEX
+
+COLUMNS = 12  # kind, then what the kind needs
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """An image, linear float32 (H, W, 3), row 0 on top at v = 1; repeats beyond [0, 1]; bilinear.
+
+    Made from ``codes``, uint8 sRGB of the same shape, it is kept in a quarter of the memory, which is faster to read.
+    ``repeat`` is how often a scene file lays it over the unit square: texture coordinates are multiplied by it
+    when the body is made. ``alpha`` (H, W), 0…1, is kept for cut-outs where the file has it.
+    """
+
+    pixels: NDArray[np.float32]
+    repeat: tuple[float, float] = (1.0, 1.0)
+    alpha: NDArray[np.float32] | None = None
+    codes: NDArray[np.uint8] | None = None
+    on_surface = True
+
+
+@dataclass(frozen=True)
+class Checker:
+    """Two linear colours in cubes of ``size`` (mm along each axis; in (u, v) units if ``on_surface``)."""
+
+    colours: tuple[tuple[float, float, float], tuple[float, float, float]]
+    size: tuple[float, float, float]
+    on_surface: bool = False
+
+
+@dataclass(frozen=True)
+class Stripes:
+    """Two linear colours in turn, each ``width`` wide (mm; in (u, v) units if ``on_surface``) along ``axis``.
+
+    The first starts at the origin. ``soft`` is the share of the width over which they run into each other.
+
+    Raises
+    ------
+    ValueError
+        If the axis is zero, the width not positive, or ``soft`` not from 0 to 1.
+    """
+
+    colours: tuple[tuple[float, float, float], tuple[float, float, float]]
+    width: float
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    soft: float = 0.0
+    on_surface: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 < self.width < np.inf:
+            raise ValueError(f"stripes are {self.width} wide: more than 0 is needed")
+        if not 0 < np.linalg.norm(self.axis) < np.inf:
+            raise ValueError(f"the axis of stripes is {self.axis}: a finite direction other than zero is needed")
+        if not 0 <= self.soft <= 1:
+            raise ValueError(f"the soft edge of stripes is {self.soft}: a share from 0 to 1 is needed")
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Two linear colours mixed by fractal gradient noise with features of ``size`` mm along each axis.
+
+    ``contrast`` 1 uses the whole mix where the noise reaches ±0.5.
+    """
+
+    colours: tuple[tuple[float, float, float], tuple[float, float, float]]
+    size: tuple[float, float, float]
+    octaves: int = 1
+    contrast: float = 1.0
+    seed: int = 0
+    on_surface: bool = False
+
+
+@dataclass(frozen=True)
+class VertexColours:
+    """The linear colours of the mesh's own vertices, which stand in the place of texture coordinates."""
+
+    on_surface = True
+
+
+Texture = Image | Checker | Stripes | Noise | VertexColours
+
+
+class TextureTable:
+    """Textures as a table (n, COLUMNS), and what their images hold.
+
+    ``texels`` are linear colours (n, 3) of some images and sRGB codes (m, 4) of the others, of which one texel never
+    lies in two cache lines; ``alphas`` those of images that have any.
+    """
+
+    def __init__(self, textures: Sequence[Texture | None]) -> None:
+        self._rows: dict[int, int] = {}
+        rows: list[list[float]] = []
+        pixels: list[NDArray[np.float32]] = [np.empty((0, 3), np.float32)]
+        codes: list[NDArray[np.uint8]] = [np.empty((0, 4), np.uint8)]
+        alphas: list[NDArray[np.float32]] = [np.empty(0, np.float32)]
+        for texture in textures:
+            if texture is None or id(texture) in self._rows:
+                continue
+            self._rows[id(texture)] = len(rows)
+            if isinstance(texture, Image):
+                height, width = texture.pixels.shape[:2]
+                coded = texture.codes is not None
+                first = sum(map(len, codes if coded else pixels))
+                rows.append([IMAGE, first, width, height, sum(map(len, alphas)), coded])
+                if texture.codes is not None:
+                    codes.append(np.pad(texture.codes.reshape(-1, 3), ((0, 0), (0, 1))))
+                else:
+                    pixels.append(texture.pixels.reshape(-1, 3))
+                if texture.alpha is not None:
+                    alphas.append(texture.alpha.reshape(-1))
+            elif isinstance(texture, Checker):
+                rows.append([CHECKER, *(1 / s for s in texture.size), *texture.colours[0], *texture.colours[1]])
+            elif isinstance(texture, VertexColours):
+                rows.append([VERTEX])
+            elif isinstance(texture, Stripes):
+                steps = np.asarray(texture.axis) / np.linalg.norm(texture.axis) / texture.width
+                rows.append([STRIPES, *steps, *texture.colours[0], *texture.colours[1], texture.soft])
+            else:
+                scale = (1 / s for s in texture.size)
+                octaves = texture.octaves + texture.seed % 1024 * 16  # one column for both
+                rows.append([NOISE, *scale, *texture.colours[0], *texture.colours[1], octaves, texture.contrast])
+        self.table = np.zeros((len(rows), COLUMNS))
+        for row, values in zip(self.table, rows, strict=True):
+            row[: len(values)] = values
+        self.texels = np.concatenate(pixels), np.concatenate(codes)
+        self.alphas = np.concatenate(alphas)
+
+    def index(self, texture: Texture | None) -> int:
+        """Row of a texture, −1 for none."""
+        return -1 if texture is None else self._rows[id(texture)]
+
+
+def linear(srgb: Any) -> NDArray[np.float64]:
+    """sRGB in [0, 1] to linear light (IEC 61966-2-1)."""
+    c = np.asarray(srgb, dtype=np.float64)
+    return np.where(c <= 0.04045, c / 12.92, ((np.maximum(c, 0) + 0.055) / 1.055) ** 2.4)
+
+
+def srgb_colour(value: Any) -> tuple[float, float, float]:
+    """``"#rrggbb"`` or three sRGB numbers in [0, 1], to linear."""
+    if isinstance(value, str):
+        if not (len(value) == 7 and value[0] == "#" and all(c in "0123456789abcdefABCDEF" for c in value[1:])):
+            raise ValueError(f"colour {value!r}: #rrggbb or three numbers from 0 to 1 are needed")
+        value = [int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    if not (
+        isinstance(value, list | tuple)
+        and len(value) == 3
+        and all(isinstance(c, int | float) and not isinstance(c, bool) and 0 <= c <= 1 for c in value)
+    ):
+        raise ValueError(f"colour {value!r}: #rrggbb or three numbers from 0 to 1 are needed")
+    r, g, b = (float(c) for c in linear(value))
+    return r, g, b
+
+
+Colour = Annotated[tuple[float, float, float], BeforeValidator(srgb_colour)]
+
+
+def image_texture(pixels: NDArray[Any]) -> Image:
+    """An image texture from stored pixels: integers are sRGB, floats linear; grey is spread, alpha kept aside.
+
+    Raises
+    ------
+    ValueError
+        If a pixel is not finite.
+    """
+    if not np.isfinite(pixels).all():
+        raise ValueError("image holds pixels that are not finite numbers")
+    data, alpha = _split(pixels)
+    codes = np.ascontiguousarray(data) if data.dtype == np.uint8 else None
+    if codes is not None:
+        data = LINEAR[codes]
+    elif data.dtype.kind == "u":
+        data = linear(np.arange(np.iinfo(data.dtype).max + 1) / np.iinfo(data.dtype).max)[data]
+    return Image(np.ascontiguousarray(data, np.float32), alpha=alpha, codes=codes)
+
+
+def normal_map(pixels: NDArray[Any]) -> Image:
+    """A normal map from stored pixels, which are data and not sRGB: x, y, z of −1…1 stand as 0…1.
+
+    Tangent space as in glTF 2.0, §3.9.3: x along growing u, y along growing v, z out of the face.
+
+    Raises
+    ------
+    ValueError
+        If there are not three channels, or a pixel is not finite.
+    """
+    if pixels.shape[2] < 3 or not np.isfinite(pixels).all():
+        raise ValueError(f"a normal map has {pixels.shape[2]} channels: three of finite numbers are needed")
+    data = pixels[..., :3]
+    if data.dtype.kind == "u":
+        data = data / np.float32(np.iinfo(data.dtype).max)
+    return Image(np.ascontiguousarray(data, np.float32))
+
+
+def _split(pixels: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.float32] | None]:
+    """Three channels of colour, and alpha as 0…1 if there is a second or fourth."""
+    channels = pixels.shape[2]
+    alpha = None
+    if channels in (2, 4):
+        alpha = pixels[..., -1].astype(np.float32)
+        if pixels.dtype.kind == "u":
+            alpha /= np.float32(np.iinfo(pixels.dtype).max)
+    return pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2), alpha

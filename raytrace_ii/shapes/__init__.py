@@ -1,0 +1,1 @@
+"""Procedural shapes: meshes computed from parameters."""

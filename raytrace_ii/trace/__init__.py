@@ -1,0 +1,1 @@
+"""Ray tracing: intersection, packed scene, shading, sampling."""

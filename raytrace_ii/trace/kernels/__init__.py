@@ -1,0 +1,1 @@
+"""Compiled kernels of the tracer; they import numpy and numba alone."""

@@ -1,0 +1,195 @@
+"""A scene as the kernels read it: flat arrays of faces, materials, textures and lights."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scene.scene import Body, Light, Material, Scene, Vector
+from ..scene.textures import TextureTable
+from .intersect import Intersector
+from .kernels.shade import DIRECTIONAL, LEAST_WEIGHT, POINT, SPOT
+
+# Spawned rays start this share of the face's largest coordinate off the face: float32 places a hit to about
+# 1e-7 of it, and from 1e-6 on no ray meets its own face again.
+LIFT = 4e-6
+
+# Columns of the material table.
+COLOUR, MIRROR, TRANSMISSION, ABSORPTION = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
+SPECULAR, SHININESS, PRIORITY, LOCAL, TEXTURE, LEAST_HALF = 12, 13, 14, 15, 16, 17
+EMISSION, IOR, CUTOFF, NORMAL_MAP, NORMAL_SCALE = slice(18, 21), slice(21, 24), 24, 25, 26
+MATERIAL_COLUMNS = 27
+
+MOST_NESTED = 8  # bodies whose bounds meet in one place that a ray keeps count of
+
+
+class PackedScene:
+    """What the kernels read.
+
+    ``corners`` is (F, 3, 3) float32 positions, ``faces`` (F, 5) unit normals, lifts and pulls. ``normals`` is like
+    ``corners`` for shading, of no faces if every body is flat; ``coordinates`` for textures, of no faces if there
+    are none: a scene pays only for what it has. ``nested`` is how many transmissive bodies a ray may be in at once
+    by their ``clear_bounds`` (B, 2, 3); they and bodies with cut-outs follow the ``opaque_faces``. ``least`` is the
+    weight from which on a ray is worth shooting.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        bodies = scene.bodies
+        opaque = sum(not _lets_through(body) for body in bodies)
+        first_clear = sum(not body.material.transmissive for body in bodies)
+        self.object_of_face = np.repeat(
+            np.arange(len(bodies), dtype=np.int32), [len(body.faces) for body in bodies]
+        ).astype(np.int32)
+        bounds = [np.stack([v.min(axis=0), v.max(axis=0)]) for v in (np.asarray(b.vertices) for b in bodies)]
+        self.clear_bounds = np.array(bounds[first_clear:], np.float64).reshape(-1, 2, 3)
+        meeting = _meeting(self.clear_bounds)
+        self.nested = min(int(meeting.sum(axis=1).max(initial=0)), MOST_NESTED)
+        vertices = [b.vertices for b in bodies[:first_clear]] + _overlapping(bodies[first_clear:], meeting)
+        self.corners = _per_corner(vertices, bodies)
+        self.faces = _face_table(self.corners)
+        self.normals = _per_corner([b.normals for b in bodies], bodies)
+        self.coordinates = _per_corner(
+            [b.texture_coordinates if b.material.texture or b.material.normal_map else None for b in bodies], bodies
+        )
+        sky = scene.background
+        images = [image for b in bodies for image in (b.material.texture, b.material.normal_map)]
+        self.textures = TextureTable([*images, sky.image])
+        # float32's values in float64's place: the kernels reckon in float64, and need not convert
+        rows = np.array([_material_row(body.material, self.textures) for body in bodies], np.float32)
+        self.materials = rows.astype(np.float64)
+        self.lights = np.array([_light_row(light) for light in scene.lights], np.float64).reshape(-1, 12)
+        self.background = np.array(
+            [
+                *(*sky.horizon, *sky.zenith, *sky.nadir, 1 / math.sin(math.radians(sky.spread_deg))),
+                *(self.textures.index(sky.image), sky.turn_deg / 360, sky.intensity),
+            ],
+            np.float64,
+        )
+        fog = scene.fog
+        self.fog = np.array([*fog.colour, fog.density_per_mm] if fog else [], np.float64)
+        self.ambient = np.array(scene.ambient, np.float64)
+        self.least = LEAST_WEIGHT / _brightest(scene)
+        self.opaque_faces = sum(len(body.faces) for body in bodies[:opaque])
+        self.first_clear = first_clear
+        self.mirrors = any(max(body.material.mirror) > 0 for body in bodies)
+        self.transmits = first_clear < len(bodies)
+        self.disperses = any(len(set(body.material.iors)) > 1 for body in bodies[first_clear:])
+        self.lets_through = opaque < len(bodies)  # shadow rays do not end at every face
+        self.passes = self.nested > 1 or any(body.material.alpha_cutoff > 0 for body in bodies)
+        self.intersector = Intersector(self.corners, self.opaque_faces)
+
+
+def _lets_through(body: Body) -> bool:
+    return body.material.transmissive or body.material.alpha_cutoff > 0
+
+
+def _material_row(m: Material, textures: TextureTable) -> NDArray[np.float64]:
+    row = np.zeros(MATERIAL_COLUMNS)
+    row[COLOUR], row[MIRROR], row[TRANSMISSION] = m.colour, m.mirror, m.transmission
+    row[ABSORPTION], row[EMISSION], row[IOR] = m.absorption_per_mm, m.emission, m.iors
+    row[SPECULAR], row[SHININESS], row[PRIORITY] = m.specular, m.shininess, m.priority
+    row[LOCAL] = max(0.0, 1 - max(m.mirror) - max(m.transmission))
+    # below this cosine the highlight is too weak to see, and its power need not be taken
+    row[LEAST_HALF] = (LEAST_WEIGHT / max(m.specular, LEAST_WEIGHT)) ** (1 / m.shininess)
+    row[TEXTURE], row[NORMAL_MAP] = textures.index(m.texture), textures.index(m.normal_map)
+    row[NORMAL_SCALE], row[CUTOFF] = m.normal_scale, m.alpha_cutoff
+    return row
+
+
+def _brightest(scene: Scene) -> float:
+    """How much brighter than 1 anything may be that a ray can meet: its weight counts for as much more."""
+    sky = scene.background
+    image = sky.intensity * float(sky.image.pixels.max()) if sky.image is not None else 0.0
+    colours = [sky.horizon, sky.zenith, sky.nadir, scene.ambient, *(light.colour for light in scene.lights)]
+    return max(1.0, image, *(max(c) for c in colours), *(max(b.material.emission) for b in scene.bodies))
+
+
+def _meeting(bounds: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(B, B): whether bounds touch or overlap, to float32's precision."""
+    slack = 4 * LIFT * np.abs(bounds).max(axis=(1, 2))[:, None]
+    low, high = bounds[:, 0] - slack, bounds[:, 1] + slack
+    return ((low[:, None] <= high[None]) & (high[:, None] >= low[None])).all(axis=2)
+
+
+def _overlapping(bodies: Sequence[Body], meeting: NDArray[np.bool_]) -> list[NDArray[Any]]:
+    """The vertices of transmissive bodies, grown by a few lifts where they may touch one of higher priority.
+
+    Of faces in one place a ray that starts behind the one misses the other. Grown, the lower body's face lies inside
+    the higher body, where it is not there, and what is left is the higher one's, in its own place.
+    """
+    order = sorted(range(len(bodies)), key=lambda b: (-bodies[b].material.priority, b))
+    grown = [body.vertices for body in bodies]
+    for place, b in enumerate(order):
+        above = sum(meeting[b, other] for other in order[:place])
+        if above:
+            vertices = np.asarray(bodies[b].vertices, np.float64)
+            step = above * 4 * LIFT * np.abs(vertices).max()
+            grown[b] = vertices + step * _corner_normals(vertices, np.asarray(bodies[b].faces))
+    return grown
+
+
+def _corner_normals(vertices: NDArray[np.float64], faces: NDArray[Any]) -> NDArray[np.float64]:
+    """At each vertex a vector that leads one out of every face around it, as nearly as one can."""
+    _, place = np.unique(vertices, axis=0, return_inverse=True)
+    p = vertices[faces]
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    total = np.zeros((int(place.max()) + 1, 3))
+    for corner in range(3):
+        before, after = p[:, corner - 1] - p[:, corner], p[:, corner - 2] - p[:, corner]
+        angle = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), np.einsum("ij,ij->i", before, after))
+        np.add.at(total, place.reshape(-1)[faces[:, corner]], normal * angle[:, None])
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    unit = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+    lean = np.full(len(unit), 1.0)  # the least cosine between a vertex's normal and those of its faces
+    for corner in range(3):
+        at = place.reshape(-1)[faces[:, corner]]
+        np.minimum.at(lean, at, np.einsum("ij,ij->i", unit[at], normal))
+    return (unit / np.clip(lean, 0.25, 1)[:, None])[place.reshape(-1)]
+
+
+def _per_corner(values: Sequence[NDArray[Any] | None], bodies: Sequence[Body]) -> NDArray[np.float32]:
+    """Vertex values gathered to (F, 3, 3) float32, zero where a body has none; of no faces if none has any."""
+    if all(value is None for value in values):
+        return np.empty((0, 3, 3), np.float32)
+    parts = [
+        np.zeros((len(b.faces), 3, 3), np.float32) if v is None else np.asarray(v, np.float32)[np.asarray(b.faces)]
+        for v, b in zip(values, bodies, strict=True)
+    ]
+    return np.ascontiguousarray(np.concatenate(parts))
+
+
+def _light_row(light: Light) -> list[float]:
+    """Kind, place or unit direction, colour; of a spot its unit direction, glTF's scale and offset of its cone."""
+    if light.kind == "directional":
+        return [DIRECTIONAL, *_unit(light.vector), *light.colour, 0, 0, 0, 0, 0]
+    if light.kind == "point":
+        return [POINT, *light.vector, *light.colour, 0, 0, 0, 0, 0]
+    inner, outer = np.cos(np.radians(light.cone_deg))
+    scale = 1 / (inner - outer)
+    return [SPOT, *light.vector, *light.colour, *_unit(light.direction), scale, -outer * scale]
+
+
+def _unit(vector: Vector) -> NDArray[np.float64]:
+    return np.asarray(vector, np.float64) / np.linalg.norm(vector)
+
+
+def _face_table(corners: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Unit normal (0 for a face without area), lift in mm and pull of every face.
+
+    The pull takes a hit about as far towards the middle of its face as the lift takes it off the face, as a share
+    of the way.
+    """
+    p = corners.astype(np.float64)
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    lift = LIFT * np.abs(p).max(axis=(1, 2))
+    longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
+    pull = np.minimum(np.divide(lift, longest, out=np.zeros_like(lift), where=longest > 0), 0.25)
+    return np.column_stack([unit, lift, pull]).astype(np.float32)

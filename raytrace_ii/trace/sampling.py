@@ -1,0 +1,190 @@
+"""Where a pixel's samples lie, and how many it gets.
+
+A fixed number is one sample in each cell of a grid. An adaptive number starts with the least, then doubles, pixel by
+pixel, until the estimated standard error of the pixel is within a target or the most is reached. The estimate is
+
+    error² = Σ(qᵢ − x̄)² / 12 + d² / n³
+
+in linear light and by channel: qᵢ are the means of the four quarters of the n samples, each of which is spread over
+the whole pixel, so that their scatter knows of the stratification; d is the largest difference, after the first
+round, to the eight neighbours under the same lens. It stands for an edge that all samples have missed: parallel to a
+side and anywhere, an edge of height d hides d / n^1.5 (root mean square) from n stratified samples. Under another
+lens something else is seen, and its pixels say nothing. The error is told in steps of 8-bit sRGB, half the distance
+of the codes of x̄ ± error, the worst channel's.
+
+The quarters share out the pixel among themselves, so that their mean is better than the mean of four strangers: the
+target is kept with room to spare. What the estimate cannot see: an object so small that in the first round no sample
+of a pixel or its neighbours meets it, as a hair far away; a highlight smaller than that; and anything beyond white,
+where the codes end, also in pictures of floats. Four quarters that agree by chance stop a pixel too soon; `least`
+guards against both.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ii_core import IICamera
+
+from .kernels import sampling as sample_kernels
+from .kernels import shade as kernels
+
+APERTURE_SEED = 1 << 40  # apart from all seeds a person gives
+MOST_SAMPLES = 1 << 16
+
+Floats = NDArray[np.float64]
+Radiance = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """From ``least`` to ``most`` samples a pixel, until its standard error is within ``error`` steps of 8 bits."""
+
+    least: int
+    most: int
+    error: float
+
+
+Sampling = int | Adaptive
+
+
+def sampling(samples: Any, error: float) -> Sampling:
+    """A number of samples, or a pair and an error, checked.
+
+    Raises
+    ------
+    ValueError
+        If a number is not whole or too small, or the error is not positive.
+    """
+    pair = samples if isinstance(samples, tuple) else (samples,)
+    for value in pair:
+        if not isinstance(value, int | np.integer) or isinstance(value, bool) or not 1 <= value <= MOST_SAMPLES:
+            raise ValueError(f"samples is {value!r}: a whole number from 1 to {MOST_SAMPLES} is needed")
+    if len(pair) == 1:
+        return int(pair[0])
+    if len(pair) != 2 or not 4 <= pair[0] <= pair[1] or any(n & (n - 1) for n in pair):
+        raise ValueError(f"samples is {samples!r}: two powers of 2 are needed, at least 4 and the second not less")
+    if not 0 < error < math.inf:
+        raise ValueError(f"error is {error}: a positive number of 8-bit steps is needed")
+    return Adaptive(int(pair[0]), int(pair[1]), float(error))
+
+
+def fixed_places(camera: IICamera, samples: int, seed: int, sample: int, rows: slice, cols: slice) -> list[ArrayLike]:
+    """Where in the pixel and where on the aperture one of a fixed number of samples lies, for a block of pixels."""
+    if samples == 1:
+        return [(0.5, 0.5), (0.5, 0.5)]
+    down = max(d for d in range(1, math.isqrt(samples) + 1) if samples % d == 0)
+    places: list[ArrayLike] = []
+    for aperture in (False, True):
+        out = np.empty((rows.stop - rows.start, cols.stop - cols.start, 2))
+        kernels.jitter(
+            seed + APERTURE_SEED * aperture, sample, samples // down, down, aperture,
+            camera.pixels[0], rows.start, cols.start, out,
+        )  # fmt: skip
+        places.append(out)
+        if not camera.samples_aperture:
+            return [out, (0.5, 0.5)]
+    return places
+
+
+class Shoot(Protocol):
+    """Traces rays of a camera; ``first`` says that these begin their pixels."""
+
+    def __call__(
+        self, L: Floats, D: Floats, shares: Floats | None, *, first: slice | None
+    ) -> NDArray[np.float32]: ...
+
+
+def adaptive_mean(
+    camera: IICamera, wanted: Adaptive, seed: int, rows: slice, cols: slice, batch: int, curve: Floats, shoot: Shoot
+) -> tuple[Radiance, NDArray[np.int32]]:
+    """Mean radiance (h·w, 3) of a block of pixels and the number of samples (h·w,) of each.
+
+    A pixel's neighbours count wherever the block ends: pixels of a rim around it are shot once, those under lenses
+    of the block's own.
+
+    Parameters
+    ----------
+    batch : int
+        Rays to shoot at a time.
+    curve : ndarray
+        8-bit codes at even steps of linear light.
+    shoot : callable
+        Called with L, D, shares and, in the first round, which of the block's pixels (in C order, every
+        ``least``-th ray) they begin; radiance of the rays comes back.
+    """
+    height, width = rows.stop - rows.start, cols.stop - cols.start
+    m, n, lens = _with_rim(camera, rows, cols)
+    own = ((n >= rows.start) & (n < rows.stop) & (m >= cols.start) & (m < cols.stop)).ravel()
+    m, n = m.ravel(), n.ravel()
+    quarters = np.zeros((len(m), 4, 3))
+
+    def add(which: NDArray[np.int64], start: int, count: int, begins: bool = False) -> None:
+        """Samples start … start + count of some pixels, to the four quarters of all so far."""
+        many = min(count, batch)
+        for first in range(start, start + count, many):
+            for i in range(0, len(which), batch // many):
+                some = which[i : i + batch // many]
+                rays = _rays(camera, seed, m[some], n[some], first, many)
+                block = slice(i, i + len(some)) if begins and first == 0 else None
+                radiance = shoot(*rays, first=block)
+                sample_kernels.add_samples(radiance, some, first, many, (start + count) // 4, quarters)
+
+    inside, rim = np.flatnonzero(own), np.flatnonzero(~own & _needed(lens, own))
+    add(inside, 0, wanted.least, begins=True)
+    add(rim, 0, wanted.least)
+    corner = int(inside[0]) // lens.shape[1], int(inside[0]) % lens.shape[1]
+    step = np.empty((height, width, 3))
+    sample_kernels.steps_to_neighbours(
+        quarters.sum(axis=1).reshape(*lens.shape, 3) / wanted.least, lens, *corner, step
+    )
+    counts = np.full(len(inside), wanted.least, np.int32)
+    unsure, count = np.arange(len(inside)), wanted.least
+    while count < wanted.most:
+        error = np.empty(len(unsure))
+        sample_kernels.standard_errors(quarters[inside[unsure]], step.reshape(-1, 3)[unsure], count, curve, error)
+        unsure = unsure[error > wanted.error]
+        if not len(unsure):
+            break
+        sample_kernels.merge_quarters(inside[unsure], quarters)
+        add(inside[unsure], count, count)
+        count *= 2
+        counts[unsure] = count
+    return (quarters[inside].sum(axis=1) / counts[:, None]).astype(np.float32), counts
+
+
+def _with_rim(camera: IICamera, rows: slice, cols: slice) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.int64]]:
+    """Columns, rows and lens numbers of a block with one pixel around it, as far as there are any."""
+    columns, lines = camera.pixels
+    n, m = np.mgrid[
+        max(rows.start - 1, 0) : min(rows.stop + 1, lines), max(cols.start - 1, 0) : min(cols.stop + 1, columns)
+    ]
+    k, l = camera.lens_lattice.nearest(m, n)
+    return m, n, np.asarray(l, np.int64) * camera.lenses[0] + np.asarray(k, np.int64)
+
+
+def _needed(lens: NDArray[np.int64], own: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which pixels have one of the block's own under the same lens beside them."""
+    mine = np.pad(np.where(own.reshape(lens.shape), lens, -1), 1, constant_values=-1)
+    height, width = lens.shape
+    near = np.zeros(lens.shape, bool)
+    for i in range(3):
+        for j in range(3):
+            near |= mine[i : i + height, j : j + width] == lens
+    return near.ravel()
+
+
+def _rays(
+    camera: IICamera, seed: int, m: NDArray[Any], n: NDArray[Any], first: int, count: int
+) -> tuple[Floats, Floats, Floats | None]:
+    """Rays of ``count`` samples of each pixel, pixel by pixel."""
+    where: list[ArrayLike] = []
+    for pair in range(1 + camera.samples_aperture):
+        out = np.empty((len(m) * count, 2))
+        sample_kernels.places(seed, m, n, camera.pixels[0], first, count, pair, out)
+        where.append(out)
+    return camera.weighted_rays_at(np.repeat(m, count), np.repeat(n, count), *where)

@@ -1,0 +1,317 @@
+"""Whitted recursion over a batch of rays, generation by generation (Whitted 1980)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..scene.scene import Scene
+from .kernels import shade as kernels
+from .packing import PackedScene
+
+KINDS = ("primary", "shadow", "reflection", "refraction")
+_NO_ROWS = np.empty(0, np.int32)
+# Support images that the tracer fills: type and how many numbers a ray.
+RECORDED = {"depth": ("f4", ()), "normal": ("f4", (3,)), "object_id": ("i4", ()), "ray_length": ("f4", ())}
+MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
+
+
+@dataclass
+class RayCount:
+    """Rays by kind, those not shot because nobody would see them, and CPU seconds inside Embree.
+
+    Rays that go on behind a face that is not there, or ask which body the camera stands in, are kind ``passed``.
+    """
+
+    rays: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(KINDS, 0)))
+    skipped: Counter[str] = field(default_factory=Counter)
+    embree_seconds: float = 0.0
+
+    def add(self, other: RayCount) -> None:
+        self.rays.update(other.rays)
+        self.skipped.update(other.skipped)
+        self.embree_seconds += other.embree_seconds
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """What n rays saw: linear radiance (n, 3), and depth, normal (n, 3), object, ray length of the first hit."""
+
+    radiance: NDArray[np.float32]
+    depth: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    object_id: NDArray[np.int32]
+    ray_length: NDArray[np.float32]
+    count: RayCount
+
+
+def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: ArrayLike | None = None) -> Traced:
+    """Trace any rays through a scene.
+
+    Parameters
+    ----------
+    locations, directions : array_like, (..., 3)
+        Starting points, mm, and directions of any length, as `IICamera.rays` gives them.
+    pose : array_like, (4, 4), optional
+        Rigid transform from the camera's frame to the scene's; none is the identity.
+
+    Returns
+    -------
+    Traced
+        One row per ray, in C order; depth is along the camera's z axis, NaN on a miss; normals are those of the
+        faces, outward; object −1 on a miss; ray length from the ray's start, mm, NaN on a miss.
+
+    Raises
+    ------
+    ValueError
+        If a ray has no direction or is not finite, or the pose is not rigid.
+    """
+    locations = np.asarray(locations, np.float64)
+    directions = np.asarray(directions, np.float64)
+    if locations.shape != directions.shape or locations.shape[-1:] != (3,):
+        raise ValueError(
+            f"locations {locations.shape} and directions {directions.shape}: the same (..., 3) is needed"
+        )
+    n = locations.size // 3
+    tracer = Tracer(scene, n, rigid(pose))
+    seen = {name: np.empty((n, *shape), dtype) for name, (dtype, shape) in RECORDED.items()}
+    radiance = np.zeros((n, 3), np.float32)
+    tracer.run(locations, directions, radiance, Support(**seen))
+    return Traced(radiance=radiance, count=tracer.count, **seen)
+
+
+@dataclass(frozen=True)
+class Support:
+    """Depth, normal, object id and ray length arrays of one block, as far as they are wanted."""
+
+    depth: NDArray[np.float32] | None = None
+    normal: NDArray[np.float32] | None = None
+    object_id: NDArray[np.int32] | None = None
+    ray_length: NDArray[np.float32] | None = None
+
+    @classmethod
+    def empty(cls, shape: tuple[int, ...], names: Collection[str]) -> Support:
+        return cls(**{n: np.empty((*shape, *RECORDED[n][1]), RECORDED[n][0]) for n in RECORDED if n in names})
+
+    def clear(self) -> None:
+        """As if no ray hit anything."""
+        nothing = {"depth": np.nan, "normal": 0, "object_id": -1, "ray_length": np.nan}
+        for name, array in vars(self).items():
+            if array is not None:
+                array[...] = nothing[name]
+
+    def rows(self) -> list[NDArray[Any]]:
+        """One row per ray; arrays of no rows are not wanted."""
+        return [
+            np.empty((0, *shape), dtype) if (array := getattr(self, name)) is None else array.reshape(-1, *shape)
+            for name, (dtype, shape) in RECORDED.items()
+        ]
+
+
+def rigid(pose: ArrayLike | None) -> NDArray[np.float64]:
+    """A (4, 4) rigid transform, checked; the identity for None."""
+    if pose is None:
+        return np.eye(4)
+    matrix = np.asarray(pose, np.float64)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+        raise ValueError("pose is not a finite 4×4 matrix")
+    turn = matrix[:3, :3]
+    turns = np.allclose(turn @ turn.T, np.eye(3), atol=1e-9) and np.linalg.det(turn) > 0
+    if not turns or not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        raise ValueError("pose is not rigid: a rotation and a shift with the last row 0 0 0 1 are needed")
+    return matrix
+
+
+@dataclass(frozen=True)
+class _Rays:
+    """Room for one generation of rays."""
+
+    origins: NDArray[np.float32]
+    directions: NDArray[np.float32]
+    weights: NDArray[np.float32]
+    pixels: NDArray[np.int32]
+    inside: NDArray[np.int32]  # (n, nested)
+
+    @classmethod
+    def room(cls, n: int, nested: int) -> _Rays:
+        def rows() -> NDArray[np.float32]:
+            return np.empty((n, 3), np.float32)
+
+        return cls(rows(), rows(), rows(), np.empty(n, np.int32), np.empty((n, nested), np.int32))
+
+
+class Tracer:
+    """Traces batches of up to ``capacity`` primary rays, keeping its work arrays between batches. One a thread."""
+
+    def __init__(self, scene: Scene, capacity: int, pose: NDArray[np.float64]) -> None:
+        self.scene: PackedScene = scene.packed
+        self.max_depth = scene.max_depth
+        self.pose = pose
+        self.count = RayCount()
+        self._primary = _Rays.room(capacity, self.scene.nested)
+        # weights and pixels of rays that carry all light, one a pixel: read only
+        self._whole = np.ones((capacity, 3), np.float32), np.arange(capacity, dtype=np.int32)
+        self._shadow = (_Rays.room(0, self.scene.nested), np.empty(0, np.float32))
+
+    def run(
+        self,
+        locations: NDArray[Any],
+        directions: NDArray[Any],
+        radiance: NDArray[np.float32],
+        support: Support | None,
+        shares: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Add what each ray sees to ``radiance`` (n, 3), and fill ``support`` if given.
+
+        ``shares`` is the share of light that each ray carries; one that carries none is not traced.
+        """
+        shape = locations.shape[:-1]
+        locations, directions = locations.reshape(-1, 3), directions.reshape(-1, 3)
+        shares = np.empty(0) if shares is None else shares.reshape(-1)
+        room = self._primary
+        n, bad = kernels.start_rays(
+            locations, directions, shares, self.pose[:3, :3], self.pose[:3, 3],
+            room.origins, room.directions, room.weights, room.pixels, room.inside,
+        )  # fmt: skip
+        if bad >= 0:
+            where = ", ".join(map(str, np.unravel_index(bad, shape)))
+            raise ValueError(
+                f"ray [{where}] from {locations[bad].tolist()} along {directions[bad].tolist()}: "
+                "a finite place and a finite direction other than zero are needed"
+            )
+        if support is not None and n < len(locations):
+            support.clear()
+        self._trace(room, n, radiance, support)
+
+    def run_separable(
+        self, rays: tuple[NDArray[np.float64], ...], radiance: NDArray[np.float32], support: Support | None
+    ) -> bool:
+        """`run` for rays of `IICamera.separable_rays`; if some are unusable, nothing is done and False comes back."""
+        room, n = self._primary, len(rays[0]) * len(rays[1])
+        usable = kernels.start_separable_rays(
+            *rays, self.pose[:3, :3], self.pose[:3, 3], room.origins, room.directions
+        )
+        if usable:
+            room.inside.fill(-1)
+            self._trace(replace(room, weights=self._whole[0], pixels=self._whole[1]), n, radiance, support)
+        return bool(usable)
+
+    def _trace(self, primary: _Rays, n: int, radiance: NDArray[np.float32], support: Support | None) -> None:
+        """Trace the first n of the primary rays."""
+        rays = _Rays(*(array[:n] for array in vars(primary).values()))
+        self.count.rays["primary"] += n
+        if self.scene.transmits:
+            self._start_inside(rays)
+        for depth in range(self.max_depth + 1):
+            rays = self._generation(rays, radiance, support if depth == 0 else None, spawn=depth < self.max_depth)
+            if not len(rays.pixels):
+                break
+
+    def _generation(self, rays: _Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool) -> _Rays:
+        """Trace and shade one generation; the next one comes back."""
+        s, n = self.scene, len(rays.pixels)
+        primitives, u, v, distances = self._hits(rays)
+        spawn = spawn and (s.mirrors or s.transmits)
+        following = _Rays.room((1 + s.transmits + 2 * s.disperses) * n if spawn else 0, s.nested)
+        shadow, reach = self._shadow_room(n * len(s.lights))
+        counts = np.zeros(5, np.int64)
+        shadows, spawned = kernels.shade(
+            primitives, u, v, distances, rays.origins, rays.directions, rays.weights, rays.pixels, rays.inside,
+            s.corners, s.faces, s.normals, s.coordinates, s.object_of_face, s.materials,
+            s.textures.table, s.textures.texels, s.lights, s.background, s.fog, s.ambient, s.least, radiance,
+            shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels, shadow.inside,
+            following.origins, following.directions, following.weights, following.pixels, following.inside, counts,
+            spawn, self.pose[:3, 3], self.pose[:3, 2], *(support or Support()).rows(),
+        )  # fmt: skip
+        self.count.rays.update({"reflection": int(counts[0]), "refraction": int(counts[1])})
+        self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[2:]), strict=True)))
+        if shadows:
+            self._light(_Rays(*(array[:shadows] for array in vars(shadow).values())), reach[:shadows], radiance)
+        return _Rays(*(array[:spawned] for array in vars(following).values()))
+
+    def _hits(self, rays: _Rays) -> tuple[NDArray[Any], ...]:
+        """Face, u, v and distance of the nearest face that is there: not cut out, not hidden in another body."""
+        s = self.scene
+        found = self._nearest(rays.origins, rays.directions)
+        if not s.passes:
+            return found
+        table, rows = found, _NO_ROWS
+        n = len(rays.pixels)
+        origins, directions, onward = (
+            np.empty((n, 3), np.float32),
+            np.empty((n, 3), np.float32),
+            np.empty(n, np.int32),
+        )
+        for _ in range(MOST_CLEAR_FACES):
+            count = kernels.pass_faces(
+                *found, rows, *table, rays.directions, rays.inside,
+                s.corners, s.faces, s.coordinates, s.object_of_face, s.materials, s.textures.table, s.textures.alphas,
+                origins, directions, onward,
+            )  # fmt: skip
+            if not count:
+                break
+            self.count.rays["passed"] += count
+            rows = onward[:count].copy()
+            found = self._nearest(origins[:count], directions[:count])
+        return table
+
+    def _nearest(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> tuple[NDArray[Any], ...]:
+        hits, seconds = self.scene.intersector.nearest(origins, directions)
+        self.count.embree_seconds += seconds
+        return hits["primID"], hits["u"], hits["v"], hits["tfar"]
+
+    def _start_inside(self, rays: _Rays) -> None:
+        """Note the transmissive bodies that camera rays start in."""
+        s = self.scene
+        rows = np.empty(len(rays.pixels), np.int32)
+        candidates = np.empty((len(rows), s.nested), np.int32)
+        count = kernels.start_inside(rays.origins, s.clear_bounds, s.first_clear, rows, candidates)
+        rows, candidates = rows[:count], candidates[:count]
+        origins, directions = rays.origins[rows], rays.directions[rows]
+        for _ in range(MOST_CLEAR_FACES):
+            if not count:
+                return
+            self.count.rays["passed"] += count
+            hits, seconds = s.intersector.nearest_clear(origins[:count], directions[:count])
+            self.count.embree_seconds += seconds
+            count = kernels.tell_inside(
+                hits["primID"], hits["u"], hits["v"], rows, candidates, origins, directions, rays.inside,
+                s.corners, s.faces, s.object_of_face, s.opaque_faces,
+            )  # fmt: skip
+
+    def _light(self, shadow: _Rays, reach: NDArray[np.float32], radiance: NDArray[np.float32]) -> None:
+        """Add the light of the shadow rays that nothing opaque stops, dimmed by what is clear."""
+        s = self.scene
+        self.count.rays["shadow"] += len(shadow.pixels)
+        # embreex overwrites the reach it is given, and clear faces need it once more
+        found, seconds = s.intersector.blocked(
+            shadow.origins, shadow.directions, reach.copy() if s.lets_through else reach
+        )
+        self.count.embree_seconds += seconds
+        if not s.lets_through:
+            kernels.add_unblocked(found, shadow.weights, shadow.pixels, radiance)
+            return
+        rays = [shadow.origins, shadow.directions, reach, *list(vars(shadow).values())[2:]]
+        kept = kernels.keep_unblocked(found, *rays)
+        for _ in range(MOST_CLEAR_FACES):
+            origins, directions, reach, colours, pixels, inside = rays = [array[:kept] for array in rays]
+            hits, seconds = s.intersector.nearest_clear(origins, directions, reach.copy())
+            self.count.embree_seconds += seconds
+            kept = kernels.pass_clear_face(
+                hits["primID"], hits["u"], hits["v"], hits["tfar"], origins, directions, reach, colours, pixels,
+                inside, s.corners, s.faces, s.coordinates, s.object_of_face, s.materials,
+                s.textures.table, s.textures.alphas, s.opaque_faces, radiance,
+            )  # fmt: skip
+            if not kept:
+                return
+            self.count.rays["shadow"] += kept
+
+    def _shadow_room(self, n: int) -> tuple[_Rays, NDArray[np.float32]]:
+        if len(self._shadow[1]) < n:
+            self._shadow = (_Rays.room(n, self.scene.nested), np.empty(n, np.float32))
+        return self._shadow
