@@ -25,7 +25,7 @@ from ii_core.files import write_json
 from metrics import provenance
 from raytrace_ii import Scene, load_scene, render, scene_names
 from raytrace_ii.rendering.render import SUPPORT
-from raytrace_ii.trace.intersect import Intersector
+from raytrace_ii.tracing.intersect import Intersector
 
 RESULTS = Path(__file__).parent / "results"
 REPEATS = 7

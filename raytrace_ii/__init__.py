@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from .files.load import load_scene, scene_names
     from .rendering.render import Shot, Stats, render, render_to
     from .scene.scene import Background, Body, Fog, Light, Material, Scene
-    from .trace.tracer import trace
+    from .tracing.tracer import trace
 
 __all__ = [
     "Background",
@@ -28,7 +28,7 @@ __all__ = [
     "trace",
 ]
 
-_HOMES = {"load_scene": "files.load", "scene_names": "files.load", "trace": "trace.tracer"}
+_HOMES = {"load_scene": "files.load", "scene_names": "files.load", "trace": "tracing.tracer"}
 _HOMES |= dict.fromkeys(["Shot", "Stats", "render", "render_to"], "rendering.render")
 
 

@@ -9,7 +9,7 @@ from ii_core.view import view_positions
 from raytrace_ii import Background, Scene, load_scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.rendering import render as rendering
-from raytrace_ii.trace.kernels import shade as kernels
+from raytrace_ii.tracing.kernels import shade as kernels
 
 SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 OFF_CENTRE = [(3.0, -2.0, -60.0), (40.0, 25.0, -55.0), (-9.0, 7.0, -300.0)]  # the second leaves the picture

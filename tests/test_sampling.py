@@ -8,7 +8,7 @@ from ii_core import IICamera, optics, preset
 from raytrace_ii import Scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.scene.textures import Checker, Noise
-from raytrace_ii.trace.kernels import sampling as sample_kernels
+from raytrace_ii.tracing.kernels import sampling as sample_kernels
 
 SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 ONE_LENS = IICamera(pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0)

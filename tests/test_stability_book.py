@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.stability import __main__ as book
 from benchmarks.stability import curves, depth, geometry, light, picture
-from raytrace_ii.trace.packing import LIFT
+from raytrace_ii.tracing.packing import LIFT
 
 
 def test_without_a_lift_half_of_all_lit_points_shade_themselves():

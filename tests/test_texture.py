@@ -13,7 +13,7 @@ from raytrace_ii import Scene, trace
 from raytrace_ii.rendering.job import CURVES
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, TextureTable, image_texture, linear, normal_map
 from raytrace_ii.shapes.primitives import rotation
-from raytrace_ii.trace.kernels import shade as kernels
+from raytrace_ii.tracing.kernels import shade as kernels
 
 BOARD = Checker((WHITE, BLACK), (2.0, 2.0, 2.0))
 CLOUD = Noise((BLACK, WHITE), (1.0, 1.0, 1.0), contrast=1.0)

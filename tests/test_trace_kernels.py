@@ -9,7 +9,7 @@ from trace_scenes import WHITE, body, hall, sphere, wall
 from ii_core import preset
 from raytrace_ii import trace
 from raytrace_ii.scene.textures import Image
-from raytrace_ii.trace.kernels import shade as kernels
+from raytrace_ii.tracing.kernels import shade as kernels
 
 NAMES = (
     "start_rays",

@@ -11,8 +11,8 @@ from trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, lamp, ramp, re
 from raytrace_ii import Background, Material, Scene, trace
 from raytrace_ii.scene.textures import Checker
 from raytrace_ii.shapes.primitives import Mesh
-from raytrace_ii.trace.kernels import shade as kernels
-from raytrace_ii.trace.packing import LIFT
+from raytrace_ii.tracing.kernels import shade as kernels
+from raytrace_ii.tracing.packing import LIFT
 
 # Radiance is float32 and the sum of a few terms, each from cosines that are right to about 1e-7.
 RTOL = 2e-6

@@ -8,7 +8,7 @@ from trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, lamp, sphere, 
 
 from raytrace_ii import Background, Body, Light, Material, Scene, trace
 from raytrace_ii.shapes.primitives import Mesh, rotation
-from raytrace_ii.trace.packing import LIFT
+from raytrace_ii.tracing.packing import LIFT
 
 LIGHT = np.array([0.5, 0.7, -0.4]) / np.linalg.norm([0.5, 0.7, -0.4])
 ROOM = Mesh(*(lambda m: (m.vertices, m.faces))(box(2, 2, 2)))  # no textures, half extent 1

@@ -16,8 +16,8 @@ from benchmarks.analytic import World, still_life
 from ii_core import preset
 from raytrace_ii import Body, Light, Material, Scene, trace
 from raytrace_ii.shapes.primitives import Mesh, Plane, Sphere, rotation
-from raytrace_ii.trace import packing
-from raytrace_ii.trace.packing import LIFT
+from raytrace_ii.tracing import packing
+from raytrace_ii.tracing.packing import LIFT
 
 Row = dict[str, Any]
 WHITE = Material(colour=(1.0, 1.0, 1.0))

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from ii_core import IICamera, MapCamera
 
 from ..scene.scene import Scene
-from ..trace.kernels import shade as kernels
-from ..trace.sampling import Adaptive, Sampling, adaptive_mean, fixed_places
-from ..trace.tracer import RayCount, Support, Tracer
+from ..tracing.kernels import shade as kernels
+from ..tracing.sampling import Adaptive, Sampling, adaptive_mean, fixed_places
+from ..tracing.tracer import RayCount, Support, Tracer
 
 TILE_RAYS = 65536  # enough that numpy's overhead vanishes, few enough that work arrays stay in cache
 

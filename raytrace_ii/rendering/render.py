@@ -20,8 +20,8 @@ from ii_core.files import atomic_path, image_writer, write_json
 from ii_core.picture import NOISE_ROWS, noisy_rows, sidecar
 
 from ..scene.scene import Scene
-from ..trace.sampling import sampling
-from ..trace.tracer import RayCount, rigid
+from ..tracing.sampling import sampling
+from ..tracing.tracer import RayCount, rigid
 from .executors import Tile, check_executor, cores, run
 from .job import CURVES, SUPPORT_IMAGES, Block, Job, check_disparity
 

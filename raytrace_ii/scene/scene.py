@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .textures import Image, Texture, VertexColours
 
 if TYPE_CHECKING:
-    from ..trace.packing import PackedScene
+    from ..tracing.packing import PackedScene
 
 Vector = tuple[float, float, float]
 
@@ -322,7 +322,7 @@ class Scene:
     @cached_property
     def packed(self) -> PackedScene:
         """The arrays that kernels read, and Embree's tree, built on first use."""
-        from ..trace.packing import PackedScene
+        from ..tracing.packing import PackedScene
 
         return PackedScene(self)
 

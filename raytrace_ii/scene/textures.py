@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from ..trace.kernels.shade import CHECKER, IMAGE, LINEAR, NOISE, STRIPES, VERTEX
+from ..tracing.kernels.shade import CHECKER, IMAGE, LINEAR, NOISE, STRIPES, VERTEX
 
 COLUMNS = 12  # kind, then what the kind needs
 

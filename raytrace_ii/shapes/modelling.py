@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, model_validator
 
 from ..scene.textures import Colour
-from ..trace.kernels.shade import terrain
+from ..tracing.kernels.shade import terrain
 from .primitives import (
     Box,
     BoxGrid,
