@@ -153,7 +153,7 @@ def test_the_worker_s_time_counts():
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of a process as Linux has them")
 def test_the_worker_s_memory_has_an_end():
-    script = "import sys; sys.path[:0] = [sys.argv[1]]; import sperr_worker as w; w.bound(1 << 26, 5); bytes(1 << 28)"
+    script = "import sys; sys.path[:0] = [sys.argv[1]]; import worker as w; w.bound(1 << 26, 5); bytes(1 << 28)"
     folder = str(Path(sperr_worker.__file__).parent)
     ended = subprocess.run([sys.executable, "-P", "-c", script, folder], capture_output=True, text=True)
     assert ended.stderr.splitlines()[-1] == "MemoryError"
