@@ -1,5 +1,7 @@
 # Everything runs from .venv, made from pyproject.toml on first use.
-PYTHON ?= python3.11
+# the first Python from 3.11 on that is found; another by make PYTHON=...
+PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
+  $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 VENV := .venv
 BIN := $(VENV)/bin
 
@@ -31,7 +33,7 @@ $(VENV)/.docs: $(VENV)/.installed
 	touch $@
 
 $(VENV)/.installed: pyproject.toml
-	command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) not found: Python 3.11 is needed (make PYTHON=...)" >&2; exit 1; }
+	command -v "$(PYTHON)" >/dev/null || { echo "no Python from 3.11 on was found: install one or type make PYTHON=..." >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[dev]"
 	touch $@
