@@ -1,6 +1,7 @@
 """What light does at surfaces, against closed forms."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -375,13 +376,14 @@ def test_smooth_shading_goes_by_the_true_normal_inside_and_out(inside):
     np.testing.assert_allclose(seen.radiance[sure, 0], cosine[sure].clip(0), atol=3e-5)
 
 
+@pytest.mark.parametrize("length", [1.0, 0.125, 8.0])
 @pytest.mark.parametrize(("above", "dark"), [(1.5, False), (2.5, True)])
-def test_shadow_rays_start_on_the_smooth_surface(above, dark):
+def test_shadow_rays_start_on_the_smooth_surface(above, dark, length):
     """That is in the corners' tangent planes, twice as high as the ball over its face (Hanika 2021).
 
-    What is lower throws no shadow there.
+    What is lower throws no shadow there, whatever the length of the normals: this test tried unit ones alone.
     """
-    ball = sphere(5, 12)
+    ball = replace(sphere(5, 12), normals=sphere(5, 12).normals * length)
     face = ball.vertices[ball.faces[len(ball.faces) // 2 + 3]]
     middle = face.mean(axis=0)
     up = middle / np.linalg.norm(middle)
@@ -394,6 +396,23 @@ def test_shadow_rays_start_on_the_smooth_surface(above, dark):
     scene = Scene(bodies=[body(ball, colour=WHITE), sheet], lights=[sun(up)])
     radiance = looked(scene, middle + 0.04 * look, -look)
     assert (radiance.max() == 0) == dark
+
+
+def test_the_length_of_vertex_normals_says_nothing():
+    """Bodies made in code may bring normals of any length: light, mirror and shadow rays are the same."""
+    ball = sphere(5, 16)
+    stretched = replace(ball, normals=ball.normals / 8)
+    directions = spread(np.random.default_rng(1), 4000)
+    one, other = (
+        trace(
+            Scene(bodies=[body(mesh, colour=WHITE, specular=0.5, mirror=(0.2, 0.2, 0.2))], lights=[sun((1, 2, -1))]),
+            -20 * directions,
+            directions,
+        ).radiance
+        for mesh in (ball, stretched)
+    )
+    assert (one > 0).any()
+    np.testing.assert_array_equal(other, one)  # the length is a power of two
 
 
 def test_a_shadow_ends_where_the_straight_line_says():

@@ -226,6 +226,14 @@ def test_faces_and_normals_must_fit_their_vertices():
             )
 
 
+def test_normals_and_texture_coordinates_that_are_no_numbers_are_refused():
+    values = np.eye(3)
+    values[2, 0] = np.nan
+    for what in ("normals", "texture_coordinates"):
+        with pytest.raises(ValueError, match=rf"object 'x': {what} of vertex 2 are \[nan, 0.0, 1.0\]: finite"):
+            Body(name="x", vertices=np.eye(3), faces=np.array([[0, 1, 2]]), material=Material(), **{what: values})
+
+
 def test_depth_and_lights_out_of_range_are_refused():
     ball = body(sphere(1, 8))
     with pytest.raises(ValueError, match="max_depth is -1"):

@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from ii_core.files import read_image
 
-from ..scene.scene import Background, Body, Fog, Light, Material, Scene, Vector
+from ..scene.scene import Background, Body, Fog, Light, Material, Scene, Vector, unit_rows
 from ..scene.textures import Checker, Image, Noise, Stripes, Texture, VertexColours, image_texture, normal_map
 from ..shapes.primitives import Mesh, rotation
 from ..shapes.watertight import flaw
@@ -306,7 +306,7 @@ def _bodies(value: ObjectTable, parts: list[Part], label: str) -> Iterator[Body]
             vertices=(mesh.vertices * size) @ turn.T + value.position_mm,
             faces=mesh.faces,
             material=material,
-            normals=None if mesh.normals is None else (mesh.normals / size) @ turn.T,
+            normals=None if mesh.normals is None else unit_rows(mesh.normals / size) @ turn.T,
             texture_coordinates=_coordinates(material, mesh, size, shared),
         )
 

@@ -35,6 +35,13 @@ def _number(what: str, value: float, least: float, *, above: bool = False) -> No
         )
 
 
+def unit_rows(vectors: Any) -> NDArray[np.float64]:
+    """Vectors (..., 3) brought to length 1; zero stays zero."""
+    rows = np.asarray(vectors, np.float64)
+    length = np.linalg.norm(rows, axis=-1, keepdims=True)
+    return np.asarray(np.divide(rows, length, out=np.zeros_like(rows), where=length > 0))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """How a surface answers light, in Whitted's terms. Colours are linear.
@@ -245,7 +252,7 @@ class Body:
     faces : ndarray of int, (F, 3)
         Counter-clockwise about the outward normal: (v1 − v0) × (v2 − v0) points out.
     normals : ndarray, (V, 3), optional
-        Vertex normals for smooth shading; None shades flat.
+        Vertex normals for smooth shading, of any length; None shades flat.
     texture_coordinates : ndarray, (V, 3), optional
         (u, v, 0) for textures on the surface and normal maps, positions in the body's own frame for solid ones,
         linear colours for those of the vertices.
@@ -282,6 +289,12 @@ class Body:
             value = getattr(self, what)
             if value is not None and np.shape(value) != vertices.shape:
                 raise ValueError(f"object {self.name!r}: {what} are {np.shape(value)}, vertices {vertices.shape}")
+            if value is not None and not np.isfinite(value).all():
+                at = int(np.argmin(np.isfinite(value).all(axis=1)))
+                raise ValueError(
+                    f"object {self.name!r}: {what} of vertex {at} are {np.asarray(value)[at].tolist()}: "
+                    "finite numbers are needed"
+                )
         if self.material.normal_map is not None and self.texture_coordinates is None:
             raise ValueError(f"object {self.name!r}: a normal map needs texture coordinates, there are none")
 

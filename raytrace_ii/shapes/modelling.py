@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, model_validator
 
+from ..scene.scene import unit_rows
 from ..scene.textures import Colour
 from ..tracing.kernels.shade import terrain
 from .primitives import (
@@ -246,7 +247,7 @@ class Implicit(Shape):
         if self.front_mm is not None:
             x0, y0, x1, y1 = self.front_mm
             uv = (vertices[:, :2] - [x0, y0]) / [x1 - x0, y1 - y0]
-        return Mesh(vertices, faces, _unit(normals.astype(np.float64)), uv, self._colours(vertices))
+        return Mesh(vertices, faces, unit_rows(normals.astype(np.float64)), uv, self._colours(vertices))
 
     def _placed(self) -> list[tuple[Any, float]]:
         """Every part with the sign of its x; a mirrored one twice."""
@@ -333,11 +334,6 @@ def _sample(values: Array, points: Array) -> Array:
     return np.asarray(here + part[:, 0] * (x - here) + part[:, 1] * (y - here) + part[:, 2] * (z - here))
 
 
-def _unit(vectors: Array) -> Array:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))
-
-
 class Heightfield(Shape):
     """Terrain or water: a fractal surface over x and z that faces up, nearest row at z = 0, x about 0.
 
@@ -398,7 +394,7 @@ class Heightfield(Shape):
             y *= 0.25 + 0.75 * t * t * (3 - 2 * t)
         y += self.rise_mm * away[:, None]
         points = np.stack([x, y, z], axis=-1)
-        normals = _unit(np.cross(np.gradient(points, axis=0), np.gradient(points, axis=1)))
+        normals = unit_rows(np.cross(np.gradient(points, axis=0), np.gradient(points, axis=1)))
         a = (np.arange(nz)[:, None] * (nx + 1) + np.arange(nx)).reshape(-1)
         b = a + nx + 1
         faces = np.concatenate([np.column_stack([a, b, b + 1]), np.column_stack([a, b + 1, a + 1])])
@@ -475,16 +471,16 @@ class Strands(Shape):
         radii = np.array(self.radii_mm)
         out = self._roots(generator)
         points, widths = self._grow(out, radii, generator)
-        along = _unit(np.gradient(points, axis=1))
-        away = _unit(points / radii**2)
-        across = _unit(np.cross(along, away))
-        facing = _unit(np.cross(across, along))
+        along = unit_rows(np.gradient(points, axis=1))
+        away = unit_rows(points / radii**2)
+        across = unit_rows(np.cross(along, away))
+        facing = unit_rows(np.cross(across, along))
         facing *= np.where((facing * away).sum(axis=-1, keepdims=True) < 0, -1.0, 1.0)
         across = np.cross(along, facing)
         half = (0.5 * widths)[..., None] * across
         sides = np.stack([points - half, points + half], axis=2)
         # bent as if the strand were round, so that each shows a light and a dark side
-        normals = _unit(np.stack([facing - 0.8 * across, facing + 0.8 * across], axis=2))
+        normals = unit_rows(np.stack([facing - 0.8 * across, facing + 0.8 * across], axis=2))
         n, rows = self.count, self.steps + 1
         first = (np.arange(n)[:, None] * rows + np.arange(self.steps)).reshape(-1) * 2
         left, right, left_on, right_on = first, first + 1, first + 2, first + 3
@@ -508,7 +504,7 @@ class Strands(Shape):
         """Directions from the head's middle to where hair grows: not on the face, not under the chin."""
         found = np.empty((0, 3))
         while len(found) < self.count:
-            n = _unit(generator.normal(size=(4 * self.count, 3)))
+            n = unit_rows(generator.normal(size=(4 * self.count, 3)))
             face = (n[:, 2] < 0) & (n[:, 1] < 0.56 + 0.1 * n[:, 0] ** 2) & (np.abs(n[:, 0]) < 0.92)
             good = ~face & (n[:, 1] > -0.45)
             found = np.concatenate([found, n[good]])
@@ -525,13 +521,13 @@ class Strands(Shape):
         point = out * radii * 1.01
         behind = np.maximum(out[:, 2], 0)  # what grows there falls where it is
         combed = np.column_stack([side * 0.9 * (1 - behind) ** 2, 0.15 * np.ones(n), 0.45 * np.ones(n)])
-        heading = _unit(0.6 * out + combed + generator.normal(0, 0.08, (n, 3)))
+        heading = unit_rows(0.6 * out + combed + generator.normal(0, 0.08, (n, 3)))
         points = [point]
         for _ in range(self.steps):
-            heading = _unit(heading + np.array([0, -self.weight, 0]))
+            heading = unit_rows(heading + np.array([0, -self.weight, 0]))
             point = point + heading * step[:, None]
             point = self._off_head(point, radii, layer, side)
-            heading = _unit(0.5 * heading + 0.5 * _unit(point - points[-1]))
+            heading = unit_rows(0.5 * heading + 0.5 * unit_rows(point - points[-1]))
             points.append(point)
         line = np.stack(points, axis=1)
         if self.wave_mm:
@@ -539,7 +535,7 @@ class Strands(Shape):
             swing = np.sin(phase[:, None] + 2 * np.pi * self.length_mm * t / self.wavelength_mm) * np.minimum(
                 3 * t, 1
             )
-            away = _unit(np.stack([line[..., 0], np.zeros(line.shape[:2]), line[..., 2] + 1e-9], axis=-1))
+            away = unit_rows(np.stack([line[..., 0], np.zeros(line.shape[:2]), line[..., 2] + 1e-9], axis=-1))
             line = line + self.wave_mm * swing[..., None] * np.stack(
                 [away[..., 2], 0 * t + 0 * swing, -away[..., 0]], -1
             )

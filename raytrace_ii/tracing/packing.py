@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene.scene import Body, Light, Material, Scene, Vector
+from ..scene.scene import Body, Light, Material, Scene, Vector, unit_rows
 from ..scene.textures import TextureTable
 from .intersect import Intersector
 from .kernels.shade import DIRECTIONAL, LEAST_WEIGHT, POINT, SPOT
@@ -31,8 +31,8 @@ class PackedScene:
     """What the kernels read.
 
     ``corners`` is (F, 3, 3) float32 positions, ``faces`` (F, 5) unit normals, lifts and pulls. ``normals`` is like
-    ``corners`` for shading, of no faces if every body is flat; ``coordinates`` for textures, of no faces if there
-    are none: a scene pays only for what it has. ``nested`` is how many transmissive bodies a ray may be in at once
+    ``corners`` for shading, of length 1 or 0, of no faces if every body is flat; ``coordinates`` for textures, of no
+    faces if there are none: a scene pays only for what it has. ``nested`` is how many transmissive bodies a ray may be in at once
     by their ``clear_bounds`` (B, 2, 3); they and bodies with cut-outs follow the ``opaque_faces``. ``least`` is the
     weight from which on a ray is worth shooting.
     """
@@ -51,7 +51,7 @@ class PackedScene:
         vertices = [b.vertices for b in bodies[:first_clear]] + _overlapping(bodies[first_clear:], meeting)
         self.corners = _per_corner(vertices, bodies)
         self.faces = _face_table(self.corners)
-        self.normals = _per_corner([b.normals for b in bodies], bodies)
+        self.normals = _per_corner([None if b.normals is None else unit_rows(b.normals) for b in bodies], bodies)
         self.coordinates = _per_corner(
             [b.texture_coordinates if b.material.texture or b.material.normal_map else None for b in bodies], bodies
         )

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scene.scene import Light
+from ...scene.scene import Light, unit_rows
 from ...shapes.primitives import Mesh
 from ..mesh_model import Model, Part
 from .container import GltfFile
@@ -203,9 +203,7 @@ def _moved(mesh: Mesh, matrix: Array) -> Mesh:
     normals = None
     if mesh.normals is not None:  # by the cofactors, which a flattening matrix has too
         cofactors = np.array([np.cross(turn[(i + 1) % 3], turn[(i + 2) % 3]) for i in range(3)])
-        normals = mesh.normals @ cofactors.T * (1.0 if np.linalg.det(turn) >= 0 else -1.0)
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+        normals = unit_rows(mesh.normals @ cofactors.T * (1.0 if np.linalg.det(turn) >= 0 else -1.0))
     return Mesh(mesh.vertices @ turn.T + matrix[:3, 3], faces, normals, mesh.uv, mesh.colours)
 
 
