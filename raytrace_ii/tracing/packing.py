@@ -32,9 +32,9 @@ class PackedScene:
 
     ``corners`` is (F, 3, 3) float32 positions, ``faces`` (F, 5) unit normals, lifts and pulls. ``normals`` is like
     ``corners`` for shading, of length 1 or 0, of no faces if every body is flat; ``coordinates`` for textures, of no
-    faces if there are none: a scene pays only for what it has. ``nested`` is how many transmissive bodies a ray may be in at once
-    by their ``clear_bounds`` (B, 2, 3); they and bodies with cut-outs follow the ``opaque_faces``. ``least`` is the
-    weight from which on a ray is worth shooting.
+    faces if there are none: a scene pays only for what it has. ``nested`` is how many transmissive bodies a ray may
+    be in at once by their ``clear_bounds`` (B, 2, 3); they and bodies with cut-outs follow the ``opaque_faces``.
+    ``least`` is the weight from which on a ray is worth shooting.
     """
 
     def __init__(self, scene: Scene) -> None:
