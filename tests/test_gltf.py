@@ -268,13 +268,25 @@ def test_a_texture_transform(tmp_path):
     np.testing.assert_allclose(seen(load_scene(tmp_path / "scene.toml"), 0, 0), G, atol=1e-3)
 
 
-def test_repeat_clamp_and_what_cannot_be_told_apart(tmp_path):
-    for wrap, inside, named in ((10497, False, False), (33071, False, True), (33071, True, False)):
+def test_images_go_on_beyond_their_border_as_the_sampler_says(tmp_path):
+    """Coordinates run from −1 to 2: 3 × 3 tiles, of which each shows its four quarters.
+
+    Mirrored images repeated unmirrored; the test of that name asked for the warning alone.
+    """
+    for wrap, tile in ((10497, (R, G, B, W)), (33648, (G, R, W, B)), (33071, (R, R, B, B))):
         gltf = Gltf()
-        painted(gltf, gltf.texture(CORNERS, wrapS=wrap), uv=SQUARE_UV * (1 if inside else 2))
-        gltf.save(tmp_path / "m.glb")
-        names = read_model(tmp_path / "m.glb").left_out
-        assert (names == ["samplers.wrapS, wrapT other than REPEAT (images repeat)"]) == named, names
+        painted(gltf, gltf.texture(CORNERS, wrapS=wrap), uv=SQUARE_UV * 3 - 1)
+        scene = scene_of(tmp_path, gltf)
+        assert read_model(tmp_path / "model.glb").left_out == []
+        for dx in (-1, 1):  # the tile to the left in the middle row; wrapT repeats
+            for dy, row in ((1, tile[:2]), (-1, tile[2:])):
+                there = seen(scene, -2 / 3 + dx / 6, dy / 6)
+                np.testing.assert_allclose(there, row[(dx + 1) // 2], atol=1e-3)
+    gltf = Gltf()
+    painted(gltf, gltf.texture(CORNERS, wrapT=1))
+    gltf.save(tmp_path / "m.glb")
+    with pytest.raises(ValueError, match=r"samplers\.0: unknown wrapping 1: known are 10497, 33648, 33071"):
+        read_model(tmp_path / "m.glb")
 
 
 def test_vertex_colours_are_linear_and_multiplied_by_the_base_colour(tmp_path):

@@ -62,6 +62,7 @@ def test_every_key_does_what_it_says(tmp_path):
         [texture.skin]
         kind = "image"
         file = "skin.png"
+        wrap = "mirror"
 
         [texture.board]
         kind = "checker"
@@ -216,6 +217,7 @@ def test_every_key_does_what_it_says(tmp_path):
     assert ball.material.mirror == (0.25, 0.25, 0.25)
     assert ball.material.colour == (1, 1, 1), "a texture alone is not dimmed"
     assert isinstance(ball.material.texture, Image)
+    assert ball.material.texture.wrap == fence.normal_map.wrap == ("mirror", "mirror")
     np.testing.assert_allclose(ball.material.texture.pixels[0, 0], linear([1, 0, 128 / 255]), rtol=1e-6)
     # scaled along its own axes, then turned, then moved: x of scale 1 becomes y
     np.testing.assert_allclose(ball.vertices.min(axis=0), [10 - 2 * 2, 20 - 2, 30 - 2 * 3], atol=1e-9)

@@ -190,6 +190,28 @@ def test_images_join_at_their_borders():
     np.testing.assert_allclose(before, right, atol=1e-8)
 
 
+@given(st.floats(-3, 3), st.floats(-3, 3))
+@settings(max_examples=50)
+def test_images_are_mirrored_or_clamped(u, v):
+    """Mirrored, it is the picture beside its mirror image; clamped, its own border goes on."""
+    mirrored = Image(PIXELS, wrap=("mirror", "repeat"))
+    twice = Image(np.concatenate([PIXELS, PIXELS[:, ::-1]], axis=1))
+    np.testing.assert_allclose(*(texture_at(i, [p]) for i, p in ((mirrored, (u, v, 0)), (twice, (u / 2, v, 0)))),
+                               atol=1e-13)  # an ulp of 4, five texels wide  # fmt: skip
+    twice = Image(np.concatenate([PIXELS[::-1], PIXELS]))
+    down = Image(PIXELS, wrap=("repeat", "mirror"))
+    np.testing.assert_allclose(*(texture_at(i, [p]) for i, p in ((down, (u, v, 0)), (twice, (u, v / 2, 0)))),
+                               atol=1e-13)  # fmt: skip
+    clamped = Image(PIXELS, wrap=("clamp", "clamp"))
+    inner = np.clip(u, 0.1, 0.9), np.clip(v, 1 / 6, 5 / 6), 0  # the middles of the outermost texels
+    np.testing.assert_allclose(*(texture_at(clamped, [p]) for p in ((u, v, 0), inner)), atol=1e-14)
+
+
+def test_an_unknown_wrapping_is_refused():
+    with pytest.raises(ValueError, match="unknown wrapping 'fold' of an image: known are repeat, mirror, clamp"):
+        Image(PIXELS, wrap=("repeat", "fold"))
+
+
 def test_one_texel_is_one_colour():
     texture = Image(np.full((1, 1, 3), 0.3, np.float32))
     np.testing.assert_allclose(

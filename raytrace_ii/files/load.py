@@ -242,7 +242,7 @@ class _Loader:
     def _texture(self, name: str, value: AnyTexture) -> Texture:
         try:
             if isinstance(value, ImageTexture):
-                return replace(self._image("file", value.file), repeat=value.repeat)
+                return replace(self._image("file", value.file), repeat=value.repeat, wrap=(value.wrap, value.wrap))
             return _pattern(value)
         except OSError as error:
             raise type(error)(f"texture.{name}.{error}") from None
@@ -261,7 +261,9 @@ class _Loader:
         if len(set(value.ior)) == 1:
             values["ior"] = value.ior[0]
         if value.normal_map is not None:
-            values["normal_map"] = self._image(f"material.{name}.normal_map", value.normal_map, normal_map)
+            bumps = self._image(f"material.{name}.normal_map", value.normal_map, normal_map)
+            texture = values["texture"]
+            values["normal_map"] = replace(bumps, wrap=texture.wrap) if isinstance(texture, Image) else bumps
         try:
             return Material(**values)
         except ValueError as error:

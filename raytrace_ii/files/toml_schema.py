@@ -49,6 +49,7 @@ class ImageTexture(_Strict):
     kind: Literal["image"]
     file: str
     repeat: tuple[PositiveFloat, PositiveFloat] = (1.0, 1.0)
+    wrap: Literal["repeat", "mirror", "clamp"] = "repeat"
 
 
 class _TwoColours(_Strict):

@@ -10,25 +10,37 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from ..tracing.kernels.shade import CHECKER, IMAGE, LINEAR, NOISE, STRIPES, VERTEX
+from ..tracing.kernels.shade import CHECKER, CLAMP, IMAGE, LINEAR, MIRROR, NOISE, REPEAT, STRIPES, VERTEX
 
 COLUMNS = 12  # kind, then what the kind needs
+WRAPS = {"repeat": REPEAT, "mirror": MIRROR, "clamp": CLAMP}
 
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """An image, linear float32 (H, W, 3), row 0 on top at v = 1; repeats beyond [0, 1]; bilinear.
+    """An image, linear float32 (H, W, 3), row 0 on top at v = 1; bilinear.
 
     Made from ``codes``, uint8 sRGB of the same shape, it is kept in a quarter of the memory, which is faster to read.
     ``repeat`` is how often a scene file lays it over the unit square: texture coordinates are multiplied by it
-    when the body is made. ``alpha`` (H, W), 0…1, is kept for cut-outs where the file has it.
+    when the body is made. ``alpha`` (H, W), 0…1, is kept for cut-outs where the file has it. ``wrap`` names for u and
+    for v how the image goes on beyond [0, 1]: it repeats, repeats mirrored every other time, or keeps its last texel.
+
+    Raises
+    ------
+    ValueError
+        If the wrapping is unknown.
     """
 
     pixels: NDArray[np.float32]
     repeat: tuple[float, float] = (1.0, 1.0)
     alpha: NDArray[np.float32] | None = None
     codes: NDArray[np.uint8] | None = None
+    wrap: tuple[str, str] = ("repeat", "repeat")
     on_surface = True
+
+    def __post_init__(self) -> None:
+        if unknown := [name for name in self.wrap if name not in WRAPS]:
+            raise ValueError(f"unknown wrapping {unknown[0]!r} of an image: known are {', '.join(WRAPS)}")
 
 
 @dataclass(frozen=True)
@@ -113,7 +125,8 @@ class TextureTable:
                 height, width = texture.pixels.shape[:2]
                 coded = texture.codes is not None
                 first = sum(map(len, codes if coded else pixels))
-                rows.append([IMAGE, first, width, height, sum(map(len, alphas)), coded])
+                wraps = (WRAPS[name] for name in texture.wrap)
+                rows.append([IMAGE, first, width, height, sum(map(len, alphas)), coded, *wraps])
                 if texture.codes is not None:
                     codes.append(np.pad(texture.codes.reshape(-1, 3), ((0, 0), (0, 1))))
                 else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from ...scene.textures import Image, VertexColours, image_texture, normal_map
 from .container import GltfFile
 from .tables import PbrMaterial, Sampler, TextureInfo, TextureSource
 
-REPEAT, MIRRORED, NEAREST = 10497, 33648, 9728
+NEAREST = 9728
+WRAPS = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 Array = NDArray[np.float64]
 
 
@@ -22,14 +23,12 @@ Array = NDArray[np.float64]
 class Look:
     """A material, and where on a primitive its images lie: set ``uv_set`` of texture coordinates, moved by ``uv``.
 
-    ``uv`` (2, 3) takes glTF's (u, v, 1), v down, to ours, v up. ``repeats`` is false where an image ends at its
-    border.
+    ``uv`` (2, 3) takes glTF's (u, v, 1), v down, to ours, v up.
     """
 
     material: Material
     uv_set: int | None = None
     uv: Array | None = None
-    repeats: bool = True
 
 
 def surface(
@@ -88,7 +87,7 @@ class Looks:
     def __init__(self, file: GltfFile, note: Callable[[str], None]) -> None:
         self.file, self.note = file, note
         self._made: dict[tuple[int | None, bool], Look | None] = {}
-        self._images: dict[tuple[int, str], Image] = {}
+        self._images: dict[tuple[int, str, tuple[str, str]], Image] = {}
 
     def look(self, index: int | None, coloured: bool, who: str) -> Look | None:
         """A material by its index, ``coloured`` if the vertices have colours; None if it cannot be seen at all."""
@@ -136,7 +135,7 @@ class Looks:
         )  # fmt: skip
         if info is None or (picture is None and bumps is None):
             return Look(material)
-        return Look(material, *_placed(info), self._repeats(info, where))
+        return Look(material, *_placed(info))
 
     def _surface(self, stored: PbrMaterial, base: Array, picture: Image | None, where: str) -> dict[str, Any]:
         """Shares, highlight and body of a material."""
@@ -188,18 +187,21 @@ class Looks:
         return self._image(info, "normal", where)
 
     def _image(self, info: TextureInfo | None, use: str, where: str) -> Image | None:
-        """An image texture for colour or normals, one object for each use of an image."""
+        """An image texture for colour or normals, one object for each use and wrapping of an image."""
         source = self._source(info, where)
         if source is None:
             return None
-        if (source, use) not in self._images:
+        assert info is not None
+        wrap = self._wrap(info, where)
+        key = source, use, wrap
+        if key not in self._images:
             pixels = self.file.image(source, where)
             make = image_texture if use == "colour" else normal_map
             try:
-                self._images[source, use] = make(pixels)
+                self._images[key] = replace(make(pixels), wrap=wrap)
             except ValueError as error:
                 raise ValueError(f"images.{source}: {error}") from None
-        return self._images[source, use]
+        return self._images[key]
 
     def _source(self, info: TextureInfo | None, where: str) -> int | None:
         """Index of a texture's image."""
@@ -225,12 +227,18 @@ class Looks:
             colour = image_texture(pixels).pixels.mean(axis=(0, 1))
         return np.append(colour, values[-1] if channels in (2, 4) else 1.0)
 
-    def _repeats(self, info: TextureInfo, where: str) -> bool:
+    def _wrap(self, info: TextureInfo, where: str) -> tuple[str, str]:
+        """How a texture goes on beyond its border, along u and v."""
         texture: TextureSource = self.file.at("textures", info.index, where)
-        sampler = Sampler() if texture.sampler is None else self.file.at("samplers", texture.sampler, where)
+        if texture.sampler is None:
+            return "repeat", "repeat"
+        sampler: Sampler = self.file.at("samplers", texture.sampler, where)
         if sampler.magFilter == NEAREST:
             self.note("samplers.magFilter NEAREST (read bilinear)")
-        return bool(sampler.wrapS == sampler.wrapT == REPEAT)
+        if unknown := [code for code in (sampler.wrapS, sampler.wrapT) if code not in WRAPS]:
+            known = ", ".join(map(str, WRAPS))
+            raise ValueError(f"samplers.{texture.sampler}: unknown wrapping {unknown[0]}: known are {known}")
+        return WRAPS[sampler.wrapS], WRAPS[sampler.wrapT]
 
 
 def _strength(values: Array) -> tuple[float, ...]:

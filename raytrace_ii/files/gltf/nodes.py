@@ -156,8 +156,6 @@ class _Reader:
         if uv is not None:
             move = look.uv if look.uv is not None else np.array([[1.0, 0, 0], [0, -1, 1]])
             uv = uv @ move[:, :2].T + move[:, 2]
-            if not look.repeats and (uv.min() < -1e-3 or uv.max() > 1 + 1e-3):
-                self.notes.append("samplers.wrapS, wrapT other than REPEAT (images repeat)")
         return Mesh(place, faces, normals, uv, colours)
 
     def _attribute(self, primitive: Primitive, name: str, width: int | tuple[int, int], where: str) -> Array | None:

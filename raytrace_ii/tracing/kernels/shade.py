@@ -16,6 +16,7 @@ from ii_core.jit import lean_kernel as kernel
 LEAST_WEIGHT = 0.5 / 255 / 12.92
 REFLECTION, REFRACTION, WEAK_SHADOW, WEAK_REFLECTION, WEAK_REFRACTION = 0, 1, 2, 3, 4  # what is counted
 IMAGE, CHECKER, NOISE, VERTEX, STRIPES = 0, 1, 2, 3, 4  # kinds of texture
+REPEAT, MIRROR, CLAMP = 0, 1, 2  # how an image goes on beyond its border
 POINT, DIRECTIONAL, SPOT = 0, 1, 2  # kinds of light
 # Odd multipliers of the noise lattice's hash.
 _PX, _PY, _PZ, _SEED, _GOLDEN = 73856093, 19349663, 83492791, 2654435761, 0x1E3779B97F4A7C15
@@ -861,9 +862,21 @@ def _cone(lights, k, lx, ly, lz, norm):
 
 
 @inline_kernel
-def _wrap(i, n):
+def _wrap(i, n, wrap):
     """Texel i and the next one, for i from −1 on; without a division."""
-    return i if i >= 0 else n - 1, i + 1 if 0 < i + 1 < n else 0
+    if wrap == REPEAT:
+        return i if i >= 0 else n - 1, i + 1 if 0 < i + 1 < n else 0
+    return max(i, 0), min(i + 1, n - 1)
+
+
+@inline_kernel
+def _folded(t, wrap):
+    """A texture coordinate taken into the image, [0, 1]."""
+    if wrap == REPEAT:
+        return t - math.floor(t)
+    if wrap == MIRROR:
+        return abs(t - 2.0 * math.floor(0.5 * t + 0.5))  # from the nearest even number
+    return min(max(t, 0.0), 1.0)
 
 
 @inner_kernel
@@ -926,11 +939,12 @@ def _image(table, row, texels, u, v):
 def _texels_at(table, row, u, v):
     """The four texels about (u, v): left and right above, left and right below, and how far to right and down."""
     first, width, height = int(table[row, 1]), int(table[row, 2]), int(table[row, 3])
-    x = (u - math.floor(u)) * width - 0.5
-    y = (1.0 - (v - math.floor(v))) * height - 0.5
+    across, down = int(table[row, 6]), int(table[row, 7])
+    x = _folded(u, across) * width - 0.5
+    y = (1.0 - _folded(v, down)) * height - 0.5
     i, j = math.floor(x), math.floor(y)
-    i0, i1 = _wrap(int(i), width)
-    j0, j1 = _wrap(int(j), height)
+    i0, i1 = _wrap(int(i), width, across)
+    j0, j1 = _wrap(int(j), height, down)
     a, b = first + j0 * width, first + j1 * width
     return a + i0, a + i1, b + i0, b + i1, x - i, y - j
 
