@@ -13,7 +13,7 @@ OBJECTS = ("render", "objects", "--scale", 128)
 
 def test_support_images_in_one_file_and_alone(run, tmp_path):
     extra = {"depth": "depth", "ray_length": "ray-length", "disparity": "disparity", "normal": "normal"}
-    extra |= {"object_id": "object-id"}
+    extra |= {"object_id": "object-id", "shading_normal": "shading-normal"}
     options = [x for name, option in extra.items() for x in (f"--{option}", tmp_path / f"{name}.exr")]
     code, out, _ = run(*OBJECTS, "-o", tmp_path / "p.png", *options)
     assert code == 0 and "rays in" in out
@@ -25,7 +25,12 @@ def test_support_images_in_one_file_and_alone(run, tmp_path):
     stored = read_channels(tmp_path / "all.exr")
     np.testing.assert_array_equal(stored["depth.Z"], shot.depth)
     np.testing.assert_array_equal(stored["disparity"], shot.disparity)
-    assert len(stored) == 7
+    assert len(stored) == 10
+    both = ("--support", tmp_path / "both.exr", "--depth", tmp_path / "z.exr")
+    assert run(*OBJECTS, "-o", tmp_path / "r.png", *both)[0] == 0
+    stored = read_channels(tmp_path / "both.exr")
+    np.testing.assert_array_equal(stored["depth.Z"], shot.depth, "a file of its own does not take it from the other")
+    assert len(stored) == 10
     flat = ("render", "objects", "--camera", "pinhole2d", "--scale", 128)
     assert run(*flat, "-o", tmp_path / "f.png", "--support", tmp_path / "f.exr")[0] == 0
     assert "disparity" not in read_channels(tmp_path / "f.exr"), "one lens has no neighbour"

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from trace_scenes import body, hall, wall
+from trace_scenes import body, hall, sphere, wall
 
 from ii_core import IICamera, IIPicture, orthoscopic, preset, stand_back
 from ii_core.files import read_about, read_channels, read_depth, read_image
@@ -18,7 +18,7 @@ SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 TALL = IICamera(pixels=(40, 150), lenses=(4, 15), pixel_pitch_mm=0.4, gap_mm=6.0)  # two bands of noise and a piece
 HEXAGONAL = IICamera(pixels=(100, 131), lenses=(8, 10), pixel_pitch_mm=0.4, gap_mm=11.7, lattice="hexagonal")
 FLAT = IICamera(pixels=(90, 150), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=15.0)
-ALL = ("depth", "normal", "object_id", "ray_length", "disparity", "samples")
+ALL = ("depth", "normal", "object_id", "ray_length", "shading_normal", "disparity", "samples")
 
 
 @pytest.fixture(scope="module")
@@ -121,6 +121,40 @@ def test_ray_length_is_the_way_from_the_camera_to_the_point():
     way = (60 - L[..., 2]) / D[..., 2] * np.linalg.norm(D, axis=-1)
     np.testing.assert_allclose(shot.ray_length, way, rtol=2e-6)  # float32 rays
     np.testing.assert_allclose(shot.depth, 60, rtol=1e-6)
+
+
+def test_depth_starts_at_the_pixel_plane_and_ray_length_at_the_pinhole():
+    """On a lens's axis they differ by the gap, which is 16 mm here."""
+    camera = IICamera(pixels=(15, 15), lenses=(3, 3), pixel_pitch_mm=0.1, gap_mm=16.0)
+    shot = render(Scene(bodies=[body(wall(60))]), camera, support=("depth", "ray_length"))
+    assert shot.depth[7, 7] == 60 and shot.ray_length[7, 7] == 44
+
+
+def test_one_image_in_several_files(scene, tmp_path):
+    alone, together = tmp_path / "z.exr", tmp_path / "all.exr"
+    render_to(None, scene, SMALL, support={"depth": (alone, together), "normal": together})
+    np.testing.assert_array_equal(read_image(alone)[..., 0], read_channels(together)["depth.Z"])
+    assert len(read_channels(together)) == 4
+
+
+def test_shading_normals_are_the_balls_own():
+    """A ball of 24 segments: the faces' normals are up to 7° off the radius, the interpolated ones hardly.
+
+    On the rim an interpolated normal that faces away gives way to the face's: the innermost 60° are looked at.
+    """
+    ball = Scene(bodies=[body(sphere(8, 24), at=(0, 0, 30))])
+    shot = render(ball, SMALL, support=("normal", "shading_normal", "ray_length"))
+    hit = np.isfinite(shot.ray_length)
+    L, D = (rays[hit] for rays in SMALL.rays())
+    radius = L + D / np.linalg.norm(D, axis=1)[:, None] * shot.ray_length[hit][:, None] - [0, 0, 30]
+    radius /= np.linalg.norm(radius, axis=1)[:, None]
+    inner = (radius * D).sum(axis=1) < -0.5 * np.linalg.norm(D, axis=1)
+    smooth, flat = ((n[hit] * radius).sum(axis=1)[inner].min() for n in (shot.shading_normal, shot.normal))
+    assert smooth > np.cos(np.radians(0.5)) > np.cos(np.radians(5)) > flat
+    assert (shot.shading_normal[~hit] == 0).all()
+    faceted = Scene(bodies=[body(sphere(8, 24), at=(0, 0, 30), flat=True)])
+    shot = render(faceted, SMALL, support=("normal", "shading_normal"))
+    np.testing.assert_array_equal(shot.shading_normal, shot.normal)
 
 
 @pytest.mark.parametrize(

@@ -36,10 +36,11 @@ def render(
     noise: Annotated[float, typer.Option(help="σ of sensor noise, in steps of 8 bits.")] = 0.0,
     bits: Annotated[int, typer.Option(help="8 or 16, for .png and .tif.")] = 8,
     support: Annotated[Exr, typer.Option(help="Write all support images to this .exr, as named channels.")] = None,
-    depth: Annotated[Exr, typer.Option(help="Write z in mm to this .exr.")] = None,
-    ray_length: Annotated[Exr, typer.Option(help="Write mm along the ray to this .exr.")] = None,
+    depth: Annotated[Exr, typer.Option(help="Write z in mm from the pixel plane to this .exr.")] = None,
+    ray_length: Annotated[Exr, typer.Option(help="Write mm along the ray from its lens to this .exr.")] = None,
     disparity: Annotated[Exr, typer.Option(help="Write pixels from lens to lens to this .exr.")] = None,
-    normal: Annotated[Exr, typer.Option(help="Write unit normals to this .exr.")] = None,
+    normal: Annotated[Exr, typer.Option(help="Write unit normals of the faces to this .exr.")] = None,
+    shading_normal: Annotated[Exr, typer.Option(help="Write unit normals as shaded to this .exr.")] = None,
     object_id: Annotated[Exr, typer.Option(help="Write object numbers to this .exr, −1 for none.")] = None,
     projection: Annotated[Path | None, typer.Option(help="Write what a 2D camera sees to this .png.")] = None,
     workers: Workers = None,
@@ -60,7 +61,7 @@ def render(
         raise ValueError("--workers are threads of this machine: with --dask there are none")
     options = {**_sampling(samples, error), "seed": seed, "noise": noise}
     wanted = {"depth": depth, "ray_length": ray_length, "disparity": disparity, "normal": normal}
-    wanted |= {"object_id": object_id}
+    wanted |= {"object_id": object_id, "shading_normal": shading_normal}
     extra = {name: path for name, path in wanted.items() if path is not None}
     arrays = _cameras(camera, scale)
     poses = [_pose(array, at) for array in arrays]
@@ -95,9 +96,9 @@ def _render_scene(
     with _cluster(dask) as executor:
         means = {"workers": workers, "executor": executor}
         for array, pose, numbered in zip(arrays, poses, names, strict=True):
-            files = {name: numbered(path) for name, path in extra.items()}
+            files = {name: [numbered(path)] for name, path in extra.items()}
             for name in _all_support(array) if support else ():
-                files.setdefault(name, numbered(support))  # type: ignore[arg-type]
+                files.setdefault(name, []).append(numbered(support))  # type: ignore[arg-type]
             more = {"pose": pose, "upright": array.lenses == (1, 1), "support": files, "dtype": dtype}
             _say_stats(_shoot(numbered(output), loaded, array, **more, **options, **means))
         if projection:

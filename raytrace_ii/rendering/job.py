@@ -26,6 +26,7 @@ SUPPORT_IMAGES = {
     "normal": ("f4", (3,)),
     "object_id": ("i4", ()),
     "ray_length": ("f4", ()),
+    "shading_normal": ("f4", (3,)),
     "disparity": ("f4", ()),
     "samples": ("i4", ()),
 }

@@ -25,6 +25,7 @@ from ..tracing.tracer import RayCount, rigid
 from .executors import Tile, check_executor, cores, run
 from .job import CURVES, SUPPORT_IMAGES, Block, Job, check_disparity
 
+Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 SUPPORT = ("depth", "normal", "object_id")  # those kept unless others are asked for
 # What the channels of support images are called in an EXR file that holds several.
 CHANNELS = {
@@ -32,11 +33,13 @@ CHANNELS = {
     "normal": ("normal.X", "normal.Y", "normal.Z"),
     "object_id": ("objectId",),
     "ray_length": ("rayLength",),
+    "shading_normal": ("shadingNormal.X", "shadingNormal.Y", "shadingNormal.Z"),
     "disparity": ("disparity",),
     "samples": ("samples",),
 }
 UNITS = (
-    "depth.Z: z in mm in the camera's frame; rayLength: mm; normal: unit vectors, outward, in the scene's frame; "
+    "depth.Z: z in mm in the camera's frame, from its pixel plane; rayLength: mm from the ray's origin, pinhole or "
+    "place on the lens; normal: unit vectors of the faces, outward, in the scene's frame; shadingNormal: as shaded; "
     "disparity: pixels to the right from one elementary image to the next on the right; nothing hit: NaN, normal 0, "
     "objectId -1; objectId is a place in objectNames"
 )
@@ -72,13 +75,17 @@ class Shot:
     Parameters
     ----------
     depth : ndarray, (N, M)
-        z in mm in the camera's frame, NaN where nothing is hit.
+        z in mm in the camera's frame, measured from its pixel plane z = 0; NaN where nothing is hit.
     normal : ndarray, (N, M, 3)
         The faces' outward unit normals in the scene's frame, 0 where nothing is hit.
     object_id : ndarray of int, (N, M)
         The row of ``object_names``, −1 where nothing is hit.
     ray_length : ndarray, (N, M)
-        mm from where the ray leaves the camera to the hit, NaN where nothing is hit.
+        mm along the ray from its origin L, the pinhole or the place on the lens; NaN where nothing is hit. starts at
+        the pixel plane instead: on the axis of a pinhole lens it is greater by the gap.
+    shading_normal : ndarray, (N, M, 3)
+        Unit normals that shading used, in the scene's frame and outward: interpolated between vertices and tilted by
+        normal maps; the face's normal where there are none; 0 where nothing is hit.
     disparity : ndarray, (N, M)
         How far the point moves from one elementary image to the next on the right, in pixels to the right; see
         `job.disparity`.
@@ -91,6 +98,7 @@ class Shot:
     normal: NDArray[np.float32] | None
     object_id: NDArray[np.int32] | None
     ray_length: NDArray[np.float32] | None
+    shading_normal: NDArray[np.float32] | None
     disparity: NDArray[np.float32] | None
     samples: NDArray[np.int32] | None
     object_names: list[str]
@@ -139,7 +147,7 @@ def render(
     pose : array_like, (4, 4), optional
         Rigid transform from the camera's frame to the scene's.
     support : tuple of str
-        Which of depth, normal, object_id, ray_length, disparity and samples to keep.
+        Which of depth, normal, object_id, ray_length, shading_normal, disparity and samples to keep.
     progress : callable, optional
         Called with blocks done and blocks in all, from the calling thread.
 
@@ -180,7 +188,7 @@ def render_to(
     scene: Scene,
     camera: IICamera | MapCamera,
     *,
-    support: Mapping[str, str | os.PathLike[str]] | None = None,
+    support: Mapping[str, Paths] | None = None,
     upright: bool = False,
     samples: int | tuple[int, int] = 1,
     error: float = 0.5,
@@ -202,9 +210,9 @@ def render_to(
     ----------
     picture : path or None
         PNG, TIFF or EXR; its structure stands beside it as with `IIPicture.save`. None for support images alone.
-    support : mapping of str to path, optional
-        Files of support images by name. Several may name one EXR, which then has named channels; the names of
-        objects stand in its header.
+    support : mapping of str to path or sequence of paths, optional
+        Files of support images by name. Several images may name one EXR, which then has named channels; the names of
+        objects stand in its header. One image may have several files.
     upright : bool
         Turn the picture of a camera of one lens, which stands on its head.
 
@@ -214,7 +222,7 @@ def render_to(
         If a file cannot be written.
     """
     tally = _Tally()
-    files = {name: os.fspath(path) for name, path in (support or {}).items()}
+    files = {name: _paths(value) for name, value in (support or {}).items()}
     job = _job(scene, camera, samples, error, seed, noise, dtype, pose, tuple(files))
     _check_workers(workers, executor)
     if upright and camera.lenses != (1, 1):
@@ -236,7 +244,7 @@ def render_to(
 
 
 def _writers(
-    stack: ExitStack, job: Job, picture: Any, files: dict[str, str], upright: bool
+    stack: ExitStack, job: Job, picture: Any, files: dict[str, list[str]], upright: bool
 ) -> list[tuple[Callable[[NDArray[Any]], None], list[str]]]:
     """Open all files; what to call with rows of which images."""
     camera = job.camera
@@ -247,14 +255,18 @@ def _writers(
         write_json(stack.enter_context(atomic_path(sidecar(picture))), structure.structure_json())
         out.append((stack.enter_context(image_writer(picture, camera.pixels, 3, job.dtype)), ["pixels"]))
     about = {"objectNames": json.dumps([body.name for body in job.scene.bodies]), "units": UNITS}
-    for file in dict.fromkeys(files.values()):
-        names = [name for name in files if files[name] == file]
+    for file in dict.fromkeys(file for paths in files.values() for file in paths):
+        names = [name for name in files if file in files[name]]
         channels = [channel for name in names for channel in CHANNELS[name]]
         writer = image_writer(
             file, camera.pixels, len(channels), "float32", names=channels if len(names) > 1 else (), about=about
         )
         out.append((stack.enter_context(writer), names))
     return out
+
+
+def _paths(value: Paths) -> list[str]:
+    return [os.fspath(value)] if isinstance(value, str | os.PathLike) else [os.fspath(path) for path in value]
 
 
 @dataclass

@@ -17,7 +17,13 @@ from .packing import PackedScene
 KINDS = ("primary", "shadow", "reflection", "refraction")
 _NO_ROWS = np.empty(0, np.int32)
 # Support images that the tracer fills: type and how many numbers a ray.
-RECORDED = {"depth": ("f4", ()), "normal": ("f4", (3,)), "object_id": ("i4", ()), "ray_length": ("f4", ())}
+RECORDED = {
+    "depth": ("f4", ()),
+    "normal": ("f4", (3,)),
+    "object_id": ("i4", ()),
+    "ray_length": ("f4", ()),
+    "shading_normal": ("f4", (3,)),
+}
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
 
@@ -40,13 +46,15 @@ class RayCount:
 
 @dataclass(frozen=True, eq=False)
 class Traced:
-    """What n rays saw: linear radiance (n, 3), and depth, normal (n, 3), object, ray length of the first hit."""
+    """What n rays saw: linear radiance (n, 3), and depth, normal (n, 3), object, ray length and shading normal
+    (n, 3) of the first hit."""
 
     radiance: NDArray[np.float32]
     depth: NDArray[np.float32]
     normal: NDArray[np.float32]
     object_id: NDArray[np.int32]
     ray_length: NDArray[np.float32]
+    shading_normal: NDArray[np.float32]
     count: RayCount
 
 
@@ -63,8 +71,9 @@ def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: Array
     Returns
     -------
     Traced
-        One row per ray, in C order; depth is along the camera's z axis, NaN on a miss; normals are those of the
-        faces, outward; object −1 on a miss; ray length from the ray's start, mm, NaN on a miss.
+        One row per ray, in C order; depth is along the camera's z axis from its origin, the pixel plane, NaN on a
+        miss; normals are those of the faces, outward; object −1 on a miss; ray length from the ray's start, mm, NaN
+        on a miss; shading normals are interpolated and tilted by normal maps, on the side of the face's normal.
 
     Raises
     ------
@@ -87,12 +96,13 @@ def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: Array
 
 @dataclass(frozen=True)
 class Support:
-    """Depth, normal, object id and ray length arrays of one block, as far as they are wanted."""
+    """Support arrays of one block, as far as they are wanted."""
 
     depth: NDArray[np.float32] | None = None
     normal: NDArray[np.float32] | None = None
     object_id: NDArray[np.int32] | None = None
     ray_length: NDArray[np.float32] | None = None
+    shading_normal: NDArray[np.float32] | None = None
 
     @classmethod
     def empty(cls, shape: tuple[int, ...], names: Collection[str]) -> Support:
@@ -100,7 +110,7 @@ class Support:
 
     def clear(self) -> None:
         """As if no ray hit anything."""
-        nothing = {"depth": np.nan, "normal": 0, "object_id": -1, "ray_length": np.nan}
+        nothing = {"depth": np.nan, "normal": 0, "object_id": -1, "ray_length": np.nan, "shading_normal": 0}
         for name, array in vars(self).items():
             if array is not None:
                 array[...] = nothing[name]

@@ -121,7 +121,7 @@ def shade(
     ambient, least, radiance,
     shadow_origins, shadow_directions, shadow_reach, shadow_colours, shadow_pixels, shadow_inside,
     next_origins, next_directions, next_weights, next_pixels, next_inside, counts, spawn,
-    eye, axis, depth, normal, object_id, ray_length,
+    eye, axis, depth, normal, object_id, ray_length, shading_normal,
 ):  # fmt: skip
     """Shade one generation of rays.
 
@@ -129,7 +129,8 @@ def shade(
     through, and, if ``spawn``, reflected and refracted rays; none weaker than ``least``. ``inside`` lists the
     transmissive bodies that a ray runs in, −1 after the last. ``fog`` is its colour and density, of no length if
     there is none; it lies outside bodies, and before the sky not at all. Of each ray are noted, where there is room,
-    the depth from ``eye`` along the camera's ``axis``, the face's normal, the object and the ray's length.
+    the depth from ``eye`` along the camera's ``axis``, the face's normal, the object, the ray's length and the normal
+    of shading.
 
     Returns
     -------
@@ -150,6 +151,8 @@ def shade(
             for c in range(3):
                 normal[pixel, c] = faces[f, c] if f >= 0 else 0.0
         if f < 0:
+            if shading_normal.shape[0] > 0:
+                _put(shading_normal, pixel, 0.0, 0.0, 0.0)
             if depth.shape[0] > 0:
                 depth[pixel] = math.nan
             b0, b1, b2 = _sky(background, textures, texels, dx, dy, dz)
@@ -193,6 +196,9 @@ def shade(
                 corners, coordinates, textures, texels, f, u[i], v[i], int(materials[body, _NORMAL_MAP]),
                 materials[body, _NORMAL_SCALE], entering, nx, ny, nz, dx, dy, dz,
             )  # fmt: skip
+        if shading_normal.shape[0] > 0:
+            side = 1.0 if entering else -1.0
+            _put(shading_normal, pixel, side * nx, side * ny, side * nz)
         ox, oy, oz = px + lift * gx, py + lift * gy, pz + lift * gz
         smooth = normals.shape[0] > 0 and (
             normals[f, 0, 0] != 0.0 or normals[f, 0, 1] != 0.0 or normals[f, 0, 2] != 0.0
