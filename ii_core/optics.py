@@ -62,9 +62,50 @@ class Under(NamedTuple):
         return (abs(x) <= across / 2) & (abs(y) <= down) & slanting
 
 
+class Scaling(NamedTuple):
+    """Change of a lens array by `presets.scaled`, as its elements need it.
+
+    Attributes
+    ----------
+    factor : float
+        Growth of gap and lens pitch.
+    gap_mm, cell_mm : float, (float, float)
+        Gap and lens pitch before.
+    forward_mm : float
+        d, how far the lens plane moves towards the scene.
+    front_mm : float, optional
+        a, distance from the lens plane to the first lens in front of the array, before; None if there is none.
+    """
+
+    factor: float
+    gap_mm: float
+    cell_mm: tuple[float, float]
+    forward_mm: float
+    front_mm: float | None
+
+    def refocused(self, vergence: Array) -> NDArray[np.float64]:
+        """Vergence 1/b, per mm, that keeps the scene plane which lenslets of vergence 1/b image; 0 is infinity.
+
+        Raises
+        ------
+        ValueError
+            If the lens plane moves up to the plane, or past it.
+        """
+        w, d = np.asarray(vergence, np.float64), self.forward_mm
+        if self.front_mm is not None:
+            a = self.front_mm
+            return (a * a * w - d) / (a - d) ** 2
+        if (d * w >= 1).any():
+            raise ValueError(
+                f"lens plane moves by {d:g} mm, lenslets focus {1 / w.max():g} mm before it: "
+                "a smaller scale is needed"
+            )
+        return w / (1 - d * w)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Element:
-    """An optical element: its parameters as plain values, and itself scaled with its camera."""
+    """An optical element: its parameters as plain values."""
 
     kind: ClassVar[str]
 
@@ -81,10 +122,6 @@ class Element:
     def to_json(self) -> dict[str, Any]:
         return {"kind": self.kind, **{k: v for k, v in asdict(self).items() if v is not None}}
 
-    def scaled(self, factor: float) -> Element:
-        """The element of a camera whose lenslets are ``factor`` times as large."""
-        return self
-
 
 class LensModel(Element):
     """The element over every lenslet."""
@@ -96,6 +133,10 @@ class LensModel(Element):
     def leave(self, under: Under) -> Bundle:
         """Rays that leave the lens plane."""
         raise NotImplementedError
+
+    def scaled(self, scaling: Scaling) -> LensModel:
+        """The model over larger lenslets that image the same scene planes; see `presets.scaled`."""
+        return self
 
 
 class FrontElement(Element):
@@ -180,11 +221,14 @@ class Lenslet(LensModel):
         dy = (u.cy + ay - u.py) - ay * (u.gap / f)
         return Bundle(u.cx + ax, u.cy + ay, _like(u.gap), dx, dy, _like(u.gap))
 
-    def scaled(self, factor: float) -> Lenslet:
-        f = self.focal_mm
-        focal = tuple(tuple(x * factor for x in row) for row in f) if isinstance(f, tuple) else f * factor
-        aperture = None if self.aperture_mm is None else self.aperture_mm * factor
-        return replace(self, focal_mm=focal, aperture_mm=aperture)
+    def scaled(self, scaling: Scaling) -> Lenslet:
+        f = np.atleast_2d(np.asarray(self.focal_mm, np.float64))
+        power = 1 / (scaling.gap_mm * scaling.factor) + scaling.refocused(1 / f - 1 / scaling.gap_mm)
+        if not (power > 0).all():
+            raise ValueError("lenslet: its focal length would be negative: a smaller scale is needed")
+        rows = tuple(tuple(float(x) for x in row) for row in 1 / power)
+        focal = rows if isinstance(self.focal_mm, tuple) else rows[0][0]
+        return replace(self, focal_mm=focal, aperture_mm=_times(self.aperture_mm, scaling.factor))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -247,9 +291,26 @@ class SphericalLenslet(LensModel):
         dx, dy, dz = n * tx - bend * nx, n * ty - bend * ny, n * tz - bend * nz
         return Bundle(u.cx + ex, u.cy + ey, u.gap + ez, dx, dy, dz, through.astype(np.float64))
 
-    def scaled(self, factor: float) -> SphericalLenslet:
-        aperture = None if self.aperture_mm is None else self.aperture_mm * factor
-        return replace(self, radius_mm=self.radius_mm * factor, aperture_mm=aperture)
+    def vergence(self, gap_mm: float, cell: tuple[float, float]) -> float:
+        """Paraxial 1/b, b from the lens plane to the plane it images, mm; infinite if that is the lens plane.
+
+        Glass of thickness t adds t/n to the gap; the sphere of power (n − 1)/R stands t before the lens plane.
+        """
+        t = self.thickness(cell)
+        at_sphere = (self.ior - 1) / self.radius_mm - 1 / (gap_mm + t / self.ior)
+        return at_sphere / (1 + t * at_sphere)
+
+    def scaled(self, scaling: Scaling) -> SphericalLenslet:
+        grown = replace(
+            self,
+            radius_mm=self.radius_mm * scaling.factor,
+            aperture_mm=_times(self.aperture_mm, scaling.factor),
+        )
+        if self.ior == 1:  # bends nothing
+            return grown
+        gap, cell = scaling.gap_mm * scaling.factor, tuple(x * scaling.factor for x in scaling.cell_mm)
+        wanted = float(scaling.refocused(np.float64(self.vergence(scaling.gap_mm, scaling.cell_mm))))
+        return replace(grown, radius_mm=_radius(grown, gap, cell, wanted))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -343,6 +404,56 @@ def chain(elements: Sequence[Any]) -> tuple[LensModel, tuple[FrontElement, ...]]
         if not isinstance(e, FrontElement):
             raise ValueError(f"{e.kind} is a lens model: it must be the first element, and the only one")
     return model, tuple(e for e in front if isinstance(e, FrontElement))
+
+
+def scaled_chain(elements: Sequence[Element], scaling: Scaling, *, nearer_mm: float = 0.0) -> tuple[Element, ...]:
+    """Elements of a scaled camera, see `presets.scaled`; ``nearer_mm``: how far the pixel array moves forward.
+
+    Raises
+    ------
+    ValueError
+        If the lens plane moves up to a lens in front, or no positive focal length keeps a plane.
+    """
+    model, *front = elements
+    placed: list[Any] = [replace(e, z_mm=e.z_mm - nearer_mm) for e in front]  # type: ignore[call-arg,attr-defined]
+    if placed and isinstance(front[0], Lens):
+        a, d = front[0].z_mm - scaling.gap_mm, scaling.forward_mm
+        if not a > d:
+            raise ValueError(
+                f"lens at z_mm {front[0].z_mm:g}: the lens plane moves by {d:g} mm and is {a:g} mm away: "
+                "a smaller scale is needed"
+            )
+        power = 1 / front[0].focal_mm + d / (a * (a - d))
+        if power == 0:
+            raise ValueError(
+                f"lens at z_mm {front[0].z_mm:g}: its focal length would be infinite: another scale is needed"
+            )
+        placed[0] = replace(placed[0], focal_mm=1 / power)
+    return (model.scaled(scaling), *placed)  # type: ignore[attr-defined]
+
+
+def _radius(lens: SphericalLenslet, gap: float, cell: tuple[float, ...], vergence: float) -> float:
+    """The radius with which a spherical lenslet has the vergence wanted."""
+    from scipy.optimize import brentq
+
+    least = math.hypot(*cell) / 2
+
+    def excess(radius: float) -> float:
+        return replace(lens, radius_mm=radius).vergence(gap, cell) - vergence  # type: ignore[arg-type]
+
+    # A sphere of twice the power that thin glass needs is too strong, one of half of it too weak.
+    thin = (lens.ior - 1) / (1 / gap + vergence)
+    low, high = max(least, thin / 2), max(2 * thin, 2 * least)
+    if not excess(low) >= 0 >= excess(high):
+        raise ValueError(
+            f"spherical-lenslet: no radius_mm of at least half the cell's diagonal, {least:g}, focuses where it did: "
+            "a smaller scale is needed"
+        )
+    return float(brentq(excess, low, high, xtol=1e-15 * high, rtol=1e-14))
+
+
+def _times(length: float | None, factor: float) -> float | None:
+    return None if length is None else length * factor
 
 
 def unit_disk(place: NDArray[np.float64]) -> tuple[Array, Array]:

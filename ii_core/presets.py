@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .camera import IICamera
+from .optics import Scaling, scaled_chain
 
 ALIASES = {"setup2": "setup2-16"}
 
@@ -29,8 +30,9 @@ def preset(name: str | os.PathLike[str], *, scale: int = 1) -> IICamera:
         One of `camera_names`; ``setup2`` is ``setup2-16``. Or a file that ends in ``.json``.
     scale : int
         Divides the number of lenses (of pixels, for a camera of one lens) along both axes. Sensor size,
-        pixels per elementary image and viewing angle stay, so pixel pitch, lens pitch, gap and everything else
-        about a lenslet grow by ``scale`` and a scene looks the same, coarser, at every scale.
+        pixels per elementary image, viewing angle and the scene planes in focus stay, so pixel pitch, lens pitch,
+        gap and apertures grow by ``scale``, focal lengths follow from them (see `scaled`), and a scene looks the
+        same, coarser, at every scale.
 
     Raises
     ------
@@ -67,7 +69,38 @@ def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IIC
 
 
 def scaled(camera: IICamera, scale: int) -> IICamera:
-    """The camera with ``scale`` times as large, fewer lenslets, or pixels if it has but one lens."""
+    """The camera with ``scale`` times as large, fewer lenslets, or pixels if it has one lens.
+
+    Pixel pitch, lens pitch, lens offset, gap and apertures grow by s = ``scale``. The scene stands still, so every
+    plane in it that the optics single out must stand still too, while the lens plane moves from Λ to sΛ, by
+    d = (s − 1)Λ. What this asks of each element:
+
+    Pinholes, GRIN rods, lenticular lenses
+        Nothing. They image no plane.
+    Lenslets, of one or several focal lengths
+        Image the plane b before the lens plane, 1/b = 1/f − 1/Λ (2.3). The same plane then lies b − d before it:
+        1/f' = 1/(sΛ) + 1/(b − d). Λ = f, depth priority, stays sΛ = f'.
+    Spherical lenslets
+        The same with the paraxial plane: the radius solves for it.
+    First lens in front: depth-control lens, main lens
+        Keeps place and rim, which make the viewpoint and the parallax of what the scene shows, and the scene plane
+        that it images onto the lens array. That plane is in focus in a plenoptic 1.0 camera and lies on the display
+        behind a depth-control lens. With a from the lens plane to the lens, 1/f' = 1/f + 1/(a − d) − 1/a.
+    Lenslets behind a lens in front
+        Keep the scene plane that they image through it. At the lens the vergence 1/(a − b) of their plane changes
+        as the lens's own power does; solved for b, 1/b' = (a²/b − d)/(a − d)².
+    Further lenses in front
+        Keep place and focal length.
+
+    Apertures grow with the lens pitch, so the blur off the focus is as many lens pitches wide: views of the picture
+    are blurred alike, in their own pixels. The field of view behind a main lens widens by a/(a − d).
+
+    Raises
+    ------
+    ValueError
+        If the scale does not divide the lenses and pixels, or the lens plane would pass a plane in focus or a lens
+        in front.
+    """
     single = camera.lenses == (1, 1)
     divided, what = (camera.pixels, "pixels") if single else (camera.lenses, "lenses")
     if not isinstance(scale, int) or scale < 1 or any(n % scale for n in (*divided, *camera.pixels)):
@@ -75,10 +108,25 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
             f"scale {scale} does not divide the {divided[0]}×{divided[1]} {what} and "
             f"{camera.pixels[0]}×{camera.pixels[1]} pixels: a whole number that divides all is needed"
         )
+    if scale == 1:
+        return camera
     pixels = camera.pixels[0] // scale, camera.pixels[1] // scale
     pitch = camera.pixel_pitch_mm * scale
     if single:
         return replace(camera, pixels=pixels, pixel_pitch_mm=pitch)
+    # The depth of a sensor in its stack grows with the gap; where a camera stands among others does not.
+    forward = camera.origin_mm[2] * (scale - 1)
+    scaling = Scaling(
+        factor=scale,
+        gap_mm=camera.gap_mm,
+        cell_mm=camera.lens_pitch_mm,
+        forward_mm=camera.gap_mm * (scale - 1) + forward,
+        front_mm=camera.front[0].z_mm - camera.gap_mm if camera.front else None,
+    )
+    try:
+        optics = scaled_chain(camera.optics, scaling, nearer_mm=forward)
+    except ValueError as error:
+        raise ValueError(f"scale {scale}: {error}") from None
     return replace(
         camera,
         pixels=pixels,
@@ -87,9 +135,8 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
         gap_mm=camera.gap_mm * scale,
         lens_pitch_mm=_times(camera.lens_pitch_mm, scale),
         lens_offset_mm=_times(camera.lens_offset_mm, scale),
-        # The depth of a sensor in its stack grows with the gap; where a camera stands among others does not.
-        origin_mm=(*camera.origin_mm[:2], camera.origin_mm[2] * scale),
-        optics=tuple(element.scaled(scale) for element in camera.optics),
+        origin_mm=(*camera.origin_mm[:2], camera.origin_mm[2] + forward),
+        optics=optics,
     )
 
 
