@@ -2,25 +2,25 @@
 
 ``python -m benchmarks.bframes --scale 4`` codes sub-images of four scenes with 0 to 3 and 7 B pictures between P
 pictures under several conditions. What is kept is the Bjøntegaard difference in PSNR to the same condition without
-B pictures, in ``benchmarks/results/bframes.json``.
+B pictures, a row a scene and condition, in ``benchmarks/results/bframes.jsonl``.
 """
 
 from __future__ import annotations
 
 import argparse
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
 from benchmarks.coders import climbing
+from benchmarks.records import Records, add_again, origin, with_commits
 from codec import decode, encode
 from ii_core import IIPicture, preset
-from ii_core.files import write_json
-from metrics import bd_psnr, provenance, q_global
+from metrics import bd_psnr, q_global
 from metrics.rd import UndefinedDifference
 from raytrace_ii import load_scene, render
 
-RESULTS = Path(__file__).parent / "results"
+RECORDS = Records("bframes", ("benchmarks.bframes", "benchmarks.coders"))
+SCALE = 4  # of the page
 COUNTS = (1, 2, 3, 7)
 QUANTISERS = (21, 27, 33, 39, 45)
 RATES = (0.1, 0.2, 0.4, 0.8, 1.6)
@@ -46,21 +46,45 @@ CONDITIONS: list[tuple[str, str, list[dict[str, Any]]]] = [
 def main() -> None:
     """Measure, print and keep."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
+    parser.add_argument("--scale", type=int, default=SCALE, help="divides the number of lenses of setup1")
     parser.add_argument("--scenes", default="apples,twins,car,cuboid")
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--output", type=Path, default=RESULTS / "bframes.json")
+    add_again(parser)
     asked = parser.parse_args()
-    rows: list[dict[str, Any]] = []
+    conditions = {name: rest for name, *rest in CONDITIONS}
     for scene in asked.scenes.split(","):
+        keys = RECORDS.todo(
+            ({"scene": scene, "scale": asked.scale, "condition": name} for name in conditions), asked.again
+        )
+        if not keys:
+            continue
         picture = render(load_scene(scene), preset("setup1", scale=asked.scale), noise=1.0, support=()).picture
+
+        def row(key: dict[str, Any], picture: IIPicture = picture) -> None:
+            scheme, goals = conditions[key["condition"]]
+            found = RECORDS.measure(key, lambda: {"scheme": scheme, "psnr": differences(picture, scheme, goals)})
+            print(f"{key['scene']:<8} {key['condition']:<44} {found['result']['psnr']}", flush=True)
+
         with ThreadPoolExecutor(asked.workers) as pool:
-            found = pool.map(lambda condition, p=picture: differences(p, *condition[1:]), CONDITIONS)
-            for (name, scheme, _), psnr in zip(CONDITIONS, found, strict=True):
-                rows.append({"scene": scene, "condition": name, "scheme": scheme, "psnr": psnr})
-                print(f"{scene:<8} {name:<44} {psnr}", flush=True)
-        asked.output.parent.mkdir(parents=True, exist_ok=True)
-        write_json(asked.output, {**provenance(), "scale": asked.scale, "rows": rows})
+            list(pool.map(row, keys))
+
+
+def table() -> list[str]:
+    """Difference in dB against no B pictures, by condition and number."""
+    rows = RECORDS.rows(scale=SCALE)
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    lines = [f"| `setup1` at scale {SCALE} | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]
+    commits = []
+    for condition in dict.fromkeys(row["condition"] for row in rows):
+        own = {row["scene"]: row for row in rows if row["condition"] == condition}
+        cells = [" · ".join(map(_decibel, own[s]["psnr"].values())) if s in own else "–" for s in scenes]
+        lines.append(f"| {condition} | {' | '.join(cells)} |")
+        commits.append([row["commit"] for row in own.values()])
+    return [origin(rows), "", *with_commits(lines, commits)]
+
+
+def _decibel(value: float | None) -> str:
+    return "–" if value is None else f"{value:+.2f}"
 
 
 def differences(picture: IIPicture, scheme: str, asked: list[dict[str, Any]]) -> dict[str, float | None]:

@@ -5,7 +5,7 @@
 In the scene stand plano-convex lenslets of glass, one triangle mesh each, with black walls between them, before a
 black box that holds the pixels, from which rays start. The other camera is a `SphericalLenslet`, which the scene
 never sees. Both are traced by the same renderer along the same samples. Numbers go to
-``benchmarks/results/camera_in_scene.json``, the two pictures beside it.
+``benchmarks/results/camera_in_scene.jsonl``, the two pictures beside it.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ import statistics
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.records import RESULTS, Records, add_again
 from ii_core import IICamera, preset
-from ii_core.files import write_image, write_json
+from ii_core.files import write_image
 from ii_core.optics import Bundle, LensModel, SphericalLenslet, Under
-from metrics import provenance, q_global
+from metrics import q_global
 from raytrace_ii import Background, Body, Material, Scene, Shot, load_scene, render
 
-RESULTS = Path(__file__).parent / "results"
+RECORDS, SCALE = Records("camera_in_scene", ("benchmarks.camera_in_scene",)), 16  # of the page
 GLASS = (1.0, 1.0, 1.0)
 BLACK = Material(colour=(0.0, 0.0, 0.0))
 REPEATS = 5
@@ -217,12 +217,18 @@ def transmitted(camera: IICamera) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Compare, time, print and keep."""
+    """Compare, time and keep."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=16)
-    arguments = parser.parse_args()
-    camera = preset("spherical", scale=arguments.scale)
-    coarse = preset("spherical", scale=2 * arguments.scale)
+    parser.add_argument("--scale", type=int, default=SCALE)
+    add_again(parser)
+    asked = parser.parse_args()
+    for key in RECORDS.todo([{"scale": asked.scale}], asked.again):
+        RECORDS.measure(key, lambda: study(asked.scale))
+
+
+def study(scale: int) -> dict[str, Any]:
+    """Compare, time and print; the two pictures go beside the record."""
+    camera, coarse = preset("spherical", scale=scale), preset("spherical", scale=2 * scale)
     apples = load_scene("apples")
     unshaded = away_from_camera(apples)
     rows: list[dict[str, Any]] = []
@@ -267,7 +273,7 @@ def main() -> None:
     print(f"Fresnel lets {shares[0]:.4f} to {shares[1]:.4f} through; stray light {stray}")
     write_image(RESULTS / "camera_in_scene.png", side_by_side(pictures))
     numbers = {"fresnel_transmits": shares, "stray_light": stray, "rows": rows, "cpu_ratio": times}
-    write_json(RESULTS / "camera_in_scene.json", {**provenance(), "camera": camera.to_json(), **numbers})
+    return {"camera": camera.to_json(), **numbers}
 
 
 def side_by_side(pictures: Sequence[Shot]) -> NDArray[np.uint8]:

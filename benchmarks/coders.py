@@ -1,7 +1,10 @@
 """Every scheme and named setting against the dissertation's: rate at equal quality, and what it costs.
 
-``python -m benchmarks.coders --scale 4`` renders the four coding scenes, codes them with everything that is
-registered and with the trials below, and leaves ``coders.json`` and ``coders.png`` in ``benchmarks/results``. The
+    python -m benchmarks.coders [--scale 4] [--scenes apples,car] [--schemes 'si-h264,si-av1*'] [--workers 2]
+
+The four coding scenes are rendered and coded with everything that is registered and with the trials below. Every
+scheme on every scene is a row of ``benchmarks/results/coders.jsonl``, written when it is measured: a run that was
+stopped goes on where it was. ``python -m benchmarks.coding_docs`` draws charts and fills pages from the rows. The
 anchor is the dissertation's SI-PVS: H.264, one I picture and P pictures, 4:2:0, constant quantiser, parallel order.
 """
 
@@ -9,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 import statistics
-import time
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from fnmatch import fnmatch
 from pathlib import Path
@@ -17,15 +20,15 @@ from typing import Any
 
 import numpy as np
 
-from codec import decode, encode, parse_scheme, schemes
+from benchmarks.records import Records, add_again, origin, with_commits
+from codec import encode, parse_scheme, schemes, timed_decode
 from codec.contract import find
 from ii_core import IIPicture, preset
-from ii_core.files import write_json
-from metrics import bd_rate, provenance, q_global
+from metrics import bd_rate, q_global
 from metrics.rd import UndefinedDifference
 from raytrace_ii import load_scene, render
 
-RESULTS = Path(__file__).parent / "results"
+RECORDS = Records("coders", ("benchmarks.coders",))
 SCENES = ("apples", "twins", "car", "cuboid")
 ANCHOR = "si-h264:chroma=420,rate=cq"
 RATES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
@@ -69,29 +72,48 @@ TRIALS = (
 
 
 def main() -> None:
-    """Code, compare, keep and draw."""
+    """Measure the rows that are asked for and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
     parser.add_argument("--scenes", default=",".join(SCENES))
     parser.add_argument("--schemes", default="*", help="only these, * for anything: si-h264,si-av1*")
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--output", type=Path, default=RESULTS / "coders.json")
+    add_again(parser)
     asked = parser.parse_args()
     chosen = asked.schemes.split(",")
     names = [name for name in candidates() if name == ANCHOR or any(fnmatch(name, one) for one in chosen)]
-    rows: list[dict[str, Any]] = []
+    if unknown := [one for one in chosen if not any(fnmatch(name, one) for name in names)]:
+        parser.error(f"no scheme {unknown[0]!r}: known are {', '.join(candidates())}")
     for scene in asked.scenes.split(","):
-        picture = render(load_scene(scene), preset("setup1", scale=asked.scale), noise=1.0, support=()).picture
-        with ThreadPoolExecutor(asked.workers) as pool:
-            curves = dict(zip(names, pool.map(lambda name, p=picture: curve(p, name), names), strict=True))
-        for name, points in curves.items():
-            rows.append({"scene": scene, "scheme": name, **compared(curves[ANCHOR], points), "points": points})
-        asked.output.parent.mkdir(parents=True, exist_ok=True)
-        write_json(asked.output, {**provenance(), "scale": asked.scale, "anchor": ANCHOR, "rows": rows})
-        print(f"{scene}: {len(names)} curves", flush=True)
-    for line in table(rows):
+        keys = RECORDS.todo(({"scene": scene, "scale": asked.scale, "scheme": name} for name in names), asked.again)
+        print(f"{scene}: {len(keys)} of {len(names)} curves to measure", flush=True)
+        if keys:
+            picture = render(load_scene(scene), preset("setup1", scale=asked.scale), noise=1.0, support=()).picture
+            measure(picture, keys, asked.workers)
+    for line in table(studied(asked.scale)):
         print(line)
-    chart(rows, asked.scale, asked.output.with_suffix(".png"))
+
+
+def measure(picture: IIPicture, keys: Sequence[Mapping[str, Any]], workers: int) -> None:
+    """Measure and record curves of one picture; an interrupt drops the curves not yet begun."""
+
+    def row(key: Mapping[str, Any]) -> None:
+        record = RECORDS.measure(key, lambda: {"points": curve(picture, key["scheme"])})
+        print(f"{key['scene']} {key['scheme']}: {record['seconds']:.1f} s", flush=True)
+
+    pool = ThreadPoolExecutor(workers)
+    try:
+        for future in [pool.submit(row, key) for key in keys]:
+            future.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def studied(scale: int) -> list[dict[str, Any]]:
+    """Return the newest row of every scene and scheme at a scale, compared with the scene's anchor."""
+    rows = RECORDS.rows(scale=scale)
+    anchors = {row["scene"]: row["points"] for row in rows if row["scheme"] == ANCHOR}
+    return [{**row, **compared(anchors[row["scene"]], row["points"])} for row in rows if row["scene"] in anchors]
 
 
 def candidates() -> list[str]:
@@ -123,15 +145,14 @@ def curve(picture: IIPicture, scheme: str) -> list[dict[str, float]]:
     points = []
     for asked in qualities(scheme):
         coded = encode(picture, scheme, **asked)
-        started = time.thread_time()
-        quality = q_global(picture, decode(coded))
+        decoded = timed_decode(coded)
         points.append(
             {
                 "bpp": coded.bpp,
-                "psnr": quality,
+                "psnr": q_global(picture, decoded.picture),
                 "codec_seconds": coded.codec_seconds or 0.0,
                 "encode_seconds": coded.encode_seconds or 0.0,
-                "decode_seconds": time.thread_time() - started,
+                "decode_seconds": decoded.seconds,
                 "runs": coded.runs,
             }
         )
@@ -168,7 +189,8 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         known = [rate for rate in rates.values() if rate is not None]
         mean = statistics.mean(known) if len(known) == len(scenes) else None
         seconds = statistics.mean(row["seconds"] for row in own)
-        out.append({"scheme": scheme, "rates": rates, "mean": mean, "seconds": seconds})
+        commits = [row["commit"] for row in own]
+        out.append({"scheme": scheme, "rates": rates, "mean": mean, "seconds": seconds, "commits": commits})
     return sorted(out, key=lambda row: (row["mean"] is None, row["mean"] or 0.0))
 
 
@@ -176,10 +198,11 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
     """Lines of a Markdown table."""
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     lines = [f"| scheme | {' | '.join(scenes)} | mean | CPU s |", "|---" * (len(scenes) + 3) + "|"]
-    for row in summary(rows):
+    best = summary(rows)
+    for row in best:
         cells = [_percent(row["rates"][scene]) for scene in scenes]
         lines.append(f"| `{row['scheme']}` | {' | '.join(cells)} | {_percent(row['mean'])} | {row['seconds']:.2f} |")
-    return lines
+    return with_commits(lines, [row["commits"] for row in best])
 
 
 def _percent(rate: float | None) -> str:
@@ -237,7 +260,8 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
     axes.step([r["seconds"] for r in edge], [1 + r["mean"] / 100 for r in edge], "k-", lw=0.8, where="post")
     axes.set(xscale="log", yscale="log", xlabel="CPU seconds of one encoder run, mean over rates and scenes")
     axes.set_ylabel("rate at equal PSNR, relative to the dissertation's SI-PVS")
-    axes.set_title(f"Speed against accuracy, setup1 at scale {scale}; the line joins what nothing quicker beats")
+    measured = origin(rows).replace("`", "")
+    axes.set_title(f"Speed against accuracy, setup1 at scale {scale}; the line is the Pareto front\n{measured}")
     ticks = [0.3, 0.4, 0.5, 0.6, 0.8, 1, 1.5, 2, 3, 5, 8, 12, 20, 30]
     low, high = axes.get_ylim()
     axes.set_yticks([tick for tick in ticks if low < tick < high])

@@ -2,39 +2,41 @@
 
 from __future__ import annotations
 
-import json
 import statistics
 from pathlib import Path
 from typing import Any
 
-from benchmarks.bframes import RESULTS
-from benchmarks.coders import ANCHOR, NEAR, TRIALS, chart, front, recommended, table
-from benchmarks.readme import fill, filled
+from benchmarks import bframes
+from benchmarks.coders import ANCHOR, NEAR, TRIALS, chart, front, recommended, studied, table
+from benchmarks.pages import Tables, publish
+from benchmarks.records import RESULTS, origin
 
-DOCS = Path(__file__).parent.parent / "docs"
-PAGE, SPEED = DOCS / "coding.md", DOCS / "speed_accuracy.md"
+IMAGES = Path(__file__).parent.parent / "docs" / "images"
+SCALE = 4  # of the larger study; the smaller one is at full size
 
 
 def main() -> None:
-    """Fill the page from coders.json, coders_full.json and bframes.json."""
-    text = PAGE.read_text(encoding="utf-8")
-    names = ("coders.json", "coders_full.json", "bframes.json")
-    coders, full, bframes = (json.loads((RESULTS / name).read_text()) for name in names)
-    trials = [row for row in coders["rows"] if row["scheme"] in {*TRIALS, ANCHOR}]
-    others = [row for row in coders["rows"] if row["scheme"] not in TRIALS]
+    """Fill the pages and draw the charts from the records."""
+    publish(tables())
+    for scale, name in ((SCALE, "coders.png"), (1, "coders_full.png")):
+        for folder in (RESULTS, IMAGES):
+            chart(studied(scale), scale, folder / name)
+
+
+def tables() -> Tables:
+    """Return all tables of schemes."""
+    coders, full = studied(SCALE), studied(1)
+    trials = [row for row in coders if row["scheme"] in {*TRIALS, ANCHOR}]
+    others = [row for row in coders if row["scheme"] not in TRIALS]
     best = ", ".join(f"`{row['scheme']}`" for row in front(others))
-    for mark, lines in (
-        ("coders", [size(coders), "", *table(others), "", f"Nothing quicker is better than: {best}."]),
-        ("full", [size(full), "", *table(full["rows"])]),
-        ("trials", [size(coders), "", *table(trials)]),
-        ("bframes", bframes_table(bframes)),
-    ):
-        text = filled(text, mark, lines)
-    PAGE.write_text(text, encoding="utf-8")
-    for study, name in ((coders, "coders.png"), (full, "coders_full.png")):
-        for folder in (RESULTS, DOCS / "images"):
-            chart(study["rows"], study["scale"], folder / name)
-    fill(SPEED, "coding", [size(coders), "", *front_table(coders["rows"])])
+    page = "docs/coding.md"
+    return {
+        (page, "coders"): [*size(SCALE, others), "", *table(others), "", f"Nothing quicker is better than: {best}."],
+        (page, "full"): [*size(1, full), "", *table(full)],
+        (page, "trials"): [*size(SCALE, trials), "", *table(trials)],
+        (page, "bframes"): bframes.table(),
+        ("docs/speed_accuracy.md", "coding"): [*size(SCALE, others), "", *front_table(coders)],
+    }
 
 
 def front_table(rows: list[dict[str, Any]]) -> list[str]:
@@ -49,24 +51,10 @@ def front_table(rows: list[dict[str, Any]]) -> list[str]:
     return [*lines, "", f"In bold the quickest whose rate is within {NEAR:.0%} of the least."]
 
 
-def size(study: dict[str, Any]) -> str:
-    """What was coded, and what the seconds are."""
-    return f"Pictures of `setup1` at scale {study['scale']}; CPU seconds of one run, mean over qualities and scenes."
-
-
-def bframes_table(study: dict[str, Any]) -> list[str]:
-    """Difference in dB against no B pictures, by condition and number."""
-    scenes = list(dict.fromkeys(row["scene"] for row in study["rows"]))
-    lines = [f"| `setup1` at scale {study['scale']} | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]
-    for condition in dict.fromkeys(row["condition"] for row in study["rows"]):
-        own = {row["scene"]: row["psnr"] for row in study["rows"] if row["condition"] == condition}
-        cells = [" · ".join(map(_decibel, own.get(scene, {}).values())) or "–" for scene in scenes]
-        lines.append(f"| {condition} | {' | '.join(cells)} |")
-    return lines
-
-
-def _decibel(value: float | None) -> str:
-    return "–" if value is None else f"{value:+.2f}"
+def size(scale: int, rows: list[dict[str, Any]]) -> list[str]:
+    """Return what was coded, what the seconds are and who measured."""
+    conditions = f"Pictures of `setup1` at scale {scale}; CPU seconds of one run, mean over qualities and scenes."
+    return [conditions, origin(rows)]
 
 
 if __name__ == "__main__":

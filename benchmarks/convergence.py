@@ -6,12 +6,13 @@ Balls of ever more segments (h = 2π/segments is the side of a triangle on a bal
 tracer in closed form: distance from the true surface, depth, normal, radiance and PSNR of a picture with shadow,
 mirror and glass. Then lenses of triangles: where they put the image of a point on the axis against Gauss, and where
 single rays end against Snell. The order of convergence is the slope of a straight line through the logarithms.
-Numbers and chart go to ``benchmarks/results/convergence.json`` and ``.png``.
+Numbers and chart go to ``benchmarks/results/convergence.jsonl`` and ``.png``.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +21,16 @@ from numpy.typing import NDArray
 
 from benchmarks.analytic import Array, Ball, World, still_life
 from benchmarks.camera_in_scene import lens_bodies
+from benchmarks.records import RESULTS, Records, add_again
 from ii_core import IICamera, preset
-from ii_core.files import atomic_path, write_json
+from ii_core.files import atomic_path
 from ii_core.optics import SphericalLenslet
-from metrics import provenance
 from metrics.plots.rd_chart import COLOURS
 from raytrace_ii import Body, Light, Material, Scene, trace
 from raytrace_ii.scene.textures import Image
 
-RESULTS = Path(__file__).parent / "results"
+RECORDS = Records("convergence", ("benchmarks.convergence", "benchmarks.analytic", "benchmarks.camera_in_scene"))
+FINEST = 768  # segments, of the page
 COARSEST = 12
 STEEP = 0.2  # least cosine between ray and surface where depth is compared: nearer to the rim its error has no bound
 LIT = 0.05  # least cosine to each of three lights where a normal is read off their light
@@ -46,27 +48,40 @@ ORDERS = {
 def main() -> None:
     """Measure, print, keep and draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--finest", type=int, default=768, help="segments of the finest ball")
-    finest = parser.parse_args().finest
-    levels = [s for s in (COARSEST * 2**i for i in range(10)) if s <= finest]
-    rows = balls(levels, preset("setup1", scale=16))
-    lenses = [*ball_lens(levels), *plano_convex([4, 8, 16, 32, 64])]
-    result = {
-        **provenance(),
+    parser.add_argument("--finest", type=int, default=FINEST, help="segments of the finest ball")
+    add_again(parser)
+    asked = parser.parse_args()
+    levels = [s for s in (COARSEST * 2**i for i in range(10)) if s <= asked.finest]
+    parts: dict[str, Callable[[], list[dict[str, Any]]]] = {
+        "balls": lambda: balls(levels, preset("setup1", scale=16)),
+        "ball lens": lambda: ball_lens(levels),
+        "plano-convex lens": lambda: plano_convex([4, 8, 16, 32, 64]),
+        "images": lambda: images(max(levels)),
+    }
+    for key in RECORDS.todo(({"part": part, "finest": asked.finest} for part in parts), asked.again):
+        RECORDS.measure(key, lambda part=key["part"]: {"rows": parts[part]()})
+    result = measured(asked.finest)
+    for part in ("rows", "lenses", "images"):
+        for row in result[part]:
+            print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
+    print("orders", result["orders"], result["lens_orders"])
+    chart(result, RESULTS / "convergence.png")
+
+
+def measured(finest: int = FINEST) -> dict[str, Any]:
+    """Return all rows, with the orders fitted to them."""
+    parts = {row["part"]: row for row in RECORDS.rows(finest=finest)}
+    rows = parts["balls"]["rows"]
+    lenses = [*parts["ball lens"]["rows"], *parts["plano-convex lens"]["rows"]]
+    return {
         "rows": rows,
         "orders": {name: order(rows, name) for name in ORDERS},
         "expected": ORDERS,
         "lenses": lenses,
         "lens_orders": lens_orders(lenses),
-        "images": images(max(levels)),
+        "images": parts["images"]["rows"],
+        "parts": list(parts.values()),
     }
-    for part in ("rows", "lenses", "images"):
-        for row in result[part]:
-            print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
-    print("orders", result["orders"], result["lens_orders"])
-    path = RESULTS / "convergence.json"
-    write_json(path, result)
-    chart(result, path.with_suffix(".png"))
 
 
 def order(rows: list[dict[str, Any]], name: str, skip: int = 1) -> float:

@@ -5,7 +5,7 @@
 Every scheme has a process of its own. After a small picture, which pays for imports and compiled kernels, the picture
 is coded and decoded ``runs`` times; medians of CPU time, and the growth of resident memory at its peak over what was
 there with the picture loaded, divided by the picture's own bytes (3 a pixel). Coded in the middle of the scheme's
-quantisers or qualities, in one run without search for a rate. Numbers go to ``benchmarks/results/cost.json``, the
+quantisers or qualities, in one run without search for a rate. Numbers go to ``benchmarks/results/cost.jsonl``, the
 table into ``docs/structure.md``.
 """
 
@@ -21,53 +21,58 @@ from statistics import median
 from typing import Any
 
 from benchmarks.fuzz import sample
-from benchmarks.readme import filled
+from benchmarks.pages import Tables, publish
+from benchmarks.records import Records, add_again, origin, with_commits
 from codec import Encoded, encode, schemes, timed_decode
 from codec.contract import find
 from ii_core import IIPicture, preset
-from ii_core.files import write_json
-from metrics import provenance, q_global
+from metrics import q_global
 from raytrace_ii import load_scene, render
 
-RESULTS = Path(__file__).parent / "results"
-DOCS = Path(__file__).parent.parent / "docs" / "structure.md"
+RECORDS = Records("cost", ("benchmarks.cost", "benchmarks.fuzz"))
+SCENE, SCALE, RUNS = "apples", 2, 3  # of the page
 PAGES = Path("/proc/self/statm")
 
 
 def main() -> None:
     """Measure, print, keep and fill the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=2)
-    parser.add_argument("--scene", default="apples")
+    parser.add_argument("--scale", type=int, default=SCALE)
+    parser.add_argument("--scene", default=SCENE)
     parser.add_argument("--schemes", default=",".join(schemes()))
-    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--runs", type=int, default=RUNS)
+    add_again(parser)
     parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one:
         print(json.dumps(measured(arguments.one[0], IIPicture.load(arguments.one[1]), arguments.runs)))
         return
-    rows = []
+    picture_of = {"scene": arguments.scene, "scale": arguments.scale}
+    names = arguments.schemes.split(",")
+    keys = RECORDS.todo(({**picture_of, "scheme": name, "runs": arguments.runs} for name in names), arguments.again)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "picture.png"
-        shot = render(load_scene(arguments.scene), preset("setup1", scale=arguments.scale), support=(), noise=1.0)
-        shot.picture.save(path)
-        for scheme in arguments.schemes.split(","):
-            command = [sys.executable, "-m", "benchmarks.cost", "--runs", str(arguments.runs), "--one", scheme]
-            done = subprocess.run([*command, str(path)], stdout=subprocess.PIPE, text=True, check=True)
-            rows.append({"scheme": scheme, **json.loads(done.stdout.splitlines()[-1])})
-            print(rows[-1], flush=True)
-    width, height = shot.picture.size
-    lines = table(rows)
-    print("\n".join(lines))
-    result = {
-        **provenance(),
-        "scene": arguments.scene,
-        "pixels": [width, height],
-        "runs": arguments.runs,
-        "rows": rows,
-    }
-    write_json(RESULTS / "cost.json", result)
-    DOCS.write_text(filled(DOCS.read_text(encoding="utf-8"), "cost", lines), encoding="utf-8")
+        if keys:
+            camera = preset("setup1", scale=arguments.scale)
+            render(load_scene(arguments.scene), camera, support=(), noise=1.0).picture.save(path)
+        for key in keys:
+            print(
+                RECORDS.measure(key, lambda key=key: apart(key["scheme"], path, arguments.runs))["result"], flush=True
+            )
+    publish(tables())
+
+
+def tables() -> Tables:
+    """Return the table of the page of structures."""
+    return {("docs/structure.md", "cost"): table(RECORDS.rows(scene=SCENE, scale=SCALE, runs=RUNS))}
+
+
+def apart(scheme: str, path: Path, runs: int) -> dict[str, Any]:
+    """Times and memory of one scheme in a process of its own."""
+    command = [sys.executable, "-m", "benchmarks.cost", "--runs", str(runs), "--one", scheme, str(path)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
 
 
 def measured(scheme: str, picture: IIPicture, runs: int) -> dict[str, Any]:
@@ -136,14 +141,14 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
     for r in rows:
         packing = r["encode_seconds"] - r["encoder_seconds"]
         unpacking = r["decode_seconds"] - r["decoder_seconds"]
-        lossless = r["q_global"] is None or r["q_global"] == float("inf")
+        lossless = r["q_global"] is None
         lines.append(
             f"| `{r['scheme']}` | {r['bpp']:.3g} | {'lossless' if lossless else format(r['q_global'], '.1f')} | "
             f"{r['encoder_seconds']:.2f} | {packing / r['encoder_seconds']:.0%} | {r['decoder_seconds']:.2f} | "
             f"{unpacking / r['encoder_seconds']:.0%} | {unpacking / r['decoder_seconds']:.0%} | "
             f"{r['encode_peak']:.1f} × | {r['decode_peak']:.1f} × |"
         )
-    return lines
+    return [origin(rows), "", *with_commits(lines, [[r["commit"]] for r in rows])]
 
 
 if __name__ == "__main__":

@@ -7,13 +7,12 @@ apart by what is seen, the first that holds: ``clear``, a body that hands light 
 ``edge``, one view pixel or less from a step in depth of more than a fifth, where what is seen is hidden from lenses
 nearby; ``flat``, without texture to go by (within a pixel of the elementary image luma changes by less than 3 steps
 of 8 bits); else ``textured``. Sensor noise is that of scale 8, where an array is 64 lenses wide. Numbers go to
-``benchmarks/results/depth_truth.json``, the chart drawn from them to ``docs/images/depth_truth.png``.
+``benchmarks/results/depth_truth.jsonl``, the chart drawn from them to ``docs/images/depth_truth.png``.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from pathlib import Path
 from typing import Any
@@ -22,19 +21,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from benchmarks.readme import fill
+from benchmarks.pages import Tables, publish
+from benchmarks.records import Records, add_again, origin, with_commits
 from codec import decode, encode
 from ii_core import IIPicture, add_sensor_noise, preset
-from ii_core.files import write_json
-from metrics import DepthQuality, FocusDepth, depth_from_focus, provenance, q_depth
+from metrics import DepthQuality, FocusDepth, depth_from_focus, q_depth
 from metrics.depth.focus import METHODS
 from metrics.depth.q_depth import virtual_camera_pixels
 from metrics.plots.rd_chart import COLOURS, new_figure, save
 from raytrace_ii import Scene, Shot, load_scene, render
 
 ROOT = Path(__file__).parent.parent
-RESULTS, CHART = ROOT / "benchmarks/results/depth_truth.json", ROOT / "docs/images/depth_truth.png"
-DOC = ROOT / "docs/metrics.md"
+RECORDS, CHART = Records("depth_truth", ("benchmarks.depth_truth",)), ROOT / "docs/images/depth_truth.png"
+SCALE = 2  # of the page
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
 KINDS = ("textured", "flat", "edge", "mirror", "clear")
 NOISES = (0, 1, 2, 4, 8)
@@ -47,40 +46,56 @@ SHADES = {"dissertation": COLOURS[1], "robust": COLOURS[0], "true": "0.15"}
 
 
 def main() -> None:
-    """Print a table, keep it, draw it."""
+    """Measure, keep, print and draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=2, help="divides setup1's lenses")
+    parser.add_argument("--scale", type=int, default=SCALE, help="divides setup1's lenses")
     parser.add_argument("--scenes", default=",".join(SCENES))
-    arguments = parser.parse_args()
-    rows, curves = [], []
-    for name in arguments.scenes.split(","):
-        scene = load_scene(name)
-        for scale in (NOISE_SCALE, arguments.scale):
-            shot = render(scene, preset("setup1", scale=scale), support=("depth", "object_id"))
-            noises = NOISES if scale == NOISE_SCALE else (0,)
-            kinds = tell_apart(scene, shot)
-            for noise in noises:
-                found = estimates(add_sensor_noise(shot.picture, noise, seed=1))
-                for method, (depth, seconds) in found.items():
-                    row = {"scene": name, "scale": scale, "noise": noise, "method": method}
-                    rows.append({**row, **errors(depth, shot, kinds), "cpu_seconds": seconds})
-                    say(rows[-1])
-        curves.append({"scene": name, "scale": scale, **quality(shot, found)})
-    write_json(RESULTS, {**provenance(), "bpp": BPP, "few": FEW, "rows": rows, "q_depth": curves})
-    write_up()
+    add_again(parser)
+    asked = parser.parse_args()
+    keys = [
+        {"scene": name, "scale": scale, "bpp": BPP}
+        for name in asked.scenes.split(",")
+        for scale in (NOISE_SCALE, asked.scale)
+    ]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda key=key: study(key["scene"], key["scale"]))
+    save(draw(data()), CHART)
+    publish(tables())
 
 
-def write_up() -> None:
-    """Chart and table of what is kept."""
-    data = json.loads(RESULTS.read_text(encoding="utf-8"))
-    save(draw(data), CHART)
-    fill(DOC, "depth-truth", table(data))
+def study(name: str, scale: int) -> dict[str, Any]:
+    """Errors of both methods on one picture, at the scale for noise with all noises; Q_depth at others."""
+    scene = load_scene(name)
+    shot = render(scene, preset("setup1", scale=scale), support=("depth", "object_id"))
+    kinds, rows = tell_apart(scene, shot), []
+    for noise in NOISES if scale == NOISE_SCALE else (0,):
+        found = estimates(add_sensor_noise(shot.picture, noise, seed=1))
+        for method, (depth, seconds) in found.items():
+            rows.append({"noise": noise, "method": method, **errors(depth, shot, kinds), "cpu_seconds": seconds})
+            say({"scene": name, "scale": scale, **rows[-1]})
+    return {"errors": rows, "q_depth": None if scale == NOISE_SCALE else quality(shot, found)}
+
+
+def data() -> dict[str, list[dict[str, Any]]]:
+    """Return the newest rows of errors and curves of Q_depth, of the scales on the page."""
+    kept = [row for row in RECORDS.rows(bpp=BPP) if row["scale"] in (NOISE_SCALE, SCALE)]
+    known = ("scene", "scale", "commit")
+    return {
+        "rows": [{**{k: row[k] for k in known}, **one} for row in kept for one in row["errors"]],
+        "q_depth": [{**{k: row[k] for k in known}, **row["q_depth"]} for row in kept if row["q_depth"]],
+    }
+
+
+def tables() -> Tables:
+    """Return the table of what is kept."""
+    return {("docs/metrics.md", "depth-truth"): table(data())}
 
 
 def table(data: dict[str, Any]) -> list[str]:
     """Both methods, scene by scene, without noise."""
     head = ("scene", "scale", "median", "90 %", "within 1 layer", "within 10 %", "Q_depth off")
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    commits = []
     for row in data["rows"]:
         if row["noise"] or row["method"] != METHODS[0]:
             continue
@@ -93,7 +108,9 @@ def table(data: dict[str, Any]) -> list[str]:
             " → ".join(off) + (" dB" if curve else ""),
         ]
         lines.append(f"| {row['scene']} | {row['scale']} | " + " | ".join(cells) + " |")
-    return [*lines, "", "Each cell: the dissertation's method → the robust one. Errors are in layers."]
+        commits.append([row["commit"]])
+    told = "Each cell: the dissertation's method → the robust one. Errors are in layers."
+    return [*with_commits(lines, commits), "", told, origin(data["rows"])]
 
 
 def _key(row: dict[str, Any]) -> dict[str, Any]:
@@ -215,7 +232,7 @@ def draw(data: dict[str, Any]) -> Any:
         axes.set_ylabel(r"$Q_\mathrm{depth}$ [dB]")
     for axes in panels[-1]:
         axes.set_xlabel("depth layer d, pooled in 24 bins")
-    upper.suptitle(f"JPEG 2000 at {data['bpp']} bit/pixel, scale {data['q_depth'][0]['scale']}", fontsize=11)
+    upper.suptitle(f"JPEG 2000 at {BPP} bit/pixel, scale {data['q_depth'][0]['scale']}", fontsize=11)
     handles, names = panels[0, 0].get_legend_handles_labels()
     upper.legend(handles, names, loc="outside lower right", ncols=3, frameon=False)
 

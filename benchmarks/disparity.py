@@ -4,23 +4,22 @@
 
 From the depth map alone: a point at distance z' from the lenses moves δP·z'/(Λ·δL) pixels from one sub-image to
 the next; it has no partner there if it leaves the picture or something nearer covers it. Numbers go to
-``benchmarks/results/disparity.json``.
+``benchmarks/results/disparity.jsonl``.
 """
 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.records import Records, add_again
 from ii_core import IICamera, preset, sub_images
-from ii_core.files import write_json
-from metrics import provenance
 from raytrace_ii import load_scene, render
 
+RECORDS = Records("disparity", ("benchmarks.disparity",))
 MOTION_RANGE = 16  # pixels, the coders' default
 
 
@@ -29,15 +28,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--scenes", default="apples,cuboid")
-    arguments = parser.parse_args()
-    rows = [
-        {"scene": name, "scale": scale, **analyse(name, scale)}
-        for name in arguments.scenes.split(",")
-        for scale in arguments.scale
-    ]
-    for row in rows:
+    add_again(parser)
+    asked = parser.parse_args()
+    keys = [{"scene": name, "scale": scale} for name in asked.scenes.split(",") for scale in asked.scale]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda key=key: analyse(key["scene"], key["scale"]))
+    for row in RECORDS.rows():
         print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
-    write_json(Path(__file__).parent / "results" / "disparity.json", {**provenance(), "rows": rows})
 
 
 def analyse(name: str, scale: int) -> dict[str, float]:

@@ -1,12 +1,13 @@
 """Damage coded pictures at random and see that decoding never does worse than say so.
 
-    python -m benchmarks.fuzz [--mutations 100000] [--workers 2] [--schemes si-h264,...] [--seed 0]
+    python -m benchmarks.fuzz [--mutations 4000] [--workers 2] [--schemes si-h264,...] [--seed 0]
 
 Every scheme's payload of a small picture is damaged past any checksum (bits flipped, bytes cut, repeated, replaced,
 put in from another scheme's stream, told to be of another size), and whole files likewise. Each must end in a picture
 of the right shape or a ValueError, in a second, in bounded memory. Workers are processes of their own with a limit on
 their memory, so that a crash is seen; what a worker died of, or took too long for, is kept with its number, from
-which ``--scheme S --only NUMBER`` makes it again. Counts and findings go to ``benchmarks/results/fuzz.json``.
+which ``--scheme S --only NUMBER`` makes it again. Counts and findings are rows of
+``benchmarks/results/fuzz.jsonl``, one a scheme; a run that was stopped goes on with the schemes that have none.
 """
 
 from __future__ import annotations
@@ -27,14 +28,15 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.pages import Tables, publish
+from benchmarks.records import Records, add_again, origin
 from codec import Encoded, decode, encode, schemes
 from codec.contract import find
 from ii_core import IIPicture
-from ii_core.files import write_json
-from metrics import provenance
 
-RESULTS = Path(__file__).parent / "results"
+RECORDS = Records("fuzz", ("benchmarks.fuzz",))
 LENSES, EI = (16, 8), (4, 4)
+ENDS = {"picture": "a picture of the right shape", "refused": "a ValueError"}
 SLOW = 1.0  # seconds of CPU time that a refusal may take
 STUCK = 300  # seconds after which a worker is taken for stuck, however loaded the machine
 HEADROOM = 1 << 30  # bytes of address space beyond what a worker has after its first decoding
@@ -43,29 +45,50 @@ HEADROOM = 1 << 30  # bytes of address space beyond what a worker has after its 
 def main() -> None:
     """Damage, count, keep."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--mutations", type=int, default=100_000)
+    parser.add_argument("--mutations", type=int, default=4000, help="of each scheme")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--schemes", default=",".join(schemes()))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--scheme", help=argparse.SUPPRESS)
     parser.add_argument("--range", type=int, nargs=2, help=argparse.SUPPRESS)
-    parser.add_argument("--only", type=int)
+    parser.add_argument("--only", type=int, help=argparse.SUPPRESS)
+    add_again(parser)
     arguments = parser.parse_args()
     if arguments.scheme:
         first, last = arguments.range or (arguments.only, arguments.only + 1)
         work(arguments.scheme, arguments.seed, first, last)
         return
-    names = arguments.schemes.split(",")
-    each = -(-arguments.mutations // len(names))
-    started = time.monotonic()
-    rows = []
-    with ThreadPoolExecutor(arguments.workers) as pool:
-        for name, outcome in zip(names, pool.map(lambda n: watched(n, arguments.seed, each), names), strict=True):
-            rows.append({"scheme": name, **outcome})
-            print(rows[-1], flush=True)
+    seed, count = arguments.seed, arguments.mutations
+    if unknown := set(arguments.schemes.split(",")) - set(schemes()):
+        parser.error(f"no scheme {min(unknown)!r}: known are {', '.join(schemes())}")
+    keys = [{"scheme": name, "seed": seed, "mutations": count} for name in arguments.schemes.split(",")]
+
+    def row(key: dict[str, Any]) -> None:
+        record = RECORDS.measure(key, lambda: watched(key["scheme"], seed, count))
+        print(f"{key['scheme']}: {record['result']}", flush=True)
+
+    pool = ThreadPoolExecutor(arguments.workers)
+    try:
+        for future in [pool.submit(row, key) for key in RECORDS.todo(keys, arguments.again)]:
+            future.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+    publish(tables())
+
+
+def tables() -> Tables:
+    """Return the sum over all schemes as lines of the page of formats."""
+    rows = RECORDS.rows()
     total = sum(sum(row["counts"].values()) for row in rows)
-    print(f"{total} mutations in {time.monotonic() - started:.0f} s")
-    write_json(RESULTS / "fuzz.json", {**provenance(), "seed": arguments.seed, "mutations": total, "rows": rows})
+    counts = Counter(kind for row in rows for kind, n in row["counts"].items() for _ in range(n))
+    longest = max(row["longest_seconds"] for row in rows)
+    ends = ", ".join(f"{counts[kind]} ended in {text}" for kind, text in ENDS.items() if counts[kind])
+    bad = total - sum(counts[kind] for kind in ENDS)
+    lines = [
+        f"{total} mutations over {len(rows)} schemes: {ends}, {bad} otherwise; the longest took {longest:.2f} CPU",
+        f"seconds. {origin(rows)}",
+    ]
+    return {("docs/formats.md", "fuzz"): lines}
 
 
 def watched(scheme: str, seed: int, count: int) -> dict[str, Any]:

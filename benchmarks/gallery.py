@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from benchmarks import camera_in_scene, map_precision
+from benchmarks.records import RESULTS, origin
 from ii_core import (
     IICamera,
     IIPicture,
@@ -34,7 +36,7 @@ from ii_core.regular import resampled
 from raytrace_ii import Scene, load_scene, render, scene_names
 
 ROOT = Path(__file__).parent.parent
-DOCS, CAMERAS, RESULTS = ROOT / "docs", ROOT / "assets" / "cameras", ROOT / "benchmarks" / "results"
+DOCS, CAMERAS = ROOT / "docs", ROOT / "assets" / "cameras"
 PANEL = (320, 160)  # pixels across and down
 GAP = 6
 SCALES = {"hdtv": 5}
@@ -101,7 +103,7 @@ def all_scenes() -> NDArray[np.uint8]:
 
 def precision() -> str:
     """What storing a camera as pictures costs, from `benchmarks.map_precision`."""
-    study = json.loads((RESULTS / "map_precision.json").read_text(encoding="utf-8"))
+    rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
     shutil.copy(RESULTS / "map_precision.png", DOCS / "images" / "map_precision.png")
     lines = [
         "\n## Stored as pictures: which format is enough\n",
@@ -110,7 +112,7 @@ def precision() -> str:
         "| camera | format | bytes per ray | angle max · rms | location max · rms | PSNR apples · cuboid |",
         "|---|---|---|---|---|---|",
     ]
-    for row in study["rows"]:
+    for row in rows:
         psnr = [row[f"psnr_{scene}"] for scene in ("apples", "cuboid")]
         shown = " · ".join("reference" if value is None else f"{value:.1f} dB" for value in psnr)
         lines.append(
@@ -118,12 +120,12 @@ def precision() -> str:
             f"| {figure(row['angle_max_urad'])} · {figure(row['angle_rms_urad'])} µrad "
             f"| {figure(row['place_max_um'])} · {figure(row['place_rms_um'])} µm | {shown} |"
         )
-    return "\n".join([*lines, "", VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""])
+    return "\n".join([*lines, "", origin(rows), VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""])
 
 
 def in_scene() -> str:
     """How the camera compares with one of glass inside the scene, from `benchmarks.camera_in_scene`."""
-    study = json.loads((RESULTS / "camera_in_scene.json").read_text(encoding="utf-8"))
+    (study,) = camera_in_scene.RECORDS.rows(scale=camera_in_scene.SCALE)
     shutil.copy(RESULTS / "camera_in_scene.png", DOCS / "images" / "camera_in_scene.png")
     lines = [
         IN_SCENE,
@@ -137,7 +139,9 @@ def in_scene() -> str:
         for row in study["rows"]
         if row["what"] in ("picture", "tessellation")
     ]
-    return "\n".join([*lines, "", "![both pictures and their differences](images/camera_in_scene.png)", ""])
+    return "\n".join(
+        [*lines, "", origin([study]), "", "![both pictures and their differences](images/camera_in_scene.png)", ""]
+    )
 
 
 IN_SCENE = """

@@ -5,31 +5,28 @@
 The pictures of ``setup2`` with fewer lenses, elementary images of 16² to 256² pixels. For every scheme and structure:
 a black picture and the scene at the coarsest quantiser, and where the stream can be taken apart the bits of its
 parameter sets and slice headers. For H.264 besides: PSNR of sub-, elementary and ray-space images at the same rates,
-beside what (5.14) and (5.15) predict. With ``--schemes`` and ``--sides`` only those are measured and the rest is kept
-from before. Numbers go to ``benchmarks/results/headers.json``, tables into
-``docs/structure.md``.
+beside what (5.14) and (5.15) predict. Every scheme with every structure is a row of
+``benchmarks/results/headers.jsonl``; tables go into ``docs/structure.md``.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.readme import filled
+from benchmarks.pages import Tables, publish
+from benchmarks.records import Records, add_again, origin, with_commits
 from codec import decode, encode, schemes
 from codec.inspect.header import coarsest, floor, frames, parts, si_below_ei, si_below_ri
 from ii_core import IIPicture, preset
-from ii_core.files import write_json
-from metrics import provenance, q_global
+from metrics import q_global
 from raytrace_ii import load_scene, render
 
-RESULTS = Path(__file__).parent / "results"
-DOCS = Path(__file__).parent.parent / "docs" / "structure.md"
+RECORDS = Records("headers", ("benchmarks.headers",))
+SCENE, SCALE = "apples", 4  # of the page
 SIDES = (16, 32, 64, 128, 256)
 RATES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
 KINDS = ("si", "ei", "ri")
@@ -38,43 +35,40 @@ KINDS = ("si", "ei", "ri")
 def main() -> None:
     """Measure, print, keep and fill the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=4)
-    parser.add_argument("--scene", default="apples")
-    parser.add_argument("--schemes", default="")
+    parser.add_argument("--scale", type=int, default=SCALE)
+    parser.add_argument("--scene", default=SCENE)
+    parser.add_argument("--schemes", default=",".join(schemes()))
     parser.add_argument("--sides", default=",".join(map(str, SIDES)))
-    arguments = parser.parse_args()
-    scene = load_scene(arguments.scene)
-    known = RESULTS / "headers.json"
-    before = json.loads(known.read_text(encoding="utf-8")) if arguments.schemes and known.exists() else {}
-    floors: list[dict[str, Any]] = before.get("floors", [])
-    duels: list[dict[str, Any]] = before.get("duels", [])
-    for side in map(int, arguments.sides.split(",")):
-        camera = preset(f"setup2-{side}", scale=arguments.scale)
-        picture = render(scene, camera, support=(), noise=1.0).picture
-        for scheme in arguments.schemes.split(",") if arguments.schemes else schemes():
-            row = {"side": side, **lowest(scheme, picture)}
-            print(row, flush=True)
-            floors = [r for r in floors if (r["side"], r["scheme"]) != (side, scheme)] + [row]
-        if not arguments.schemes:
-            duels.append({"side": side, **duel(picture)})
-            print(duels[-1], flush=True)
-    floors.sort(key=lambda row: (row["scheme"], row["side"]))
-    result = {**provenance(), "scale": arguments.scale, "scene": arguments.scene, "floors": floors, "duels": duels}
-    write_json(RESULTS / "headers.json", result)
-    text = DOCS.read_text(encoding="utf-8")
-    for mark, lines in (("floors", floor_table(floors)), ("parts", part_table(floors)), ("duels", duel_table(duels))):
-        text = filled(text, mark, lines)
-    DOCS.write_text(text, encoding="utf-8")
+    add_again(parser)
+    asked = parser.parse_args()
+    picture_of = {"scene": asked.scene, "scale": asked.scale}
+    for side in map(int, asked.sides.split(",")):
+        keys: list[dict[str, Any]] = [
+            {"part": "floor", **picture_of, "side": side, "scheme": scheme} for scheme in asked.schemes.split(",")
+        ]
+        if asked.schemes == parser.get_default("schemes"):
+            keys.append({"part": "duel", **picture_of, "side": side})
+        if not (keys := RECORDS.todo(keys, asked.again)):
+            continue
+        camera = preset(f"setup2-{side}", scale=asked.scale)
+        picture = render(load_scene(asked.scene), camera, support=(), noise=1.0).picture
+        for key in keys:
+
+            def found(key: dict[str, Any] = key, picture: IIPicture = picture) -> dict[str, Any]:
+                return lowest(key["scheme"], picture) if key["part"] == "floor" else duel(picture)
+
+            print(key, RECORDS.measure(key, found)["result"], flush=True)
+    publish(tables())
 
 
 def lowest(scheme: str, picture: IIPicture) -> dict[str, Any]:
     """The least a scheme can do with a structure: black, and with this picture."""
-    found: dict[str, Any] = {"scheme": scheme}
+    found: dict[str, Any] = {}
     try:
         black = floor(scheme, picture.lenses, picture.ei_pixels)
         real = coarsest(picture, scheme)
     except ValueError as error:
-        return {**found, "refused": str(error)}
+        return {"refused": str(error)}
     kind = scheme.partition("-")[0]
     if kind in KINDS and "-" in scheme:
         found["frames"] = frames(kind, picture.lenses, picture.ei_pixels)
@@ -112,19 +106,36 @@ def duel(picture: IIPicture) -> dict[str, Any]:
     return found
 
 
+def tables() -> Tables:
+    """Return the tables of the page of structures."""
+    floors, duels = (RECORDS.rows(part=part, scene=SCENE, scale=SCALE) for part in ("floor", "duel"))
+    floors.sort(key=lambda row: (row["scheme"], row["side"]))
+    return {
+        ("docs/structure.md", mark): [origin(rows), "", *made(rows)]
+        for mark, made, rows in (
+            ("floors", floor_table, floors), ("parts", part_table, floors), ("duels", duel_table, duels)
+        )
+    }  # fmt: skip
+
+
 def floor_table(rows: list[dict[str, Any]]) -> list[str]:
     """Black / scene at the coarsest, bpp, a column a structure."""
     lines = ["| scheme | " + " | ".join(f"{side}²" for side in SIDES) + " |", "|---|" + "---|" * len(SIDES)]
+    commits = []
     for scheme in dict.fromkeys(row["scheme"] for row in rows):
         those = {row["side"]: row for row in rows if row["scheme"] == scheme}
         cells = [floor_cell(those[side]) if side in those else "" for side in SIDES]
         lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
-    return lines
+        commits.append([row["commit"] for row in those.values()])
+    return with_commits(lines, commits)
 
 
 def floor_cell(row: dict[str, Any]) -> str:
     """Black / scene, and its PSNR."""
-    return "–" if "refused" in row else f"{row['black_bpp']:.2g} / {row['floor_bpp']:.2g} ({row['floor_db']:.1f})"
+    if "refused" in row:
+        return "–"
+    quality = "lossless" if row["floor_db"] is None else f"{row['floor_db']:.1f}"
+    return f"{row['black_bpp']:.2g} / {row['floor_bpp']:.2g} ({quality})"
 
 
 def part_table(rows: list[dict[str, Any]]) -> list[str]:
@@ -133,9 +144,8 @@ def part_table(rows: list[dict[str, Any]]) -> list[str]:
         "| scheme | EI | frames | start codes, lengths | parameter sets | slice headers | the rest | bits a frame |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for row in rows:
-        if "parts" not in row or row["side"] not in (16, 64, 256):
-            continue
+    shown = [row for row in rows if "parts" in row and row["side"] in (16, 64, 256)]
+    for row in shown:
         p, j = row["parts"], row["frames"]
         headers = "(in the rest)" if p["headers"] is None else f"{p['headers'] / j:.1f}"
         total = sum(p[name] or 0 for name in ("framing", "parameters", "messages", "headers", "data"))
@@ -143,7 +153,7 @@ def part_table(rows: list[dict[str, Any]]) -> list[str]:
             f"| `{row['scheme']}` | {row['side']}² | {j} | {p['framing'] / j:.1f} | {p['parameters'] / j:.1f} | "
             f"{headers} | {(p['data'] + p['messages']) / j:.1f} | {total / j:.1f} |"
         )
-    return lines
+    return with_commits(lines, [[row["commit"]] for row in shown])
 
 
 def duel_table(rows: list[dict[str, Any]]) -> list[str]:
@@ -159,7 +169,7 @@ def duel_table(rows: list[dict[str, Any]]) -> list[str]:
         cells += [f"{ei['lowest']['si'] or '–'}, {ei['lowest']['ei'] or '–'}"]
         cells += [yes(ri["predicted"]), yes(ri["fewer_header_bits"]), gain(ri), f"{ri['lowest']['ri'] or '–'}"]
         lines.append(f"| {row['side']}² | " + " | ".join(cells) + " |")
-    return lines
+    return with_commits(lines, [[row["commit"]] for row in rows])
 
 
 def yes(value: bool) -> str:

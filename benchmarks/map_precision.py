@@ -4,7 +4,7 @@
 
 For each format the largest and the root mean square angle between stored and true direction (µrad), the same for
 locations (µm), and the PSNR of *Apples* and *Cuboid* rendered from the maps against float maps. Numbers and chart go
-to ``benchmarks/results/map_precision.json`` and ``.png``.
+to ``benchmarks/results/map_precision.jsonl`` and ``.png``.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.records import RESULTS, Records, add_again, number
 from ii_core import IICamera, preset, read_maps, write_maps
-from ii_core.files import write_json
 from ii_core.maps import FORMATS
-from metrics import provenance, q_global
+from metrics import q_global
 from raytrace_ii import load_scene, render
 
-RESULTS = Path(__file__).parent / "results"
+RECORDS = Records("map_precision", ("benchmarks.map_precision",))
+SCALE = 4  # of the pages
 SCENES = ("apples", "cuboid")
 CAMERAS = ("setup1", "setup3", "spherical")
 
@@ -30,28 +31,35 @@ CAMERAS = ("setup1", "setup3", "spherical")
 def main() -> None:
     """Measure, print, keep and draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=4)
-    arguments = parser.parse_args()
+    parser.add_argument("--scale", type=int, default=SCALE)
+    parser.add_argument("--cameras", default=",".join(CAMERAS))
+    add_again(parser)
+    asked = parser.parse_args()
     scenes = {name: load_scene(name) for name in SCENES}
-    rows: list[dict[str, Any]] = []
-    for name in CAMERAS:
-        camera = preset(name, scale=arguments.scale)
+    for name in asked.cameras.split(","):
+        keys = RECORDS.todo(
+            ({"scale": asked.scale, "camera": name, "format": format} for format in FORMATS), asked.again
+        )
+        if not keys:
+            continue
+        camera = preset(name, scale=asked.scale)
         exact = {
             scene: render(loaded, stored(camera, "exr")[0], support=()).picture for scene, loaded in scenes.items()
         }
-        for format in FORMATS:
-            maps, size = stored(camera, format)
-            row = {"camera": name, "format": format, "bytes_per_pixel": size / camera.pixels[0] / camera.pixels[1]}
-            row |= errors(camera, maps)
-            for scene, loaded in scenes.items():
-                picture = render(loaded, maps, support=()).picture
-                row[f"psnr_{scene}"] = q_global(exact[scene], picture)
-            rows.append(row)
-            print(
-                "  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()), flush=True
-            )
-    write_json(RESULTS / "map_precision.json", {**provenance(), "scale": arguments.scale, "rows": rows})
-    chart(rows, RESULTS / "map_precision.png")
+        for key in keys:
+
+            def row(format: str = key["format"], camera: IICamera = camera, exact: Any = exact) -> dict[str, Any]:
+                maps, size = stored(camera, format)
+                psnr = {
+                    f"psnr_{scene}": q_global(exact[scene], render(loaded, maps, support=()).picture)
+                    for scene, loaded in scenes.items()
+                }
+                return {"bytes_per_pixel": size / camera.pixels[0] / camera.pixels[1], **errors(camera, maps), **psnr}
+
+            RECORDS.measure(key, row)
+    for line in RECORDS.rows(scale=asked.scale):
+        print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in line.items()))
+    chart(RECORDS.rows(scale=SCALE), RESULTS / "map_precision.png")
 
 
 def stored(camera: IICamera, format: str) -> tuple[Any, int]:
@@ -87,7 +95,7 @@ def chart(rows: list[dict[str, Any]], path: Path) -> None:
     colours = dict(zip(CAMERAS, ("#0072B2", "#D55E00", "#009E73"), strict=True))
     for axes, scene in zip(figure.subplots(1, 2, sharey=True), SCENES, strict=True):
         for row in rows:
-            if not np.isfinite(row[f"psnr_{scene}"]):
+            if not np.isfinite(number(row[f"psnr_{scene}"])):
                 continue  # the float maps are what the others are held against
             axes.plot(
                 row["bytes_per_pixel"], row[f"psnr_{scene}"], markers[row["format"]], color=colours[row["camera"]],

@@ -4,13 +4,13 @@
 
 Times are CPU seconds of the process, so that others on the machine count as little as can be; what runs on two
 cores takes half as long by the clock if both are free. Memory is what numpy allocates at most during a call, over
-the two pictures; that of Q_depth the growth of the process. Numbers go to ``benchmarks/results/metrics_speed.json``,
+the two pictures; that of Q_depth the growth of the process. Numbers go to ``benchmarks/results/metrics_speed.jsonl``,
 the chart drawn from them to ``docs/images/depth_cost.png``.
 """
 
 from __future__ import annotations
 
-import json
+import argparse
 import statistics
 import subprocess
 import sys
@@ -24,19 +24,19 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
-from benchmarks.readme import fill
+from benchmarks.pages import Tables, publish
+from benchmarks.records import Records, add_again, origin, with_commits
 from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, preset
-from ii_core.files import write_json
-from metrics import depth_from_focus, linear_layers, provenance, q_angle, q_depth, q_global, q_view
+from metrics import depth_from_focus, linear_layers, q_angle, q_depth, q_global, q_view
 from metrics.depth.q_depth import virtual_camera_pixels
 from metrics.plots.rd_chart import COLOURS, MARKERS, new_figure, save
 from metrics.view import LUMA, view_pair
 from raytrace_ii import Shot, load_scene, render
 
 ROOT = Path(__file__).parent.parent
-RESULTS, CHART = ROOT / "benchmarks/results/metrics_speed.json", ROOT / "docs/images/depth_cost.png"
-DOC, SPEED, FRONT = ROOT / "docs/metrics.md", ROOT / "docs/speed_accuracy.md", ROOT / "docs/images/depth_pareto.png"
+RECORDS = Records("metrics_speed", ("benchmarks.metrics_speed",))
+CHART, FRONT = ROOT / "docs/images/depth_cost.png", ROOT / "docs/images/depth_pareto.png"
 NEAR = 0.05  # of the depths right: what the recommended setting may have fewer than the best
 REPEATS = 7
 SCENES, SCALE, BPP = ("apples", "twins"), 4, 0.35  # of the accuracy chart
@@ -45,32 +45,75 @@ FARTHEST = 250  # layers of z = d·f, whatever their number
 
 def main() -> None:
     """Measure all, print, keep and draw."""
-    depth = q_depth_at_full_size("dissertation"), q_depth_at_full_size("robust")  # in processes of their own
-    a, b = full_size()
-    rows = [
-        *against_numpy(a, b),
-        {"what": "q_view: CPU s beyond SSIM's own", "target": "≤ 1", "value": view_seconds(a, b)},
-        {"what": "q_depth, 250 layers, 25 + 25 EIs: CPU s / 2 cores", "target": "≤ 30", "value": depth[0][0] / 2},
-        {"what": "q_depth: GiB over the pictures", "target": "≤ 1", "value": depth[0][1]},
-        {"what": "q_depth, robust: CPU s / 2 cores", "target": "", "value": depth[1][0] / 2},
-        {"what": "q_depth, robust: GiB over the pictures", "target": "", "value": depth[1][1]},
-    ]
-    for row in rows:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", default=",".join(SCENES), help="of the accuracy chart")
+    add_again(parser)
+    asked = parser.parse_args()
+    for key in RECORDS.todo(({"what": what} for what in TARGETS), asked.again):
+        RECORDS.measure(key, lambda what=key["what"]: {"value": value_of(what)})
+    for row in data()["rows"]:
         print(f"{row['what']:<56} {row['target']:>5}  {row['value']:.3g}", flush=True)
-    del a, b
-    points = [point for name in SCENES for point in accuracy(name)]
-    write_json(RESULTS, {**provenance(), "rows": rows, "accuracy": points, "scale": SCALE, "bpp": BPP})
-    write_up()
+    keys = [{"accuracy": name, "scale": SCALE, "bpp": BPP} for name in asked.scenes.split(",")]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda name=key["accuracy"]: {"points": accuracy(name)})
+    kept = data()
+    save(draw(kept), CHART)
+    save(draw_front(kept["accuracy"]), FRONT)
+    publish(tables())
 
 
-def write_up() -> None:
-    """Charts and tables of what is kept."""
-    data = json.loads(RESULTS.read_text(encoding="utf-8"))
-    save(draw(data), CHART)
-    save(draw_front(data["accuracy"]), FRONT)
-    fill(SPEED, "evaluation", front_table(data))
-    lines = [f"| {row['what']} | {row['target']} | {row['value']:.3g} |" for row in data["rows"]]
-    fill(DOC, "speed", ["| | target | measured |", "|---|---|---|", *lines])
+# Rows of the table, and their targets.
+TARGETS = {
+    "q_global / numpy subtract and square": "≤ 3",
+    "q_global: MiB allocated at most": "",
+    "q_angle / numpy subtract and square": "≤ 3",
+    "q_angle: MiB allocated at most": "",
+    "q_view: CPU s beyond SSIM's own": "≤ 1",
+    "q_depth, 250 layers, 25 + 25 EIs: CPU s / 2 cores": "≤ 30",
+    "q_depth: GiB over the pictures": "≤ 1",
+    "q_depth, robust: CPU s / 2 cores": "",
+    "q_depth, robust: GiB over the pictures": "",
+}
+
+
+def value_of(what: str) -> float:
+    """Measure one row."""
+    if what.startswith("q_depth"):
+        seconds, gib = q_depth_at_full_size("robust" if "robust" in what else "dissertation")
+        return gib if "GiB" in what else seconds / 2
+    a, b = full_size()
+    if what.startswith("q_view"):
+        return view_seconds(a, b)
+    metric = {"q_global": q_global, "q_angle": q_angle}[what.replace(":", " ").split()[0]]
+    metric(a, b)
+    return _peak(lambda: metric(a, b)) if "MiB" in what else against_numpy(metric, a, b)
+
+
+def data() -> dict[str, list[dict[str, Any]]]:
+    """Return the newest rows and points of the accuracy chart."""
+    rows = {row["what"]: row for row in RECORDS.rows() if "what" in row}
+    points = [
+        {"scene": row["accuracy"], "commit": row["commit"], **point}
+        for row in RECORDS.rows(scale=SCALE, bpp=BPP)
+        for point in row["points"]
+    ]
+    return {
+        "rows": [{"target": target, **rows[what]} for what, target in TARGETS.items() if what in rows],
+        "accuracy": points,
+    }
+
+
+def tables() -> Tables:
+    """Return the tables of what is kept."""
+    kept = data()
+    lines = [f"| {row['what']} | {row['target']} | {row['value']:.3g} |" for row in kept["rows"]]
+    cost = with_commits(
+        ["| | target | measured |", "|---|---|---|", *lines], [[row["commit"]] for row in kept["rows"]]
+    )
+    return {
+        ("docs/speed_accuracy.md", "evaluation"): front_table(kept),
+        ("docs/metrics.md", "speed"): [*cost, "", origin(kept["rows"])],
+    }
 
 
 def full_size() -> tuple[IIPicture, IIPicture]:
@@ -83,24 +126,14 @@ def full_size() -> tuple[IIPicture, IIPicture]:
     return a, b
 
 
-def against_numpy(a: IIPicture, b: IIPicture) -> list[dict[str, Any]]:
-    """Times of q_global and q_angle over that of numpy's subtraction and square of bytes, and their memory."""
+def against_numpy(metric: Callable[[IIPicture, IIPicture], object], a: IIPicture, b: IIPicture) -> float:
+    """CPU time of a measure over that of numpy's subtraction and square of bytes."""
 
     def plain() -> None:
         difference = np.subtract(a.pixels, b.pixels)  # of bytes, wrong as it wraps: the least that numpy can do
         np.square(difference, out=difference)
 
-    rows = []
-    for name, metric in (("q_global", q_global), ("q_angle", q_angle)):
-        metric(a, b)
-        ratios = [_cpu(lambda m=metric: m(a, b)) / _cpu(plain) for _ in range(REPEATS)]
-        rows.append(
-            {"what": f"{name} / numpy subtract and square", "target": "≤ 3", "value": statistics.median(ratios)}
-        )
-        rows.append(
-            {"what": f"{name}: MiB allocated at most", "target": "", "value": _peak(lambda m=metric: m(a, b))}
-        )
-    return rows
+    return statistics.median([_cpu(lambda: metric(a, b)) / _cpu(plain) for _ in range(REPEATS)])
 
 
 def view_seconds(a: IIPicture, b: IIPicture) -> float:
@@ -170,7 +203,7 @@ def accuracy(name: str) -> list[dict[str, Any]]:
         seconds = time.process_time() - started
         measured = q_depth(picture, decoded, depth=found)
         points.append(
-            {"scene": name, "what": what, "number": number, "method": method, "cpu_seconds": seconds,
+            {"what": what, "number": number, "method": method, "cpu_seconds": seconds,
              **compared(shot, decoded, found, measured)}
         )  # fmt: skip
         print(f"{name} {method} {what} {number}: {points[-1]['right']:.3f} right, {points[-1]['off_db']:.2f} dB off, "
@@ -246,14 +279,22 @@ def setting(point: dict[str, Any]) -> str:
 def front_table(data: dict[str, Any]) -> list[str]:
     """The fronts, the recommended setting in bold."""
     lines = ["| scene | take | depths right | Q_depth off | CPU time |", "|---|---|---|---|---|"]
+    commits = []
     for scene, best in fronts(data["accuracy"]).items():
         pick = recommended(best)
         for point in best:
             name = f"**{setting(point)}**" if point is pick else setting(point)
             cells = f"{point['right']:.0%} | {point['off_db']:.1f} dB | {point['cpu_seconds']:.2f} s"
             lines.append(f"| {scene} | {name} | {cells} |")
-    size = f"`setup1` at `scale={data['scale']}`, JPEG 2000 at {data['bpp']} bit/pixel."
-    return [size, "", *lines, "", f"In bold the quickest within {100 * NEAR:.0f} of a hundred depths of the best."]
+            commits.append([point["commit"]])
+    size = f"`setup1` at `scale={SCALE}`, JPEG 2000 at {BPP} bit/pixel. {origin(data['accuracy'])}"
+    return [
+        size,
+        "",
+        *with_commits(lines, commits),
+        "",
+        f"In bold the quickest within {100 * NEAR:.0f} of a hundred depths of the best.",
+    ]
 
 
 def draw_front(points: list[dict[str, Any]]) -> Any:

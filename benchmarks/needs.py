@@ -7,15 +7,13 @@ from it by no more than the reference set's own 8-bit picture does, with its sen
 SSIM of the worst of five views, and in the error that one pixel in a thousand exceeds. The last is there for what is
 small and far off, which means hide. Of the things that a scene can do without, those that save most are left out
 first, as long as all that is left out together is not to be told apart. CPU time is the median over rounds in which
-every model is rendered once. Numbers go to ``benchmarks/results/needs.json``, tables and chart to
+every model is rendered once. Numbers go to ``benchmarks/results/needs.jsonl``, tables and chart to
 ``docs/speed_accuracy.md``.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -27,19 +25,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import zoom
 
+from benchmarks.pages import Tables, publish
 from benchmarks.pareto import BASE, SCENES, at_depth, cut_scene, scene_text, sizes
-from benchmarks.readme import filled
+from benchmarks.records import Records, add_again, by_scene
 from ii_core import IICamera, IIPicture, add_sensor_noise, preset
 from ii_core.component import light_field
-from ii_core.files import atomic_path, write_json
-from metrics import provenance, q_global, q_view
+from metrics import q_global, q_view
 from metrics.plots.rd_chart import COLOURS, new_figure, save
 from raytrace_ii import Body, Scene, Shot, render
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, VertexColours
 
 ROOT = Path(__file__).parent.parent
-RESULTS, CHART = ROOT / "benchmarks/results/needs.json", ROOT / "docs/images/needs.png"
-PAGE = ROOT / "docs/speed_accuracy.md"
+RECORDS, CHART = Records("needs", ("benchmarks.needs", "benchmarks.pareto")), ROOT / "docs/images/needs.png"
+PAGE, SCALE, ROUNDS = "docs/speed_accuracy.md", 16, 5
 RARE = 0.999  # share of pixels whose error is no greater than "one in a thousand exceeds"
 SHADOWS, FILTER = "shadows", "texture filtering"
 DEPTH, CUT = "bounces beyond {}", "triangles, × {:g}"
@@ -49,21 +47,26 @@ CUTS = (0.25, 0.5)
 def main() -> None:
     """Measure, keep, and fill the page once all scenes are there."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=16)
+    parser.add_argument("--scale", type=int, default=SCALE)
     parser.add_argument("--scenes", default=",".join(SCENES))
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--output", type=Path, default=RESULTS)
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
+    add_again(parser)
     asked = parser.parse_args()
-    studies = {}
-    for name in asked.scenes.split(","):
-        started = time.perf_counter()
-        studies[name] = study(name, asked.scale, asked.rounds)
-        least = studies[name]["least"]
-        print(f"{name}: without {', '.join(least['without']) or 'nothing'}, {least['psnr']:.1f} dB, "
-              f"{least['time']:+.0%}, {time.perf_counter() - started:.0f} s", flush=True)  # fmt: skip
-    write_json(asked.output, {**provenance(), "scale": asked.scale, "rounds": asked.rounds, "scenes": studies})
-    if asked.output == RESULTS and set(studies) == set(SCENES):
-        write_up()
+    keys = [{"scene": name, "scale": asked.scale, "rounds": asked.rounds} for name in asked.scenes.split(",")]
+    for key in RECORDS.todo(keys, asked.again):
+        record = RECORDS.measure(key, lambda key=key: study(key["scene"], key["scale"], key["rounds"]))
+        least = record["result"]["least"]
+        print(f"{key['scene']}: without {', '.join(least['without']) or 'nothing'}, {least['time']:+.0%}, "
+              f"{record['seconds']:.0f} s", flush=True)  # fmt: skip
+    if set(scenes := measured()) == set(SCENES):
+        save(draw(scenes), CHART)
+        publish(tables())
+
+
+def measured() -> dict[str, Any]:
+    """Return the newest row of every scene at the page's scale, in the order of SCENES."""
+    rows = {row["scene"]: row for row in RECORDS.rows(scale=SCALE, rounds=ROUNDS)}
+    return {name: rows[name] for name in SCENES if name in rows}
 
 
 def study(name: str, scale: int, rounds: int) -> dict[str, Any]:
@@ -291,23 +294,18 @@ def enlarged(picture: IIPicture, axes: tuple[int, int], *, linear: bool) -> NDAr
     return field.astype(picture.pixels.dtype).reshape(l * v, k * u, 3)
 
 
-def write_up() -> None:
-    """Chart and tables of what is kept."""
-    data = json.loads(RESULTS.read_text(encoding="utf-8"))
-    save(draw(data), CHART)
-    (k, l), (m, n) = (lambda c: (c.lenses, c.pixels))(preset("setup1", scale=data["scale"]))
-    text = PAGE.read_text(encoding="utf-8")
-    size = f"`setup1` at `scale={data['scale']}`: {m}×{n} pixels, {k}×{l} lenses, {BASE} samples a pixel."
-    for mark, lines in (
-        ("needs-size", [size]),
-        ("uses", uses_table(data["scenes"])),
-        ("least", least_table(data["scenes"])),
-        ("needs", needs_table(data["scenes"])),
-        ("fewer", fewer_table(data["scenes"])),
-    ):
-        text = filled(text, mark, lines)
-    with atomic_path(PAGE) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+def tables() -> Tables:
+    """Return the tables of what is kept."""
+    scenes, camera = measured(), preset("setup1", scale=SCALE)
+    (k, l), (m, n) = camera.lenses, camera.pixels
+    size = f"`setup1` at `scale={SCALE}`: {m}×{n} pixels, {k}×{l} lenses, {BASE} samples a pixel."
+    return {
+        (PAGE, "needs-size"): [size, by_scene(scenes)],
+        (PAGE, "uses"): uses_table(scenes),
+        (PAGE, "least"): least_table(scenes),
+        (PAGE, "needs"): needs_table(scenes),
+        (PAGE, "fewer"): fewer_table(scenes),
+    }
 
 
 def uses_table(scenes: dict[str, Any]) -> list[str]:
@@ -377,10 +375,10 @@ def fewer_table(scenes: dict[str, Any]) -> list[str]:
     return lines
 
 
-def draw(data: dict[str, Any]) -> Any:
+def draw(scenes: dict[str, Any]) -> Any:
     """A panel a scene: how far the picture is off without each thing, and what that saves."""
     figure = new_figure(15, 8.5)
-    for axes, (name, one) in zip(figure.subplots(2, 4).flat, data["scenes"].items(), strict=True):
+    for axes, (name, one) in zip(figure.subplots(2, 4).flat, scenes.items(), strict=True):
         rows = sorted(one["left_out"], key=lambda row: _place(row["what"]), reverse=True)
         limit = one["limit"]["psnr"]
         top = limit + 25  # the same picture has no PSNR: it stands at the edge

@@ -3,46 +3,63 @@
     python -m benchmarks.orders [--scale 2] [--scenes apples,twins,car,cuboid]
 
 Correlation of consecutive frames, its spread, and residual energy, (5.3)–(5.7). Numbers go to
-``benchmarks/results/orders.json``, the table into ``docs/structure.md``.
+``benchmarks/results/orders.jsonl``, the table into ``docs/structure.md``.
 """
 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
-from benchmarks.readme import filled
+from benchmarks.pages import Tables, publish
+from benchmarks.records import Records, add_again, origin, with_commits
 from codec.inspect.order_analysis import analyse_orders
 from codec.order import ORDERS
 from ii_core import preset
-from ii_core.files import write_json
-from metrics import provenance
 from raytrace_ii import load_scene, render
 
-RESULTS = Path(__file__).parent / "results"
-DOCS = Path(__file__).parent.parent / "docs" / "structure.md"
+RECORDS = Records("orders", ("benchmarks.orders",))
+SCALE = 2  # of the page
 
 
 def main() -> None:
     """Measure, print, keep and fill the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=2)
+    parser.add_argument("--scale", type=int, default=SCALE)
     parser.add_argument("--scenes", default="apples,twins,car,cuboid")
-    arguments = parser.parse_args()
-    rows: list[dict[str, Any]] = []
-    for name in arguments.scenes.split(","):
-        shot = render(load_scene(name), preset("setup1", scale=arguments.scale), support=(), noise=1.0)
-        rows += [{"scene": name, **analysis.to_json()} for analysis in analyse_orders(shot.picture)]
-    lines = table(rows)
-    print("\n".join(lines))
-    write_json(RESULTS / "orders.json", {**provenance(), "camera": "setup1", "scale": arguments.scale, "rows": rows})
-    DOCS.write_text(filled(DOCS.read_text(encoding="utf-8"), "orders", lines), encoding="utf-8")
+    add_again(parser)
+    asked = parser.parse_args()
+    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes.split(",")]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda key=key: analysed(**key))
+    print("\n".join(table(measured(asked.scale))))
+    publish(tables())
+
+
+def analysed(scene: str, scale: int) -> dict[str, Any]:
+    """All orders of all kinds of component images of one scene."""
+    shot = render(load_scene(scene), preset("setup1", scale=scale), support=(), noise=1.0)
+    return {"orders": [analysis.to_json() for analysis in analyse_orders(shot.picture)]}
+
+
+def measured(scale: int) -> list[dict[str, Any]]:
+    """A row an order, of the newest records of a scale."""
+    return [
+        {"scene": row["scene"], "commit": row["commit"], **one}
+        for row in RECORDS.rows(scale=scale)
+        for one in row["orders"]
+    ]
+
+
+def tables() -> Tables:
+    """Return the table of the page of structures."""
+    return {("docs/structure.md", "orders"): table(measured(SCALE))}
 
 
 def table(rows: list[dict[str, Any]]) -> list[str]:
     """A row a scene and kind; a column an order: mean correlation, its spread, energy a sample."""
     lines = ["| scene | images | " + " | ".join(ORDERS) + " |", "|---|---|" + "---|" * len(ORDERS)]
+    commits = []
     for scene, kind in dict.fromkeys((row["scene"], row["kind"]) for row in rows):
         those = {row["order"]: row for row in rows if (row["scene"], row["kind"]) == (scene, kind)}
         best = max(those, key=lambda order: those[order]["correlation_mean"])
@@ -52,7 +69,8 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
             cell = f"{r['correlation_mean']:.3f} ± {r['correlation_sigma']:.3f}, {r['energy_per_sample']:.0f}"
             cells.append(f"**{cell}**" if order == best else cell)
         lines.append(f"| {scene} | {kind.upper()} | " + " | ".join(cells) + " |")
-    return lines
+        commits.append([row["commit"] for row in those.values()])
+    return [origin(rows), "", *with_commits(lines, commits)]
 
 
 if __name__ == "__main__":

@@ -5,18 +5,16 @@
 The error is PSNR in 16-bit sRGB against a reference of 64 samples a pixel, 12 bounces and, where the scene's file
 says how finely its shapes are cut, triangles half as large; time is CPU seconds of `render` without support images,
 the least of two or three. Samples a pixel, adaptive sampling to an error, recursion depth and tessellation are swept;
-settings that nothing beats in both are the Pareto front. Numbers and chart go to ``benchmarks/results/pareto.json``
+settings that nothing beats in both are the Pareto front. Numbers and chart go to ``benchmarks/results/pareto.jsonl``
 and ``.png``, tables and chart to ``docs/speed_accuracy.md``.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import re
 import shutil
 import tempfile
-import time
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -24,15 +22,18 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.readme import filled
+from benchmarks.map_precision import RECORDS as MAPS
+from benchmarks.map_precision import SCALE as MAPS_SCALE
+from benchmarks.pages import Tables, publish
+from benchmarks.records import RESULTS, Records, add_again, by_scene, origin
 from ii_core import IICamera, IIPicture, preset
-from ii_core.files import atomic_path, write_json
-from metrics import provenance, q_global
+from ii_core.files import atomic_path
+from metrics import q_global
 from metrics.plots.rd_chart import COLOURS
 from raytrace_ii import Scene, load_scene, render
 
 ROOT = Path(__file__).parent.parent
-RESULTS, DOCS = ROOT / "benchmarks" / "results", ROOT / "docs"
+RECORDS, SCALE = Records("pareto", ("benchmarks.pareto",)), 32  # of the page
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
 SAMPLES = (1, 2, 4, 9, 16)
 AT_DEPTHS = (1, 4, 16)  # samples at which other depths are tried
@@ -49,21 +50,41 @@ BASE = 4  # samples at which depth and cut are compared
 def main() -> None:
     """Measure, print, keep, draw and fill the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=32)
+    parser.add_argument("--scale", type=int, default=SCALE)
     parser.add_argument("--scenes", default=",".join(SCENES))
-    arguments = parser.parse_args()
-    camera = preset("setup1", scale=arguments.scale)
-    studies = {}
-    for name in arguments.scenes.split(","):
-        started = time.perf_counter()
-        studies[name] = study(name, camera)
-        best = studies[name]["recommended"]
-        print(f"{name}: {best['setting']}, {best['psnr']:.1f} dB, {time.perf_counter() - started:.0f} s", flush=True)
-    path = RESULTS / "pareto.json"
-    write_json(path, {**provenance(), "scale": arguments.scale, "scenes": studies})
-    if set(studies) == set(SCENES):
-        chart(path, path.with_suffix(".png"))
-        document(path)
+    add_again(parser)
+    asked = parser.parse_args()
+    camera = preset("setup1", scale=asked.scale)
+    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes.split(",")]
+    for key in RECORDS.todo(keys, asked.again):
+        record = RECORDS.measure(key, lambda key=key: study(key["scene"], camera))
+        best = record["result"]["recommended"]
+        print(f"{key['scene']}: {best['setting']}, {best['psnr']:.1f} dB, {record['seconds']:.0f} s", flush=True)
+    if set(scenes := measured()) == set(SCENES):
+        chart(scenes, RESULTS / "pareto.png")
+        shutil.copy(RESULTS / "pareto.png", ROOT / "docs" / "images" / "pareto.png")
+        publish(tables())
+
+
+def measured() -> dict[str, Any]:
+    """Return the newest row of every scene at the page's scale, in the order of SCENES."""
+    rows = {row["scene"]: row for row in RECORDS.rows(scale=SCALE)}
+    return {name: rows[name] for name in SCENES if name in rows}
+
+
+def tables() -> Tables:
+    """Return the tables of the page."""
+    data, camera = measured(), preset("setup1", scale=SCALE)
+    (k, l), (m, n) = camera.lenses, camera.pixels
+    page = "docs/speed_accuracy.md"
+    return {
+        (page, "size"): [f"`setup1` at `scale={SCALE}`: {m}×{n} pixels, {k}×{l} lenses.", by_scene(data)],
+        (page, "recommended"): recommended_table(data),
+        (page, "samples"): samples_table(data),
+        (page, "depth"): depth_table(data),
+        (page, "cut"): cut_table(data),
+        (page, "maps"): maps_table(MAPS.rows(scale=MAPS_SCALE, camera="setup1")),
+    }
 
 
 def study(name: str, camera: IICamera) -> dict[str, Any]:
@@ -193,13 +214,12 @@ NAMES = {
 }  # fmt: skip
 
 
-def chart(source: Path, target: Path) -> None:
-    """A panel a scene, from what `main` wrote."""
+def chart(data: dict[str, Any], target: Path) -> None:
+    """A panel a scene."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    data = json.loads(source.read_text(encoding="utf-8"))["scenes"]
     figure = Figure(figsize=(14, 7.4), layout="constrained")
     FigureCanvasAgg(figure)
     for axes, (name, one) in zip(figure.subplots(2, 4).flat, data.items(), strict=True):
@@ -238,27 +258,6 @@ def chart(source: Path, target: Path) -> None:
     )  # fmt: skip
     with atomic_path(target) as temporary:
         figure.savefig(temporary, dpi=120, format="png")
-
-
-def document(source: Path) -> None:
-    """Put chart and tables on the page."""
-    result = json.loads(source.read_text(encoding="utf-8"))
-    data = result["scenes"]
-    shutil.copy(source.with_suffix(".png"), DOCS / "images" / "pareto.png")
-    page = DOCS / "speed_accuracy.md"
-    text = page.read_text(encoding="utf-8")
-    (k, l), (m, n) = (preset("setup1", scale=result["scale"]).lenses, preset("setup1", scale=result["scale"]).pixels)
-    text = filled(text, "size", [f"`setup1` at `scale={result['scale']}`: {m}×{n} pixels, {k}×{l} lenses."])
-    for mark, lines in (
-        ("recommended", recommended_table(data)),
-        ("samples", samples_table(data)),
-        ("depth", depth_table(data)),
-        ("cut", cut_table(data)),
-        ("maps", maps_table(json.loads((RESULTS / "map_precision.json").read_text(encoding="utf-8")))),
-    ):
-        text = filled(text, mark, lines)
-    with atomic_path(page) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def recommended_table(data: dict[str, Any]) -> list[str]:
@@ -318,17 +317,17 @@ def cut_table(data: dict[str, Any]) -> list[str]:
     return lines
 
 
-def maps_table(data: dict[str, Any]) -> list[str]:
+def maps_table(rows: list[dict[str, Any]]) -> list[str]:
     """What `benchmarks.map_precision` found for setup1."""
     lines = ["| stored as | bytes a ray | largest angle off | apples | cuboid |", "|---|---|---|---|---|"]
-    for row in (r for r in data["rows"] if r["camera"] == "setup1"):
+    for row in rows:
         psnr = [
             "exact" if p is None or not np.isfinite(p) else f"{p:.1f} dB"
             for p in (row["psnr_apples"], row["psnr_cuboid"])
         ]
         cells = f"{row['bytes_per_pixel']:.2f} | {row['angle_max_urad']:.2g} µrad | {psnr[0]} | {psnr[1]}"
         lines.append(f"| {row['format']} | {cells} |")
-    return lines
+    return [*lines, "", origin(rows)]
 
 
 if __name__ == "__main__":

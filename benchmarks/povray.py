@@ -6,12 +6,13 @@ POV-Ray knows balls and planes in closed form, and its ``mesh_camera`` takes one
 triangles: from their centroids along their normals, which is a way to hand over any L and D. Its picture is held
 against ours (triangles) and against `analytic` (closed form, as itself): PSNR of linear light by object, and a
 picture of the difference. Needs ``povray`` on the path (Debian: ``apt-get install povray``); without it the script
-says so and ends. Numbers and pictures go to ``benchmarks/results/povray.json`` and ``.png``.
+says so and ends. Numbers and pictures go to ``benchmarks/results/povray.jsonl`` and ``.png``.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import shutil
 import subprocess
 import sys
@@ -24,13 +25,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.analytic import Array, Ball, Floor, World, still_life
-from benchmarks.readme import filled
+from benchmarks.pages import Tables, publish
+from benchmarks.records import RESULTS, Records, add_again, origin, with_commits
 from ii_core import IICamera, preset
-from ii_core.files import atomic_path, write_image, write_json
-from metrics import provenance
+from ii_core.files import write_image
 from raytrace_ii import Light, Material, trace
 
-RESULTS = Path(__file__).parent / "results"
+RECORDS = Records("povray", ("benchmarks.povray", "benchmarks.analytic"))
+DOCS = Path(__file__).parents[1] / "docs"
+SCALE = 16  # of the page
 SEGMENTS = 384
 SIDE = 1.0  # mm from corner to centroid of a triangle that stands for a ray; POV-Ray drops very small ones
 
@@ -38,26 +41,37 @@ SIDE = 1.0  # mm from corner to centroid of a triangle that stands for a ray; PO
 def main() -> None:
     """Render with all three, compare, keep."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=16)
-    arguments = parser.parse_args()
+    parser.add_argument("--scale", type=int, default=SCALE)
+    add_again(parser)
+    asked = parser.parse_args()
     if shutil.which("povray") is None:
         print("povray is not installed: nothing to compare with (Debian: apt-get install povray)")
         sys.exit(0)
     world = still_life()
-    array = preset("setup1", scale=arguments.scale)
+    array = preset("setup1", scale=asked.scale)
     pitch = 10.24 / array.pixels[0]
     flat = IICamera(name="pinhole", pixels=array.pixels, lenses=(1, 1), pixel_pitch_mm=pitch, gap_mm=8.0)
-    rows, pictures = [], []
-    for camera, mesh in ((flat, False), (flat, True), (array, True)):
-        found, picture = compare(world, camera, mesh)
-        rows += found
-        pictures.append(picture)
-    for row in rows:
-        print("  ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()), flush=True)
-    write_json(RESULTS / "povray.json", {**provenance(), "povray": version(), "segments": SEGMENTS, "rows": rows})
-    gap = np.full((8, pictures[0].shape[1], 3), 255, np.uint8)
-    write_image(RESULTS / "povray.png", np.concatenate([pictures[0], gap, pictures[2]]))
-    document(rows)
+    pictures = []
+    cases = {("pinhole", "pinhole"): flat, ("pinhole", "mesh_camera"): flat, ("setup1", "mesh_camera"): array}
+    keys = [{"scale": asked.scale, "camera": name, "rays by": by, "segments": SEGMENTS} for name, by in cases]
+    if not (keys := RECORDS.todo(keys, asked.again)):
+        publish(tables())
+        return
+    for key in keys:
+
+        def found(name: str = key["camera"], by: str = key["rays by"]) -> dict[str, Any]:
+            rows, picture = compare(world, cases[name, by], by == "mesh_camera")
+            if (name, by) != ("pinhole", "mesh_camera"):
+                pictures.append(picture)
+            return {"povray": version(), "rows": rows}
+
+        for row in RECORDS.measure(key, found)["result"]["rows"]:
+            print("  ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
+    if len(pictures) == 2:
+        gap = np.full((8, pictures[0].shape[1], 3), 255, np.uint8)
+        write_image(RESULTS / "povray.png", np.concatenate([pictures[0], gap, pictures[1]]))
+        shutil.copy(RESULTS / "povray.png", DOCS / "images" / "povray.png")
+    publish(tables())
 
 
 def compare(world: World, camera: IICamera, mesh: bool) -> tuple[list[dict[str, Any]], NDArray[np.uint8]]:
@@ -75,7 +89,7 @@ def compare(world: World, camera: IICamera, mesh: bool) -> tuple[list[dict[str, 
         here = np.full(len(which), True) if i is None else which == i
         if not here.any():
             continue
-        row = {"camera": camera.name, "rays by": "mesh_camera" if mesh else "pinhole", "seen": name}
+        row: dict[str, Any] = {"seen": name}
         for pair, a, b in (
             ("ours", ours, theirs),
             ("closed form", exact, theirs),
@@ -90,19 +104,17 @@ def compare(world: World, camera: IICamera, mesh: bool) -> tuple[list[dict[str, 
     return rows, np.concatenate([part.reshape(shape) for part in parts], axis=1)
 
 
-def document(rows: list[dict[str, Any]]) -> None:
-    """Put table and picture on the page of what is known about truth."""
-    docs = RESULTS.parent.parent / "docs"
-    shutil.copy(RESULTS / "povray.png", docs / "images" / "povray.png")
+def tables() -> Tables:
+    """Return the table of the page of stability."""
     pairs = ("POV-Ray / closed form", "POV-Ray / ours", "ours / closed form")
     lines = ["| camera | rays by | seen | " + " | ".join(f"{pair}, dB" for pair in pairs) + " |", "|---" * 6 + "|"]
-    for row in rows:
-        cells = " | ".join(f"{row[f'{pair}, dB']:.1f}" for pair in pairs)
-        lines.append(f"| {row['camera']} | {row['rays by']} | {row['seen']} | {cells} |")
-    page = docs / "stability.md"
-    text = filled(page.read_text(encoding="utf-8"), "povray", lines)
-    with atomic_path(page) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    measured, commits = RECORDS.rows(scale=SCALE), []
+    for one in measured:
+        for row in one["rows"]:
+            cells = " | ".join(f"{row[f'{pair}, dB']:.1f}" for pair in pairs)
+            lines.append(f"| {one['camera']} | {one['rays by']} | {row['seen']} | {cells} |")
+            commits.append([one["commit"]])
+    return {("docs/stability.md", "povray"): [*with_commits(lines, commits), "", origin(measured)]}
 
 
 def _psnr(error: Array) -> float:
@@ -117,7 +129,21 @@ def _coded(light: Array) -> NDArray[np.uint8]:
 def version() -> str:
     """What ``povray`` calls itself."""
     run = subprocess.run(["povray", "--version"], capture_output=True, text=True, check=False)
-    return (run.stderr + run.stdout).splitlines()[0]
+    return stated(run.stdout + run.stderr)
+
+
+def stated(text: str) -> str:
+    """The version in what POV-Ray prints, among which are complaints about missing configuration files.
+
+    Raises
+    ------
+    ValueError
+        If no version is there.
+    """
+    found = re.search(r"POV-Ray \d\S*", text)
+    if found is None:
+        raise ValueError(f"povray --version says no version: {text.strip()[:200]!r}")
+    return found.group()
 
 
 def povray(world: World, camera: IICamera, o: Array, d: Array, mesh: bool) -> Array:

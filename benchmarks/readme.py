@@ -7,11 +7,13 @@ kept there.
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
-from typing import Any
 
+from benchmarks import disparity, speed
+from benchmarks.pages import Tables, publish
+from benchmarks.pages import filled as filled  # benchmarks.viewer takes it from here
+from benchmarks.records import commit_of, origin, with_commits
 from metrics import read_study, summary_table
 
 ROOT = Path(__file__).parent.parent
@@ -30,35 +32,28 @@ def main() -> None:
             shutil.copy(study.with_suffix(".png"), IMAGES / f"{run}_{study.stem}.png")
     for name in SHOWN:
         shutil.copy(ROOT / "out" / "demo" / name, IMAGES / name)
-    readme = ROOT / "README.md"
-    text = readme.read_text(encoding="utf-8")
-    for mark, lines in (("gain", gain_table()), ("disparity", disparity_table()), ("speed", speed_table())):
-        text = filled(text, mark, lines)
-    readme.write_text(text, encoding="utf-8")
-    fill(ROOT / "docs" / "study.md", "gain", gain_table())
+    publish(tables())
 
 
-def filled(text: str, mark: str, lines: list[str]) -> str:
-    """The text with these lines between ``<!-- mark -->`` and ``<!-- /mark -->``."""
-    begin, end = f"<!-- {mark} -->\n", f"<!-- /{mark} -->"
-    before, after = text.index(begin) + len(begin), text.index(end)
-    return "\n".join([text[:before], *lines, "", text[after:]])
-
-
-def fill(path: Path, mark: str, lines: list[str]) -> None:
-    """Put lines between the marks of a document on disk."""
-    path.write_text(filled(path.read_text(encoding="utf-8"), mark, lines), encoding="utf-8")
+def tables() -> Tables:
+    """Return the tables of the README, one of which the page of the study shows too."""
+    made = {("README.md", "gain"): gain_table(), ("docs/study.md", "gain"): gain_table()}
+    return {**made, ("README.md", "disparity"): disparity_table(), ("README.md", "speed"): speed_table()}
 
 
 def gain_table() -> list[str]:
     """Gain of the pseudo video sequences over JPEG 2000, by scene and size."""
     lines = ["| scene | picture | SI-PVS | RI-PVS | EI-PVS |", "|---|---|---|---|---|"]
+    commits = []
     for path in sorted(RESULTS.glob("*_*_rd.json")):
         run, scene, _ = path.stem.split("_")
-        gains = {row["scheme"]: row["gain"] for row in summary_table(read_study(path))}
+        study = read_study(path)
+        gains = {row["scheme"]: row["gain"] for row in summary_table(study)}
         cells = " | ".join(gains[f"{kind}-h264"] for kind in ("si", "ri", "ei"))
         lines.append(f"| {scene} | {SIZES[run]} | {cells} |")
-    return lines
+        commits.append(commit_of(study))
+    told = origin({"commit": commit} for commit in commits)
+    return [*with_commits(lines, [[commit] for commit in commits]), "", told]
 
 
 def disparity_table() -> list[str]:
@@ -66,25 +61,24 @@ def disparity_table() -> list[str]:
     head = (
         "| scene | lenses | median disparity | 90 % below | beyond motion range | no partner | step between pixels |"
     )
-    return [head, "|---|---|---|---|---|---|---|"] + [
+    rows = disparity.RECORDS.rows()
+    lines = [head, "|---|---|---|---|---|---|---|"] + [
         f"| {row['scene']} | {512 // row['scale']}×{256 // row['scale']} | {row['median_px']:.1f} px | "
         f"{row['p90_px']:.1f} px | {row['beyond_motion_range']:.0%} | {row['without_partner']:.0%} | "
         f"{row['detail']:.1f} codes |"
-        for row in _load("disparity.json")["rows"]
+        for row in rows
     ]
+    return [*with_commits(lines, [[row["commit"]] for row in rows]), "", origin(rows)]
 
 
 def speed_table() -> list[str]:
     """The ratios of `benchmarks.speed` beside their targets."""
-    lines = ["| | target | median | from … to |", "|---|---|---|---|"]
-    return lines + [
+    rows = speed.measured()
+    lines = ["| | target | median | from … to |", "|---|---|---|---|"] + [
         f"| {row['what']} | {row['target']} | {row['median']:.2f} | {min(row['all']):.2f} … {max(row['all']):.2f} |"
-        for row in _load("speed.json")["rows"]
+        for row in rows
     ]
-
-
-def _load(name: str) -> Any:
-    return json.loads((RESULTS / name).read_text(encoding="utf-8"))
+    return [*with_commits(lines, [[row["commit"]] for row in rows]), "", origin(rows)]
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
 """How fast, as ratios taken within one run: ours against the library's bare call or a copy. ``make bench``.
 
 Everything is interleaved and the median taken, because machines drift. Numbers go to
-``benchmarks/results/speed.json`` with the commit they were taken on.
+``benchmarks/results/speed.jsonl`` with the commit they were taken on.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import statistics
 import subprocess
@@ -13,27 +14,53 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from pathlib import Path
+from fnmatch import fnmatch
 from typing import Any
 
 import numpy as np
 
 from benchmarks.bare import bare_encoder
+from benchmarks.records import Records, add_again
 from codec import encode
 from ii_core import IIPicture, component_images, preset
-from ii_core.files import write_json
-from metrics import provenance
 from raytrace_ii import Scene, load_scene, render, scene_names
 from raytrace_ii.rendering.render import SUPPORT
 from raytrace_ii.tracing.intersect import Intersector
 
-RESULTS = Path(__file__).parent / "results"
+RECORDS = Records("speed", ("benchmarks.speed", "benchmarks.bare"))
 REPEATS = 7
 
 
 def main() -> None:
-    """Measure all, print and keep."""
-    targets = [
+    """Measure what is asked for, print and keep."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", default="*", help="ratios by name, * for anything: 'render*,peak*'")
+    add_again(parser)
+    asked = parser.parse_args()
+    wanted = {
+        what: call for what, (_, call) in targets().items() if any(fnmatch(what, p) for p in asked.only.split(","))
+    }
+    for key in RECORDS.todo(({"what": what} for what in wanted), asked.again):
+
+        def row(call: Callable[[], list[float]] = wanted[key["what"]]) -> dict[str, Any]:
+            values = call()
+            return {"median": statistics.median(values), "all": values}
+
+        RECORDS.measure(key, row)
+    for found in measured():
+        span = f"({min(found['all']):.2f} … {max(found['all']):.2f})"
+        print(f"{found['what']:<52} {found['target']:>6}  {found['median']:.2f}   {span}")
+
+
+def measured() -> list[dict[str, Any]]:
+    """Return the newest row of each ratio, with its target, in the order of `targets`."""
+    rows = {row["what"]: row for row in RECORDS.rows()}
+    return [{"target": target, **rows[what]} for what, (target, _) in targets().items() if what in rows]
+
+
+def targets() -> dict[str, tuple[str, Callable[[], list[float]]]]:
+    """Return target and measurement of each ratio."""
+    every: list[tuple[str, str, Callable[[], list[float]]]] = [
         *(
             (f"render {name}, depth: CPU time / EmbreeScene.run", "≤ 1.2", lambda name=name: render_ratio(name))
             for name in scene_names()
@@ -52,14 +79,7 @@ def main() -> None:
         ("encode si-av1:fast / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("si-av1:fast")),
         ("peak memory of rendering setup1 at full size, GiB", "≤ 1.5", peak_memory),
     ]
-    rows = []
-    for what, target, measure in targets:
-        values = measure()
-        row = {"what": what, "target": target, "median": statistics.median(values), "all": values}
-        rows.append(row)
-        print(f"{what:<52} {target:>6}  {row['median']:.2f}   ({min(values):.2f} … {max(values):.2f})", flush=True)
-    RESULTS.mkdir(exist_ok=True)
-    write_json(RESULTS / "speed.json", {**provenance(), "rows": rows})
+    return {what: (target, call) for what, target, call in every}
 
 
 def render_ratio(name: str, support: tuple[str, ...] = ("depth",)) -> list[float]:

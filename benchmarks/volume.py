@@ -3,29 +3,28 @@
     python -m benchmarks.volume [--scale 4] [--scenes apples cuboid]
 
 Rates against the dissertation's video setting (x264 IPPP, 4:2:0, constant quantiser, parallel order) are Bjøntegaard
-differences by RGB PSNR, over the qualities that both curves reach. Goes to ``benchmarks/results/volume.json`` and
+differences by RGB PSNR, over the qualities that both curves reach. Goes to ``benchmarks/results/volume.jsonl`` and
 into the tables of ``docs/volume.md``.
 """
 
 from __future__ import annotations
 
 import argparse
-import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.pages import Tables, publish
+from benchmarks.records import Records, add_again, origin, with_commits
 from codec import decode, encode
 from codec.bitstream.jpeg2000 import decode_planes, encode_planes, whole_codestream
 from codec.frames import layout
 from ii_core import IIPicture, component_images, preset
-from ii_core.files import write_json
-from metrics import bd_rate, provenance, q_global
+from metrics import bd_rate, q_global
 from raytrace_ii import load_scene, render
 
-RESULTS = Path(__file__).parent / "results"
-DOCS = Path(__file__).parents[1] / "docs" / "volume.md"
+RECORDS = Records("volume", ("benchmarks.volume",))
+SCALE = 4  # of the page
 ANCHOR = "si-h264:rate=cq,chroma=420"
 # Settings by scheme: PSNR in dB, or quantisers.
 CURVES: dict[str, list[dict[str, Any]]] = {
@@ -47,21 +46,26 @@ LOSSLESS = ("si-jp3d", "si-jp3d:levels=1", "ri-jp3d", "ei-jp3d", "si-jpeg2000", 
 
 def main() -> None:
     """Measure, print and keep."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scale", type=int, default=4)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=SCALE)
     parser.add_argument("--scenes", nargs="+", default=["apples", "cuboid"])
-    arguments = parser.parse_args()
-    scenes = {}
-    for name in arguments.scenes:
-        picture = render(load_scene(name), preset("setup1", scale=arguments.scale), noise=1.0, support=()).picture
-        scenes[name] = {"size": picture.size, "curves": curves(picture), "lossless_bpp": lossless(picture)}
-        scenes[name]["apart"] = apart(picture)
-        for row in rows(name, scenes[name]):
-            print(row, flush=True)
-    record = {**provenance(), "anchor": ANCHOR, "scale": arguments.scale, "scenes": scenes}
-    RESULTS.mkdir(exist_ok=True)
-    write_json(RESULTS / "volume.json", record)
-    fill(scenes)
+    add_again(parser)
+    asked = parser.parse_args()
+    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda key=key: study(**key))
+    for scene in RECORDS.rows(scale=asked.scale):
+        for line in rows(scene["scene"], scene):
+            print(line, flush=True)
+    publish(tables())
+
+
+def study(scene: str, scale: int) -> dict[str, Any]:
+    """All of one scene."""
+    picture = render(load_scene(scene), preset("setup1", scale=scale), noise=1.0, support=()).picture
+    return {
+        "size": picture.size, "curves": curves(picture), "lossless_bpp": lossless(picture), "apart": apart(picture)
+    }  # fmt: skip
 
 
 def curves(picture: IIPicture) -> dict[str, list[tuple[float, float]]]:
@@ -130,23 +134,26 @@ def rows(name: str, scene: dict[str, Any]) -> list[str]:
     return lines
 
 
-def fill(scenes: dict[str, Any]) -> None:
-    """Put the figures between the marks of the page."""
+def tables() -> Tables:
+    """Return the tables of the page."""
+    scenes = RECORDS.rows(scale=SCALE)
     table = ["| scene | scheme | rate | bpp | dB | lossless, bpp |", "|---|---|---|---|---|---|"]
-    for name, scene in scenes.items():
-        table += rows(name, scene)
     apart_table = ["| scene | a stream each, bpp | of it headers | one stream, bpp |", "|---|---|---|---|"]
-    for name, scene in scenes.items():
+    commits: list[list[str]] = []
+    for scene in scenes:
+        lines = rows(scene["scene"], scene)
+        table += lines
+        commits += [[scene["commit"]]] * len(lines)
         a = scene["apart"]
         apart_table.append(
-            f"| {name} | {a['apart_bpp']:.3f} | {a['headers_bpp']:.3f} | {a['together_bpp']:.3f} "
+            f"| {scene['scene']} | {a['apart_bpp']:.3f} | {a['headers_bpp']:.3f} | {a['together_bpp']:.3f} "
             f"({100 * (a['together_bpp'] / a['apart_bpp'] - 1):+.1f} %) |"
         )
-    text = DOCS.read_text()
-    for mark, lines in (("rates", table), ("apart", apart_table)):
-        block = f"<!-- {mark} -->\n\n" + "\n".join(lines) + f"\n\n<!-- /{mark} -->"
-        text = re.sub(rf"<!-- {mark} -->.*?<!-- /{mark} -->", lambda _, block=block: block, text, flags=re.DOTALL)
-    DOCS.write_text(text)
+    page, told = "docs/volume.md", origin(scenes)
+    return {
+        (page, "rates"): [told, "", *with_commits(table, commits)],
+        (page, "apart"): [told, "", *with_commits(apart_table, [[scene["commit"]] for scene in scenes])],
+    }
 
 
 if __name__ == "__main__":

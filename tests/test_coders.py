@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from benchmarks.coders import LETTERS, offsets, summary, table, touch
 
 ROWS = [
-    {"scene": scene, "scheme": scheme, "bd_rate": rate, "seconds": seconds}
+    {"scene": scene, "scheme": scheme, "bd_rate": rate, "seconds": seconds, "commit": "abcdef0"}
     for scheme, scene, rate, seconds in (
         ("everywhere", "apples", -10.0, 1.0),
         ("everywhere", "car", -30.0, 3.0),

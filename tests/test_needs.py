@@ -1,8 +1,5 @@
 """Leaving things out of scenes, and what counts as not to be told apart; figures come from `benchmarks.needs`."""
 
-import json
-import re
-
 import numpy as np
 import pytest
 from trace_scenes import WHITE, body, floor, hall, sphere, sun
@@ -103,12 +100,3 @@ def test_pictures_are_enlarged_lens_by_lens_or_pixel_by_pixel():
     np.testing.assert_array_equal(
         needs.enlarged(IIPicture(ramp, (1, 1), (8, 8)), (1, 3), linear=True)[0, 1:-1, 0], 25 + 50 * np.arange(14)
     )
-
-
-def test_the_page_says_what_was_measured():
-    """Its tables are those that the numbers kept give."""
-    scenes = json.loads(needs.RESULTS.read_text(encoding="utf-8"))["scenes"]
-    page = needs.PAGE.read_text(encoding="utf-8")
-    for mark, lines in (("uses", needs.uses_table), ("least", needs.least_table), ("needs", needs.needs_table)):
-        held = re.search(f"<!-- {mark} -->\n(.*?)<!-- /{mark} -->", page, re.DOTALL)
-        assert held and held[1].strip().splitlines() == lines(scenes), mark

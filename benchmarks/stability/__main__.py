@@ -1,30 +1,30 @@
 """Hunt for where methods fail: ``python -m benchmarks.stability [case ...]``.
 
 Every case sweeps one thing until it breaks; cases can be run one by one. Numbers go to
-``benchmarks/results/stability.json``, a chart and two strips of pictures beside it, and between the marks of
+``benchmarks/results/stability.jsonl``, a chart and two strips of pictures beside it, and between the marks of
 ``docs/stability.md``, with those of ``benchmarks.convergence``.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import shutil
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.readme import filled
+from benchmarks import convergence
+from benchmarks.pages import Tables, publish
+from benchmarks.records import RESULTS, Records, add_again, origin
 from benchmarks.stability import curves, depth, geometry, light, picture, pictures
 from benchmarks.stability.geometry import Row
-from ii_core.files import atomic_path, write_image, write_json
-from metrics import provenance
+from ii_core.files import atomic_path, write_image
 from metrics.depth.focus import METHODS
 from metrics.plots.rd_chart import COLOURS
 
 ROOT = Path(__file__).parent.parent.parent
-RESULTS, DOCS = ROOT / "benchmarks" / "results", ROOT / "docs"
+MODULES = ("benchmarks.stability", "benchmarks.analytic", "benchmarks.map_precision", "benchmarks.depth_truth")
+RECORDS = Records("stability", MODULES)
 CASES: dict[str, Callable[[], list[Row]]] = {
     case.__name__: case
     for case in (
@@ -51,44 +51,44 @@ def main() -> None:
     """Run every case or those asked for, keep, draw, fill the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", nargs="*", metavar="case", help=f"all, or some of: {', '.join(CASES)}")
-    asked = parser.parse_args().cases or list(CASES)
+    add_again(parser)
+    arguments = parser.parse_args()
+    asked = arguments.cases or list(CASES)
     if unknown := set(asked) - set(CASES):
         parser.error(f"unknown case {', '.join(sorted(unknown))}: known are {', '.join(CASES)}")
-    path = RESULTS / "stability.json"
-    kept = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    cases, origin = kept.get("cases", {}), kept.get("measured", {})
-    for name in asked:
-        started = time.perf_counter()
-        cases[name], origin[name] = CASES[name](), provenance()["git"]
-        print(f"{name}: {time.perf_counter() - started:.0f} s", flush=True)
-    cases = {name: cases[name] for name in CASES if name in cases}
-    write_json(path, {**provenance(), "measured": origin, "cases": cases})
+    for key in RECORDS.todo(({"case": name} for name in asked), arguments.again):
+        record = RECORDS.measure(key, lambda name=key["case"]: {"rows": CASES[name]()})
+        print(f"{key['case']}: {record['seconds']:.0f} s", flush=True)
     write_image(RESULTS / "stability_pictures.png", pictures.rendering())
     write_image(RESULTS / "stability_pictures_2.png", pictures.coding_and_depth())
+    cases = {name: row["rows"] for name, row in measured().items()}
     if missing := set(CASES) - set(cases):
         print(f"the page waits for {', '.join(sorted(missing))}")
         return
-    chart(path, path.with_suffix(".png"))
-    document(path)
-
-
-def document(path: Path) -> None:
-    """Fill ``docs/stability.md`` from what is kept."""
-    cases = json.loads(path.read_text(encoding="utf-8"))["cases"]
+    chart(cases, RESULTS / "stability.png")
     for name in ("stability.png", "stability_pictures.png", "stability_pictures_2.png", "convergence.png"):
-        shutil.copy(RESULTS / name, DOCS / "images" / name)
-    page = DOCS / "stability.md"
-    text = page.read_text(encoding="utf-8")
-    for name, rows in cases.items():
-        text = filled(text, name, table(rows, PIVOTS.get(name)))
-    text = filled(text, "convergence", convergence())
-    with atomic_path(page) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        shutil.copy(RESULTS / name, ROOT / "docs" / "images" / name)
+    publish(tables())
 
 
-def convergence() -> list[str]:
+def measured() -> dict[str, dict[str, Any]]:
+    """Return the newest row of every case, in the order of CASES."""
+    rows = {row["case"]: row for row in RECORDS.rows()}
+    return {name: rows[name] for name in CASES if name in rows}
+
+
+def tables() -> Tables:
+    """Return the tables of the page of stability."""
+    page = "docs/stability.md"
+    cases = {
+        (page, name): [*table(row["rows"], PIVOTS.get(name)), "", origin([row])] for name, row in measured().items()
+    }
+    return {**cases, (page, "convergence"): orders()}
+
+
+def orders() -> list[str]:
     """Fitted orders beside those expected, and the lens images."""
-    found = json.loads((RESULTS / "convergence.json").read_text(encoding="utf-8"))
+    found = convergence.measured()
     first, last = found["rows"][0], found["rows"][-1]
     heads = ["error", f"{first['segments']} segments", f"{last['segments']} segments", "order", "expected"]
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
@@ -102,7 +102,12 @@ def convergence() -> list[str]:
             text = f"{lens} lens, {kind}, mm at the focus"
             lines.append(f"| {text} | {ends[0]} (coarsest) | {ends[1]} | {number(orders[kind])} | {expected} |")
     worst = max(abs(row["off"]) for row in found["images"])
-    return [*lines, "", f"Images of a ball lens lie where Gauss puts them to {worst:.1g} of their distance."]
+    return [
+        *lines,
+        "",
+        origin(found["parts"]),
+        f"Images of a ball lens lie where Gauss puts them to {worst:.1g} of their distance.",
+    ]
 
 
 def table(rows: list[Row], pivot: Any = None) -> list[str]:
@@ -176,12 +181,11 @@ PANELS: list[tuple[str, str, list[str], str, str]] = [
 ]
 
 
-def chart(source: Path, target: Path) -> None:
+def chart(cases: Mapping[str, list[Row]], target: Path) -> None:
     """A panel a sweep."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    cases = json.loads(source.read_text(encoding="utf-8"))["cases"]
     figure = Figure(figsize=(14, 11.5), layout="constrained")
     FigureCanvasAgg(figure)
     for axes, (case, across, names, logarithmic, title) in zip(figure.subplots(4, 4).flat, PANELS, strict=True):

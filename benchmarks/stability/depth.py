@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import depth_truth
 from benchmarks.stability.geometry import Row
 from ii_core import IIPicture, add_sensor_noise, preset
 from metrics import FocusDepth, depth_from_focus
@@ -17,7 +16,6 @@ from metrics.depth.focus import METHODS
 from raytrace_ii import Body, Light, Material, Scene, render
 from raytrace_ii.scene.textures import Image, linear
 
-RESULTS = Path(__file__).parent.parent / "results"
 CAMERA = preset("setup1", scale=8)
 LAYER, BEHIND = 20, 60  # of the wall, and of what is seen in or through it; of 250
 SHARES = (0.0, 0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0)
@@ -151,7 +149,7 @@ def depth_kinds() -> list[Row]:
 
 
 def _kept() -> list[dict[str, Any]]:
-    return list(json.loads((RESULTS / "depth_truth.json").read_text(encoding="utf-8"))["rows"])
+    return list(depth_truth.data()["rows"])
 
 
 def _only(rows: list[dict[str, Any]], scene: str, noise: float, method: str) -> dict[str, Any]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks import map_precision
 from benchmarks.analytic import still_life
 from benchmarks.stability.geometry import Row
 from codec import decode, encode
@@ -16,12 +15,10 @@ from ii_core.regular import resampled
 from metrics import q_global
 from raytrace_ii import load_scene, render, trace
 
-RESULTS = Path(__file__).parent.parent / "results"
-
 
 def quantised_maps() -> list[Row]:
     """What `benchmarks.map_precision` measured."""
-    rows = _kept("map_precision.json")["rows"]
+    rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
     return [
         {
             "camera": row["camera"], "stored as": row["format"], "direction off, µrad": row["angle_max_urad"],
@@ -59,10 +56,6 @@ def _unit(vectors: Any) -> Any:
 def _srgb(light: Any) -> Any:
     c = np.clip(light.astype(np.float64), 0, 1)
     return np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
-
-
-def _kept(name: str) -> Any:
-    return json.loads((RESULTS / name).read_text(encoding="utf-8"))
 
 
 def _finite(value: float | None) -> float | None:

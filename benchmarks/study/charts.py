@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.records import number
 from metrics.plots.depth_chart import depth_rate_chart
 from metrics.plots.rd_chart import COLOURS, LINES, MARKERS, edges, new_figure, save, set_rate_axis
 
 from .claims import NAMES, Results, of_scenes
 from .rates import MODERN, REFERENCE, SI, VOLUME
-from .runner import number
 from .views import BEYOND
 
 LABELS = {

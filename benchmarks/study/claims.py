@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.records import number
+
 from . import theirs
 from .coding import SCENES
 from .rates import BFRAMES, CONTROLS, GOPS, RANGES, REFERENCE, SI, VOLUME, types
-from .runner import number
 from .theirs import Verdict, compare
 from .volume_model import APART, MODEL
 

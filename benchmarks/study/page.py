@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.coders import climbing
-from benchmarks.readme import filled
+from benchmarks import coders
+from benchmarks.coders import ANCHOR, climbing
+from benchmarks.pages import Tables, filled
+from benchmarks.records import ROOT, origin, with_commits
 from ii_core.files import atomic_path
 from metrics import bd_psnr, bd_rate
 from metrics.rd import UndefinedDifference
@@ -19,12 +20,12 @@ from .charts import LABELS, draw_all
 from .claims import Claim, Results, by_detail, claims, gain, of_scenes, shown, type_table
 from .coding import SCENES
 from .rates import BFRAMES, GOPS, MODERN, PVS, RANGES, REFERENCE, SI, VOLUME
-from .runner import ROOT, digest_of, records
+from .runner import digest_of, records
 from .theirs import said
 from .volume_model import APART, MODEL
 
 PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
-CODERS = ROOT / "benchmarks" / "results" / "coders.json"
+CODERS_SCALE = 4
 OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
 # Which part of the page shows which figures.
 SECTIONS = {
@@ -47,15 +48,27 @@ def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Pat
         keep(path, kept / path.name)
     everything = {path.stem: records(kept, path.stem) for path in sorted(kept.glob("*.jsonl"))}
     best = {name: largest(some) for name, some in everything.items()}
-    results = {name: record["result"] for name, record in best.items()}
     copy_pictures(folder, images, best)
-    draw_all(results, images)
+    draw_all({name: record["result"] for name, record in best.items()}, images)
     text = page.read_text(encoding="utf-8")
-    by_size = {"gain-by-size": sizes(everything), "view-by-size": views_by_size(everything)}
-    for mark, lines in {**tables(results, best), **by_size}.items():
+    for (_, mark), lines in tables(kept).items():
         text = filled(text, mark, lines)
     with atomic_path(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def tables(kept: Path = KEPT) -> Tables:
+    """Return all tables of the page, from the records that are kept."""
+    everything = {path.stem: records(kept, path.stem) for path in sorted(kept.glob("*.jsonl"))}
+    best = {name: largest(some) for name, some in everything.items()}
+    results = {name: record["result"] for name, record in best.items()}
+    made = {
+        **shown_tables(results, best),
+        "gain-by-size": sizes(everything),
+        "view-by-size": views_by_size(everything),
+        "bjontegaard": bjontegaard(coders.RECORDS.rows(scale=CODERS_SCALE)),
+    }
+    return {("docs/study.md", mark): lines for mark, lines in made.items()}
 
 
 def copy_pictures(folder: Path, images: Path, best: Mapping[str, Mapping[str, Any]]) -> None:
@@ -128,7 +141,7 @@ def smaller(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return ["Not at full size yet: " + "; ".join(lists) + ". What disagrees there may be no more than that."]
 
 
-def tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
+def shown_tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
     """Lines for each mark of the page."""
     made = claims(results)
     parts = {
@@ -149,7 +162,6 @@ def tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str,
         "frames": frame_table(results),
         "detail": detail_table(results),
         "artefact-rates": artefact_table(results),
-        "bjontegaard": bjontegaard(json.loads(CODERS.read_text(encoding="utf-8"))) if CODERS.exists() else [],
         "records": record_table(best),
     }
 
@@ -330,25 +342,24 @@ def gains_modern(results: Results) -> list[str]:
     return lines
 
 
-def bjontegaard(study: Mapping[str, Any]) -> list[str]:
+def bjontegaard(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """All schemes of `benchmarks.coders`: rate against the dissertation's SI-PVS and JPEG 2000, and gain in dB."""
-    scenes = list(dict.fromkeys(row["scene"] for row in study["rows"]))
-    curves = {(row["scene"], row["scheme"]): pairs(row["points"]) for row in study["rows"]}
-    lines = [
-        f"Setup 1 at scale {study['scale']}: rate at equal quality against `{study['anchor']}` · against `jpeg2000`, "
-        "and mean gain over JPEG 2000 at equal rate.",
-        "",
-        "| scheme | " + " | ".join(scenes) + " |",
-        "|---" * (len(scenes) + 1) + "|",
-    ]
-    for scheme in dict.fromkeys(row["scheme"] for row in study["rows"] if ":" not in row["scheme"]):
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    curves = {(row["scene"], row["scheme"]): pairs(row["points"]) for row in rows}
+    lines, commits = ["| scheme | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"], []
+    for scheme in dict.fromkeys(row["scheme"] for row in rows if ":" not in row["scheme"]):
         cells = []
         for scene in scenes:
             own = curves.get((scene, scheme), [])
-            first, second = (curves.get((scene, anchor), []) for anchor in (study["anchor"], REFERENCE))
+            first, second = (curves.get((scene, anchor), []) for anchor in (ANCHOR, REFERENCE))
             cells.append(f"{rate_cell(first, own)} · {rate_cell(second, own)} · {gain_cell(second, own)}")
         lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
-    return lines
+        commits.append([row["commit"] for row in rows if row["scheme"] == scheme])
+    conditions = (
+        f"Setup 1 at scale {CODERS_SCALE}: rate at equal quality against `{ANCHOR}` · against `jpeg2000`, "
+        "and mean gain over JPEG 2000 at equal rate."
+    )
+    return [conditions, origin(rows), "", *with_commits(lines, commits)]
 
 
 def pairs(points: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:

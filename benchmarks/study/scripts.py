@@ -7,7 +7,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from .runner import ROOT, Step
+from benchmarks.records import ROOT
+
+from .runner import Step
 
 # Script, what it is for, arguments. In this order: `coding_docs` and `readme` put on pages what others found.
 SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (

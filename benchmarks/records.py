@@ -1,0 +1,369 @@
+"""Append-only records of benchmarks: every row carries its own commit, machine, versions and date.
+
+A record is a line of JSON in ``benchmarks/results/NAME.jsonl``. The script that measures a row appends it the moment
+its measurement ends; nothing else writes there, and no line is changed afterwards. Readers take the newest record of
+each key. `check` holds the files to this rule.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fcntl
+import hashlib
+import importlib.util
+import json
+import math
+import os
+import subprocess
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from metrics import provenance
+
+Record = dict[str, Any]
+FORMAT, VERSION = "ii-record", 1
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "benchmarks" / "results"
+STAMP = ("code", "git", "machine", "versions", "when")
+FIELDS = ("key", *STAMP, "seconds", "result")
+# Sources of every number, besides the modules of the benchmark itself; pages and charts may change freely.
+PACKAGES = ("ii_core", "raytrace_ii", "codec", "metrics", "assets")
+SOURCES = (".py", ".toml", ".json", ".png", ".jpg")
+CHANGED, MISSING, ALL = AGAIN = ("changed", "missing", "all")
+
+
+@dataclass(frozen=True)
+class Records:
+    """The records of one benchmark.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file in ``benchmarks/results``, without its ending.
+    modules : tuple of str
+        Modules of ``benchmarks`` that the results come from.
+    """
+
+    name: str
+    modules: tuple[str, ...]
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return RESULTS / f"{self.name}.jsonl"
+
+    def measure(self, key: Mapping[str, Any], call: Callable[[], Mapping[str, Any]]) -> Record:
+        """Run a measurement and append its record; values that are not finite become null.
+
+        Raises
+        ------
+        RuntimeError
+            If sources changed on disk meanwhile: the commit at the start is not that of all code that ran.
+        """
+        begin, started = stamp(self.modules), time.perf_counter()
+        result = json.loads(json.dumps(_finite(call())))
+        record = {
+            "format": FORMAT,
+            "version": VERSION,
+            "key": plain(key),
+            **begin,
+            "seconds": round(time.perf_counter() - started, 2),
+            "result": result,
+        }
+        append(self.path, record)
+        return record
+
+    def todo(self, keys: Iterable[Mapping[str, Any]], again: str = CHANGED) -> list[dict[str, Any]]:
+        """Return the keys that are to be measured.
+
+        Parameters
+        ----------
+        keys : iterable of mapping
+        again : {"changed", "missing", "all"}
+            "changed": keys without a record by the present code and libraries; "missing": keys without a measured
+            record, whatever the code; "all": every key.
+        """
+        there = {_name(record["key"]): record for record in self.newest()}
+        now = {"code": code_hash(self.modules), "versions": provenance()["versions"]}
+
+        def wanted(key: Mapping[str, Any]) -> bool:
+            record = there.get(_name(plain(key)))
+            if again == ALL or record is None or "unsure" in record:
+                return True
+            return again == CHANGED and any(record[name] != value for name, value in now.items())
+
+        return [dict(key) for key in keys if wanted(key)]
+
+    def newest(self, **only: Any) -> list[Record]:
+        """Return the newest record of each key, in the order in which keys first appear.
+
+        Parameters
+        ----------
+        only
+            Values that the keys must have.
+        """
+        found: dict[str, Record] = {}
+        for record in read(self.path, FORMAT, VERSION):
+            name = _name(record["key"])
+            if "unsure" not in record or "unsure" in found.get(name, record):
+                found[name] = record
+        return [record for record in found.values() if only.items() <= record["key"].items()]
+
+    def rows(self, **only: Any) -> list[dict[str, Any]]:
+        """Return key and result of the newest records as one dict each, with ``commit`` as `commit_of` gives it."""
+        return [{**r["key"], **r["result"], "commit": commit_of(r)} for r in self.newest(**only)]
+
+
+def add_again(parser: argparse.ArgumentParser) -> None:
+    """Add ``--again`` to a command line."""
+    parser.add_argument(
+        "--again",
+        choices=AGAIN,
+        default=CHANGED,
+        help="measure again: rows of other code or libraries (changed), nothing that has a row (missing), all",
+    )
+
+
+def stamp(modules: Sequence[str]) -> dict[str, Any]:
+    """Return code hash, commit, machine and versions as they were when this process first measured, and the time.
+
+    Raises
+    ------
+    RuntimeError
+        If sources have changed on disk since then.
+    """
+    begin, now = _at_start(tuple(modules)), code_hash(modules)
+    if now != begin["code"]:
+        raise RuntimeError(
+            "sources changed on disk since this process began to measure: start it again, "
+            "best from a worktree in which nobody works"
+        )
+    return {**begin, "when": datetime.now(UTC).isoformat(timespec="seconds")}
+
+
+@lru_cache(maxsize=8)
+def _at_start(modules: tuple[str, ...]) -> dict[str, Any]:
+    return {"code": code_hash(modules), **provenance()}
+
+
+def code_hash(modules: Sequence[str]) -> str:
+    """Return the SHA-256 of the packages and of these modules' files.
+
+    Raises
+    ------
+    ValueError
+        If a module does not exist.
+    """
+    digest = hashlib.sha256(_packages().encode())
+    for module in modules:
+        found = importlib.util.find_spec(module)
+        if found is None or found.origin is None:
+            raise ValueError(f"there is no module {module}: results cannot come from it")
+        origin = Path(found.origin)
+        for path in sorted(origin.parent.glob("*.py")) if origin.name == "__init__.py" else [origin]:
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _packages() -> str:
+    digest = hashlib.sha256()
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*")):
+            if path.suffix in SOURCES and path.is_file():
+                digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0")
+                digest.update(_digest(path, path.stat().st_mtime_ns).encode())
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=4096)
+def _digest(path: Path, _changed: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def append(path: Path, record: Mapping[str, Any]) -> None:
+    """Add a line to a file of records, on disk when this returns; a line that a kill cut off is removed first."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    line = json.dumps(record, ensure_ascii=False) + "\n"
+    with path.open("a+b") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)  # another process may measure other rows
+        file.seek(0)
+        file.truncate(file.read().rfind(b"\n") + 1)
+        file.write(line.encode())
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def read(path: Path, format: str, version: int) -> list[Record]:
+    """Return all records of a file, oldest first; a last line that a kill cut off is left out.
+
+    Raises
+    ------
+    ValueError
+        If another line is no record of this format.
+    """
+    if not path.exists():
+        return []
+    found = []
+    for number, line in enumerate(path.read_bytes().splitlines(keepends=True), 1):
+        if not line.endswith(b"\n"):
+            break
+        try:
+            record = json.loads(line)
+        except ValueError as error:
+            raise ValueError(f"{path}, line {number}: {error}") from None
+        if not isinstance(record, dict) or (record.get("format"), record.get("version")) != (format, version):
+            raise ValueError(f'{path}, line {number}: no record: needs "format": "{format}", "version": {version}')
+        found.append(record)
+    return found
+
+
+def commit_of(record: Mapping[str, Any]) -> str:
+    """Return the commit as a page shows it: seven digits, ``+`` if its code was changed, ``unsure``, or ``none``."""
+    if "unsure" in record:
+        return "unsure"
+    git = record["git"]
+    return "none" if git is None else git["commit"][:7] + "+" * git["dirty"]
+
+
+def origin(rows: Iterable[Mapping[str, Any]]) -> str:
+    """Return a sentence that says which commits measured these rows."""
+    commits = list(dict.fromkeys(row["commit"] for row in rows))
+    known = ", ".join(f"`{commit}`" for commit in commits if commit != "unsure")
+    unsure = "of unsure provenance (several commits measured them, the stamp of one was put over all)"
+    if "unsure" not in commits:
+        return f"Measured by {known}."
+    return f"Measured by {known}; rows without a commit are {unsure}." if known else f"All rows are {unsure}."
+
+
+def by_scene(scenes: Mapping[str, Any]) -> str:
+    """Return a sentence that says which commit measured which scene."""
+    commits: dict[str, list[str]] = {}
+    for name, one in scenes.items():
+        commits.setdefault(one["commit"], []).append(name)
+    if len(commits) == 1:
+        return origin(scenes.values())
+    return "Measured by " + ", ".join(f"`{commit}` ({', '.join(names)})" for commit, names in commits.items()) + "."
+
+
+def with_commits(lines: Sequence[str], commits: Sequence[Iterable[str]]) -> list[str]:
+    """Return a Markdown table with a column of commits, if its rows were not all measured by one.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        Head, rule and rows.
+    commits : sequence of iterables of str
+        Those of each row's records.
+    """
+    each = [list(dict.fromkeys(some)) for some in commits]
+    if len({commit for some in each for commit in some}) < 2:
+        return list(lines)
+    cells = [", ".join(f"`{commit}`" for commit in some if commit != "unsure") for some in each]
+    head, rule, *body = lines
+    return [f"{head} commit |", f"{rule}---|", *(f"{a} {b} |" for a, b in zip(body, cells, strict=True))]
+
+
+def check(path: Path) -> list[str]:
+    """Return what is wrong with a file of records, a line each.
+
+    Every record has all fields and a commit that exists, as far as this checkout has a history. No two have the same
+    measured seconds under different commits. No committed line was changed or removed. Records converted from a file
+    of an earlier form have no code hash and no date; records of unsure provenance have no commit either.
+    """
+    wrong, seen = [], dict[tuple[float, ...], str]()
+    for number, record in enumerate(read(path, FORMAT, VERSION), 1):
+        where = f"{path.name}, line {number}"
+        if missing := [name for name in FIELDS if name not in record]:
+            wrong.append(f"{where}: no {', '.join(missing)}")
+            continue
+        optional = {"unsure": (*STAMP, "seconds"), "converted": ("code", "when", "seconds")}
+        may = {name for kind, names in optional.items() if kind in record for name in names}
+        if empty := [name for name in FIELDS if record[name] is None and name not in may]:
+            wrong.append(f"{where}: {', '.join(empty)} is null")
+        git = record["git"]
+        if git is not None and not exists(git["commit"]):
+            wrong.append(f"{where}: commit {git['commit']} is not in this history")
+        seconds = tuple(seconds_in(record["result"]))
+        if len(seconds) and seen.setdefault(seconds, commit_of(record)) != commit_of(record):
+            wrong.append(f"{where}: seconds identical to a row of {seen[seconds]}, stamped {commit_of(record)}")
+    lines = set(path.read_text(encoding="utf-8").splitlines())
+    lost = [line for line in committed(path) if line not in lines and '"unsure":' not in line]
+    return wrong + [f"{path.name}: a committed row was changed or removed"] * bool(lost)
+
+
+def committed(path: Path) -> list[str]:
+    """Return all lines that a file ever had in this checkout's history; none without a history."""
+    if not path.is_relative_to(ROOT):
+        return []
+    found = []
+    try:
+        versions = _git("log", "--format=%H:", "--", str(path)).stdout.split()
+        for commit in versions:
+            found += _git("show", commit + path.relative_to(ROOT).as_posix()).stdout.splitlines()
+    except (OSError, subprocess.SubprocessError):
+        return []
+    return found
+
+
+def _git(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True, timeout=30)
+
+
+@lru_cache(maxsize=1024)
+def exists(commit: str) -> bool:
+    """Whether a commit is in this checkout's history; True without a whole history to ask."""
+    try:
+        shallow = _git("rev-parse", "--is-shallow-repository")
+        return shallow.stdout.strip() != "false" or _git("cat-file", "-e", f"{commit}^{{commit}}").returncode == 0
+    except (OSError, subprocess.SubprocessError):
+        return True
+
+
+def seconds_in(value: Any) -> Iterable[float]:
+    """Yield all measured times of a result: fractional numbers under a name with ``seconds`` in it."""
+    if isinstance(value, Mapping):
+        for name, item in value.items():
+            if "seconds" in name and isinstance(item, float):
+                yield item
+            else:
+                yield from seconds_in(item)
+    elif isinstance(value, list):
+        for item in value:
+            yield from seconds_in(item)
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON gives it back: lists for tuples, text for infinities, None for NaN."""
+    return json.loads(json.dumps(_spelt(value)))
+
+
+def _spelt(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _spelt(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_spelt(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def number(value: Any) -> float:
+    """Return a number that `plain` has spelt."""
+    return math.nan if value is None else float(value)
+
+
+def _name(key: Mapping[str, Any]) -> str:
+    return json.dumps(key, sort_keys=True)
