@@ -12,7 +12,6 @@ knows no negative numbers and gets the true box.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .camera import IICamera, whole_pair
-from .files import read_image, write_image, write_json
+from .files import image_header, read_image, read_json, write_image, write_json
 
 FORMATS = {
     "png16": (".png", "uint16"),
@@ -88,6 +87,14 @@ def write_maps(
                 progress(len(samples) * i + j + 1, total)
         arrays.append({"camera": camera.to_json(), "samples": stored})
     write_json(folder / SHEET, {**_structure(first), "arrays": arrays})
+
+
+def map_files(cameras: Sequence[IICamera], format: str = "png16", *, samples: int = 1) -> list[str]:
+    """Names of all files that `write_maps` may leave in its folder; W is left out if all rays carry all light."""
+    check_format(format)
+    total = len(cameras) * samples
+    endings = [f"_{i}_{j}" for i in range(len(cameras)) for j in range(samples)] if total > 1 else [""]
+    return [SHEET, *(f"{name}{ending}{FORMATS[format][0]}" for ending in endings for name in "LDW")]
 
 
 def check_format(format: str) -> None:
@@ -242,34 +249,22 @@ def read_maps(folder: str | os.PathLike[str]) -> tuple[MapCamera, ...]:
         If one is missing.
     """
     path = Path(folder) / SHEET
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist")
+    sheet = read_json(path)
     try:
-        sheet = json.loads(path.read_text(encoding="utf-8"))
         if not isinstance(sheet, Mapping) or not isinstance(sheet.get("arrays"), list) or not sheet["arrays"]:
             raise ValueError('no camera maps: "arrays" with at least one is needed')
         return tuple(_map_camera(sheet, array, path.parent) for array in sheet["arrays"])
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
         raise ValueError(f"{path}: {error.args[0] if error.args else error}") from None
 
 
 def _map_camera(sheet: Mapping[str, Any], array: Mapping[str, Any], folder: Path) -> MapCamera:
     if not isinstance(array, Mapping) or not array.get("samples"):
         raise ValueError('an array has no "samples"')
-    maps = tuple(
-        {name: _map(pair, name, folder) for name in ("L", "D", "W") if name in pair} for pair in array["samples"]
-    )
-    for pair in maps:
+    for pair in array["samples"]:
         if not {"L", "D"} <= set(pair):
             raise ValueError("every sample needs the images L and D")
-    height, width = maps[0]["L"].stored.shape[:2]
-    for pair in maps:
-        for name, image in pair.items():
-            if image.stored.shape[:2] != (height, width):
-                raise ValueError(
-                    f"{name} has {image.stored.shape[1]}×{image.stored.shape[0]} pixels, "
-                    f"the first L {width}×{height}: the same is needed"
-                )
+    (height, width, _), _ = image_header(_inside(folder, array["samples"][0]["L"]["file"]))
     lenses = whole_pair("lenses", sheet.get("lenses", (1, 1)))
     model = IICamera.from_json(array["camera"]) if array.get("camera") else None
     if model is not None and (model.pixels, model.lenses) != ((width, height), lenses):
@@ -279,13 +274,25 @@ def _map_camera(sheet: Mapping[str, Any], array: Mapping[str, Any], folder: Path
         if model
         else whole_pair("width and height over lenses", (width / lenses[0], height / lenses[1]))
     )
+    maps = tuple(
+        {name: _map(pair, name, folder, (width, height)) for name in ("L", "D", "W") if name in pair}
+        for pair in array["samples"]
+    )
     name = str(sheet.get("name", folder.name))
     return MapCamera((width, height), lenses, ei, bool(sheet.get("erect", False)), model, name, maps)
 
 
-def _map(pair: Mapping[str, Any], name: str, folder: Path) -> _Map:
+def _inside(folder: Path, name: str) -> Path:
+    """A file of the folder; ValueError if the name leads out of it."""
+    if not isinstance(name, str) or not (folder / name).resolve().is_relative_to(folder.resolve()):
+        raise ValueError(f"file is {name!r}: a name inside {folder} is needed")
+    return folder / name
+
+
+def _map(pair: Mapping[str, Any], name: str, folder: Path, size: tuple[int, int]) -> _Map:
+    """One map, whose header is held against the size of the first L before it is decoded."""
     entry = pair[name]
-    stored = read_image(folder / entry["file"])
+    stored = read_image(_inside(folder, entry["file"]), size=size)
     if stored.shape[2] < 3:
         raise ValueError(f"{entry['file']} has {stored.shape[2]} channels: x, y and z are needed")
     integer = stored.dtype.kind == "u"

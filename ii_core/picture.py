@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import os
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import IICamera, Pair, whole_pair
-from .files import atomic_path, image_types, read_image, write_image, write_json
+from .files import (
+    RowWriter,
+    atomic_paths,
+    check_type,
+    image_header,
+    image_rows,
+    image_types,
+    json_text,
+    pixel_digest,
+    read_image,
+    read_json,
+)
 from .jit import kernel
 
 DTYPES = ("uint8", "uint16", "float32")
+BINDING = "pixels_blake2b"  # the sidecar's entry that names the pixels it belongs to
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +137,8 @@ class IIPicture:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the picture and, beside it, ``<path>.json`` with its structure and camera.
 
-        PNG holds 8 and 16 bit, EXR float, TIFF all three. A file of that name is replaced, whole.
+        PNG holds 8 and 16 bit, EXR float, TIFF all three. Files of these names are replaced, whole and together: the
+        sidecar holds a hash of the pixels, and `load` refuses a sidecar of other pixels.
 
         Raises
         ------
@@ -133,9 +147,12 @@ class IIPicture:
         OSError
             If the files cannot be written.
         """
-        with atomic_path(sidecar(path)) as temporary:  # neither file appears if the other cannot
-            write_json(temporary, self.structure_json())
-            write_image(path, self.pixels)
+        check_type(path, self.pixels.dtype.name)
+        with (
+            atomic_paths([sidecar(path), path]) as (beside, file),
+            picture_rows(self, file, beside, named=path) as write,
+        ):
+            write(self.pixels)
 
     def structure_json(self) -> dict[str, Any]:
         """Everything but the pixels, as plain values."""
@@ -186,19 +203,48 @@ class IIPicture:
         if (lenses is None) != (ei_pixels is None):
             raise ValueError("the structure of a picture needs both lenses and ei_pixels, only one is given")
         image_types(path)
-        pixels = read_image(path)
+        shape, dtype = image_header(path)
+        nothing = np.broadcast_to(np.zeros(1, dtype), shape)  # the structure is held against the header first
         if lenses is not None and ei_pixels is not None:
-            return cls(pixels, lenses, ei_pixels)
+            return cls(nothing, lenses, ei_pixels).with_pixels(read_image(path))
         try:
-            text = sidecar(path).read_bytes()
+            data = read_json(sidecar(path))
         except FileNotFoundError:
             raise ValueError(
                 f"{path} has no sidecar {sidecar(path).name} that gives its structure: give lenses and ei_pixels"
             ) from None
         try:
-            return cls.from_structure_json(pixels, json.loads(text))
-        except (ValueError, TypeError) as error:
+            picture = cls.from_structure_json(nothing, data)
+        except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
             raise ValueError(f"{sidecar(path)}: {error}") from None
+        picture = picture.with_pixels(read_image(path))
+        if data.get(BINDING) not in (None, pixel_digest(picture.pixels)):
+            raise ValueError(
+                f"{path} and {sidecar(path).name} do not belong together: the sidecar was written for other pixels. "
+                f"Give lenses and ei_pixels, or remove {BINDING!r} from the sidecar if its structure holds"
+            )
+        return picture
+
+
+@contextmanager
+def picture_rows(
+    structure: IIPicture, file: Path, beside: Path, *, named: str | os.PathLike[str]
+) -> Iterator[RowWriter]:
+    """Write a picture band by band, and its sidecar, into temporary files of `atomic_paths`.
+
+    The sidecar must get its name before the picture: a run that is killed between the two leaves a sidecar that
+    `IIPicture.load` refuses, where a new picture beside an old sidecar without a hash would load.
+
+    Parameters
+    ----------
+    structure : IIPicture
+        Of the picture's size and type; its pixels are not looked at.
+    named : path
+        The picture's final name, for errors.
+    """
+    with image_rows(file, structure.size, 3, structure.pixels.dtype.name, named=named) as write:
+        yield write
+    beside.write_text(json_text({**structure.structure_json(), BINDING: write.digest}), encoding="utf-8")
 
 
 def sidecar(path: str | os.PathLike[str]) -> Path:

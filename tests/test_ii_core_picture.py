@@ -98,7 +98,7 @@ def test_bare_picture_needs_a_structure(tmp_path):
         ('{"format": "ii-picture", "version": 1, "lenses": 5, "ei_pixels": [4, 3]}', "lenses is 5"),
         ('{"format": "ii-picture", "version": 1, "lenses": [5, 4], "ei_pixels": [4, 3], "camera": 1}', "camera"),
         ('{"width": 20}', "no II-picture structure"),
-        (b"\xff\xfe\x00", "codec can't decode"),
+        (b"\xff\xfe\x00", "no UTF-8 text"),
     ],
 )
 def test_broken_and_foreign_sidecars_are_named(tmp_path, text, message):

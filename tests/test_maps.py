@@ -183,7 +183,7 @@ def test_missing_and_mismatched_images(tmp_path):
         read_maps(tmp_path)
     write_maps([SMALL], tmp_path)
     write_image(tmp_path / "D.png", np.zeros((3, 3, 3), np.uint16))
-    with pytest.raises(ValueError, match="D has 3×3 pixels, the first L 256×128"):
+    with pytest.raises(ValueError, match=r"D\.png has 3×3 pixels: 256×128 are needed"):
         read_maps(tmp_path)
     (tmp_path / "D.png").unlink()
     with pytest.raises(FileNotFoundError):

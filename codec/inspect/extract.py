@@ -116,7 +116,8 @@ def _mux(stream: Sequence, path: Path) -> None:
     shown = _display_order(stream)
     # A packet is read before it is shown by as much as any runs ahead.
     ahead = max(i - shown[i] for i in range(len(shown)))
-    with av.open(str(path), "w") as out:
+    # bitexact: Matroska's own numbers and dates are left out, so that equal streams make equal files
+    with av.open(str(path), "w", options={"fflags": "+bitexact"}) as out:
         target, keep = _stream(stream, out)
         target.time_base = Fraction(1, RATE)
         for i, packet in enumerate(stream.packets):

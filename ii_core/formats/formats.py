@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import configparser
 import itertools
-import json
 import math
 import os
 import re
@@ -39,7 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Pair
-from ..files import atomic_path, read_image, write_image, write_json
+from ..files import atomic_path, check_file, read_image, read_json, read_text, write_image, write_json
 from ..picture import IIPicture
 from .view_order import Arrangement, Read, estimate
 
@@ -49,6 +48,7 @@ HCI_VIEW = re.compile(r"input_Cam(\d+)\.\w+")
 QUILT = re.compile(r"_qs(\d+)x(\d+)(?:a(\d+(?:\.\d+)?))?")
 STRUCTURE = "structure.json"
 WHOLE_ORDER = frozenset(("transposed", "flip_down", "flip_across"))
+MAX_CONFIG = 1 << 20  # bytes of a parameters.cfg; those of the benchmark have a thousand
 LISTED = 5  # of many missing views, how many a message names
 
 
@@ -236,10 +236,10 @@ def _numbered(folder: Path, members: list[Path], grid: Pair | None) -> Views:
 def _written(folder: Path, shape: tuple[int, int]) -> dict[str, Any]:
     """What `write_views` knows of its own folder: order and structure."""
     path = folder / STRUCTURE
-    if not path.is_file():
+    if not os.path.lexists(path):
         return {}
     try:
-        structure = json.loads(path.read_bytes())
+        structure = read_json(path)
         u, v = structure["ei_pixels"]
     except (ValueError, TypeError, KeyError) as error:
         raise ValueError(f"{path} is no structure of an II-picture: {error!r}") from None
@@ -260,9 +260,10 @@ def _listed(files: list[Path], grid: Pair, known: frozenset[str]) -> Views:
 
 def _hci_grid(folder: Path, count: int) -> Pair:
     """(rows, columns) by the folder's parameters.cfg, or a square."""
-    config = configparser.ConfigParser()
+    config = configparser.ConfigParser(interpolation=None)
     try:
-        config.read(folder / "parameters.cfg", encoding="utf-8")
+        if os.path.lexists(folder / "parameters.cfg"):
+            config.read_string(read_text(folder / "parameters.cfg", MAX_CONFIG))
         if config.has_section("extrinsics"):
             return config.getint("extrinsics", "num_cams_y"), config.getint("extrinsics", "num_cams_x")
     except (configparser.Error, ValueError) as error:
@@ -338,6 +339,7 @@ def write_views(picture: IIPicture, folder: str | os.PathLike[str]) -> int:
     OSError
         If a file cannot be written.
     """
+    picture.check_regular()
     folder, count = Path(folder), 0
     suffix = ".exr" if picture.pixels.dtype.kind == "f" else ".png"
     digits = max(2, len(str(max(picture.ei_pixels) - 1)))
@@ -373,6 +375,7 @@ def write_hci(picture: IIPicture, folder: str | os.PathLike[str], *, depth: NDAr
     OSError
         If a file cannot be written.
     """
+    picture.check_regular()
     folder = Path(folder)
     disparity = None if depth is None else view_disparity(picture, depth)
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
@@ -413,6 +416,7 @@ def write_quilt(picture: IIPicture, path: str | os.PathLike[str], *, row: int | 
     OSError
         If it cannot be written.
     """
+    picture.check_regular()
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
     chosen = v // 2 if row is None else row
     if not 0 <= chosen < v:
@@ -430,6 +434,7 @@ def write_quilt(picture: IIPicture, path: str | os.PathLike[str], *, row: int | 
 
 def quilt_path(path: str | os.PathLike[str], picture: IIPicture) -> Path:
     """The name under which `write_quilt` writes: tiles and aspect behind the stem."""
+    picture.check_regular()
     path = Path(path)
     (k, l), (u, _) = picture.lenses, picture.ei_pixels
     across, down = _tiles(u, (k, l))
@@ -500,6 +505,7 @@ def read_pfm(path: str | os.PathLike[str]) -> NDArray[np.float32]:
     ValueError
         If it is none, or not whole.
     """
+    check_file(path)
     match = re.match(rb"Pf\s+(\d{1,6})\s+(\d{1,6})\s+(-?[\d.]+)\s", data := Path(path).read_bytes())
     if not match or len(data) - match.end() != 4 * int(match[1]) * int(match[2]):
         raise ValueError(f"{path} is no whole grey portable float map")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -64,8 +65,11 @@ def save(figure: Any, path: str | os.PathLike[str], *, dpi: int = 130) -> None:
     kind = check_suffix(path)
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {}}[kind]  # the same chart, the same file
     text: Any = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "raytrace-ii"}
-    with matplotlib.rc_context(text), atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=dpi, format=kind, metadata=undated)
+    drawn = io.BytesIO()  # written to a file, PDF and SVG are cut short by a full disk without an error
+    with matplotlib.rc_context(text):
+        figure.savefig(drawn, dpi=dpi, format=kind, metadata=undated)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(drawn.getvalue())
 
 
 def new_figure(width: float, height: float, layout: Any = "constrained") -> Any:

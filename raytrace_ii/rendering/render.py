@@ -8,7 +8,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise
-from ii_core.files import atomic_path, image_writer, write_json
-from ii_core.picture import NOISE_ROWS, noisy_rows, sidecar
+from ii_core.files import RowWriter, atomic_paths, check_type, image_rows
+from ii_core.picture import NOISE_ROWS, noisy_rows, picture_rows, sidecar
 
 from ..scene.scene import Scene
 from ..tracing.sampling import sampling
@@ -229,8 +229,7 @@ def render_to(
         raise ValueError(f"only the picture of one lens is turned upright: this camera has {camera.lenses} lenses")
     strips = _strips(job.tiles())
     tiles = [tile for strip in (reversed(strips) if upright else strips) for tile in strip]
-    with ExitStack() as stack:
-        writers = _writers(stack, job, picture, files, upright)
+    with _outputs(job, picture, files, upright) as (stack, writers):
         blocks = stack.enter_context(closing(_rendered(job, tiles, workers, executor, progress, tally)))
         for top, band in _bands(blocks, camera.pixels, upright):
             if noise:
@@ -243,26 +242,35 @@ def render_to(
     return tally.stats()
 
 
-def _writers(
-    stack: ExitStack, job: Job, picture: Any, files: dict[str, list[str]], upright: bool
-) -> list[tuple[Callable[[NDArray[Any]], None], list[str]]]:
-    """Open all files; what to call with rows of which images."""
-    camera = job.camera
-    out: list[tuple[Callable[[NDArray[Any]], None], list[str]]] = []
-    if picture is not None:
-        nothing = np.broadcast_to(np.zeros(1, job.dtype), (*camera.pixels[::-1], 3))
-        structure = IIPicture(nothing, camera.lenses, camera.ei_pixels, camera.model, camera.erect != upright)
-        write_json(stack.enter_context(atomic_path(sidecar(picture))), structure.structure_json())
-        out.append((stack.enter_context(image_writer(picture, camera.pixels, 3, job.dtype)), ["pixels"]))
-    about = {"objectNames": json.dumps([body.name for body in job.scene.bodies]), "units": UNITS}
-    for file in dict.fromkeys(file for paths in files.values() for file in paths):
-        names = [name for name in files if file in files[name]]
-        channels = [channel for name in names for channel in CHANNELS[name]]
-        writer = image_writer(
-            file, camera.pixels, len(channels), "float32", names=channels if len(names) > 1 else (), about=about
-        )
-        out.append((stack.enter_context(writer), names))
-    return out
+@contextmanager
+def _outputs(
+    job: Job, picture: str | os.PathLike[str] | None, files: dict[str, list[str]], upright: bool
+) -> Iterator[tuple[ExitStack, list[tuple[RowWriter, list[str]]]]]:
+    """Open all files; a stack to end with them, and what to call with rows of which images.
+
+    All files are whole and checked before the first appears.
+    """
+    camera, unique = job.camera, list(dict.fromkeys(file for paths in files.values() for file in paths))
+    for file, dtype in [*([(picture, job.dtype)] if picture is not None else []), *((f, "float32") for f in unique)]:
+        check_type(file, dtype)
+    pair = [] if picture is None else [sidecar(picture), picture]
+    out: list[tuple[RowWriter, list[str]]] = []
+    with atomic_paths([*pair, *unique]) as temporaries, ExitStack() as stack:
+        if picture is not None:
+            beside, file = temporaries[:2]
+            nothing = np.broadcast_to(np.zeros(1, job.dtype), (*camera.pixels[::-1], 3))
+            structure = IIPicture(nothing, camera.lenses, camera.ei_pixels, camera.model, camera.erect != upright)
+            out.append((stack.enter_context(picture_rows(structure, file, beside, named=picture)), ["pixels"]))
+        about = {"objectNames": json.dumps([body.name for body in job.scene.bodies]), "units": UNITS}
+        for target, file in zip(unique, temporaries[len(pair) :], strict=True):
+            names = [name for name in files if target in files[name]]
+            channels = [channel for name in names for channel in CHANNELS[name]]
+            writer = image_rows(
+                file, camera.pixels, len(channels), "float32", names=channels if len(names) > 1 else (), about=about,
+                named=target,
+            )  # fmt: skip
+            out.append((stack.enter_context(writer), names))
+        yield stack, out
 
 
 def _paths(value: Paths) -> list[str]:

@@ -1,0 +1,197 @@
+"""Files as units: picture and sidecar, equal bytes for equal content, remains of dead runs, pipes and devices."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from codec import encode
+from codec.inspect.extract import extract
+from ii_core import IIPicture
+from ii_core.atomic import atomic_paths
+from ii_core.files import atomic_path, image_header, pixel_digest, read_image, read_json, write_image, write_json
+from ii_core.picture import sidecar
+
+RNG = np.random.default_rng(5)
+
+
+def picture(lenses=(8, 4), value=None):
+    pixels = RNG.integers(0, 256, (32, 64, 3), np.uint8) if value is None else np.full((32, 64, 3), value, np.uint8)
+    return IIPicture(pixels, lenses, (64 // lenses[0], 32 // lenses[1]))
+
+
+@pytest.mark.parametrize("end", [".png", ".tif", ".exr", ".hdr"])
+def test_a_pair_holds_together(tmp_path, end):
+    path = tmp_path / f"p{end}"
+    one = picture() if end in (".png", ".tif") else picture().with_pixels(np.zeros((32, 64, 3), np.float32) + 0.3)
+    one.save(path)
+    loaded = IIPicture.load(path)
+    assert loaded.lenses == (8, 4)
+    assert json.loads(sidecar(path).read_text())["pixels_blake2b"] == pixel_digest(loaded.pixels)
+
+
+def test_a_sidecar_of_other_pixels_is_refused(tmp_path, run, refused):
+    a, b = tmp_path / "a.png", tmp_path / "b.png"
+    picture().save(a)
+    picture((16, 8)).save(b)
+    sidecar(b).replace(sidecar(a))
+    with pytest.raises(ValueError, match=r"a\.png and a\.png\.json do not belong together"):
+        IIPicture.load(a)
+    refused(run("encode", a, "--qp", 30, "-o", tmp_path / "a.ii"), "do not belong together")
+    assert IIPicture.load(a, lenses=(8, 4), ei_pixels=(8, 8)).lenses == (8, 4)
+    # a pair written before there was a binding, or by another program, has none
+    old = json.loads(sidecar(a).read_text())
+    del old["pixels_blake2b"]
+    sidecar(a).write_text(json.dumps(old))
+    assert IIPicture.load(a).lenses == (16, 8)
+
+
+def test_the_same_pixels_in_another_coding_keep_their_sidecar(tmp_path):
+    path = tmp_path / "p.png"
+    picture().save(path)
+    before = path.read_bytes()
+    write_image(path, np.ascontiguousarray(read_image(path)))
+    from PIL import Image
+
+    Image.open(path).save(path, compress_level=9)  # as an optimiser of PNG does
+    assert path.read_bytes() != before
+    assert IIPicture.load(path).lenses == (8, 4)
+
+
+KILLED = """
+import os, sys
+from ii_core import IIPicture, IICamera, preset
+from raytrace_ii import load_scene, render_to
+import numpy as np
+after, how = int(sys.argv[1]), sys.argv[2]
+replace, calls = os.replace, []
+def dies(*names):
+    replace(*names)
+    calls.append(names)
+    if len(calls) == after:
+        os._exit(9)
+os.replace = dies
+if how == "save":
+    IIPicture(np.full((32, 64, 3), 7, np.uint8), (16, 8), (4, 4)).save("p.png")
+else:
+    camera = IICamera(pixels=(64, 32), lenses=(16, 8), pixel_pitch_mm=1.0, gap_mm=9.0)
+    render_to("p.png", load_scene("cuboid"), camera)
+"""
+
+
+@pytest.mark.parametrize("how", ["save", "render_to"])
+@pytest.mark.parametrize("bound", [True, False])
+def test_a_kill_between_the_two_never_leaves_a_pair_that_loads_wrongly(tmp_path, how, bound):
+    """Before, the new picture stood first beside the old sidecar, and loaded with the old structure."""
+    path = tmp_path / "p.png"
+    picture().save(path)
+    if not bound:
+        data = json.loads(sidecar(path).read_text())
+        del data["pixels_blake2b"]
+        sidecar(path).write_text(json.dumps(data))
+    before = read_image(path)
+    done = subprocess.run([sys.executable, "-c", KILLED, "1", how], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 9, done.stderr
+    np.testing.assert_array_equal(read_image(path), before)
+    with pytest.raises(ValueError, match="do not belong together"):
+        IIPicture.load(path)
+
+
+def test_two_writers_of_one_name_leave_a_pair_or_nothing_that_loads(tmp_path):
+    path, pictures = tmp_path / "p.png", {(8, 4): picture((8, 4), 1), (16, 8): picture((16, 8), 2)}
+    for first, second in (((8, 4), (16, 8)), ((16, 8), (8, 4))):
+        pictures[first].save(path)
+        left = sidecar(path).read_bytes()
+        pictures[second].save(path)
+        sidecar(path).write_bytes(left)  # the first writer's came last
+        with pytest.raises(ValueError, match="do not belong together"):
+            IIPicture.load(path)
+
+
+def test_outputs_appear_together_or_not_at_all(tmp_path):
+    names = [tmp_path / "a", tmp_path / "b"]
+    with pytest.raises(OSError, match="no"), atomic_paths(names) as temporaries:
+        temporaries[0].write_text("x")
+        raise OSError("no")
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(ValueError, match="is to be written twice"), atomic_paths([names[0], tmp_path / "." / "a"]):
+        pass
+
+
+def content(name):
+    kinds = {".exr": "float32", ".tif": "uint16", ".png": "uint8"}
+    return np.arange(90).reshape(5, 6, 3).astype(kinds[name[-4:]])
+
+
+@pytest.mark.parametrize("name", ["a.exr", "a.tif", "a.png", "a.mkv", "a.mp4"])
+def test_equal_content_makes_equal_files(tmp_path, name):
+    """EXR and TIFF had the time of day in them, Matroska random numbers."""
+    coded = encode(picture(), "si-h264", qp=30) if name[-3:] in ("mkv", "mp4") else None
+    made = []
+    for folder in ("one", "two"):
+        path = tmp_path / folder / name
+        path.parent.mkdir()
+        extract(coded, path) if coded else write_image(path, content(name))
+        made.append(path.read_bytes())
+        time.sleep(1.1)  # dates are of seconds
+    assert made[0] == made[1]
+    assert not re.search(rb"20\d\d:\d\d:\d\d", made[0])
+
+
+DIES = """
+import os, sys, signal
+from ii_core.files import atomic_path
+with atomic_path(sys.argv[1]) as temporary:
+    temporary.write_text("half")
+    print(temporary.name, flush=True)
+    os.kill(os.getpid(), signal.SIGKILL) if sys.argv[2] == "dies" else sys.stdin.read()
+"""
+NEXT = "import sys; from ii_core.files import write_json; write_json(sys.argv[1], 1)"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc to tell the dead from the living")
+def test_remains_of_dead_runs_are_removed_and_those_of_the_living_are_not(tmp_path):
+    mine = tmp_path / ".mine.ii-tmp-notes.txt"
+    mine.write_text("a user's")
+    dead = subprocess.run([sys.executable, "-c", DIES, tmp_path / "a.txt", "dies"], capture_output=True, text=True)
+    assert dead.returncode == -signal.SIGKILL and (tmp_path / dead.stdout.strip()).exists()
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", DIES, tmp_path / "b.txt", "lives"], text=True, **pipes) as alive:
+        held = tmp_path / alive.stdout.readline().strip()
+        other = held.with_name(re.sub(r"ii-tmp-[0-9a-f]{8}", "ii-tmp-00000000", dead.stdout.strip()))
+        other.write_text("of another machine, whose processes nobody here can see")
+        subprocess.run([sys.executable, "-c", NEXT, tmp_path / "c.json"], check=True)
+        assert not (tmp_path / dead.stdout.strip()).exists()
+        assert held.exists() and mine.exists() and other.exists()
+        alive.communicate("")
+    assert (tmp_path / "b.txt").read_text() == "half"
+
+
+def test_devices_and_pipes_are_neither_written_nor_read(tmp_path):
+    pipe = tmp_path / "pipe.json"
+    os.mkfifo(pipe)
+    with pytest.raises(OSError, match=r"pipe\.json: it is a device, pipe or socket"):
+        write_json(pipe, 1)
+    with pytest.raises(OSError, match="a regular file is needed"):
+        read_json(pipe)
+    os.mkfifo(tmp_path / "p.png")
+    for read in (read_image, image_header, IIPicture.load):
+        with pytest.raises(OSError, match="a regular file is needed"):
+            read(tmp_path / "p.png")
+    (tmp_path / "link").symlink_to("/dev/null")
+    with pytest.raises(OSError, match="it is a device"), atomic_path(tmp_path / "link"):
+        pass
+    assert pipe.is_fifo() and (tmp_path / "link").is_symlink()
+
+
+def test_a_link_stays_a_link(tmp_path):
+    (tmp_path / "real.json").write_text("0")
+    (tmp_path / "link.json").symlink_to("real.json")
+    write_json(tmp_path / "link.json", 5)
+    assert (tmp_path / "link.json").is_symlink() and read_json(tmp_path / "real.json") == 5
