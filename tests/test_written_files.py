@@ -73,7 +73,7 @@ after, how = int(sys.argv[1]), sys.argv[2]
 replace, calls = os.replace, []
 def dies(*names):
     replace(*names)
-    calls.append(names)
+    calls.extend(name for name in names if os.path.basename(name).startswith("p.png"))  # numba has files, too
     if len(calls) == after:
         os._exit(9)
 os.replace = dies
