@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,9 @@ import numpy as np
 from ii_core import IIPicture
 from ii_core.camera import whole_pair
 
-from . import container
+from . import container, file_header
 from .coders.clock import cpu_seconds
-from .contract import MAX_PIXELS, Value, check_picture, checked_goal, checked_options, find, parse_scheme
+from .contract import MAX_PIXELS, Goal, Value, check_picture, checked_goal, find, parse_scheme
 from .rate import within
 
 
@@ -29,8 +29,8 @@ class Encoded:
     options : mapping
         Every option of the scheme.
     payload : bytes
-        What the scheme's decoder reads: stream headers included; structure, camera and options are not, and neither
-        are messages of the encoder to the reader that no decoder needs.
+        What the scheme's decoder reads, stream headers included. Messages of the encoder to the reader that no
+        decoder needs are left out.
     structure : mapping
         `IIPicture.structure_json` of the picture.
     dtype : str
@@ -45,14 +45,14 @@ class Encoded:
         False if the rate misses ``target_bpp`` by more than 2 %: it lies beyond what the coder can do here, and this
         is the nearest.
     runs : int
-        How many times the encoder ran to meet the rate.
+        Number of encoder runs. None if read from a file.
     encode_seconds : float or None
         CPU time of all of `encode`, rearrangement and every run: that of the calling thread and of an encoder's own
         threads. None if read from a file.
     codec_seconds : float or None
         The part of it inside the encoder, for the run that was kept alone: the coder's own time (5.16).
     versions : mapping
-        Libraries that did the work.
+        Libraries that did the work. Empty if read from a file.
     """
 
     scheme: str
@@ -64,15 +64,20 @@ class Encoded:
     qp: int | None = None
     quality: float | None = None
     reached: bool = True
-    runs: int = 1
+    runs: int | None = None
     encode_seconds: float | None = None
     codec_seconds: float | None = None
-    versions: Mapping[str, str]
+    versions: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def nbytes(self) -> int:
-        """Size of the payload in bytes."""
-        return len(self.payload)
+        """Size in bytes of the ``.ii`` file that `save` writes: payload, header and checksum."""
+        return self.overhead + len(self.payload)
+
+    @property
+    def overhead(self) -> int:
+        """Bytes of the file beyond the payload: structure, camera, scheme, options, lengths and checksum."""
+        return container.overhead(file_header.values(self), len(self.payload))
 
     @property
     def size(self) -> tuple[int, int]:
@@ -82,7 +87,7 @@ class Encoded:
 
     @property
     def bpp(self) -> float:
-        """Bits of payload per pixel of the picture, 8·nbytes/(M·N) (5.8)."""
+        """Bits of the whole file per pixel of the picture, 8·nbytes/(M·N) (5.8)."""
         width, height = self.size
         return 8 * self.nbytes / (width * height)
 
@@ -94,10 +99,7 @@ class Encoded:
         OSError
             If it cannot be written.
         """
-        header = {name: getattr(self, name) for name in _HEADER}
-        container.write(
-            path, {key: dict(v) if isinstance(v, Mapping) else v for key, v in header.items()}, self.payload
-        )
+        container.write(path, file_header.values(self), self.payload)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Encoded:
@@ -112,28 +114,21 @@ class Encoded:
         """
         header, payload = container.read(path)
         try:
-            return _from_header(header, payload)
+            return _from_file(header, payload)
         except (ValueError, TypeError, OverflowError) as error:
             raise ValueError(f"{os.fspath(path)} is damaged: {error}") from None
 
 
-_HEADER = ("scheme", "options", "structure", "dtype", "target_bpp", "qp", "quality", "reached", "runs", "versions")
-# What the first files did not say.
-_LATER = {"dtype": "uint8", "quality": None}
+def _from_file(header: container.Header, payload: bytes) -> Encoded:
+    fields = file_header.fields(header)
+    structure = blank_picture(fields["structure"], fields["dtype"]).structure_json()
+    coded = Encoded(**fields | {"structure": structure}, payload=payload)
+    return coded if "reached" in fields else replace(coded, reached=_reached(coded))
 
 
-def _from_header(header: dict[str, Any], payload: bytes) -> Encoded:
-    header = {**_LATER, **header}
-    if set(header) != set(_HEADER):
-        raise ValueError(f"its header has {', '.join(sorted(header)) or 'nothing'}: needed are {', '.join(_HEADER)}")
-    if not isinstance(header["scheme"], str) or not isinstance(header["options"], dict):
-        raise ValueError("its header names no scheme with options")
-    coder = find(header["scheme"])
-    options = checked_options(coder, header["options"])
-    if header["dtype"] not in coder.dtypes:
-        raise ValueError(f"its pixels are {header['dtype']!r}: scheme {coder.name} takes {', '.join(coder.dtypes)}")
-    structure = blank_picture(header["structure"], header["dtype"]).structure_json()
-    return Encoded(**{**header, "options": options, "structure": structure}, payload=payload)
+def _reached(coded: Encoded) -> bool:
+    width, height = coded.size
+    return coded.target_bpp is None or within(coded.nbytes, coded.target_bpp * width * height / 8)
 
 
 def encode(
@@ -153,7 +148,7 @@ def encode(
     scheme : str
         ``name`` or ``name:preset,option=value,…``; see `schemes` and `options`.
     bpp : float
-        Bits per pixel of the II-picture; `Encoded.reached` tells whether it was met within 2 %.
+        Bits of the ``.ii`` file per pixel of the II-picture. `Encoded.reached` is whether it was met within 2 %.
     qp : int
         Quantiser, in the scheme's range and on its scale.
     quality : float
@@ -169,24 +164,39 @@ def encode(
     coder, options = parse_scheme(scheme)
     goal = checked_goal(coder, options, bpp, qp, quality)
     check_picture(coder, options, picture)
-    coding = coder.encode(picture, options, goal)
-    width, height = picture.size
-    size = len(coding.run.payload)
-    return Encoded(
+    coded = Encoded(
         scheme=coder.name,
         options=options,
-        payload=coding.run.payload,
+        payload=b"",
         structure=picture.structure_json(),
         dtype=picture.pixels.dtype.name,
         target_bpp=goal.bpp,
         qp=goal.qp,
         quality=goal.quality,
-        reached=goal.bpp is None or within(size, goal.bpp * width * height / 8),
-        runs=coding.runs,
-        encode_seconds=cpu_seconds() - started,
-        codec_seconds=coding.run.codec_seconds,
         versions=coder.versions,
     )
+    coding = coder.encode(picture, options, _payload_goal(goal, coded))
+    coded = replace(coded, payload=coding.run.payload, runs=coding.runs)
+    return replace(
+        coded,
+        reached=_reached(coded),
+        encode_seconds=cpu_seconds() - started,
+        codec_seconds=coding.run.codec_seconds,
+    )
+
+
+# What is asked of a coder where the header alone takes more than the target: the least it can do.
+LEAST_BPP = 1e-9
+
+
+def _payload_goal(goal: Goal, coded: Encoded) -> Goal:
+    """The goal for the payload: a target rate counts the whole file."""
+    if goal.bpp is None:
+        return goal
+    width, height = coded.size
+    target = min(goal.bpp * width * height / 8, float(1 << 62))
+    header = container.overhead(file_header.values(coded), int(target))
+    return Goal(bpp=max(goal.bpp - 8 * header / (width * height), min(goal.bpp, LEAST_BPP)))
 
 
 @dataclass(frozen=True, kw_only=True)

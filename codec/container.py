@@ -1,16 +1,18 @@
 """The ``.ii`` file: a coded picture that decodes by itself.
 
-====================  =====  ==========================================================
-part                  bytes  meaning, little endian
-====================  =====  ==========================================================
-magic                 8      ``89 49 49 43 0D 0A 1A 0A``, damaged by any text transfer
-version               2      1
-header length         4
-payload length        8
-digest                32     SHA-256 of everything else, in file order
-header                       JSON, UTF-8: scheme, options, structure, camera, versions
-payload                      what the scheme's decoder reads, and nothing else
-====================  =====  ==========================================================
+==============  =======  =============================================================================
+part            bytes    meaning
+==============  =======  =============================================================================
+magic           4        ``89 49 49 43``
+version         1        2
+lengths         2 to 10  of header and payload, LEB128
+digest          8        the first bytes of SHA-256 of everything else, in file order
+header                   values of `codec.file_header`, in the form of `codec.bitstream.compact`
+payload                  what the scheme's decoder reads, and nothing else
+==============  =======  =============================================================================
+
+Files of the first version have ``0D 0A 1A 0A`` after the magic, then, little endian, the version 1 (2 bytes) and the
+lengths of header (4) and payload (8), all 32 bytes of SHA-256, and a header in JSON. They are read, not written.
 """
 
 from __future__ import annotations
@@ -19,20 +21,51 @@ import hashlib
 import json
 import os
 import struct
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from ii_core.files import atomic_path
 
-MAGIC = b"\x89IIC\r\n\x1a\n"
-VERSION = 1
-# A header is under a kilobyte; more than this is no header of ours.
+from .bitstream.compact import leb128, read_leb128, read_values, write_values
+
+MAGIC = b"\x89IIC"
+VERSION = 2
+# Names and cameras of a user's own take some hundred bytes; more than this is no header of ours.
 MAX_HEADER = 1 << 20
-_FIXED = struct.Struct("<8sHIQ")
-_DIGEST = 32
+_DIGEST = 8
+
+FIRST_MAGIC = MAGIC + b"\r\n\x1a\n"
+_FIRST = struct.Struct("<8sHIQ")
+_FIRST_DIGEST = 32
+# No fixed part and digest of either version have more bytes: a number in LEB128 has at most 9.
+_START = max(len(MAGIC) + 1 + 2 * 9 + _DIGEST, _FIRST.size + _FIRST_DIGEST)
+
+Header = dict[str, Any] | list[Any]
 
 
-def write(path: str | os.PathLike[str], header: dict[str, Any], payload: bytes) -> None:
+@dataclass(frozen=True)
+class _Frame:
+    """What stands before the header: its bytes without the digest, the digest, and the lengths it states."""
+
+    fixed: bytes
+    digest: bytes
+    header: int
+    payload: int
+
+    @property
+    def total(self) -> int:
+        """Bytes of the whole file."""
+        return len(self.fixed) + len(self.digest) + self.header + self.payload
+
+
+def overhead(header: list[Any], payload_length: int) -> int:
+    """Return how many bytes a file has beyond its payload."""
+    text = write_values(header)
+    return len(_fixed(text, payload_length)) + _DIGEST + len(text)
+
+
+def write(path: str | os.PathLike[str], header: list[Any], payload: bytes) -> None:
     """Write a coded picture, whole or not at all; the same content makes the same bytes.
 
     Raises
@@ -42,17 +75,23 @@ def write(path: str | os.PathLike[str], header: dict[str, Any], payload: bytes) 
     OSError
         If the file cannot be written.
     """
-    text = json.dumps(header, ensure_ascii=False, allow_nan=False, sort_keys=True, separators=(",", ":")).encode()
+    text = write_values(header)
     if len(text) > MAX_HEADER:
         raise ValueError(f"the header has {len(text)} bytes: at most {MAX_HEADER} are allowed")
-    fixed = _FIXED.pack(MAGIC, VERSION, len(text), len(payload))
+    fixed = _fixed(text, len(payload))
     with atomic_path(path) as temporary, temporary.open("wb") as file:
-        for part in (fixed, _digest(fixed, text, payload), text, payload):
+        for part in (fixed, _digest(fixed, text, payload)[:_DIGEST], text, payload):
             file.write(part)
 
 
-def read(path: str | os.PathLike[str]) -> tuple[dict[str, Any], bytes]:
-    """Header and payload of a coded picture; memory stays within the file's own size.
+def read(path: str | os.PathLike[str]) -> tuple[Header, bytes]:
+    """Return header and payload of a coded picture; memory stays within the file's own size.
+
+    Returns
+    -------
+    header : list or dict
+        The values given to `write`; an object from a file of the first version.
+    payload : bytes
 
     Raises
     ------
@@ -63,40 +102,77 @@ def read(path: str | os.PathLike[str]) -> tuple[dict[str, Any], bytes]:
     """
     path = Path(path)
     with path.open("rb") as file:
-        header_length, payload_length, fixed, digest = _lengths(path, file)
-        text, payload = file.read(header_length), file.read(payload_length)
-    if _digest(fixed, text, payload) != digest:
+        frame = _frame(path, file)
+        text, payload = file.read(frame.header), file.read(frame.payload)
+    if _digest(frame.fixed, text, payload)[: len(frame.digest)] != frame.digest:
         raise ValueError(f"{path} is damaged: its content does not match its checksum")
+    try:
+        return _first_header(text) if frame.fixed.startswith(FIRST_MAGIC) else read_values(text), payload
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path} is damaged: {error}") from None
+
+
+def _fixed(text: bytes, payload_length: int) -> bytes:
+    return MAGIC + bytes([VERSION]) + leb128(len(text)) + leb128(payload_length)
+
+
+def _frame(path: Path, file: BinaryIO) -> _Frame:
+    """Read the part before the header and check its lengths against the file's real size."""
+    there = os.fstat(file.fileno()).st_size
+    start = file.read(_START)
+    if start[: len(MAGIC)] != MAGIC[: len(start)] or not start:
+        raise ValueError(f"{path} is no coded II-picture: it does not start like one")
+    try:
+        frame = _first_frame(path, start) if start[4:5] == FIRST_MAGIC[4:5] else _second_frame(path, start)
+    except IndexError:
+        raise ValueError(f"{path} is truncated: {there} bytes are there, its fixed part alone has more") from None
+    if frame.header > MAX_HEADER:
+        raise ValueError(f"{path} is damaged: a header of {frame.header} bytes, at most {MAX_HEADER} are allowed")
+    if there < frame.total:
+        raise ValueError(f"{path} is truncated: {there} bytes are there, {frame.total} are needed")
+    if there > frame.total:
+        raise ValueError(f"{path} is damaged: {there} bytes are there, {frame.total} are expected")
+    file.seek(len(frame.fixed) + len(frame.digest))
+    return frame
+
+
+def _second_frame(path: Path, start: bytes) -> _Frame:
+    version = start[len(MAGIC)]
+    if version != VERSION:
+        raise ValueError(f"{path} is of version {version}: this program reads versions 1 and {VERSION}")
+    at = len(MAGIC) + 1
+    try:
+        header, at = read_leb128(start, at)
+        payload, at = read_leb128(start, at)
+    except ValueError as error:
+        if len(start) < _START:
+            raise IndexError from None
+        raise ValueError(f"{path} is damaged: {error}") from None
+    if len(start) < at + _DIGEST:
+        raise IndexError
+    return _Frame(start[:at], start[at : at + _DIGEST], header, payload)
+
+
+def _first_frame(path: Path, start: bytes) -> _Frame:
+    fixed, digest = start[: _FIRST.size], start[_FIRST.size : _FIRST.size + _FIRST_DIGEST]
+    if fixed[: len(FIRST_MAGIC)] != FIRST_MAGIC[: len(fixed)]:
+        raise ValueError(f"{path} is no coded II-picture: it does not start like one")
+    if len(digest) < _FIRST_DIGEST:
+        raise IndexError
+    _, version, header, payload = _FIRST.unpack(fixed)
+    if version != 1:
+        raise ValueError(f"{path} is of version {version}: this program reads versions 1 and {VERSION}")
+    return _Frame(fixed, digest, header, payload)
+
+
+def _first_header(text: bytes) -> dict[str, Any]:
     try:
         header = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ValueError(f"{path} is damaged: its header is no JSON ({error})") from None
+        raise ValueError(f"its header is no JSON ({error})") from None
     if not isinstance(header, dict):
-        raise ValueError(f"{path} is damaged: its header is a {type(header).__name__}, an object is needed")
-    return header, payload
-
-
-def _lengths(path: Path, file: BinaryIO) -> tuple[int, int, bytes, bytes]:
-    """The fixed part, checked against the file's real size before anything is read by its word."""
-    there = os.fstat(file.fileno()).st_size
-    fixed, digest = file.read(_FIXED.size), file.read(_DIGEST)
-    if fixed[: len(MAGIC)] != MAGIC[: len(fixed)] or not fixed:
-        raise ValueError(f"{path} is no coded II-picture: it does not start like one")
-    if len(digest) < _DIGEST:
-        raise ValueError(
-            f"{path} is truncated: {there} bytes are there, the fixed part alone has {_FIXED.size + _DIGEST}"
-        )
-    _, version, header_length, payload_length = _FIXED.unpack(fixed)
-    if version != VERSION:
-        raise ValueError(f"{path} is of version {version}: this program reads version {VERSION}")
-    if header_length > MAX_HEADER:
-        raise ValueError(f"{path} is damaged: a header of {header_length} bytes, at most {MAX_HEADER} are allowed")
-    needed = _FIXED.size + _DIGEST + header_length + payload_length
-    if there < needed:
-        raise ValueError(f"{path} is truncated: {there} bytes are there, {needed} are needed")
-    if there > needed:
-        raise ValueError(f"{path} is damaged: {there} bytes are there, {needed} are expected")
-    return header_length, payload_length, fixed, digest
+        raise ValueError(f"its header is a {type(header).__name__}, an object is needed")
+    return header
 
 
 def _digest(*parts: bytes) -> bytes:

@@ -252,7 +252,7 @@ def checked_goal(coder: Coder, options: Options, bpp: Any, qp: Any, quality: Any
         told = " and ".join(f"{name} is {given.get(name)}" for name in known)
         raise ValueError(f"{told}: {exactly} is needed")
     if bpp is not None:
-        if not _is_number(bpp) or not 0 < bpp < math.inf:
+        if not is_number(bpp) or not 0 < bpp < math.inf:
             raise ValueError(f"bpp is {bpp!r}: a positive number is needed")
         return Goal(bpp=float(bpp))
     for name, value, bounds in (("qp", qp, coder.qp_range), ("quality", quality, coder.quality_range)):
@@ -296,7 +296,7 @@ def _number(text: str, bounds: tuple[float, float]) -> float | None:
 
 def _within(value: Any, bounds: tuple[float, float]) -> float | None:
     """The number, a float or an int as the bounds are, if it is one within them."""
-    if not _is_number(value) or not bounds[0] <= value <= bounds[1]:
+    if not is_number(value) or not bounds[0] <= value <= bounds[1]:
         return None
     if _fractions(bounds):
         return float(value)
@@ -306,5 +306,6 @@ def _within(value: Any, bounds: tuple[float, float]) -> float | None:
         return None
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Whether a value is a number and no truth value."""
     return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)

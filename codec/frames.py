@@ -63,8 +63,11 @@ def layout(lenses: Pair, ei_pixels: Pair, kind: str) -> Layout:
     =====  ============  =================  ==============
     ei     V × U         L × K              one lens
     si     L × K         V × U              one direction
-    ri     K × U         V × L              one picture row
+    ri     K × U         L × V              one picture row
     =====  ============  =================  ==============
+
+    By (2.11) the first index of a component image runs across the grid and the second down, so that ray-space images
+    in row order are the picture's rows from top to bottom (2.14).
 
     Raises
     ------
@@ -77,7 +80,7 @@ def layout(lenses: Pair, ei_pixels: Pair, kind: str) -> Layout:
     # One step along each axis of the light field [l, v, k, u], in pixels.
     size = {"l": l, "v": v, "k": k, "u": u}
     step = {"l": v * k * u, "v": k * u, "k": u, "u": 1}
-    row, col, y, x = tuple({"ei": "lkvu", "si": "vulk", "ri": "vlku"}[kind])
+    row, col, y, x = tuple({"ei": "lkvu", "si": "vulk", "ri": "lvku"}[kind])
     return Layout(
         rows=size[row],
         cols=size[col],
@@ -94,7 +97,8 @@ def layout(lenses: Pair, ei_pixels: Pair, kind: str) -> Layout:
 class Film:
     """The frames of a pseudo video sequence: which component images, in what order and colours, how large.
 
-    ``width`` and ``height`` are those of the frames that are coded, at least those of a component image.
+    ``width`` and ``height`` are those of the frames that are coded, at least those of a component image. ``start``
+    and ``stop`` bound the frames of a part of the sequence.
     """
 
     layout: Layout
@@ -103,15 +107,17 @@ class Film:
     format: Format
     width: int
     height: int
+    start: int = 0
+    stop: int | None = None
 
     @property
     def frames(self) -> int:
-        """How many."""
-        return self.layout.frames
+        """Number of frames."""
+        return (self.layout.frames if self.stop is None else self.stop) - self.start
 
     def origins(self) -> NDArray[np.int64]:
         """The first pixel of each frame in the picture."""
-        return self.layout.origins(self.order, self.by)
+        return self.layout.origins(self.order, self.by)[self.start : self.stop]
 
     def batch(self, strides: list[int] | None = None) -> Planes:
         """Room for one batch of frames, an array (B, rows, ``stride``) of samples for each plane."""

@@ -59,9 +59,11 @@ def test_one_component_is_that_of_the_whole(scheme, gop):
     stream = coded(f"{scheme}:gop={gop}")
     kind = scheme.partition("-")[0]
     whole = component_images(decode(stream), kind)
+    if kind == "ri":  # the stack is [v, l], the grid has v across
+        whole = whole.swapaxes(0, 1)
     rows, cols = whole.shape[:2]
     for row, col in ((0, 0), (rows - 1, cols - 1), (rows // 2, cols // 2), (0, cols - 1)):
-        place = (row, col) if kind == "ri" else (col, row)
+        place = (col, row)
         np.testing.assert_array_equal(decode_component(stream, place), whole[row, col])
     taken = sequence(stream)
     count = len(taken.packets)
@@ -166,7 +168,7 @@ def test_whole_pictures_are_files_that_open(scheme, tmp_path):
     for suffix in suffixes(stream):
         path = tmp_path / f"out{suffix}"
         extract(stream, path)
-        assert path.stat().st_size - stream.nbytes in (0, 85)
+        assert path.stat().st_size - len(stream.payload) in (0, 85)
         if suffix in (".jp2", ".j2k", ".jpg"):
             with Image.open(path) as image:
                 assert image.size == picture().size
@@ -203,7 +205,7 @@ def test_the_bare_payload_is_a_stream(tmp_path):
     """What stands in the file needs no more than to be cut out."""
     stream = coded("si-h264")
     stream.save(tmp_path / "x.ii")
-    payload = (tmp_path / "x.ii").read_bytes()[-stream.nbytes :]
+    payload = (tmp_path / "x.ii").read_bytes()[-len(stream.payload) :]
     assert Encoded.load(tmp_path / "x.ii").payload == payload
     with av.open(io.BytesIO(payload), format="h264") as container:
         assert sum(1 for _ in container.decode(video=0)) == 12

@@ -19,6 +19,8 @@ counts = st.integers(1, 6)
 def direct(picture, kind, order):
     """(5.3) and (5.7) as they stand."""
     stack = component_images(picture, kind).astype(np.float64)
+    if kind == "ri":  # the stack is [v, l], the grid has v across
+        stack = stack.swapaxes(0, 1)
     rows, cols = stack.shape[:2]
     frames = stack.reshape(rows * cols, -1)[selection_order(order, rows, cols)]
     c, e = [], []

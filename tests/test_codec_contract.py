@@ -153,12 +153,12 @@ def test_rate_is_met(scheme):
 def test_all_bytes_are_accounted_for(scheme, tmp_path):
     picture = textured()
     coded = encode(picture, quick(scheme), **medium(scheme))
-    assert coded.bpp == 8 * coded.nbytes / picture.pixels[..., 0].size
-    assert coded.nbytes == len(coded.payload)
     path = tmp_path / "coded.ii"
     coded.save(path)
     assert path.read_bytes().endswith(coded.payload)
-    assert path.stat().st_size - coded.nbytes < 2000
+    assert coded.nbytes == path.stat().st_size
+    assert coded.overhead == coded.nbytes - len(coded.payload) <= 64
+    assert coded.bpp == 8 * coded.nbytes / picture.pixels[..., 0].size
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from codec import Encoded, container, decode, encode
-from codec.container import MAGIC
-from ii_core import IIPicture
+from codec.bitstream.compact import WORDS, leb128, write_values
+from codec.container import FIRST_MAGIC, MAGIC
+from ii_core import IIPicture, preset
 
 
 @pytest.fixture(scope="module")
@@ -24,11 +25,18 @@ def whole(coded, tmp_path):
     return path.read_bytes()
 
 
+def first_file(header, payload=b"\x00\x00\x00\x01"):
+    """A file of the first version with a right checksum over anything."""
+    text = header if isinstance(header, bytes) else json.dumps(header).encode()
+    fixed = struct.pack("<8sHIQ", FIRST_MAGIC, 1, len(text), len(payload))
+    return fixed + hashlib.sha256(fixed + text + payload).digest() + text + payload
+
+
 def forged(header, payload=b"\x00\x00\x00\x01"):
     """A file with a right checksum over anything."""
-    text = header if isinstance(header, bytes) else json.dumps(header).encode()
-    fixed = struct.pack("<8sHIQ", MAGIC, 1, len(text), len(payload))
-    return fixed + hashlib.sha256(fixed + text + payload).digest() + text + payload
+    text = header if isinstance(header, bytes) else write_values(header)
+    fixed = b"\x89IIC\x02" + leb128(len(text)) + leb128(len(payload))
+    return fixed + hashlib.sha256(fixed + text + payload).digest()[:8] + text + payload
 
 
 def refused(path, data, match):
@@ -42,7 +50,18 @@ def test_everything_survives_the_file(coded, tmp_path):
     path = tmp_path / "coded.ii"
     coded.save(path)
     back = Encoded.load(path)
-    for name in ("scheme", "options", "payload", "structure", "target_bpp", "qp", "reached", "versions", "bpp"):
+    for name in (
+        "scheme",
+        "options",
+        "payload",
+        "structure",
+        "dtype",
+        "target_bpp",
+        "qp",
+        "quality",
+        "reached",
+        "bpp",
+    ):
         assert getattr(back, name) == getattr(coded, name)
     assert back.encode_seconds is None
     again = tmp_path / "again.ii"
@@ -50,10 +69,12 @@ def test_everything_survives_the_file(coded, tmp_path):
     assert again.read_bytes() == path.read_bytes()
 
 
-def test_truncated_anywhere(whole, tmp_path):
+@pytest.mark.parametrize("version", [1, 2])
+def test_truncated_anywhere(coded, whole, tmp_path, version):
     path = tmp_path / "cut.ii"
-    for length in [*range(0, 120), *range(120, len(whole), 37)]:
-        refused(path, whole[:length], "no coded II-picture" if length == 0 else "is truncated")
+    data = whole if version == 2 else first_file(header_of(coded), coded.payload)
+    for length in [*range(0, 120), *range(120, len(data), 37)]:
+        refused(path, data[:length], "no coded II-picture" if length == 0 else "is truncated")
 
 
 def test_longer_than_it_says(whole, tmp_path):
@@ -62,14 +83,71 @@ def test_longer_than_it_says(whole, tmp_path):
 
 def test_foreign(tmp_path):
     path = tmp_path / "foreign.ii"
-    for data in (b"\x89PNG\r\n\x1a\n" + bytes(100), b"hello", bytes(1000), MAGIC.replace(b"\r\n", b"\n") + bytes(99)):
+    for data in (
+        b"\x89PNG\r\n\x1a\n" + bytes(100),
+        b"hello",
+        bytes(1000),
+        FIRST_MAGIC.replace(b"\r\n", b"\r") + bytes(99),
+    ):
         refused(path, data, "is no coded II-picture")
 
 
-def test_another_version(whole, tmp_path):
-    refused(
-        tmp_path / "new.ii", whole[:8] + b"\x02\x00" + whole[10:], "is of version 2: this program reads version 1"
+def test_another_version(coded, whole, tmp_path):
+    path = tmp_path / "new.ii"
+    refused(path, MAGIC + b"\x03" + whole[5:], "is of version 3: this program reads versions 1 and 2")
+    first = first_file(header_of(coded), coded.payload)
+    refused(path, first[:8] + b"\x02\x00" + first[10:], "is of version 2: this program reads versions 1 and 2")
+
+
+def test_bytes_of_a_file_by_the_tables_of_the_format(tmp_path):
+    """Put together by hand from the tables in container.py, file_header.py and compact.py."""
+    camera = preset("setup1", scale=64)  # 8×4 lenses, pitch 0.3904 mm, gap 11.691979456 mm
+    coded = Encoded(
+        scheme="si-h264",
+        options={
+            **encode(IIPicture(np.zeros((4, 4, 3), np.uint8), (2, 2), (2, 2)), "si-h264", qp=51).options,
+            "gop": 300,
+        },
+        payload=b"\1\2\3",
+        structure=IIPicture(np.zeros((64, 128, 3), np.uint8), (8, 4), (16, 16), camera).structure_json(),
+        qp=30,
     )
+    coded.save(tmp_path / "x.ii")
+
+    def word(text):
+        return bytes([128 + WORDS.index(text)])
+
+    header = bytes([8, 4, 16, 16, 0x61]) + word("uint8") + word("si-h264")
+    header += b"\x69\2" + word("qp") + b"\x1e" + word("gop") + b"\x63" + bytes([0xCC, 0x01])  # 300 − 96 = 204
+    header += b"\x69\3" + word("name") + word("setup1") + word("pixel_pitch_mm")
+    header += bytes([0x65, 128 - 4, 0x63]) + leb128(3904 - 96) + word("gap_mm")
+    mantissa = round(camera.gap_mm * 10**9)
+    assert camera.gap_mm == mantissa / 10**9 and mantissa % 10
+    header += bytes([0x65, 128 - 9, 0x63]) + leb128(mantissa - 96)
+    fixed = b"\x89IIC\2" + bytes([len(header), 3])
+    digest = hashlib.sha256(fixed + header + b"\1\2\3").digest()[:8]
+    assert (tmp_path / "x.ii").read_bytes() == fixed + digest + header + b"\1\2\3"
+
+
+def test_words_keep_their_numbers():
+    """The table is part of the format: words may be appended, and a changed hash then needs a new one here."""
+    assert hashlib.sha256(" ".join(WORDS[:124]).encode()).hexdigest()[:16] == "6235f16dcbd7c8c6"
+    assert len(set(WORDS)) == len(WORDS)
+
+
+@pytest.mark.parametrize(
+    "scheme", ["si-h264:balanced", "ei-hevc:best", "ri-av1:best,by=columns", "si-avif:best", "jpeg2000"]
+)
+def test_usual_files_have_at_most_64_bytes_beside_the_payload(scheme, tmp_path):
+    for name in ("setup1", "setup2-64", "setup3"):
+        camera = preset(name, scale=32 if name != "setup2-64" else 16)
+        picture = IIPicture(np.zeros((*camera.pixels[::-1], 3), np.uint8), camera.lenses, camera.ei_pixels, camera)
+        coded = encode(picture, scheme, bpp=0.125)
+        coded.save(tmp_path / "x.ii")
+        size = (tmp_path / "x.ii").stat().st_size
+        assert size - len(coded.payload) <= 64
+        assert coded.nbytes == size and coded.bpp == 8 * size / (camera.pixels[0] * camera.pixels[1])
+        assert decode(tmp_path / "x.ii").camera == camera
 
 
 def test_hundreds_of_mutations_are_found_fast(whole, tmp_path):
@@ -91,13 +169,15 @@ def test_lengths_are_not_believed(whole, tmp_path):
         (10, 2**63, "is truncated"),
         (0, 2**64 - 1, "is truncated"),
     ):
-        fixed = struct.pack("<8sHIQ", MAGIC, 1, header_length, payload_length)
-        refused(path, fixed + whole[len(fixed) :], message)
+        fixed = struct.pack("<8sHIQ", FIRST_MAGIC, 1, header_length, payload_length)
+        refused(path, fixed + whole[5:], message)
+        lengths = leb128(header_length) + leb128(payload_length)
+        refused(path, MAGIC + b"\2" + lengths + whole[7:], f"{message}|too large")
 
 
 def header_of(coded, **changes):
     names = ("scheme", "options", "structure", "target_bpp", "qp", "reached", "runs", "versions")
-    return {name: getattr(coded, name) for name in names} | changes
+    return {name: getattr(coded, name) for name in names} | {"runs": 1} | changes
 
 
 def structure(**changes):
@@ -133,17 +213,82 @@ def structure(**changes):
     ],
 )
 def test_headers_with_a_right_checksum_are_not_believed(coded, tmp_path, change):
-    refused(tmp_path / "forged.ii", forged(header_of(coded, **change), coded.payload), "forged.ii is damaged")
+    refused(tmp_path / "forged.ii", first_file(header_of(coded, **change), coded.payload), "forged.ii is damaged")
+
+
+GOOD = [6, 4, 4, 4, False, "uint8", "si-h264", {"qp": 30, "gop": 4}, None]
+
+
+def changed(place, value):
+    return [*GOOD[:place], value, *GOOD[place + 1 :]]
+
+
+def test_the_good_header_is_good(coded, tmp_path):
+    (tmp_path / "good.ii").write_bytes(forged(GOOD, coded.payload))
+    assert Encoded.load(tmp_path / "good.ii").options == coded.options
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        GOOD[:-1],
+        [*GOOD, None],
+        changed(0, 10**9),
+        changed(0, 5),
+        changed(0, 0),
+        changed(0, -6),
+        changed(0, 6.0),
+        changed(0, True),
+        changed(2, None),
+        changed(5, "float32"),
+        changed(5, ["uint8"]),
+        changed(6, "si-h999"),
+        changed(6, 3),
+        changed(7, []),
+        changed(7, {"gop": -1}),
+        changed(7, {"speed": 3}),
+        changed(7, {"qp": "30"}),
+        changed(7, {"bpp": [1]}),
+        changed(8, {}),
+        changed(8, {"pixel_pitch_mm": 1.0, "gap_mm": 1.0, "unheard": 2}),
+        changed(8, {"pixel_pitch_mm": 1.0, "gap_mm": 1.0, "lenses": [1, 1]}),
+        changed(8, "setup1"),
+        [2**15, 2**15, 2**15, 2**15, *GOOD[4:]],
+        write_values(GOOD)[:-1],
+        write_values(GOOD).replace(b"\6", b"\x63\0", 1),  # 96 and more than one way to write a number
+        write_values(GOOD) + b"\x6f",
+        b"\x68\1" * 100_000,
+        b"\x68" + leb128(2**40),
+        b"\x67" + leb128(2**40),
+        b"\x66\0",
+        b"\x65",
+        b"\x65\x80\x62",
+        b"\x77\xff",
+        b"\x67\1\xff",
+        b"\x69\1\1\1",
+        b"\x63" + b"\xff" * 30,
+        b"",
+    ],
+)
+def test_compact_headers_with_a_right_checksum_are_not_believed(coded, tmp_path, header):
+    refused(tmp_path / "forged.ii", forged(header, coded.payload), "forged.ii is damaged")
 
 
 @pytest.mark.parametrize("text", [b"", b"[1]", b"{", b"\xff", b"[" * 100_000, b'{"scheme": "si-h264"}', b"null"])
 def test_headers_that_are_none(tmp_path, text):
-    refused(tmp_path / "forged.ii", forged(text), "forged.ii is damaged")
+    refused(tmp_path / "forged.ii", first_file(text), "forged.ii is damaged")
 
 
 def test_a_header_must_be_plain(tmp_path):
-    with pytest.raises(ValueError, match="at most 1048576 are allowed"):
-        container.write(tmp_path / "x.ii", {"long": "x" * (1 << 20)}, b"")
+    for header, message in (
+        (["x" * (1 << 20)], "at most 1048576 are allowed"),
+        ([float("nan")], "not finite"),
+        ([object()], "no JSON value"),
+        ([{1: 2}], "no JSON value"),
+        ([1 << 63], "more than 63 bits"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            container.write(tmp_path / "x.ii", header, b"")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -61,6 +61,8 @@ def test_frames_are_the_component_images_in_order(k, l, u, v, kind, order, by):
     luma, cb, cr = to_planes(picture.pixels, film, extra=3)
 
     stack = component_images(picture, kind)[..., 0]
+    if kind == "ri":  # the stack is [v, l], the grid has v across
+        stack = stack.swapaxes(0, 1)
     images = stack.reshape(-1, *stack.shape[2:])
     assert (film.layout.rows, film.layout.cols) == stack.shape[:2]
     np.testing.assert_array_equal(luma, images[selection_order(order, *stack.shape[:2], by)])
@@ -69,6 +71,16 @@ def test_frames_are_the_component_images_in_order(k, l, u, v, kind, order, by):
     back = np.zeros_like(picture.pixels)
     film.scatter([luma, cb, cr], film.origins(), back)
     np.testing.assert_array_equal(back, picture.pixels)
+
+
+def test_ray_space_images_in_row_order_are_the_rows_of_the_picture_from_top_to_bottom():
+    """By (2.11) and (2.14). The test above took the grid from the stack [v, l], and missed a transposed one."""
+    k, l, u, v = 3, 4, 2, 5
+    grey = np.arange(l * v, dtype=np.uint8)[:, None, None] * np.ones((1, k * u, 3), np.uint8)  # row n has value n
+    film = film_of(IIPicture(grey, (k, l), (u, v)), "ri", order="row")
+    luma, _, _ = to_planes(grey, film)
+    assert luma[:, 0, 0].tolist() == list(range(l * v))
+    assert (luma == luma[:, :1, :1]).all()
 
 
 def test_frames_on_their_side():

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from .compact import leb128, read_leb128
+
 
 def pack(first: bytes, packets: Sequence[bytes]) -> bytes:
     """One payload."""
-    table = bytearray()
-    for number in (len(first), len(packets), *map(len, packets)):
-        while number > 127:
-            table.append(number & 127 | 128)
-            number >>= 7
-        table.append(number)
+    table = b"".join(leb128(number) for number in (len(first), len(packets), *map(len, packets)))
     return b"".join([table, first, *packets])
 
 
@@ -31,16 +28,10 @@ def unpack(payload: bytes, count: int) -> tuple[bytes, list[memoryview]]:
     at = 0
     numbers: list[int] = []
     while len(numbers) < count + 2:
-        number = shift = 0
-        while True:
-            if at >= len(payload) or shift > 28:
-                raise ValueError("its table of packets is broken")
-            byte = payload[at]
-            at += 1
-            number |= (byte & 127) << shift
-            shift += 7
-            if byte < 128:
-                break
+        try:
+            number, at = read_leb128(payload, at)
+        except ValueError:
+            raise ValueError("its table of packets is broken") from None
         numbers.append(number)
         if len(numbers) == 2 and number != count:
             raise ValueError(f"it has {number} packets, {count} are needed")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar
 
@@ -64,12 +64,14 @@ def fine_rate(size: float, film: Film) -> tuple[int, int]:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What an encoder is opened with. A pass of several leaves notes for the next, and its bytes are thrown away."""
+    """Settings of an encoder. Frames from ``frames`` on are a sequence of their own with ``then``, if it is given."""
 
     parameters: Mapping[str, str]
     frame_rate: int = 25
     bit_rate: int | None = None
     threads: int = 1
+    frames: int = 0
+    then: Settings | None = None
 
 
 class Video(Coder):
@@ -254,6 +256,11 @@ def new_frame(film: Film, context: Any) -> Any:
 
 def encoded(coder: Video, pixels: NDArray[Any], film: Film, settings: Settings) -> tuple[list[bytes], bytes, float]:
     """One run of an encoder over all frames: its packets, what a decoder needs before them, CPU seconds inside it."""
+    if settings.then is not None:
+        start, end = replace(film, stop=settings.frames), replace(film, start=settings.frames)
+        packets, first, seconds = encoded(coder, pixels, start, replace(settings, then=None))
+        more, _, longer = encoded(coder, pixels, end, settings.then)
+        return packets + more, first, seconds + longer
     context = open_encoder(coder, film, settings)
     threads = OwnThreads(context.open)
     frame = new_frame(film, context)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import ClassVar
 
 from ..contract import Option, Options
@@ -35,7 +36,7 @@ class Vp9(Video):
         return _settings(options, {"crf": f"{quantiser:g}", "b": "0", "lossless": str(int(quantiser == 0))})
 
     def meet(self, target: float, film: Film, options: Options, run: Callable[[Settings], Run]) -> tuple[Run, int]:
-        """By the quality; its steps are coarse, so that what is left is done by a rate between two of them."""
+        """By the quality; its steps are coarse, so that the rest is done by a rate between two of them."""
         runs = nearest_quantiser(
             lambda quantiser: run(self.constant(quantiser, film, options)),
             target,
@@ -55,7 +56,17 @@ class Vp9(Video):
             return run(_settings(options, bounds, frame_rate, 1000 * kilobits))
 
         better, more = nearest_rate(at_rate, target, coarsest=lambda: runs[coarse], finest=lambda: runs[fine])
-        return nearest([best, better], target), len(runs) + more
+        if within(len(better.payload), target):
+            return better, len(runs) + more
+        found, tried = self.between(runs, target, film, options, run)
+        return nearest([better, found], target), tried + more
+
+    def mixed(self, fine: float, coarse: float, frames: int, film: Film, options: Options) -> Settings:
+        """Two sequences one after the other: there is one more I picture."""
+        if not 0 < frames < film.frames:
+            return self.constant(fine if frames else coarse, film, options)
+        then = self.constant(coarse, film, options)
+        return replace(self.constant(fine, film, options), frames=frames, then=then)
 
 
 def _settings(

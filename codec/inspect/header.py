@@ -1,5 +1,7 @@
 """The header portion H: what of a stream describes the coding and not the picture (5.11)–(5.15).
 
+The stream is the payload of the ``.ii`` file. The file's own header, some 50 bytes, is no part of H.
+
 Three ways to see it: a black picture at the coarsest quantiser holds little else; a stream taken apart tells the bits
 of its parameter sets and, for H.264, of every slice header; and the number of frames alone says which kind of
 component image can reach the lower rate.
@@ -55,7 +57,7 @@ class Parts:
 
 
 def parts(coded: Encoded) -> Parts:
-    """Bits of a coded picture's stream by what they are for; they add up to its size.
+    """Bits of a coded picture's stream by what they are for; they add up to the size of its payload.
 
     Raises
     ------
@@ -91,13 +93,14 @@ class Floor:
 
     @property
     def bits(self) -> int:
-        """Of all J frames, b̄_h·J."""
-        return 8 * self.coded.nbytes
+        """Of all J frames, b̄_h·J: the stream alone, not the header of the ``.ii`` file around it."""
+        return 8 * len(self.coded.payload)
 
     @property
     def bpp(self) -> float:
-        """The rate below which nothing can be coded: where H = 1."""
-        return self.coded.bpp
+        """The rate of the stream below which nothing can be coded: where H = 1."""
+        width, height = self.coded.size
+        return self.bits / (width * height)
 
     def portion(self, bpp: float) -> float:
         """H at a rate (5.13): the share that headers take of it. Above 1 the rate cannot be reached."""

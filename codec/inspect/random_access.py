@@ -156,10 +156,9 @@ def decode_component(coded: Encoded, place: tuple[int, int]) -> Pixels:
     """
     stream = sequence(coded)
     layout = stream.film.layout
-    row, col = place if stream.coder.kind == "ri" else (place[1], place[0])
+    col, row = place
     if not (0 <= row < layout.rows and 0 <= col < layout.cols):
-        counts = (layout.rows, layout.cols) if stream.coder.kind == "ri" else (layout.cols, layout.rows)
-        raise ValueError(f"component image {place} is asked for: there are {counts[0]}×{counts[1]}, from (0, 0)")
+        raise ValueError(f"component image {place} is asked for: there are {layout.cols}×{layout.rows}, from (0, 0)")
     order = selection_order(stream.film.order, layout.rows, layout.cols, stream.film.by)
     return decode_frame(coded, int(inverse(order)[row * layout.cols + col]))
 

@@ -90,7 +90,7 @@ def extract(
     check_output(output, force)
     with spinner(f"extract {coded.name}"):
         extract(stream, output)
-    print(f"{output}: {output.stat().st_size} bytes around {stream.nbytes} of {stream.scheme}")
+    print(f"{output}: {output.stat().st_size} bytes around {len(stream.payload)} of {stream.scheme}")
 
 
 def _place(text: str) -> tuple[int, int]:
