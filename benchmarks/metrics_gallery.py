@@ -12,7 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks.focus_patterns import main as draw_patterns
-from codec import decode, encode
+from codec import decode, encode, timed_decode
 from ii_core import preset
 from metrics import (
     depth_rate_chart,
@@ -44,7 +44,7 @@ def main() -> None:
     plot_error_views(picture, decoded, IMAGES / "errors_views.png")
     plot_error_layers(picture, q_depth(picture, decoded, depth=shot.depth), IMAGES / "errors_depth.png")
     measure = measuring(picture, ["q_depth_min", "q_depth_mean", "q_depth_max", "q_view"], depth=shot.depth)
-    records = rate_distortion(picture, SCHEMES, RATES, encode=encode, decode=decode, measure=measure)
+    records = rate_distortion(picture, SCHEMES, RATES, encode=encode, decode=timed_decode, measure=measure)
     write_study(STUDY, "Apples", records, {"scale": 4, "noise": 1.0}, picture=picture)
     depth_rate_chart(read_study(STUDY), IMAGES / "q_depth_rate.png")
 

@@ -8,12 +8,10 @@ each key. `check` holds the files to this rule.
 from __future__ import annotations
 
 import argparse
-import fcntl
 import hashlib
 import importlib.util
 import json
 import math
-import os
 import subprocess
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,6 +21,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from ii_core.identity import source_hash
+from ii_core.json_lines import append_record, read_records
 from metrics import provenance
 
 Record = dict[str, Any]
@@ -75,7 +75,7 @@ class Records:
             "seconds": round(time.perf_counter() - started, 2),
             "result": result,
         }
-        append(self.path, record)
+        append_record(self.path, record)
         return record
 
     def todo(self, keys: Iterable[Mapping[str, Any]], again: str = CHANGED) -> list[dict[str, Any]]:
@@ -108,7 +108,7 @@ class Records:
             Values that the keys must have.
         """
         found: dict[str, Record] = {}
-        for record in read(self.path, FORMAT, VERSION):
+        for record in read_records(self.path, FORMAT, VERSION):
             name = _name(record["key"])
             if "unsure" not in record or "unsure" in found.get(name, record):
                 found[name] = record
@@ -159,7 +159,7 @@ def code_hash(modules: Sequence[str]) -> str:
     ValueError
         If a module does not exist.
     """
-    digest = hashlib.sha256(_packages().encode())
+    digest = hashlib.sha256(source_hash(PACKAGES, SOURCES).encode())
     for module in modules:
         found = importlib.util.find_spec(module)
         if found is None or found.origin is None:
@@ -168,58 +168,6 @@ def code_hash(modules: Sequence[str]) -> str:
         for path in sorted(origin.parent.glob("*.py")) if origin.name == "__init__.py" else [origin]:
             digest.update(path.read_bytes())
     return digest.hexdigest()
-
-
-def _packages() -> str:
-    digest = hashlib.sha256()
-    for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*")):
-            if path.suffix in SOURCES and path.is_file():
-                digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0")
-                digest.update(_digest(path, path.stat().st_mtime_ns).encode())
-    return digest.hexdigest()
-
-
-@lru_cache(maxsize=4096)
-def _digest(path: Path, _changed: int) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def append(path: Path, record: Mapping[str, Any]) -> None:
-    """Add a line to a file of records, on disk when this returns; a line that a kill cut off is removed first."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    line = json.dumps(record, ensure_ascii=False) + "\n"
-    with path.open("a+b") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)  # another process may measure other rows
-        file.seek(0)
-        file.truncate(file.read().rfind(b"\n") + 1)
-        file.write(line.encode())
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def read(path: Path, format: str, version: int) -> list[Record]:
-    """Return all records of a file, oldest first; a last line that a kill cut off is left out.
-
-    Raises
-    ------
-    ValueError
-        If another line is no record of this format.
-    """
-    if not path.exists():
-        return []
-    found = []
-    for number, line in enumerate(path.read_bytes().splitlines(keepends=True), 1):
-        if not line.endswith(b"\n"):
-            break
-        try:
-            record = json.loads(line)
-        except ValueError as error:
-            raise ValueError(f"{path}, line {number}: {error}") from None
-        if not isinstance(record, dict) or (record.get("format"), record.get("version")) != (format, version):
-            raise ValueError(f'{path}, line {number}: no record: needs "format": "{format}", "version": {version}')
-        found.append(record)
-    return found
 
 
 def commit_of(record: Mapping[str, Any]) -> str:
@@ -276,7 +224,7 @@ def check(path: Path) -> list[str]:
     of an earlier form have no code hash and no date; records of unsure provenance have no commit either.
     """
     wrong, seen = [], dict[tuple[float, ...], str]()
-    for number, record in enumerate(read(path, FORMAT, VERSION), 1):
+    for number, record in enumerate(read_records(path, FORMAT, VERSION), 1):
         where = f"{path.name}, line {number}"
         if missing := [name for name in FIELDS if name not in record]:
             wrong.append(f"{where}: no {', '.join(missing)}")

@@ -161,7 +161,7 @@ def rate_distortion(
     rates: Sequence[float],
     *,
     encode: Callable[..., Any],
-    decode: Callable[[Any], IIPicture],
+    decode: Callable[[Any], Any],
     progress: Callable[[int, int, str], None] | None = None,
     workers: int = 2,
     measure: Callable[[IIPicture], Mapping[str, Any]] | None = None,
@@ -179,12 +179,12 @@ def rate_distortion(
         ``encode(picture, scheme, bpp=rate)`` gives an object with ``bpp``, ``nbytes``, ``encode_seconds`` and
         ``reached``: whether the scheme could meet the target.
     decode : callable
-        ``decode(coded)`` gives the picture back.
+        ``decode(coded)`` gives the picture back, or an object with ``picture`` and ``seconds``, as
+        `codec.timed_decode` does.
     progress : callable, optional
         ``progress(done, total, text)`` after every point, in the calling thread.
     workers : int
-        Points measured at a time, in threads. Everything but the seconds is the same for any number; seconds
-        are wall-clock and fit for comparison when taken with one worker.
+        Points measured at a time, in threads. Everything but the seconds is the same for any number.
     measure : callable, optional
         ``measure(decoded)`` gives what else to keep of each point, as that of `measuring` does. Q_global always is.
 
@@ -192,8 +192,10 @@ def rate_distortion(
     -------
     list of dict
         Scheme by scheme, rate by rate, as given: scheme, options, target_bpp, bpp, reached, q_global (dB),
-        encode_seconds, decode_seconds, nbytes. A target that a scheme cannot meet is a record with ``reached``
-        False and what the scheme gave instead.
+        encode_seconds, decode_seconds, nbytes. Options are those of the scheme's name, its preset under ``preset``
+        (``best+slow`` if the encoder's own is given, too). Seconds are CPU seconds: those that ``encode`` and
+        ``decode`` state, else those of the calling thread within ``decode``. A target that a scheme cannot meet is a
+        record with ``reached`` False and what the scheme gave instead.
 
     Raises
     ------
@@ -233,14 +235,15 @@ def _measure(
     scheme: str,
     rate: float,
     encode: Callable[..., Any],
-    decode: Callable[[Any], IIPicture],
+    decode: Callable[[Any], Any],
     measure: Callable[[IIPicture], Mapping[str, Any]] | None,
 ) -> dict[str, Any]:
     try:
         coded = encode(picture, scheme, bpp=rate)
-        start = time.perf_counter()
-        decoded = decode(coded)
-        seconds = time.perf_counter() - start
+        start = time.thread_time()
+        answer = decode(coded)
+        spent = time.thread_time() - start
+        decoded, seconds = getattr(answer, "picture", answer), getattr(answer, "seconds", spent)
         quality = {"q_global": q_global(picture, decoded), **(measure(decoded) if measure else {})}
     except Exception as error:
         error.add_note(f"while measuring {scheme} at {rate:g} bpp")
@@ -253,15 +256,21 @@ def _measure(
         "reached": bool(coded.reached),
         **quality,
         "encode_seconds": float(coded.encode_seconds),
-        "decode_seconds": seconds,
+        "decode_seconds": float(seconds),
         "nbytes": int(coded.nbytes),
     }
 
 
 def _options(scheme: str) -> dict[str, str]:
-    """What stands after the colon of a scheme's name."""
-    pairs = (item.partition("=") for item in scheme.partition(":")[2].split(",") if item)
-    return {key.strip(): value.strip() for key, _, value in pairs}
+    """What stands after the colon of a scheme's name; a preset, which has no key, gets the key ``preset``."""
+    found: dict[str, str] = {}
+    for item in scheme.partition(":")[2].split(","):
+        key, equals, value = (part.strip() for part in item.partition("="))
+        if not equals:
+            key, value = "preset", key
+        if value:
+            found[key] = f"{found[key]}+{value}" if key in found else value
+    return found
 
 
 def _told(record: dict[str, Any]) -> str:

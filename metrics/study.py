@@ -9,7 +9,6 @@ import os
 import platform
 import subprocess
 from collections.abc import Mapping, Sequence
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 
 from ii_core import IIPicture
 from ii_core.files import write_json
+from ii_core.identity import library_versions
 
 from .measures import MEASURES
 
@@ -35,7 +35,6 @@ FIELDS = (
 )
 PACKAGES = ("ii_core", "raytrace_ii", "codec", "metrics", "assets", "benchmarks")
 CODE = (*(f":(top){package}" for package in PACKAGES), ":(top)pyproject.toml", ":(top,exclude)benchmarks/results")
-LIBRARIES = ("numpy", "numba", "OpenImageIO", "scikit-image", "av", "pillow", "glymur", "bjontegaard")
 
 
 def write_study(
@@ -150,7 +149,7 @@ def provenance() -> dict[str, Any]:
     return {
         "git": _git(),
         "machine": {"platform": platform.platform(), "cpus": os.cpu_count()},
-        "versions": _versions(),
+        "versions": library_versions(),
     }
 
 
@@ -170,13 +169,3 @@ def _git() -> dict[str, Any] | None:
         return {"commit": git("rev-parse", "HEAD"), "dirty": bool(git("status", "--porcelain", "--", *CODE))}
     except (OSError, subprocess.SubprocessError):
         return None
-
-
-def _versions() -> dict[str, str]:
-    found = {"python": platform.python_version()}
-    for library in ("raytrace-ii", *LIBRARIES):
-        try:
-            found[library] = metadata.version(library)
-        except metadata.PackageNotFoundError:
-            continue
-    return found

@@ -1,15 +1,30 @@
 import csv
 import json
 import math
+import re
 import threading
 import time
+import tomllib
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ii_core import IIPicture
-from metrics import bd_psnr, bd_rate, q_global, rate_distortion, rd_chart, read_study, summary_table, write_csv
+from ii_core.identity import LIBRARIES, library_versions
+from metrics import (
+    bd_psnr,
+    bd_rate,
+    provenance,
+    q_global,
+    rate_distortion,
+    rd,
+    rd_chart,
+    read_study,
+    summary_table,
+    write_csv,
+)
 from metrics import write_study as _write_study
 from metrics.plots.rd_chart import draw
 
@@ -137,6 +152,42 @@ def test_records_hold_every_point_in_the_order_asked_for():
     assert records[4]["q_global"] == math.inf
     assert [(done, total) for done, total, _ in told] == [(i + 1, 10) for i in range(10)]
     assert any("coarse:order=spiral,gop=32 9 bpp" in text and "target 3 not reached" in text for *_, text in told)
+
+
+def test_seconds_to_decode_are_cpu_time_of_the_decoder_alone():
+    """Neither a wait in the decoder, nor the measures count: on b1dc540 the wait did."""
+
+    def slow(coded):
+        time.sleep(0.2)
+        return coded.picture
+
+    def work(decoded):
+        until = time.thread_time() + 0.2
+        while time.thread_time() < until:
+            pass
+        return {}
+
+    def once(decode):
+        (record,) = rate_distortion(picture(), ["fine"], [9], encode=encode, decode=decode, measure=work)
+        return record
+
+    assert once(slow)["decode_seconds"] < 0.1
+    stated = once(lambda coded: SimpleNamespace(picture=coded.picture, seconds=7.0))
+    assert stated["decode_seconds"] == 7.0 and stated["q_global"] == once(slow)["q_global"]
+
+
+def test_options_of_a_name_keep_its_preset():
+    assert rd._options("si-hevc:best,gop=32") == {"preset": "best", "gop": "32"}
+    assert rd._options("si-hevc:best, preset=slow") == {"preset": "best+slow"}
+    assert rd._options("si-hevc") == rd._options("si-hevc:") == {}
+
+
+def test_versions_are_those_of_all_that_results_depend_on():
+    """An upgrade of embreex or imagecodecs undid no step on b1dc540; glymur is not used."""
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
+    needed = {re.match(r"[\w-]+", line)[0] for line in project["dependencies"]}
+    assert set(LIBRARIES) == needed - {"matplotlib", "pydantic", "typer", "rich"}
+    assert set(LIBRARIES) <= set(library_versions()) and "python" in provenance()["versions"]
 
 
 def test_same_records_whatever_the_workers():

@@ -12,6 +12,7 @@ import pytest
 from benchmarks import coders, fuzz, pages, povray, records
 from benchmarks.records import ALL, MISSING, Records, check, commit_of, origin, with_commits
 from ii_core import preset
+from ii_core.json_lines import append_record
 from raytrace_ii import load_scene, render
 
 ROOT = Path(__file__).parents[1]
@@ -60,7 +61,7 @@ def test_the_stamp_of_one_commit_over_rows_of_another_is_found(tmp_path):
     bare = {name: value for name, value in first.items() if name != "versions"}
     undated = {**first, "when": None}
     for record in (stamped, invented, bare, undated):
-        records.append(TOY.path, record)
+        append_record(TOY.path, record)
     wrong = check(TOY.path)
     assert len(wrong) == 4
     for line, says in zip(
@@ -76,7 +77,7 @@ def test_a_row_that_was_committed_stays(tmp_path, monkeypatch):
     TOY.measure({"row": 1}, lambda: {"value": 1})
     monkeypatch.setattr(records, "ROOT", tmp_path)
     monkeypatch.setattr(records, "exists", lambda commit: True)
-    records.append(TOY.path, {**TOY.newest()[0], "key": {"row": 2}, "unsure": "by hand", "git": None})
+    append_record(TOY.path, {**TOY.newest()[0], "key": {"row": 2}, "unsure": "by hand", "git": None})
     git("add", ".", cwd=tmp_path)
     git("commit", "-qm", "rows", cwd=tmp_path)
     lines = TOY.path.read_text().splitlines(keepends=True)
@@ -161,7 +162,7 @@ def test_tables_name_the_commits_where_they_differ():
 
 def test_a_measured_row_replaces_an_unsure_one_wherever_it_stands():
     measured = TOY.measure({"row": 1}, lambda: {"value": 1})
-    records.append(TOY.path, {**measured, "result": {"value": 0}, "git": None, "unsure": "by hand"})
+    append_record(TOY.path, {**measured, "result": {"value": 0}, "git": None, "unsure": "by hand"})
     assert [row["value"] for row in TOY.rows()] == [1]
 
 

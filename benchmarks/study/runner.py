@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.records import append, code_hash, plain, read, stamp
+from benchmarks.records import code_hash, plain, stamp
+from ii_core.json_lines import append_record, read_records
 from metrics import provenance
 
 FORMAT, VERSION = "ii-study-step", 1
@@ -58,7 +59,7 @@ def perform(steps: Iterable[Step], folder: Path, *, force: bool = False) -> list
         record = performed(step, folder)
         if before is not None:
             record["repeats"] = findings(record) == findings(before)
-        append(folder / f"{step.name}.jsonl", record)
+        append_record(folder / f"{step.name}.jsonl", record)
         made.append(record)
         again = {True: ", the same to the bit", False: ", NOT the same as before", None: ""}[record.get("repeats")]
         print(f"  {record['seconds']:.0f} s{again}", flush=True)
@@ -108,7 +109,7 @@ def records(folder: Path, name: str) -> list[dict[str, Any]]:
     ValueError
         If a line is no record.
     """
-    return read(folder / f"{name}.jsonl", FORMAT, VERSION)
+    return read_records(folder / f"{name}.jsonl", FORMAT, VERSION)
 
 
 def known(step: Step, folder: Path) -> dict[str, Any] | None:

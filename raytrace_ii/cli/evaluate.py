@@ -174,7 +174,7 @@ def run_study(
     depth: Any = None,
 ) -> None:  # fmt: skip
     """Measure; leave `study_files` in a folder, the charts and tables made from the JSON; print the tables."""
-    from codec import decode, encode
+    from codec import encode, timed_decode
     from metrics import (
         depth_rate_chart,
         measuring,
@@ -192,7 +192,7 @@ def run_study(
     more = measuring(picture, measures, depth=depth) if set(measures) - {"q_global"} else None
     with progress_bar(f"code {name}") as report:
         records = rate_distortion(
-            picture, schemes, rates, encode=encode, decode=decode, progress=report, workers=workers or cores(),
+            picture, schemes, rates, encode=encode, decode=timed_decode, progress=report, workers=workers or cores(),
             measure=more,
         )  # fmt: skip
     numbers = folder / f"{name}_rd.json"
