@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tomllib
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -18,7 +18,17 @@ from pydantic import ValidationError
 from ii_core.files import read_image
 
 from ..scene.scene import Background, Body, Fog, Light, Material, Scene, Vector, unit_rows
-from ..scene.textures import Checker, Image, Noise, Stripes, Texture, VertexColours, image_texture, normal_map
+from ..scene.textures import (
+    Checker,
+    Image,
+    Noise,
+    Stripes,
+    Texture,
+    VertexColours,
+    image_texture,
+    metallic_roughness_map,
+    normal_map,
+)
 from ..shapes.primitives import Mesh, rotation
 from ..shapes.watertight import flaw
 from .mesh_model import Model, Part
@@ -160,6 +170,13 @@ def _known(names: Iterable[str]) -> str:
     return ", ".join(names) or "none"
 
 
+MAPS: dict[str, Callable[[NDArray[Any]], Image]] = {
+    "normal_map": normal_map,
+    "emission_map": image_texture,
+    "metallic_roughness_map": metallic_roughness_map,
+}
+
+
 class _Loader:
     """Makes a scene of one file's tables; every mesh file is read once."""
 
@@ -257,13 +274,21 @@ class _Loader:
         values["texture"] = textures[value.texture] if value.texture is not None else None
         if value.texture is not None and "colour" not in value.model_fields_set:
             values["colour"] = (1.0, 1.0, 1.0)
-        values["emission"] = tuple(e * value.emission_strength for e in value.emission)
+        # a factor that is not given is 1 beside its map, else 0
+        maps = {"emission": value.emission_map, "roughness": value.metallic_roughness_map}
+        maps["metallic"] = value.metallic_roughness_map
+        for factor, file in maps.items():
+            if values[factor] is None:
+                full, none = ((1.0,) * 3, (0.0,) * 3) if factor == "emission" else (1.0, 0.0)
+                values[factor] = none if file is None else full
+        values["emission"] = tuple(e * value.emission_strength for e in values["emission"])
         if len(set(value.ior)) == 1:
             values["ior"] = value.ior[0]
-        if value.normal_map is not None:
-            bumps = self._image(f"material.{name}.normal_map", value.normal_map, normal_map)
-            texture = values["texture"]
-            values["normal_map"] = replace(bumps, wrap=texture.wrap) if isinstance(texture, Image) else bumps
+        for key, make in MAPS.items():
+            if values[key] is not None:
+                image = self._image(f"material.{name}.{key}", values[key], make)
+                texture = values["texture"]
+                values[key] = replace(image, wrap=texture.wrap) if isinstance(texture, Image) else image
         try:
             return Material(**values)
         except ValueError as error:
@@ -325,13 +350,14 @@ def _coordinates(material: Material, mesh: Mesh, size: NDArray[np.float64], shar
         if mesh.colours is None:
             raise ValueError("a texture of vertex colours needs them, the mesh has none")
         return mesh.colours
-    if texture is None and material.normal_map is None:
+    if not material.textures:
         return None
     if texture is not None and not texture.on_surface:
         return mesh.vertices * size
     if mesh.uv is None:
-        what = "texture on the surface" if texture is not None else "normal map"
-        raise ValueError(f"a {what} needs texture coordinates, the mesh has none")
+        what = next((what for what, image in material.maps.items() if image is not None), "")
+        what = what if texture is None else "a texture on the surface"
+        raise ValueError(f"{what} needs texture coordinates, the mesh has none")
     repeat = texture.repeat if isinstance(texture, Image) else (1.0, 1.0)
     key = id(mesh.uv), repeat
     if key not in shared:

@@ -39,6 +39,7 @@ def _positive(value: Any) -> Point3:
 Share = Annotated[Point3, BeforeValidator(_share)]
 OneOrThree = Annotated[Point3, BeforeValidator(_positive)]
 NotNegative = Annotated[float, Field(ge=0)]
+OfOne = Annotated[float, Field(ge=0, le=1)]
 
 
 class _Strict(BaseModel):
@@ -94,11 +95,16 @@ class MaterialTable(_Strict):
     ior: OneOrThree = (1.5, 1.5, 1.5)
     absorption_per_mm: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
     priority: int = 0
-    emission: Share = (0.0, 0.0, 0.0)
+    roughness: OfOne | None = None
+    metallic: OfOne | None = None
+    metallic_roughness_map: str | None = None
+    emission: Share | None = None
     emission_strength: NotNegative = 1.0
+    emission_map: str | None = None
     normal_map: str | None = None
     normal_scale: NotNegative = 1.0
-    alpha_cutoff: Annotated[float, Field(ge=0, le=1)] = 0.0
+    alpha_cutoff: OfOne = 0.0
+    alpha_blend: OfOne = 0.0
 
 
 class PointLight(_Strict):

@@ -15,8 +15,9 @@ from ii_core import IICamera, MapCamera
 
 from ..scene.scene import Scene
 from ..tracing.kernels import shade as kernels
+from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.sampling import Adaptive, Sampling, adaptive_mean, fixed_places
-from ..tracing.tracer import RayCount, Support, Tracer
+from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
 
 TILE_RAYS = 65536  # enough that numpy's overhead vanishes, few enough that work arrays stay in cache
 
@@ -125,9 +126,16 @@ class Job:
         if tracer is None:
             with _building:
                 _ = self.scene.packed
-            tracer = self._local.tracer = Tracer(self.scene, TILE_RAYS, self.pose)
+            tracer = self._local.tracer = Tracer(self.scene, TILE_RAYS, self.pose, self._lobes())
         tracer.count = RayCount()
         return tracer
+
+    def _lobes(self) -> tuple[int, int]:
+        """Rays that a sample sends over the lobe of a rough mirror, and samples that share the lobe's places."""
+        least, most = (self.sampling.least, self.sampling.most) if isinstance(self.sampling, Adaptive) else (
+            self.sampling, self.sampling
+        )  # fmt: skip
+        return -(-LOBE_RAYS // least), most
 
     def _support_room(self, shape: tuple[int, ...]) -> Support | None:
         """What the tracer fills, None if nobody asks."""
@@ -140,9 +148,10 @@ class Job:
     ) -> NDArray[np.float32]:
         """Summed radiance of a block whose pixels all have the same number of samples."""
         radiance = np.zeros(((rows.stop - rows.start) * (cols.stop - cols.start), 3), np.float32)
+        keys = self._block_keys(rows, cols, 0)
         if samples == 1 and isinstance(self.camera, IICamera):
             rays = self.camera.separable_rays(rows, cols)
-            if rays is not None and tracer.run_separable(rays, radiance, support):
+            if rays is not None and tracer.run_separable(rays, radiance, support, keys):
                 return radiance
         for sample in range(samples):
             if isinstance(self.camera, MapCamera):
@@ -150,8 +159,24 @@ class Job:
             else:
                 where = fixed_places(self.camera, samples, self.seed, sample, rows, cols)
                 L, D, shares = self.camera.weighted_rays(rows, cols, *where)
-            tracer.run(L, D, radiance, support if sample == 0 else None, shares)
+            if sample > 0:
+                keys = self._block_keys(rows, cols, sample)
+            tracer.run(L, D, radiance, support if sample == 0 else None, shares, keys)
         return radiance
+
+    def _block_keys(self, rows: slice, cols: slice, sample: int) -> NDArray[np.uint64] | None:
+        if not self.scene.packed.glossy:
+            return None
+        n, m = np.mgrid[rows, cols]
+        return self._keys(m, n, sample, 1)
+
+    def _keys(self, m: NDArray[Any], n: NDArray[Any], first: int, count: int) -> NDArray[np.uint64] | None:
+        """Keys of ``count`` samples of each pixel, if the scene is glossy."""
+        if not self.scene.packed.glossy:
+            return None
+        keys = np.empty(m.size * count, np.uint64)
+        lobe_keys(self.seed, m.reshape(-1), n.reshape(-1), self.camera.pixels[0], first, count, keys)
+        return keys
 
     def _adaptive(
         self, tracer: Tracer, wanted: Adaptive, rows: slice, cols: slice, support: Support | None
@@ -159,10 +184,10 @@ class Job:
         """Mean radiance of a block, and how many samples each pixel took."""
         assert isinstance(self.camera, IICamera)
 
-        def shoot(L: Any, D: Any, shares: Any, *, first: slice | None) -> NDArray[np.float32]:
+        def shoot(L: Any, D: Any, shares: Any, *, numbers: Any, first: slice | None) -> NDArray[np.float32]:
             radiance = np.zeros((len(L), 3), np.float32)
             room = self._support_room((len(L),)) if first is not None else None
-            tracer.run(L, D, radiance, room, shares)
+            tracer.run(L, D, radiance, room, shares, self._keys(*numbers))
             if room is not None and first is not None:
                 every = len(L) // (first.stop - first.start)
                 for name, array in vars(support).items():

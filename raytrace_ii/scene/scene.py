@@ -53,9 +53,18 @@ class Material:
     colour : (3,)
         Diffuse and ambient reflectance, multiplied by the texture.
     specular, shininess : float
-        Strength and exponent of the Blinn–Phong highlight.
+        Strength and exponent of the Blinn–Phong highlight. With a metallic-roughness map both follow from the map and
+        ``specular`` is a factor.
     mirror : (3,)
         Share of light reflected as by a mirror.
+    roughness : float
+        Of the reflection, 0 to 1: a GGX lobe of α = roughness² with single scattering; 0 is a sharp mirror. Refracted
+        light stays sharp.
+    metallic : float
+        Share of the surface that is metal, 0 to 1: it mirrors ``colour``, times the texture, and has no matt share,
+        transmission or ``mirror``.
+    metallic_roughness_map : Image, optional
+        As `texture.metallic_roughness_map` reads it: green multiplies ``roughness``, blue ``metallic``.
     transmission : (3,)
         Share of light that each face of the body hands on, split by Fresnel into reflected and refracted: a pane
         takes it twice.
@@ -66,12 +75,18 @@ class Material:
     texture : Texture, optional
     emission : (3,)
         Light that the surface gives off on both sides, whatever falls on it; of any strength. It lights nothing else.
+    emission_map : Image, optional
+        Multiplies the emission.
     normal_map : Image, optional
-        As `texture.normal_map` reads it; over (u, v), so that the texture, if any, must lie on the surface too.
+        As `texture.normal_map` reads it. All maps lie over (u, v), so that the texture, if any, must lie on the
+        surface too.
     normal_scale : float
         Factor of the map's x and y.
     alpha_cutoff : float
         Where the texture's alpha is below it there is no surface; 0 for no cut-outs.
+    alpha_blend : float
+        The surface is there to this share, times the texture's alpha where it has one, and is seen through, unbent,
+        to the rest; 0 for no blending.
     priority : int
         Where transmissive bodies overlap the one of higher priority is there (Schmidt and Budge 2002); of equal
         ones the one entered first.
@@ -86,14 +101,19 @@ class Material:
     specular: float = 0.0
     shininess: float = 50.0
     mirror: Vector = (0.0, 0.0, 0.0)
+    roughness: float = 0.0
+    metallic: float = 0.0
+    metallic_roughness_map: Image | None = None
     transmission: Vector = (0.0, 0.0, 0.0)
     ior: float | Vector = 1.5
     absorption_per_mm: Vector = (0.0, 0.0, 0.0)
     texture: Texture | None = None
     emission: Vector = (0.0, 0.0, 0.0)
+    emission_map: Image | None = None
     normal_map: Image | None = None
     normal_scale: float = 1.0
     alpha_cutoff: float = 0.0
+    alpha_blend: float = 0.0
     priority: int = 0
 
     def __post_init__(self) -> None:
@@ -109,15 +129,19 @@ class Material:
                 "are more than all the light: at most 1 together is needed"
             )
         _number("normal_scale", self.normal_scale, 0)
-        if not 0 <= self.alpha_cutoff <= 1:
-            raise ValueError(f"alpha_cutoff is {self.alpha_cutoff}: a number from 0 to 1 is needed")
+        for what in ("roughness", "metallic", "alpha_cutoff", "alpha_blend"):
+            if not 0 <= getattr(self, what) <= 1:
+                raise ValueError(f"{what} is {getattr(self, what)}: a number from 0 to 1 is needed")
+        if self.metallic > 0 and max(self.colour) > 1:
+            raise ValueError(f"colour is {self.colour}: at most 1 is needed of a metal, which mirrors it")
         if self.alpha_cutoff > 0 and (not isinstance(self.texture, Image) or self.texture.alpha is None):
             raise ValueError(f"alpha_cutoff is {self.alpha_cutoff}: an image texture with alpha is needed")
         if not isinstance(self.priority, int | np.integer):
             raise ValueError(f"priority is {self.priority!r}: a whole number is needed")
         shares = self.texture is None or (self.texture.on_surface and not isinstance(self.texture, VertexColours))
-        if self.normal_map is not None and not shares:
-            raise ValueError("a normal map needs a texture on the surface or none: they share (u, v)")
+        for what, image in self.maps.items():
+            if image is not None and not shares:
+                raise ValueError(f"{what} needs a texture on the surface or none: they share (u, v)")
 
     @property
     def iors(self) -> Vector:
@@ -126,6 +150,29 @@ class Material:
             return (self.ior,) * 3  # type: ignore[return-value]
         _numbers("ior", self.ior)
         return self.ior  # type: ignore[return-value]
+
+    @property
+    def maps(self) -> dict[str, Image | None]:
+        """Images over (u, v) beside the texture, by what they are."""
+        return {
+            "a normal map": self.normal_map,
+            "an emission map": self.emission_map,
+            "a metallic-roughness map": self.metallic_roughness_map,
+        }
+
+    @property
+    def textures(self) -> list[Texture]:
+        """The texture and the maps that there are."""
+        return [image for image in (self.texture, *self.maps.values()) if image is not None]
+
+    @property
+    def reflects(self) -> bool:
+        return max(self.mirror) > 0 or self.metallic > 0 or self.transmissive
+
+    @property
+    def has_holes(self) -> bool:
+        """Whether rays may pass the surface unbent."""
+        return self.alpha_cutoff > 0 or self.alpha_blend > 0
 
     @property
     def transmissive(self) -> bool:
@@ -295,8 +342,9 @@ class Body:
                     f"object {self.name!r}: {what} of vertex {at} are {np.asarray(value)[at].tolist()}: "
                     "finite numbers are needed"
                 )
-        if self.material.normal_map is not None and self.texture_coordinates is None:
-            raise ValueError(f"object {self.name!r}: a normal map needs texture coordinates, there are none")
+        for what, image in self.material.maps.items():
+            if image is not None and self.texture_coordinates is None:
+                raise ValueError(f"object {self.name!r}: {what} needs texture coordinates, there are none")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -323,9 +371,9 @@ class Scene:
         if not self.max_depth >= 0:
             raise ValueError(f"max_depth is {self.max_depth}: at least 0 is needed")
         _numbers("ambient", self.ambient, least=0)
-        # Transmissive bodies go last, before them those with cut-outs: opaque faces are a prefix that shadow rays may
+        # Transmissive bodies go last, before them those with holes: opaque faces are a prefix that shadow rays may
         # be tested against alone.
-        ordered = sorted(self.bodies, key=lambda b: (b.material.transmissive, b.material.alpha_cutoff > 0))
+        ordered = sorted(self.bodies, key=lambda b: (b.material.transmissive, b.material.has_holes))
         object.__setattr__(self, "bodies", tuple(ordered))
 
     def with_depth(self, max_depth: int) -> Scene:

@@ -126,7 +126,8 @@ class TextureTable:
                 coded = texture.codes is not None
                 first = sum(map(len, codes if coded else pixels))
                 wraps = (WRAPS[name] for name in texture.wrap)
-                rows.append([IMAGE, first, width, height, sum(map(len, alphas)), coded, *wraps])
+                opaque = texture.alpha is None
+                rows.append([IMAGE, first, width, height, -1 if opaque else sum(map(len, alphas)), coded, *wraps])
                 if texture.codes is not None:
                     codes.append(np.pad(texture.codes.reshape(-1, 3), ((0, 0), (0, 1))))
                 else:
@@ -209,8 +210,23 @@ def normal_map(pixels: NDArray[Any]) -> Image:
     ValueError
         If there are not three channels, or a pixel is not finite.
     """
+    return _data(pixels, "normal map")
+
+
+def metallic_roughness_map(pixels: NDArray[Any]) -> Image:
+    """A map of roughness in green and metal in blue from stored pixels, which are data and not sRGB (glTF 2.0).
+
+    Raises
+    ------
+    ValueError
+        If there are not three channels, or a pixel is not finite.
+    """
+    return _data(pixels, "metallic-roughness map")
+
+
+def _data(pixels: NDArray[Any], what: str) -> Image:
     if pixels.shape[2] < 3 or not np.isfinite(pixels).all():
-        raise ValueError(f"a normal map has {pixels.shape[2]} channels: three of finite numbers are needed")
+        raise ValueError(f"a {what} has {pixels.shape[2]} channels: three of finite numbers are needed")
     data = pixels[..., :3]
     if data.dtype.kind == "u":
         data = data / np.float32(np.iinfo(data.dtype).max)

@@ -22,7 +22,8 @@ LIFT = 4e-6
 COLOUR, MIRROR, TRANSMISSION, ABSORPTION = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 SPECULAR, SHININESS, PRIORITY, LOCAL, TEXTURE, LEAST_HALF = 12, 13, 14, 15, 16, 17
 EMISSION, IOR, CUTOFF, NORMAL_MAP, NORMAL_SCALE = slice(18, 21), slice(21, 24), 24, 25, 26
-MATERIAL_COLUMNS = 27
+ROUGHNESS, METALLIC, GLOSS_MAP, EMISSION_MAP, ALPHA_BLEND = 27, 28, 29, 30, 31
+MATERIAL_COLUMNS = 32
 
 MOST_NESTED = 8  # bodies whose bounds meet in one place that a ray keeps count of
 
@@ -53,10 +54,10 @@ class PackedScene:
         self.faces = _face_table(self.corners)
         self.normals = _per_corner([None if b.normals is None else unit_rows(b.normals) for b in bodies], bodies)
         self.coordinates = _per_corner(
-            [b.texture_coordinates if b.material.texture or b.material.normal_map else None for b in bodies], bodies
+            [b.texture_coordinates if b.material.textures else None for b in bodies], bodies
         )
         sky = scene.background
-        images = [image for b in bodies for image in (b.material.texture, b.material.normal_map)]
+        images = [image for b in bodies for image in b.material.textures]
         self.textures = TextureTable([*images, sky.image])
         # float32's values in float64's place: the kernels reckon in float64, and need not convert
         rows = np.array([_material_row(body.material, self.textures) for body in bodies], np.float32)
@@ -75,7 +76,10 @@ class PackedScene:
         self.least = LEAST_WEIGHT / _brightest(scene)
         self.opaque_faces = sum(len(body.faces) for body in bodies[:opaque])
         self.first_clear = first_clear
-        self.mirrors = any(max(body.material.mirror) > 0 for body in bodies)
+        looks = [body.material for body in bodies]
+        self.mirrors = any(max(look.mirror) > 0 or look.metallic > 0 for look in looks)
+        self.glossy = any(look.roughness > 0 and look.reflects for look in looks)
+        self.blends = any(look.alpha_blend > 0 for look in looks)
         self.transmits = first_clear < len(bodies)
         self.disperses = any(len(set(body.material.iors)) > 1 for body in bodies[first_clear:])
         self.lets_through = opaque < len(bodies)  # shadow rays do not end at every face
@@ -84,7 +88,7 @@ class PackedScene:
 
 
 def _lets_through(body: Body) -> bool:
-    return body.material.transmissive or body.material.alpha_cutoff > 0
+    return body.material.transmissive or body.material.has_holes
 
 
 def _material_row(m: Material, textures: TextureTable) -> NDArray[np.float64]:
@@ -96,7 +100,9 @@ def _material_row(m: Material, textures: TextureTable) -> NDArray[np.float64]:
     # below this cosine the highlight is too weak to see, and its power need not be taken
     row[LEAST_HALF] = (LEAST_WEIGHT / max(m.specular, LEAST_WEIGHT)) ** (1 / m.shininess)
     row[TEXTURE], row[NORMAL_MAP] = textures.index(m.texture), textures.index(m.normal_map)
-    row[NORMAL_SCALE], row[CUTOFF] = m.normal_scale, m.alpha_cutoff
+    row[NORMAL_SCALE], row[CUTOFF], row[ALPHA_BLEND] = m.normal_scale, m.alpha_cutoff, m.alpha_blend
+    row[ROUGHNESS], row[METALLIC] = m.roughness if m.reflects else 0.0, m.metallic
+    row[GLOSS_MAP], row[EMISSION_MAP] = textures.index(m.metallic_roughness_map), textures.index(m.emission_map)
     return row
 
 
@@ -105,7 +111,12 @@ def _brightest(scene: Scene) -> float:
     sky = scene.background
     image = sky.intensity * float(sky.image.pixels.max()) if sky.image is not None else 0.0
     colours = [sky.horizon, sky.zenith, sky.nadir, scene.ambient, *(light.colour for light in scene.lights)]
-    return max(1.0, image, *(max(c) for c in colours), *(max(b.material.emission) for b in scene.bodies))
+    return max(1.0, image, *(max(c) for c in colours), *map(_brightest_emission, scene.bodies))
+
+
+def _brightest_emission(body: Body) -> float:
+    image = body.material.emission_map
+    return max(body.material.emission) * (1.0 if image is None else float(image.pixels.max()))
 
 
 def _meeting(bounds: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -92,11 +92,15 @@ def fixed_places(camera: IICamera, samples: int, seed: int, sample: int, rows: s
 
 
 class Shoot(Protocol):
-    """Traces rays of a camera; ``first`` says that these begin their pixels."""
+    """Traces rays of a camera; ``first`` says that these begin their pixels.
+
+    ``numbers`` are columns and rows of the pixels, the first of their samples, and how many each has.
+    """
 
     def __call__(
-        self, L: Floats, D: Floats, shares: Floats | None, *, first: slice | None
-    ) -> NDArray[np.float32]: ...
+        self, L: Floats, D: Floats, shares: Floats | None, *,
+        numbers: tuple[NDArray[Any], NDArray[Any], int, int], first: slice | None,
+    ) -> NDArray[np.float32]: ...  # fmt: skip
 
 
 def adaptive_mean(
@@ -114,8 +118,8 @@ def adaptive_mean(
     curve : ndarray
         8-bit codes at even steps of linear light.
     shoot : callable
-        Called with L, D, shares and, in the first round, which of the block's pixels (in C order, every
-        ``least``-th ray) they begin; radiance of the rays comes back.
+        Called with L, D, shares, the numbers of pixels and samples and, in the first round, which of the block's
+        pixels (in C order, every ``least``-th ray) they begin; radiance of the rays comes back.
     """
     height, width = rows.stop - rows.start, cols.stop - cols.start
     m, n, lens = _with_rim(camera, rows, cols)
@@ -129,9 +133,10 @@ def adaptive_mean(
         for first in range(start, start + count, many):
             for i in range(0, len(which), batch // many):
                 some = which[i : i + batch // many]
-                rays = _rays(camera, seed, m[some], n[some], first, many)
+                numbers = m[some], n[some], first, many
+                rays = _rays(camera, seed, *numbers)
                 block = slice(i, i + len(some)) if begins and first == 0 else None
-                radiance = shoot(*rays, first=block)
+                radiance = shoot(*rays, numbers=numbers, first=block)
                 sample_kernels.add_samples(radiance, some, first, many, (start + count) // 4, quarters)
 
     inside, rim = np.flatnonzero(own), np.flatnonzero(~own & _needed(lens, own))

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..scene.scene import Scene
 from .kernels import shade as kernels
+from .kernels.sampling import lobe_keys
 from .packing import PackedScene
 
 KINDS = ("primary", "shadow", "reflection", "refraction")
@@ -24,6 +25,7 @@ RECORDED = {
     "ray_length": ("f4", ()),
     "shading_normal": ("f4", (3,)),
 }
+LOBE_RAYS = 16  # over the lobe of a rough mirror, for each pixel
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
 
@@ -90,7 +92,9 @@ def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: Array
     tracer = Tracer(scene, n, rigid(pose))
     seen = {name: np.empty((n, *shape), dtype) for name, (dtype, shape) in RECORDED.items()}
     radiance = np.zeros((n, 3), np.float32)
-    tracer.run(locations, directions, radiance, Support(**seen))
+    keys = np.empty(n if scene.packed.glossy else 0, np.uint64)
+    lobe_keys(0, np.arange(len(keys)), np.zeros(len(keys), np.int64), max(n, 1), 0, 1, keys)
+    tracer.run(locations, directions, radiance, Support(**seen), keys=keys if len(keys) else None)
     return Traced(radiance=radiance, count=tracer.count, **seen)
 
 
@@ -146,24 +150,39 @@ class _Rays:
     weights: NDArray[np.float32]
     pixels: NDArray[np.int32]
     inside: NDArray[np.int32]  # (n, nested)
+    keys: NDArray[np.uint64]  # of no rows where nothing is rough
 
     @classmethod
-    def room(cls, n: int, nested: int) -> _Rays:
+    def room(cls, n: int, nested: int, glossy: bool = False) -> _Rays:
         def rows() -> NDArray[np.float32]:
             return np.empty((n, 3), np.float32)
 
-        return cls(rows(), rows(), rows(), np.empty(n, np.int32), np.empty((n, nested), np.int32))
+        return cls(
+            rows(),
+            rows(),
+            rows(),
+            np.empty(n, np.int32),
+            np.empty((n, nested), np.int32),
+            np.empty(n * glossy, np.uint64),
+        )
 
 
 class Tracer:
-    """Traces batches of up to ``capacity`` primary rays, keeping its work arrays between batches. One a thread."""
+    """Traces batches of up to ``capacity`` primary rays, keeping its work arrays between batches. One a thread.
 
-    def __init__(self, scene: Scene, capacity: int, pose: NDArray[np.float64]) -> None:
+    ``lobes`` is how many rays at most a camera ray sends over the lobe of a rough mirror, and how many samples of a
+    pixel share the lobe's places; later rays send one.
+    """
+
+    def __init__(
+        self, scene: Scene, capacity: int, pose: NDArray[np.float64], lobes: tuple[int, int] = (LOBE_RAYS, 1)
+    ) -> None:
         self.scene: PackedScene = scene.packed
         self.max_depth = scene.max_depth
         self.pose = pose
         self.count = RayCount()
-        self._primary = _Rays.room(capacity, self.scene.nested)
+        self.lobes = lobes
+        self._primary = _Rays.room(capacity, self.scene.nested, self.scene.glossy)
         # weights and pixels of rays that carry all light, one a pixel: read only
         self._whole = np.ones((capacity, 3), np.float32), np.arange(capacity, dtype=np.int32)
         self._shadow = (_Rays.room(0, self.scene.nested), np.empty(0, np.float32))
@@ -175,10 +194,12 @@ class Tracer:
         radiance: NDArray[np.float32],
         support: Support | None,
         shares: NDArray[np.float64] | None = None,
+        keys: NDArray[np.uint64] | None = None,
     ) -> None:
         """Add what each ray sees to ``radiance`` (n, 3), and fill ``support`` if given.
 
-        ``shares`` is the share of light that each ray carries; one that carries none is not traced.
+        ``shares`` is the share of light that each ray carries; one that carries none is not traced. ``keys`` are
+        needed if the scene is glossy.
         """
         shape = locations.shape[:-1]
         locations, directions = locations.reshape(-1, 3), directions.reshape(-1, 3)
@@ -196,11 +217,14 @@ class Tracer:
             )
         if support is not None and n < len(locations):
             support.clear()
+        if keys is not None:
+            room.keys[:n] = keys[room.pixels[:n]]
         self._trace(room, n, radiance, support)
 
     def run_separable(
-        self, rays: tuple[NDArray[np.float64], ...], radiance: NDArray[np.float32], support: Support | None
-    ) -> bool:
+        self, rays: tuple[NDArray[np.float64], ...], radiance: NDArray[np.float32], support: Support | None,
+        keys: NDArray[np.uint64] | None = None,
+    ) -> bool:  # fmt: skip
         """`run` for rays of `IICamera.separable_rays`; if some are unusable, nothing is done and False comes back."""
         room, n = self._primary, len(rays[0]) * len(rays[1])
         usable = kernels.start_separable_rays(
@@ -208,6 +232,8 @@ class Tracer:
         )
         if usable:
             room.inside.fill(-1)
+            if keys is not None:
+                room.keys[:n] = keys
             self._trace(replace(room, weights=self._whole[0], pixels=self._whole[1]), n, radiance, support)
         return bool(usable)
 
@@ -218,28 +244,36 @@ class Tracer:
         if self.scene.transmits:
             self._start_inside(rays)
         for depth in range(self.max_depth + 1):
-            rays = self._generation(rays, radiance, support if depth == 0 else None, spawn=depth < self.max_depth)
+            lobe_rays = self.lobes[0] if depth == 0 else 1
+            spawn = depth < self.max_depth
+            rays = self._generation(rays, radiance, support if depth == 0 else None, spawn, lobe_rays)
             if not len(rays.pixels):
                 break
 
-    def _generation(self, rays: _Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool) -> _Rays:
+    def _generation(
+        self, rays: _Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool, lobe_rays: int
+    ) -> _Rays:
         """Trace and shade one generation; the next one comes back."""
         s, n = self.scene, len(rays.pixels)
         primitives, u, v, distances = self._hits(rays)
-        spawn = spawn and (s.mirrors or s.transmits)
-        following = _Rays.room((1 + s.transmits + 2 * s.disperses) * n if spawn else 0, s.nested)
+        spawn = spawn and (s.mirrors or s.transmits or s.blends)
+        most = (lobe_rays if s.glossy else 1) + s.transmits + 2 * s.disperses + s.blends
+        following = _Rays.room(most * n if spawn else 0, s.nested, s.glossy)
         shadow, reach = self._shadow_room(n * len(s.lights))
-        counts = np.zeros(5, np.int64)
+        counts = np.zeros(6, np.int64)
         shadows, spawned = kernels.shade(
             primitives, u, v, distances, rays.origins, rays.directions, rays.weights, rays.pixels, rays.inside,
-            s.corners, s.faces, s.normals, s.coordinates, s.object_of_face, s.materials,
-            s.textures.table, s.textures.texels, s.lights, s.background, s.fog, s.ambient, s.least, radiance,
+            rays.keys, s.corners, s.faces, s.normals, s.coordinates, s.object_of_face, s.materials,
+            s.textures.table, s.textures.texels, s.textures.alphas, s.lights, s.background, s.fog, s.ambient, s.least,
+            lobe_rays, self.lobes[1], radiance,
             shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels, shadow.inside,
-            following.origins, following.directions, following.weights, following.pixels, following.inside, counts,
-            spawn, self.pose[:3, 3], self.pose[:3, 2], *(support or Support()).rows(),
+            following.origins, following.directions, following.weights, following.pixels, following.inside,
+            following.keys, counts, spawn, self.pose[:3, 3], self.pose[:3, 2], *(support or Support()).rows(),
         )  # fmt: skip
         self.count.rays.update({"reflection": int(counts[0]), "refraction": int(counts[1])})
-        self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[2:]), strict=True)))
+        self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[2:5]), strict=True)))
+        if s.blends:
+            self.count.rays["passed"] += int(counts[5])
         if shadows:
             self._light(_Rays(*(array[:shadows] for array in vars(shadow).values())), reach[:shadows], radiance)
         return _Rays(*(array[:spawned] for array in vars(following).values()))
@@ -306,7 +340,14 @@ class Tracer:
         if not s.lets_through:
             kernels.add_unblocked(found, shadow.weights, shadow.pixels, radiance)
             return
-        rays = [shadow.origins, shadow.directions, reach, *list(vars(shadow).values())[2:]]
+        rays: list[NDArray[Any]] = [
+            shadow.origins,
+            shadow.directions,
+            reach,
+            shadow.weights,
+            shadow.pixels,
+            shadow.inside,
+        ]
         kept = kernels.keep_unblocked(found, *rays)
         for _ in range(MOST_CLEAR_FACES):
             origins, directions, reach, colours, pixels, inside = rays = [array[:kept] for array in rays]

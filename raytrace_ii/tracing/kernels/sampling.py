@@ -31,6 +31,23 @@ def places(seed, m, n, columns, first, count, pair, out):
 
 
 @kernel
+def lobe_keys(seed, m, n, columns, first, count, out):
+    """Keys of places in [0, 1)² in the lobes of rough mirrors, as rows of ``out``: samples of pixels (m, n).
+
+    Each 32 bits are a fraction. The samples of a pixel follow the R2 sequence (Roberts 2018), which spreads any
+    number of places evenly, from a start by a hash of seed and pixel.
+    """
+    for i in range(m.shape[0]):
+        pixel = np.uint64(n[i]) * np.uint64(columns) + np.uint64(m[i])
+        own = _mix(_mix(np.uint64(seed) ^ _mix(pixel)) + np.uint64(2))
+        for j in range(count):
+            step = np.uint64(first + j)
+            across = ((own & _LOW) + step * np.uint64(3242174889)) & _LOW
+            around = ((own >> np.uint64(32)) + step * np.uint64(2447445414)) & _LOW
+            out[i * count + j] = (around << np.uint64(32)) | across
+
+
+@kernel
 def merge_quarters(which, quarters):
     """Make the four sums of each pixel named the first two of twice as many samples."""
     for i in range(which.shape[0]):

@@ -14,12 +14,15 @@ from ii_core.jit import lean_kernel as kernel
 
 # A weight this small cannot move a colour by half a step of 8 bits, not even on sRGB's steep foot, of light up to 1.
 LEAST_WEIGHT = 0.5 / 255 / 12.92
-REFLECTION, REFRACTION, WEAK_SHADOW, WEAK_REFLECTION, WEAK_REFRACTION = 0, 1, 2, 3, 4  # what is counted
+# What is counted.
+REFLECTION, REFRACTION, WEAK_SHADOW, WEAK_REFLECTION, WEAK_REFRACTION, PASSED = 0, 1, 2, 3, 4, 5
 IMAGE, CHECKER, NOISE, VERTEX, STRIPES = 0, 1, 2, 3, 4  # kinds of texture
 REPEAT, MIRROR, CLAMP = 0, 1, 2  # how an image goes on beyond its border
 POINT, DIRECTIONAL, SPOT = 0, 1, 2  # kinds of light
 # Odd multipliers of the noise lattice's hash.
 _PX, _PY, _PZ, _SEED, _GOLDEN = 73856093, 19349663, 83492791, 2654435761, 0x1E3779B97F4A7C15
+# Steps of the R2 sequence, 1/g and 1/g² of g³ = g + 1, as fractions of 2³².
+_LOW, _R2_ACROSS, _R2_AROUND = np.uint64(0xFFFFFFFF), np.uint64(3242174889), np.uint64(2447445414)
 # Perlin's sixteen: towards the twelve edges of a cube, four of them twice. A table, for branches would be guesses.
 _GRADIENTS = np.array(
     [[x, y, 0] for y in (1, -1) for x in (1, -1)]
@@ -36,6 +39,7 @@ LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) 
 # Columns of the material table and of the light table, as in packing.py.
 _MIRROR, _TRANSMISSION, _ABSORPTION, _SPECULAR, _SHININESS, _PRIORITY, _LOCAL = 3, 6, 9, 12, 13, 14, 15
 _TEXTURE, _LEAST_HALF, _EMISSION, _IOR, _CUTOFF, _NORMAL_MAP, _NORMAL_SCALE = 16, 17, 18, 21, 24, 25, 26
+_ROUGHNESS, _METALLIC, _GLOSS_MAP, _EMISSION_MAP, _ALPHA_BLEND = 27, 28, 29, 30, 31
 _LIGHT_COLOUR, _CONE_AXIS, _CONE_SCALE, _CONE_OFFSET = 4, 7, 10, 11
 _SKY_IMAGE, _SKY_TURN, _SKY_INTENSITY = 10, 11, 12
 _LEAST, _MOST = 1e-150, 1e150  # between them squares and their sums neither vanish nor overflow
@@ -116,18 +120,20 @@ def start_separable_rays(x, y, z, rotation, shift, out_origins, out_directions):
 
 @kernel
 def shade(
-    primitives, u, v, distances, origins, directions, weights, pixels, inside,
-    corners, faces, normals, coordinates, object_of_face, materials, textures, texels, lights, background, fog,
-    ambient, least, radiance,
+    primitives, u, v, distances, origins, directions, weights, pixels, inside, keys,
+    corners, faces, normals, coordinates, object_of_face, materials, textures, texels, alphas, lights, background,
+    fog, ambient, least, lobe_rays, lobe_stride, radiance,
     shadow_origins, shadow_directions, shadow_reach, shadow_colours, shadow_pixels, shadow_inside,
-    next_origins, next_directions, next_weights, next_pixels, next_inside, counts, spawn,
+    next_origins, next_directions, next_weights, next_pixels, next_inside, next_keys, counts, spawn,
     eye, axis, depth, normal, object_id, ray_length, shading_normal,
 ):  # fmt: skip
     """Shade one generation of rays.
 
     Adds background, emitted and ambient light to ``radiance``; writes shadow rays with the light they would let
     through, and, if ``spawn``, reflected and refracted rays; none weaker than ``least``. ``inside`` lists the
-    transmissive bodies that a ray runs in, −1 after the last. ``fog`` is its colour and density, of no length if
+    transmissive bodies that a ray runs in, −1 after the last. ``keys`` are places in the lobes of rough mirrors, as
+    `sampling.lobe_keys` gives them, of no length if there are none; up to ``lobe_rays`` rays go over a lobe, whose
+    places stand ``lobe_stride`` apart. ``fog`` is its colour and density, of no length if
     there is none; it lies outside bodies, and before the sky not at all. Of each ray are noted, where there is room,
     the depth from ``eye`` along the camera's ``axis``, the face's normal, the object, the ray's length and the normal
     of shading.
@@ -186,6 +192,18 @@ def shade(
             radiance[pixel, 1] += w1 * (1.0 - through) * fog[1]
             radiance[pixel, 2] += w2 * (1.0 - through) * fog[2]
             w0, w1, w2 = w0 * through, w1 * through, w2 * through
+        if spawn and materials[body, _ALPHA_BLEND] > 0.0:
+            # seen through to the share that is not there; the last generation takes it as there
+            there = _there(coordinates, textures, alphas, materials, body, f, u[i], v[i])
+            w = (1.0 - there) * max(w0, w1, w2)
+            if w >= least:
+                _put_behind(next_origins, spawned, corners, faces, f, u[i], v[i], entering)
+                _put(next_directions, spawned, dx, dy, dz)
+                _put(next_weights, spawned, (1.0 - there) * w0, (1.0 - there) * w1, (1.0 - there) * w2)
+                _hand_on(next_pixels, next_inside, next_keys, spawned, pixel, inside, keys, i)
+                counts[PASSED] += 1
+                spawned += 1
+            w0, w1, w2 = there * w0, there * w1, there * w2
         if not entering:
             gx, gy, gz = -gx, -gy, -gz
         nx, ny, nz = gx, gy, gz
@@ -207,13 +225,36 @@ def shade(
         own0 = w0 * materials[body, _EMISSION]
         own1 = w1 * materials[body, _EMISSION + 1]
         own2 = w2 * materials[body, _EMISSION + 2]
-        local = materials[body, _LOCAL]
-        if local > 0.0 or materials[body, _SPECULAR] > 0.0:
-            r, g, b = local * materials[body, 0], local * materials[body, 1], local * materials[body, 2]
-            if materials[body, _TEXTURE] >= 0 and local > 0.0:
+        if materials[body, _EMISSION_MAP] >= 0:
+            s0, s1, s2 = _interpolate(coordinates, f, u[i], v[i])
+            t0, t1, t2 = _image(textures, int(materials[body, _EMISSION_MAP]), texels, s0, s1)
+            own0, own1, own2 = own0 * t0, own1 * t1, own2 * t2
+        local, metallic, rough = materials[body, _LOCAL], materials[body, _METALLIC], materials[body, _ROUGHNESS]
+        specular, shininess, least_half = (
+            materials[body, _SPECULAR],
+            materials[body, _SHININESS],
+            materials[body, _LEAST_HALF],
+        )
+        t0, t1, t2 = 1.0, 1.0, 1.0
+        if materials[body, _TEXTURE] >= 0 and (local > 0.0 or metallic > 0.0):
+            s0, s1, s2 = _interpolate(coordinates, f, u[i], v[i])
+            t0, t1, t2 = texture_colour(textures, int(materials[body, _TEXTURE]), texels, s0, s1, s2)
+        k0, k1, k2 = materials[body, _MIRROR], materials[body, _MIRROR + 1], materials[body, _MIRROR + 2]
+        if metallic > 0.0 or materials[body, _GLOSS_MAP] >= 0:
+            if materials[body, _GLOSS_MAP] >= 0:
                 s0, s1, s2 = _interpolate(coordinates, f, u[i], v[i])
-                t0, t1, t2 = texture_colour(textures, int(materials[body, _TEXTURE]), texels, s0, s1, s2)
-                r, g, b = r * t0, g * t1, b * t2
+                _, s1, s2 = _image(textures, int(materials[body, _GLOSS_MAP]), texels, s0, s1)
+                rough, metallic = rough * s1, metallic * s2
+            local, clear = (1.0 - metallic) * local, (1.0 - metallic) * clear
+            k0 = (1.0 - metallic) * k0 + metallic * materials[body, 0] * t0
+            k1 = (1.0 - metallic) * k1 + metallic * materials[body, 1] * t1
+            k2 = (1.0 - metallic) * k2 + metallic * materials[body, 2] * t2
+            if specular > 0.0 and materials[body, _GLOSS_MAP] >= 0:
+                strength, shininess = highlight((k0 + k1 + k2) / 3.0, rough)
+                specular, least_half = specular * strength, 0.0
+        if local > 0.0 or specular > 0.0:
+            r, g, b = local * materials[body, 0], local * materials[body, 1], local * materials[body, 2]
+            r, g, b = r * t0, g * t1, b * t2
             r, g, b = w0 * r, w1 * g, w2 * b
             own0, own1, own2 = own0 + r * ambient[0], own1 + g * ambient[1], own2 + b * ambient[2]
             for k in range(lights.shape[0]):
@@ -223,12 +264,12 @@ def shade(
                 if cosine <= 0.0 or (not smooth and gx * lx + gy * ly + gz * lz <= 0.0):
                     continue
                 shine = 0.0
-                if materials[body, _SPECULAR] > 0.0:
+                if specular > 0.0:
                     hx, hy, hz = lx * norm - dx, ly * norm - dy, lz * norm - dz
                     half, square = nx * hx + ny * hy + nz * hz, hx * hx + hy * hy + hz * hz
                     # too weak to see, as nearly everywhere: told without a root or a power
-                    if half > 0.0 and half * half > materials[body, _LEAST_HALF] ** 2 * square:
-                        shine = materials[body, _SPECULAR] * (half / math.sqrt(square)) ** materials[body, _SHININESS]
+                    if half > 0.0 and half * half > least_half**2 * square:
+                        shine = specular * (half / math.sqrt(square)) ** shininess
                 cone = _cone(lights, k, lx, ly, lz, norm) if lights[k, 0] == SPOT else 1.0
                 c0 = (r * cosine + w0 * shine) * cone * lights[k, _LIGHT_COLOUR]
                 c1 = (g * cosine + w1 * shine) * cone * lights[k, _LIGHT_COLOUR + 1]
@@ -257,11 +298,7 @@ def shade(
             continue
 
         # Shares of the light that goes on: by the mirror, and by glass through Fresnel's formulas.
-        m0, m1, m2 = (
-            w0 * materials[body, _MIRROR],
-            w1 * materials[body, _MIRROR + 1],
-            w2 * materials[body, _MIRROR + 2],
-        )
+        m0, m1, m2 = w0 * k0, w1 * k1, w2 * k2
         if clear > 0.0:
             before, after = _media(inside, i, materials, body, entering)
             ex, ey, ez = np.float64(dx), np.float64(dy), np.float64(dz)
@@ -270,6 +307,8 @@ def shade(
                 t0 = w0 * materials[body, _TRANSMISSION]
                 t1 = w1 * materials[body, _TRANSMISSION + 1]
                 t2 = w2 * materials[body, _TRANSMISSION + 2]
+                if metallic > 0.0:
+                    t0, t1, t2 = (1.0 - metallic) * t0, (1.0 - metallic) * t1, (1.0 - metallic) * t2
                 if c > 0 or _disperses(materials, before) or _disperses(materials, after):  # one channel alone
                     t0, t1, t2 = t0 if c == 0 else 0.0, t1 if c == 1 else 0.0, t2 if c == 2 else 0.0
                 ratio = _index(materials, before, c) / _index(materials, after, c)
@@ -285,13 +324,30 @@ def shade(
                     _put(next_origins, spawned, px - lift * gx, py - lift * gy, pz - lift * gz)
                     _put(next_directions, spawned, tx, ty, tz)
                     _put(next_weights, spawned, t0, t1, t2)
-                    next_pixels[spawned] = pixel
-                    for j in range(inside.shape[1]):
-                        next_inside[spawned, j] = inside[i, j]
+                    _hand_on(next_pixels, next_inside, next_keys, spawned, pixel, inside, keys, i)
                     _cross(next_inside, spawned, body, entering)
                     counts[REFRACTION] += 1
                     spawned += 1
-        if max(m0, m1, m2) >= least:
+        if rough > 0.0 and max(m0, m1, m2) >= least:
+            rays = min(max(math.ceil(lobe_rays * max(m0, m1, m2)), 1), lobe_rays)
+            for j in range(rays):
+                across, around = _in_lobe(keys[i], j * lobe_stride)
+                rx, ry, rz, share = glossy_direction(rough * rough, across, around, dx, dy, dz, nx, ny, nz)
+                share /= rays
+                if share * max(m0, m1, m2) * rays < least:
+                    counts[WEAK_REFLECTION] += 1
+                    continue
+                along = rx * gx + ry * gy + rz * gz
+                if along <= 0.0:  # out of the face that it would go into
+                    rx, ry, rz = rx - 2.0 * along * gx, ry - 2.0 * along * gy, rz - 2.0 * along * gz
+                _put(next_origins, spawned, ox, oy, oz)
+                _put(next_directions, spawned, rx, ry, rz)
+                _put(next_weights, spawned, share * m0, share * m1, share * m2)
+                _hand_on(next_pixels, next_inside, next_keys, spawned, pixel, inside, keys, i)
+                next_keys[spawned] = _mix(keys[i] + np.uint64(j))
+                counts[REFLECTION] += 1
+                spawned += 1
+        elif max(m0, m1, m2) >= least:
             twice = 2.0 * (dx * nx + dy * ny + dz * nz)
             rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
             if rx * gx + ry * gy + rz * gz <= 0.0:  # nor may it send a reflection into the face
@@ -300,14 +356,96 @@ def shade(
             _put(next_origins, spawned, ox, oy, oz)
             _put(next_directions, spawned, rx, ry, rz)
             _put(next_weights, spawned, m0, m1, m2)
-            next_pixels[spawned] = pixel
-            for j in range(inside.shape[1]):
-                next_inside[spawned, j] = inside[i, j]
+            _hand_on(next_pixels, next_inside, next_keys, spawned, pixel, inside, keys, i)
             counts[REFLECTION] += 1
             spawned += 1
         elif max(m0, m1, m2) > 0.0:
             counts[WEAK_REFLECTION] += 1
     return shadows, spawned
+
+
+@inner_kernel
+def _hand_on(next_pixels, next_inside, next_keys, k, pixel, inside, keys, i):
+    """Give a spawned ray its pixel, the bodies that it runs in and its place in lobes."""
+    next_pixels[k] = pixel
+    for j in range(inside.shape[1]):
+        next_inside[k, j] = inside[i, j]
+    if next_keys.shape[0] > 0:
+        next_keys[k] = keys[i]
+
+
+@inline_kernel
+def _in_lobe(key, step):
+    """A place in [0, 1)²: the key's own, ``step`` places on along the R2 sequence (Roberts 2018)."""
+    step = np.uint64(step)
+    a = ((key & _LOW) + step * _R2_ACROSS) & _LOW
+    b = ((key >> np.uint64(32)) + step * _R2_AROUND) & _LOW
+    return a * (1.0 / 4294967296.0), b * (1.0 / 4294967296.0)
+
+
+@kernel
+def glossy_direction(alpha, across, around, dx, dy, dz, nx, ny, nz):
+    """Reflect a direction at a facet of a GGX surface, one of those seen from there, and how much of it gets away.
+
+    Facets are sampled in proportion to their visible area by spherical caps (Dupuy and Benyoub 2023); the share is
+    G2/G1 of Smith's height-correlated shadowing (Heitz 2014), 0 for a direction into the surface. Its mean is the
+    single-scattering albedo.
+
+    Parameters
+    ----------
+    alpha : float
+        GGX's width, above 0: the square of the roughness.
+    across, around : float
+        A place in [0, 1)².
+    """
+    cosine = -(dx * nx + dy * ny + dz * nz)
+    # the surface's frame: z its normal, x away from which the ray comes
+    tx, ty, tz = -dx - cosine * nx, -dy - cosine * ny, -dz - cosine * nz
+    sine = math.sqrt(tx * tx + ty * ty + tz * tz)
+    if sine < 1e-6:
+        if abs(nx) < 0.8:
+            tx, ty, tz = 1.0 - nx * nx, -nx * ny, -nx * nz
+        else:
+            tx, ty, tz = -ny * nx, 1.0 - ny * ny, -ny * nz
+        length = math.sqrt(tx * tx + ty * ty + tz * tz)
+        sine = 0.0
+    else:
+        length = sine
+    tx, ty, tz = tx / length, ty / length, tz / length
+    bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+    # stretched to a sphere: a cap of it, shifted, holds the facets that are seen
+    vx, vz = alpha * sine, cosine
+    length = math.sqrt(vx * vx + vz * vz)
+    vx, vz = vx / length, vz / length
+    hz = (1.0 - across) * (1.0 + vz) - vz
+    radius = math.sqrt(max(1.0 - hz * hz, 0.0))
+    angle = 2.0 * math.pi * around
+    hx, hy, hz = alpha * (radius * math.cos(angle) + vx), alpha * radius * math.sin(angle), hz + vz
+    length = math.sqrt(hx * hx + hy * hy + hz * hz)
+    hx, hy, hz = hx / length, hy / length, hz / length
+    twice = 2.0 * (sine * hx + cosine * hz)
+    rx, ry, rz = twice * hx - sine, twice * hy, twice * hz - cosine
+    if rz <= 0.0:
+        return nx, ny, nz, 0.0
+    seen = _smith(alpha, cosine)
+    share = (1.0 + seen) / (1.0 + seen + _smith(alpha, rz))
+    return rx * tx + ry * bx + rz * nx, rx * ty + ry * by + rz * ny, rx * tz + ry * bz + rz * nz, share
+
+
+@inline_kernel
+def _smith(alpha, cosine):
+    """Smith's Λ of a GGX surface."""
+    return 0.5 * (math.sqrt(1.0 + alpha * alpha * (1.0 / (cosine * cosine) - 1.0)) - 1.0)
+
+
+@kernel
+def highlight(f0, roughness):
+    """Strength and exponent of the Blinn–Phong highlight of a microfacet surface.
+
+    Its width is that of a lobe of α = roughness² (Karis 2013), its strength normalised D/4 seen head on, at most 1.
+    """
+    shininess = max(2.0 / max(roughness, 0.05) ** 4 - 2.0, 1.0)
+    return min(f0 * (1.0 - roughness) * (shininess + 2.0) / 8.0, 1.0), shininess
 
 
 @inline_kernel
@@ -428,9 +566,13 @@ def pass_clear_face(
         body = object_of_face[f] if hit else -1
         entering = hit and faces[f, 0] * dx + faces[f, 1] * dy + faces[f, 2] * dz < 0.0
         there = hit and not _cut_out(coordinates, textures, alphas, materials, body, f, u[i], v[i])
-        if there and not _transmits(materials, body):
+        past = 0.0  # the share that the body leaves free
+        if there and materials[body, _ALPHA_BLEND] > 0.0:
+            past = 1.0 - _there(coordinates, textures, alphas, materials, body, f, u[i], v[i])
+        clear = there and _transmits(materials, body)
+        if there and past == 0.0 and not clear:
             continue
-        if there and not entering:
+        if clear and not entering:
             _enter(inside, i, body)
         way = min(float(distances[i]), reach[i]) if hit else reach[i]
         medium = _medium(inside, i, materials, -1)
@@ -443,20 +585,22 @@ def pass_clear_face(
             continue
         strongest = 0.0
         before, after = -1, -1
-        if there:
+        if clear:
             before, after = _media(inside, i, materials, body, entering)
         for c in range(3):
+            through = 0.0 if there and not clear else 1.0
             if before != after:
-                colours[i, c] *= materials[body, _TRANSMISSION + c] * (
+                through = materials[body, _TRANSMISSION + c] * (
                     1.0 - _straight_reflectance(materials, before, after, c, faces, f, dx, dy, dz, length)
                 )
+            colours[i, c] *= past + (1.0 - past) * through
             colours[kept, c] = colours[i, c]
             strongest = max(strongest, colours[kept, c])
         if strongest < LEAST_WEIGHT:
             continue
         for j in range(inside.shape[1]):
             inside[kept, j] = inside[i, j]
-        if there:
+        if clear:
             _cross(inside, kept, body, entering)
         _put_behind(origins, kept, corners, faces, f, u[i], v[i], entering)
         _put(directions, kept, dx, dy, dz)
@@ -637,13 +781,28 @@ def _cut_out(coordinates, textures, alphas, materials, body, f, u, v):
     """Whether the texture's alpha leaves no surface at a place of a face."""
     if materials[body, _CUTOFF] == 0.0:
         return False
-    row = int(materials[body, _TEXTURE])
     x, y, _ = _interpolate(coordinates, f, u, v)
+    return _alpha(textures, int(materials[body, _TEXTURE]), alphas, x, y) < materials[body, _CUTOFF]
+
+
+@kernel
+def _there(coordinates, textures, alphas, materials, body, f, u, v):
+    """The share of a blended surface that is there: its factor times the texture's alpha, where it has one."""
+    share, row = materials[body, _ALPHA_BLEND], int(materials[body, _TEXTURE])
+    if row >= 0 and textures[row, 0] == IMAGE and textures[row, 4] >= 0.0:
+        x, y, _ = _interpolate(coordinates, f, u, v)
+        share *= _alpha(textures, row, alphas, x, y)
+    return share
+
+
+@kernel
+def _alpha(textures, row, alphas, x, y):
+    """Alpha of an image at (u, v), bilinear."""
     a, b, c, d, fx, fy = _texels_at(textures, row, x, y)
     first = int(textures[row, 4]) - int(textures[row, 1])
     upper = (1 - fx) * alphas[first + a] + fx * alphas[first + b]
     lower = (1 - fx) * alphas[first + c] + fx * alphas[first + d]
-    return (1 - fy) * upper + fy * lower < materials[body, _CUTOFF]
+    return (1 - fy) * upper + fy * lower
 
 
 @kernel
