@@ -25,7 +25,8 @@ from benchmarks.pages import Tables, publish
 from benchmarks.records import Records, add_again, origin, with_commits
 from codec import decode, encode
 from ii_core import IIPicture, add_sensor_noise, preset
-from metrics import DepthQuality, FocusDepth, depth_from_focus, q_depth
+from ii_core.view import camera_of
+from metrics import DepthQuality, FocusDepth, depth_from_focus, linear_layers, q_depth
 from metrics.depth.focus import METHODS
 from metrics.depth.q_depth import virtual_camera_pixels
 from metrics.plots.rd_chart import COLOURS, new_figure, save
@@ -122,7 +123,7 @@ def estimates(picture: IIPicture) -> dict[str, tuple[FocusDepth, float]]:
     found = {}
     for method in METHODS:
         started = time.process_time()
-        depth = depth_from_focus(picture, method=method)
+        depth = depth_from_focus(picture, method=method, layers_mm=linear_layers(camera_of(picture)))
         found[method] = depth, time.process_time() - started
     return found
 
@@ -186,7 +187,7 @@ def quality(shot: Shot, found: dict[str, tuple[FocusDepth, float]]) -> dict[str,
     """Q_depth of a coded picture with true and with estimated depth."""
     picture: IIPicture = shot.picture
     decoded = decode(encode(picture, "jpeg2000", bpp=BPP))
-    true = q_depth(picture, decoded, depth=shot.depth)
+    true = q_depth(picture, decoded, depth=shot.depth, layers_mm=linear_layers(camera_of(picture)))
     at = [round(float(x), 2) for x in np.sqrt(BINS[1:] * BINS[:-1])]
     row: dict[str, Any] = {"layer": at, "true": pooled(true)}
     for method, (depth, _) in found.items():

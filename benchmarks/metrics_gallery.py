@@ -10,12 +10,15 @@ coded picture, three schemes at five rates for Q_depth over rate; true depth. Th
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from benchmarks.focus_patterns import main as draw_patterns
 from codec import decode, encode, timed_decode
 from ii_core import preset
+from ii_core.view import camera_of
 from metrics import (
     depth_rate_chart,
+    linear_layers,
     measuring,
     plot_angle,
     plot_error_layers,
@@ -42,8 +45,9 @@ def main() -> None:
     plot_angle(picture, decoded, IMAGES / "q_angle.png")
     plot_views(picture, decoded, IMAGES / "views.png")
     plot_error_views(picture, decoded, IMAGES / "errors_views.png")
-    plot_error_layers(picture, q_depth(picture, decoded, depth=shot.depth), IMAGES / "errors_depth.png")
-    measure = measuring(picture, ["q_depth_min", "q_depth_mean", "q_depth_max", "q_view"], depth=shot.depth)
+    truth: Any = {"depth": shot.depth, "layers_mm": linear_layers(camera_of(picture))}
+    plot_error_layers(picture, q_depth(picture, decoded, **truth), IMAGES / "errors_depth.png")
+    measure = measuring(picture, ["q_depth_min", "q_depth_mean", "q_depth_max", "q_view"], **truth)
     records = rate_distortion(picture, SCHEMES, RATES, encode=encode, decode=timed_decode, measure=measure)
     write_study(STUDY, "Apples", records, {"scale": 4, "noise": 1.0}, picture=picture)
     depth_rate_chart(read_study(STUDY), IMAGES / "q_depth_rate.png")

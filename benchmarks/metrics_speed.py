@@ -162,11 +162,11 @@ from ii_core import IIPicture, preset
 small = preset("setup1", scale=32)
 a, b = full_size()
 tiny = IIPicture(a.pixels[: small.pixels[1], : small.pixels[0]].copy(), small.lenses, small.ei_pixels, small)
-q_depth(tiny, tiny, method={method!r})
+q_depth(tiny, tiny, method={method!r}, layers_mm=linear_layers(small))
 def most():  # not `getrusage`, which would begin with what the process that started this one holds
     return int(dict(line.split(":") for line in open("/proc/self/status"))["VmHWM"].split()[0])
 before, started = most(), time.process_time()
-q_depth(a, b, method={method!r})
+q_depth(a, b, method={method!r}, layers_mm=linear_layers(a.camera))
 print(time.process_time() - started, (most() - before) / 2**20)
 """
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT)

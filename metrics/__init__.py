@@ -2,7 +2,7 @@
 
 from .angle import AngleQuality, q_angle_ssim, q_angle_ycbcr
 from .depth.focus import FocusDepth, depth_from_focus
-from .depth.layers import linear_layers, logarithmic_layers
+from .depth.layers import covering_layers, linear_layers, logarithmic_layers
 from .depth.q_depth import DepthQuality, q_depth
 from .global_angle import angle_axes, mean_q_angle, q_angle, q_global
 from .measures import MEASURES, measuring
@@ -27,6 +27,7 @@ __all__ = [
     "angle_axes",
     "bd_psnr",
     "bd_rate",
+    "covering_layers",
     "depth_from_focus",
     "depth_over_rate",
     "depth_rate_chart",

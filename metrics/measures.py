@@ -88,7 +88,7 @@ def measuring(
     -------
     callable
         ``measure(decoded)`` gives a dict: every name's value; with a name of Q_depth also ``q_depth``, its value in
-        every layer, and ``depth_mm``, the layers.
+        every layer, ``depth_mm``, the layers, and ``depth_outside``, the share of view pixels in no layer.
 
     Raises
     ------
@@ -132,6 +132,7 @@ def measuring(
             extremes = {"q_depth_min": layers.min, "q_depth_mean": layers.mean, "q_depth_max": layers.max}
             kept |= {name: extremes[name] for name in groups["q_depth"]}
             kept |= {"q_depth": layers.values.tolist(), "depth_mm": layers.depth_mm.tolist()}
+            kept["depth_outside"] = layers.outside_share
         return kept
 
     return measure

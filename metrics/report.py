@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ii_core import IIPicture
 
 from .angle import SCALES, q_angle_ssim, q_angle_ycbcr
-from .depth.q_depth import DepthQuality, q_depth
+from .depth.q_depth import DepthQuality, q_depth, told_outside
 from .global_angle import angle_axes, mean_q_angle, q_angle, q_global
 from .study import spelt
 from .view import WINDOW, q_view
@@ -161,5 +161,7 @@ def _depth(made: Report, quality: DepthQuality) -> tuple[str, Any]:
             f"depth: {quality.source}"
         )
     found = {name: getattr(quality, name).tolist() for name in ("depth_mm", "values", "counts")}
-    found |= {name: getattr(quality, name) for name in ("min", "mean", "max", "outside", "source")}
+    single = ("min", "mean", "max", "outside", "outside_share", "missing", "source")
+    found |= {name: getattr(quality, name) for name in single}
+    text += f"; {told_outside(quality.outside_share)}"
     return text, found

@@ -110,7 +110,7 @@ def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise ValueError(f"{path}: {error}") from None
     for point in study["points"]:
         lossless = point.pop("lossless", False)
-        for name in measures_of([point]) + ["q_depth"] * ("q_depth" in point):
+        for name in [*measures_of([point]), *(name for name in ("q_depth", "depth_outside") if name in point)]:
             point[name] = _read(point[name])
         if lossless:
             point["q_global"] = math.inf

@@ -240,10 +240,22 @@ def test_any_number_of_threads_gives_the_same():
 def test_a_textured_wall_lies_in_its_layer(d, method):
     camera = preset("setup1", scale=8)
     shot = shoot(textured_wall(d * camera.gap_mm))
-    f = depth_from_focus(shot.picture, method=method)
+    f = depth_from_focus(shot.picture, method=method, layers_mm=linear_layers(camera))
     error = np.abs(f.layer + 1 - d)
     # Lenses at the picture's edge have their partners on one side only: a few of them may miss.
     assert (error <= 1).mean() > 0.97
+
+
+@pytest.mark.parametrize("method", ["dissertation", "robust"])
+@pytest.mark.parametrize("d", [7, 40, 400])  # the dissertation's layers end at 250
+def test_default_layers_find_a_wall_near_and_far(d, method):
+    camera = preset("setup1", scale=8)
+    shot = shoot(textured_wall(d * camera.gap_mm, half=1000.0 if d > 250 else 200.0))
+    f = depth_from_focus(shot.picture, method=method)
+    # One of the dissertation's layers, as above, and a tenth of a pixel over the spread of 14 lenses: from lens to
+    # lens a point moves 16/d pixels.
+    assert np.median(abs(f.depth_mm / (d * camera.gap_mm) - 1)) < 1 / d + d / 2240
+    assert q_depth(shot.picture, shot.picture, depth=f).outside == 0
 
 
 @pytest.mark.parametrize("make", ["black", "constant", "one lens", "one-pixel images", "layers before the lenses"])
@@ -293,12 +305,13 @@ def test_noise_on_what_stands_at_one_depth_is_found_there_and_nowhere_else():
     noisy[there] += np.where(noisy[there] < 128, 8, -8)
     noisy = shot.picture.with_pixels(noisy.astype(np.uint8))
     at = 20 * math.log10(255 / 8)
-    given = q_depth(shot.picture, noisy, depth=shot.depth)
+    layers = linear_layers(camera)
+    given = q_depth(shot.picture, noisy, depth=shot.depth, layers_mm=layers)
     assert np.flatnonzero(np.isfinite(given.values)).tolist() == [far - 1]
     assert given.values[far - 1] == pytest.approx(at, abs=1e-9)  # exact sums, one logarithm
     assert given.source == "given"
 
-    focus = q_depth(shot.picture, noisy)
+    focus = q_depth(shot.picture, noisy, layers_mm=layers)
     assert focus.source == "focus (dissertation)" and focus.outside == 0
     error = np.where(focus.counts > 0, 3 * focus.counts * 255**2 / 10 ** (focus.values / 10), 0)
     assert focus.values[far - 1] < at + 0.5
@@ -313,7 +326,7 @@ def test_equal_distortion_at_two_depths_gives_equal_values():
     pixels = shot.picture.pixels.astype(int)
     worse = shot.picture.with_pixels(np.where(pixels < 128, pixels + 5, pixels - 5).astype(np.uint8))
     for depth in (shot.depth, None):
-        q = q_depth(shot.picture, worse, depth=depth)
+        q = q_depth(shot.picture, worse, depth=depth, layers_mm=linear_layers(camera))
         assert q.counts[[7, 23]].min() > 300
         np.testing.assert_allclose(q.values[q.counts > 0], 20 * math.log10(255 / 5), rtol=1e-14)
 
@@ -425,7 +438,7 @@ def test_the_robust_method_sees_past_edges_and_between_layers():
     z = seen_depth(shot) / camera.gap_mm
     right = {}
     for method in ("dissertation", "robust"):
-        f = depth_from_focus(shot.picture, method=method)
+        f = depth_from_focus(shot.picture, method=method, layers_mm=linear_layers(camera))
         right[method] = (np.abs(f.layer + 1 - z) <= 1).mean()
     assert right["robust"] > 0.99 > 0.95 > right["dissertation"]
     behind = z > 20

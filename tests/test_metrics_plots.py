@@ -67,11 +67,13 @@ def test_depth_curve_shows_each_layer_that_has_pixels():
     q = q_depth(a, b, depth=depth)
     upper, lower = _depth_figure(q).axes
     (points,) = upper.collections
-    np.testing.assert_allclose(points.get_offsets(), [[150, q.values[99]]])
+    np.testing.assert_allclose(points.get_offsets(), [[150, q.values[-1]]])
     (same,) = (line for line in upper.lines if line.get_markerfacecolor() == "white")
     np.testing.assert_allclose(same.get_xdata(), [15])
     assert upper.get_title(loc="left").startswith("Q_depth; depth: given")
-    assert lower.get_xlabel() == "depth z [mm]"
+    assert lower.get_xlabel() == "depth z [mm]" and lower.get_title(loc="right").startswith("0.0% of view pixels")
+    half = _depth_figure(q_depth(a, b, depth=depth, layers_mm=[14.0, 15.0, 16.0]))
+    assert half.axes[1].get_title(loc="right") == "50.0% of view pixels outside all layers"
 
 
 @pytest.mark.parametrize("kind", ["identical", "no depth"])

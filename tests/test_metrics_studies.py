@@ -14,6 +14,7 @@ from metrics import (
     MEASURES,
     depth_over_rate,
     depth_rate_chart,
+    linear_layers,
     measuring,
     q_angle,
     q_angle_ycbcr,
@@ -84,6 +85,7 @@ def test_records_hold_what_the_functions_give(study):
         assert (record["q_depth_min"], record["q_depth_mean"]) == (layers.min, layers.mean)
         np.testing.assert_array_equal(record["q_depth"], layers.values)
         np.testing.assert_array_equal(record["depth_mm"], layers.depth_mm)
+        assert record["depth_outside"] == layers.outside_share == 0
 
 
 def test_the_file_keeps_infinite_and_missing_qualities_apart(study):
@@ -125,7 +127,7 @@ def test_csv_has_a_column_a_measure(study, tmp_path):
     with (tmp_path / "s.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["q_view"]) for row in rows] == [record["q_view"] for record in study[0]]
-    assert "q_depth" not in rows[0] and "q_depth_mean" in rows[0]
+    assert "q_depth" not in rows[0] and "q_depth_mean" in rows[0] and float(rows[0]["depth_outside"]) == 0
 
 
 def test_latex_says_what_the_table_says(study, tmp_path):
@@ -223,5 +225,21 @@ def test_the_command_charts_all_measures(run, refused, tmp_path):
     assert {path.name for path in (tmp_path / "s").iterdir()} == expected
     assert read_image(tmp_path / "s" / "a_q_depth.png").shape[0] > 300
     refused(run(*command, *more), "is there already")
+    # Layers that leave out the far half: the share is printed, kept and drawn.
+    assert "0.0% of view pixels outside all layers" in out
+    code, out, _ = run(*command, *more[:-1], tmp_path / "near", "--layers", "5:30:40")
+    assert code == 0 and "50.0% of view pixels outside all layers" in out
+    kept = read_study(tmp_path / "near" / "a_rd.json")
+    assert {point["depth_outside"] for point in kept["points"]} == {0.5}
+    assert len(kept["points"][0]["depth_mm"]) == 40
+    assert draw_depth_rate(kept).get_suptitle() == "a: 50.0% of view pixels outside all layers"
+    code, _, _ = run(
+        *command, "--measures", "q_depth_mean", "--method", "robust", "--layers", "dissertation", "-o", tmp_path / "d"
+    )
+    kept = read_study(tmp_path / "d" / "a_rd.json")
+    np.testing.assert_array_equal(kept["points"][0]["depth_mm"], linear_layers(a.camera))
+    refused(
+        run(*command, *more[:-1], tmp_path / "x", "--layers", "all"), "layers are 'all': dissertation, a number or"
+    )
     refused(run(*command, "--measures", "q_best", "-o", tmp_path / "t"), "unknown measure 'q_best'")
     assert not (tmp_path / "t").exists()

@@ -8,7 +8,7 @@ from skimage import data
 
 from ii_core import IICamera, IIPicture, five_viewpoints, preset, view_image
 from ii_core.view import view_positions
-from metrics import q_angle, q_depth, q_global, q_view
+from metrics import linear_layers, q_angle, q_depth, q_global, q_view
 from raytrace_ii import load_scene, render
 
 
@@ -93,7 +93,12 @@ def test_noise_on_one_true_layer_of_a_scene_finds_that_layer_and_no_other():
     pixels = shot.picture.pixels.astype(int)
     there = layer == target
     pixels[there] += np.where(pixels[there] < 128, 6, -6)
-    q = q_depth(shot.picture, shot.picture.with_pixels(pixels.astype(np.uint8)), depth=shot.depth)
+    q = q_depth(
+        shot.picture,
+        shot.picture.with_pixels(pixels.astype(np.uint8)),
+        depth=shot.depth,
+        layers_mm=linear_layers(camera),
+    )
     if q.counts[int(target) - 1] == 0:
         pytest.fail("the view has no pixel in the layer: nothing was tested")
     assert np.flatnonzero(np.isfinite(q.values)).tolist() == [int(target) - 1]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from benchmarks import depth_truth
 from benchmarks.stability.geometry import Row
 from ii_core import IIPicture, add_sensor_noise, preset
-from metrics import FocusDepth, depth_from_focus
+from metrics import FocusDepth, depth_from_focus, linear_layers
 from metrics.depth.focus import METHODS
 from raytrace_ii import Body, Light, Material, Scene, render
 from raytrace_ii.scene.textures import Image, linear
@@ -55,12 +55,17 @@ def depth_contrast(sizes: tuple[float, ...] = (0, 1, 2, 4, 8, 16, 32, 64, 128)) 
         row: Row = {"contrast, steps": steps}
         for method in METHODS:
             for sigma in (0, 1, 4):
-                found = depth_from_focus(add_sensor_noise(sharp, sigma, seed=1), method=method)
+                found = estimated(add_sensor_noise(sharp, sigma, seed=1), method)
                 row[f"{method}, σ {sigma}"] = near(found, LAYER)
                 if sigma == 1:
                     row[f"{method}, σ 1, sure"] = float((found.confidence > 0.5).mean())
         rows.append(row)
     return rows
+
+
+def estimated(picture: IIPicture, method: str) -> FocusDepth:
+    """Depth from focus on the dissertation's layers, in which these experiments count."""
+    return depth_from_focus(picture, method=method, layers_mm=linear_layers(CAMERA))
 
 
 def near(found: FocusDepth, layer: int) -> float:
@@ -86,7 +91,7 @@ def depth_two_layers(shares: tuple[float, ...] = SHARES) -> list[Row]:
         for kind, bodies in kinds.items():
             picture = seen(*bodies)
             for method in METHODS:
-                found = depth_from_focus(picture, method=method)
+                found = estimated(picture, method)
                 row[f"{kind}, {method}: wall"] = near(found, LAYER)
                 row[f"{kind}, {method}: behind"] = near(found, BEHIND)
         rows.append(row)
@@ -112,7 +117,7 @@ def depth_highlight() -> list[Row]:
             "pixels brighter": float((picture.pixels != without.pixels).any(axis=2).mean()),
         }
         for method in METHODS:
-            row[method] = near(depth_from_focus(picture, method=method), LAYER)
+            row[method] = near(estimated(picture, method), LAYER)
         rows.append(row)
     return rows
 

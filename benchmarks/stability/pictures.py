@@ -12,7 +12,6 @@ from benchmarks.analytic import still_life
 from benchmarks.stability import depth, geometry, light
 from codec import decode, encode
 from ii_core import add_sensor_noise, preset, read_maps, view_image, write_maps
-from metrics import depth_from_focus
 from metrics.depth.focus import METHODS
 from raytrace_ii import Body, Scene, load_scene, render, trace
 from raytrace_ii.shapes.primitives import rotation
@@ -58,8 +57,8 @@ def coding_and_depth() -> NDArray[np.uint8]:
     even = add_sensor_noise(depth.seen(depth.wall(depth.LAYER, 0)), 1.0, seed=1)
     half = depth.seen(depth.wall(depth.LAYER, 128, mirror=(0.5,) * 3), depth.mirrored())
     views = [view_image(apples, eye)[0], view_image(coarse, front)[0], view_image(stored, front)[0]]
-    maps = [depth.shown(depth_from_focus(even, method=method)) for method in METHODS]
-    maps.append(depth.shown(depth_from_focus(half, method="dissertation")))
+    maps = [depth.shown(depth.estimated(even, method)) for method in METHODS]
+    maps.append(depth.shown(depth.estimated(half, "dissertation")))
     tiles = [*views, *(np.repeat(one[..., None], 3, axis=2) for one in maps)]
     return _row([np.rint(tile).astype(np.uint8).repeat(3, axis=0).repeat(3, axis=1) for tile in tiles])
 

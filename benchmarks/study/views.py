@@ -13,7 +13,18 @@ from numpy.typing import NDArray
 from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, view_image
 from ii_core.files import write_image
-from metrics import FocusDepth, angle_axes, depth_from_focus, measuring, q_angle, q_depth, q_global, q_view
+from ii_core.view import camera_of
+from metrics import (
+    FocusDepth,
+    angle_axes,
+    depth_from_focus,
+    linear_layers,
+    measuring,
+    q_angle,
+    q_depth,
+    q_global,
+    q_view,
+)
 from metrics.depth.layers import virtual_viewpoint
 from raytrace_ii import Shot
 from raytrace_ii.rendering.render import cores
@@ -57,12 +68,17 @@ def steps(scale: int) -> list[Step]:
 def over_rate(_folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> dict[str, Any]:
     """Q_view and Q_depth of all schemes over rate, with true depth."""
     made = shot(scene, "setup3", scale)
-    points = curves(made.picture, schemes, measure=measuring(made.picture, MEASURES, depth=made.depth))
+    points = curves(made.picture, schemes, measure=measuring(made.picture, MEASURES, **truth(made)))
     depth_mm = points[0]["depth_mm"]
     for point in points:
         del point["depth_mm"]  # the same for all
         point["q_depth"] = rounded(point["q_depth"])
     return {"points": points, "depth_mm": rounded(depth_mm)}
+
+
+def truth(made: Shot) -> dict[str, Any]:
+    """True depth, on the dissertation's layers."""
+    return {"depth": made.depth, "layers_mm": linear_layers(camera_of(made.picture))}
 
 
 def artefacts(folder: Path, *, scene: str, scale: int, camera: str, crop: int | None) -> dict[str, Any]:
@@ -101,13 +117,14 @@ def equal(folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> 
         found = list(pool.map(lambda scheme: at_quality(made.picture, scheme, EQUAL_DB), schemes))
     views = [front(made.picture), *(front(decoded) for _, decoded in found)]
     write_image(folder / f"equal-{scene}_views.png", sheet([large(view) for view in views], 3))
-    focus = depth_from_focus(made.picture)
+    focus = depth_from_focus(made.picture, layers_mm=truth(made)["layers_mm"])
     rows = [
         judged(made, focus, decoded, coded) | {"scheme": scheme}
         for scheme, (coded, decoded) in zip(schemes, found, strict=True)
     ]
     degrees, _ = angle_axes(made.picture.camera)
-    layers, guessed = (q_depth(made.picture, made.picture, depth=depth) for depth in (made.depth, focus))
+    layers = q_depth(made.picture, made.picture, **truth(made))
+    guessed = q_depth(made.picture, made.picture, depth=focus)
     return {
         "rows": rows,
         "angle_deg": rounded(degrees.tolist()),
@@ -120,7 +137,8 @@ def equal(folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> 
 def judged(made: Shot, focus: FocusDepth, decoded: IIPicture, coded: Any) -> dict[str, Any]:
     """Every quality of one decoded picture; over depth by the renderer's and by what focus tells."""
     angle = q_angle(made.picture, decoded)
-    layers, guessed = (q_depth(made.picture, decoded, depth=depth) for depth in (made.depth, focus))
+    layers = q_depth(made.picture, decoded, **truth(made))
+    guessed = q_depth(made.picture, decoded, depth=focus)
     return {
         "bpp": coded.bpp,
         "q_global": q_global(made.picture, decoded),
@@ -135,7 +153,7 @@ def detail(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
     """How much neighbouring pixels of the virtual camera's view differ, layer by layer: mean square, four ways."""
     made = shot(scene, "setup3", scale)
     assert made.picture.camera is not None
-    layers = q_depth(made.picture, made.picture, depth=made.depth)
+    layers = q_depth(made.picture, made.picture, **truth(made))
     view, _ = view_image(made.picture, virtual_viewpoint(made.picture.camera), interpolation="nearest")
     down, across = (np.square(np.diff(view.astype(float), axis=axis)).mean(axis=2) for axis in (0, 1))
     steps = np.zeros(view.shape[:2])

@@ -108,8 +108,8 @@ def depth_from_focus(
     picture : IIPicture
         Regular, with its camera.
     layers_mm : array_like, (layers,), optional
-        Depths to try, increasing; `linear_layers` if not given. See also `logarithmic_layers`. None but those
-        beyond the lens plane can be chosen.
+        Depths to try, increasing; `covering_layers` if not given. The dissertation's are `linear_layers`, see also
+        `logarithmic_layers`. None but those beyond the lens plane can be chosen.
     method : {"dissertation", "robust"}
         How alike the lenses see a layer. ``robust`` follows the ray of the very pixel that `q_depth` measures,
         compares its colour with that of lenses in which the ray's point falls on whole pixels (`whole_pixel_steps`,

@@ -30,7 +30,8 @@ class DepthQuality:
         View pixels in each layer.
     outside : int
         View pixels that hit something nearer or farther than all layers; they count nowhere. 0 if the depth is
-        estimated: it is always that of a layer, or none.
+        estimated: it is always that of a layer, or none. 0 with the default layers too, but for depths at the pixel
+        array or behind it.
     source : str
         Where depth came from: ``given``, or ``focus`` with the method, as in ``focus (dissertation)``.
     layer : ndarray of int64, (L', K)
@@ -38,6 +39,8 @@ class DepthQuality:
         that the camera does not see.
     error : ndarray of float64, (L', K)
         Root of the mean over R, G and B of the squared error at each of these pixels, in shares of the peak.
+    missing : int
+        View pixels without a depth: nothing is hit, or nothing tells the layers apart.
     """
 
     depth_mm: NDArray[np.float64]
@@ -47,12 +50,19 @@ class DepthQuality:
     source: str
     layer: NDArray[np.int64]
     error: NDArray[np.float64]
+    missing: int = 0
 
     def error_map(self, layer: int) -> NDArray[np.float64]:
         """The error at the pixels of one layer, NaN at all others, (L', K)."""
         if not 0 <= layer < self.values.size:
             raise ValueError(f"layer is {layer}: 0 to {self.values.size - 1} are needed")
         return np.where(self.layer == layer, self.error, np.nan)
+
+    @property
+    def outside_share(self) -> float:
+        """Share of ``outside`` in the view pixels that have a depth; NaN if none has."""
+        hit = self.outside + int(self.counts.sum())
+        return self.outside / hit if hit else float("nan")
 
     @property
     def min(self) -> float:
@@ -97,8 +107,9 @@ def q_depth(
         Scene z at every pixel of the picture, mm, NaN where nothing is hit; or what `depth_from_focus` found in the
         reference before, with its layers. If it is not given, depth is estimated from the reference now.
     layers_mm : array_like, (layers,), optional
-        Depths of the layers, increasing; z = d·f from the pixel array, d = 1 … 250, with f = Λ in the pinhole
-        approximation, if not given. See `linear_layers` and `logarithmic_layers`.
+        Depths of the layers, increasing. If not given, `covering_layers`: 250 in equal ratios from the nearest to
+        the farthest depth in view, or, where depth is estimated, over all that can be told apart. The dissertation's,
+        z = d·Λ with d = 1 … 250, are `linear_layers`; see also `logarithmic_layers`.
     method : {"dissertation", "robust"}
         How depth is estimated, if it is; see `depth_from_focus`.
     mask : array_like of bool, (N, M), optional
@@ -134,7 +145,12 @@ def q_depth(
         check_finite(reference, decoded, mask)
     if isinstance(depth, FocusDepth) and layers_mm is None:
         layers_mm = depth.layers_mm
-    layers = check_layers(layers_mm, camera)
+    z = None
+    if depth is not None and not isinstance(depth, FocusDepth):
+        z = _true_depth(depth, reference)[n, m].astype(np.float64)
+        if np.isinf(z).any():
+            raise ValueError("depth is infinite at a pixel in view: NaN is needed where nothing is hit")
+    layers = check_layers(layers_mm, camera, None if z is None else z[counted])
     if depth is None:
         depth = depth_from_focus(reference, layers_mm=layers, method=method)
     if isinstance(depth, FocusDepth):
@@ -146,10 +162,8 @@ def q_depth(
         source, layer = f"focus ({depth.method})", depth.layer[lens_rows]
         missing = layer < 0
     else:
+        assert z is not None
         source = "given"
-        z = _true_depth(depth, reference)[n, m].astype(np.float64)
-        if np.isinf(z).any():
-            raise ValueError("depth is infinite at a pixel in view: NaN is needed where nothing is hit")
         layer, missing = nearest_layer(z, layers, camera.gap_mm), np.isnan(z)
 
     outside = int((counted & (layer < 0) & ~missing).sum())
@@ -166,7 +180,13 @@ def q_depth(
         source=source,
         layer=layer,
         error=np.where(counted, np.sqrt(squared_error / 3) / peak(dtype), np.nan),
+        missing=int((counted & missing).sum()),
     )
+
+
+def told_outside(share: float) -> str:
+    """The share of view pixels in no layer, in words."""
+    return "no view pixel has a depth" if np.isnan(share) else f"{share:.1%} of view pixels outside all layers"
 
 
 def _true_depth(depth: ArrayLike, picture: IIPicture) -> NDArray[Any]:

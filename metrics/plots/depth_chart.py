@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..depth.layers import logarithmic
+from ..depth.q_depth import told_outside
 from .rd_chart import COLOURS, LINES, MARKERS, check_suffix, edges, new_figure, save, set_rate_axis
 
 EXTREMES = ("q_depth_min", "q_depth_mean", "q_depth_max")
@@ -58,7 +60,7 @@ def depth_rate_chart(study: Mapping[str, Any], path: str | os.PathLike[str]) -> 
     """Draw Q_depth(r): for every scheme an image over rate and depth, and below it min, mean and max over rate.
 
     A column of the image reaches half way, in ratio, to the next rate measured; layers without pixels stay grey,
-    identical ones are hatched.
+    identical ones are hatched. The title names the share of view pixels that are in no layer.
 
     Parameters
     ----------
@@ -96,12 +98,16 @@ def draw_depth_rate(study: Mapping[str, Any]) -> Any:
     for axes, scheme in zip(panels[1], schemes, strict=True):
         _extremes(axes, [p for p in points if p["scheme"] == scheme])
         set_rate_axis(axes, points)
+    if all(logarithmic(depth) for _, depth, _ in images):
+        panels[0, 0].set_yscale("log")
     panels[0, 0].set_ylabel("depth z [mm]")
     panels[1, 0].set_ylabel(r"$Q_\mathrm{depth}$ [dB]")
     handles, names = panels[1, 0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower right", ncols=3, frameon=False, fontsize=9)
     figure.colorbar(map_, ax=panels[0].tolist(), label=r"$Q_\mathrm{depth}$ [dB]")
-    figure.suptitle(study["picture"]["name"], x=0.01, ha="left", fontsize=12)
+    lost = [p["depth_outside"] for p in points if "depth_outside" in p]
+    told = f": {told_outside(max(lost))}" if lost else ""  # the same for all: depth is the reference's
+    figure.suptitle(study["picture"]["name"] + told, x=0.01, ha="left", fontsize=12)
     return figure
 
 

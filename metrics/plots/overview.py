@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ii_core import IIPicture, five_viewpoints, view_image
 from ii_core.view import camera_of
 
-from ..depth.q_depth import DepthQuality
+from ..depth.layers import logarithmic
+from ..depth.q_depth import DepthQuality, told_outside
 from ..global_angle import angle_axes, peak, q_angle
 from .error_maps import plot_error_layers, plot_error_views
 from .rd_chart import COLOURS, edges, new_figure, save
@@ -145,8 +146,9 @@ def _depth_figure(quality: DepthQuality) -> Any:
     lower.set_ylim(0.5, 2 * max(quality.counts.max(), 1))
     lower.set_ylabel("view pixels")
     lower.set_xlabel("depth z [mm]")
-    if z.size > 2 and z[-1] / z[0] > 10 and np.ptp(np.diff(np.log(z))) < 1e-6:  # the layers are logarithmic
+    if logarithmic(z):
         lower.set_xscale("log")
+    lower.set_title(told_outside(quality.outside_share), loc="right", fontsize=9)
     for axes in (upper, lower):
         axes.grid(True, color="0.9", linewidth=0.8)
         axes.set_axisbelow(True)

@@ -30,6 +30,7 @@ def write_csv(path: str | os.PathLike[str], records: Sequence[Mapping[str, Any]]
     check_points(records)
     with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         more = [name for name in measures_of(records) if name not in FIELDS]
+        more += ["depth_outside"] * all("depth_outside" in record for record in records)
         writer = csv.DictWriter(file, [*FIELDS, *more], extrasaction="ignore")
         writer.writeheader()
         for record in records:

@@ -18,6 +18,14 @@ RATES = (0.02, 0.05, 0.15, 0.4, 1.0)
 SCHEMES = ("si-h264", "ei-h264", "ri-h264", "jpeg2000")
 STUDY_ENDS = (".tex", ".png", ".pdf")
 OVER_DEPTH = ("q_depth_min", "q_depth_mean", "q_depth_max")
+Layers = Annotated[
+    str | None,
+    typer.Option(
+        help="Depth layers: NEAR:FAR:COUNT in mm, spaced in equal ratios; COUNT of one gap each, from pixels on; "
+        "dissertation for 250 of these. 250 over all depths of the picture if not given."
+    ),
+]
+Method = Annotated[str, typer.Option(help="Of depth from focus: dissertation or robust.")]
 
 
 @app.command()
@@ -28,10 +36,8 @@ def measure(
     plots: Annotated[Path | None, typer.Option(help="Draw angles, depth, views and errors into this folder.")] = None,
     depth: Annotated[Path | None, typer.Option(help="Quality over depth, of this map: z in mm, an .exr.")] = None,
     focus: Annotated[bool, typer.Option("--focus", help="Quality over depth, estimated from focus.")] = False,
-    method: Annotated[str, typer.Option(help="Of depth from focus: dissertation or robust.")] = "dissertation",
-    layers: Annotated[
-        str | None, typer.Option(help="Depth layers: how many, or NEAR:FAR:COUNT in mm, spaced in equal ratios.")
-    ] = None,
+    method: Method = "dissertation",
+    layers: Layers = None,
     ssim: Annotated[bool, typer.Option("--ssim", help="Also SSIM and MS-SSIM of every sub-image.")] = False,
     mask: Annotated[Path | None, typer.Option(help="Only pixels that are white in this picture count.")] = None,
     force: Force = False,
@@ -86,12 +92,14 @@ def _judged(path: Path, reference: IIPicture) -> IIPicture:
 
 
 def _layers(text: str | None, picture: IIPicture) -> Any:
-    """Depths of layers, from ``250`` or ``5:200:60``; None for the default."""
+    """Depths of layers, from ``dissertation``, ``250`` or ``5:200:60``; None for the default."""
     from ii_core.view import camera_of
     from metrics import linear_layers, logarithmic_layers
 
     if text is None:
         return None
+    if text == "dissertation":
+        return linear_layers(camera_of(picture))
     parts = text.split(":")
     try:
         if len(parts) == 1:
@@ -99,7 +107,9 @@ def _layers(text: str | None, picture: IIPicture) -> Any:
         near, far, count = parts
         return logarithmic_layers(float(near), float(far), int(count))
     except ValueError as error:
-        raise ValueError(f"layers are {text!r}: a number or NEAR:FAR:COUNT is needed ({error})") from None
+        raise ValueError(
+            f"layers are {text!r}: dissertation, a number or NEAR:FAR:COUNT is needed ({error})"
+        ) from None
 
 
 @app.command()
@@ -114,6 +124,8 @@ def study(
         str, typer.Option(help="What to chart, parted by commas: q_global, q_view, q_depth …")
     ] = "q_global",
     depth: Annotated[Path | None, typer.Option(help="For q_depth: z in mm, an .exr; else found from focus.")] = None,
+    method: Method = "dissertation",
+    layers: Layers = None,
     orders: Annotated[
         bool, typer.Option("--orders", help="Code nothing: correlation and residuals of every order instead.")
     ] = False,
@@ -140,7 +152,8 @@ def study(
         check_output(path, force, make_folder=True)
     original = IIPicture.load(picture)
     z = None if depth is None else read_depth(depth)
-    run_study(original, picture.stem, names, targets, output, workers=workers, measures=wanted, depth=z)
+    over_depth = {"depth": z, "method": method, "layers_mm": _layers(layers, original)}
+    run_study(original, picture.stem, names, targets, output, workers=workers, measures=wanted, **over_depth)
 
 
 def _measures(text: str) -> list[str]:
@@ -171,9 +184,12 @@ def _stem(name: str, measure: str) -> str:
 def run_study(
     picture: IIPicture, name: str, schemes: Sequence[str], rates: Sequence[float], folder: Path, *,
     workers: int | None = None, extra: dict[str, Any] | None = None, measures: Sequence[str] = ("q_global",),
-    depth: Any = None,
+    **over_depth: Any,
 ) -> None:  # fmt: skip
-    """Measure; leave `study_files` in a folder, the charts and tables made from the JSON; print the tables."""
+    """Measure; leave `study_files` in a folder, the charts and tables made from the JSON; print the tables.
+
+    ``over_depth`` are depth, layers_mm and method of `measuring`.
+    """
     from codec import encode, timed_decode
     from metrics import (
         depth_rate_chart,
@@ -186,10 +202,11 @@ def run_study(
         write_latex,
         write_study,
     )
+    from metrics.depth.q_depth import told_outside
 
     from ..rendering.render import cores
 
-    more = measuring(picture, measures, depth=depth) if set(measures) - {"q_global"} else None
+    more = measuring(picture, measures, **over_depth) if set(measures) - {"q_global"} else None
     with progress_bar(f"code {name}") as report:
         records = rate_distortion(
             picture, schemes, rates, encode=encode, decode=timed_decode, progress=report, workers=workers or cores(),
@@ -205,6 +222,8 @@ def run_study(
         for chart in charts:
             rd_chart(drawn, chart, measure=measure)
         print_summary(name, drawn, measure)
+    if lost := {point["depth_outside"] for point in drawn["points"] if "depth_outside" in point}:
+        print(f"{name}: {told_outside(max(lost))}")
     if set(OVER_DEPTH) <= set(measures):
         for end in (".png", ".pdf"):
             depth_rate_chart(drawn, folder / f"{name}_q_depth{end}")
