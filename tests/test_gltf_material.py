@@ -11,7 +11,7 @@ from test_gltf import look, scene_of
 
 from ii_core import preset
 from ii_core.files import write_image
-from raytrace_ii import load_scene, render
+from raytrace_ii import load_scene, render, trace
 from raytrace_ii.files.gltf.materials import surface
 from raytrace_ii.files.load import read_model
 from raytrace_ii.scene.textures import Image, VertexColours, linear
@@ -27,7 +27,7 @@ def test_no_surface_gives_more_than_it_gets(base, metallic, roughness, f0, trans
     s = surface(base, metallic, roughness, f0, transmission, thin=thin)
     colour, mirror, through = (np.array(s[k]) for k in ("colour", "mirror", "transmission"))
     left = max(0.0, 1 - mirror.max() - through.max())
-    assert (colour >= 0).all() and left >= -1e-9
+    assert (colour >= 0).all() and (colour <= 1).all(), "a metal mirrors its colour"
     assert (left * colour + mirror + through <= 1 + 1e-9).all()
     assert 0 <= s["specular"] <= 1 and s["shininess"] >= 1
 
@@ -36,10 +36,10 @@ def test_known_limits():
     base, glass = np.array([0.8, 0.5, 0.2]), np.full(3, 0.04)
     chalk = surface(base, 0.0, 1.0, 0 * glass, 0.0)
     assert (chalk["colour"], chalk["mirror"], chalk["specular"]) == (tuple(base), (0, 0, 0), 0)
-    polished = surface(base, 1.0, 0.0, glass, 0.0)
-    assert (polished["mirror"], polished["colour"]) == (tuple(base), (0, 0, 0))
-    rough = surface(base, 1.0, 1.0, glass, 0.0)  # no picture in it: matt in the metal's colour
-    assert (rough["mirror"], rough["colour"], rough["specular"]) == ((0, 0, 0), tuple(base), 0)
+    for roughness in (0.0, 1.0):
+        metal = surface(base, 1.0, roughness, glass, 0.0)  # it mirrors its colour, in a lobe
+        assert (metal["metallic"], metal["colour"], metal["roughness"]) == (1.0, tuple(base), roughness)
+    assert metal["specular"] == 0
     lacquer = surface(base, 0.0, 0.0, glass, 0.0)
     np.testing.assert_allclose(lacquer["mirror"], 0.04)
     np.testing.assert_allclose(np.array(lacquer["colour"]) * 0.96, base * 0.96)  # what is left, with what goes in
@@ -137,8 +137,8 @@ def test_light_given_off(tmp_path):
     picture = gltf.texture(np.full((2, 2, 3), (255, 0, 188)))
     index = gltf.material(emissiveFactor=[1, 1, 1], emissiveTexture={"index": picture})
     material, notes = material_of(tmp_path, gltf, index)
-    np.testing.assert_allclose(material.emission, linear([1, 0, 188 / 255]), rtol=1e-6)
-    assert notes == ["emissiveTexture (its mean is used)"]
+    assert material.emission == (1, 1, 1) and not notes
+    np.testing.assert_allclose(material.emission_map.pixels[0, 0], linear([1, 0, 188 / 255]), rtol=1e-6)
 
 
 def test_unlit_gives_off_its_colour(tmp_path):
@@ -149,13 +149,58 @@ def test_unlit_gives_off_its_colour(tmp_path):
     assert material.specular == 0
 
 
-def test_metal_and_roughness_of_a_texture_are_their_means(tmp_path):
+def test_metal_and_roughness_of_a_texture(tmp_path):
+    """A map where it lies as the base colour does; its mean where it does not."""
     gltf = Gltf()
     picture = gltf.texture(np.full((2, 2, 3), (0, 51, 255)))  # roughness 0.2, all metal
     pbr = {"baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicRoughnessTexture": {"index": picture}}
+    pbr["roughnessFactor"] = 0.5
     material, notes = material_of(tmp_path, gltf, gltf.material(pbr=pbr))
-    np.testing.assert_allclose(material.mirror, 0.5 * (1 - 2 * 0.2) ** 2)
-    assert notes == ["metallicRoughnessTexture (its mean is used)"]
+    assert (material.roughness, material.metallic, material.colour) == (0.5, 1, (0.5,) * 3) and not notes
+    np.testing.assert_allclose(material.metallic_roughness_map.pixels[0, 0], [0, 0.2, 1], rtol=1e-6)
+    gltf = Gltf()
+    index = gltf.texture(np.full((2, 2, 3), (0, 51, 255)))
+    pbr |= {"baseColorTexture": {"index": index}, "metallicRoughnessTexture": {"index": index, "texCoord": 1}}
+    material, notes = material_of(tmp_path, gltf, gltf.material(pbr=pbr), TEXCOORD_1=SQUARE_UV)
+    assert material.metallic_roughness_map is None and (material.roughness, material.metallic) == (0.1, 1)
+    assert notes == [
+        "metallicRoughnessTexture on other texture coordinates than baseColorTexture",
+        "metallicRoughnessTexture (its mean is used)",
+    ]
+
+
+def test_light_of_a_texture_elsewhere_is_left_out(tmp_path):
+    """A mean emission is farther from Cycles than none."""
+    gltf = Gltf()
+    picture = gltf.texture(np.full((2, 2, 3), 128))
+    index = gltf.material(
+        pbr={"baseColorTexture": {"index": picture}},
+        emissiveFactor=[1, 1, 1],
+        emissiveTexture={"index": picture, "texCoord": 1},
+    )
+    material, notes = material_of(tmp_path, gltf, index, TEXCOORD_1=SQUARE_UV)
+    assert material.emission == (0, 0, 0) and material.emission_map is None
+    assert notes == ["emissiveTexture on other texture coordinates than baseColorTexture"]
+
+
+@pytest.mark.parametrize("mode", ["emission", "unlit"])
+def test_a_square_that_glows_shows_its_texels(tmp_path, mode):
+    """Radiance through the middle of every texel of a file's texture, as linear light."""
+    pixels = np.random.default_rng(5).integers(0, 256, (4, 6, 3))
+    gltf = Gltf()
+    picture = {"index": gltf.texture(pixels)}
+    black = {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0}
+    if mode == "emission":
+        strength = {"KHR_materials_emissive_strength": {"emissiveStrength": 2}}
+        index = gltf.material(strength, pbr=black, emissiveFactor=[0.5, 0.5, 0.5], emissiveTexture=picture)
+    else:
+        index = gltf.material({"KHR_materials_unlit": {}}, pbr={"baseColorTexture": picture})
+    gltf.node(mesh=gltf.mesh(SQUARE, SQUARE_FACES, material=index, TEXCOORD_0=SQUARE_UV))
+    scene = scene_of(tmp_path, gltf).with_depth(0)
+    y, x = np.mgrid[:4, :6]
+    start = np.stack([(x + 0.5) / 3 - 1, 1 - (y + 0.5) / 2, np.full(x.shape, -5.0)], axis=-1)
+    seen = trace(scene, start, np.broadcast_to([0, 0, 1.0], start.shape)).radiance
+    np.testing.assert_allclose(seen, linear(pixels.reshape(-1, 3) / 255), rtol=1e-4, atol=2e-6)
 
 
 def test_cut_outs(tmp_path):
@@ -182,9 +227,22 @@ def test_a_blended_surface_lets_its_share_through(tmp_path):
     pbr = {"baseColorFactor": [0.8, 0.4, 0, 0.25], **MATT}
     index = gltf.material({"KHR_materials_specular": {"specularFactor": 0}}, pbr=pbr, alphaMode="BLEND")
     material, _ = material_of(tmp_path, gltf, index)
-    np.testing.assert_allclose(material.transmission, 0.75)
-    np.testing.assert_allclose(np.array(material.colour) * 0.25, np.array([0.8, 0.4, 0]) * 0.25)
-    assert material.ior == 1.0
+    assert material.alpha_blend == 0.25 and material.transmission == (0, 0, 0)
+    np.testing.assert_allclose(material.colour, [0.8, 0.4, 0])
+
+
+def test_blending_by_texels(tmp_path):
+    pixels = np.random.default_rng(6).integers(0, 256, (4, 6, 4))
+    gltf = Gltf()
+    pbr = {"baseColorTexture": {"index": gltf.texture(pixels)}, "baseColorFactor": [1, 1, 1, 0.8], **MATT}
+    material, notes = material_of(tmp_path, gltf, gltf.material(pbr=pbr, alphaMode="BLEND"))
+    assert (material.alpha_blend, material.alpha_cutoff) == (0.8, 0) and not notes
+    np.testing.assert_allclose(material.texture.alpha, pixels[..., 3] / 255, rtol=1e-6)
+    gltf = Gltf()
+    gone = gltf.material(pbr={"baseColorFactor": [1, 1, 1, 0]}, alphaMode="BLEND")
+    gltf.node(mesh=gltf.mesh(SQUARE, SQUARE_FACES, material=gone))
+    gltf.node(mesh=gltf.mesh(SQUARE, SQUARE_FACES), name="there")
+    assert [part.name for part in read_model(gltf.save(tmp_path / "m.glb")).parts] == ["there"]
 
 
 def test_normal_maps(tmp_path):

@@ -10,11 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scene.scene import Material
-from ...scene.textures import Image, VertexColours, image_texture, normal_map
+from ...scene.textures import Image, VertexColours, image_texture, metallic_roughness_map, normal_map
+from ...tracing.kernels.shade import highlight
 from .container import GltfFile
 from .tables import PbrMaterial, Sampler, TextureInfo, TextureSource
 
 NEAREST = 9728
+READERS: dict[str, Callable[[NDArray[Any]], Image]] = {
+    "colour": image_texture,
+    "emission_map": image_texture,
+    "normal_map": normal_map,
+    "metallic_roughness_map": metallic_roughness_map,
+}
 WRAPS = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 Array = NDArray[np.float64]
 
@@ -41,7 +48,7 @@ def surface(
     ----------
     base : ndarray, (3,)
         Linear base colour, that a texture may multiply; ``tint`` is the same with the texture's mean, for what a
-        texture cannot colour here: mirror and glass.
+        texture cannot colour here: glass and the highlight.
     metallic, roughness, transmission : float
     reflectance : ndarray, (3,)
         F0 of the dielectric.
@@ -51,25 +58,22 @@ def surface(
     Returns
     -------
     dict
-        Parameters of `Material`.
+        Parameters of `Material`. What is not metal has the shares ``mirror``, ``transmission`` and the rest, matt.
     """
     tint = base if tint is None else tint
-    sharp = max(0.0, 1 - 2 * roughness) ** 2  # the share of the reflection that shows a picture
-    clear = (1 - metallic) * transmission  # what glass has of the surface
-    matt = (1 - metallic) * (1 - transmission)
-    mirror = sharp * (metallic * tint + matt * reflectance)
-    through = clear * tint
+    mirror, through = (1 - transmission) * reflectance, transmission * tint
     if thin:
-        mirror, through = mirror + clear * reflectance, through * (1 - reflectance)
-    diffuse = matt * base * (1 - reflectance) + metallic * base * (1 - sharp)
+        mirror, through = mirror + transmission * reflectance, through * (1 - reflectance)
+    matt = (1 - transmission) * base * (1 - reflectance)
     left = 1 - mirror.max() - through.max()  # by which the tracer multiplies the colour
+    colour = matt / left if left > 1e-6 else 0 * matt
     f0 = float(np.mean(metallic * tint + (1 - metallic) * reflectance))
-    # Blinn–Phong of the same width (Karis 2013), as strong as normalised D/4 seen head on, none on a matt surface
-    shininess = max(2 / max(roughness, 0.05) ** 4 - 2, 1.0)
-    specular = min(float(f0 * (1 - roughness) * (shininess + 2) / 8), 1.0)
+    specular, shininess = highlight(f0, roughness)
     return {
-        "colour": _vector(diffuse / left if left > 1e-6 else 0 * diffuse),
+        "colour": _vector(base if metallic > 0 else colour),  # of metal it is what is mirrored
         "mirror": _vector(mirror),
+        "roughness": roughness,
+        "metallic": metallic,
         "transmission": _vector(through),
         "specular": specular,
         "shininess": shininess,
@@ -103,8 +107,9 @@ class Looks:
         picture = self._image(pbr.baseColorTexture, "colour", where)
         if picture is not None and coloured:
             self.note("vertex colours under a texture")
-        values = self._surface(stored, base, picture, where)
-        cutoff = 0.0
+        images, place = self._maps(stored, picture, coloured, where)
+        values = self._surface(stored, base, picture, "metallic_roughness_map" in images, where)
+        cutoff = blend = 0.0
         has_alpha = picture is not None and picture.alpha is not None and bool(picture.alpha.min() < 1)
         if stored.alphaMode == "MASK":
             if not has_alpha and alpha < stored.alphaCutoff:
@@ -113,36 +118,63 @@ class Looks:
             if cutoff > 1 or (has_alpha and alpha == 0 < stored.alphaCutoff):
                 return None
         elif stored.alphaMode == "BLEND":
-            if has_alpha:
-                self.note("alphaMode BLEND of a texture (cut out at 0.5)")
-                cutoff = 0.5
-            values = _blended(values, alpha)
+            if alpha == 0:
+                return None
+            blend = alpha if has_alpha or alpha < 1 else 0.0
         if more.KHR_materials_unlit is not None:
-            if picture is None and not coloured:
-                values |= {"emission": _strength(base), "colour": (0.0, 0.0, 0.0), "specular": 0.0}
-                values |= {"mirror": (0.0, 0.0, 0.0)}
+            values |= {"mirror": (0.0, 0.0, 0.0), "metallic": 0.0, "specular": 0.0, "colour": (0.0, 0.0, 0.0)}
+            images = {"emission_map": picture} if picture is not None else {}
+            if picture is None and coloured:
+                self.note("KHR_materials_unlit with vertex colours (lit as matt)")
+                values["colour"] = _vector(base)
             else:
-                self.note("KHR_materials_unlit with a texture (lit as matt)")
-                values |= {"mirror": (0.0, 0.0, 0.0), "specular": 0.0, "colour": _vector(base)}
-        else:
-            values["emission"] = self._emission(stored, where)
+                values["emission"] = _strength(base)
+        elif "emission_map" in images or stored.emissiveTexture is None:
+            strength = more.KHR_materials_emissive_strength.emissiveStrength
+            values["emission"] = _strength(np.array(stored.emissiveFactor) * strength)
         texture: Any = picture if picture is not None else VertexColours() if coloured else None
-        bumps = self._bumps(stored, coloured and picture is None, where)
-        info = pbr.baseColorTexture if picture is not None else stored.normalTexture
-        material = Material(
-            **values, texture=texture, alpha_cutoff=cutoff, normal_map=bumps,
-            normal_scale=max(stored.normalTexture.scale, 0.0) if bumps is not None and stored.normalTexture else 1.0,
-        )  # fmt: skip
-        if info is None or (picture is None and bumps is None):
-            return Look(material)
-        return Look(material, *_placed(info))
+        if "normal_map" in images and stored.normalTexture is not None:
+            values["normal_scale"] = max(stored.normalTexture.scale, 0.0)
+        material = Material(**values, **images, texture=texture, alpha_cutoff=cutoff, alpha_blend=blend)
+        return Look(material, *(_placed(place) if place is not None and (images or picture is not None) else ()))
 
-    def _surface(self, stored: PbrMaterial, base: Array, picture: Image | None, where: str) -> dict[str, Any]:
-        """Shares, highlight and body of a material."""
+    def _maps(
+        self, stored: PbrMaterial, picture: Image | None, coloured: bool, where: str
+    ) -> tuple[dict[str, Any], TextureInfo | None]:
+        """Images beside the base colour's that lie where the first image does, by the fields that they fill."""
+        pbr = stored.pbrMetallicRoughness
+        first, place = ("baseColorTexture", pbr.baseColorTexture) if picture is not None else ("", None)
+        images: dict[str, Any] = {}
+        for key, what, info in (
+            ("metallic_roughness_map", "metallicRoughnessTexture", pbr.metallicRoughnessTexture),
+            ("emission_map", "emissiveTexture", stored.emissiveTexture if any(stored.emissiveFactor) else None),
+            ("normal_map", "normalTexture", stored.normalTexture),
+        ):
+            if info is None:
+                continue
+            if coloured and picture is None:
+                self.note(f"{what} over vertex colours")
+                continue
+            if place is not None and not _same_place(place, info):
+                self.note(f"{what} on other texture coordinates than {first}")
+                continue
+            if key == "normal_map" and info.scale < 0:
+                self.note("a negative scale of a normalTexture (taken as 0)")
+            image = self._image(info, key, where)
+            if image is not None:
+                images[key] = image
+                first, place = (first, place) if place is not None else (what, info)
+        return images, place
+
+    def _surface(
+        self, stored: PbrMaterial, base: Array, picture: Image | None, mapped: bool, where: str
+    ) -> dict[str, Any]:
+        """Shares, highlight and body of a material; ``mapped`` if metal and roughness have a map."""
         pbr, more = stored.pbrMetallicRoughness, stored.extensions
         metallic, roughness = pbr.metallicFactor, pbr.roughnessFactor
-        mean = self._mean(pbr.metallicRoughnessTexture, "metallicRoughnessTexture", where)
-        roughness, metallic = roughness * mean[1], metallic * mean[2]
+        if not mapped:
+            mean = self._mean(pbr.metallicRoughnessTexture, "metallicRoughnessTexture", where)
+            roughness, metallic = float(roughness * mean[1]), float(metallic * mean[2])
         ior = more.KHR_materials_ior.ior
         gloss = more.KHR_materials_specular
         strength = gloss.specularFactor * self._mean(gloss.specularTexture, "specularTexture", where)[3]
@@ -156,6 +188,8 @@ class Looks:
         thin = not volume.thicknessFactor > 0
         tint = base * picture.pixels.mean(axis=(0, 1)) if picture is not None else base
         values = surface(base, metallic, roughness, np.minimum(f0 * hue, 1) * strength, through, thin=thin, tint=tint)
+        if mapped:
+            values["specular"] = 1.0  # a factor of what the map says
         if through > 0:
             spread = (ior - 1) * 0.025 * more.KHR_materials_dispersion.dispersion
             index = max(ior, 1.0)
@@ -164,27 +198,6 @@ class Looks:
                 kept = np.maximum(volume.attenuationColor, 1e-6)
                 values["absorption_per_mm"] = tuple(float(a) for a in -np.log(kept) / volume.attenuationDistance)
         return values
-
-    def _emission(self, stored: PbrMaterial, where: str) -> tuple[float, ...]:
-        strength = stored.extensions.KHR_materials_emissive_strength.emissiveStrength
-        if not any(stored.emissiveFactor):
-            return (0.0, 0.0, 0.0)
-        mean = self._mean(stored.emissiveTexture, "emissiveTexture", where, srgb=True)[:3]
-        return _strength(np.array(stored.emissiveFactor) * strength * mean)
-
-    def _bumps(self, stored: PbrMaterial, coloured: bool, where: str) -> Image | None:
-        info, base = stored.normalTexture, stored.pbrMetallicRoughness.baseColorTexture
-        if info is None:
-            return None
-        if coloured:
-            self.note("normalTexture over vertex colours")
-            return None
-        if base is not None and not _same_place(base, info):
-            self.note("normalTexture on other texture coordinates than baseColorTexture")
-            return None
-        if stored.normalTexture is not None and stored.normalTexture.scale < 0:
-            self.note("a negative scale of a normalTexture (taken as 0)")
-        return self._image(info, "normal", where)
 
     def _image(self, info: TextureInfo | None, use: str, where: str) -> Image | None:
         """An image texture for colour or normals, one object for each use and wrapping of an image."""
@@ -196,7 +209,7 @@ class Looks:
         key = source, use, wrap
         if key not in self._images:
             pixels = self.file.image(source, where)
-            make = image_texture if use == "colour" else normal_map
+            make = READERS[use]
             try:
                 self._images[key] = replace(make(pixels), wrap=wrap)
             except ValueError as error:
@@ -243,18 +256,6 @@ class Looks:
 
 def _strength(values: Array) -> tuple[float, ...]:
     return tuple(float(v) for v in values)
-
-
-def _blended(values: dict[str, Any], alpha: float) -> dict[str, Any]:
-    """A surface of which the share ``alpha`` is there and the rest is seen through, unbent."""
-    if alpha >= 1:
-        return values
-    mirror, through = (np.array(values[k]) * alpha for k in ("mirror", "transmission"))
-    left = alpha * (1 - max(values["mirror"]) - max(values["transmission"]))  # keeps its share of the light
-    through = through + (1 - alpha)
-    colour = np.array(values["colour"]) * left / max(1 - mirror.max() - through.max(), 1e-6)
-    more = {"colour": _vector(colour), "mirror": _vector(mirror), "transmission": _vector(through)}
-    return {**values, **more, "specular": values["specular"] * alpha, "ior": 1.0}
 
 
 def _placed(info: TextureInfo) -> tuple[int, Array]:
