@@ -39,6 +39,7 @@ class Layout:
     step_col: int
     step_y: int
     step_x: int
+    turned: bool = False  # whether rows are the columns of the component image
 
     @property
     def frames(self) -> int:
@@ -52,7 +53,8 @@ class Layout:
 
     def transposed(self) -> Layout:
         """The same images in the same grid, each with rows for columns."""
-        return replace(self, height=self.width, width=self.height, step_y=self.step_x, step_x=self.step_y)
+        sides = {"height": self.width, "width": self.height, "step_y": self.step_x, "step_x": self.step_y}
+        return replace(self, **sides, turned=not self.turned)
 
 
 def layout(lenses: Pair, ei_pixels: Pair, kind: str) -> Layout:

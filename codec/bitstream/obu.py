@@ -20,8 +20,9 @@ def temporal_units(payload: bytes) -> Iterator[memoryview]:
         kind = payload[at] >> 3 & 15
         if at == 0 and kind != TEMPORAL_DELIMITER:
             break
-        if at > start and kind == TEMPORAL_DELIMITER:
-            yield view[start:at]
+        if kind == TEMPORAL_DELIMITER:
+            if at > start + 2:  # a delimiter of two bytes alone shows nothing; older `si-avif` files have them
+                yield view[start:at]
             start = at
         extension, has_size = payload[at] >> 2 & 1, payload[at] >> 1 & 1
         at += 1 + extension

@@ -23,7 +23,8 @@ from ..rate import Run
 from .clock import cpu_seconds
 from .video import COMMON, DEPTH, Settings, Video
 
-DELIMITER = b"\x12\x00"  # the temporal delimiter that every frame begins with, and a box leaves out
+# The temporal delimiter that every frame begins with. A box leaves it out; libaom's sequences have it all the same.
+DELIMITER = b"\x12\x00"
 IDENTITY = 0
 MOST = 1e300  # bytes: what is asked may overflow
 
@@ -41,6 +42,8 @@ class Avif(Video):
     octave = 9.0
     qp_range = (0, 63)
     scale_about = "libaom's quantiser; 0 is lossless but for colour"
+    # The stream says identity matrix, and its G, B and R are Y, Cb and Cr of BT.709.
+    relabel = "av1_metadata=color_primaries=1:transfer_characteristics=13:matrix_coefficients=1:color_range=pc"
     options: ClassVar[Mapping[str, Option]] = {
         "order": COMMON["order"],
         "by": COMMON["by"],
@@ -118,7 +121,7 @@ def _encoded(frames: NDArray[Any], film: Film, settings: Settings) -> Run:
                 matrix=IDENTITY,
                 numthreads=1,
             )
-            stream += b"".join(DELIMITER + sample for sample in samples(bytes(boxes)))
+            stream += b"".join(DELIMITER + sample.removeprefix(DELIMITER) for sample in samples(bytes(boxes)))
     return Run(stream, cpu_seconds() - started)
 
 

@@ -97,6 +97,8 @@ class Video(Coder):
         Quantiser steps that about halve the rate; where the search starts from.
     quantiser_step : float
         Finest step of the quantiser, where `step` says nothing else.
+    relabel : str
+        FFmpeg's bitstream filter for files of other programs, where the stream names other colours than it holds.
 
     References
     ----------
@@ -114,6 +116,7 @@ class Video(Coder):
     min_frame_bytes: ClassVar[int] = 1
     octave: ClassVar[float] = 6.0
     quantiser_step: ClassVar[float] = 1.0
+    relabel: ClassVar[str] = ""
 
     def __init__(self, kind: str) -> None:
         self.kind = kind

@@ -1,18 +1,21 @@
-"""Out of the ``.ii`` file: the coded stream as a file that other players and viewers open, without coding it again.
+"""Extraction: the coded stream of an ``.ii`` file as a file that other players and viewers open, not coded again.
 
 =================  ===========================================================================================
 schemes            files
 =================  ===========================================================================================
 ``*-h264``         ``.mkv``, ``.mp4``, ``.mov``, ``.h264`` (the payload as it is)
-``*-hevc``         ``.mkv``, ``.mp4``, ``.mov``, ``.hevc`` (the payload as it is)
-``*-av1``          ``.mkv``, ``.mp4``, ``.ivf``, ``.obu`` (the payload as it is)
+``*-hevc``         ``.mkv``, ``.mp4``, ``.mov``, ``.hevc``
+``*-av1``          ``.mkv``, ``.mp4``, ``.ivf``, ``.avif``, ``.obu`` (the payload as it is)
+``*-avif``         ``.avif``, ``.mkv``, ``.mp4``, ``.ivf``, ``.obu``
 ``*-vp9``          ``.mkv``, ``.mp4``, ``.webm``, ``.ivf``
 ``*-ffv1``         ``.mkv``, ``.avi``
 ``*-mpeg2``        ``.mkv``, ``.mp4``, ``.m2v`` (the payload as it is)
-whole pictures     what their payload is: ``.j2k`` or, in its boxes, ``.jp2``; ``.jpg``, ``.jxl``, ``.jph``, ``.avif``
+whole pictures     what their payload is: ``.j2k`` or, in its boxes, ``.jp2``; ``.jpg``, ``.jxl``, ``.jph``
 =================  ===========================================================================================
 
-Frames are component images in the order of the sequence, 25 a second, which means nothing.
+Frames are coded frames in the order of the sequence, 25 a second, which means nothing. Where the encoder needs it, a
+coded frame is larger than its component image or lies on its side; `extract` says so. HEVC streams get a conformance
+window, by which players show the component image alone. Streams of libaom get the matrix that they hold, BT.709.
 """
 
 from __future__ import annotations
@@ -21,30 +24,33 @@ import io
 import os
 import struct
 from collections.abc import Sequence as Many
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
 import av
 import numpy as np
+from av.bitstream import BitStreamFilterContext
 
 from ii_core.files import atomic_path
 
 from ..api import Encoded
 from ..coders.video import Video, decoder_of, open_encoder
-from ..contract import Coder, find
+from ..contract import find
 from .random_access import DEMUXERS, Sequence, sequence
 
 RATE = 25
 CONTAINERS = {
     "H.264": (".mkv", ".mp4", ".mov"),
     "HEVC": (".mkv", ".mp4", ".mov"),
-    "AV1": (".mkv", ".mp4", ".ivf"),
+    "AV1": (".mkv", ".mp4", ".ivf", ".avif"),
     "VP9": (".mkv", ".mp4", ".webm", ".ivf"),
     "FFV1": (".mkv", ".avi"),
     "MPEG-2": (".mkv", ".mp4"),
 }
 BARE = {"H.264": (".h264", ".264"), "HEVC": (".hevc", ".265"), "AV1": (".obu",), "MPEG-2": (".m2v",)}
+HEVC_BLOCK = 8  # x265 codes whole smallest blocks, and crops what is beyond the frame
 FOURCC = {"AV1": b"AV01", "VP9": b"VP90"}
 # How the payload of a whole picture starts, and what such a file is called.
 STILLS: tuple[tuple[bytes, tuple[str, ...]], ...] = (
@@ -57,7 +63,39 @@ STILLS: tuple[tuple[bytes, tuple[str, ...]], ...] = (
 HIGH_THROUGHPUT = b"\xff\x50"  # the extended capabilities of Part 15 stand among the first markers
 
 
-def extract(coded: Encoded, path: str | os.PathLike[str]) -> None:
+@dataclass(frozen=True, kw_only=True)
+class Extracted:
+    """What a file of an extracted stream shows.
+
+    Parameters
+    ----------
+    frames : int
+        Number of frames; 1 for a whole picture.
+    size : (int, int)
+        Width and height of a frame as players show it.
+    image : (int, int)
+        Width and height of the component image, or the picture, in it.
+    turned : bool
+        Whether rows of a frame are columns of the component image.
+    """
+
+    frames: int
+    size: tuple[int, int]
+    image: tuple[int, int]
+    turned: bool = False
+
+    def __str__(self) -> str:
+        (width, height), (across, down) = self.size, self.image
+        said = f"{self.frames} frame{'s' if self.frames > 1 else ''} of {width}×{height} pixels"
+        corner = (down, across) if self.turned else (across, down)
+        if self.turned:
+            said += f", rows are the columns of images of {across}×{down}"
+        if corner != self.size:
+            said += f", the image is the upper left {corner[0]}×{corner[1]} and the rest is filling"
+        return said
+
+
+def extract(coded: Encoded, path: str | os.PathLike[str]) -> Extracted:
     """Write the stream of a coded picture as a file of its own kind, whole or not at all.
 
     Parameters
@@ -65,6 +103,11 @@ def extract(coded: Encoded, path: str | os.PathLike[str]) -> None:
     coded : Encoded
     path : path
         Its ending says what it becomes; see `suffixes`.
+
+    Returns
+    -------
+    Extracted
+        Number and size of frames, and where the component images lie in them.
 
     Raises
     ------
@@ -80,35 +123,66 @@ def extract(coded: Encoded, path: str | os.PathLike[str]) -> None:
         raise ValueError(f"the stream of scheme {coded.scheme} does not go into {path.name}: possible are {known}")
     coder = find(coded.scheme)
     with atomic_path(path) as temporary:
-        if not _is_stream(coder):
+        if not isinstance(coder, Video):
             boxed = suffix in (".jp2", ".jph") and coded.payload[:2] == b"\xff\x4f"
             temporary.write_bytes(_jp2(coded) if boxed else coded.payload)
-        elif suffix in BARE.get(coder.standard, ()):
-            temporary.write_bytes(coded.payload)
+            return Extracted(frames=1, size=coded.size, image=coded.size)
+        stream, size = _for_others(sequence(coded))
+        if suffix in BARE.get(coder.standard, ()):
+            temporary.write_bytes(b"".join(packet.data for packet in stream.packets))
+        elif suffix == ".ivf":
+            temporary.write_bytes(_ivf(stream))
         else:
-            stream = sequence(coded)
-            if suffix == ".ivf":
-                temporary.write_bytes(_ivf(stream))
-            else:
-                _mux(stream, temporary)
+            _mux(stream, temporary)
+    shape = stream.film.layout
+    image = (shape.height, shape.width) if shape.turned else (shape.width, shape.height)
+    return Extracted(frames=len(stream.packets), size=size, image=image, turned=shape.turned)
+
+
+def _for_others(stream: Sequence) -> tuple[Sequence, tuple[int, int]]:
+    """The sequence with its colours and, for HEVC, its size named as other programs need it; and that size."""
+    film, coder = stream.film, stream.coder
+    filters, size = [coder.relabel] if coder.relabel else [], (film.width, film.height)
+    if coder.standard == "HEVC":
+        unit = 2 if film.format.chroma == "420" else 1  # cropping counts whole samples of chroma
+        size = -(-film.layout.width // unit) * unit, -(-film.layout.height // unit) * unit
+        right, bottom = (
+            -(-coded // HEVC_BLOCK) * HEVC_BLOCK - shown
+            for coded, shown in zip((film.width, film.height), size, strict=True)
+        )
+        filters.append(f"hevc_metadata=crop_right={right}:crop_bottom={bottom}")
+    for name in filters:
+        source = _demuxer(stream)
+        context = BitStreamFilterContext(name, source.streams.video[0])
+        packets = []
+        for packet in stream.packets:
+            (filtered,) = context.filter(av.Packet(packet.data))
+            packets.append(replace(packet, data=bytes(filtered)))
+        stream = replace(stream, packets=packets)
+    return stream, size
+
+
+def _demuxer(stream: Sequence) -> Any:
+    """FFmpeg's view of the stream, which describes it to filters and containers."""
+    if stream.coder.standard in FOURCC:
+        return av.open(io.BytesIO(_ivf(stream)), format="ivf")
+    data = b"".join(packet.data for packet in stream.packets)
+    return av.open(io.BytesIO(data), format=DEMUXERS[stream.coder.standard])
 
 
 def suffixes(coded: Encoded) -> tuple[str, ...]:
     """Endings of the files that `extract` can make of a coded picture, the usual one first."""
     coder = find(coded.scheme)
-    if _is_stream(coder):
-        return CONTAINERS[coder.standard] + BARE.get(coder.standard, ())
+    if isinstance(coder, Video):
+        found = CONTAINERS[coder.standard] + BARE.get(coder.standard, ())
+        usual = ".avif" if coder.encoder == "libaom" else found[0]
+        return (usual, *(suffix for suffix in found if suffix != usual))
     for magic, names in STILLS:
         if coded.payload.startswith(magic):
             if names[0] == ".j2k" and HIGH_THROUGHPUT in coded.payload[:128]:
                 return (".jph", ".j2c")
             return names
-    return (".avif",) if coded.payload[4:8] == b"ftyp" and coded.payload[8:11] == b"avi" else ()
-
-
-def _is_stream(coder: Coder) -> TypeGuard[Video]:
-    """Whether the payload is a video stream, and not an image sequence in boxes of its own."""
-    return isinstance(coder, Video) and "gop" in coder.options
+    return ()
 
 
 def _mux(stream: Sequence, path: Path) -> None:
@@ -141,11 +215,7 @@ def _stream(stream: Sequence, out: Any) -> tuple[Any, Any]:
         if bytes(target.codec_context.extradata or b"") != stream.first:
             raise ValueError("the coded picture was made by another version of FFV1 than this program writes")
         return target, None
-    if coder.standard in FOURCC:
-        source: Any = av.open(io.BytesIO(_ivf(stream)), format="ivf")
-    else:
-        data = b"".join(packet.data for packet in stream.packets)
-        source = av.open(io.BytesIO(data), format=DEMUXERS[coder.standard])
+    source = _demuxer(stream)
     # Described by what it is and not by who decodes it: dav1d writes nothing.
     target = out.add_stream_from_template(source.streams.video[0], opaque=True)
     context = target.codec_context

@@ -77,7 +77,7 @@ def sequence(coded: Encoded) -> Sequence:
         If the scheme codes no pseudo video sequence, or the stream does not hold as many packets as frames.
     """
     coder = find(coded.scheme)
-    if not isinstance(coder, Video) or "gop" not in coder.options:
+    if not isinstance(coder, Video):
         raise ValueError(f"scheme {coded.scheme} codes the picture as a whole: it has no frames to be had alone")
     film = coder.film(blank_picture(coded.structure, coded.dtype), coded.options)
     first = b""
@@ -164,7 +164,7 @@ def decode_component(coded: Encoded, place: tuple[int, int]) -> Pixels:
 
 
 def _pixels(frame: Any, film: Film, dtype: np.dtype[Any]) -> Pixels:
-    """A decoded frame as RGB."""
+    """The component image of a decoded frame, RGB."""
     height, width = film.layout.height, film.layout.width
     alone = replace(film.layout, rows=1, cols=1, step_row=0, step_col=0, step_y=width, step_x=1)
     single = replace(film, layout=alone)
@@ -173,7 +173,7 @@ def _pixels(frame: Any, film: Film, dtype: np.dtype[Any]) -> Pixels:
         video.copy_plane(plane, target[0])
     pixels = np.empty((height, width, 3), dtype)
     single.scatter(planes, np.zeros(1, np.int64), pixels)
-    return pixels
+    return np.ascontiguousarray(pixels.swapaxes(0, 1)) if film.layout.turned else pixels
 
 
 def _demuxed(payload: bytes, format: str) -> list[Packet]:

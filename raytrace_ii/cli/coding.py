@@ -89,8 +89,8 @@ def extract(
     stream = Encoded.load(coded)
     check_output(output, force)
     with spinner(f"extract {coded.name}"):
-        extract(stream, output)
-    print(f"{output}: {output.stat().st_size} bytes around {len(stream.payload)} of {stream.scheme}")
+        shown = extract(stream, output)
+    print(f"{output}: {output.stat().st_size} bytes around {len(stream.payload)} of {stream.scheme}, {shown}")
 
 
 def _place(text: str) -> tuple[int, int]:
