@@ -3,10 +3,16 @@
 import multiprocessing
 import os
 import pickle
+import re
+import shutil
 import signal
+import socket
+import subprocess
 import sys
 import threading
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +22,7 @@ from ii_core import IIPicture, preset
 from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.rendering import executors, job
 
+ROOT = Path(__file__).parents[1]
 CAMERA = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 SUPPORT = ("depth", "normal", "object_id", "ray_length", "disparity", "samples")
 OPTIONS = {"samples": (4, 16), "error": 4.0, "seed": 2, "support": SUPPORT}
@@ -93,6 +100,81 @@ def test_a_cluster_of_processes_loses_nothing_when_one_is_killed(scene, whole, r
         assert code == 0, error
         expected = render(load_scene("objects"), preset("setup1", scale=128)).picture
         np.testing.assert_array_equal(IIPicture.load(tmp_path / "p.png").pixels, expected.pixels)
+
+
+@pytest.fixture
+def cluster():
+    """A dask scheduler and workers as processes of their own: ``start(tree)`` adds a worker that runs that tree."""
+    pytest.importorskip("distributed")
+    from distributed import Client
+
+    processes = []
+
+    def start(module, *arguments, tree=ROOT):
+        command = [sys.executable, "-m", f"distributed.cli.{module}", *arguments, "--no-dashboard"]
+        environment = {**os.environ, "PYTHONPATH": str(tree)}
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        processes.append(subprocess.Popen(command, env=environment, cwd=tree, **quiet))
+        return processes[-1]
+
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    scheduler = start("dask_scheduler", "--host", "127.0.0.1", "--port", address.rpartition(":")[2])
+    client = Client(address, timeout=60, set_as_default=False)
+
+    def add(tree=ROOT):
+        count = len(client.scheduler_info(n_workers=-1)["workers"])
+        start("dask_worker", address, "--nthreads", "1", "--no-nanny", tree=tree)
+        client.wait_for_workers(count + 1, timeout=60)
+
+    try:
+        yield SimpleNamespace(scheduler=scheduler, client=client, address=address, add=add)
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+        client.close(timeout=1)
+
+
+def test_a_worker_with_other_code_is_refused_by_name(cluster, run, refused, tmp_path):
+    """On b1dc540 its blocks went into the picture: a quarter of the pixels differed."""
+    other = tmp_path / "other"
+    for package in ("raytrace_ii", "ii_core", "assets"):
+        shutil.copytree(ROOT / package, other / package, ignore=shutil.ignore_patterns("__pycache__"))
+    kernel = other / "raytrace_ii" / "tracing" / "kernels" / "shade.py"
+    kernel.write_text(kernel.read_text() + "\n# brighter\n")
+    cluster.add()
+    command = ("render", "objects", "--scale", 128, "--dask", cluster.address, "-o")
+    code, _, error = run(*command, tmp_path / "good.png")
+    assert code == 0, error
+    cluster.add(other)
+    result = run(*command, tmp_path / "p.png")
+    refused(result, "is refused: code ")
+    assert re.search(r"dask worker tcp://\S+ is refused: code \w{12} there, \w{12} here;", result[2])
+    assert not (tmp_path / "p.png").exists()
+
+
+@pytest.mark.parametrize("name", ["code", "embreex", "numba", "numpy"])
+def test_a_worker_that_differs_renders_no_block(scene, name, monkeypatch, tmp_path):
+    """One that joins late meets no check but this."""
+    ours = executors.identity()
+    assert set(ours) == {"code", "embreex", "numba", "numpy"} and len(ours["code"]) == 12
+    monkeypatch.setattr(executors, "identity", lambda: {**ours, name: "0"})
+    with pytest.raises(OSError, match=rf"worker process \d+ is refused: {name} 0 there, {ours[name]} here"):
+        executors._tile_from(str(tmp_path / "no.job"), (slice(0, 1), slice(0, 1)), ours)
+
+
+def test_a_lost_scheduler_is_one_line(cluster, scene):
+    cluster.add()
+
+    def kill(done, total):
+        if done == 1:
+            cluster.scheduler.kill()
+            cluster.scheduler.wait()
+
+    with pytest.raises(OSError, match=r"^the dask scheduler was lost while it rendered: .* not finished$"):
+        render(scene, preset("setup1", scale=4), executor=cluster.client, progress=kill)
 
 
 def test_a_scene_travels_without_its_trees(scene):

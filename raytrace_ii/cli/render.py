@@ -154,6 +154,11 @@ def _cluster(address: str | None) -> Iterator[Any]:
         from distributed import Client
     except ImportError:
         raise ValueError("--dask needs dask, which is not installed: pip install 'raytrace-ii[dask]'") from None
+    import logging
+
+    from ..rendering.executors import check_workers
+
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told by our one line
     try:
         client = Client(address, timeout=5, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -164,6 +169,7 @@ def _cluster(address: str | None) -> Iterator[Any]:
         client.close()
         raise OSError(f"the dask scheduler at {address} has no workers") from None
     with client:
+        check_workers(client)  # before the output is opened
         yield client
 
 
