@@ -19,6 +19,7 @@ from .lattice import LATTICES, Lattice
 from .optics import Bundle, Element, FrontElement, LensModel, Under, chain, unit_disk
 
 Pair = tuple[int, int]
+MOST_ALONG, MOST_PIXELS = 1 << 20, 1 << 34  # of a camera; a hundred times the largest picture in use
 Floats = NDArray[np.float64]
 
 
@@ -78,7 +79,10 @@ class IICamera:
             object.__setattr__(self, field, value)
 
         for field in ("pixels", "lenses"):
-            put(field, whole_pair(field, getattr(self, field)))
+            across, down = whole_pair(field, getattr(self, field))
+            if max(across, down) > MOST_ALONG or across * down > MOST_PIXELS:
+                raise ValueError(f"{field} are {across}×{down}: at most {MOST_ALONG} a side, {MOST_PIXELS} in all")
+            put(field, (across, down))
         for field in ("pixel_pitch_mm", "gap_mm"):
             put(field, positive(field, getattr(self, field)))
         if self.lens_pitch_mm is None:

@@ -5,18 +5,42 @@ numba's cache watches only a kernel's own file: a kernel that called one of anot
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from typing import Any
 
 import numba
+from numba.core.caching import FunctionCache
+
+
+class Cache(FunctionCache):
+    """numba's disk cache, with kernels compiled again where it cannot be read and left uncached where not written.
+
+    A file may be cut short, name modules that have been renamed since (its time stamp is the source file's, which a
+    renamed folder leaves as it was), or lie on a full disk. Unpickling fails in as many ways as there are bytes.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled kernel of a signature, None if there is none that can be read."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:
+            with contextlib.suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled kernel if the disk takes it."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
 
 
 def kernel(function: Callable[..., Any], **options: Any) -> Any:
     """Compile on first call and keep the result, or just compile where nothing can be kept."""
-    try:
-        return numba.njit(cache=True, nogil=True, **options)(function)
-    except RuntimeError:  # no folder to keep it in can be written
-        return numba.njit(nogil=True, **options)(function)
+    compiled = numba.njit(nogil=True, **options)(function)
+    with contextlib.suppress(RuntimeError):  # no folder to keep it in can be written
+        compiled._cache = Cache(function)  # as numba's own enable_caching does
+    return compiled
 
 
 def lean_kernel(function: Callable[..., Any], **options: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .camera import IICamera
+from .files import read_json
 from .optics import Scaling, scaled_chain
 
 ALIASES = {"setup2": "setup2-16"}
@@ -64,7 +64,7 @@ def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IIC
     try:
         members = data["cameras"] if data.get("kind") == "set" else [data]
         return tuple(scaled(IICamera.from_json({"name": path.stem, **member}), scale) for member in members)
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
         raise ValueError(f"{path if Path(name).suffix else name}: {error}") from None
 
 
@@ -149,12 +149,7 @@ def _folder() -> Path:
 
 
 def _read(path: Path) -> Mapping[str, Any]:
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist")
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
+    data = read_json(path)
     if not isinstance(data, Mapping):
         raise ValueError(f"{path}: no camera: an object is needed")
     return data

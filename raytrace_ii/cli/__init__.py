@@ -5,6 +5,7 @@ The only package that reaches every other; it does so inside its functions, so t
 
 from __future__ import annotations
 
+import io
 import sys
 import warnings
 from typing import Any
@@ -13,6 +14,8 @@ import typer
 
 from . import synthesize, render, pictures, coding, evaluate, show
 from .common import app
+from .ending import ends_soon
+from .words import SPELT, one_line
 
 __all__ = ["app", "coding", "evaluate", "main", "pictures", "render", "show", "synthesize"]
 
@@ -22,13 +25,23 @@ INTERRUPTED = 130  # the exit code of a command that Ctrl-C ended
 def main() -> None:
     """Run the command; a bad input is one line on the error stream and exit code 2, a warning one line."""
     warnings.showwarning = _warn
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors=SPELT)
+    with ends_soon():
+        _run()
+
+
+def _run() -> None:
     try:
         code = app(standalone_mode=False)
         if code == INTERRUPTED:  # what typer makes of Ctrl-C
             print("interrupted", file=sys.stderr)
         sys.exit(code if isinstance(code, int) else 0)
-    except (ValueError, OSError, MemoryError) as error:
+    except (ValueError, OSError, MemoryError, ArithmeticError) as error:
         _fail(str(error) or type(error).__name__)
+    except RecursionError:
+        _fail("the input nests too deeply")
     except (KeyboardInterrupt, typer.Abort):
         print("interrupted", file=sys.stderr)
         sys.exit(INTERRUPTED)
@@ -42,9 +55,9 @@ def main() -> None:
 def _warn(
     message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None
 ) -> None:
-    print(f"warning: {' '.join(str(message).split())}", file=sys.stderr)
+    print(f"warning: {one_line(str(message))}", file=sys.stderr)
 
 
 def _fail(message: str) -> None:
-    print(f"error: {' '.join(message.split())}", file=sys.stderr)
+    print(f"error: {one_line(message)}", file=sys.stderr)
     sys.exit(2)

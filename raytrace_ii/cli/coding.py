@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .common import Force, app, check_output, check_picture, columns, spinner
+from .common import Force, app, check_outputs, columns, console, image_file, picture_files, spinner
+from .words import one_line, say
 
 
 @app.command()
@@ -24,7 +25,7 @@ def schemes(
         columns({name: known[name] for name in asked})
         return
     for name, lines in asked.items():
-        print(f"{name}: {known[name]}")
+        say(f"{name}: {known[name]}")
         columns({f"  {key}": text for key, text in lines.items()})
 
 
@@ -42,14 +43,14 @@ def encode(
     from codec import encode
     from ii_core import IIPicture
 
-    check_output(output, force)
+    check_outputs([output], force)
     original = IIPicture.load(picture)
     with spinner(f"{scheme} codes {picture.name}"):
         coded = encode(original, scheme, bpp=bpp, qp=qp, quality=quality)
     coded.save(output)
-    print(f"{output}: {coded.nbytes} bytes, {coded.bpp:.4g} bpp in {coded.encode_seconds:.1f} s")
+    say(f"{output}: {coded.nbytes} bytes, {coded.bpp:.4g} bpp in {coded.encode_seconds:.1f} s")
     if not coded.reached:
-        print(f"{scheme} cannot reach {bpp:g} bpp with this picture: {coded.bpp:.4g} is as near as it comes")
+        say(f"{scheme} cannot reach {bpp:g} bpp with this picture: {coded.bpp:.4g} is as near as it comes")
 
 
 @app.command()
@@ -64,10 +65,12 @@ def decode(
 ) -> None:
     """Decode an II-picture, or one component image of it."""
     from codec import Encoded, decode, decode_component
-    from ii_core.files import write_image
+    from ii_core.files import check_file, write_image
 
+    check_file(coded)
     stream = Encoded.load(coded)
-    check_picture(output, stream.dtype, force)
+    files = picture_files if component is None else image_file
+    check_outputs(files(output, stream.dtype), force)
     with spinner(f"decode {coded.name}"):
         if component is None:
             decode(stream).save(output)
@@ -85,12 +88,14 @@ def extract(
 ) -> None:
     """Take the coded stream out as a file that other programs open, without coding it again."""
     from codec import Encoded, extract
+    from ii_core.files import check_file
 
+    check_file(coded)
+    check_outputs([output], force)
     stream = Encoded.load(coded)
-    check_output(output, force)
     with spinner(f"extract {coded.name}"):
         shown = extract(stream, output)
-    print(f"{output}: {output.stat().st_size} bytes around {len(stream.payload)} of {stream.scheme}, {shown}")
+    say(f"{output}: {output.stat().st_size} bytes around {len(stream.payload)} of {stream.scheme}, {shown}")
 
 
 def _place(text: str) -> tuple[int, int]:
@@ -103,7 +108,6 @@ def _place(text: str) -> tuple[int, int]:
 
 def study_orders(path: Path, folder: Path, force: bool) -> None:
     """Leave name_orders.json in a folder and print its table: what each order promises before coding."""
-    from rich.console import Console
     from rich.table import Table
 
     from codec import analyse_orders
@@ -112,11 +116,11 @@ def study_orders(path: Path, folder: Path, force: bool) -> None:
     from metrics import provenance
 
     numbers = folder / f"{path.stem}_orders.json"
-    check_output(numbers, force, make_folder=True)
+    check_outputs([numbers], force, make_folder=True)
     with spinner(f"analyse {path.name}"):
         rows = [analysis.to_json() for analysis in analyse_orders(IIPicture.load(path))]
     write_json(numbers, {**provenance(), "picture": path.name, "rows": rows})
-    table = Table(title=f"{path.stem}: consecutive frames; e is the mean energy of their difference")
+    table = Table(title=one_line(f"{path.stem}: consecutive frames; e is the mean energy of their difference"))
     for column in ("images", "order", "frames", "mean c", "σ of c", "undefined", "e", "e a sample"):
         table.add_column(column, justify="left" if column in ("images", "order") else "right")
     for r in rows:
@@ -124,4 +128,4 @@ def study_orders(path: Path, folder: Path, force: bool) -> None:
             r["kind"], r["order"], str(r["frames"]), f"{r['correlation_mean']:.4f}", f"{r['correlation_sigma']:.4f}",
             str(r["undefined"]), f"{r['energy']:.4g}", f"{r['energy_per_sample']:.1f}",
         )  # fmt: skip
-    Console().print(table)
+    console().print(table)

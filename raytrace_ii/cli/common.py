@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .words import one_line, say
+
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ii_core import IIPicture
 
 app = typer.Typer(
@@ -28,34 +32,73 @@ Workers = Annotated[int | None, typer.Option(help="Threads; as many as cores if 
 def load_any(path: Path) -> IIPicture:
     """An II-picture, or the one in a coded file."""
     from ii_core import IIPicture
-    from ii_core.files import IMAGE_TYPES
+    from ii_core.files import IMAGE_TYPES, check_file
 
     if path.suffix in IMAGE_TYPES:
         return IIPicture.load(path)
     from codec import decode
 
+    check_file(path)
     return decode(path)
 
 
-def check_picture(path: Path, dtype: str, force: bool) -> None:
-    """Raise, before any work, unless a picture of this type can be written there."""
-    from ii_core.files import image_types
+def image_file(path: Path | None, dtype: str) -> list[Path]:
+    """The file of a plain image for `check_outputs`, none for None; ValueError if it cannot hold the pixel type."""
+    from ii_core.files import check_type
 
-    if dtype not in image_types(path):
-        raise ValueError(f"{path} cannot hold {dtype} pixels: {path.suffix} takes {', '.join(image_types(path))}")
-    check_output(path, force)
+    if path is None:
+        return []
+    check_type(path, dtype)
+    return [path]
 
 
-def check_output(path: Path, force: bool, *, make_folder: bool = False) -> None:
-    """Raise, before any work, unless a file can be written there without losing another."""
-    if make_folder:
+def picture_files(path: Path, dtype: str) -> list[Path]:
+    """The files of an II-picture for `check_outputs`: it and its sidecar."""
+    from ii_core.picture import sidecar
+
+    return [*image_file(path, dtype), sidecar(path)]
+
+
+def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = False) -> None:
+    """Raise, before any work, unless all files of a command can be written without losing another.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        All that the command writes, sidecars too.
+    force : bool
+        Files that are there may be replaced. Folders, devices and pipes never are.
+    make_folder : bool
+        Make the folders that are missing.
+    """
+    from ii_core.files import check_name
+
+    files = list(paths)
+    seen: set[str] = set()
+    for path in files:
+        check_name(path)
+        _check_place(path.parent, path, make_folder)
+        if path.is_dir():
+            raise IsADirectoryError(f"cannot write {path}: it is a folder")
+        if path.exists() and not path.is_file():
+            raise OSError(f"cannot write {path}: it is a device, pipe or socket, and a regular file is needed")
+        if os.path.lexists(path) and not force:
+            raise FileExistsError(f"{path} is there already: --force replaces it")
+        if (real := os.path.realpath(path)) in seen:
+            raise ValueError(f"{path} is to be written twice: every output needs a name of its own")
+        seen.add(real)
+    for path in files if make_folder else ():
         path.parent.mkdir(parents=True, exist_ok=True)
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"cannot write {path}: {path.parent} is no folder")
-    if not os.access(path.parent, os.W_OK):
-        raise PermissionError(f"cannot write {path}: {path.parent} cannot be written")
-    if path.exists() and not force:
-        raise FileExistsError(f"{path} is there already: --force replaces it")
+
+
+def _check_place(folder: Path, path: Path, make_folder: bool) -> None:
+    """Raise unless a folder is there, or can be made, and can be written."""
+    if make_folder:
+        folder = next(place for place in (folder, *folder.parents) if place.exists() or place == place.parent)
+    if not folder.is_dir():
+        raise FileNotFoundError(f"cannot write {path}: {folder} is no folder")
+    if not os.access(folder, os.W_OK):
+        raise PermissionError(f"cannot write {path}: {folder} cannot be written")
 
 
 def check_folder(folder: Path, force: bool) -> None:
@@ -65,26 +108,44 @@ def check_folder(folder: Path, force: bool) -> None:
         raise FileExistsError(f"{folder} is not empty: --force writes into it all the same")
 
 
+def pair(name: str, text: str, limit: int = 1 << 16) -> tuple[int, int]:
+    """Two counts from text like 9x9."""
+    try:
+        a, b = (int(part) for part in text.lower().replace("×", "x").split("x"))
+    except ValueError:
+        a = b = 0
+    if not (1 <= a <= limit and 1 <= b <= limit):
+        raise ValueError(f"{name} is {text!r}: two whole numbers from 1 to {limit} as in 9x9 are needed")
+    return a, b
+
+
 def columns(rows: dict[str, str]) -> None:
     """Names and what they are, in two columns."""
     width = max(map(len, rows), default=0)
     for name, text in rows.items():
-        print(f"{name:<{width}}  {text}")
+        say(f"{name:<{width}}  {text}")
+
+
+def console(**options: Any) -> Console:
+    """A console that prints names as they are: brackets are no markup, colons no pictures."""
+    from rich.console import Console
+
+    return Console(markup=False, emoji=False, highlight=False, **options)
 
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[int, int, str], None]]:
     """A bar on the terminal's error stream; yields what to call with done, total and a word on the last step."""
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    bar = Progress(*columns, TextColumn("{task.fields[step]}"), console=Console(stderr=True))
-    task = bar.add_task(title, total=None, step="")
+    named = TextColumn("{task.description}", markup=False)
+    columns = (named, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    bar = Progress(*columns, TextColumn("{task.fields[step]}", markup=False), console=console(stderr=True))
+    task = bar.add_task(one_line(title), total=None, step="")
 
     def report(done: int, total: int, step: str) -> None:
         bar.start()  # only now: what fails before its first step leaves no empty bar
-        bar.update(task, completed=done, total=total, step=step)
+        bar.update(task, completed=done, total=total, step=one_line(step))
 
     try:
         yield report
@@ -96,7 +157,8 @@ def progress_bar(title: str) -> Iterator[Callable[[int, int, str], None]]:
 @contextmanager
 def spinner(title: str) -> Iterator[None]:
     """A sign of life on the terminal's error stream, for work whose steps cannot be counted."""
-    from rich.console import Console
+    from rich.text import Text
 
-    with Console(stderr=True).status(title):
+    out = console(stderr=True)
+    with out.status(Text(one_line(title)), spinner="dots" if out.encoding.startswith("utf") else "line"):
         yield

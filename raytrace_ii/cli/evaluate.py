@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .coding import study_orders
-from .common import Force, Workers, app, check_output, columns, load_any, progress_bar, spinner
+from .common import Force, Workers, app, check_outputs, columns, console, load_any, progress_bar, spinner
+from .words import one_line
 
 if TYPE_CHECKING:
     from ii_core import IIPicture
@@ -47,22 +48,21 @@ def measure(
     from ii_core.files import read_depth, read_image, write_json
     from metrics import report
 
-    if json:
-        check_output(json, force)
+    files = [json] if json else []
+    check_outputs(files, force)
     if plots:
         from metrics import PLOTS, plot_all
 
-        for name in PLOTS:
-            check_output(plots / name, force, make_folder=True)
+        check_outputs([*files, *(plots / name for name in PLOTS)], force, make_folder=True)
     a = IIPicture.load(reference)
     b = _judged(decoded, a)
     made = report(
         a,
         b,
-        mask=None if mask is None else read_image(mask).min(axis=2) > 0,
+        mask=None if mask is None else read_image(mask, size=a.size).min(axis=2) > 0,
         ssim=ssim,
         over_depth=bool(depth or focus or plots),
-        depth=None if depth is None else read_depth(depth),
+        depth=None if depth is None else read_depth(depth, size=a.size),
         layers_mm=_layers(layers, a),
         method=method,
     )
@@ -76,19 +76,18 @@ def measure(
 
 def _judged(path: Path, reference: IIPicture) -> IIPicture:
     """The picture to judge; one without a sidecar, as other tools write, has the structure of the reference."""
-    from ii_core.files import IMAGE_TYPES, read_image
+    from ii_core.files import IMAGE_TYPES, image_header, read_image
     from ii_core.picture import sidecar
 
     if path.suffix not in IMAGE_TYPES or sidecar(path).exists():
         return load_any(path)
-    pixels = read_image(path)
-    if pixels.shape != reference.pixels.shape:
+    shape, _ = image_header(path)
+    if shape != reference.pixels.shape:
         raise ValueError(
-            f"{path} has no sidecar {sidecar(path).name}, and {pixels.shape[1]}×{pixels.shape[0]} px of "
-            f"{pixels.shape[2]} channels: those of the reference, {reference.size[0]}×{reference.size[1]} of 3, "
-            "are needed"
+            f"{path} has no sidecar {sidecar(path).name}, and {shape[1]}×{shape[0]} px of {shape[2]} channels: "
+            f"those of the reference, {reference.size[0]}×{reference.size[1]} of 3, are needed"
         )
-    return reference.with_pixels(pixels)
+    return reference.with_pixels(read_image(path))
 
 
 def _layers(text: str | None, picture: IIPicture) -> Any:
@@ -148,10 +147,9 @@ def study(
     except ValueError:
         raise ValueError(f"rates are {rates!r}: numbers parted by commas are needed") from None
     wanted = _measures(measures)
-    for path in study_files(output, picture.stem, wanted):
-        check_output(path, force, make_folder=True)
+    check_outputs(study_files(output, picture.stem, wanted), force, make_folder=True)
     original = IIPicture.load(picture)
-    z = None if depth is None else read_depth(depth)
+    z = None if depth is None else read_depth(depth, size=original.size)
     over_depth = {"depth": z, "method": method, "layers_mm": _layers(layers, original)}
     run_study(original, picture.stem, names, targets, output, workers=workers, measures=wanted, **over_depth)
 
@@ -240,16 +238,14 @@ def about(measure: str) -> str:
 
 def print_summary(name: str, study: dict[str, Any], measure: str = "q_global") -> None:
     """The study as a table in the terminal."""
-    from rich.console import Console
     from rich.table import Table
 
     from metrics import summary_table
 
     rows = summary_table(study, measure=measure)
-    table = Table(title=f"{name}: {about(measure)}")
+    table = Table(title=one_line(f"{name}: {about(measure)}"))
     for column in rows[0]:
         table.add_column(column, justify="left" if column == "scheme" else "right", no_wrap=True)
     for row in rows:
-        table.add_row(*row.values())
-    console = Console()
-    Console(width=max(console.width, 150)).print(table)
+        table.add_row(*map(one_line, row.values()))
+    console(width=max(console().width, 150)).print(table)

@@ -7,7 +7,19 @@ from typing import Annotated
 
 import typer
 
-from .common import Force, app, check_folder, check_output, check_picture, load_any, progress_bar, spinner
+from .common import (
+    Force,
+    app,
+    check_folder,
+    check_outputs,
+    image_file,
+    load_any,
+    pair,
+    picture_files,
+    progress_bar,
+    spinner,
+)
+from .words import say
 
 
 @app.command()
@@ -24,22 +36,21 @@ def regular(
     import numpy as np
 
     from ii_core import IIPicture, resampled, smallest_rectangle
-    from ii_core.files import image_types, write_image
+    from ii_core.files import write_image
 
     methods = {"rectangle": smallest_rectangle, "resample": resampled}
     if method not in methods:
         raise ValueError(f"unknown method {method!r}: known are {', '.join(methods)}")
-    image_types(output)
-    check_output(output, force)
-    if mask:
-        check_picture(mask, "uint8", force)
+    original = IIPicture.load(picture)
+    files = [*picture_files(output, original.pixels.dtype.name), *image_file(mask, "uint8")]
+    check_outputs(files, force)
     with spinner(f"{method} {picture.name}"):
-        made, owned = methods[method](IIPicture.load(picture))
+        made, owned = methods[method](original)
         made.save(output)
         if mask:
             write_image(mask, owned.astype(np.uint8) * 255)
     (k, l), (u, v) = made.lenses, made.ei_pixels
-    print(f"{output}: {k}×{l} lenses of {u}×{v} px, {owned.mean():.1%} of the pixels owned by their lens")
+    say(f"{output}: {k}×{l} lenses of {u}×{v} px, {owned.mean():.1%} of the pixels owned by their lens")
 
 
 @app.command("import")
@@ -68,22 +79,23 @@ def import_(
     In which order the views lie is found from the pictures, as far as they tell, and said.
     """
     from ii_core import find_views, load_mosaic, picture_of
-    from ii_core.files import image_types
+    from ii_core.files import check_type, image_types
+    from ii_core.picture import sidecar
 
     image_types(output)
-    check_output(output, force)
+    check_outputs([output, sidecar(output)], force)
     if ei_pixels is not None:
-        made, order = load_mosaic(source, _pair("ei-pixels", ei_pixels)), None
+        made, order = load_mosaic(source, pair("ei-pixels", ei_pixels)), None
     else:
-        views = find_views(source, grid=None if grid is None else _pair("grid", grid))
+        views = find_views(source, grid=None if grid is None else pair("grid", grid))
         with spinner(f"import {source.name}"):
             made, order = picture_of(views, transposed=transposed, flip_down=flip_down, flip_across=flip_across)
-    check_picture(output, made.pixels.dtype.name, force)
+    check_type(output, made.pixels.dtype.name)
     made.save(output)
     (k, l), (u, v) = made.lenses, made.ei_pixels
-    print(f"{output}: {k}×{l} lenses of {u}×{v} px, {made.pixels.dtype}")
+    say(f"{output}: {k}×{l} lenses of {u}×{v} px, {made.pixels.dtype}")
     if order is not None:
-        print(order.describe())
+        say(order.describe())
 
 
 @app.command()
@@ -111,17 +123,17 @@ def export(
             if to == "views":
                 count = write_views(original, output)
             else:
-                z = None if depth is None else read_depth(depth)
+                z = None if depth is None else read_depth(depth, size=original.size)
                 count = write_hci(original, output, depth=z)
-        print(f"{output}: {count} views of {original.lenses[0]}×{original.lenses[1]} px")
+        say(f"{output}: {count} views of {original.lenses[0]}×{original.lenses[1]} px")
         return
     target = quilt_path(output, original) if to == "quilt" else output
-    check_picture(target, original.pixels.dtype.name, force)
+    check_outputs(image_file(target, original.pixels.dtype.name), force)
     if to == "quilt":
         write_quilt(original, target, row=row)
     else:
         write_image(target, original.pixels)
-    print(target)
+    say(target)
 
 
 @app.command()
@@ -145,30 +157,19 @@ def components(
     if type not in KINDS:
         raise ValueError(f"unknown component image {type!r}: known are {', '.join(KINDS)}")
     original = load_any(picture)
-    check_folder(output, force)
-    if sheet:
-        check_picture(sheet, original.pixels.dtype.name, force)
     stack = component_images(original, type)
     rows, cols, height, width, _ = stack.shape
     suffix = ".exr" if stack.dtype.kind == "f" else ".png"
     digits = len(str(max(rows, cols) - 1))
+    names = [output / f"{type}_{row:0{digits}}_{col:0{digits}}{suffix}" for row, col in np.ndindex(rows, cols)]
+    check_outputs([*image_file(sheet, stack.dtype.name), *names], force, make_folder=True)
+    check_folder(output, force)
     with progress_bar(f"write {output}") as report:
-        for i, (row, col) in enumerate(np.ndindex(rows, cols)):
-            write_image(output / f"{type}_{row:0{digits}}_{col:0{digits}}{suffix}", stack[row, col])
+        for i, (name, image) in enumerate(zip(names, stack.reshape(-1, height, width, 3), strict=True)):
+            write_image(name, image)
             report(i + 1, rows * cols, "")
     if sheet:
         lined = np.zeros((rows, height + 1, cols, width + 1, 3), stack.dtype)
         lined[:, :-1, :, :-1] = stack.transpose(0, 2, 1, 3, 4)
         write_image(sheet, lined.reshape(rows * (height + 1), cols * (width + 1), 3)[:-1, :-1])
-    print(f"{output}: {rows}×{cols} images of {width}×{height} px")
-
-
-def _pair(name: str, text: str) -> tuple[int, int]:
-    """Two counts from text like 9x9."""
-    try:
-        a, b = (int(part) for part in text.lower().replace("×", "x").split("x"))
-    except ValueError:
-        a = b = 0
-    if a < 1 or b < 1:
-        raise ValueError(f"{name} is {text!r}: two whole numbers as in 9x9 are needed")
-    return a, b
+    say(f"{output}: {rows}×{cols} images of {width}×{height} px")

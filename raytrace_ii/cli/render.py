@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, Workers, app, check_output, check_picture, progress_bar
+from .common import Force, Workers, app, check_outputs, image_file, picture_files, progress_bar
+from .words import say
 
 if TYPE_CHECKING:
     from ..rendering.render import Stats
@@ -75,12 +76,12 @@ def render(
         raise ValueError(f"{support}: only .exr has named channels")
     dtype = "float32" if output.suffix == ".exr" else f"uint{bits}"
     names = [_numbered(len(arrays), i) for i in range(len(arrays))]
+    shared = dict.fromkeys([*extra.values(), *([support] if support else [])])  # support images may share a file
+    files = image_file(projection, "uint8")
     for numbered in names:
-        check_picture(numbered(output), dtype, force)
-        for path in (*extra.values(), *([support] if support else [])):
-            check_picture(numbered(path), "float32", force)
-    if projection:
-        check_picture(projection, "uint8", force)
+        files += picture_files(numbered(output), dtype)
+        files += [file for path in shared for file in image_file(numbered(path), "float32")]
+    check_outputs(files, force)
     _render_scene(scene, output, arrays, poses, names, extra, support, projection, dask, workers, dtype, options)
 
 
@@ -133,7 +134,7 @@ def _render_set(
 
     if name not in SETS:
         raise ValueError(f"unknown set {name!r}: known are {', '.join(SETS)}")
-    check_output(folder / "manifest.json", True, make_folder=True)
+    check_outputs([folder / "manifest.json"], True, make_folder=True)
     with progress_bar(f"render {name}") as report:
         manifest = render_set(
             name, folder, arrays, poses=poses, bits=bits, workers=workers, executor=executor, force=force,
@@ -141,7 +142,7 @@ def _render_set(
         )  # fmt: skip
     products = [p for entry in manifest["scenes"].values() for p in entry["products"].values()]
     seconds, rays = sum(p["seconds"] for p in products), sum(sum(p["rays"].values()) for p in products)
-    print(f"{folder}: {len(manifest['scenes'])} scenes, {rays / 1e6:.1f} M rays, rendered in {seconds:.1f} s in all")
+    say(f"{folder}: {len(manifest['scenes'])} scenes, {rays / 1e6:.1f} M rays, rendered in {seconds:.1f} s in all")
 
 
 @contextmanager
@@ -161,7 +162,7 @@ def _cluster(address: str | None) -> Iterator[Any]:
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told by our one line
     try:
         client = Client(address, timeout=5, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # tls:// without certificates, too
         raise OSError(f"no dask scheduler answers at {address}: {error}") from None
     try:
         client.wait_for_workers(1, timeout=30)
@@ -234,6 +235,6 @@ def _say_stats(s: Stats) -> None:
     if sum(s.skipped.values()):
         counts += f", {sum(s.skipped.values()) / 1e6:.2f} M too weak to shoot,"
     spread = f" ({s.mean_samples:.1f} per pixel)" if len(s.samples) > 1 else ""
-    print(
+    say(
         f"{counts} rays{spread} in {s.seconds:.1f} s, {s.embree_seconds:.1f} s of {s.cpu_seconds:.1f} CPU s in Embree"
     )

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from .common import Force, app, check_output, check_picture, load_any, progress_bar, spinner
+from .common import Force, app, check_outputs, image_file, load_any, pair, progress_bar, spinner
+from .words import say
 
 
 @app.command()
@@ -26,7 +27,7 @@ def view(
 ) -> None:
     """Look at an II-picture in a browser: parallax, focus, comparison, stereo."""
     from ii_core import IIPicture
-    from ii_core.files import read_image
+    from ii_core.files import read_depth
     from metrics.viewer import JPEG_QUALITY, write_viewer, write_viewer_folder
 
     if (output is None) == (not serve):
@@ -34,17 +35,19 @@ def view(
     if output is not None:
         if output.suffix not in (".html", ".htm"):
             raise ValueError(f"{output} is no page: .html is needed")
-        check_output(output, force)
+        check_outputs([output], force)
+    if not 0 <= port < 1 << 16:
+        raise ValueError(f"port is {port}: a number from 1 to 65535, or 0 for any that is free, is needed")
     options: dict[str, Any] = {"title": picture.stem, "quality": None if lossless else JPEG_QUALITY}
     original = IIPicture.load(picture)
     decoded = load_any(compare) if compare else None
     if depth is not None:
-        options["depth"] = read_image(depth)[..., 0]
+        options["depth"] = read_depth(depth, size=original.size)
     with progress_bar(f"view {picture.name}") as report:
         options["progress"] = lambda done, total: report(done, total, "")
         if output is not None:
             size = write_viewer(output, original, decoded, **options)
-            print(f"{output}: {size / 2**20:.1f} MB")
+            say(f"{output}: {size / 2**20:.1f} MB")
             return
         import tempfile
 
@@ -57,13 +60,14 @@ def view(
 def _serve(folder: str, port: int) -> None:
     """Serve a folder to this machine alone, until interrupted."""
     from functools import partial
-    from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
-    class Quiet(SimpleHTTPRequestHandler):
-        def log_message(self, format: str, *args: Any) -> None:
-            pass
+    from .server import Pages, PageServer
 
-    with ThreadingHTTPServer(("127.0.0.1", port), partial(Quiet, directory=folder)) as server:
+    try:
+        server = PageServer(("127.0.0.1", port), partial(Pages, directory=folder))
+    except OSError as error:
+        raise OSError(f"port {port} cannot be served: {error.strerror}") from None
+    with server:
         print(f"http://127.0.0.1:{server.server_port}/ shows it, until Ctrl-C", flush=True)
         server.serve_forever()
 
@@ -107,14 +111,14 @@ def display(
     kinds = ("quilt", "lenticular", "simulation", "parallax")
     if kind not in kinds:
         raise ValueError(f"unknown kind {kind!r}: known are {', '.join(kinds)}")
-    pixels, grid = _pair("size", size), _pair("tiles", tiles)
+    pixels, grid = pair("size", size), pair("tiles", tiles)
     if kind == "quilt":
         output = output.with_name(f"{output.stem}_qs{grid[0]}x{grid[1]}a{pixels[0] / pixels[1]:.4g}{output.suffix}")
     if kind == "parallax":
-        check_output(output, force)
+        check_outputs([output], force)
         _film(picture, output, pixels, depth, cone, frames, fps)
         return
-    check_picture(output, "uint8", force)
+    check_outputs(image_file(output, "uint8"), force)
     original = display.with_assumed_camera(IIPicture.load(picture))
     options: dict[str, Any] = {"size": pixels, "depth_mm": depth, "cone": cone}
     with spinner(f"{kind} of {picture.name}"):
@@ -125,7 +129,7 @@ def display(
         else:
             made = display.display_simulation(original, _eye(original, at), size=pixels, fill=fill)
         write_image(output, made)
-    print(f"{output}: {made.shape[1]}×{made.shape[0]} px")
+    say(f"{output}: {made.shape[1]}×{made.shape[0]} px")
 
 
 def _film(
@@ -145,15 +149,7 @@ def _film(
                 report(done, count, "")
 
         write_animation(output, frames(), fps=fps)
-    print(f"{output}: {count} frames of {size[0]}×{size[1]} px")
-
-
-def _pair(name: str, text: str) -> tuple[int, int]:
-    try:
-        first, second = (int(n) for n in text.split("x"))
-    except ValueError:
-        raise ValueError(f"{name} is {text!r}: two whole numbers like 8x6 are needed") from None
-    return first, second
+    say(f"{output}: {count} frames of {size[0]}×{size[1]} px")
 
 
 def _eye(picture: Any, at: str | None) -> Any:

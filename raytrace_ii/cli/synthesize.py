@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from .common import Force, app, check_output, columns, progress_bar
+from .common import Force, app, check_outputs, columns, progress_bar
+from .words import say
 
 
 @app.command()
@@ -40,7 +41,7 @@ def camera(
 ) -> None:
     """Store a camera as L and D maps, report on it, or solve for a missing measure."""
     from ii_core import preset_cameras, write_maps
-    from ii_core.maps import check_format
+    from ii_core.maps import check_format, map_files
 
     check_format(format)
     if solve is not None:
@@ -52,9 +53,9 @@ def camera(
     if output is None or report:
         from ii_core.properties import report as describe
 
-        print("\n\n".join(describe(array) for array in arrays))
+        say("\n\n".join(describe(array) for array in arrays))
     if output is not None:
-        check_output(output / "camera.json", force, make_folder=True)
+        check_outputs([output / file for file in map_files(arrays, format)], force, make_folder=True)
         with progress_bar(f"write {output}") as tell:
             write_maps(arrays, output, format=format, progress=lambda done, total: tell(done, total, ""))
 

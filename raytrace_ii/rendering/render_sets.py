@@ -6,7 +6,6 @@ the same scene, camera, options and version, is not made again, so that an inter
 
 from __future__ import annotations
 
-import json
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +17,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ii_core import IICamera, MapCamera, projection_camera
-from ii_core.files import write_json
+from ii_core.files import read_json, write_json
+from ii_core.picture import sidecar
 
 from ..files.load import load_scene
 from ..scene.hashing import content_hash, file_hash
@@ -219,15 +219,34 @@ def _commit() -> str | None:
 def _read_manifest(folder: Path, name: str) -> dict[str, Any]:
     """What the folder's manifest says, nothing if there is none."""
     path = folder / MANIFEST
-    if not path.is_file():
+    if not path.exists():
         return {}
-    try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
+    manifest = read_json(path)
     if not isinstance(manifest, dict) or manifest.get("format") != "ii-picture-set" or manifest.get("set") != name:
         raise ValueError(f"{path} is not the manifest of the set {name!r}: another folder is needed")
+    if not _is_well_formed(manifest):
+        raise ValueError(f"{path} is damaged: remove it, and give --force to make its files again")
     return manifest
+
+
+def _is_well_formed(manifest: dict[str, Any]) -> bool:
+    """Whether whatever a manifest holds is of the type that this module writes."""
+    claims, scenes = manifest.get("claims", []), manifest.get("scenes", {})
+    if not isinstance(claims, list) or not isinstance(scenes, dict):
+        return False
+    products = [scene.get("products", {}) if isinstance(scene, dict) else None for scene in scenes.values()]
+    if not all(isinstance(made, dict) for made in products):
+        return False
+    records = [record for made in products if made for record in made.values()]
+    if manifest.get(CONTACT) is not None:
+        records.append(manifest[CONTACT])
+    return all(
+        isinstance(record, dict)
+        and isinstance(record.get("key"), str)
+        and isinstance(record.get("files"), dict)
+        and all(isinstance(file, dict) and {"bytes", "sha256"} <= set(file) for file in record["files"].values())
+        for record in records
+    )
 
 
 def _write_manifest(folder: Path, manifest: dict[str, Any], old: dict[str, Any]) -> None:
@@ -242,9 +261,12 @@ def _write_manifest(folder: Path, manifest: dict[str, Any], old: dict[str, Any])
 def _claims(folder: Path, name: str, arrays: int, old: dict[str, Any], force: bool) -> list[str]:
     """Names of all files of the set; FileExistsError if one is there that no manifest has claimed."""
     numbers = [""] if arrays == 1 else [f"_{i}" for i in range(arrays)]
-    ends = [f"{number}{end}" for number in numbers for end in (".png", "_support.exr")]
-    ours = [f"{title}{end}" for title in SETS[name] for end in (*ends, "_flat.png", "_flat_support.exr")] + [CONTACT]
-    strange = [file for file in ours if (folder / file).exists() and file not in old.get("claims", ())]
+    pictures = [f"{title}{end}.png" for title in SETS[name] for end in (*numbers, "_flat")]
+    ours = [file for picture in pictures for file in (picture, sidecar(picture).name, f"{picture[:-4]}_support.exr")]
+    ours.append(CONTACT)
+    # Manifests of before did not claim sidecars: one beside a claimed picture is of the set.
+    known = {file for claim in old.get("claims", ()) for file in (claim, sidecar(claim).name)}
+    strange = [file for file in ours if (folder / file).exists() and file not in known]
     if strange and not force:
         raise FileExistsError(f"{folder / strange[0]} is there already and not of this set: --force replaces it")
     return ours

@@ -1,0 +1,68 @@
+"""How a command ends when it is interrupted: cleaned up, and within two seconds whatever it is doing."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+GRACE_SECONDS = 1.5  # for the cleanup; compiled code that runs longer is not waited for
+CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
+SHOW_CURSOR = b"\x1b[?25h"  # a progress bar hides it
+
+
+@contextmanager
+def ends_soon() -> Iterator[None]:
+    """Turn SIGTERM into an exit that cleans up, and end the process if neither it nor Ctrl-C has done so in time.
+
+    Python runs handlers of signals between its own instructions: not while the main thread is in a coder or waits
+    for threads that trace. The number of a signal is written to a socket at once, which a thread reads.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard, told = socket.socketpair()
+    told.setblocking(False)
+    before = signal.signal(signal.SIGTERM, _terminate)
+    wakeup = signal.set_wakeup_fd(told.fileno(), warn_on_full_buffer=False)
+    threading.Thread(target=_watch, args=(heard,), daemon=True).start()
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(wakeup)
+        signal.signal(signal.SIGTERM, before)
+        told.close()  # which ends the thread
+
+
+def _terminate(number: int, frame: Any) -> None:
+    sys.exit(CODES[signal.SIGTERM])
+
+
+def _watch(heard: socket.socket) -> None:
+    with heard:
+        while (data := heard.recv(1)) and data[0] not in CODES:
+            pass
+        if not data:
+            return
+        heard.settimeout(GRACE_SECONDS)
+        try:
+            while heard.recv(64):  # more signals change nothing; the end of the command closes the socket
+                pass
+        except TimeoutError:
+            _stop(CODES[signal.Signals(data[0])])
+
+
+def _stop(code: int) -> None:
+    """End the process, without its threads, and without its unfinished files."""
+    from ii_core.atomic import remove_temporaries
+
+    remove_temporaries()
+    if sys.stderr.isatty():
+        os.write(2, SHOW_CURSOR)
+    os.write(2, b"interrupted\n")
+    os._exit(code)

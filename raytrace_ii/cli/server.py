@@ -1,0 +1,40 @@
+"""The web server of ``raytrace-ii view --serve``: one folder, for this machine alone."""
+
+from __future__ import annotations
+
+import sys
+from http import HTTPStatus
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+from urllib.parse import unquote
+
+
+class PageServer(ThreadingHTTPServer):
+    """Says nothing when a browser closes a connection early."""
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Report an error of the server, none of the connection."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
+
+
+class Pages(SimpleHTTPRequestHandler):
+    """Answers requests to this machine by one of its own names, with files of one folder.
+
+    A page of another site whose name is made to lead to 127.0.0.1 (DNS rebinding) sends its own name as host.
+    """
+
+    def send_head(self) -> Any:
+        """Refuse other hosts and names that no file can have."""
+        assert isinstance(self.server, PageServer)
+        port = self.server.server_port
+        if self.headers.get("Host", "").lower() not in (f"127.0.0.1:{port}", f"localhost:{port}"):
+            self.send_error(HTTPStatus.MISDIRECTED_REQUEST)
+            return None
+        if "\0" in unquote(self.path):
+            self.send_error(HTTPStatus.BAD_REQUEST)
+            return None
+        return super().send_head()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Print nothing."""

@@ -1,0 +1,43 @@
+"""Text for a terminal: no control characters from names and files, and letters that every terminal has."""
+
+from __future__ import annotations
+
+import codecs
+
+# What our own messages hold beyond ASCII, for terminals that have no more.
+ASCII = {
+    "×": "x", "–": "-", "−": "-", "…": "...", "·": "*", "°": " deg", "±": "+-", "≥": ">=", "≤": "<=", "∞": "inf",
+    "σ": "sigma", "δ": "d", "Λ": "Lambda", "Γ": "Gamma", "φ": "phi", "θ": "theta", "λ": "lambda", "µ": "u", "μ": "u",
+    "²": "^2", "³": "^3", "é": "e", "ø": "o", "→": "->", "‖": "||", "⅓": "1/3", "½": "1/2",
+    "─": "-", "━": "-", "╺": "-", "╸": "-", "│": "|", "┃": "|",
+}  # fmt: skip
+SPELT = "raytrace-ii-spelt"  # the name of an error handler of codecs
+
+
+def plain(text: str) -> str:
+    """The text with control characters, and halves of bytes that are no UTF-8, spelt out: \\\\x1b is no colour."""
+    return "".join(c if c.isprintable() or c == "\n" else _escaped(c) for c in text)
+
+
+def one_line(text: str) -> str:
+    """`plain`, on one line."""
+    return plain(" ".join(text.split()))
+
+
+def say(text: object = "") -> None:
+    """Print a result to the output stream."""
+    print(plain(str(text)))
+
+
+def _escaped(character: str) -> str:
+    return character.encode("unicode_escape").decode("ascii")
+
+
+def _spelt(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    part = error.object[error.start : error.end]
+    return "".join(ASCII.get(c, _escaped(c)) for c in part), error.end
+
+
+codecs.register_error(SPELT, _spelt)

@@ -1,0 +1,340 @@
+"""The command line against bad input and rough ends: one line, exit code 2, nothing of the user's lost."""
+
+import http.client
+import json
+import os
+import signal
+import struct
+import subprocess
+import sys
+import time
+import zlib
+
+import numpy as np
+import pytest
+
+from ii_core import IICamera, IIPicture
+from ii_core.camera import MOST_ALONG
+from ii_core.files import MAX_TEXT, write_image
+from ii_core.picture import sidecar
+
+SMALL = ("render", "objects", "--scale", 128)
+COMMAND = [sys.executable, "-m", "raytrace_ii.cli"]
+
+
+@pytest.fixture
+def picture(tmp_path):
+    """64×32 px, 8×4 lenses."""
+    path = tmp_path / "p.png"
+    pixels = np.random.default_rng(0).integers(0, 256, (32, 64, 3), np.uint8)
+    IIPicture(pixels, (8, 4), (8, 8)).save(path)
+    return path
+
+
+def state(folder):
+    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+# Outputs
+
+
+@pytest.mark.parametrize(
+    ("mine", "command"),
+    [
+        ("out.png.json", (*SMALL, "-o", "out.png")),
+        ("out.png.json", ("decode", "p.ii", "-o", "out.png")),
+        ("out.png.json", ("regular", "p.png", "-o", "out.png")),
+        ("out.png.json", ("import", "p.png", "--ei-pixels", "8x8", "-o", "out.png")),
+        ("cam/L.png", ("camera", "setup1", "--scale", 128, "-o", "cam")),
+        ("cam/D.png", ("camera", "setup1", "--scale", 128, "-o", "cam")),
+        ("cam/W_1_0.png", ("camera", "moving-lenslets", "--scale", 32, "-o", "cam")),
+        ("set/apples.png.json", ("render", "--set", "reference", "--scale", 128, "-o", "set")),
+    ],
+)
+def test_nothing_of_the_user_is_replaced(run, refused, picture, tmp_path, monkeypatch, mine, command):
+    """The old test of this name looked at the picture alone, not at what comes with it."""
+    monkeypatch.chdir(tmp_path)
+    if "p.ii" in command:
+        assert run("encode", picture, "--qp", 40, "-o", "p.ii")[0] == 0
+    (tmp_path / mine).parent.mkdir(exist_ok=True)
+    (tmp_path / mine).write_text("precious")
+    before = state(tmp_path)
+    refused(run(*command), "--force replaces it")
+    assert state(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("-o", "q.exr", "--depth", "q.exr"),
+        ("-o", "q.exr", "--support", "./q.exr"),
+        ("-o", "r.png", "--projection", "r.png"),
+        ("-o", "r.png", "--projection", "link/r.png"),
+        ("-o", "r.png", "--depth", "d.exr", "--projection", "r.png", "--force"),
+    ],
+)
+def test_two_outputs_of_one_name_are_refused(run, refused, tmp_path, monkeypatch, options):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "link").symlink_to(".")
+    refused(run(*SMALL, *options), "is to be written twice")
+    assert [path.name for path in tmp_path.iterdir()] == ["link"]
+
+
+def test_support_images_may_share_a_file(run, tmp_path):
+    both = ("--depth", tmp_path / "both.exr", "--normal", tmp_path / "both.exr")
+    assert run(*SMALL, "-o", tmp_path / "p.png", *both)[0] == 0
+
+
+def test_sheet_and_components_do_not_meet(run, refused, picture, tmp_path):
+    command = ("components", picture, "-o", tmp_path / "c", "--sheet", tmp_path / "c" / "si_0_0.png")
+    refused(run(*command), "is to be written twice")
+    assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_devices_pipes_and_folders_stay_what_they_are(run, refused, picture, tmp_path, force):
+    pipe, link, folder = tmp_path / "pipe.ii", tmp_path / "null.ii", tmp_path / "folder.ii"
+    os.mkfifo(pipe)
+    link.symlink_to("/dev/null")
+    folder.mkdir()
+    for path in (pipe, link, folder):
+        refused(run("encode", picture, "--qp", 40, "-o", path, *force), "cannot write")
+    assert pipe.is_fifo() and link.is_symlink() and folder.is_dir() and not os.path.isfile("/dev/null")
+    for command in (("decode", pipe), ("extract", pipe), ("components", pipe)):
+        refused(run(*command, "-o", tmp_path / "out.png"), "a regular file is needed")
+
+
+# Sizes
+
+
+def bomb(path, width, height):
+    """A PNG that says it is large, and is not."""
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
+    filling = chunk(b"fiLl", bytes(8 << 20))  # OpenImageIO refuses headers that a file cannot live up to
+    pixels = chunk(b"IDAT", zlib.compress(bytes(1000)))
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + header + filling + pixels + chunk(b"IEND", b""))
+
+
+LIMITED = """
+import resource, sys
+from raytrace_ii import cli
+import numba, codec, metrics, ii_core.picture  # what they need is there before the limit is set
+used = int(next(line for line in open("/proc/self/status") if line.startswith("VmData")).split()[1]) * 1024
+resource.setrlimit(resource.RLIMIT_DATA, (used + (1 << 29),) * 2)
+cli.main()
+"""
+
+
+def test_headers_are_held_against_structures_before_decoding(picture, tmp_path):
+    bomb(picture, 40000, 40000)
+    write_image(tmp_path / "small.png", np.zeros((32, 64, 3), np.uint8))
+    IIPicture(np.zeros((32, 64, 3), np.uint8), (8, 4), (8, 8)).save(tmp_path / "good.png")
+    bomb(tmp_path / "bare.png", 40000, 40000)
+    good = tmp_path / "good.png"
+    said = {
+        ("encode", picture, "--qp", 30, "-o", tmp_path / "x.ii"): "this one has 40000×40000",
+        ("measure", good, tmp_path / "bare.png"): "40000×40000 px of 3 channels",
+        ("measure", good, good, "--mask", tmp_path / "bare.png"): "64×32 are needed",
+    }
+    for command, words in said.items():
+        done = subprocess.run([sys.executable, "-c", LIMITED, *map(str, command)], capture_output=True, text=True)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1) and words in done.stderr, done.stderr
+
+
+def test_pictures_larger_than_the_memory_are_refused(run, refused, tmp_path):
+    bomb(tmp_path / "m.png", 2_000_000, 2_000_000)
+    command = ("import", tmp_path / "m.png", "--ei-pixels", "8x8", "-o", tmp_path / "o.png")
+    code, _, err = run(*command)
+    assert code == 2 and err.count("\n") == 1  # OpenImageIO may refuse first
+    bomb(tmp_path / "m.png", 100_000, 100_000)
+    code, _, err = run(*command)
+    assert code == 2 and err.count("\n") == 1, err
+
+
+@pytest.mark.parametrize("pixels", [[3_000_000_000, 1], [1 << 19, 1 << 19]])
+def test_cameras_have_a_largest_size(run, refused, tmp_path, pixels):
+    path = tmp_path / "c.json"
+    path.write_text(json.dumps({"pixels": pixels, "lenses": [1, 1], "pixel_pitch_mm": 0.1, "gap_mm": 3}))
+    refused(run("camera", path, "-o", tmp_path / "maps"), f"at most {MOST_ALONG} a side")
+    assert not (tmp_path / "maps").exists()
+
+
+def test_text_files_are_read_up_to_a_limit(run, refused, picture, tmp_path):
+    views = tmp_path / "views"
+    views.mkdir()
+    for i in range(4):
+        write_image(views / f"input_Cam{i:03}.png", np.full((8, 8, 3), i, np.uint8))
+    command = ("import", views, "-o", tmp_path / "o.png")
+    (views / "parameters.cfg").symlink_to("/dev/zero")
+    refused(run(*command), "a regular file is needed")
+    (views / "parameters.cfg").unlink()
+    (views / "parameters.cfg").write_bytes(b"[extrinsics]\n" + b"# more\n" * 200_000)
+    refused(run(*command), "longer than 1 MiB")
+    code = ("encode", picture, "--qp", 30, "-o", tmp_path / "x.ii")
+    known = json.loads(sidecar(picture).read_text())
+    for text, words in {
+        "[" * 200_000: "nested too deeply",
+        " " * (MAX_TEXT + 1): "longer than 16 MiB",
+        json.dumps({**known, "lenses": [8, 10**400]}): "a number of 401 digits",
+        json.dumps({**known, "camera": {"pixels": "64"}}): "p.png.json",
+        json.dumps([]): "no II-picture structure",
+    }.items():
+        sidecar(picture).write_text(text)
+        refused(run(*code), words)
+
+
+# Tracebacks
+
+
+def test_an_irregular_picture_is_no_quilt(run, refused, tmp_path):
+    camera = IICamera(pixels=(100, 131), lenses=(8, 10), pixel_pitch_mm=0.4, gap_mm=11.7, lattice="hexagonal")
+    path = tmp_path / "hexagonal.png"
+    IIPicture(np.zeros((131, 100, 3), np.uint8), camera.lenses, camera.ei_pixels, camera).save(path)
+    for to in ("quilt", "views", "hci"):
+        refused(run("export", path, "--to", to, "-o", tmp_path / "out"), "the structure is not regular")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"format": "ii-picture-set", "set": "reference", "scenes": null}',
+        '{"format": "ii-picture-set", "set": "reference", "scenes": {"apples": 3}}',
+        '{"format": "ii-picture-set", "set": "reference", "scenes": {"car": {"products": {"flat": {"key": "x"}}}}}',
+        '{"format": "ii-picture-set", "set": "reference", "claims": 7}',
+        '{"format": "ii-picture-set", "set": "reference", "contact.png": []}',
+    ],
+)
+def test_a_damaged_manifest_is_one_line(run, refused, tmp_path, text):
+    (tmp_path / "manifest.json").write_text(text)
+    refused(run("render", "--set", "reference", "--scale", 128, "-o", tmp_path), "manifest.json")
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (("view", "p.png", "--serve", "--port", -1), "port is -1"),
+        (("view", "p.png", "--serve", "--port", 65536), "port is 65536"),
+        (("display", "p.png", "-o", "f.png", "--as", "simulation", "--size", "8x0"), "size is '8x0'"),
+        (("display", "p.png", "-o", "f.png", "--as", "quilt", "--tiles", "-1x4"), "tiles is '-1x4'"),
+        (("display", "p.png", "-o", "f.png", "--as", "simulation", "--size", "8x99999999"), "from 1 to 65536"),
+        ((*SMALL, "-o", "x.png", "--dask", "tls://127.0.0.1:9"), "no dask scheduler answers at tls://127.0.0.1:9"),
+        ((*SMALL, "-o", "x.png", "--dask", "nothing://x"), "no dask scheduler answers at nothing://x"),
+    ],
+)
+def test_strange_options_are_one_line(run, refused, picture, tmp_path, monkeypatch, command, said):
+    monkeypatch.chdir(tmp_path)
+    refused(run(*command), said)
+
+
+def test_brackets_in_names_are_names(run, picture, tmp_path):
+    """They are markup to the library that draws bars and tables."""
+    for name in ("[bold]", "[red] x", "a[1]", ":smile:"):
+        coded = tmp_path / f"{name}.ii"
+        IIPicture.load(picture).save(tmp_path / f"{name}.png")
+        code, out, err = run("encode", tmp_path / f"{name}.png", "--qp", 40, "-o", coded)
+        assert code == 0 and f"{name}.ii" in out, err
+        done = run("components", coded, "-o", tmp_path / f"{name}_views")
+        assert done[0] == 0 and f"{name}_v" in done[2]
+        assert run("study", tmp_path / f"{name}.png", "--orders", "-o", tmp_path / "s")[0] == 0
+
+
+def test_a_name_that_is_no_utf8_is_one_line(picture, tmp_path):
+    strange = os.fsencode(tmp_path) + b"/\xff.png"
+    os.rename(picture, strange)
+    for command in (("encode", strange, "--qp", "30", "-o", "x.ii"), (*map(str, SMALL), "-o", strange + b"2.png")):
+        done = subprocess.run([*COMMAND, *command], capture_output=True, cwd=tmp_path)
+        assert done.returncode == 2 and done.stderr.count(b"\n") == 1, done.stderr
+        assert b"is no UTF-8 name" in done.stderr and b"udcff" in done.stderr
+
+
+def test_messages_carry_no_terminal_escapes(run, refused, picture, tmp_path):
+    code, out, err = run("encode", tmp_path / "\x1b[31mred\x07.png", "--qp", 30, "-o", tmp_path / "x.ii")
+    assert code == 2 and "\x1b" not in err and "\x07" not in err and "\\x1b[31mred\\x07" in err
+    code, out, _ = run("encode", picture, "--qp", 40, "-o", tmp_path / "\x1b]0;title\x07.ii")
+    assert code == 0 and "\x1b" not in out and "\\x1b]0;title" in out
+
+
+@pytest.mark.parametrize("command", [("cameras",), ("camera", "setup1"), ("encode", "a×b.png", "-o", "c")])
+def test_a_terminal_of_ascii(tmp_path, command):
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    done = subprocess.run([*COMMAND, *command], capture_output=True, cwd=tmp_path, env=environment)
+    assert done.returncode == (2 if "encode" in command else 0), done.stderr
+    assert b"Traceback" not in done.stderr and (done.stdout + done.stderr).isascii()
+    if "encode" in command:
+        assert b"axb.png" in done.stderr
+
+
+# Ends
+
+
+def wait_for(condition, seconds=120):
+    end = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < end, "it does not come"
+        time.sleep(0.05)
+    return found
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_a_run_within_two_seconds(tmp_path, number, code):
+    """A block of 65536 pixels with 4096 samples takes minutes, and the main thread waits for its end."""
+    command = ("render", "apples", "--scale", "8", "--samples", "4096", "-o", "p.png")
+    with subprocess.Popen([*COMMAND, *command], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
+        wait_for(lambda: list(tmp_path.glob(".p*")))
+        time.sleep(5)  # the scene is loaded, and threads trace
+        started = time.monotonic()
+        running.send_signal(number)
+        said = running.stderr.read()
+        assert running.wait(60) == code
+        seconds = time.monotonic() - started
+    assert seconds < 2.5, "1.5 s of grace, and what a loaded machine adds"
+    assert "interrupted" in said and "Traceback" not in said
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def served(picture, tmp_path):
+    """A served page: its process, port and folder."""
+    environment = {**os.environ, "TMPDIR": str(tmp_path / "tmp")}
+    (tmp_path / "tmp").mkdir()
+    command = [*COMMAND, "view", str(picture), "--serve"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
+        port = int(process.stdout.readline().split("/")[2].split(":")[1])
+        yield process, port, tmp_path / "tmp"
+        process.kill()
+
+
+def asked(port, path, host):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+    connection.putrequest("GET", path, skip_host=True)
+    if host is not None:
+        connection.putheader("Host", host)
+    connection.endheaders()
+    return connection.getresponse().status
+
+
+def test_only_this_machines_own_names_are_served(served):
+    """A site whose name is made to lead to 127.0.0.1 would read the picture (DNS rebinding)."""
+    process, port, folder = served
+    for host in (f"127.0.0.1:{port}", f"localhost:{port}", f"LOCALHOST:{port}"):
+        assert asked(port, "/", host) == 200
+    for host in ("evil.example", f"evil.example:{port}", "127.0.0.1", "", None):
+        assert asked(port, "/", host) == 421, host
+    for path in ("/%00", "/a%00b", "/index.html%00.png"):
+        assert asked(port, path, f"localhost:{port}") == 400
+    assert asked(port, "/../../etc/passwd", f"localhost:{port}") == 404
+    assert asked(port, "/", f"localhost:{port}") == 200, "it still serves"
+    assert list(folder.iterdir())
+    process.terminate()
+    assert process.wait(20) == 143
+    assert process.stderr.read().count("Traceback") == 0
+    assert list(folder.iterdir()) == []

@@ -1,0 +1,77 @@
+"""The cache of compiled kernels: whatever lies there, kernels run, and the cache is whole again."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+KERNEL = """
+from ii_core.jit import kernel
+
+@kernel
+def doubled(x):
+    return 2 * x
+"""
+CALL = """
+import importlib, sys
+found = importlib.import_module(sys.argv[1])
+print(found.doubled(21), len(found.doubled.stats.cache_hits))
+"""
+
+
+def call(folder, module, **environment):
+    done = subprocess.run(
+        [sys.executable, "-c", CALL, module],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env={
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", ""), os.getcwd()]),
+        }
+        | environment,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    return done.stdout.split()
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A package with a kernel that has been compiled and kept."""
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "__init__.py").write_text("")
+    (tmp_path / "old" / "kernels.py").write_text(KERNEL)
+    assert call(tmp_path, "old.kernels") == ["42", "0"]
+    assert call(tmp_path, "old.kernels") == ["42", "1"], "it is kept"
+    return tmp_path
+
+
+@pytest.mark.parametrize("end", ["nbi", "nbc"])
+@pytest.mark.parametrize("cut", [0, 1, 30, 0.5, 0.95])
+def test_a_file_cut_short_is_made_again(package, end, cut):
+    (file,) = (package / "old" / "__pycache__").glob(f"*.{end}")
+    whole = file.read_bytes()
+    file.write_bytes(whole[: int(cut * len(whole)) if isinstance(cut, float) else cut])
+    assert call(package, "old.kernels") == ["42", "0"]
+    assert call(package, "old.kernels") == ["42", "1"]
+
+
+def test_a_renamed_folder(package):
+    """Its cache names modules that are gone; the source file's time, by which numba goes, is the same."""
+    (package / "old").rename(package / "new")
+    assert call(package, "new.kernels")[0] == "42"
+    assert call(package, "new.kernels") == ["42", "1"]
+
+
+def test_foreign_files(package):
+    for file in (package / "old" / "__pycache__").glob("*.nb?"):
+        file.write_bytes(b"\x80\x05cos\nabsent\n.")
+    assert call(package, "old.kernels") == ["42", "0"]
+
+
+def test_a_cache_that_takes_nothing(package):
+    limited = package / "limited.py"
+    limited.write_text("import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n" + KERNEL)
+    assert call(package, "limited") == ["42", "0"]
