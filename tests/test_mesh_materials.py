@@ -98,15 +98,24 @@ def test_what_is_not_supported_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("obj", "mtl", "says"),
     [
-        (OBJ.replace("a.mtl", "b.mtl"), MTL, "b.mtl does not exist"),
-        (OBJ.replace("usemtl glass", "usemtl glas"), MTL, "usemtl glas: known are red one, glass"),
         (OBJ, MTL.replace("Kd 0 0 1", "Kd 0 x 1"), "a.mtl: glass: Kd '0 x 1': numbers of at least 0 are needed"),
         (OBJ, MTL.replace("Kd 0 0 1", "Kd"), "a.mtl: glass: Kd '': numbers of at least 0 are needed"),
         (OBJ, MTL.replace("Kd 0 0 1", "Kd -1 0 1"), "a.mtl: glass: Kd '-1 0 1': numbers of at least 0 are needed"),
         (OBJ, MTL.replace("Tr 0.8", "Tr 8"), "glass: d or Tr leaves 8 to go through: a share from 0 to 1"),
-        (OBJ, MTL.replace("Ni 1.45", "map_Kd no.png"), "no.png does not exist"),
-        (OBJ.replace("1/1 2/2 3/3", "1/1 2/2 9/3"), MTL, ""),
-        ("v 0 0 0\n", MTL, ""),
+        (OBJ.replace("1/1 2/2 3/3", "1/1 2/2 9/3"), MTL, "f '9/3': names a v that is not there: there are 4"),
+        (OBJ.replace("1/1 2/2 3/3", "1/1 2/2 3/9"), MTL, "f '3/9': names a vt that is not there: there are 4"),
+        (OBJ.replace("1/1 2/2 3/3", "1/1 2/2 -9/3"), MTL, "f '-9/3': names a v that is not there: there are 4"),
+        (OBJ.replace("1/1 2/2 3/3", "1/1 2/2 0/3"), MTL, "f '0/3': names a v that is not there: there are 4"),
+        (
+            OBJ.replace("1/1 2/2 3/3", "1/1 2/2 " + "9" * 400),
+            MTL,
+            "whole numbers v, v/vt, v//vn or v/vt/vn are needed",
+        ),
+        (OBJ.replace("1/1 2/2 3/3", "1/1 2/2"), MTL, "f '1/1 2/2': at least three corners are needed"),
+        (OBJ.replace("v 2 0 0", "v 2 0"), MTL, "v '2 0': 3 numbers are needed"),
+        (OBJ.replace("v 2 0 0", "v 2 0 nan"), MTL, "v '2 0 nan': finite numbers are needed"),
+        (OBJ.replace("v 2 0 0", "v 2 0 1" + "0" * 400), MTL, "finite numbers are needed"),
+        ("v 0 0 0\n", MTL, "holds no triangles"),
     ],
 )
 def test_what_is_wrong_is_named(obj, mtl, says, tmp_path):
@@ -115,13 +124,82 @@ def test_what_is_wrong_is_named(obj, mtl, says, tmp_path):
     assert str(caught.value).startswith("a.obj: ") and says in str(caught.value) and "\n" not in str(caught.value)
 
 
+LOST = "materials that no MTL file has"
+
+
+def test_missing_materials_and_pictures_are_named_and_the_rest_is_shown(tmp_path):
+    """They refused the whole file. What is missing has the default grey, or no picture."""
+    for obj, mtl, names, lost in (
+        (
+            OBJ.replace("a.mtl", "b.mtl"),
+            MTL,
+            ["mtllib b.mtl (not there)", "materials that no MTL file has: red one, glass"],
+            2,
+        ),
+        (OBJ.replace("usemtl glass", "usemtl glas"), MTL, [f"{LOST}: glas"], 1),
+        (OBJ, MTL.replace("Ni 1.45", "map_Kd no.png"), ["a.mtl: glass: map_Kd no.png (not there)"], 0),
+        (OBJ, MTL.replace("Ni 1.45", "map_Kd ../x.png"), ["a.mtl: glass: map_Kd ../x.png (not there)"], 0),
+        (OBJ, MTL.replace("Ni 1.45", "map_Kd C:\\x.png"), ["a.mtl: glass: map_Kd C:\\x.png (not there)"], 0),
+    ):
+        folder = tmp_path / "in"
+        folder.mkdir(exist_ok=True)
+        write_image(tmp_path / "x.png", np.zeros((2, 2, 3), np.uint8))  # there, but out of the file's folder
+        model = read_model(saved(folder, obj, mtl))
+        assert model.left_out == names
+        assert sum(part.material is None for part in model.parts) == (3 if lost == 2 else 2 * lost)
+        with pytest.warns(UserWarning, match="a.obj: not supported or not there, and left out: ") as warned:
+            load_scene(folder / "a.obj")
+        assert all(name in str(warned[0].message) for name in names)
+
+
+def test_a_picture_without_texture_coordinates_is_left_out(tmp_path):
+    write_image(tmp_path / "c.png", np.zeros((2, 2, 3), np.uint8))
+    obj = OBJ.replace("f 1/1 3/3 4/4", "f 1 3 4")
+    model = read_model(saved(tmp_path, obj, MTL.replace("Ni 1.45", "map_Kd c.png")))
+    assert model.left_out == ["map_Kd of glass (no texture coordinates)"]
+    assert [part.material.texture is None for part in model.parts] == [True, True, False]
+
+
+def test_d_wins_over_tr(tmp_path):
+    """Many exporters write `d 1` and `Tr 1` for what is opaque: by Tr alone it would not be there."""
+    for lines, gone in (("d 1\nTr 1", 0), ("Tr 1\nd 1", 0), ("Tr 0\nd 0.25", 0.75), ("d 1.000001", 0)):
+        path = saved(tmp_path, OBJ, MTL.replace("Tr 0.8", lines).replace("Tf 1 0.5 0.25\n", ""))
+        assert read_model(path).parts[-1].material.transmission == (gone,) * 3
+
+
+def test_colours_of_an_objs_vertices(tmp_path):
+    """Three more numbers of a v, sRGB; they were dropped without a word. They multiply Kd."""
+    codes = [(1, 0, 0), (0, 0.5, 0), (0, 0, 1), (1, 1, 1)]
+    obj = "\n".join(f"v {x} {y} 0 {r} {g} {b}" for (x, y), (r, g, b) in zip(
+        ((0, 0), (1, 0), (1, 1), (0, 1)), codes, strict=True)) + "\nf 1 2 3\nf 1 3 4\n"  # fmt: skip
+    (part,) = read_model(saved(tmp_path, obj)).parts
+    assert isinstance(part.material.texture, VertexColours) and part.material.colour == (1, 1, 1)
+    order = np.lexsort((part.mesh.vertices[:, 0], part.mesh.vertices[:, 1]))
+    np.testing.assert_allclose(part.mesh.colours[order], linear(np.array(codes)[[0, 1, 3, 2]]))
+    bytes_ = obj.replace("0.5", "127.5").replace(" 1 0 0\n", " 255 0 0\n", 1)
+    assert read_model(saved(tmp_path, bytes_)).parts[0].mesh.colours.max() == 1
+    (part,) = read_model(saved(tmp_path, "mtllib a.mtl\nusemtl red one\n" + obj)).parts
+    np.testing.assert_allclose(part.material.colour, linear([0.5, 0.25, 0]))
+    assert isinstance(part.material.texture, VertexColours)
+
+
+def test_names_that_are_not_utf_8_or_hold_brackets(tmp_path):
+    data = OBJ.replace("left", "[/red]").replace("right", "\\x1b[31m").encode() + "o größe\nf 1 2 3\n".encode(
+        "latin-1"
+    )
+    saved(tmp_path)
+    (tmp_path / "a.obj").write_bytes(data)
+    names = [part.name for part in read_model(tmp_path / "a.obj").parts]
+    assert names[0] == "[/red]_red one" and names[-1].startswith("gr")
+
+
 def test_colours_of_a_plys_vertices(tmp_path):
     box = trimesh.creation.box((2, 2, 2))
     box.visual.vertex_colors = np.tile([255, 128, 0, 255], (8, 1))
     box.export(tmp_path / "b.ply")
     (part,) = read_model(tmp_path / "b.ply").parts
     assert isinstance(part.material.texture, VertexColours)
-    np.testing.assert_allclose(part.mesh.colours, np.tile(linear([1, 128 / 255, 0]), (8, 1)))
+    np.testing.assert_allclose(part.mesh.colours, np.tile(linear([1, 128 / 255, 0]), (24, 1)))  # sharp edges
     (tmp_path / "s.toml").write_text('ambient = 1\n[[object]]\nname = "b"\nmesh = "b.ply"\n')
     scene = load_scene(tmp_path / "s.toml")
     assert scene.bodies[0].name == "b"

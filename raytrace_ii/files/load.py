@@ -15,8 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from ii_core.files import read_image
-
 from ..scene.scene import Background, Body, Fog, Light, Material, Scene, Vector, unit_rows
 from ..scene.textures import (
     Checker,
@@ -31,7 +29,11 @@ from ..scene.textures import (
 )
 from ..shapes.primitives import Mesh, rotation
 from ..shapes.watertight import flaw
+from .beside import read_texture
 from .mesh_model import Model, Part
+from .obj import read_obj
+from .ply import read_ply
+from .stl import read_stl
 from .toml_schema import (  # fmt: skip
     AnyLight,
     AnyTexture,
@@ -54,6 +56,7 @@ from .validation_messages import line, words
 
 GLTF_TYPES = (".glb", ".gltf")
 MESH_TYPES = (*GLTF_TYPES, ".obj", ".ply", ".stl")
+MOST_NAMED = 40  # of what a file holds that is left out
 # Where a mesh file alone is put, mm: as large as fits, its front at the near side; setup1 sees all of it.
 WORKING_VOLUME = np.array([[-20.0, -10.0, 20.0], [20.0, 10.0, 80.0]])
 
@@ -120,7 +123,9 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
             raise type(error)(f"{path}: {error}") from None
     for file, model in models.items():
         if model.left_out:
-            warnings.warn(f"{file}: not supported and left out: {', '.join(model.left_out)}", stacklevel=2)
+            named, more = model.left_out[:MOST_NAMED], len(model.left_out) - MOST_NAMED
+            rest = f" and {more} more" if more > 0 else ""
+            warnings.warn(f"{file}: not supported or not there, and left out: {', '.join(named)}{rest}", stacklevel=2)
     glass = [body for body in scene.bodies if body.material.fills]
     if hollow := [f"{body.name!r} ({why})" for body in glass if (why := flaw(body.vertices, body.faces))]:
         needed = "closed meshes whose faces look outwards are needed, or ior = 1 without absorption for a sheet"
@@ -149,11 +154,11 @@ def read_model(path: Path) -> Model:
 
             model = read_gltf(path)
         else:
-            from .obj_ply_stl import read_mesh_file
-
-            model = read_mesh_file(path)
-        if not model.parts:
+            model = {".obj": read_obj, ".ply": read_ply, ".stl": read_stl}[kind](path)
+        if not any(len(part.mesh.faces) for part in model.parts):
             raise ValueError("holds no triangles")
+        if not any(_has_area(part.mesh) for part in model.parts):
+            raise ValueError("holds no triangles with an area")
         return model
     except ValidationError as error:
         first = error.errors()[0]
@@ -164,6 +169,12 @@ def read_model(path: Path) -> Model:
         raise type(error)(f"{path.name}: {error}") from None
     except MemoryError:
         raise ValueError(f"{path.name}: needs more memory than there is") from None
+
+
+def _has_area(mesh: Mesh) -> bool:
+    p = mesh.vertices[mesh.faces]
+    with np.errstate(over="ignore", invalid="ignore"):  # reaching too far is refused later, with its place
+        return bool((np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) != 0).any())
 
 
 def _known(names: Iterable[str]) -> str:
@@ -237,7 +248,7 @@ class _Loader:
 
     def _image(self, where: str, name: str, make: Any = image_texture) -> Image:
         try:
-            image: Image = make(read_image(self.path.parent / name))
+            image: Image = make(read_texture(self.path.parent / name))
         except OSError as error:
             raise type(error)(f"{where}: {error}") from None
         except ValueError as error:

@@ -14,12 +14,12 @@ from urllib.parse import unquote_to_bytes, urlsplit
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.files import read_image
-
+from ..beside import beside, read_bytes, read_texture
 from .tables import KNOWN_EXTENSIONS, Accessor, Buffer, BufferView, Gltf, ImageSource
 
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SHAPES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+MOST_ROWS = 10_000_000  # of an accessor without a view: no bytes of the file answer for them
 _GLB, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 
 
@@ -38,7 +38,7 @@ class GltfFile:
 
     def __init__(self, path: Path) -> None:
         self.folder = path.parent
-        data = path.read_bytes()
+        data = read_bytes(path)
         text, self._chunk = _glb(data) if data[:4] == b"glTF" else (data, None)
         self.tables = _checked(text)
         unknown = sorted(set(self.tables.extensionsRequired) - KNOWN_EXTENSIONS)
@@ -74,7 +74,9 @@ class GltfFile:
         if a.type not in _SHAPES:
             raise ValueError(f"{where}: unknown type {a.type!r}: known are {', '.join(_SHAPES)}")
         kind, width = _component(a.componentType, where), _SHAPES[a.type]
-        if a.bufferView is None:
+        if a.bufferView is None:  # zeros, which sparse values may replace
+            if a.count > MOST_ROWS:
+                raise ValueError(f"{where}: {a.count} rows of zeros: at most {MOST_ROWS} are made up")
             values = np.zeros((a.count, width), kind)
         else:
             values = self._rows(a.bufferView, where, a.byteOffset, a.count, kind, width)
@@ -144,21 +146,35 @@ class GltfFile:
             self._images[index] = _pixels(data, where)
         return self._images[index]
 
+    def missing(self, index: int, who: str) -> str | None:
+        """Why the file that an image names cannot be had; None if it can, or the image stands in the glTF itself."""
+        source: ImageSource = self.at("images", index, who)
+        if source.bufferView is not None or source.uri is None or source.uri.startswith("data:"):
+            return None
+        try:
+            return None if self._path(source.uri).is_file() else f"{source.uri[:80]!r} does not exist"
+        except (ValueError, OSError) as error:
+            return str(error)
+
     def _fetch(self, uri: str, where: str) -> bytes:
-        """What a uri stands for: the data in it, or a file that it names relative to the glTF's own folder."""
+        """What a uri stands for: the data in it, or a file that it names in the glTF's own folder."""
         if uri.startswith("data:"):
             head, _, body = uri.partition(",")
             try:
                 return base64.b64decode(body, validate=True) if head.endswith(";base64") else unquote_to_bytes(body)
             except binascii.Error as error:
                 raise ValueError(f"{where}: data uri: {error}") from None
-        name = unquote_to_bytes(uri).decode("utf-8", "replace")
-        if urlsplit(uri).scheme or Path(name).is_absolute() or "\0" in name:
-            raise ValueError(f"{where}: uri {uri[:80]!r}: data or the relative name of a file is needed")
-        path = self.folder / name
-        if not path.is_file():
-            raise FileNotFoundError(f"{where}: {path} does not exist")
-        return path.read_bytes()
+        try:
+            return read_bytes(self._path(uri))
+        except ValueError as error:
+            raise ValueError(f"{where}: uri {error}") from None
+        except OSError as error:
+            raise type(error)(f"{where}: {error}") from None
+
+    def _path(self, uri: str) -> Path:
+        if urlsplit(uri).scheme:
+            raise ValueError(f"{uri[:80]!r}: data or the relative name of a file is needed")
+        return beside(self.folder, unquote_to_bytes(uri).decode("utf-8", "replace"))
 
 
 def _glb(data: bytes) -> tuple[bytes, bytes | None]:
@@ -211,7 +227,9 @@ def _pixels(data: bytes, where: str) -> NDArray[Any]:
         path = Path(folder) / f"image{suffix}"
         path.write_bytes(data)
         try:
-            return read_image(path)
+            return read_texture(path)
+        except ValueError as error:
+            raise ValueError(f"{where}: {str(error).replace(path.name, 'it')}") from None
         except OSError as error:
             reason = str(error).replace(f"cannot read {path}: ", "").replace(str(path), "it")
             raise ValueError(f"{where}: cannot be read as a picture: {' '.join(reason.split())}") from None

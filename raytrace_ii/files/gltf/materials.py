@@ -223,6 +223,9 @@ class Looks:
         texture: TextureSource = self.file.at("textures", info.index, where)
         if texture.source is None:
             self.note("textures without an image that can be read")
+        elif why := self.file.missing(texture.source, where):
+            self.note(f"images.{texture.source} ({why})")
+            return None
         return texture.source
 
     def _mean(self, info: TextureInfo | None, what: str, where: str, *, srgb: bool = False) -> Array:

@@ -1,8 +1,4 @@
-"""glTF 2.0 scenes: nodes, meshes and lights, with the materials of gltf_material.py.
-
-trimesh reads glTF too, but leaves out transmission, index, volume, lights and all but one set of texture
-coordinates, and does not say so; the file's own JSON says all.
-"""
+"""glTF 2.0 scenes: nodes, meshes and lights, with the materials of materials.py."""
 
 from __future__ import annotations
 
@@ -25,6 +21,7 @@ from .tables import GltfMesh, Node, Primitive, PunctualLight, left_out
 Array = NDArray[np.float64]
 FLIP = np.diag([1.0, 1.0, -1.0, 1.0])  # right-handed with −z ahead to left-handed with z ahead
 TRIANGLES, STRIP, FAN = 4, 5, 6
+MOST_FACES = 50_000_000  # of all instances: about 10 GB when they are traced
 # Attributes that are read or have no bearing here: tangents follow from the texture coordinates, of which no
 # texture needs the other sets or is named itself, and those with an underscore are the application's own.
 _READ = re.compile(r"(POSITION|NORMAL|TANGENT|COLOR_0|TEXCOORD_\d+|_.*)$")
@@ -106,6 +103,7 @@ class _Reader:
         self.lights: list[tuple[PunctualLight, Array]] = []
         self._looks = Looks(file, self.notes.append)
         self._meshes: dict[int, list[tuple[Mesh, Look]]] = {}
+        self._faces_shown = 0
 
     def node(self, index: int, matrix: Array) -> None:
         """Add what a node shows, by its matrix to our frame."""
@@ -115,6 +113,9 @@ class _Reader:
             if node.mesh not in self._meshes:
                 self._meshes[node.mesh] = list(self._primitives(node.mesh, mesh))
             shown = self._meshes[node.mesh]
+            self._faces_shown += sum(len(primitive.faces) for primitive, _ in shown)
+            if self._faces_shown > MOST_FACES:
+                raise ValueError(f"nodes.{index}: more than {MOST_FACES} triangles, all instances counted")
             name = node.name or mesh.name or f"node {index}"
             for i, (primitive, look) in enumerate(shown):
                 own = f"{name} {i}" if len(shown) > 1 else name

@@ -10,10 +10,18 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from ..tolerance import share
 
 Index = Annotated[int, Field(ge=0)]
-Share = Annotated[float, Field(ge=0, le=1)]
+
+
+def _clamped(value: Any) -> Any:
+    return share(value) if isinstance(value, float) else value
+
+
+Share = Annotated[float, Field(ge=0, le=1), BeforeValidator(_clamped)]
 NotNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
 Vector2 = tuple[float, float]
