@@ -11,6 +11,7 @@ from .plots.error_maps import error_map, plot_error_layers, plot_error_views
 from .plots.overview import PLOTS, plot_all, plot_angle, plot_depth, plot_pair, plot_views
 from .plots.rd_chart import rd_chart
 from .plots.tables import summary_table, write_csv, write_latex
+from .point_log import PointLog
 from .rd import bd_psnr, bd_rate, rate_distortion
 from .report import Report, report
 from .study import provenance, read_study, write_study
@@ -22,6 +23,7 @@ __all__ = [
     "AngleQuality",
     "DepthQuality",
     "FocusDepth",
+    "PointLog",
     "Report",
     "ViewQuality",
     "angle_axes",

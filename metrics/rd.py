@@ -165,6 +165,8 @@ def rate_distortion(
     progress: Callable[[int, int, str], None] | None = None,
     workers: int = 2,
     measure: Callable[[IIPicture], Mapping[str, Any]] | None = None,
+    known: Mapping[tuple[str, float], dict[str, Any]] | None = None,
+    keep: Callable[[dict[str, Any]], None] | None = None,
 ) -> list[dict[str, Any]]:
     """Code a picture by every scheme at every rate and measure what comes back.
 
@@ -187,6 +189,10 @@ def rate_distortion(
         Points measured at a time, in threads. Everything but the seconds is the same for any number.
     measure : callable, optional
         ``measure(decoded)`` gives what else to keep of each point, as that of `measuring` does. Q_global always is.
+    known : mapping, optional
+        Records by scheme and target, as those of a `PointLog`: they are not measured again.
+    keep : callable, optional
+        ``keep(record)`` as soon as a point is measured, in the calling thread.
 
     Returns
     -------
@@ -213,15 +219,18 @@ def rate_distortion(
         raise ValueError(f"workers is {workers}: at least 1 is needed")
 
     points = [(scheme, rate) for scheme in schemes for rate in rates]
-    records: list[dict[str, Any]] = [{} for _ in points]
+    records: list[dict[str, Any]] = [dict((known or {}).get(point, {})) for point in points]
     with ThreadPoolExecutor(workers) as pool:
         futures = {
             pool.submit(_measure, picture, scheme, rate, encode, decode, measure): i
             for i, (scheme, rate) in enumerate(points)
+            if not records[i]
         }
         try:
-            for done, future in enumerate(as_completed(futures), 1):
+            for done, future in enumerate(as_completed(futures), 1 + len(points) - len(futures)):
                 record = records[futures[future]] = future.result()
+                if keep is not None:
+                    keep(record)
                 if progress is not None:
                     progress(done, len(points), _told(record))
         except BaseException:

@@ -8,7 +8,7 @@ import math
 import os
 import platform
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,19 +67,12 @@ def write_study(
         If the file cannot be written.
     """
     check_points(records)
-    (width, height) = picture.size
     write_json(
         path,
         {
             "format": FORMAT,
             "version": VERSION,
-            "picture": {
-                "name": picture_name,
-                "sha256": hashlib.sha256(np.ascontiguousarray(picture.pixels).data).hexdigest(),
-                "pixels": [width, height],
-                "dtype": picture.pixels.dtype.name,
-                **picture.structure_json(),
-            },
+            "picture": picture_json(picture_name, picture),
             "pooling": POOLING,
             **provenance(),
             "extra": dict(extra or {}),
@@ -87,6 +80,17 @@ def write_study(
             "points": [{**spelt(dict(record)), "lossless": record["q_global"] == math.inf} for record in records],
         },
     )
+
+
+def picture_json(name: str, picture: IIPicture) -> dict[str, Any]:
+    """Return what identifies a picture: the SHA-256 of its pixels, their type, and its structure."""
+    return {
+        "name": name,
+        "sha256": hashlib.sha256(np.ascontiguousarray(picture.pixels).data).hexdigest(),
+        "pixels": list(picture.size),
+        "dtype": picture.pixels.dtype.name,
+        **picture.structure_json(),
+    }
 
 
 def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -100,21 +104,33 @@ def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
         If it cannot be read.
     """
     try:
-        study = json.loads(Path(path).read_text(encoding="utf-8"))
+        study = json.loads(Path(path).read_bytes().decode("utf-8"))
         if not isinstance(study, dict) or study.get("format") != FORMAT or study.get("version") != VERSION:
             raise ValueError(f'not a study: needs "format": "{FORMAT}", "version": {VERSION}')
         if missing := {"picture", "points"} - set(study):
             raise ValueError(f"not a study: {', '.join(sorted(missing))} missing")
+        if not isinstance(study["picture"], dict) or not isinstance(study["points"], list):
+            raise ValueError("not a study: picture is to be an object, points a list")
         check_points(study["points"])
+        study["points"] = [unspelt(point) for point in study["points"]]
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path} is no UTF-8 text: {error}") from None
+    except RecursionError:
+        raise ValueError(f"{path}: not a study: it is nested too deeply") from None
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    for point in study["points"]:
-        lossless = point.pop("lossless", False)
-        for name in [*measures_of([point]), *(name for name in ("q_depth", "depth_outside") if name in point)]:
-            point[name] = _read(point[name])
-        if lossless:
-            point["q_global"] = math.inf
     return study
+
+
+def unspelt(point: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a point as `rate_distortion` gave it, from what `spelt` and JSON made of it."""
+    point = dict(point)
+    lossless = point.pop("lossless", False)
+    for name in measures_of([point]) + ["q_depth"] * ("q_depth" in point):
+        point[name] = _read(name, point[name])
+    if lossless:
+        point["q_global"] = math.inf
+    return point
 
 
 def measures_of(points: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -123,25 +139,58 @@ def measures_of(points: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def spelt(value: Any) -> Any:
-    """Plain values for JSON: infinities as text; NaN becomes null when it is written."""
-    if isinstance(value, dict):
+    """Return plain values for JSON: infinities as text, null for NaN."""
+    if isinstance(value, Mapping):
         return {key: spelt(item) for key, item in value.items()}
     if isinstance(value, list):
         return [spelt(item) for item in value]
-    return str(value) if isinstance(value, float) and math.isinf(value) else value
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value
 
 
-def _read(value: Any) -> Any:
+def _read(name: str, value: Any) -> Any:
     if isinstance(value, list):
-        return [_read(item) for item in value]
-    return math.nan if value is None else float(value)
+        return [_read(name, item) for item in value]
+    if value is None:
+        return math.nan
+    try:
+        if not isinstance(value, bool):
+            return float(value)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ValueError(f"{name} is {_short(value)}: a number is needed")
 
 
 def check_points(records: Any) -> None:
-    """Raise ValueError unless every record has all FIELDS."""
+    """Raise ValueError unless every record has all FIELDS, each of its kind."""
     for i, record in enumerate(records):
+        if not isinstance(record, Mapping):
+            raise ValueError(f"points[{i}] is {_short(record)}: an object is needed")
         if missing := set(FIELDS) - set(record):
             raise ValueError(f"points[{i}] has no {', '.join(sorted(missing))}")
+        for name, (kind, right) in KINDS.items():
+            if not right(record[name]):
+                raise ValueError(f"points[{i}]: {name} is {_short(record[name])}: {kind} is needed")
+
+
+def _rate(value: Any) -> bool:
+    """Whether a value is a positive number; its logarithm is charted."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < 1e300
+
+
+KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
+    "scheme": ("a name", lambda value: isinstance(value, str)),
+    "options": ("an object", lambda value: isinstance(value, Mapping)),
+    "target_bpp": ("a positive number", _rate),
+    "bpp": ("a positive number", _rate),
+    "reached": ("true or false", lambda value: isinstance(value, bool)),
+}
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else f"{text[:37]}…"
 
 
 def provenance() -> dict[str, Any]:

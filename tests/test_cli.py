@@ -1,14 +1,20 @@
 """The command line, run in this process: what it writes, and that bad input is one line, exit code 2 and no file."""
 
 import json
+import math
+import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
 
+import codec
+from codec import encode
 from ii_core import IIPicture, preset
 from ii_core.files import read_image
+from metrics import PointLog
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +83,46 @@ def test_study_leaves_chart_numbers_and_a_table(run, picture, tmp_path):
     assert [p["target_bpp"] for p in study["points"]] == [0.1, 0.5, 2] * 2
     assert (tmp_path / "s" / "small_rd.csv").read_text().count("\n") == 7
     assert read_image(tmp_path / "s" / "small_rd.png").shape[0] > 300
+
+
+def test_a_killed_study_continues_where_it_was(run, picture, tmp_path, monkeypatch):
+    """On b1dc540 all points of a killed study were lost."""
+    arguments = ["study", picture, "--schemes", "si-h264,si-hevc", "--rates", "0.3,0.6,1,2", "-o", tmp_path / "s"]
+    log, numbers = (tmp_path / "s" / f"small_rd{end}" for end in (".points.jsonl", ".json"))
+    command = [sys.executable, "-m", "raytrace_ii.cli", *map(str, arguments), "--workers", "1"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    until = time.monotonic() + 100
+    while (not log.exists() or log.read_text().count("\n") < 2) and time.monotonic() < until:
+        time.sleep(0.005)
+    process.kill()
+    assert process.wait() == -signal.SIGKILL and not numbers.exists()
+    kept = [json.loads(line)["point"] for line in log.read_text().splitlines()]
+    assert 2 <= len(kept) < 8
+    with log.open("a") as file:
+        file.write('{"format": "ii-')  # as a kill within a line would leave it
+
+    coded = []
+    monkeypatch.setattr(codec, "encode", lambda *a, **o: (coded.append(a), encode(*a, **o))[1])
+    code, out, _ = run(*arguments)
+    assert code == 0 and f"{len(kept)} points are there" in out
+    assert len(coded) == 8 - len(kept) and not log.exists()
+    points = json.loads(numbers.read_text())["points"]
+    whole = json.loads(json.dumps(points))
+    assert all({**point, "lossless": False} in whole for point in kept)
+    assert [point["target_bpp"] for point in points] == [0.3, 0.6, 1, 2] * 2
+
+
+def test_points_of_another_picture_or_measure_are_not_taken(tmp_path):
+    a = IIPicture(np.zeros((8, 8, 3), np.uint8), (4, 4), (2, 2))
+    point = {"scheme": "x", "target_bpp": 1.0, "q_global": math.inf}
+    depth = np.ones((4, 4))
+    path = tmp_path / "p.jsonl"
+    PointLog(path, a, measures=["q_global"], depth=depth).keep(point)
+    assert PointLog(path, a, measures=["q_global"], depth=depth).known == {("x", 1.0): point}
+    b = a.with_pixels(a.pixels + 1)
+    assert not PointLog(path, b, measures=["q_global"], depth=depth).known
+    assert not PointLog(path, a, measures=["q_global"], depth=2 * depth).known
+    assert not PointLog(path, a, measures=["q_global", "q_view"], depth=depth).known
 
 
 def test_a_study_that_cannot_be_leaves_nothing(run, refused, picture, tmp_path):

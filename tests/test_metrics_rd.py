@@ -277,6 +277,58 @@ def test_what_is_no_study(tmp_path):
             read_study(path)
     with pytest.raises(FileNotFoundError):
         read_study(tmp_path / "none.json")
+
+
+GOOD = {
+    "scheme": "a", "options": {}, "target_bpp": 1, "bpp": 1, "reached": True, "q_global": 30, "encode_seconds": 1,
+    "decode_seconds": 1, "nbytes": 9,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ([1], r"points\[0\] is 1: an object is needed"),
+        ([[]], r"points\[0\] is \[\]: an object"),
+        ({}, "points a list"),
+        (5, "points a list"),
+        ([{**GOOD, "bpp": "1"}], r"points\[0\]: bpp is '1': a positive number"),
+        ([{**GOOD, "bpp": 10**400}], r"bpp is 1000\S+…: a positive number"),
+        ([{**GOOD, "target_bpp": 0}], "target_bpp is 0: a positive number"),
+        ([{**GOOD, "scheme": 3}], "scheme is 3: a name"),
+        ([{**GOOD, "options": []}], r"options is \[\]: an object"),
+        ([{**GOOD, "reached": "no"}], "reached is 'no': true or false"),
+        ([{**GOOD, "q_global": "high"}], "q_global is 'high': a number"),
+        ([{**GOOD, "q_global": {}}], r"q_global is \{\}: a number"),
+        ([{**GOOD, "q_global": 10**400}], "q_global is 1000"),
+        ([{**GOOD, "q_global": True}], "q_global is True: a number"),
+    ],
+)
+def test_points_of_other_kinds_are_named(tmp_path, points, message):
+    """``points: [1]`` and most of these were tracebacks on b1dc540: TypeError, OverflowError, AttributeError."""
+    path = tmp_path / "s.json"
+    study = {"format": "ii-rd-study", "version": 1, "picture": {}, "points": points}
+    path.write_text(json.dumps(study))
+    with pytest.raises(ValueError, match=rf"s\.json: .*{message}"):
+        read_study(path)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"\xff\xfe{}", r"s\.json is no UTF-8 text"),
+        (b"[" * 100_000, "s.json: not a study: it is nested too deeply"),
+        (b'{"format": "ii-rd-study", "version": 1, "picture": 3, "points": []}', "picture is to be an object"),
+    ],
+)
+def test_bytes_that_are_no_study_are_named(tmp_path, data, message):
+    path = tmp_path / "s.json"
+    path.write_bytes(data)
+    with pytest.raises(ValueError, match=message):
+        read_study(path)
+
+
+def test_what_cannot_be_written_is_named(tmp_path):
     with pytest.raises(ValueError, match=r"points\[0\] has no bpp"):
         write_study(tmp_path / "t.json", [{"scheme": "x"}])
     assert not (tmp_path / "t.json").exists()

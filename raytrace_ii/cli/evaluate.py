@@ -186,10 +186,12 @@ def run_study(
 ) -> None:  # fmt: skip
     """Measure; leave `study_files` in a folder, the charts and tables made from the JSON; print the tables.
 
+    Points are kept in ``NAME_rd.points.jsonl`` until all are measured; a study that was killed continues from there.
     ``over_depth`` are depth, layers_mm and method of `measuring`.
     """
     from codec import encode, timed_decode
     from metrics import (
+        PointLog,
         depth_rate_chart,
         measuring,
         rate_distortion,
@@ -205,13 +207,17 @@ def run_study(
     from ..rendering.render import cores
 
     more = measuring(picture, measures, **over_depth) if set(measures) - {"q_global"} else None
+    log = PointLog(folder / f"{name}_rd.points.jsonl", picture, measures=sorted(measures), **over_depth)
+    if log.known:
+        print(f"{name}: {len(log.known)} points are there from a run that was stopped")
     with progress_bar(f"code {name}") as report:
         records = rate_distortion(
             picture, schemes, rates, encode=encode, decode=timed_decode, progress=report, workers=workers or cores(),
-            measure=more,
+            measure=more, known=log.known, keep=log.keep,
         )  # fmt: skip
     numbers = folder / f"{name}_rd.json"
     write_study(numbers, name, records, extra, picture=picture)
+    log.remove()
     write_csv(folder / f"{name}_rd.csv", records)
     drawn = read_study(numbers)
     for measure in measures:

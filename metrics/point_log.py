@@ -1,0 +1,70 @@
+"""Points of a rate–distortion study, on disk as soon as they are measured: a killed study continues from them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ii_core import IIPicture
+from ii_core.identity import library_versions, source_hash
+from ii_core.json_lines import append_record, read_records
+
+from .study import picture_json, spelt, unspelt
+
+FORMAT, VERSION = "ii-rd-point", 1
+PACKAGES = ("ii_core", "codec", "metrics")  # what a point depends on
+
+
+class PointLog:
+    """A file of points; those of the same picture, conditions, code and libraries are known.
+
+    Parameters
+    ----------
+    path : path
+    picture : IIPicture
+        What is coded.
+    **conditions
+        What else values depend on: names of measures, depth map, layers.
+
+    Raises
+    ------
+    ValueError
+        If the file is there and holds something else.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], picture: IIPicture, **conditions: Any) -> None:
+        self.path = Path(path)
+        same = {
+            "picture": picture_json("", picture),
+            "code": source_hash(PACKAGES),
+            "versions": library_versions(),
+            "conditions": {name: _plain(value) for name, value in conditions.items()},
+        }
+        self._same = hashlib.sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()
+        self.known: dict[tuple[str, float], dict[str, Any]] = {}
+        for line in read_records(self.path, FORMAT, VERSION):
+            if line.get("same") == self._same:
+                point = unspelt(line["point"])
+                self.known[point["scheme"], point["target_bpp"]] = point
+
+    def keep(self, point: dict[str, Any]) -> None:
+        """Append a point."""
+        append_record(self.path, {"format": FORMAT, "version": VERSION, "same": self._same, "point": spelt(point)})
+
+    def remove(self) -> None:
+        """Remove the file: the study holds all points."""
+        self.path.unlink(missing_ok=True)
+
+
+def _plain(value: Any) -> Any:
+    if value is None or isinstance(value, str | int | float):
+        return value
+    if isinstance(value, list | tuple) and all(isinstance(item, str) for item in value):
+        return list(value)
+    array = np.ascontiguousarray(value)
+    return [list(array.shape), array.dtype.str, hashlib.sha256(array.data).hexdigest()]
