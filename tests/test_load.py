@@ -1,5 +1,7 @@
 """Scene files: everything that may stand in them works, and what may not is named."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -601,3 +603,48 @@ material = "m"
         error = np.mean((picture(scale) - one) ** 2)
         # 60 dB is the least: powers of two scale without rounding, so that only the turn of a bit is left
         assert error == 0 or 10 * np.log10(255**2 / error) > 60
+
+
+@pytest.mark.parametrize(
+    ("shape", "says"),
+    [
+        ('shape = "sphere"\nradius_mm = 1\nsegments = 20000', "about 4e+08 triangles: at most 20000000 are made"),
+        ('shape = "cylinder"\nradius_mm = 1\nheight_mm = 1\nsegments = 900000000', "about 3.6e+09 triangles"),
+        ('shape = "revolve"\nprofile_mm = [[1, 0], [1, 1]]\nsteps = 2000000000', "about 3.8e+11 triangles"),
+        ('shape = "box_grid"\ncount = [9999, 9999, 9999]\nspacing_mm = [1, 1, 1]\nbox_mm = 1', "about 1.2e+13"),
+        (
+            'shape = "strands"\ncount = 3\nradii_mm = [1, 1, 1]\nlength_mm = 1\nwidth_mm = 1\nsteps = 2000000000',
+            "1.2e+10",
+        ),
+        (
+            'shape = "heightfield"\nsize_mm = [1, 1]\nheight_mm = 1\nfeature_mm = 1\ncells = [100000, 100000]',
+            "about 2e+10 triangles",
+        ),
+        ('shape = "sphere"\nradius_mm = 1\nsegments = ' + "9" * 400, "triangles: at most 20000000 are made"),
+        ('shape = "sphere"\nradius_mm = ' + "9" * 400, "radius_mm: "),
+    ],
+)
+def test_shapes_are_counted_before_they_are_made(shape, says, tmp_path):
+    """Each took all memory, or a traceback."""
+    with pytest.raises(ValueError) as caught:
+        load(tmp_path, ball('shape = "sphere"\nradius_mm = 1', shape))
+    assert "object.0" in str(caught.value) and says in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_deep_nesting_pipes_and_other_codings_are_refused_in_one_line(tmp_path):
+    for text in (
+        "a = " + "[" * 100000,
+        "a = " + "[" * 400 + "]" * 400,
+        "a." * 3000 + "b = 1",
+        "ambient = " + "9" * 5000,
+    ):
+        with pytest.raises(ValueError) as caught:
+            load(tmp_path, text + "\n" + BALL)
+        assert "\n" not in str(caught.value)
+    (tmp_path / "scene.toml").write_bytes("title = 'größe'\n".encode("latin-1"))
+    with pytest.raises(ValueError, match="utf-8"):
+        load_scene(tmp_path / "scene.toml")
+    for name in ("pipe.toml", "pipe.obj", "pipe.glb"):
+        os.mkfifo(tmp_path / name)
+        with pytest.raises(OSError, match="is a device, pipe or socket: a regular file is needed"):
+            load_scene(tmp_path / name)

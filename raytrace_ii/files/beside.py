@@ -6,10 +6,9 @@ import os
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
-import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from ii_core.files import read_image
+from ii_core.files import check_file, image_header, read_image
 
 MOST_BYTES = 4 << 30  # of a mesh file or a buffer of one
 MOST_TEXELS = 1 << 28  # of a texture: 16384², 3 GB as linear float32
@@ -25,7 +24,7 @@ def read_bytes(path: Path) -> bytes:
     OSError
         If it does not exist or is not a regular file: a pipe or device may never end.
     """
-    _check(path)
+    check_file(path)
     size = path.stat().st_size
     if size > MOST_BYTES:
         raise ValueError(f"{path.name} has {size} bytes: at most {MOST_BYTES} are read")
@@ -42,14 +41,9 @@ def read_texture(path: Path) -> NDArray[Any]:
     OSError
         If it does not exist, is not a regular file, or is not a whole picture.
     """
-    _check(path)
-    source = oiio.ImageInput.open(str(path))
-    if not source:
-        raise OSError(f"cannot read {path}: {oiio.geterror()}")
-    spec = source.spec()
-    source.close()
-    if spec.width * spec.height > MOST_TEXELS:
-        raise ValueError(f"{path.name} has {spec.width}×{spec.height} pixels: at most {MOST_TEXELS} are read")
+    (height, width, _), _ = image_header(path)
+    if width * height > MOST_TEXELS:
+        raise ValueError(f"{path.name} has {width}×{height} pixels: at most {MOST_TEXELS} are read")
     return read_image(path)
 
 
@@ -67,13 +61,6 @@ def beside(folder: Path, name: str) -> Path:
     if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
         raise ValueError(f"{name[:80]!r} leads out of the file's folder: nothing is read there")
     return path
-
-
-def _check(path: Path) -> None:
-    if not path.is_file():
-        if path.exists() and not path.is_dir():
-            raise OSError(f"{path} is a device, pipe or socket: a regular file is needed")
-        raise FileNotFoundError(f"{path} does not exist")
 
 
 def decoded_text(data: bytes) -> str:

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from ii_core.files import check_file
+
 from ..scene.scene import Background, Body, Fog, Light, Material, Scene, Vector, unit_rows
 from ..scene.textures import (
     Checker,
@@ -105,8 +107,7 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
                 f"unknown scene {str(name)!r}: known are {', '.join(known)}, or give a .toml or mesh file"
             )
         path = Path(str(files("assets") / "scenes" / f"{name}.toml"))
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist")
+    check_file(path)
     if alone:
         model = read_model(path)
         try:
@@ -146,8 +147,7 @@ def read_model(path: Path) -> Model:
     kind = path.suffix.lower()
     if kind not in MESH_TYPES:
         raise ValueError(f"{path.name} is no known mesh type: known are {', '.join(MESH_TYPES)}")
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist")
+    check_file(path)
     try:
         if kind in GLTF_TYPES:
             from .gltf.nodes import read_gltf

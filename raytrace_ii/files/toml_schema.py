@@ -94,7 +94,7 @@ class MaterialTable(_Strict):
     transmission: Share = (0.0, 0.0, 0.0)
     ior: OneOrThree = (1.5, 1.5, 1.5)
     absorption_per_mm: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
-    priority: int = 0
+    priority: Annotated[int, Field(ge=-1_000_000, le=1_000_000)] = 0
     roughness: OfOne | None = None
     metallic: OfOne | None = None
     metallic_roughness_map: str | None = None
@@ -227,6 +227,8 @@ def parse(text: str) -> SceneFile:
         return _checked(SceneFile, tomllib.loads(text))
     except ValidationError as error:
         raise ValueError(_first(error)) from None
+    except RecursionError:
+        raise ValueError("tables or lists are nested too deeply") from None
 
 
 def parse_mesh(parameters: dict[str, Any]) -> MeshFile:

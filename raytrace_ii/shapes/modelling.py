@@ -151,7 +151,7 @@ class Tube(_Part):
 
     part: Literal["tube"]
     points_mm: Annotated[list[tuple[float, float, float, PositiveFloat]], Field(min_length=2)]
-    steps: PositiveInt = 12
+    steps: Annotated[int, Field(ge=1, le=1000)] = 12
 
     def distance(self, x: Array, y: Array, z: Array) -> Array:
         shape = np.broadcast_shapes(x.shape, y.shape, z.shape)
@@ -377,6 +377,9 @@ class Heightfield(Shape):
     steep: Colour | None = None
     seed: Annotated[int, Field(ge=0, lt=1024)] = 0
 
+    def triangles(self) -> int:
+        return 2 * self.cells[0] * self.cells[1]
+
     def mesh(self) -> Mesh:
         nx, nz = self.cells
         across, away = np.linspace(-0.5, 0.5, nx + 1), np.linspace(0, 1, nz + 1)
@@ -465,6 +468,9 @@ class Strands(Shape):
     face: Annotated[float, Field(ge=0, le=1)] = 0.75
     colours: tuple[Colour, Colour] = ((0.02, 0.01, 0.005), (0.1, 0.05, 0.02))
     seed: Annotated[int, Field(ge=0)] = 0
+
+    def triangles(self) -> int:
+        return 2 * self.count * self.steps
 
     def mesh(self) -> Mesh:
         generator = np.random.default_rng(self.seed)

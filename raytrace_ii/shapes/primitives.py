@@ -5,13 +5,14 @@ Every mesh stands in its own frame, x right, y up, z away, millimetres, with out
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, model_validator
 
 Point2 = tuple[float, float]
 Point3 = tuple[float, float, float]
@@ -32,13 +33,26 @@ class Mesh:
     colours: NDArray[np.float64] | None = None
 
 
+MOST_TRIANGLES = 20_000_000  # of one shape: about 4 GB when it is traced
+
+
 class Shape(BaseModel):
-    """What all shapes share: only known parameters, only finite numbers."""
+    """What all shapes share: only known parameters, only finite numbers, no more triangles than fit in memory."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def mesh(self) -> Mesh:
         raise NotImplementedError
+
+    def triangles(self) -> int:
+        """About how many triangles the mesh has, told before it is made."""
+        return 12
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Self:
+        if (count := self.triangles()) > MOST_TRIANGLES:
+            raise ValueError(f"about {float(min(count, 10**300)):.2g} triangles: at most {MOST_TRIANGLES} are made")
+        return self
 
 
 class Sphere(Shape):
@@ -47,6 +61,9 @@ class Sphere(Shape):
     shape: Literal["sphere"]
     radius_mm: PositiveFloat
     segments: Annotated[int, Field(ge=3)] = 96
+
+    def triangles(self) -> int:
+        return self.segments**2
 
     def mesh(self) -> Mesh:
         angle = np.linspace(-np.pi / 2, np.pi / 2, max(self.segments // 2, 2) + 1)
@@ -88,6 +105,9 @@ class Cylinder(Shape):
     top_mm: Annotated[float, Field(ge=0)] | None = None
     segments: Annotated[int, Field(ge=3)] = 96
 
+    def triangles(self) -> int:
+        return 4 * self.segments
+
     def mesh(self) -> Mesh:
         top = self.radius_mm if self.top_mm is None else self.top_mm
         corners = [(0.0, 0.0), (self.radius_mm, 0.0), (top, self.height_mm), (0.0, self.height_mm)]
@@ -116,6 +136,9 @@ class Revolve(Shape):
     lobes: Annotated[int, Field(ge=0)] = 0
     lobe_depth: Annotated[float, Field(ge=0, lt=1)] = 0.0
     sideways_mm: Point2 = (0.0, 0.0)
+
+    def triangles(self) -> int:
+        return 2 * self.segments * self.steps
 
     def mesh(self) -> Mesh:
         profile = smooth_curve(np.array(self.profile_mm, float), self.steps)
@@ -157,8 +180,11 @@ class BoxGrid(Shape):
     box_mm: PositiveFloat
     jitter: Annotated[float, Field(ge=0, le=1)] = 0.0
     grow: Annotated[float, Field(ge=0)] = 0.0
-    tiles: PositiveInt = 1
+    tiles: Annotated[int, Field(ge=1, le=4096)] = 1
     seed: Annotated[int, Field(ge=0)] = 0
+
+    def triangles(self) -> int:
+        return 12 * math.prod(self.count)
 
     def mesh(self) -> Mesh:
         generator = np.random.default_rng(self.seed)
