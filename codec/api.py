@@ -13,8 +13,9 @@ from ii_core import IIPicture
 from ii_core.camera import whole_pair
 
 from . import container, file_header
+from .checks import check_type, whole
 from .coders.clock import cpu_seconds
-from .contract import MAX_PIXELS, Goal, Value, check_picture, checked_goal, find, parse_scheme
+from .contract import MAX_DECODED_PIXELS, MAX_PIXELS, Goal, Value, check_picture, checked_goal, find, parse_scheme
 from .rate import within
 
 
@@ -96,9 +97,12 @@ class Encoded:
 
         Raises
         ------
+        TypeError
+            If ``path`` is no path.
         OSError
             If it cannot be written.
         """
+        check_type("path", path, (str, os.PathLike), "a path")
         container.write(path, file_header.values(self), self.payload)
 
     @classmethod
@@ -112,6 +116,7 @@ class Encoded:
         OSError
             If it cannot be read.
         """
+        check_type("path", path, (str, os.PathLike), "a path")
         header, payload = container.read(path)
         try:
             return _from_file(header, payload)
@@ -211,31 +216,47 @@ class Decoding:
     codec_seconds: float
 
 
-def decode(coded: Encoded | str | os.PathLike[str]) -> IIPicture:
-    """The picture of a coded one, or of an ``.ii`` file, with its structure and camera.
+def decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = MAX_DECODED_PIXELS) -> IIPicture:
+    """Decode a coded picture or an ``.ii`` file, with its structure and camera.
+
+    Parameters
+    ----------
+    coded : Encoded or path
+    max_pixels : int
+        Pixels of the largest picture to decode. It bounds the memory that a forged file can take: up to 10 bytes a
+        pixel, with SPERR 22. 2²⁷ by default, 2³¹ at most.
 
     Raises
     ------
+    TypeError
+        If ``coded`` is neither a coded picture nor a path.
     ValueError
-        If the bytes are not a whole coded picture.
+        If the bytes are not a whole coded picture, or the picture has more than ``max_pixels``.
     OSError
         If the file cannot be read.
     """
-    return timed_decode(coded).picture
+    return timed_decode(coded, max_pixels=max_pixels).picture
 
 
-def timed_decode(coded: Encoded | str | os.PathLike[str]) -> Decoding:
+def timed_decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = MAX_DECODED_PIXELS) -> Decoding:
     """`decode`, with its cost."""
     started = cpu_seconds()
+    check_type("coded", coded, (Encoded, str, os.PathLike), "a coded picture or a path")
     path = None
     if not isinstance(coded, Encoded):
         path, coded = os.fspath(coded), Encoded.load(coded)
+    name = path or "the coded picture"
     coder = find(coded.scheme)
     blank = blank_picture(coded.structure, coded.dtype)
+    width, height = blank.size
+    if width * height > whole("max_pixels", max_pixels, 1, MAX_PIXELS):
+        raise ValueError(
+            f"{name} has {width}×{height} pixels: at most {max_pixels} are decoded, max_pixels allows more"
+        )
     try:
         pixels, codec_seconds = coder.decode(coded.payload, blank, coded.options)
     except ValueError as error:
-        raise ValueError(f"{path or 'the coded picture'} is damaged: {error}") from None
+        raise ValueError(f"{name} is damaged: {error}") from None
     picture = blank.with_pixels(pixels)
     return Decoding(picture=picture, seconds=cpu_seconds() - started, codec_seconds=codec_seconds)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import operator
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,14 +14,18 @@ from numpy.typing import NDArray
 
 from ii_core import IIPicture
 
+from .checks import check_type
 from .rate import Run
 
 Value = int | float | str
 Options = Mapping[str, Value]
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Six gigabytes of pixels; whatever claims more is taken for damage or mischief.
+# Pixels of a picture: six gigabytes.
 MAX_PIXELS = 1 << 31
+# Pixels of a picture that is decoded without an explicit limit: 16384×8192, four times the full setup 1. Decoders
+# take up to 10 bytes a pixel, SPERR 22 (docs/structure.md, cost).
+MAX_DECODED_PIXELS = 1 << 27
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,7 +166,8 @@ def register(coder: Coder) -> None:
 
 
 def find(name: str) -> Coder:
-    """The coder of a name, or a ValueError that lists the known."""
+    """Return the coder of a name; for an unknown one raise ValueError with the known."""
+    check_type("scheme", name, str, "a name")
     if name not in _CODERS:
         raise ValueError(f"unknown scheme {name!r}: known are {', '.join(sorted(_CODERS))}")
     return _CODERS[name]
@@ -252,7 +257,7 @@ def checked_goal(coder: Coder, options: Options, bpp: Any, qp: Any, quality: Any
         told = " and ".join(f"{name} is {given.get(name)}" for name in known)
         raise ValueError(f"{told}: {exactly} is needed")
     if bpp is not None:
-        if not is_number(bpp) or not 0 < bpp < math.inf:
+        if not is_number(bpp) or not 0 < bpp <= sys.float_info.max:
             raise ValueError(f"bpp is {bpp!r}: a positive number is needed")
         return Goal(bpp=float(bpp))
     for name, value, bounds in (("qp", qp, coder.qp_range), ("quality", quality, coder.quality_range)):

@@ -7,6 +7,12 @@ import json
 import subprocess
 import sys
 
+import numpy as np
+import pytest
+
+from codec import decode, encode
+from ii_core import IIPicture
+
 SCRIPT = """
 import json, resource, sys, time
 from dataclasses import replace
@@ -48,3 +54,75 @@ def test_claims_are_refused_fast_and_small():
     assert len(results) >= 6 * 4
     wrong = [result for result in results if result[3] != "refused" or result[4] > 1]
     assert wrong == []
+
+
+FORGED = """
+import io, resource, sys, time
+from pathlib import Path
+import numpy as np
+from codec import Encoded, decode, encode
+from ii_core import IIPicture
+
+side, path = int(sys.argv[2]), sys.argv[3]
+asked = {"bpp": 1} if sys.argv[1] == "jpeg2000" else {"quality": 5}
+coded = encode(IIPicture(np.zeros((64, 64, 3), np.uint8), (8, 8), (8, 8)), sys.argv[1], **asked)
+small, large = (64).to_bytes(4, "big"), side.to_bytes(4, "big")
+payload = coded.payload
+if sys.argv[1] == "jpeg":
+    at = payload.index(b"\\xff\\xc2") + 5
+    payload = payload[:at] + 2 * large[2:] + payload[at + 4 :]
+else:
+    assert payload.count(small) == 4
+    payload = payload.replace(small, large)
+structure = coded.structure | {"lenses": [side // 8, side // 8]}
+Encoded(scheme=coded.scheme, options=coded.options, payload=payload, structure=structure).save(path)
+assert Path(path).stat().st_size < 1500
+room = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + (1 << 28)
+resource.setrlimit(resource.RLIMIT_AS, (room, room))
+started = time.process_time()
+try:
+    decode(path)
+except ValueError as error:
+    print(error)
+assert time.process_time() - started < 1
+"""
+
+
+@pytest.mark.parametrize(
+    ("scheme", "side", "said"),
+    [
+        ("jpeg", 32000, "at most 134217728 are decoded, max_pixels allows more"),
+        ("jpeg", 8000, "cannot hold 8000×8000 pixels"),
+        ("jpeg2000", 32000, "at most 134217728 are decoded, max_pixels allows more"),
+    ],
+)
+def test_forged_streams_that_agree_with_a_forged_structure_are_refused_small(scheme, side, said, tmp_path):
+    """The test above forges the structure alone, so that streams gave claims away by their own size."""
+    path = str(tmp_path / "forged.ii")
+    done = subprocess.run(
+        [sys.executable, "-c", FORGED, scheme, str(side), path],
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert said in done.stdout
+
+
+def test_larger_pictures_decode_by_an_explicit_limit(run, tmp_path):
+    picture = IIPicture(np.zeros((64, 64, 3), np.uint8), (8, 8), (8, 8))
+    coded = encode(picture, "jpeg", quality=50)
+    with pytest.raises(ValueError, match=r"has 64×64 pixels: at most 4095 are decoded, max_pixels allows more"):
+        decode(coded, max_pixels=4095)
+    assert decode(coded, max_pixels=4096).size == (64, 64)
+    coded.save(tmp_path / "x.ii")
+    code, _, err = run("decode", tmp_path / "x.ii", "-o", tmp_path / "x.png", "--max-pixels", "4095")
+    assert code == 2 and "at most 4095 are decoded" in err
+    assert run("decode", tmp_path / "x.ii", "-o", tmp_path / "x.png", "--max-pixels", "4096")[0] == 0
+
+
+@pytest.mark.parametrize("chroma", ["444", "420"])
+def test_the_least_that_jpeg_writes_is_taken(chroma):
+    picture = IIPicture(np.zeros((1024, 1024, 3), np.uint8), (64, 64), (16, 16))
+    assert decode(encode(picture, f"jpeg:chroma={chroma}", quality=1)).pixels.max() <= 1  # a rounding of colour

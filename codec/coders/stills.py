@@ -117,6 +117,8 @@ class Jpeg(Still):
     scale_about = "libjpeg's quality"
     search: ClassVar[dict[str, Any]] = {"low": 1.0, "high": 100.0, "start": 20.0, "octave": 25.0}
     max_side = 65500  # libjpeg's
+    # Every block has a DC coefficient of at least a bit: six blocks in 16×16 pixels at 4:2:0.
+    pixels_a_byte = 8 * 256 // 6
 
     @property
     def versions(self) -> dict[str, str]:
@@ -142,6 +144,9 @@ class Jpeg(Still):
         return out.getvalue()
 
     def _decoded(self, payload: bytes, blank: IIPicture, options: Options) -> Pixels:
+        width, height = blank.size
+        if len(payload) * self.pixels_a_byte < width * height:
+            raise ValueError(f"its JPEG stream of {len(payload)} bytes cannot hold {width}×{height} pixels")
         try:
             with JpegImageFile(io.BytesIO(payload)) as image:
                 if image.size != blank.size or image.mode != "RGB":

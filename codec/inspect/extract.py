@@ -36,6 +36,7 @@ from av.bitstream import BitStreamFilterContext
 from ii_core.files import atomic_path
 
 from ..api import Encoded
+from ..checks import check_type
 from ..coders.video import Video, decoder_of, open_encoder
 from ..contract import find
 from .random_access import DEMUXERS, Sequence, sequence
@@ -111,11 +112,15 @@ def extract(coded: Encoded, path: str | os.PathLike[str]) -> Extracted:
 
     Raises
     ------
+    TypeError
+        If an argument is of the wrong type.
     ValueError
         If the scheme's stream does not go into such a file, or is damaged.
     OSError
         If it cannot be written.
     """
+    check_type("coded", coded, Encoded, "a coded picture")
+    check_type("path", path, (str, os.PathLike), "a path")
     path = Path(path)
     suffix, allowed = path.suffix.lower(), suffixes(coded)
     if suffix not in allowed:

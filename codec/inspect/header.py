@@ -16,8 +16,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ii_core import IIPicture
+from ii_core.camera import whole_pair
 
 from ..api import Encoded, encode
+from ..checks import check_type
 from ..contract import find
 
 Pair = tuple[int, int]
@@ -64,6 +66,7 @@ def parts(coded: Encoded) -> Parts:
     ValueError
         If the scheme's stream is of a kind that is not taken apart, or it is damaged.
     """
+    check_type("coded", coded, Encoded, "a coded picture")
     kind = coded.scheme.rpartition("-")[2]
     if kind not in _TAKE_APART:
         known = ", ".join(_TAKE_APART)
@@ -121,13 +124,14 @@ def floor(scheme: str, lenses: Pair, ei_pixels: Pair) -> Floor:
     ----------
     Olsson 2008, §5.5.3.
     """
-    (k, l), (u, v) = lenses, ei_pixels
+    (k, l), (u, v) = whole_pair("lenses", lenses), whole_pair("ei_pixels", ei_pixels)
     black = IIPicture(np.zeros((l * v, k * u, 3), np.uint8), lenses, ei_pixels)
     return Floor(scheme=scheme, lenses=black.lenses, ei_pixels=black.ei_pixels, coded=coarsest(black, scheme))
 
 
 def coarsest(picture: IIPicture, scheme: str) -> Encoded:
     """A picture at the coarsest quantiser, the worst quality or, if neither can be asked for, the least rate."""
+    check_type("scheme", scheme, str, "a name")
     coder = find(scheme.partition(":")[0])
     if coder.qp_range is not None:
         return encode(picture, scheme, qp=coder.qp_range[1])

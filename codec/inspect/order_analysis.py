@@ -18,6 +18,7 @@ from ii_core import IIPicture
 from ii_core.component import KINDS
 from ii_core.jit import kernel
 
+from ..checks import check_type, texts
 from ..frames import layout
 from ..order import ORDERS, selection_order
 
@@ -97,6 +98,8 @@ def analyse_orders(
 
     Raises
     ------
+    TypeError
+        If an argument is of the wrong type.
     ValueError
         If a kind or an order is unknown, or the structure is not regular.
 
@@ -104,6 +107,8 @@ def analyse_orders(
     ----------
     Olsson 2008, (5.3)–(5.7), §5.5.2.
     """
+    check_type("picture", picture, IIPicture, "an IIPicture")
+    kinds, orders = texts("kinds", kinds), texts("orders", orders)
     picture.check_regular()
     flat = np.ascontiguousarray(picture.pixels).reshape(-1, 3)
     middle = float(np.rint(np.mean(picture.pixels[:: max(1, picture.size[1] // 64)], dtype=np.float64)))

@@ -19,9 +19,10 @@ import numpy as np
 from ..api import Encoded, blank_picture
 from ..bitstream import framing
 from ..bitstream.obu import temporal_units
+from ..checks import check_type, whole_pair
 from ..coders import video
 from ..coders.video import Video
-from ..contract import Options, Pixels, find
+from ..contract import MAX_DECODED_PIXELS, Options, Pixels, find
 from ..frames import Film
 from ..order import inverse, selection_order
 
@@ -76,10 +77,15 @@ def sequence(coded: Encoded) -> Sequence:
     ValueError
         If the scheme codes no pseudo video sequence, or the stream does not hold as many packets as frames.
     """
+    check_type("coded", coded, Encoded, "a coded picture")
     coder = find(coded.scheme)
     if not isinstance(coder, Video):
         raise ValueError(f"scheme {coded.scheme} codes the picture as a whole: it has no frames to be had alone")
     film = coder.film(blank_picture(coded.structure, coded.dtype), coded.options)
+    if film.width * film.height > MAX_DECODED_PIXELS:
+        raise ValueError(
+            f"frames have {film.width}×{film.height} pixels: at most {MAX_DECODED_PIXELS} are decoded alone"
+        )
     first = b""
     try:
         if coder.framed:
@@ -115,12 +121,16 @@ def decode_frame(coded: Encoded, index: int) -> Pixels:
 
     Raises
     ------
+    TypeError
+        If an argument is of the wrong type.
     ValueError
         If there is no such frame, the scheme codes no frames, or the stream is damaged.
     """
+    check_type("coded", coded, Encoded, "a coded picture")
+    check_type("index", index, (int, np.integer), "a whole number")
     stream = sequence(coded)
     if isinstance(index, bool) or not 0 <= index < len(stream.packets):
-        raise ValueError(f"frame {index} is asked for: there are {len(stream.packets)}, from 0")
+        raise ValueError(f"frame index {index} is asked for: there are {len(stream.packets)}, from 0")
     start, stop = stream.group(index)
     part = stream.packets[start:stop]
     film = replace(stream.film, layout=replace(stream.film.layout, rows=1, cols=len(part)))
@@ -154,9 +164,10 @@ def decode_component(coded: Encoded, place: tuple[int, int]) -> Pixels:
     ValueError
         As `decode_frame`; or if there is no such component image.
     """
+    check_type("coded", coded, Encoded, "a coded picture")
+    col, row = whole_pair("place", place)
     stream = sequence(coded)
     layout = stream.film.layout
-    col, row = place
     if not (0 <= row < layout.rows and 0 <= col < layout.cols):
         raise ValueError(f"component image {place} is asked for: there are {layout.cols}×{layout.rows}, from (0, 0)")
     order = selection_order(stream.film.order, layout.rows, layout.cols, stream.film.by)

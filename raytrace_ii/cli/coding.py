@@ -61,10 +61,14 @@ def decode(
         str | None,
         typer.Option(help="Only one component image, without the rest: u,v of SIs, k,l of EIs, v,l of RIs."),
     ] = None,
+    max_pixels: Annotated[
+        int | None, typer.Option(help="Pixels of the largest picture to decode, 2^27 if not given; bounds memory.")
+    ] = None,
     force: Force = False,
 ) -> None:
     """Decode an II-picture, or one component image of it."""
     from codec import Encoded, decode, decode_component
+    from codec.contract import MAX_DECODED_PIXELS
     from ii_core.files import check_file, write_image
 
     check_file(coded)
@@ -73,7 +77,7 @@ def decode(
     check_outputs(files(output, stream.dtype), force)
     with spinner(f"decode {coded.name}"):
         if component is None:
-            decode(stream).save(output)
+            decode(stream, max_pixels=MAX_DECODED_PIXELS if max_pixels is None else max_pixels).save(output)
         else:
             write_image(output, decode_component(stream, _place(component)))
 
