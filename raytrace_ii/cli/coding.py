@@ -68,7 +68,6 @@ def decode(
 ) -> None:
     """Decode an II-picture, or one component image of it."""
     from codec import Encoded, decode, decode_component
-    from codec.contract import MAX_DECODED_PIXELS
     from ii_core.files import check_file, write_image
 
     check_file(coded)
@@ -77,7 +76,8 @@ def decode(
     check_outputs(files(output, stream.dtype), force)
     with spinner(f"decode {coded.name}"):
         if component is None:
-            decode(stream, max_pixels=MAX_DECODED_PIXELS if max_pixels is None else max_pixels).save(output)
+            limit = {} if max_pixels is None else {"max_pixels": max_pixels}
+            decode(stream, **limit).save(output)
         else:
             write_image(output, decode_component(stream, _place(component)))
 
