@@ -3,6 +3,7 @@
 from .api import Encoded, decode, encode, timed_decode
 from .coders.ffv1 import Ffv1
 from .coders.jpeg2000 import Jpeg2000
+from .coders.lf.coder import LightField
 from .coders.libaom import Avif
 from .coders.mpeg2 import Mpeg2
 from .coders.sperr.coder import Sperr
@@ -27,6 +28,7 @@ for _kind in ("ei", "si", "ri"):
 register(Separate("si"))
 register(Sperr("si"))
 register(Avif("si"))
+register(LightField())
 
 __all__ = [
     "Encoded",

@@ -1,0 +1,209 @@
+"""Adaptive binary arithmetic coding: one function for both directions.
+
+`code_bit` writes a bit or reads one, by the direction of the coder it is given, so that each syntax element is
+written down once for encoder and decoder.
+
+A context holds two probabilities of a one in units of 2^-16, which follow the bits at two rates, and the number of
+bits seen. Their mean is used. The range coder is that of LZMA (Pavlov) with 40 bits of range instead of 32: bytes
+leave from the top, a carry runs through those that wait.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .jit import inner, lean
+
+LOW, RANGE, CACHE, WAITING, AT, DECODING, CODE, RAW_BITS = range(8)
+FULL = (1 << 40) - 1
+LEAST_RANGE = 1 << 32
+ONE = 1 << 16
+LEAST = 48  # of a probability: 0.001 bit
+FAST, SLOW, SEEN = 16, 140, 255  # the rates' limits as 1/n
+BEYOND = 16  # bytes a decoder may read past the end: the encoder drops zeros there
+
+_N = np.arange(SEEN + 1)
+RATES = np.stack(
+    [np.rint(ONE * np.maximum(1 / (_N + 1.6), 1 / limit)).astype(np.int64) for limit in (FAST, SLOW)], axis=1
+)
+# Cost in bits of an event of probability i / 4096.
+COSTS = -np.log2(np.maximum(np.arange(4097), 0.5) / 4096).astype(np.float32)
+
+
+class Arithmetic(NamedTuple):
+    """State of a coder: contexts (C, 3), registers and bytes."""
+
+    contexts: Any
+    state: Any
+    data: Any
+
+
+def new_contexts(count: int) -> NDArray[np.int32]:
+    """Contexts that have seen nothing."""
+    contexts = np.zeros((count, 3), np.int32)
+    contexts[:, :2] = ONE // 2
+    return contexts
+
+
+def writer(contexts: NDArray[np.int32], capacity: int) -> Arithmetic:
+    """A coder that writes at most so many bytes; `finish` gives them."""
+    state = np.zeros(8, np.int64)
+    state[RANGE], state[WAITING] = FULL, 1
+    return Arithmetic(contexts, state, np.zeros(capacity, np.uint8))
+
+
+def enlarged(coder: Arithmetic, capacity: int) -> Arithmetic:
+    """The same coder with room for so many bytes more."""
+    if coder.data.size - coder.state[AT] - coder.state[WAITING] >= capacity:
+        return coder
+    data = np.zeros(2 * coder.data.size + capacity, np.uint8)
+    data[: coder.data.size] = coder.data
+    return coder._replace(data=data)
+
+
+def reader(contexts: NDArray[np.int32], data: bytes) -> Arithmetic:
+    """A coder that reads bytes, and zeros after them."""
+    state = np.zeros(8, np.int64)
+    state[RANGE], state[DECODING], state[AT] = FULL, 1, 5
+    state[CODE] = int.from_bytes(data[:5].ljust(5, b"\0"), "big")
+    return Arithmetic(contexts, state, np.array(np.frombuffer(data, np.uint8)))
+
+
+def finish(coder: Arithmetic) -> bytes:
+    """The bytes written: so few that the decoder, which reads zeros after them, stays within the range."""
+    low, size = int(coder.state[LOW]), int(coder.state[RANGE])
+    for zeros in range(40, -1, -1):
+        value = -(-low >> zeros) << zeros
+        if value < low + size:
+            break
+    coder.state[LOW] = value
+    for _ in range(6):
+        _shift(coder)
+    # The first byte is the carry's place, always zero.
+    return coder.data[1 : int(coder.state[AT])].tobytes().rstrip(b"\0")
+
+
+def overrun(coder: Arithmetic) -> bool:
+    """Whether a decoder has read further than the encoder can have written."""
+    return bool(coder.state[AT] > coder.data.size + BEYOND)
+
+
+@lean
+def _shift(coder):
+    """Move the top byte out, with what waits for a carry."""
+    state, data = coder.state, coder.data
+    low = state[LOW]
+    if low < 0xFF00000000 or low > FULL:
+        carry = low >> 40
+        at = state[AT]
+        byte = state[CACHE]
+        for _ in range(state[WAITING]):
+            data[at] = (byte + carry) & 255
+            at += 1
+            byte = 255
+        state[AT] = at
+        state[WAITING] = 0
+        state[CACHE] = (low >> 32) & 255
+    state[WAITING] += 1
+    state[LOW] = (low & 0xFFFFFFFF) << 8
+
+
+@inner
+def _normalise(coder):
+    state = coder.state
+    while state[RANGE] < LEAST_RANGE:
+        state[RANGE] <<= 8
+        if state[DECODING]:
+            at = state[AT]
+            state[CODE] <<= 8
+            if at < coder.data.size:
+                state[CODE] |= np.int64(coder.data[at])
+            state[AT] = at + 1
+        else:
+            _shift(coder)
+
+
+@inner
+def probability(contexts, context):
+    """Of a one, in units of 2^-16."""
+    p = (np.int64(contexts[context, 0]) + np.int64(contexts[context, 1])) >> 1
+    return min(max(p, LEAST), ONE - LEAST)
+
+
+@inner
+def bit_cost(contexts, context, bit):
+    """Bits that a bit would take."""
+    p = (probability(contexts, context) + 8) >> 4
+    return COSTS[p] if bit else COSTS[4096 - p]
+
+
+@lean
+def code_bit(coder, context, bit):
+    """Write or read a bit in a context, which learns it; return it."""
+    state, contexts = coder.state, coder.contexts
+    split = (state[RANGE] >> 16) * probability(contexts, context)
+    if state[DECODING]:
+        bit = 1 if state[CODE] < split else 0
+        if not bit:
+            state[CODE] -= split
+    elif not bit:
+        state[LOW] += split
+    state[RANGE] = split if bit else state[RANGE] - split
+    _normalise(coder)
+    seen = contexts[context, 2]
+    target = ONE if bit else 0
+    for rate in range(2):
+        p = np.int64(contexts[context, rate])
+        contexts[context, rate] = p + (((target - p) * RATES[seen, rate]) >> 16)
+    if seen < SEEN:
+        contexts[context, 2] = seen + 1
+    return bit
+
+
+@lean
+def code_raw(coder, bit):
+    """Write or read a bit of even odds."""
+    state = coder.state
+    half = state[RANGE] >> 1
+    if state[DECODING]:
+        bit = 1 if state[CODE] < half else 0
+        if not bit:
+            state[CODE] -= half
+    elif not bit:
+        state[LOW] += half
+    state[RANGE] = half if bit else state[RANGE] - half
+    _normalise(coder)
+    return bit
+
+
+MOST_DIGITS = 24
+
+
+@lean
+def code_number(coder, first, count, order, value):
+    """Write or read a number from 0 up: an Exp-Golomb code whose prefix has contexts first … first + count - 1."""
+    total = value + (1 << order)
+    digits = order
+    while digits < MOST_DIGITS:
+        if not code_bit(coder, first + min(digits - order, count - 1), 1 if total >> (digits + 1) else 0):
+            break
+        digits += 1
+    found = 1
+    for place in range(digits - 1, -1, -1):
+        found = 2 * found + code_raw(coder, (total >> place) & 1)
+    return found - (1 << order)
+
+
+@lean
+def number_cost(contexts, first, count, order, value):
+    """Bits that `code_number` would take."""
+    total = value + (1 << order)
+    bits = np.float32(0)
+    digits = order
+    while total >> (digits + 1):
+        bits += bit_cost(contexts, first + min(digits - order, count - 1), 1)
+        digits += 1
+    return bits + bit_cost(contexts, first + min(digits - order, count - 1), 0) + np.float32(digits)

@@ -1,0 +1,506 @@
+"""Blocks of a view: a quadtree from 32 to 4 samples, three kinds of prediction, and a residual.
+
+A block is predicted by *synthesis* (the picture the decoder makes of other views by itself, `synthesis`), by an
+*explicit* disparity between the view and up to four others, or from its surroundings (`intra`).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import contexts as at
+from .arithmetic import DECODING, Arithmetic, bit_cost, code_bit, code_number, code_raw, number_cost
+from .coefficients import code_coefficients, dequantise
+from .intra import MODES, SMOOTH, fill_border, predict_intra
+from .jit import kernel, lean
+from .transform import LARGEST, inverse
+from .warp import moved_block
+
+LOG_LARGEST, LOG_LEAST = 5, 2
+INTRA, EXPLICIT, SYNTHESIS = 0, 1, 2
+MOST_REFERENCES = 4
+LIMIT = 8191  # of a decoded sample's magnitude, in eighths of an 8-bit code
+MOST_INDEX = 1 << 14
+# What is known of each 4×4.
+KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, FIELDS = range(8)
+
+
+class Job(NamedTuple):
+    """A view to be coded or decoded.
+
+    Parameters
+    ----------
+    views : ndarray of int16, (J, 3, H, W)
+        Decoded views; sides are multiples of 4.
+    at : int
+        Which of them this is.
+    references : ndarray of int64, (R, 3)
+        Views to predict from: index, and how far each is, in columns and rows of the grid; R ≤ 4.
+    unit : int
+        Disparity of an index of 1, in 2^-8 samples between neighbouring views.
+    low, high : int
+        Range of the index.
+    made : ndarray of int16, (3, H, W)
+        The synthesised view, if ``synthesised``.
+    disparity : ndarray of int16, (H, W)
+        That of the synthesis, in 2^-8 samples between neighbouring views.
+    synthesised : int
+    step : int
+        Of the quantiser, in 2^-7 of an 8-bit code.
+    blocks : ndarray of int16, (FIELDS, H / 4, W / 4)
+    levels : ndarray of int16, (3, H, W)
+        The encoder's quantised coefficients.
+    """
+
+    views: Any
+    at: Any
+    references: Any
+    unit: Any
+    low: Any
+    high: Any
+    made: Any
+    disparity: Any
+    synthesised: Any
+    step: Any
+    blocks: Any
+    levels: Any
+
+
+class Work(NamedTuple):
+    """Memory for one block."""
+
+    predicted: Any
+    block: Any
+    half: Any
+    coefficients: Any
+    levels: Any
+    border: Any
+    rows: Any
+
+
+def new_work() -> Work:
+    """Memory for one block."""
+    square = (LARGEST, LARGEST)
+    return Work(
+        predicted=np.zeros((3, *square), np.int32),
+        block=np.zeros(square, np.int32),
+        half=np.zeros(square, np.int32),
+        coefficients=np.zeros(square, np.int32),
+        levels=np.zeros(square, np.int32),
+        border=np.zeros((2, 2 * LARGEST + 1), np.int32),
+        rows=np.zeros((LARGEST + 5, LARGEST), np.int32),
+    )
+
+
+def new_blocks(height: int, width: int) -> np.ndarray[Any, Any]:
+    """Nothing known yet."""
+    return np.zeros((FIELDS, height // 4, width // 4), np.int16)
+
+
+@lean
+def neighbours(blocks, field, value, by, bx):
+    """How many of the blocks above and left have a value."""
+    count = 0
+    if by > 0 and blocks[field, by - 1, bx] == value:
+        count += 1
+    if bx > 0 and blocks[field, by, bx - 1] == value:
+        count += 1
+    return count
+
+
+@lean
+def split_context(blocks, by, bx, log):
+    """By how many of the blocks above and left are smaller."""
+    count = 0
+    if by > 0 and blocks[LOG, by - 1, bx] < log:
+        count += 1
+    if bx > 0 and blocks[LOG, by, bx - 1] < log:
+        count += 1
+    return at.SPLIT + (log - 3) * 3 + count
+
+
+@lean
+def synthesis_context(blocks, by, bx, log):
+    """By size, and how many of the blocks above and left are synthesised."""
+    return at.SYNTHESIS + (log - 2) * 3 + neighbours(blocks, np.int64(KIND), np.int64(SYNTHESIS), by, bx)
+
+
+@lean
+def residual_context(blocks, by, bx, log, kind):
+    """By size, kind, and how many of the blocks above and left have a residual."""
+    other = 0 if kind == SYNTHESIS else 1
+    return at.RESIDUAL + ((log - 2) * 2 + other) * 3 + neighbours(blocks, np.int64(CODED), np.int64(1), by, bx)
+
+
+@lean
+def coded_context(plane, log, kind, first):
+    """By plane, size, kind, and whether the first plane has a residual."""
+    return at.CODED + ((plane * 4 + log - 2) * 2 + (1 if kind == INTRA else 0)) * 2 + first
+
+
+@lean
+def guesses(job, by, bx, log):
+    """Indices that the synthesis and the blocks left and above suggest; below the range where there is none."""
+    none = job.low - 1
+    made = left = above = none
+    if job.synthesised:
+        half = (1 << log) >> 1
+        d = np.int64(job.disparity[by * 4 + half, bx * 4 + half])
+        made = min(max((2 * d + job.unit) // (2 * job.unit), job.low), job.high)
+    if bx > 0 and job.blocks[KIND, by, bx - 1] == EXPLICIT:
+        left = np.int64(job.blocks[INDEX, by, bx - 1])
+    if by > 0 and job.blocks[KIND, by - 1, bx] == EXPLICIT:
+        above = np.int64(job.blocks[INDEX, by - 1, bx])
+    return made, left, above
+
+
+@lean
+def expected_mask(job, by, bx):
+    """The references of the block left or above, or all."""
+    if bx > 0 and job.blocks[KIND, by, bx - 1] == EXPLICIT:
+        return np.int64(job.blocks[MASK, by, bx - 1])
+    if by > 0 and job.blocks[KIND, by - 1, bx] == EXPLICIT:
+        return np.int64(job.blocks[MASK, by - 1, bx])
+    return (1 << job.references.shape[0]) - 1
+
+
+@lean
+def likely_directions(blocks, by, bx):
+    """Two intra modes, from the blocks left and above."""
+    first = np.int64(blocks[DIRECTION, by, bx - 1]) if bx > 0 else SMOOTH
+    second = np.int64(blocks[DIRECTION, by - 1, bx]) if by > 0 else 0
+    if second == first:
+        second = 0 if first else SMOOTH
+    return first, second
+
+
+@lean
+def code_kind(coder, job, by, bx, log, kind, index, mask, direction):
+    """Write or read how a block is predicted; return kind, index, mask and direction."""
+    blocks, count = job.blocks, job.references.shape[0]
+    if count == 0:
+        kind = INTRA
+    else:
+        made = 0
+        if job.synthesised:
+            made = code_bit(coder, synthesis_context(blocks, by, bx, log), 1 if kind == SYNTHESIS else 0)
+        if made:
+            kind = SYNTHESIS
+        else:
+            context = at.INTRA + neighbours(blocks, np.int64(KIND), np.int64(INTRA), by, bx)
+            kind = INTRA if code_bit(coder, context, 1 if kind == INTRA else 0) else EXPLICIT
+    if kind == SYNTHESIS:
+        index = guesses(job, by, bx, log)[0]
+    elif kind == INTRA:
+        first, second = likely_directions(blocks, by, bx)
+        if code_bit(coder, np.int64(at.INTRA_MODE), 1 if direction == first else 0):
+            direction = first
+        elif code_bit(coder, np.int64(at.INTRA_MODE + 1), 1 if direction == second else 0):
+            direction = second
+        elif code_bit(coder, np.int64(at.INTRA_MODE + 2), 1 if direction <= SMOOTH else 0):
+            direction = code_raw(coder, direction)
+        else:
+            direction = _code_direction(coder, direction)
+    else:
+        index = _code_index(coder, job, by, bx, log, index)
+        mask = _code_mask(coder, job, by, bx, mask) if count > 1 else 1
+    return kind, index, mask, direction
+
+
+@lean
+def _code_direction(coder, direction):
+    """34 directions: 30 of five bits, the last 4 of six."""
+    value = direction - 2
+    long = value >= 30
+    head = 30 + ((value - 30) >> 1) if long else value
+    found = 0
+    for place in range(4, -1, -1):
+        found = 2 * found + code_raw(coder, (head >> place) & 1)
+    if found >= 30:
+        found = 30 + 2 * (found - 30) + code_raw(coder, (value - 30) & 1)
+    return min(found, 33) + 2
+
+
+@lean
+def _code_index(coder, job, by, bx, log, index):
+    made, left, above = guesses(job, by, bx, log)
+    none = job.low - 1
+    if made > none and code_bit(coder, np.int64(at.MERGE), 1 if index == made else 0):
+        return made
+    if left > none and left != made and code_bit(coder, np.int64(at.MERGE + 1), 1 if index == left else 0):
+        return left
+    new = above > none and above != made and above != left
+    if new and code_bit(coder, np.int64(at.MERGE + 2), 1 if index == above else 0):
+        return above
+    base = left if left > none else (above if above > none else (made if made > none else 0))
+    size = code_number(coder, np.int64(at.DELTA), np.int64(14), np.int64(1), abs(index - base))
+    if size:
+        size = -size if code_bit(coder, np.int64(at.DELTA + 14), 1 if index < base else 0) else size
+    return min(max(base + size, job.low), job.high)
+
+
+@lean
+def _code_mask(coder, job, by, bx, mask):
+    expected = expected_mask(job, by, bx)
+    if code_bit(coder, np.int64(at.SAME_MASK), 1 if mask == expected else 0):
+        return expected
+    count = job.references.shape[0]
+    found = 0
+    for i in range(count):
+        if i == count - 1 and found == 0:
+            found = 1 << i
+        else:
+            context = at.MASK + ((count - 1) * 4 + i) * 2 + (1 if found else 0)
+            found |= code_bit(coder, context, (mask >> i) & 1) << i
+    return found
+
+
+@lean
+def kind_cost(contexts, job, by, bx, log, kind, index, mask, direction):
+    """Bits that `code_kind` would take."""
+    blocks, count = job.blocks, job.references.shape[0]
+    bits = np.float32(0)
+    if count and job.synthesised:
+        bits += bit_cost(contexts, synthesis_context(blocks, by, bx, log), 1 if kind == SYNTHESIS else 0)
+    if count and kind != SYNTHESIS:
+        context = at.INTRA + neighbours(blocks, np.int64(KIND), np.int64(INTRA), by, bx)
+        bits += bit_cost(contexts, context, 1 if kind == INTRA else 0)
+    if kind == INTRA:
+        first, second = likely_directions(blocks, by, bx)
+        bits += bit_cost(contexts, np.int64(at.INTRA_MODE), 1 if direction == first else 0)
+        if direction != first:
+            bits += bit_cost(contexts, np.int64(at.INTRA_MODE + 1), 1 if direction == second else 0)
+            if direction != second:
+                bits += bit_cost(contexts, np.int64(at.INTRA_MODE + 2), 1 if direction <= SMOOTH else 0)
+                bits += np.float32(1) if direction <= SMOOTH else np.float32(5.1)
+    elif kind == EXPLICIT:
+        bits += _index_cost(contexts, job, by, bx, log, index)
+        if count > 1:
+            bits += mask_cost(contexts, job, by, bx, mask)
+    return bits
+
+
+@lean
+def _index_cost(contexts, job, by, bx, log, index):
+    made, left, above = guesses(job, by, bx, log)
+    none = job.low - 1
+    bits = np.float32(0)
+    if made > none:
+        bits += bit_cost(contexts, np.int64(at.MERGE), 1 if index == made else 0)
+        if index == made:
+            return bits
+    if left > none and left != made:
+        bits += bit_cost(contexts, np.int64(at.MERGE + 1), 1 if index == left else 0)
+        if index == left:
+            return bits
+    if above > none and above != made and above != left:
+        bits += bit_cost(contexts, np.int64(at.MERGE + 2), 1 if index == above else 0)
+        if index == above:
+            return bits
+    base = left if left > none else (above if above > none else (made if made > none else 0))
+    bits += number_cost(contexts, np.int64(at.DELTA), np.int64(14), np.int64(1), abs(index - base))
+    if index != base:
+        bits += bit_cost(contexts, np.int64(at.DELTA + 14), 1 if index < base else 0)
+    return bits
+
+
+@lean
+def mask_cost(contexts, job, by, bx, mask):
+    """Bits that a set of references would take."""
+    same = mask == expected_mask(job, by, bx)
+    bits = bit_cost(contexts, np.int64(at.SAME_MASK), 1 if same else 0)
+    if same:
+        return bits
+    count = job.references.shape[0]
+    found = 0
+    for i in range(count):
+        bit = (mask >> i) & 1
+        if i < count - 1 or found:
+            bits += bit_cost(contexts, at.MASK + ((count - 1) * 4 + i) * 2 + (1 if found else 0), bit)
+        found |= bit
+    return bits
+
+
+@lean
+def predict_explicit(job, work, y0, x0, n, index, mask):
+    """work.predicted = the mean of the masked references at a disparity."""
+    d = index * job.unit
+    count = 0
+    predicted = work.predicted
+    for p in range(3):
+        for y in range(n):
+            for x in range(n):
+                predicted[p, y, x] = 0
+    for r in range(job.references.shape[0]):
+        if (mask >> r) & 1:
+            count += 1
+            for p in range(3):
+                moved_block(
+                    job.views,
+                    job.references[r, 0],
+                    p,
+                    y0,
+                    x0,
+                    n,
+                    d * job.references[r, 2],
+                    d * job.references[r, 1],
+                    work.rows,
+                    predicted,
+                )
+    if count == 3:
+        for p in range(3):
+            for y in range(n):
+                for x in range(n):
+                    predicted[p, y, x] = (np.int64(predicted[p, y, x]) * 21845 + (1 << 27)) >> 28
+    else:
+        shift = 11 + max(count, 1)
+        if count == 4:
+            shift = 14
+        for p in range(3):
+            for y in range(n):
+                for x in range(n):
+                    predicted[p, y, x] = np.int32(predicted[p, y, x] + np.int32(1 << (shift - 1))) >> shift
+
+
+@lean
+def predict_synthesis(job, work, y0, x0, n):
+    """work.predicted = the synthesised view."""
+    for p in range(3):
+        for y in range(n):
+            for x in range(n):
+                work.predicted[p, y, x] = job.made[p, y0 + y, x0 + x]
+
+
+@lean
+def predict_direction(job, work, plane, y0, x0, n, direction):
+    """work.predicted[plane] from the block's surroundings."""
+    fill_border(job.views, job.at, plane, job.blocks, np.int64(DONE), y0, x0, n, work.border)
+    predict_intra(work.border, direction, n, work.predicted, plane)
+
+
+@lean
+def store(job, work, plane, y0, x0, n, residual):
+    """Decoded samples: the prediction, and work.block if there is a residual."""
+    for y in range(n):
+        for x in range(n):
+            value = work.predicted[plane, y, x]
+            if residual:
+                value = min(max(np.int32(value + work.block[y, x]), -LIMIT), LIMIT)
+            job.views[job.at, plane, y0 + y, x0 + x] = value
+
+
+@lean
+def mark(blocks, by, bx, log, kind, index, mask, direction, coded):
+    """Note a block as decoded."""
+    size = 1 << (log - 2)
+    for y in range(by, by + size):
+        for x in range(bx, bx + size):
+            blocks[KIND, y, x] = kind
+            blocks[INDEX, y, x] = index
+            blocks[MASK, y, x] = mask
+            blocks[DIRECTION, y, x] = direction if kind == INTRA else SMOOTH
+            blocks[LOG, y, x] = log
+            blocks[CODED, y, x] = coded
+            blocks[DONE, y, x] = 1
+
+
+@lean
+def _load_levels(job, work, plane, y0, x0, n):
+    """work.levels = the encoder's; return whether one is not zero."""
+    found = 0
+    for y in range(n):
+        for x in range(n):
+            level = job.levels[plane, y0 + y, x0 + x]
+            work.levels[y, x] = level
+            if level:
+                found = 1
+    return found
+
+
+@lean
+def _clear(levels, n):
+    for y in range(n):
+        for x in range(n):
+            levels[y, x] = 0
+
+
+@lean
+def code_block(coder, job, work, y0, x0, log):
+    """Write a block that is marked, or read and decode one."""
+    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    blocks = job.blocks
+    decoding = coder.state[DECODING]
+    kind, index = np.int64(blocks[KIND, by, bx]), np.int64(blocks[INDEX, by, bx])
+    mask, direction = np.int64(blocks[MASK, by, bx]), np.int64(blocks[DIRECTION, by, bx])
+    kind, index, mask, direction = code_kind(coder, job, by, bx, log, kind, index, mask, direction)
+    if decoding:
+        if kind == SYNTHESIS:
+            predict_synthesis(job, work, y0, x0, n)
+        elif kind == EXPLICIT:
+            predict_explicit(job, work, y0, x0, n, index, mask)
+        else:
+            for p in range(3):
+                predict_direction(job, work, p, y0, x0, n, direction)
+    coded = code_bit(coder, residual_context(blocks, by, bx, log, kind), np.int64(blocks[CODED, by, bx]))
+    first = 0
+    for p in range(3):
+        some = 0
+        if coded:
+            if not decoding:
+                some = _load_levels(job, work, p, y0, x0, n)
+            some = code_bit(coder, coded_context(p, log, kind, first), some)
+            if p == 0:
+                first = some
+            if some:
+                if decoding:
+                    _clear(work.levels, n)
+                code_coefficients(coder, work.levels, p, log)
+        if decoding:
+            if some:
+                rows, cols = dequantise(work.levels, log, job.step, work.coefficients)
+                inverse(work.coefficients, log, rows, cols, work.half, work.block)
+            store(job, work, p, y0, x0, n, some)
+    if decoding:
+        mark(blocks, by, bx, log, kind, index, mask, direction, coded)
+
+
+@kernel
+def code_tree(coder, job, work, y0, x0, log):
+    """Write or read the blocks of a square; parts beyond the view have none."""
+    height, width = job.levels.shape[1:]
+    if y0 >= height or x0 >= width:
+        return
+    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    if y0 + n > height or x0 + n > width:
+        split = 1
+    elif log > LOG_LEAST:
+        smaller = 1 if job.blocks[LOG, by, bx] < log else 0
+        split = code_bit(coder, split_context(job.blocks, by, bx, log), smaller)
+    else:
+        split = 0
+    if split:
+        half = n >> 1
+        for part in range(4):
+            code_tree(coder, job, work, y0 + (part >> 1) * half, x0 + (part & 1) * half, log - 1)
+    else:
+        code_block(coder, job, work, y0, x0, log)
+
+
+@kernel
+def code_blend(coder, nearest):
+    """Write or read how a synthesised view is blended."""
+    return code_bit(coder, np.int64(at.BLEND), nearest)
+
+
+def decode_view(coder: Arithmetic, job: Job, work: Work) -> None:
+    """Read all blocks of a view."""
+    height, width = job.levels.shape[1:]
+    size = 1 << LOG_LARGEST
+    for y0 in range(0, height, size):
+        for x0 in range(0, width, size):
+            code_tree(coder, job, work, y0, x0, LOG_LARGEST)
+
+
+assert MODES == 36  # `_code_direction` counts on 34 directions

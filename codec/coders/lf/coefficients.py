@@ -1,0 +1,175 @@
+"""Coefficients of a block: their syntax, its cost, and quantisation that weighs rate against error."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .arithmetic import bit_cost, code_bit, code_number, code_raw, number_cost
+from .contexts import ABOVE_ONE, ABOVE_TWO, LAST, REST, SIGNIFICANT
+from .jit import inner, lean
+from .transform import LARGEST, SCANS
+
+MOST_LEVEL = 32000
+NEVER = 0.62  # of a step: less is never worth being the last coefficient
+HOPE = np.float32(2.5)  # bits that a lone last coefficient costs besides its own
+
+
+@inner
+def _neighbourhood(levels, y, x, n):
+    """Sum of the magnitudes of the five places before, in the order of coding, at most 5."""
+    total = 0
+    if x + 1 < n:
+        total += abs(levels[y, x + 1])
+        if y + 1 < n:
+            total += abs(levels[y + 1, x + 1])
+        if x + 2 < n:
+            total += abs(levels[y, x + 2])
+    if y + 1 < n:
+        total += abs(levels[y + 1, x])
+        if y + 2 < n:
+            total += abs(levels[y + 2, x])
+    return min(total, 5)
+
+
+@inner
+def _place(y, x):
+    s = y + x
+    return 0 if s == 0 else (1 if s < 3 else (2 if s < 7 else 3))
+
+
+@lean
+def code_coefficients(coder, levels, plane, log):
+    """Write or read levels[:n, :n], of which one at least is not zero; a reader finds only zeros there before."""
+    n = 1 << log
+    kind = 1 if plane else 0
+    last = n * n - 1
+    while last > 0 and levels[SCANS[log, last] >> 5, SCANS[log, last] & 31] == 0:
+        last -= 1
+    last = min(code_number(coder, LAST + (kind * 4 + log - 2) * 12, np.int64(12), np.int64(0), last), n * n - 1)
+    for k in range(last, -1, -1):
+        y, x = SCANS[log, k] >> 5, SCANS[log, k] & 31
+        value = np.int64(levels[y, x])
+        size = abs(value)
+        near = _neighbourhood(levels, y, x, n)
+        place = _place(y, x)
+        if k < last and not code_bit(
+            coder, SIGNIFICANT + ((kind * 4 + log - 2) * 4 + place) * 6 + near, 1 if size else 0
+        ):
+            continue
+        context = (kind * 6 + near) * 2 + (1 if place == 0 else 0)
+        found = 1
+        if code_bit(coder, ABOVE_ONE + context, 1 if size > 1 else 0):
+            found = 2
+            if code_bit(coder, ABOVE_TWO + context, 1 if size > 2 else 0):
+                found = 3 + min(code_number(coder, REST + kind * 16, np.int64(16), np.int64(0), size - 3), MOST_LEVEL)
+        levels[y, x] = -found if code_raw(coder, 1 if value < 0 else 0) else found
+
+
+@inner
+def _level_cost(contexts, size, near, place, kind, log, last):
+    bits = np.float32(0)
+    if not last:
+        bits += bit_cost(contexts, SIGNIFICANT + ((kind * 4 + log - 2) * 4 + place) * 6 + near, 1 if size else 0)
+        if size == 0:
+            return bits
+    bits += np.float32(1)
+    context = (kind * 6 + near) * 2 + (1 if place == 0 else 0)
+    bits += bit_cost(contexts, ABOVE_ONE + context, 1 if size > 1 else 0)
+    if size > 1:
+        bits += bit_cost(contexts, ABOVE_TWO + context, 1 if size > 2 else 0)
+        if size > 2:
+            bits += number_cost(contexts, REST + kind * 16, np.int64(16), np.int64(0), size - 3)
+    return bits
+
+
+@lean
+def quantise(contexts, coefficients, plane, log, step, weight, levels):
+    """Fill levels[:n, :n]; return the bits, those of "coded or not" left out, and the squared error.
+
+    Parameters
+    ----------
+    step : float32
+        Of the quantiser, in units of the coefficients.
+    weight : float32
+        Squared error that a bit is worth.
+    """
+    n = 1 << log
+    kind = 1 if plane else 0
+    nothing = np.float32(0)
+    first = -1
+    for y in range(n):
+        for x in range(n):
+            levels[y, x] = 0
+    for k in range(n * n):
+        place = SCANS[log, k]
+        size = abs(np.float32(coefficients[place >> 5, place & 31]))
+        nothing += size * size
+        if size > NEVER * step:
+            first = k
+    if first < 0:
+        return np.float32(0), nothing
+    error, bits, last = nothing, np.float32(0), -1
+    for k in range(first, -1, -1):
+        y, x = SCANS[log, k] >> 5, SCANS[log, k] & 31
+        value = coefficients[y, x]
+        size = abs(np.float32(value))
+        level: Any = min(np.int64(size / step + np.float32(0.5)), MOST_LEVEL)
+        if last < 0:
+            if level == 0:
+                continue
+            cost = _level_cost(contexts, level, 0, _place(y, x), kind, log, True)
+            missed = size - np.float32(level) * step
+            gain = size * size - missed * missed
+            if level == 1 and gain < weight * (cost + HOPE):
+                continue
+            last, best = k, level
+            bits += cost
+            error -= gain
+        else:
+            near, where = _neighbourhood(levels, y, x, n), _place(y, x)
+            best = 0
+            cost = _level_cost(contexts, 0, near, where, kind, log, False)
+            least = size * size + weight * cost
+            kept, missed2 = cost, size * size
+            for tried in range(max(1, level - 1), level + 1):
+                cost = _level_cost(contexts, tried, near, where, kind, log, False)
+                missed = size - np.float32(tried) * step
+                total = missed * missed + weight * cost
+                if total < least:
+                    least, best, kept, missed2 = total, tried, cost, missed * missed
+            bits += kept
+            error += missed2 - size * size
+        levels[y, x] = -best if value < 0 else best
+    if last < 0:
+        return np.float32(0), nothing
+    bits += number_cost(contexts, LAST + (kind * 4 + log - 2) * 12, np.int64(12), np.int64(0), last)
+    if error + weight * bits >= nothing:
+        for y in range(n):
+            for x in range(n):
+                levels[y, x] = 0
+        return np.float32(0), nothing
+    return bits, error
+
+
+@lean
+def dequantise(levels, log, step, coefficients):
+    """Fill coefficients[:n, :n] where they are not zero; return the rows and columns that hold them.
+
+    ``step`` is in units of 1/16.
+    """
+    n = 1 << log
+    rows = cols = 0
+    for y in range(n):
+        for x in range(n):
+            if levels[y, x]:
+                rows = y + 1
+                cols = max(cols, x + 1)
+    for y in range(rows):
+        for x in range(cols):
+            coefficients[y, x] = (np.int64(levels[y, x]) * step + 8) >> 4
+    return rows, cols
+
+
+assert LARGEST == 32  # the scans' places are read by shifts

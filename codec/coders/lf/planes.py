@@ -1,0 +1,49 @@
+"""Views of a picture as planes of its principal colours, in whole eighths of an 8-bit code."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .jit import lean
+from .warp import clamped
+
+
+@lean
+def gather(pixels, grid, row, col, axes, sixteen, out):
+    """out (3, H, W) = the planes of a view; sides beyond the view repeat its border.
+
+    Parameters
+    ----------
+    pixels : ndarray of uint8 or uint16, (N, M, 3)
+    grid : (int, int)
+        Rows and columns of views, which are interleaved.
+    axes : ndarray of int16, (3, 3)
+        Colours by rows, in units of 2^-14.
+    sixteen : bool
+        Whether pixels have 16 bits.
+    """
+    height, width = pixels.shape[0] // grid[0], pixels.shape[1] // grid[1]
+    middle, shift = (1 << 15, 19) if sixteen else (1 << 7, 11)
+    for y in range(out.shape[1]):
+        for x in range(out.shape[2]):
+            i, j = clamped(y, height) * grid[0] + row, clamped(x, width) * grid[1] + col
+            for p in range(3):
+                total = np.int64(1 << (shift - 1))
+                for c in range(3):
+                    total += np.int64(axes[p, c]) * (np.int64(pixels[i, j, c]) - middle)
+                out[p, y, x] = total >> shift
+
+
+@lean
+def scatter(views, at, grid, row, col, axes, sixteen, pixels):
+    """The inverse of `gather`, rounded and clipped; the axes are a rotation."""
+    height, width = pixels.shape[0] // grid[0], pixels.shape[1] // grid[1]
+    middle, shift, top = (1 << 15, 9, 65535) if sixteen else (1 << 7, 17, 255)
+    for y in range(height):
+        for x in range(width):
+            i, j = y * grid[0] + row, x * grid[1] + col
+            for c in range(3):
+                total = np.int64(1 << (shift - 1))
+                for p in range(3):
+                    total += np.int64(axes[p, c]) * np.int64(views[at, p, y, x])
+                pixels[i, j, c] = min(max((total >> shift) + middle, 0), top)

@@ -1,0 +1,431 @@
+"""How the encoder finds blocks: by squared error + weight · bits, from the largest block down."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .arithmetic import Arithmetic, bit_cost
+from .blocks import (
+    EXPLICIT,
+    INTRA,
+    LIMIT,
+    LOG_LARGEST,
+    LOG_LEAST,
+    SYNTHESIS,
+    Job,
+    Work,
+    code_tree,
+    coded_context,
+    guesses,
+    kind_cost,
+    mark,
+    mask_cost,
+    predict_direction,
+    predict_explicit,
+    predict_synthesis,
+    residual_context,
+    split_context,
+)
+from .coefficients import dequantise, quantise
+from .intra import MODES
+from .jit import inner, kernel, lean
+from .transform import LARGEST, forward, inverse
+from .warp import clamped, moved_block
+
+HUGE = np.float32(1e30)
+ZERO = 0
+MOST_GUESSES = 12
+# A block whose cost a sample is less, in units of the weight, is not split, and not tried in other ways.
+GOOD, GOOD_SPLIT = np.float32(0.15), np.float32(0.18)
+
+
+class Search(NamedTuple):
+    """What the encoder has beside the job.
+
+    Parameters
+    ----------
+    original : ndarray of int16, (3, H, W)
+    volume : ndarray of float32, (indices, R, H / 4, W / 4)
+        Squared error of the first plane for each disparity and reference.
+    weight : float32
+        Squared error that a bit is worth.
+    least : int
+        Binary logarithm of the least block.
+    intra_tries : int
+    """
+
+    original: Any
+    volume: Any
+    weight: Any
+    least: Any
+    intra_tries: Any
+
+
+class Trial(NamedTuple):
+    """Memory of the search, by block size."""
+
+    decoded: Any  # (6, 3, 32, 32) of the best way found
+    levels: Any
+    trial_decoded: Any  # (3, 32, 32) of the way tried
+    trial_levels: Any
+    moved: Any  # (4, 3, 32, 32)
+
+
+def new_trial() -> Trial:
+    """Memory of the search."""
+    return Trial(
+        decoded=np.zeros((6, 3, LARGEST, LARGEST), np.int16),
+        levels=np.zeros((6, 3, LARGEST, LARGEST), np.int16),
+        trial_decoded=np.zeros((3, LARGEST, LARGEST), np.int16),
+        trial_levels=np.zeros((3, LARGEST, LARGEST), np.int16),
+        moved=np.zeros((4, 3, LARGEST, LARGEST), np.int32),
+    )
+
+
+@lean
+def fill_volume(job, original, volume):
+    """Squared error of each 4×4 of the first plane, for every index and reference, between samples bilinearly."""
+    height, width = original.shape[1:]
+    views = job.views
+    for k in range(volume.shape[0]):
+        d = (job.low + k) * job.unit
+        for r in range(volume.shape[1]):
+            view = job.references[r, 0]
+            dx, dy = d * job.references[r, 1], d * job.references[r, 2]
+            ix, iy = dx >> 8, dy >> 8
+            fx, fy = np.float32((dx & 255) / 256), np.float32((dy & 255) / 256)
+            a, b = (np.float32(1) - fx) * (np.float32(1) - fy), fx * (np.float32(1) - fy)
+            c, e = (np.float32(1) - fx) * fy, fx * fy
+            from_, to = min(max(0, -ix), width), max(min(width, width - 1 - ix), 0)
+            for by in range(height >> 2):
+                for bx in range(width >> 2):
+                    volume[k, r, by, bx] = 0
+                for y in range(4 * by, 4 * by + 4):
+                    y0, y1 = clamped(y + iy, height), clamped(y + iy + 1, height)
+                    for bx in range(width >> 2):
+                        total = np.float32(0)
+                        if 4 * bx >= from_ and 4 * bx + 4 <= to:
+                            for x in range(4 * bx, 4 * bx + 4):
+                                value = a * views[view, 0, y0, x + ix] + b * views[view, 0, y0, x + ix + 1]
+                                value += c * views[view, 0, y1, x + ix] + e * views[view, 0, y1, x + ix + 1]
+                                value -= original[0, y, x]
+                                total += value * value
+                        else:
+                            for x in range(4 * bx, 4 * bx + 4):
+                                x0, x1 = clamped(x + ix, width), clamped(x + ix + 1, width)
+                                value = a * views[view, 0, y0, x0] + b * views[view, 0, y0, x1]
+                                value += c * views[view, 0, y1, x0] + e * views[view, 0, y1, x1]
+                                value -= original[0, y, x]
+                                total += value * value
+                        volume[k, r, by, bx] += total
+
+
+@lean
+def try_residual(contexts, job, search, work, trial, y0, x0, log, kind):
+    """Code the difference to work.predicted; return bits, error and whether there is a residual."""
+    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    step = np.float32(job.step / 16)
+    bits, error, without = np.float32(0), np.float32(0), np.float32(0)
+    first, coded = 0, 0
+    for p in range(3):
+        least = np.float32(0)
+        for y in range(n):
+            for x in range(n):
+                difference = search.original[p, y0 + y, x0 + x] - work.predicted[p, y, x]
+                work.block[y, x] = difference
+                least += np.float32(difference * difference)
+        without += least
+        context = coded_context(p, log, kind, first)
+        free = bit_cost(contexts, context, np.int64(0))
+        some = 0
+        if least > np.float32(0.2) * step * step:
+            forward(work.block, log, work.half, work.coefficients)
+            more, missed = quantise(contexts, work.coefficients, p, log, step, search.weight, work.levels)
+            if more > 0:
+                more += bit_cost(contexts, context, 1)
+                if missed + search.weight * more < least + search.weight * free:
+                    some = 1
+        if some:
+            rows, cols = dequantise(work.levels, log, job.step, work.coefficients)
+            inverse(work.coefficients, log, rows, cols, work.half, work.block)
+            real = np.float32(0)
+            for y in range(n):
+                for x in range(n):
+                    value = min(max(np.int32(work.predicted[p, y, x] + work.block[y, x]), -LIMIT), LIMIT)
+                    trial.trial_decoded[p, y, x] = value
+                    trial.trial_levels[p, y, x] = work.levels[y, x]
+                    difference = search.original[p, y0 + y, x0 + x] - value
+                    real += np.float32(difference * difference)
+            bits += more
+            error += real
+            coded = 1
+            if p == 0:
+                first = 1
+        else:
+            for y in range(n):
+                for x in range(n):
+                    trial.trial_decoded[p, y, x] = work.predicted[p, y, x]
+                    trial.trial_levels[p, y, x] = 0
+            bits += free
+            error += least
+    context = residual_context(job.blocks, by, bx, log, kind)
+    empty = bit_cost(contexts, context, np.int64(0))
+    if coded:
+        bits += bit_cost(contexts, context, 1)
+        if error + search.weight * bits < without + search.weight * empty:
+            return bits, error, 1
+        for p in range(3):
+            for y in range(n):
+                for x in range(n):
+                    trial.trial_decoded[p, y, x] = work.predicted[p, y, x]
+                    trial.trial_levels[p, y, x] = 0
+    return empty, without, 0
+
+
+@inner
+def _keep(trial, log):
+    n = 1 << log
+    for p in range(3):
+        for y in range(n):
+            for x in range(n):
+                trial.decoded[log, p, y, x] = trial.trial_decoded[p, y, x]
+                trial.levels[log, p, y, x] = trial.trial_levels[p, y, x]
+
+
+@lean
+def _best_disparities(job, search, y0, x0, log, found):
+    """Fill ``found`` with indices worth trying; return their number."""
+    by, bx, size = y0 >> 2, x0 >> 2, 1 << (log - 2)
+    count = job.references.shape[0]
+    made, left, above = guesses(job, by, bx, log)
+    number = 0
+    for guess in (made, left, above):
+        if guess >= job.low:
+            found[number] = guess
+            number += 1
+    b0 = b1 = b2 = b3 = best_all = best_two = HUGE
+    k0 = k1 = k2 = k3 = k_all = k_two = job.low - 1
+    for k in range(search.volume.shape[0]):
+        total, least, second = np.float32(0), HUGE, HUGE
+        for r in range(count):
+            error = np.float32(0)
+            for i in range(by, by + size):
+                for j in range(bx, bx + size):
+                    error += search.volume[k, r, i, j]
+            total += error
+            if error < least:
+                least, second = error, least
+            elif error < second:
+                second = error
+            if r == 0 and error < b0:
+                b0, k0 = error, job.low + k
+            elif r == 1 and error < b1:
+                b1, k1 = error, job.low + k
+            elif r == 2 and error < b2:
+                b2, k2 = error, job.low + k
+            elif r == 3 and error < b3:
+                b3, k3 = error, job.low + k
+        if total < best_all:
+            best_all, k_all = total, job.low + k
+        if least + second < best_two:
+            best_two, k_two = least + second, job.low + k
+    for k in (k_all, k_two, k0, k1, k2, k3):
+        seen = k < job.low
+        for i in range(number):
+            if found[i] == k:
+                seen = True
+        if not seen:
+            found[number] = k
+            number += 1
+    return number
+
+
+@lean
+def _best_explicit(contexts, job, search, work, trial, y0, x0, log, tried):
+    """Index and mask of the least squared error + weight · bits, before any residual."""
+    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    count = job.references.shape[0]
+    moved = trial.moved
+    number = _best_disparities(job, search, y0, x0, log, tried)
+    best, best_index, best_mask = HUGE, job.low, 1
+    for t in range(number):
+        index = tried[t]
+        d = index * job.unit
+        for r in range(count):
+            for p in range(3):
+                for y in range(n):
+                    for x in range(n):
+                        work.predicted[p, y, x] = 0
+                moved_block(
+                    job.views,
+                    job.references[r, 0],
+                    p,
+                    y0,
+                    x0,
+                    n,
+                    d * job.references[r, 2],
+                    d * job.references[r, 1],
+                    work.rows,
+                    work.predicted,
+                )
+                for y in range(n):
+                    for x in range(n):
+                        moved[r, p, y, x] = search.original[p, y0 + y, x0 + x] - (
+                            np.int32(work.predicted[p, y, x] + 2048) >> 12
+                        )
+        index_bits = kind_cost(contexts, job, by, bx, log, np.int64(EXPLICIT), index, (1 << count) - 1, np.int64(0))
+        if count > 1:
+            index_bits -= mask_cost(contexts, job, by, bx, (1 << count) - 1)
+        products = _products(moved, count, n)
+        for mask in range(1, 1 << count):
+            members = 0
+            error = np.float32(0)
+            at = 0
+            for r in range(count):
+                for s in range(r + 1):
+                    if (mask >> r) & 1 and (mask >> s) & 1:
+                        error += products[at] if r == s else 2 * products[at]
+                    at += 1
+                members += (mask >> r) & 1
+            total = error / np.float32(members * members) + search.weight * index_bits
+            if total < best and count > 1:
+                total += search.weight * mask_cost(contexts, job, by, bx, mask)
+            if total < best:
+                best, best_index, best_mask = total, index, mask
+    return best_index, best_mask
+
+
+@inner
+def _dot(moved, r, s, n):
+    total = np.float32(0)
+    for p in range(3):
+        for y in range(n):
+            for x in range(n):
+                total += np.float32(moved[r, p, y, x]) * np.float32(moved[s, p, y, x])
+    return total
+
+
+@lean
+def _products(moved, count, n):
+    """Inner products of the references' differences, the lower triangle by rows."""
+    p00 = _dot(moved, 0, 0, n)
+    p10 = p11 = p20 = p21 = p22 = p30 = p31 = p32 = p33 = np.float32(0)
+    if count > 1:
+        p10, p11 = _dot(moved, 1, 0, n), _dot(moved, 1, 1, n)
+    if count > 2:
+        p20, p21, p22 = _dot(moved, 2, 0, n), _dot(moved, 2, 1, n), _dot(moved, 2, 2, n)
+    if count > 3:
+        p30, p31 = _dot(moved, 3, 0, n), _dot(moved, 3, 1, n)
+        p32, p33 = _dot(moved, 3, 2, n), _dot(moved, 3, 3, n)
+    return p00, p10, p11, p20, p21, p22, p30, p31, p32, p33
+
+
+@lean
+def _best_direction(contexts, job, search, work, y0, x0, log, rank, errors):
+    """The intra mode with the rank-th least sum of magnitudes; ``errors`` is filled at rank 0."""
+    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    if rank == 0:
+        for mode in range(MODES):
+            total = np.float32(0)
+            for p in range(3):
+                predict_direction(job, work, p, y0, x0, n, mode)
+                for y in range(n):
+                    for x in range(n):
+                        total += np.float32(abs(search.original[p, y0 + y, x0 + x] - work.predicted[p, y, x]))
+            errors[mode] = total + np.float32(np.sqrt(search.weight)) * kind_cost(
+                contexts, job, by, bx, log, INTRA, 0, 0, mode
+            )
+    best = 0
+    for mode in range(MODES):
+        if errors[mode] < errors[best]:
+            best = mode
+    errors[best] = HUGE
+    return best
+
+
+@kernel
+def best_block(contexts, job, search, work, trial, y0, x0, log):
+    """Try the ways to code a block and note the best; return its cost and whether it has a residual."""
+    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    best, kind, index, mask, direction, coded = HUGE, INTRA, 0, 0, 0, 0
+    good = GOOD * search.weight * np.float32(n * n)
+    if job.synthesised:
+        side = kind_cost(contexts, job, by, bx, log, np.int64(SYNTHESIS), np.int64(0), np.int64(0), np.int64(0))
+        predict_synthesis(job, work, y0, x0, n)
+        bits, error, some = try_residual(contexts, job, search, work, trial, y0, x0, log, np.int64(SYNTHESIS))
+        best, kind, coded = error + search.weight * (bits + side), SYNTHESIS, some
+        index = guesses(job, by, bx, log)[0]
+        _keep(trial, log)
+    if job.references.shape[0] and best > good:
+        tried = np.zeros(MOST_GUESSES, np.int64)
+        k, m = _best_explicit(contexts, job, search, work, trial, y0, x0, log, tried)
+        side = kind_cost(contexts, job, by, bx, log, np.int64(EXPLICIT), k, m, np.int64(0))
+        predict_explicit(job, work, y0, x0, n, k, m)
+        bits, error, some = try_residual(contexts, job, search, work, trial, y0, x0, log, np.int64(EXPLICIT))
+        total = error + search.weight * (bits + side)
+        if total < best:
+            best, kind, index, mask, coded = total, EXPLICIT, k, m, some
+            _keep(trial, log)
+    if job.references.shape[0] == 0 or best > 2 * good:
+        errors = np.zeros(MODES, np.float32)
+        for rank in range(search.intra_tries):
+            mode = _best_direction(contexts, job, search, work, y0, x0, log, rank, errors)
+            side = kind_cost(contexts, job, by, bx, log, np.int64(INTRA), np.int64(0), np.int64(0), mode)
+            for p in range(3):
+                predict_direction(job, work, p, y0, x0, n, mode)
+            bits, error, some = try_residual(contexts, job, search, work, trial, y0, x0, log, np.int64(INTRA))
+            total = error + search.weight * (bits + side)
+            if total < best:
+                best, kind, index, mask, direction, coded = total, INTRA, 0, 0, mode, some
+                _keep(trial, log)
+    return best, kind, index, mask, direction, coded
+
+
+@kernel
+def search_tree(contexts, job, search, work, trial, y0, x0, log):
+    """Find, mark and decode the blocks of a square; return the cost."""
+    height, width = job.levels.shape[1:]
+    if y0 >= height or x0 >= width:
+        return np.float32(0)
+    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    half = n >> 1
+    if y0 + n > height or x0 + n > width:
+        total = np.float32(0)
+        for part in range(4):
+            total += search_tree(
+                contexts, job, search, work, trial, y0 + (part >> 1) * half, x0 + (part & 1) * half, log - 1
+            )
+        return total
+    best, kind, index, mask, direction, coded = best_block(contexts, job, search, work, trial, y0, x0, log)
+    if log > LOG_LEAST:
+        context = split_context(job.blocks, by, bx, log)
+        best += search.weight * bit_cost(contexts, context, np.int64(0))
+        if log > search.least and (coded or best > GOOD_SPLIT * search.weight * np.float32(n * n)):
+            total = search.weight * bit_cost(contexts, context, 1)
+            for part in range(4):
+                total += search_tree(
+                    contexts, job, search, work, trial, y0 + (part >> 1) * half, x0 + (part & 1) * half, log - 1
+                )
+                if total > best:
+                    break
+            if total < best:
+                return total
+    for p in range(3):
+        for y in range(n):
+            for x in range(n):
+                job.views[job.at, p, y0 + y, x0 + x] = trial.decoded[log, p, y, x]
+                job.levels[p, y0 + y, x0 + x] = trial.levels[log, p, y, x]
+    mark(job.blocks, by, bx, log, kind, index, mask, direction, coded)
+    return best
+
+
+def encode_view(coder: Arithmetic, job: Job, search: Search, work: Work, trial: Trial) -> None:
+    """Search and write all blocks of a view."""
+    height, width = job.levels.shape[1:]
+    size = 1 << LOG_LARGEST
+    for y0 in range(0, height, size):
+        for x0 in range(0, width, size):
+            search_tree(coder.contexts, job, search, work, trial, y0, x0, LOG_LARGEST)
+            code_tree(coder, job, work, y0, x0, LOG_LARGEST)

@@ -1,0 +1,111 @@
+"""The payload: a header, an index of the levels, and a payload of the arithmetic coder for each level."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+VERSION = 1
+PIXELS_A_BYTE = (
+    4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
+)
+MOST_LOG_STRIDE = 6
+MOST_STEP = 1 << 18
+MOST_SOURCES = 8
+MOST_DISPARITY = 1 << 14
+
+_HEAD = struct.Struct("<BBBbhh9h")
+_LEVEL = struct.Struct("<II")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Header:
+    """What the decoder needs besides the structure.
+
+    Parameters
+    ----------
+    log_stride : int
+        Binary logarithm of the distance between views of the first level.
+    sources : int
+        How many views a synthesis is made of; 0 for none.
+    down : int
+        1, or -1 where disparity has the other sign along columns than along rows.
+    low, high : int
+        Range of disparity between neighbouring views, in 2^-8 samples.
+    axes : ndarray of int16, (3, 3)
+        Colours, in units of 2^-14.
+    steps : tuple of int
+        The quantiser's step of each level, in 2^-7 of an 8-bit code.
+    """
+
+    log_stride: int
+    sources: int
+    down: int
+    low: int
+    high: int
+    axes: NDArray[np.int16]
+    steps: tuple[int, ...]
+
+
+def pack(header: Header, levels: list[bytes], pixels: int) -> bytes:
+    """The payload of a picture of so many pixels."""
+    head = _HEAD.pack(
+        VERSION,
+        header.log_stride,
+        header.sources,
+        header.down,
+        header.low,
+        header.high,
+        *header.axes.ravel().tolist(),
+    )
+    index = b"".join(_LEVEL.pack(step, len(level)) for step, level in zip(header.steps, levels, strict=True))
+    return (head + index + b"".join(levels)).ljust(least_bytes(pixels), b"\0")
+
+
+def least_bytes(pixels: int) -> int:
+    """Length of the shortest payload of a picture of so many pixels."""
+    return -(-pixels // PIXELS_A_BYTE)
+
+
+def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
+    """Header and levels.
+
+    Raises
+    ------
+    ValueError
+        If the payload is none of a picture of so many pixels.
+    """
+    if len(payload) < max(_HEAD.size, least_bytes(pixels)):
+        raise ValueError(f"its light field has {len(payload)} bytes, too few for {pixels} pixels")
+    version, log_stride, sources, down, low, high, *axes = _HEAD.unpack_from(payload)
+    if version != VERSION:
+        raise ValueError(f"its light field is of version {version}: this decoder reads version {VERSION}")
+    sound = log_stride <= MOST_LOG_STRIDE and sources <= MOST_SOURCES and abs(down) == 1
+    if not sound or not -MOST_DISPARITY <= low <= high <= MOST_DISPARITY:
+        raise ValueError("its header holds values that no encoder writes")
+    count = log_stride + 1
+    start = _HEAD.size + count * _LEVEL.size
+    if len(payload) < start:
+        raise ValueError(f"its light field has {len(payload)} bytes: header and index alone have {start}")
+    index = [_LEVEL.unpack_from(payload, _HEAD.size + i * _LEVEL.size) for i in range(count)]
+    levels = []
+    for step, length in index:
+        if not 0 < step <= MOST_STEP:
+            raise ValueError(f"its quantiser has a step of {step}: 1 to {MOST_STEP} is needed")
+        levels.append(payload[start : start + length])
+        start += length
+    if len(payload) != max(start, least_bytes(pixels)) or payload[start:].strip(b"\0"):
+        raise ValueError(f"its light field has {len(payload)} bytes, where its index says {start}")
+    header = Header(
+        log_stride=log_stride,
+        sources=sources,
+        down=down,
+        low=low,
+        high=high,
+        axes=np.array(axes, np.int16).reshape(3, 3),
+        steps=tuple(step for step, _ in index),
+    )
+    return header, levels
