@@ -22,9 +22,9 @@ from typing import Any
 
 from benchmarks.readme import filled
 from ii_core import preset
+from ii_core.display.viewer import write_viewer
 from ii_core.files import write_json
 from metrics import provenance
-from metrics.viewer import write_viewer
 from raytrace_ii import load_scene, render, scene_names
 
 ROOT = Path(__file__).parent.parent

@@ -13,7 +13,7 @@ from .plots.rd_chart import rd_chart
 from .plots.tables import summary_table, write_csv, write_latex
 from .point_log import PointLog
 from .rd import bd_psnr, bd_rate, rate_distortion
-from .report import Report, report
+from .report import Report, quality_rows, report
 from .study import provenance, read_study, write_study
 from .view import ViewQuality, q_view
 
@@ -52,6 +52,7 @@ __all__ = [
     "q_depth",
     "q_global",
     "q_view",
+    "quality_rows",
     "rate_distortion",
     "rd_chart",
     "read_study",

@@ -103,6 +103,18 @@ def report(
     return made
 
 
+def quality_rows(reference: IIPicture, decoded: IIPicture) -> list[tuple[str, str]]:
+    """Names and values of Q_global, Q_angle and, where the picture allows, Q_view, for a table beside pictures."""
+    angle = q_angle(reference, decoded)
+    rows = [
+        ("Q_global", f"{q_global(reference, decoded):.2f} dB"),
+        ("Q_angle", f"{angle.min():.2f} … {angle.max():.2f} dB"),
+    ]
+    if not (_unseen(reference) or _few(reference, WINDOW)):
+        rows += [(f"Q_view {name}", f"{value:.4f}") for name, value in q_view(reference, decoded).values.items()]
+    return rows
+
+
 def _unseen(picture: IIPicture) -> str | None:
     if picture.camera is not None:
         return None

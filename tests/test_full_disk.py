@@ -26,7 +26,7 @@ from ii_core.display.film import write_animation
 from ii_core.files import write_image, write_json
 from ii_core.formats.formats import write_pfm
 from metrics import write_csv, write_latex
-from metrics.viewer import write_viewer
+from ii_core.display.viewer import write_viewer
 from metrics.plots.rd_chart import new_figure, save
 from raytrace_ii import load_scene, render_to
 from raytrace_ii.rendering import contact_sheet

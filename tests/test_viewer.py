@@ -1,5 +1,6 @@
 """The page in a real browser. Where none is installed these tests are skipped, and say so."""
 
+import io
 import json
 import re
 import shutil
@@ -9,11 +10,13 @@ import urllib.request
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from ii_core import IICamera, IIPicture, preset, view_image
+from ii_core.display.viewer import page, write_viewer, write_viewer_folder
+from ii_core.display.viewer.page import depth_view
 from ii_core.files import write_image
-from metrics import viewer
-from metrics.viewer import depth_view, write_viewer, write_viewer_folder
+from metrics import quality_rows
 from raytrace_ii import load_scene, render
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -127,7 +130,7 @@ def test_any_structure(show, tmp_path, lenses, ei_pixels, with_camera):
 
 
 def test_a_mosaic_of_several_pages(show, shot, tmp_path, monkeypatch):
-    monkeypatch.setattr(viewer, "PAGE_SIDE", 100)  # cuts through sub-images of 32×16 px
+    monkeypatch.setattr(page, "PAGE_SIDE", 100)  # cuts through sub-images of 32×16 px
     write_viewer(tmp_path / "v.html", shot.picture, quality=None)
     shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=-0.4, y=0.9, f=0, a=1)
     assert np.abs(shown - view_image(shot.picture, viewpoint)[0]).max() <= 1
@@ -144,11 +147,13 @@ def focused(picture, viewpoint, shift, radius):
     total, weights = np.zeros((l, k, 3)), np.zeros((l, k, 1))
     for row in range(l):
         for col in range(k):
+            room = np.minimum([col, row], [k - 1 - col, l - 1 - row]) + 0.5  # to the border of the array
+            held = np.clip(shift, -room, room)
             for j in range(v):
                 for i in range(u):
                     off = np.array([i - x[col], j - y[row]])
                     weight = np.prod(np.maximum(0, 1 - np.abs(off) / radius))
-                    at = np.array([col, row]) + shift * off
+                    at = np.array([col, row]) + held * off
                     if weight <= 0 or (at < -0.5).any() or (at > [k - 0.5, l - 0.5]).any():
                         continue
                     low = np.floor(at).astype(int)
@@ -260,7 +265,7 @@ def test_a_click_without_a_map_finds_where_views_agree(show, tmp_path):
 def test_comparison_shows_the_difference(show, shot, tmp_path):
     a = shot.picture
     b = a.with_pixels(np.minimum(a.pixels, 245) + np.uint8(10))
-    write_viewer(tmp_path / "v.html", a, b, quality=None)
+    write_viewer(tmp_path / "v.html", a, b, quality=None, quality_rows=quality_rows(a, b))
     tab = show(tmp_path / "v.html")
     assert tab.evaluate("ii.viewer.state.mode") == "split"
     first, _ = snapshot(tab, mode="original", f=0)
@@ -270,7 +275,9 @@ def test_comparison_shows_the_difference(show, shot, tmp_path):
     split, _ = snapshot(tab, mode="split", split=0.5)
     np.testing.assert_array_equal(split[:, :14], first[:, :14])
     np.testing.assert_array_equal(split[:, 18:], second[:, 18:])
-    assert "dB" in tab.locator("table").inner_text()
+    names, values = (tab.locator(f"table {kind}").all_inner_texts() for kind in ("th", "td"))
+    assert names[:3] == ["Qglobal", "Qangle", "Qview front"] and values[0] == quality_rows(a, b)[0][1]
+    assert tab.locator("table sub").count() == len(names)
 
 
 def test_stereo_pairs_and_keys(show, shot, tmp_path):
@@ -287,6 +294,68 @@ def test_stereo_pairs_and_keys(show, shot, tmp_path):
     again = show(tmp_path / "v.html", tab.evaluate("location.hash"))
     for key, value in again.evaluate("ii.viewer.state").items():
         assert value == (state[key] if isinstance(value, str) else pytest.approx(state[key], rel=1e-4, abs=1e-5))
+
+
+BACKGROUND = (13, 13, 15)  # of the shader, in steps of 8 bits
+
+
+def screen(tab):
+    """The pane of the picture as pixels, and which of them lie on the array by a pixel's margin, or beside it."""
+    box = tab.locator("#main").bounding_box()
+    tab.evaluate("() => new Promise(done => { ii.viewer.redraw(); setTimeout(done, 200); })")
+    pixels = np.asarray(Image.open(io.BytesIO(tab.screenshot(clip=box))).convert("RGB")).astype(int)
+    origin, pace, lenses = tab.evaluate(
+        "() => { const v = ii.viewer, m = v.map(v.pane('main')); return [m.origin, m.pace, v.meta.lenses] }"
+    )
+    on, off = np.ones(pixels.shape[:2], bool), np.zeros(pixels.shape[:2], bool)
+    for axis, n in enumerate(pixels.shape[1::-1]):
+        at = origin[axis] + pace[axis] * (np.arange(n) + 0.5)
+        edge = np.minimum(at + 0.5, lenses[axis] - 0.5 - at) / pace[axis]  # pixels to the border
+        side = (None, slice(None)) if axis == 0 else (slice(None), None)
+        on &= (edge > 2)[side]
+        off |= (edge < -2)[side]
+    return pixels, on, off
+
+
+@pytest.mark.parametrize("with_map", [True, False])
+@pytest.mark.parametrize("scene", ["twins", "mountains"])
+def test_far_scenes_open_without_bands(show, tmp_path, scene, with_map):
+    made = render(load_scene(scene), preset("setup1", scale=16), support=("depth",))
+    write_viewer(tmp_path / "v.html", made.picture, depth=made.depth if with_map else None)
+    tab = show(tmp_path / "v.html")
+    for far in (False, True):  # as it opens, and focused as far as the slider goes
+        if far:
+            tab.evaluate("ii.viewer.set({ f: ii.viewer.meta.focus[1] })")
+        pixels, on, off = screen(tab)
+        background = (abs(pixels - BACKGROUND) <= 1).all(axis=2)
+        assert background[off].all() and off.any()  # nothing is drawn beside the array
+        assert not background[on].any()  # no black on it
+    # The lens of a neighbouring pixel is at most a sixteenth of 16 rows away.
+    assert abs(tab.evaluate("ii.viewer.opening.f")) <= 1
+
+
+def test_focus_breaks_nowhere_in_the_picture(show, tmp_path):
+    """A smooth far scene, focused near: where a neighbour's lens left the array a strip began with a step."""
+    camera = IICamera(pixels=(256, 128), lenses=(32, 16), pixel_pitch_mm=0.0244, gap_mm=0.73)
+    ramp = np.tile(np.linspace(40, 215, 8)[:, None], (16, 256))  # what every lens sees of infinity
+    picture = IIPicture(np.repeat(ramp[..., None], 3, axis=2).astype(np.uint8), (32, 16), (8, 8), camera)
+    near = picture.pixels.reshape(16, 8, 32, 8, 3) + np.arange(16, dtype=np.uint8)[:, None, None, None, None]
+    write_viewer(tmp_path / "v.html", picture.with_pixels(near.reshape(128, 256, 3)), quality=None)
+    shown, _ = snapshot(show(tmp_path / "v.html"), f=6, a=1)
+    step = np.diff(shown[..., 0].mean(axis=1))
+    # From row to row: a pixel of the ramp over 16 lenses and its brightening; a pixel of the ramp alone is 25.
+    assert abs(step).max() < 14, step
+
+
+def test_reset_returns_to_what_the_page_opened_with(show, shot, tmp_path):
+    write_viewer(tmp_path / "v.html", shot.picture, shot.picture, depth=shot.depth)
+    tab = show(tmp_path / "v.html")
+    opened = tab.evaluate("ii.viewer.state")
+    assert opened["f"] != 0 and opened["mode"] == "split"
+    tab.evaluate("ii.viewer.set({ f: 0, x: 1, zoom: 3, mode: 'decoded', a: 2 })")
+    assert "f=0" in tab.url
+    tab.locator("#reset").click()
+    assert tab.evaluate("ii.viewer.state") == opened and tab.evaluate("location.hash") == ""
 
 
 def test_a_damaged_link_is_ignored(show, shot, tmp_path):
@@ -357,7 +426,7 @@ def test_command_refuses_what_it_cannot_show(run, refused, shot, tmp_path, monke
     refused(run("view", path, "-o", tmp_path / "a.png"), "is no page: .html is needed")
     write_image(tmp_path / "bare.png", shot.picture.pixels)
     refused(run("view", tmp_path / "bare.png", "-o", tmp_path / "b.html"), "bare.png")
-    monkeypatch.setattr(viewer, "MAX_EMBEDDED", 1000)
+    monkeypatch.setattr(page, "MAX_EMBEDDED", 1000)
     refused(run("view", path, "-o", tmp_path / "v.html"), "--serve")
     assert not list(tmp_path.glob("*.html")) and not list(tmp_path.glob(".*"))
 

@@ -99,26 +99,38 @@ def _shifts(camera: IICamera, erect: bool, depth_mm: float | None) -> NDArray[np
 
 
 @kernel
+def held(shift, lens, lenses):
+    """Focus, in lenses a pixel, of a place on the array: no more than there are lenses to the border."""
+    room = max(0.0, min(lens + 0.5, lenses - 0.5 - lens))
+    return min(max(shift, -room), room)
+
+
+@kernel
 def look(field, lens_x, lens_y, pixel_x, pixel_y, shift, radius, out):
-    """All pixels within the aperture, each under the lens that sees the same point of the plane in focus."""
+    """All pixels within the aperture, each under the lens that sees the same point of the plane in focus.
+
+    Towards the array's border the focus goes back to 0, so that the lens of the next pixel is never beyond it.
+    """
     rows, ei_v, columns, ei_u, _ = field.shape
     for row in range(out.shape[0]):
         zone_v = math.floor((pixel_y[row] + 0.5) / ei_v)  # 0, or a neighbouring elementary image
         v = min(max(pixel_y[row] - zone_v * ei_v, 0.0), ei_v - 1.0)
+        shift_v = held(shift[1], lens_y[row] + zone_v, rows)
         for column in range(out.shape[1]):
             zone_u = math.floor((pixel_x[column] + 0.5) / ei_u)
             u = min(max(pixel_x[column] - zone_u * ei_u, 0.0), ei_u - 1.0)
+            shift_u = held(shift[0], lens_x[column] + zone_u, columns)
             red, green, blue, total = 0.0, 0.0, 0.0, 0.0
             for j in range(max(0, math.ceil(v - radius[1])), min(ei_v - 1, math.floor(v + radius[1])) + 1):
                 weight_v = 1.0 - abs(j - v) / radius[1]
-                y = lens_y[row] + zone_v + shift[1] * (j - v)
+                y = lens_y[row] + zone_v + shift_v * (j - v)
                 if weight_v <= 0.0 or y < -0.5 or y > rows - 0.5:
                     continue
                 y0, ty = min(max(math.floor(y), 0), rows - 1), y - math.floor(y)
                 y1 = min(max(math.floor(y) + 1, 0), rows - 1)
                 for i in range(max(0, math.ceil(u - radius[0])), min(ei_u - 1, math.floor(u + radius[0])) + 1):
                     weight = weight_v * (1.0 - abs(i - u) / radius[0])
-                    x = lens_x[column] + zone_u + shift[0] * (i - u)
+                    x = lens_x[column] + zone_u + shift_u * (i - u)
                     if weight <= 0.0 or x < -0.5 or x > columns - 0.5:
                         continue
                     x0, tx = min(max(math.floor(x), 0), columns - 1), x - math.floor(x)

@@ -27,8 +27,8 @@ def view(
 ) -> None:
     """Look at an II-picture in a browser: parallax, focus, comparison, stereo."""
     from ii_core import IIPicture
+    from ii_core.display.viewer import JPEG_QUALITY, write_viewer, write_viewer_folder
     from ii_core.files import read_depth
-    from metrics.viewer import JPEG_QUALITY, write_viewer, write_viewer_folder
 
     if (output is None) == (not serve):
         raise ValueError("one of --output and --serve is needed")
@@ -41,6 +41,10 @@ def view(
     options: dict[str, Any] = {"title": picture.stem, "quality": None if lossless else JPEG_QUALITY}
     original = IIPicture.load(picture)
     decoded = load_any(compare) if compare else None
+    if decoded is not None:
+        from metrics import quality_rows
+
+        options["quality_rows"] = quality_rows(original, decoded)
     if depth is not None:
         options["depth"] = read_depth(depth, size=original.size)
     with progress_bar(f"view {picture.name}") as report:

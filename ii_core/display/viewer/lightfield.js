@@ -23,9 +23,11 @@ vec4 texel(sampler2DArray pages, ivec2 lens, ivec2 view) {
   return texelFetch(pages, ivec3(at - page * side, page.y * across + page.x), 0);
 }
 
+bool beyond(vec2 lens) { return any(lessThan(lens, vec2(-0.5))) || any(greaterThan(lens, vec2(lenses) - 0.5)); }
+
 // Between four lenses, as one pixel of each sees it; nothing outside the array or where no page has come yet.
 vec4 between(sampler2DArray pages, vec2 lens, ivec2 view) {
-  if (any(lessThan(lens, vec2(-0.5))) || any(greaterThan(lens, vec2(lenses) - 0.5))) return vec4(0);
+  if (beyond(lens)) return vec4(0);
   ivec2 low = ivec2(floor(lens));
   vec2 t = lens - vec2(low);
   return mix(mix(texel(pages, low, view), texel(pages, low + ivec2(1, 0), view), t.x),
@@ -44,30 +46,38 @@ uniform int mode;           // 0 original, 1 decoded, 2 split, 3 difference
 uniform float divide, gain; // where a split pane is parted, in pixels; of a difference
 uniform vec3 mask;
 
-// The scene focused on one plane: all pixels within the aperture, each from the lens that sees the same point.
+const vec4 NOTHING = vec4(0.05, 0.05, 0.06, 1);
+
+// The scene focused on one plane: all pixels within the aperture, each from the lens that sees the same point. Towards
+// the array's border the focus goes back to 0, so that the lens of the next pixel is never beyond it.
 vec4 look(sampler2DArray pages, vec2 lens) {
   vec2 pixel = base + slope * lens;
   vec2 zone = floor((pixel + 0.5) / vec2(ei));  // 0, or a neighbouring elementary image: a side viewing zone
   pixel = clamp(pixel - zone * vec2(ei), vec2(0), vec2(ei - 1));
   ivec2 first = max(ivec2(0), ivec2(ceil(pixel - radius))), last = min(ei - 1, ivec2(floor(pixel + radius)));
+  vec2 at = lens + zone, room = max(min(at + 0.5, vec2(lenses) - 0.5 - at), vec2(0));
+  vec2 held = clamp(focus, -room, room);
   vec4 sum = vec4(0);
   for (int v = first.y; v <= last.y; v += stride) {
     for (int u = first.x; u <= last.x; u += stride) {
       vec2 off = vec2(u, v) - pixel;
       vec2 weight = max(vec2(0), 1.0 - abs(off) / radius);
       if (weight.x * weight.y > 0.0)
-        sum += weight.x * weight.y * between(pages, lens + zone + focus * off, ivec2(u, v));
+        sum += weight.x * weight.y * between(pages, at + held * off, ivec2(u, v));
     }
   }
   if (sum.a > 0.0) return vec4(sum.rgb / sum.a, 1);
-  vec2 at = lens + zone;
-  if (any(lessThan(at, vec2(-0.5))) || any(greaterThan(at, vec2(lenses) - 0.5))) return vec4(0.05, 0.05, 0.06, 1);
+  if (beyond(at)) return NOTHING;
   return texture(preview, (at + 0.5) / vec2(lenses));
 }
 
 void main() {
   vec2 lens = place();
   float x = gl_FragCoord.x - corner.x;
+  if (beyond(lens)) {  // beside the array is no picture, whatever the focus
+    colour = vec4(mask * NOTHING.rgb, 1);
+    return;
+  }
   if (mode == 3) {
     vec3 apart = look(decoded, lens).rgb - look(original, lens).rgb;
     colour = vec4(mask * (0.5 + gain * apart), 1);

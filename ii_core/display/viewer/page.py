@@ -1,4 +1,4 @@
-"""A page that shows an II-picture in a browser: one HTML file with everything in it, or a folder to be served.
+"""Viewer page of an II-picture: one HTML file with everything in it, or a folder for a web server.
 
 The page holds the mosaic of sub-images (2.13) cut into square pages, which become the layers of one texture; its
 shader looks through the lenses as `ii_core.view_image` does (4.1), and focuses by shifting and adding.
@@ -12,7 +12,7 @@ import io
 import json
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -22,21 +22,18 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ii_core import IIPicture, five_viewpoints, view_image
-from ii_core.display.panel import ASSUMED_ANGLE_DEG, with_assumed_camera
-from ii_core.files import atomic_path
-from ii_core.picture import codes8
-from ii_core.view import camera_of
-
-from .global_angle import q_angle, q_global
-from .view import WINDOW, q_view
+from ...files import atomic_path
+from ...picture import IIPicture, codes8
+from ...view import camera_of, five_viewpoints, view_image
+from ..panel import ASSUMED_ANGLE_DEG, with_assumed_camera
 
 PAGE_SIDE = 2048  # the largest texture every WebGL2 takes
 PREVIEW_SIDE = 512
 MOST_LAYERS = 256  # and the most layers
 MAX_EMBEDDED = 256 << 20  # bytes of a page; browsers read no more in reasonable time
 JPEG_QUALITY = 95
-FARTHEST = 250  # gaps to the last layer in focus, as in `q_depth`
+FARTHEST = 250  # gaps to the farthest focus
+Rows = Sequence[tuple[str, str]]
 
 
 def write_viewer(
@@ -47,6 +44,7 @@ def write_viewer(
     depth: NDArray[Any] | None = None,
     title: str = "",
     quality: int | None = JPEG_QUALITY,
+    quality_rows: Rows = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> int:
     """One self-contained HTML file, which opens from disk in a browser with WebGL2.
@@ -65,6 +63,8 @@ def write_viewer(
         The name shown.
     quality : int or None
         Of JPEG pages (4:4:4), 1 to 100; None for WebP without loss, four times as large as 95.
+    quality_rows : sequence of (str, str)
+        Names and values of a table beside the picture, such as ``("Q_global", "31.20 dB")``.
     progress : callable, optional
         Called with pages done and pages in all.
 
@@ -81,7 +81,7 @@ def write_viewer(
     OSError
         If the file cannot be written.
     """
-    page = _Page(picture, decoded, depth, title, quality)
+    page = _Page(picture, decoded, depth, title, quality, quality_rows)
     used = 0
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         head, tail = page.html("\x00").split("\x00")
@@ -107,10 +107,11 @@ def write_viewer_folder(
     depth: NDArray[Any] | None = None,
     title: str = "",
     quality: int | None = JPEG_QUALITY,
+    quality_rows: Rows = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
     """The page as index.html with its data in files beside it, for a web server; parameters as `write_viewer`."""
-    page = _Page(picture, decoded, depth, title, quality)
+    page = _Page(picture, decoded, depth, title, quality, quality_rows)
     order: list[list[Any]] = []
     for number, (kind, where, data) in enumerate(page.parts(progress)):
         name = f"{number}.{kind}"
@@ -131,6 +132,7 @@ class _Page:
         depth: NDArray[Any] | None,
         title: str,
         quality: int | None,
+        quality_rows: Rows,
     ) -> None:
         picture.check_regular()
         if decoded is not None:
@@ -143,7 +145,7 @@ class _Page:
             )
         self.pictures = [picture] if decoded is None else [picture, decoded]
         self.depth = None if depth is None else depth_view(picture, depth)
-        self.title, self.jpeg = title or "II-picture", quality
+        self.title, self.jpeg, self.quality_rows = title or "II-picture", quality, quality_rows
         (k, l), (u, v) = picture.lenses, picture.ei_pixels
         self.side = min(PAGE_SIDE, max(k * u, l * v))
         self.grid = -(-(k * u) // self.side), -(-(l * v) // self.side)
@@ -155,7 +157,7 @@ class _Page:
 
     def html(self, data: str) -> str:
         """The page around its data."""
-        folder = files("assets") / "viewer"
+        folder = files(__package__)
         text = {name: (folder / name).read_text(encoding="utf-8") for name in ("page.html", "style.css")}
         script = "\n".join((folder / name).read_text(encoding="utf-8") for name in ("lightfield.js", "viewer.js"))
         meta = json.dumps(self.meta()).replace("<", "\\u003c")
@@ -166,7 +168,7 @@ class _Page:
             style=text["style.css"],
             compare=COMPARE if compared else "",
             keys=", M comparison" if compared else "",
-            quality=self.quality() if compared else "",
+            quality=self.quality() if self.quality_rows else "",
             script=f"{script}\nii.start({meta});",
             data=data,
         )
@@ -210,16 +212,17 @@ class _Page:
         return f"{k} × {l} lenses of {u} × {v} px, {camera}"
 
     def quality(self) -> str:
-        """A table of what the comparison costs, in HTML."""
-        a, b = self.pictures
-        angle = q_angle(a, b)
-        rows = [
-            ("Q<sub>global</sub>", f"{q_global(a, b):.2f} dB"),
-            ("Q<sub>angle</sub>", f"{angle.min():.2f} … {angle.max():.2f} dB"),
-        ]
-        if a.camera is not None and min(a.lenses) >= WINDOW:
-            rows += [(f"Q<sub>view</sub> {name}", f"{value:.4f}") for name, value in q_view(a, b).values.items()]
-        lines = "".join(f"<tr><th>{name}</th><td>{text}</td></tr>" for name, text in rows)
+        """The table of qualities, in HTML; what follows _ in a name's first word stands lower."""
+
+        def named(name: str) -> str:
+            symbol, *rest = name.split(" ", 1)
+            base, _, sub = symbol.partition("_")
+            low = f"<sub>{html.escape(sub)}</sub>" if sub else ""
+            return " ".join([html.escape(base) + low, *map(html.escape, rest)])
+
+        lines = "".join(
+            f"<tr><th>{named(name)}</th><td>{html.escape(text)}</td></tr>" for name, text in self.quality_rows
+        )
         return f'<table aria-label="Quality of the decoded picture">{lines}</table>'
 
     def parts(self, progress: Callable[[int, int], None] | None) -> Iterator[tuple[str, tuple[int, ...], bytes]]:

@@ -3,6 +3,8 @@
 
 const DEFAULTS = { x: 0, y: 0, r: 1, f: 0, a: 1, zoom: 1, cx: 0.5, cy: 0.5, mode: "original", split: 0.5, gain: 4,
   stereo: "off", eyes: 0.25 };
+// The opening focus moves a neighbouring pixel's lens by at most this share of the array.
+const OPENING_SHARE = 1 / 16;
 const MODES = ["original", "decoded", "split", "difference"];
 
 class Viewer {
@@ -12,7 +14,9 @@ class Viewer {
     this.field = new LightField(this.canvas, meta);
     this.limits = { x: [-2, 2], y: [-2, 2], r: [0.35, 10], f: meta.focus, a: [1, Math.max(1, Math.max(...meta.ei) / 2)],
       zoom: [1, 40], cx: [0, 1], cy: [0, 1], split: [0, 1], gain: [1, 32], eyes: [0, 1] };
-    this.state = { ...DEFAULTS, ...(meta.compared ? { mode: "split" } : {}) };
+    // What the page opens with and Reset returns to; the focus comes once the picture is there.
+    this.opening = { ...DEFAULTS, ...(meta.compared ? { mode: "split" } : {}) };
+    this.state = { ...this.opening };
     this.cursor = [(meta.lenses[0] - 1) / 2, (meta.lenses[1] - 1) / 2];
     this.quick = false;
     this.work = [];
@@ -48,16 +52,20 @@ class Viewer {
   async finished() {
     await Promise.all(this.work);
     this.say("");
-    if (!/[#&]f=/.test(location.hash)) this.state.f = this.start();
+    this.opening.f = this.start();
+    if (!/[#&]f=/.test(location.hash)) this.state.f = this.opening.f;
     this.redraw();
   }
 
-  // Where the focus is unless the link says it: on the nearer things, or on what lies in the middle; never so far
-  // that neighbouring views have no lens in common.
+  // Where the focus is unless the link says it: on the nearer things, or on what lies in the middle, as far as
+  // neighbouring pixels' lenses stay in the array almost everywhere.
   start() {
     const found = this.depthMap ? [...this.depthMap].filter(Number.isFinite).sort((a, b) => a - b) : [];
     const f = found.length ? this.focusOf(found[Math.floor(found.length / 4)]) : this.pick(this.cursor);
-    return Math.min(Math.max(f, this.meta.focus[0]), this.meta.focus[1] / 3);
+    const { lenses, camera: c, focus: [near, far] } = this.meta;
+    const rows = c.vertical_parallax ? lenses[1] * c.lens_pitch_mm[1] / c.lens_pitch_mm[0] : Infinity;
+    const most = OPENING_SHARE * Math.min(lenses[0], rows);
+    return Math.min(Math.max(f, near, -most), far, most);
   }
 
   // --- geometry ----------------------------------------------------------------------------------------------
@@ -234,7 +242,7 @@ class Viewer {
   }
 
   toLink() {
-    const kept = Object.entries(this.state).filter(([key, value]) => value !== DEFAULTS[key]);
+    const kept = Object.entries(this.state).filter(([key, value]) => value !== this.opening[key]);
     const text = kept.map(([key, value]) => `${key}=${typeof value === "number" ? +value.toFixed(5) : value}`).join("&");
     history.replaceState(null, "", text ? `#${text}` : location.pathname + location.search);
   }
@@ -314,9 +322,9 @@ class Viewer {
       input.addEventListener("input", () => this.set({ [input.dataset.state]: input.value }, input.type === "range"));
     }
     document.getElementById("save").addEventListener("click", () => this.save());
-    document.getElementById("reset").addEventListener("click", () => this.set({ ...DEFAULTS, mode: this.state.mode }));
+    document.getElementById("reset").addEventListener("click", () => this.set({ ...this.opening }));
     window.addEventListener("hashchange", () => {
-      this.state = { ...DEFAULTS };
+      this.state = { ...this.opening };
       this.fromLink();
       this.redraw();
     });
