@@ -7,16 +7,18 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 from codec import encode
 from codec.inspect.extract import extract
-from ii_core import IIPicture
+from ii_core import IIPicture, preset
 from ii_core.atomic import atomic_paths
 from ii_core.files import atomic_path, image_header, pixel_digest, read_image, read_json, write_image, write_json
 from ii_core.picture import sidecar
+from raytrace_ii import load_scene, render
 
 RNG = np.random.default_rng(5)
 
@@ -195,3 +197,18 @@ def test_a_link_stays_a_link(tmp_path):
     (tmp_path / "link.json").symlink_to("real.json")
     write_json(tmp_path / "link.json", 5)
     assert (tmp_path / "link.json").is_symlink() and read_json(tmp_path / "real.json") == 5
+
+
+def test_threads_at_once_give_what_they_give_alone():
+    camera = preset("setup1", scale=128)
+    names = ("objects", "cuboid", "apples", "objects")
+
+    def made(name):
+        shot = render(load_scene(name), camera, samples=2, workers=2).picture
+        return shot.pixels, encode(shot, "si-h264", qp=30).payload
+
+    alone = {name: made(name) for name in set(names)}
+    with ThreadPoolExecutor(4) as pool:
+        for name, (pixels, payload) in zip(names, pool.map(made, names), strict=True):
+            np.testing.assert_array_equal(pixels, alone[name][0])
+            assert payload == alone[name][1]

@@ -10,7 +10,7 @@ import typer
 
 from .coding import study_orders
 from .common import Force, Workers, app, check_outputs, columns, console, load_any, progress_bar, spinner
-from .words import one_line
+from .words import one_line, say
 
 if TYPE_CHECKING:
     from ii_core import IIPicture
@@ -227,7 +227,7 @@ def run_study(
             rd_chart(drawn, chart, measure=measure)
         print_summary(name, drawn, measure)
     if lost := {point["depth_outside"] for point in drawn["points"] if "depth_outside" in point}:
-        print(f"{name}: {told_outside(max(lost))}")
+        say(f"{name}: {told_outside(max(lost))}")
     if set(OVER_DEPTH) <= set(measures):
         for end in (".png", ".pdf"):
             depth_rate_chart(drawn, folder / f"{name}_q_depth{end}")

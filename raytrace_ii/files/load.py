@@ -87,6 +87,8 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
 
     Raises
     ------
+    TypeError
+        If the name is no text and no path.
     ValueError
         If the name is unknown, the file is wrong, or a mesh or texture is.
     OSError
@@ -98,6 +100,8 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
         Once for each mesh file that holds something unsupported, naming all of it; and once if glass is not closed
         or looks inwards, naming the objects.
     """
+    if not isinstance(name, str | os.PathLike) or not isinstance(os.fspath(name), str):
+        raise TypeError(f"name is {name!r}: the name of a scene or a path is needed")
     path = Path(name)
     alone = path.suffix.lower() in MESH_TYPES
     if path.suffix != ".toml" and not alone:

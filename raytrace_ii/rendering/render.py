@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import time
 from collections import Counter
@@ -21,11 +20,13 @@ from ii_core.picture import NOISE_ROWS, noisy_rows, picture_rows, sidecar
 
 from ..scene.scene import Scene
 from ..tracing.sampling import sampling
-from ..tracing.tracer import RayCount, rigid
+from ..tracing.tracer import RayCount, check_scene, rigid
 from .executors import Tile, check_executor, cores, run
 from .job import CURVES, SUPPORT_IMAGES, Block, Job, check_disparity
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
+MOST_WORKERS = 1024
+MOST_NOISE = 1e6  # steps of 8 bits; 255 is white
 SUPPORT = ("depth", "normal", "object_id")  # those kept unless others are asked for
 # What the channels of support images are called in an EXR file that holds several.
 CHANNELS = {
@@ -157,14 +158,14 @@ def render(
 
     Raises
     ------
-    ValueError
-        If a parameter is out of range.
+    TypeError, ValueError
+        If a parameter is of another type or out of range.
     OSError
         If worker processes die and are not replaced.
     """
     tally = _Tally()
     job = _job(scene, camera, samples, error, seed, noise, dtype, pose, support)
-    _check_workers(workers, executor)
+    _check_means(workers, executor, progress)
     columns, rows = camera.pixels
     out: dict[str, NDArray[Any]] = {"pixels": np.empty((rows, columns, 3), dtype)}
     for name in support:
@@ -222,9 +223,13 @@ def render_to(
         If a file cannot be written.
     """
     tally = _Tally()
+    if picture is not None:
+        picture = _path("picture", picture)
+    if not isinstance(support, Mapping | None):
+        raise TypeError(f"support is {support!r}: a mapping of names to paths is needed")
     files = {name: _paths(value) for name, value in (support or {}).items()}
     job = _job(scene, camera, samples, error, seed, noise, dtype, pose, tuple(files))
-    _check_workers(workers, executor)
+    _check_means(workers, executor, progress)
     if upright and camera.lenses != (1, 1):
         raise ValueError(f"only the picture of one lens is turned upright: this camera has {camera.lenses} lenses")
     strips = _strips(job.tiles())
@@ -274,7 +279,8 @@ def _outputs(
 
 
 def _paths(value: Paths) -> list[str]:
-    return [os.fspath(value)] if isinstance(value, str | os.PathLike) else [os.fspath(path) for path in value]
+    several = not isinstance(value, str | bytes | os.PathLike)
+    return [_path("support", path) for path in (_items("support", value) if several else [value])]
 
 
 @dataclass
@@ -358,16 +364,26 @@ def _job(
     pose: ArrayLike | None, support: tuple[str, ...],
 ) -> Job:  # fmt: skip
     """A picture to be rendered, all of it checked."""
+    check_scene(scene)
+    if not isinstance(camera, IICamera | MapCamera):
+        raise TypeError(f"camera is a {type(camera).__name__}: an IICamera or a MapCamera is needed")
     if isinstance(camera, MapCamera):
         if samples not in (1, camera.stored_samples):
             raise ValueError(f"samples is {samples}: the maps hold {camera.stored_samples} for each pixel")
         samples = camera.stored_samples
-    if not isinstance(seed, int | np.integer) or seed < 0:
-        raise ValueError(f"seed is {seed!r}: a whole number of at least 0 is needed")
-    if not 0 <= noise < math.inf:
-        raise ValueError(f"noise sigma is {noise}: at least 0 is needed")
+    if not isinstance(seed, int | np.integer) or not 0 <= seed < 1 << 63:
+        raise ValueError(f"seed is {_short(seed)}: a whole number of at least 0 and below 2⁶³ is needed")
+    for name, value in (("error", error), ("noise", noise)):
+        if not isinstance(value, int | float | np.number):
+            raise TypeError(f"{name} is {value!r}: a number is needed")
+    if not 0 <= noise <= MOST_NOISE:
+        raise ValueError(f"noise sigma is {_short(noise)}: a number from 0 to {MOST_NOISE} is needed")
+    if not isinstance(dtype, str):
+        raise TypeError(f"dtype is {dtype!r}: one of the names {', '.join(CURVES)} is needed")
     if dtype not in CURVES:
         raise ValueError(f"unknown pixel type {dtype!r}: known are {', '.join(CURVES)}")
+    if isinstance(support, str) or not all(isinstance(name, str) for name in _items("support", support)):
+        raise TypeError(f"support is {support!r}: a sequence of names is needed")
     if unknown := set(support) - set(SUPPORT_IMAGES):
         known = ", ".join(SUPPORT_IMAGES)
         raise ValueError(f"unknown support image {', '.join(sorted(unknown))}: known are {known}")
@@ -376,9 +392,31 @@ def _job(
     return Job(scene, camera, sampling(samples, error), int(seed), rigid(pose), dtype, support)
 
 
-def _check_workers(workers: int | None, executor: Any) -> None:
-    if workers is not None and (not isinstance(workers, int | np.integer) or workers < 1):
-        raise ValueError(f"workers is {workers!r}: a whole number of at least 1 is needed")
+def _short(value: Any) -> str:
+    """A value for a message; a number of 400 digits is not read by anyone."""
+    text = repr(value)
+    return text if len(text) < 40 else f"{text[:20]}… ({len(text)} characters)"
+
+
+def _items(name: str, value: Any) -> Iterator[Any]:
+    try:
+        return iter(value)
+    except TypeError:
+        raise TypeError(f"{name} is {value!r}: a sequence is needed") from None
+
+
+def _path(name: str, value: Any) -> str:
+    """A path as text; TypeError that names the argument."""
+    if not isinstance(value, str | os.PathLike) or not isinstance(path := os.fspath(value), str):
+        raise TypeError(f"{name} is {value!r}: a path is needed")
+    return path
+
+
+def _check_means(workers: int | None, executor: Any, progress: Any) -> None:
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress is {progress!r}: a function of blocks done and blocks in all is needed")
+    if workers is not None and (not isinstance(workers, int | np.integer) or not 1 <= workers <= MOST_WORKERS):
+        raise ValueError(f"workers is {_short(workers)}: a whole number from 1 to {MOST_WORKERS} is needed")
     check_executor(executor, workers)
 
 

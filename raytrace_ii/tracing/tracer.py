@@ -79,11 +79,11 @@ def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: Array
 
     Raises
     ------
-    ValueError
-        If a ray has no direction or is not finite, or the pose is not rigid.
+    TypeError, ValueError
+        If a parameter is of another type, a ray has no direction or is not finite, or the pose is not rigid.
     """
-    locations = np.asarray(locations, np.float64)
-    directions = np.asarray(directions, np.float64)
+    check_scene(scene)
+    locations, directions = _numbers("locations", locations), _numbers("directions", directions)
     if locations.shape != directions.shape or locations.shape[-1:] != (3,):
         raise ValueError(
             f"locations {locations.shape} and directions {directions.shape}: the same (..., 3) is needed"
@@ -127,11 +127,25 @@ class Support:
         ]
 
 
+def check_scene(scene: Any) -> None:
+    """Raise TypeError unless it is a scene."""
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene is a {type(scene).__name__}: a Scene is needed, as load_scene gives it")
+
+
+def _numbers(name: str, value: Any) -> NDArray[np.float64]:
+    """An array of float64; a ValueError that names the argument if the value is none."""
+    try:
+        return np.asarray(value, np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{name} is no array of numbers: {error}") from None
+
+
 def rigid(pose: ArrayLike | None) -> NDArray[np.float64]:
     """A (4, 4) rigid transform, checked; the identity for None."""
     if pose is None:
         return np.eye(4)
-    matrix = np.asarray(pose, np.float64)
+    matrix = _numbers("pose", pose)
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
         raise ValueError("pose is not a finite 4×4 matrix")
     turn = matrix[:3, :3]

@@ -1,0 +1,106 @@
+"""Calls with arguments of the wrong type: TypeError or ValueError that names the argument, before any work."""
+
+import numpy as np
+import pytest
+
+from ii_core import preset
+from raytrace_ii import load_scene, render, render_to, trace
+
+CAMERA = preset("setup1", scale=128)
+
+
+class Odd:
+    """A thing of no use."""
+
+
+ODD = [
+    7,
+    -1.5,
+    "text",
+    b"bytes",
+    None,
+    True,
+    [],
+    {},
+    (),
+    {1: 2},
+    Odd(),
+    Odd,
+    np.zeros(3),
+    [None],
+    ["x"],
+    10**400,
+    {3},
+]
+# Values of the list that an argument takes.
+TAKEN = {
+    "samples": [7, True],
+    "seed": [7, True],
+    "noise": [7, True],
+    "workers": [7, None, True],
+    "executor": [None],
+    "pose": [None],
+    "progress": [None, Odd],
+    "support": [[], {}, (), None],
+    "picture": ["text", None],
+}
+NAMED = {"dtype": ("dtype", "pixel type"), "support": ("support",), "name": ("name", "scene")}
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return load_scene("cuboid")
+
+
+def wrong(argument):
+    taken = TAKEN.get(argument, [])
+    return [value for value in ODD if not any(type(value) is type(t) and value == t for t in taken)]
+
+
+def check(call, argument, value):
+    with pytest.raises((TypeError, ValueError)) as caught:
+        call(value)
+    said = str(caught.value)
+    assert any(name in said for name in NAMED.get(argument, (argument,))), said
+
+
+RENDER = ("scene", "camera", "samples", "seed", "noise", "dtype", "workers", "executor", "pose", "progress")
+
+
+@pytest.mark.parametrize("argument", [*RENDER, "support"])
+def test_render(scene, argument):
+    arguments = {"scene": scene, "camera": CAMERA}
+    more = [None] if argument == "support" else []
+    for value in [*wrong(argument), *more]:
+        check(lambda value: render(**{**arguments, argument: value}), argument, value)
+
+
+@pytest.mark.parametrize("value", ["text", None, [], Odd(), {}, np.zeros(3)])
+def test_error_of_adaptive_samples(scene, value):
+    check(lambda value: render(scene, CAMERA, samples=(4, 16), error=value), "error", value)
+
+
+@pytest.mark.parametrize("argument", ["picture", *RENDER, "support"])
+def test_render_to(scene, argument, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = {"picture": "p.png", "scene": scene, "camera": CAMERA}
+    more = (
+        [{"depth": 7}, {"depth": b"d.exr"}, {7: "d.exr"}, {"depth": [None]}, [], ()] if argument == "support" else []
+    )
+    for value in [*wrong(argument), *more]:
+        check(lambda value: render_to(**{**arguments, argument: value}), argument, value)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("argument", ["scene", "locations", "directions", "pose"])
+def test_trace(scene, argument):
+    arguments = {"scene": scene, "locations": [0.0, 0.0, 0.0], "directions": [0.0, 0.0, 1.0]}
+    for value in wrong(argument):
+        if argument in ("locations", "directions") and isinstance(value, np.ndarray):
+            continue  # three numbers are a place, and a direction of zero has a test of its own
+        check(lambda value: trace(**{**arguments, argument: value}), argument, value)
+
+
+def test_load_scene():
+    for value in ODD:
+        check(load_scene, "name", value)
