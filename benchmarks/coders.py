@@ -15,6 +15,7 @@ import statistics
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from fnmatch import fnmatch
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -76,11 +77,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
     parser.add_argument("--scenes", default=",".join(SCENES))
-    parser.add_argument("--schemes", default="*", help="only these, * for anything: si-h264,si-av1*")
+    parser.add_argument(
+        "--schemes",
+        default="*",
+        help="only these, * for anything, options parted by semicolons: si-av1*,si-h264:balanced;merange=64",
+    )
     parser.add_argument("--workers", type=int, default=1)
     add_again(parser)
     asked = parser.parse_args()
-    chosen = asked.schemes.split(",")
+    chosen = [one.replace(";", ",") for one in asked.schemes.split(",")]
     names = [name for name in candidates() if name == ANCHOR or any(fnmatch(name, one) for one in chosen)]
     if unknown := [one for one in chosen if not any(fnmatch(name, one) for name in names)]:
         parser.error(f"no scheme {unknown[0]!r}: known are {', '.join(candidates())}")
@@ -97,9 +102,11 @@ def main() -> None:
 def measure(picture: IIPicture, keys: Sequence[Mapping[str, Any]], workers: int) -> None:
     """Measure and record curves of one picture; an interrupt drops the curves not yet begun."""
 
+    done = count(1)
+
     def row(key: Mapping[str, Any]) -> None:
         record = RECORDS.measure(key, lambda: {"points": curve(picture, key["scheme"])})
-        print(f"{key['scene']} {key['scheme']}: {record['seconds']:.1f} s", flush=True)
+        print(f"{next(done)} of {len(keys)}: {key['scene']} {key['scheme']}, {record['seconds']:.1f} s", flush=True)
 
     pool = ThreadPoolExecutor(workers)
     try:

@@ -75,6 +75,7 @@ class Records:
             "seconds": round(time.perf_counter() - started, 2),
             "result": result,
         }
+        stamp(self.modules)  # processes that the measurement started have loaded the same code
         append_record(self.path, record)
         return record
 

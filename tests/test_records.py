@@ -147,6 +147,13 @@ def test_code_that_changes_while_it_is_measured_is_no_record(monkeypatch):
         TOY.measure({"row": 2}, lambda: {})
 
 
+def test_code_that_changes_within_a_row_is_no_record_either(monkeypatch):
+    TOY.measure({"row": 1}, lambda: {})
+    with pytest.raises(RuntimeError, match="sources changed on disk"):
+        TOY.measure({"row": 2}, lambda: monkeypatch.setattr(records, "code_hash", lambda modules: "1" * 64) or {})
+    assert [row["row"] for row in TOY.rows()] == [1]
+
+
 def test_tables_name_the_commits_where_they_differ():
     lines = ["| scene | dB |", "|---|---|", "| car | 1 |", "| twins | 2 |"]
     assert with_commits(lines, [["abc"], ["abc"]]) == lines
@@ -181,6 +188,9 @@ def test_coders_continue_and_take_subsets(monkeypatch, capsys):
     assert "cuboid: 1 of 3 curves to measure" in run("--scenes", "cuboid", "--schemes", "jpeg2000,si-mpeg2")
     assert len(coders.RECORDS.path.read_text().splitlines()) == 3
     assert {row["scheme"] for row in coders.studied(64)} == {coders.ANCHOR, "jpeg2000", "si-mpeg2"}
+    assert "2 of 2: cuboid si-h264:balanced,merange=64" in run(
+        "--scenes", "cuboid", "--schemes", "si-h264:balanced;merange=64,si-h264:fast"
+    )
     with pytest.raises(SystemExit):
         run("--schemes", "jpg2000")
 
