@@ -4,7 +4,7 @@
 commit, in a work tree of its own, and by the code at hand. It reports the PSNR between the two pictures, the share
 of pixels that differ by more than 8 codes in a channel, and the rate of ``si-h264`` at equal quality (Bjøntegaard).
 Pictures to be coded have the tables' sensor noise, the same in both; those compared have none. One row a scene is
-appended to ``results/before_after.json``.
+appended to ``results/before_after.jsonl``.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.records import Records, add_again
 from codec import decode, encode
 from ii_core import IIPicture
-from ii_core.files import read_image, write_json
-from metrics import bd_rate, provenance, q_global
+from ii_core.files import read_image
+from metrics import bd_rate, q_global
 from metrics.rd import UndefinedDifference
 
 ROOT = Path(__file__).parent.parent
-RESULTS = Path(__file__).parent / "results" / "before_after.json"
+RECORDS = Records("before_after", ("benchmarks.before_after",))
 SCHEME, QUANTISERS = "si-h264:rate=cq", (21, 26, 31, 36, 41)
 VISIBLE = 8  # codes of 8 bits
 
@@ -38,24 +39,31 @@ def main() -> None:
     parser.add_argument("commit", help="of the code before")
     parser.add_argument("--scenes", default="apples,twins,car,cuboid")
     parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
+    add_again(parser)
     asked = parser.parse_args()
-    rows = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else []
+    scenes = asked.scenes.split(",")
+    keys = RECORDS.todo(
+        ({"before": asked.commit, "scene": scene, "scale": asked.scale} for scene in scenes), asked.again
+    )
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         before = folder / "code"
         git = ["git", "-C", str(ROOT), "worktree"]
         subprocess.run([*git, "add", "-q", "--detach", before, asked.commit], check=True)
         try:
-            for scene in asked.scenes.split(","):
-                for code, at in (("before", before), ("after", ROOT)):
-                    rendered(at, scene, asked.scale, folder / f"{code}.png", folder / f"{code}.exr")
-                    rendered(at, scene, asked.scale, folder / f"{code}_noisy.png", None)
-                row = {"before": asked.commit, "scene": scene, "scale": asked.scale, **compared(folder)}
-                print(json.dumps(row))
-                rows.append({**row, **provenance()})
+            for key in keys:
+                record = RECORDS.measure(key, lambda key=key: both(key["scene"], key["scale"], before, folder))
+                print(key["scene"], json.dumps(record["result"]), flush=True)
         finally:
             subprocess.run([*git, "remove", "--force", before], check=True)
-    write_json(RESULTS, rows)
+
+
+def both(scene: str, scale: int, before: Path, folder: Path) -> dict[str, Any]:
+    """Render a scene by the code before and by the code at hand, and compare."""
+    for code, at in (("before", before), ("after", ROOT)):
+        rendered(at, scene, scale, folder / f"{code}.png", folder / f"{code}.exr")
+        rendered(at, scene, scale, folder / f"{code}_noisy.png", None)
+    return compared(folder)
 
 
 def rendered(code: Path, scene: str, scale: int, picture: Path, depth: Path | None) -> None:
