@@ -34,6 +34,7 @@ from metrics import q_global, q_view
 from metrics.plots.rd_chart import COLOURS, new_figure, save
 from raytrace_ii import Body, Scene, Shot, render
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, VertexColours
+from raytrace_ii.tracing.intersect import Hits
 
 ROOT = Path(__file__).parent.parent
 RECORDS, CHART = Records("needs", ("benchmarks.needs", "benchmarks.pareto")), ROOT / "docs/images/needs.png"
@@ -139,14 +140,14 @@ def unshadowed(scene: Scene) -> Scene:
     free = replace(scene)  # with a tree of its own
     none = np.empty(0, np.float32)
 
-    def clear(o: NDArray[Any], d: NDArray[Any], reach: Any = None) -> tuple[dict[str, Any], float]:
-        return {"primID": np.full(len(o), -1, np.int32), "u": none, "v": none, "tfar": none}, 0.0
+    def clear(o: NDArray[Any]) -> tuple[Hits, float]:
+        return Hits(np.full(len(o), -1, np.int32), none, none, none), 0.0
 
     vars(free.packed.intersector)["blocked"] = lambda o, d, reach: (np.full(len(o), -1, np.int32), 0.0)
     if scene.packed.lets_through:
         found = free.packed.intersector.nearest_clear  # the camera's rays still ask what they start in
         vars(free.packed.intersector)["nearest_clear"] = lambda o, d, reach=None: (
-            found(o, d) if reach is None else clear(o, d)
+            found(o, d) if reach is None else clear(o)
         )
     return free
 

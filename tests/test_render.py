@@ -9,6 +9,7 @@ from ii_core.view import view_positions
 from raytrace_ii import Background, Scene, load_scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.rendering import render as rendering
+from raytrace_ii.rendering.tiles import tiles
 from raytrace_ii.tracing.kernels import shade as kernels
 
 SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
@@ -19,7 +20,7 @@ ONE_LENS = IICamera(pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2
 def encoded(radiance, dtype="uint8"):
     """Codes as `render` stores them."""
     out = np.empty(radiance.shape, dtype)
-    kernels.encode_srgb(radiance, 1.0, job.CURVES[dtype], out)
+    kernels.encode_srgb(radiance, np.arange(len(radiance)), 1.0, job.CURVES[dtype], out)
     return out
 
 
@@ -86,9 +87,9 @@ def test_tiles_cover_every_pixel_once(monkeypatch):
     for tile in (1, 7, 24, 25, 100, 10**6):
         monkeypatch.setattr(job, "TILE_RAYS", tile)
         seen = np.zeros((16, 24), int)
-        for rows, cols in job.blocks((24, 16), (1, 1), tile):
+        for rows, cols in tiles(ONE_LENS, tile):
             seen[rows, cols] += 1
-            assert seen[rows, cols].size <= tile or tile < 24
+            assert seen[rows, cols].size <= tile
         assert (seen == 1).all()
 
 
@@ -131,10 +132,10 @@ def test_noise_is_the_picture_s_own(hall_scene):
 
 
 def test_progress_counts_every_tile(monkeypatch):
-    monkeypatch.setattr(job, "TILE_RAYS", 48)
+    monkeypatch.setattr(job, "TILE_RAYS", 64)
     calls = []
     render(Scene(bodies=[body(wall(5))]), ONE_LENS, progress=lambda *at: calls.append(at))
-    assert calls == [(i, 8) for i in range(1, 9)]
+    assert calls == [(i, 6) for i in range(1, 7)]
 
 
 def test_an_interrupted_picture_stops(monkeypatch):

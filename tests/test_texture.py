@@ -228,7 +228,7 @@ def test_every_code_survives_texture_light_and_encoding(bits):
     texture = image_texture(np.broadcast_to(codes[None, :, None], (1, count, 3)))
     out = np.empty((count, 3), dtype)
     curve = CURVES[dtype]
-    kernels.encode_srgb(texture.pixels[0], 1.0, curve, out)
+    kernels.encode_srgb(texture.pixels[0], np.arange(len(texture.pixels[0])), 1.0, curve, out)
     np.testing.assert_array_equal(out, codes[:, None].repeat(3, axis=1))
 
 
@@ -242,7 +242,7 @@ def test_every_code_survives_a_rendered_wall():
     start = np.stack([x, y, np.zeros_like(x)], axis=-1)
     radiance = trace(scene, start, np.broadcast_to([0.0, 0, 1], start.shape)).radiance
     out = np.empty(radiance.shape, np.uint8)
-    kernels.encode_srgb(radiance, 1.0, CURVES["uint8"], out)
+    kernels.encode_srgb(radiance, np.arange(len(radiance)), 1.0, CURVES["uint8"], out)
     # upright and unmirrored: row 0 on top, column 0 on the left
     np.testing.assert_array_equal(out.reshape(16, 16, 3)[..., 0], codes)
     np.testing.assert_array_equal(out.reshape(16, 16, 3)[..., 1], codes[::-1])
@@ -255,7 +255,7 @@ def test_encoding_is_the_standards_curve(dtype):
     peak = np.iinfo(dtype).max
     x = np.linspace(-0.1, 1.1, 100_001).astype(np.float32).reshape(-1, 1).repeat(3, axis=1)
     out = np.empty(x.shape, dtype)
-    kernels.encode_srgb(x, 1.0, CURVES[dtype], out)
+    kernels.encode_srgb(x, np.arange(len(x)), 1.0, CURVES[dtype], out)
     light = np.clip(x[:, 0].astype(float), 0, 1)
     exact = peak * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     assert np.abs(out[:, 0] - exact).max() <= 0.52

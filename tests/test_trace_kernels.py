@@ -78,10 +78,11 @@ def test_start_rays_name_the_first_bad_one():
     directions[2, 1] = np.nan
     rows = [np.empty((6, 3), np.float32) for _ in range(3)]
     out = (*rows, np.empty(6, np.int32), np.empty((6, 2), np.int32))
-    all_of_it = np.empty(0)
+    all_of_it, as_they_come = np.empty(0), np.empty(0, np.int32)
     for function in (kernels.start_rays, kernels.start_rays.py_func):
-        assert function(locations, directions, all_of_it, np.eye(3), np.zeros(3), *out) == (6, 2)
-        assert function(locations[:2], directions[:2], all_of_it, np.eye(3), np.ones(3), *out) == (2, -1)
+        assert function(locations, directions, all_of_it, as_they_come, np.eye(3), np.zeros(3), *out) == (6, 2)
+        two = locations[:2], directions[:2]
+        assert function(*two, all_of_it, as_they_come, np.eye(3), np.ones(3), *out) == (2, -1)
         np.testing.assert_array_equal(rows[0][:2], 1)
         np.testing.assert_allclose(rows[1][:2], 3**-0.5, rtol=1e-7)
         np.testing.assert_array_equal(rows[2][:2], 1)
@@ -94,11 +95,13 @@ def test_rays_without_light_are_left_out():
     pixels, inside = np.empty(4, np.int32), np.empty((4, 0), np.int32)
     for function in (kernels.start_rays, kernels.start_rays.py_func):
         shares = np.array([0.25, 0, 0, 1])
-        found = function(locations, directions, shares, np.eye(3), np.zeros(3), *rows, pixels, inside)
-        assert found == (2, -1)
-        assert pixels[:2].tolist() == [0, 3]
-        np.testing.assert_array_equal(rows[0][:2], locations[[0, 3]])
-        np.testing.assert_array_equal(rows[2][:2, 0], [0.25, 1])
+        for order, row, left in (([], [0, 3], [0, 3]), ([3, 1, 0, 2], [0, 2], [3, 0])):
+            order = np.array(order, np.int32)
+            found = function(locations, directions, shares, order, np.eye(3), np.zeros(3), *rows, pixels, inside)
+            assert found == (2, -1)
+            assert pixels[:2].tolist() == row
+            np.testing.assert_array_equal(rows[0][:2], locations[left])
+            np.testing.assert_array_equal(rows[2][:2, 0], shares[left])
 
 
 def test_rays_by_row_and_column_are_those_one_by_one():
@@ -110,24 +113,26 @@ def test_rays_by_row_and_column_are_those_one_by_one():
         grid[k, ..., 0], grid[k, ..., 1], grid[k, ..., 2] = x[:, k], y[:, k, None], z[k]
     expected = [np.empty((15, 3), np.float32) for _ in range(3)]
     pixels, inside = np.empty(15, np.int32), np.empty((15, 0), np.int32)
-    kernels.start_rays(*grid.reshape(2, 15, 3), np.empty(0), turn, np.arange(3.0), *expected, pixels, inside)
+    order = rng.permutation(15).astype(np.int32)
+    kernels.start_rays(*grid.reshape(2, 15, 3), np.empty(0), order, turn, np.arange(3.0), *expected, pixels, inside)
     for function in (kernels.start_separable_rays, kernels.start_separable_rays.py_func):
         found = [np.empty((15, 3), np.float32) for _ in range(2)]
-        assert function(x, y, z, turn, np.arange(3.0), *found)
+        assert function(x, y, z, order // 5, order % 5, turn, np.arange(3.0), *found)
         np.testing.assert_array_equal(found, expected[:2])
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e200])
 def test_rows_and_columns_of_unusable_rays_are_told(wrong):
     room = [np.empty((15, 3), np.float32) for _ in range(2)]
-    sizes = (10, 6, 2)
+    sizes, order = (10, 6, 2), (np.zeros(15, np.int32),) * 2
     for where in range(18):
         flat = np.ones(18)
         flat[where] = wrong
         x, y, z = np.split(flat, np.cumsum(sizes)[:-1])
-        assert not kernels.start_separable_rays(x.reshape(5, 2), y.reshape(3, 2), z, np.eye(3), np.zeros(3), *room)
+        rays = x.reshape(5, 2), y.reshape(3, 2), z
+        assert not kernels.start_separable_rays(*rays, *order, np.eye(3), np.zeros(3), *room)
     nowhere = np.zeros((5, 2)), np.zeros((3, 2)), np.zeros(2)
-    assert not kernels.start_separable_rays(*nowhere, np.eye(3), np.zeros(3), *room), "no direction"
+    assert not kernels.start_separable_rays(*nowhere, *order, np.eye(3), np.zeros(3), *room), "no direction"
 
 
 def test_shadow_rays_that_arrive_are_packed_to_the_front():

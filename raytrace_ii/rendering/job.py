@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +17,7 @@ from ..tracing.kernels import shade as kernels
 from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.sampling import Adaptive, Sampling, adaptive_mean, fixed_places
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
+from .tiles import Order, Tile, ray_order, tiles
 
 TILE_RAYS = 65536  # enough that numpy's overhead vanishes, few enough that work arrays stay in cache
 
@@ -44,14 +44,14 @@ def _curve(peak: int, samples: int) -> NDArray[np.float64]:
 CURVES = {"uint8": _curve(255, 4097), "uint16": _curve(65535, 65537), "float32": None}
 
 
-def encoded(radiance: NDArray[np.float32], divisor: int, dtype: str) -> NDArray[Any]:
-    """Summed radiance (n, 3) as pixels: integers are sRGB, floats linear light."""
+def encoded(radiance: NDArray[np.float32], rows: NDArray[np.int32], divisor: int, dtype: str) -> NDArray[Any]:
+    """Summed radiance (n, 3) as pixels, each at its row: integers are sRGB, floats linear light."""
     out = np.empty(radiance.shape, dtype)
     curve = CURVES[dtype]
     if curve is None:
-        np.divide(radiance, divisor, out=out)
+        out[rows] = radiance / divisor
     else:
-        kernels.encode_srgb(radiance, 1 / divisor, curve, out)
+        kernels.encode_srgb(radiance, rows, 1 / divisor, curve, out)
     return out
 
 
@@ -85,39 +85,34 @@ class Job:
             self.scene, self.camera, self.sampling, self.seed, self.pose, self.dtype, self.support
         )  # fmt: skip
 
-    def tiles(self) -> list[tuple[slice, slice]]:
+    def tiles(self) -> list[Tile]:
         """Blocks that cover the picture, in rows of blocks, the same whatever the workers."""
-        if not isinstance(self.sampling, Adaptive):
-            return list(blocks(self.camera.pixels, (1, 1), TILE_RAYS))
-        assert isinstance(self.camera, IICamera)
-        if self.camera.regular and self.camera.lenses != (1, 1):
-            return list(blocks(self.camera.pixels, self.camera.ei_pixels, TILE_RAYS))
-        side = max(1, int(TILE_RAYS**0.5))  # a small rim
-        return list(blocks(self.camera.pixels, (side, side), TILE_RAYS))
+        return list(tiles(self.camera, TILE_RAYS, whole_lenses=isinstance(self.sampling, Adaptive)))
 
     def tile(self, rows: slice, cols: slice) -> Block:
         """Render one block."""
         started = time.thread_time()
         tracer = self._tracer()
         shape = rows.stop - rows.start, cols.stop - cols.start
-        support = self._support_room(shape)
+        order = ray_order(self.camera, rows, cols)
+        support = self._support_room(len(order.pixels))
         if isinstance(self.sampling, Adaptive):
-            radiance, samples = self._adaptive(tracer, self.sampling, rows, cols, support)
-            found, times = np.unique(samples, return_counts=True)
-            histogram = dict(zip(found.tolist(), times.tolist(), strict=True))
+            radiance, samples = self._adaptive(tracer, self.sampling, rows, cols, order, support)
+            counts, times = np.unique(samples, return_counts=True)
+            histogram = dict(zip(counts.tolist(), times.tolist(), strict=True))
             divisor = 1
         else:
-            radiance, divisor = self._fixed(tracer, self.sampling, rows, cols, support), self.sampling
+            radiance, divisor = self._fixed(tracer, self.sampling, rows, cols, order, support), self.sampling
             samples = np.full(len(radiance), divisor, np.int32)
             histogram = {divisor: len(radiance)}
-        arrays = {"pixels": encoded(radiance, divisor, self.dtype).reshape(*shape, 3)}
+        found = {} if support is None else vars(support)
+        arrays = {"pixels": encoded(radiance, order.pixels, divisor, self.dtype).reshape(*shape, 3)}
         for name in self.support:
-            if name == "samples":
-                arrays[name] = samples.reshape(shape)
-            elif name == "disparity":
-                arrays[name] = disparity(self.camera, vars(support)["depth"])
-            else:
-                arrays[name] = vars(support)[name]
+            values: NDArray[Any] = samples if name == "samples" else found["depth" if name == "disparity" else name]
+            image = np.empty_like(values)
+            image[order.pixels] = values
+            image = image.reshape(*shape, *values.shape[1:])
+            arrays[name] = disparity(self.camera, image) if name == "disparity" else image
         return Block(rows, cols, arrays, tracer.count, histogram, time.thread_time() - started)
 
     def _tracer(self) -> Tracer:
@@ -127,7 +122,7 @@ class Job:
             with _building:
                 _ = self.scene.packed
             tracer = self._local.tracer = Tracer(self.scene, TILE_RAYS, self.pose, self._lobes())
-        tracer.count = RayCount()
+        tracer.begin()
         return tracer
 
     def _lobes(self) -> tuple[int, int]:
@@ -137,21 +132,21 @@ class Job:
         )  # fmt: skip
         return -(-LOBE_RAYS // least), most
 
-    def _support_room(self, shape: tuple[int, ...]) -> Support | None:
-        """What the tracer fills, None if nobody asks."""
+    def _support_room(self, rays: int) -> Support | None:
+        """Support arrays for so many rays, None if no support image is wanted."""
         if not set(self.support) - {"samples"}:
             return None
-        return Support.empty(shape, {"depth" if name == "disparity" else name for name in self.support})
+        return Support.empty((rays,), {"depth" if name == "disparity" else name for name in self.support})
 
     def _fixed(
-        self, tracer: Tracer, samples: int, rows: slice, cols: slice, support: Support | None
+        self, tracer: Tracer, samples: int, rows: slice, cols: slice, order: Order, support: Support | None
     ) -> NDArray[np.float32]:
-        """Summed radiance of a block whose pixels all have the same number of samples."""
-        radiance = np.zeros(((rows.stop - rows.start) * (cols.stop - cols.start), 3), np.float32)
-        keys = self._block_keys(rows, cols, 0)
+        """Summed radiance of a block whose pixels all have the same number of samples, in the order of the rays."""
+        radiance = np.zeros((len(order.pixels), 3), np.float32)
+        keys = self._keys(cols.start + order.columns, rows.start + order.rows, 0, 1)
         if samples == 1 and isinstance(self.camera, IICamera):
             rays = self.camera.separable_rays(rows, cols)
-            if rays is not None and tracer.run_separable(rays, radiance, support, keys):
+            if rays is not None and tracer.run_separable(rays, radiance, support, order.rows, order.columns, keys):
                 return radiance
         for sample in range(samples):
             if isinstance(self.camera, MapCamera):
@@ -160,15 +155,9 @@ class Job:
                 where = fixed_places(self.camera, samples, self.seed, sample, rows, cols)
                 L, D, shares = self.camera.weighted_rays(rows, cols, *where)
             if sample > 0:
-                keys = self._block_keys(rows, cols, sample)
-            tracer.run(L, D, radiance, support if sample == 0 else None, shares, keys)
+                keys = self._keys(cols.start + order.columns, rows.start + order.rows, sample, 1)
+            tracer.run(L, D, radiance, support if sample == 0 else None, shares, keys, order.pixels)
         return radiance
-
-    def _block_keys(self, rows: slice, cols: slice, sample: int) -> NDArray[np.uint64] | None:
-        if not self.scene.packed.glossy:
-            return None
-        n, m = np.mgrid[rows, cols]
-        return self._keys(m, n, sample, 1)
 
     def _keys(self, m: NDArray[Any], n: NDArray[Any], first: int, count: int) -> NDArray[np.uint64] | None:
         """Keys of ``count`` samples of each pixel, if the scene is glossy."""
@@ -179,36 +168,25 @@ class Job:
         return keys
 
     def _adaptive(
-        self, tracer: Tracer, wanted: Adaptive, rows: slice, cols: slice, support: Support | None
+        self, tracer: Tracer, wanted: Adaptive, rows: slice, cols: slice, order: Order, support: Support | None
     ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """Mean radiance of a block, and how many samples each pixel took."""
+        """Mean radiance of a block, and how many samples each pixel took, in the order of the rays."""
         assert isinstance(self.camera, IICamera)
 
         def shoot(L: Any, D: Any, shares: Any, *, numbers: Any, first: slice | None) -> NDArray[np.float32]:
             radiance = np.zeros((len(L), 3), np.float32)
-            room = self._support_room((len(L),)) if first is not None else None
+            room = self._support_room(len(L)) if first is not None else None
             tracer.run(L, D, radiance, room, shares, self._keys(*numbers))
             if room is not None and first is not None:
                 every = len(L) // (first.stop - first.start)
                 for name, array in vars(support).items():
                     if array is not None:
-                        array.reshape(-1, *array.shape[2:])[first] = getattr(room, name)[::every]
+                        array[first] = getattr(room, name)[::every]
             return radiance
 
         codes = CURVES["uint8"]
         assert codes is not None
-        return adaptive_mean(self.camera, wanted, self.seed, rows, cols, TILE_RAYS, codes, shoot)
-
-
-def blocks(pixels: tuple[int, int], unit: tuple[int, int], most: int) -> Iterator[tuple[slice, slice]]:
-    """Blocks of whole units that cover a picture, about ``most`` pixels each, as wide as can be."""
-    columns, rows = pixels
-    across, down = unit
-    width = min(columns, max(1, most // (across * down)) * across)
-    height = max(1, most // (width * down)) * down
-    for top in range(0, rows, height):
-        for left in range(0, columns, width):
-            yield slice(top, min(top + height, rows)), slice(left, min(left + width, columns))
+        return adaptive_mean(self.camera, wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, shoot)
 
 
 def check_disparity(camera: IICamera | MapCamera) -> None:

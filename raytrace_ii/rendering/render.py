@@ -53,7 +53,7 @@ class Stats:
     ``rays`` by kind (primary, shadow, reflection, refraction), and those ``skipped`` because no 8-bit pixel would
     show them; ``seconds`` by the clock; ``embree_seconds`` and
     ``cpu_seconds`` summed over all threads and processes that rendered; ``samples`` says how many pixels got how
-    many.
+    many; ``embree`` is Embree's version and the rays of a packet, or why rays went one by one.
     """
 
     rays: dict[str, int]
@@ -62,6 +62,7 @@ class Stats:
     embree_seconds: float
     cpu_seconds: float
     samples: dict[int, int]
+    embree: str
 
     @property
     def mean_samples(self) -> float:
@@ -306,6 +307,7 @@ class _Tally:
             embree_seconds=self.count.embree_seconds,
             cpu_seconds=self.block_seconds + time.thread_time() - self.cpu,
             samples=dict(sorted(self.samples.items())),
+            embree="; ".join(sorted(self.count.embree)),
         )
 
 

@@ -1,63 +1,101 @@
-"""Rays against triangles, by Embree. The only place that knows embreex.
+"""Rays against triangles, by Embree: in packets where its library can be called directly, else one by one by embreex.
 
-What embreex leaves to its caller is settled here: float32 C-order arrays, finite vertices, one geometry whose
-primitive number is the row of the face, and a second tree of opaque faces for shadow rays.
+What Embree leaves to its caller is settled here: float32 C-order arrays, finite vertices, one geometry whose
+primitive number is the row of the face, places of hits that are the same for every kind of call, and a second tree
+of opaque faces for shadow rays.
 """
 
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from .embree import Tree, library
+from .kernels.hits import place_hits
+
+Floats = NDArray[np.float32]
+_NO_REACH = np.empty(0, np.float32)
+
+
+class Hits(NamedTuple):
+    """Nearest hit of each ray: row of the face, −1 on a miss; u, v; distance in lengths of the direction."""
+
+    faces: NDArray[np.int32]
+    u: Floats
+    v: Floats
+    distances: Floats
+
 
 class Intersector:
     """Embree trees over (F, 3, 3) float32 face corners, of which the first ``opaque`` faces block light wholly.
 
-    ``robust`` keeps rays from slipping between faces that share an edge.
+    ``robust`` keeps rays from slipping between faces that share an edge. ``about`` says what traces the rays.
     """
 
-    def __init__(self, corners: NDArray[np.float32], opaque: int, *, robust: bool = True) -> None:
+    def __init__(self, corners: Floats, opaque: int, *, robust: bool = True) -> None:
         self.opaque = opaque
-        self._all = _tree(corners, robust)
+        embree = library()
+        self.about = embree if isinstance(embree, str) else embree.about
+
+        def tree(corners: Floats) -> Tree | SingleRays:
+            return SingleRays(corners, robust) if isinstance(embree, str) else Tree(embree, corners, robust)
+
+        self._all = tree(corners)
+        self._opaque: Tree | SingleRays | None
+        self._clear: Tree | SingleRays | None
         if opaque == len(corners):
             self._opaque, self._clear = self._all, None
         else:
-            self._opaque = _tree(corners[:opaque], robust) if opaque else None
-            self._clear = _tree(corners[opaque:], robust)
+            self._opaque = tree(corners[:opaque]) if opaque else None
+            self._clear = tree(corners[opaque:])
 
-    def nearest(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> tuple[dict[str, Any], float]:
-        """Nearest hit of every ray: ``primID`` (face row, −1 on a miss), ``u``, ``v``, ``tfar``; and CPU seconds."""
-        start = time.thread_time()
-        hits = self._all.run(origins, directions, query="INTERSECT", output=True)
-        return hits, time.thread_time() - start
+    def nearest(self, origins: Floats, directions: Floats) -> tuple[Hits, float]:
+        """Nearest hit of every ray, and CPU seconds inside Embree."""
+        return _nearest(self._all, origins, directions, _NO_REACH)
 
-    def blocked(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], reach: NDArray[np.float32]
-    ) -> tuple[NDArray[np.int32], float]:
+    def nearest_clear(self, origins: Floats, directions: Floats, reach: Floats = _NO_REACH) -> tuple[Hits, float]:
+        """Nearest hit within ``reach`` with a face that lets light through; faces count from their first."""
+        assert self._clear is not None
+        return _nearest(self._clear, origins, directions, reach)
+
+    def blocked(self, origins: Floats, directions: Floats, reach: Floats) -> tuple[NDArray[np.int32], float]:
         """0 where an opaque face lies within ``reach`` lengths of the direction, −1 where not; and CPU seconds."""
-        if self._opaque is None:
-            return np.full(len(origins), -1, np.int32), 0.0
+        found = np.full(len(origins), -1, np.int32)
         start = time.thread_time()
-        found = self._opaque.run(origins, directions, dists=reach, query="OCCLUDED")
+        if self._opaque is not None:
+            self._opaque.occluded(origins, directions, reach, found)
         return found, time.thread_time() - start
 
-    def nearest_clear(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], reach: NDArray[np.float32] | None = None
-    ) -> tuple[dict[str, Any], float]:
-        """Nearest hit within ``reach`` with a face that lets light through; ``primID`` counts from their first."""
-        assert self._clear is not None
-        start = time.thread_time()
-        hits = self._clear.run(origins, directions, dists=reach, query="INTERSECT", output=True)
-        return hits, time.thread_time() - start
+
+class SingleRays:
+    """As `embree.Tree`, by embreex's own calls."""
+
+    def __init__(self, corners: Floats, robust: bool) -> None:
+        self.corners = corners
+        self._scene = EmbreeScene(robust=robust)
+        vertices = np.ascontiguousarray(corners.reshape(-1, 3), np.float32)
+        TriangleMesh(self._scene, vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3))
+
+    def nearest(self, origins: Floats, directions: Floats, reach: Floats, out: Hits) -> None:
+        dists = reach.copy() if len(reach) else None  # embreex overwrites it
+        found = self._scene.run(origins, directions, dists=dists, query="INTERSECT", output=True)
+        for array, name in zip(out, ("primID", "u", "v", "tfar"), strict=True):
+            array[:] = found[name]
+
+    def occluded(self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32]) -> None:
+        out[:] = self._scene.run(origins, directions, dists=reach.copy(), query="OCCLUDED")
 
 
-def _tree(corners: NDArray[np.float32], robust: bool) -> EmbreeScene:
-    tree = EmbreeScene(robust=robust)
-    vertices = np.ascontiguousarray(corners.reshape(-1, 3), np.float32)
-    TriangleMesh(tree, vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3))
-    return tree
+def _nearest(tree: Tree | SingleRays, origins: Floats, directions: Floats, reach: Floats) -> tuple[Hits, float]:
+    n = len(origins)
+    hits = Hits(np.empty(n, np.int32), *(np.empty(n, np.float32) for _ in range(3)))
+    start = time.thread_time()
+    tree.nearest(origins, directions, reach, hits)
+    seconds = time.thread_time() - start
+    place_hits(origins, directions, tree.corners, *hits)
+    return hits, seconds

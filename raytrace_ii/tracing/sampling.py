@@ -104,22 +104,25 @@ class Shoot(Protocol):
 
 
 def adaptive_mean(
-    camera: IICamera, wanted: Adaptive, seed: int, rows: slice, cols: slice, batch: int, curve: Floats, shoot: Shoot
-) -> tuple[Radiance, NDArray[np.int32]]:
-    """Mean radiance (h·w, 3) of a block of pixels and the number of samples (h·w,) of each.
+    camera: IICamera, wanted: Adaptive, seed: int, rows: slice, cols: slice, order: NDArray[np.int32], batch: int,
+    curve: Floats, shoot: Shoot,
+) -> tuple[Radiance, NDArray[np.int32]]:  # fmt: skip
+    """Mean radiance (h·w, 3) of a block of pixels and the number of samples (h·w,) of each, in a given order.
 
     A pixel's neighbours count wherever the block ends: pixels of a rim around it are shot once, those under lenses
     of the block's own.
 
     Parameters
     ----------
+    order : ndarray of int, (h·w,)
+        The block's pixels, by their numbers in C order.
     batch : int
         Rays to shoot at a time.
     curve : ndarray
         8-bit codes at even steps of linear light.
     shoot : callable
-        Called with L, D, shares, the numbers of pixels and samples and, in the first round, which of the block's
-        pixels (in C order, every ``least``-th ray) they begin; radiance of the rays comes back.
+        Called with L, D, shares, the numbers of pixels and samples and, in the first round, which of the ordered
+        pixels (every ``least``-th ray) they begin; radiance of the rays comes back.
     """
     height, width = rows.stop - rows.start, cols.stop - cols.start
     m, n, lens = _with_rim(camera, rows, cols)
@@ -140,18 +143,20 @@ def adaptive_mean(
                 sample_kernels.add_samples(radiance, some, first, many, (start + count) // 4, quarters)
 
     inside, rim = np.flatnonzero(own), np.flatnonzero(~own & _needed(lens, own))
+    corner = int(inside[0]) // lens.shape[1], int(inside[0]) % lens.shape[1]
+    inside = inside[order]
     add(inside, 0, wanted.least, begins=True)
     add(rim, 0, wanted.least)
-    corner = int(inside[0]) // lens.shape[1], int(inside[0]) % lens.shape[1]
     step = np.empty((height, width, 3))
     sample_kernels.steps_to_neighbours(
         quarters.sum(axis=1).reshape(*lens.shape, 3) / wanted.least, lens, *corner, step
     )
+    step = step.reshape(-1, 3)[order]
     counts = np.full(len(inside), wanted.least, np.int32)
     unsure, count = np.arange(len(inside)), wanted.least
     while count < wanted.most:
         error = np.empty(len(unsure))
-        sample_kernels.standard_errors(quarters[inside[unsure]], step.reshape(-1, 3)[unsure], count, curve, error)
+        sample_kernels.standard_errors(quarters[inside[unsure]], step[unsure], count, curve, error)
         unsure = unsure[error > wanted.error]
         if not len(unsure):
             break

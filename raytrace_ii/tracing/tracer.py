@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..scene.scene import Scene
+from .intersect import Hits
 from .kernels import shade as kernels
 from .kernels.sampling import lobe_keys
 from .packing import PackedScene
@@ -31,7 +32,7 @@ MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as d
 
 @dataclass
 class RayCount:
-    """Rays by kind, those not shot because nobody would see them, and CPU seconds inside Embree.
+    """Rays by kind, those not shot because nobody would see them, CPU seconds inside Embree and how it was called.
 
     Rays that go on behind a face that is not there, or ask which body the camera stands in, are kind ``passed``.
     """
@@ -39,11 +40,13 @@ class RayCount:
     rays: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(KINDS, 0)))
     skipped: Counter[str] = field(default_factory=Counter)
     embree_seconds: float = 0.0
+    embree: set[str] = field(default_factory=set)
 
     def add(self, other: RayCount) -> None:
         self.rays.update(other.rays)
         self.skipped.update(other.skipped)
         self.embree_seconds += other.embree_seconds
+        self.embree |= other.embree
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,12 +197,16 @@ class Tracer:
         self.scene: PackedScene = scene.packed
         self.max_depth = scene.max_depth
         self.pose = pose
-        self.count = RayCount()
         self.lobes = lobes
+        self.begin()
         self._primary = _Rays.room(capacity, self.scene.nested, self.scene.glossy)
         # weights and pixels of rays that carry all light, one a pixel: read only
         self._whole = np.ones((capacity, 3), np.float32), np.arange(capacity, dtype=np.int32)
         self._shadow = (_Rays.room(0, self.scene.nested), np.empty(0, np.float32))
+
+    def begin(self) -> None:
+        """Count from 0."""
+        self.count = RayCount(embree={self.scene.intersector.about})
 
     def run(
         self,
@@ -209,10 +216,12 @@ class Tracer:
         support: Support | None,
         shares: NDArray[np.float64] | None = None,
         keys: NDArray[np.uint64] | None = None,
+        order: NDArray[np.int32] = _NO_ROWS,
     ) -> None:
         """Add what each ray sees to ``radiance`` (n, 3), and fill ``support`` if given.
 
-        ``shares`` is the share of light that each ray carries; one that carries none is not traced. ``keys`` are
+        ``shares`` is the share of light that each ray carries; one that carries none is not traced. ``order`` names
+        the rays in the order in which they are traced: that of ``radiance``, ``support`` and ``keys``, which are
         needed if the scene is glossy.
         """
         shape = locations.shape[:-1]
@@ -220,7 +229,7 @@ class Tracer:
         shares = np.empty(0) if shares is None else shares.reshape(-1)
         room = self._primary
         n, bad = kernels.start_rays(
-            locations, directions, shares, self.pose[:3, :3], self.pose[:3, 3],
+            locations, directions, shares, order, self.pose[:3, :3], self.pose[:3, 3],
             room.origins, room.directions, room.weights, room.pixels, room.inside,
         )  # fmt: skip
         if bad >= 0:
@@ -236,13 +245,21 @@ class Tracer:
         self._trace(room, n, radiance, support)
 
     def run_separable(
-        self, rays: tuple[NDArray[np.float64], ...], radiance: NDArray[np.float32], support: Support | None,
+        self,
+        rays: tuple[NDArray[np.float64], ...],
+        radiance: NDArray[np.float32],
+        support: Support | None,
+        rows: NDArray[np.int32],
+        columns: NDArray[np.int32],
         keys: NDArray[np.uint64] | None = None,
-    ) -> bool:  # fmt: skip
-        """`run` for rays of `IICamera.separable_rays`; if some are unusable, nothing is done and False comes back."""
-        room, n = self._primary, len(rays[0]) * len(rays[1])
+    ) -> bool:
+        """`run` for rays of `IICamera.separable_rays`; if some are unusable, nothing is done and False comes back.
+
+        ``rows`` and ``columns`` name the rays in the order in which they are traced.
+        """
+        room, n = self._primary, len(rows)
         usable = kernels.start_separable_rays(
-            *rays, self.pose[:3, :3], self.pose[:3, 3], room.origins, room.directions
+            *rays, rows, columns, self.pose[:3, :3], self.pose[:3, 3], room.origins, room.directions
         )
         if usable:
             room.inside.fill(-1)
@@ -274,25 +291,26 @@ class Tracer:
         most = (lobe_rays if s.glossy else 1) + s.transmits + 2 * s.disperses + s.blends
         following = _Rays.room(most * n if spawn else 0, s.nested, s.glossy)
         shadow, reach = self._shadow_room(n * len(s.lights))
-        counts = np.zeros(6, np.int64)
-        shadows, spawned = kernels.shade(
+        counts, lit = np.zeros(6, np.int64), np.zeros(len(s.lights), np.int64)
+        spawned = kernels.shade(
             primitives, u, v, distances, rays.origins, rays.directions, rays.weights, rays.pixels, rays.inside,
             rays.keys, s.corners, s.faces, s.normals, s.coordinates, s.object_of_face, s.materials,
             s.textures.table, s.textures.texels, s.textures.alphas, s.lights, s.background, s.fog, s.ambient, s.least,
             lobe_rays, self.lobes[1], radiance,
             shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels, shadow.inside,
             following.origins, following.directions, following.weights, following.pixels, following.inside,
-            following.keys, counts, spawn, self.pose[:3, 3], self.pose[:3, 2], *(support or Support()).rows(),
+            following.keys, counts, lit, spawn, self.pose[:3, 3], self.pose[:3, 2], *(support or Support()).rows(),
         )  # fmt: skip
         self.count.rays.update({"reflection": int(counts[0]), "refraction": int(counts[1])})
         self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[2:5]), strict=True)))
         if s.blends:
             self.count.rays["passed"] += int(counts[5])
-        if shadows:
-            self._light(_Rays(*(array[:shadows] for array in vars(shadow).values())), reach[:shadows], radiance)
+        for light in np.flatnonzero(lit):
+            some = slice(light * n, light * n + lit[light])
+            self._light(_Rays(*(array[some] for array in vars(shadow).values())), reach[some], radiance)
         return _Rays(*(array[:spawned] for array in vars(following).values()))
 
-    def _hits(self, rays: _Rays) -> tuple[NDArray[Any], ...]:
+    def _hits(self, rays: _Rays) -> Hits:
         """Face, u, v and distance of the nearest face that is there: not cut out, not hidden in another body."""
         s = self.scene
         found = self._nearest(rays.origins, rays.directions)
@@ -318,10 +336,10 @@ class Tracer:
             found = self._nearest(origins[:count], directions[:count])
         return table
 
-    def _nearest(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> tuple[NDArray[Any], ...]:
+    def _nearest(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> Hits:
         hits, seconds = self.scene.intersector.nearest(origins, directions)
         self.count.embree_seconds += seconds
-        return hits["primID"], hits["u"], hits["v"], hits["tfar"]
+        return hits
 
     def _start_inside(self, rays: _Rays) -> None:
         """Note the transmissive bodies that camera rays start in."""
@@ -338,7 +356,7 @@ class Tracer:
             hits, seconds = s.intersector.nearest_clear(origins[:count], directions[:count])
             self.count.embree_seconds += seconds
             count = kernels.tell_inside(
-                hits["primID"], hits["u"], hits["v"], rows, candidates, origins, directions, rays.inside,
+                hits.faces, hits.u, hits.v, rows, candidates, origins, directions, rays.inside,
                 s.corners, s.faces, s.object_of_face, s.opaque_faces,
             )  # fmt: skip
 
@@ -346,10 +364,7 @@ class Tracer:
         """Add the light of the shadow rays that nothing opaque stops, dimmed by what is clear."""
         s = self.scene
         self.count.rays["shadow"] += len(shadow.pixels)
-        # embreex overwrites the reach it is given, and clear faces need it once more
-        found, seconds = s.intersector.blocked(
-            shadow.origins, shadow.directions, reach.copy() if s.lets_through else reach
-        )
+        found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, reach)
         self.count.embree_seconds += seconds
         if not s.lets_through:
             kernels.add_unblocked(found, shadow.weights, shadow.pixels, radiance)
@@ -365,11 +380,11 @@ class Tracer:
         kept = kernels.keep_unblocked(found, *rays)
         for _ in range(MOST_CLEAR_FACES):
             origins, directions, reach, colours, pixels, inside = rays = [array[:kept] for array in rays]
-            hits, seconds = s.intersector.nearest_clear(origins, directions, reach.copy())
+            hits, seconds = s.intersector.nearest_clear(origins, directions, reach)
             self.count.embree_seconds += seconds
             kept = kernels.pass_clear_face(
-                hits["primID"], hits["u"], hits["v"], hits["tfar"], origins, directions, reach, colours, pixels,
-                inside, s.corners, s.faces, s.coordinates, s.object_of_face, s.materials,
+                *hits, origins, directions, reach, colours, pixels, inside,
+                s.corners, s.faces, s.coordinates, s.object_of_face, s.materials,
                 s.textures.table, s.textures.alphas, s.opaque_faces, radiance,
             )  # fmt: skip
             if not kept:

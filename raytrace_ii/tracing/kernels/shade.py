@@ -47,11 +47,13 @@ _LEAST, _MOST = 1e-150, 1e150  # between them squares and their sums neither van
 
 @kernel
 def start_rays(
-    locations, directions, shares, rotation, shift, out_origins, out_directions, out_weights, out_pixels, out_inside
-):
+    locations, directions, shares, order, rotation, shift,
+    out_origins, out_directions, out_weights, out_pixels, out_inside,
+):  # fmt: skip
     """Place and normalise the camera rays that carry light, packed to the front.
 
-    ``shares`` is the share of light of every ray, empty if all carry all.
+    ``shares`` is the share of light of every ray, empty if all carry all; ``order`` names the rays in the order in
+    which they are to stand, empty if as they come.
 
     Returns
     -------
@@ -59,7 +61,8 @@ def start_rays(
         How many rays there are, and the index of the first unusable one, or −1.
     """
     count, bad = 0, -1
-    for i in range(locations.shape[0]):
+    for row in range(locations.shape[0]):
+        i = order[row] if order.shape[0] > 0 else row
         share = shares[i] if shares.shape[0] > 0 else 1.0
         if share == 0.0:
             continue
@@ -77,7 +80,7 @@ def start_rays(
             out_origins[count, c] = place
             out_directions[count, c] = (r0 * dx + r1 * dy + r2 * dz) * inverse
             out_weights[count, c] = share
-        out_pixels[count] = i
+        out_pixels[count] = row
         for k in range(out_inside.shape[1]):
             out_inside[count, k] = -1
         count += 1
@@ -85,8 +88,10 @@ def start_rays(
 
 
 @kernel
-def start_separable_rays(x, y, z, rotation, shift, out_origins, out_directions):
+def start_separable_rays(x, y, z, rows, columns, rotation, shift, out_origins, out_directions):
     """As `start_rays` for a block of pixels whose rays all carry all light, from `IICamera.separable_rays`.
+
+    ``rows`` and ``columns`` name the pixels in the order in which their rays are to stand.
 
     Returns
     -------
@@ -102,19 +107,16 @@ def start_separable_rays(x, y, z, rotation, shift, out_origins, out_directions):
     for rays in (x, y):
         for i in range(rays.shape[0]):
             sure &= (abs(rays[i, 0]) < _MOST) & (abs(rays[i, 1]) < _MOST)
-    columns = x.shape[0]
-    for i in range(y.shape[0]):
-        ly, dy = y[i, 0], y[i, 1]
-        for j in range(columns):
-            lx, dx = x[j, 0], x[j, 1]
-            inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
-            row = i * columns + j
-            out_origins[row, 0] = r00 * lx + r01 * ly + r02 * lz + s0
-            out_origins[row, 1] = r10 * lx + r11 * ly + r12 * lz + s1
-            out_origins[row, 2] = r20 * lx + r21 * ly + r22 * lz + s2
-            out_directions[row, 0] = (r00 * dx + r01 * dy + r02 * dz) * inverse
-            out_directions[row, 1] = (r10 * dx + r11 * dy + r12 * dz) * inverse
-            out_directions[row, 2] = (r20 * dx + r21 * dy + r22 * dz) * inverse
+    for i in range(rows.shape[0]):
+        lx, dx = x[columns[i], 0], x[columns[i], 1]
+        ly, dy = y[rows[i], 0], y[rows[i], 1]
+        inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
+        out_origins[i, 0] = r00 * lx + r01 * ly + r02 * lz + s0
+        out_origins[i, 1] = r10 * lx + r11 * ly + r12 * lz + s1
+        out_origins[i, 2] = r20 * lx + r21 * ly + r22 * lz + s2
+        out_directions[i, 0] = (r00 * dx + r01 * dy + r02 * dz) * inverse
+        out_directions[i, 1] = (r10 * dx + r11 * dy + r12 * dz) * inverse
+        out_directions[i, 2] = (r20 * dx + r21 * dy + r22 * dz) * inverse
     return sure
 
 
@@ -124,26 +126,26 @@ def shade(
     corners, faces, normals, coordinates, object_of_face, materials, textures, texels, alphas, lights, background,
     fog, ambient, least, lobe_rays, lobe_stride, radiance,
     shadow_origins, shadow_directions, shadow_reach, shadow_colours, shadow_pixels, shadow_inside,
-    next_origins, next_directions, next_weights, next_pixels, next_inside, next_keys, counts, spawn,
+    next_origins, next_directions, next_weights, next_pixels, next_inside, next_keys, counts, lit, spawn,
     eye, axis, depth, normal, object_id, ray_length, shading_normal,
 ):  # fmt: skip
     """Shade one generation of rays.
 
     Adds background, emitted and ambient light to ``radiance``; writes shadow rays with the light they would let
-    through, and, if ``spawn``, reflected and refracted rays; none weaker than ``least``. ``inside`` lists the
-    transmissive bodies that a ray runs in, −1 after the last. ``keys`` are places in the lobes of rough mirrors, as
-    `sampling.lobe_keys` gives them, of no length if there are none; up to ``lobe_rays`` rays go over a lobe, whose
-    places stand ``lobe_stride`` apart. ``fog`` is its colour and density, of no length if
-    there is none; it lies outside bodies, and before the sky not at all. Of each ray are noted, where there is room,
-    the depth from ``eye`` along the camera's ``axis``, the face's normal, the object, the ray's length and the normal
-    of shading.
+    through, n rows for each light, and, if ``spawn``, reflected and refracted rays; none weaker than ``least``.
+    ``inside`` lists the transmissive bodies that a ray runs in, −1 after the last. ``keys`` are places in the lobes
+    of rough mirrors, as `sampling.lobe_keys` gives them, of no length if there are none; up to ``lobe_rays`` rays go
+    over a lobe, whose places stand ``lobe_stride`` apart. ``fog`` is its colour and density, of no length if there is
+    none; it lies outside bodies, and before the sky not at all. Of each ray are noted, where there is room, the depth
+    from ``eye`` along the camera's ``axis``, the face's normal, the object, the ray's length and the normal of
+    shading.
 
     Returns
     -------
-    shadows, spawned : int
-        How many rows of the ``shadow_`` and ``next_`` arrays were filled.
+    spawned : int
+        How many rows of the ``next_`` arrays were filled; ``lit`` is how many of each light's ``shadow_`` rows.
     """
-    shadows, spawned = 0, 0
+    spawned = 0
     for i in range(primitives.shape[0]):
         pixel = pixels[i]
         dx, dy, dz = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
@@ -283,6 +285,7 @@ def shade(
                     sx, sy, sz = ox + ax, oy + ay, oz + az
                     if reach != FAR:
                         lx, ly, lz = lx - ax, ly - ay, lz - az
+                shadows = k * primitives.shape[0] + lit[k]
                 _put(shadow_origins, shadows, sx, sy, sz)
                 _put(shadow_directions, shadows, lx, ly, lz)
                 _put(shadow_colours, shadows, c0, c1, c2)
@@ -290,7 +293,7 @@ def shade(
                 shadow_pixels[shadows] = pixel
                 for j in range(inside.shape[1]):
                     shadow_inside[shadows, j] = inside[i, j]
-                shadows += 1
+                lit[k] += 1
         radiance[pixel, 0] += own0
         radiance[pixel, 1] += own1
         radiance[pixel, 2] += own2
@@ -361,7 +364,7 @@ def shade(
             spawned += 1
         elif max(m0, m1, m2) > 0.0:
             counts[WEAK_REFLECTION] += 1
-    return shadows, spawned
+    return spawned
 
 
 @inner_kernel
@@ -910,14 +913,17 @@ def _sky_image(background, textures, texels, dx, dy, dz):
 
 
 @kernel
-def encode_srgb(radiance, scale, curve, out):
-    """Linear light times ``scale`` to rounded integer sRGB by a curve of samples over [0, 1]."""
+def encode_srgb(radiance, rows, scale, curve, out):
+    """Linear light times ``scale`` to rounded integer sRGB by a curve of samples over [0, 1].
+
+    ``rows`` says where in ``out`` each colour goes.
+    """
     last = curve.shape[0] - 1
     for i in range(radiance.shape[0]):
         for c in range(3):
             x = min(max(radiance[i, c] * scale, 0.0), 1.0) * last
             j = min(int(x), last - 1)
-            out[i, c] = int(curve[j] + (x - j) * (curve[j + 1] - curve[j]) + 0.5)
+            out[rows[i], c] = int(curve[j] + (x - j) * (curve[j + 1] - curve[j]) + 0.5)
 
 
 @kernel

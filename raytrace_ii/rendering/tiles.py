@@ -1,0 +1,135 @@
+"""Tiles of a picture, and the order in which the rays of a tile are traced.
+
+Neighbouring lenses see nearly the same: rays of one place under the lens, of 4×4 lenses, have equal directions and
+origins a lens pitch apart, and make a packet. Tiles and order depend on the camera alone, so that all workers trace
+the same packets.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ii_core import IICamera, MapCamera
+from ii_core.lattice import Lattice
+
+SIDE = 4  # lenses, or pixels, across and down a packet of 16 rays
+# From this many pixels per lens on, 4×4 neighbouring pixels lie closer together than those under 4×4 lenses.
+LARGE_LENS = 96
+
+Tile = tuple[slice, slice]
+Integers = NDArray[np.int64]
+
+
+class Order(NamedTuple):
+    """The pixels of a tile in the order of their rays: number in C order, row and column."""
+
+    pixels: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    columns: NDArray[np.int32]
+
+
+def tiles(camera: IICamera | MapCamera, rays: int, *, whole_lenses: bool = False) -> Iterator[Tile]:
+    """Tiles of at most so many rays, in rows of tiles; of a regular camera they hold whole packets.
+
+    ``whole_lenses`` keeps the pixels under one lens of a regular camera together, even if they are more.
+    """
+    columns, rows = camera.pixels
+    cells = _regular_cells(camera) or (1, 1)
+    across = min(columns, max(1, math.isqrt(rays)))
+    height = _span(min(rows, max(1, rays // across)), cells[1], whole_lenses)
+    width = _span(min(columns, max(1, rays // height)), cells[0], whole_lenses)
+    for top in range(0, rows, height):
+        for left in range(0, columns, width):
+            yield slice(top, min(top + height, rows)), slice(left, min(left + width, columns))
+
+
+def _span(most: int, cell: int, whole: bool) -> int:
+    """The largest multiple of a packet's lenses, or of a lens, up to ``most`` pixels."""
+    for unit in (SIDE * cell, cell):
+        if unit <= most:
+            return most // unit * unit
+    return cell if whole else most
+
+
+def ray_order(camera: IICamera | MapCamera, rows: slice, cols: slice) -> Order:
+    """The order of the rays of a tile: by place under the lens, then by blocks of 4×4 lenses.
+
+    Under large lenses, or a single one, by blocks of 4×4 pixels; for maps without lenses by direction and origin.
+    """
+    shape = rows.stop - rows.start, cols.stop - cols.start
+    lattice = _lattice(camera)
+    if lattice is None:
+        assert isinstance(camera, MapCamera)
+        return _order(_along_rays(camera, rows, cols), shape[1])
+    if max(lattice.pitch) > LARGE_LENS:
+        return _in_cells(shape, (rows.start % SIDE, cols.start % SIDE), (1, 1))
+    if cells := _regular_cells(camera):
+        packet = cells[1] * SIDE, cells[0] * SIDE
+        return _in_cells(shape, (rows.start % packet[0], cols.start % packet[1]), cells)
+    m, n = np.arange(cols.start, cols.stop)[None], np.arange(rows.start, rows.stop)[:, None]
+    k, l = lattice.nearest(m, n)
+    x, y = lattice.centres(k, l)
+    u, v = (
+        np.floor(at + 0.5 - centre + pitch / 2).clip(0, math.ceil(pitch) - 1).astype(np.int64)
+        for at, centre, pitch in ((m, x, lattice.pitch[0]), (n, y, lattice.pitch[1]))
+    )
+    return _order(_keys(k, l, u, v), shape[1])
+
+
+@lru_cache(maxsize=64)
+def _in_cells(shape: tuple[int, int], start: tuple[int, int], cells: tuple[int, int]) -> Order:
+    """The order of a tile whose pixels fill cells of equal size; its corner lies at ``start`` in a packet's cells."""
+    n, m = np.arange(shape[0])[:, None] + start[0], np.arange(shape[1])[None] + start[1]
+    return _order(_keys(m // cells[0], n // cells[1], m % cells[0], n % cells[1]), shape[1])
+
+
+def _keys(k: Integers, l: Integers, u: Integers, v: Integers) -> Integers:
+    """Ranks of pixels by their place (u, v) under the lens, then by packet, then by lens (k, l)."""
+    across, down = k // SIDE - k.min() // SIDE, l // SIDE - l.min() // SIDE
+    packet = down * (across.max() + 1) + across
+    place = v * (u.max() + 1) + u
+    return ((place * (packet.max() + 1) + packet) * SIDE + l % SIDE) * SIDE + k % SIDE
+
+
+def _along_rays(camera: MapCamera, rows: slice, cols: slice) -> Integers:
+    """Ranks of pixels by coarse direction, by origin, and by fine direction, each along a Morton curve."""
+    L, D, _ = camera.stored_rays(0, rows, cols)
+    D = D / np.maximum(np.abs(D).sum(axis=2, keepdims=True), 1e-300)
+    axes = np.argsort(np.ptp(L.reshape(-1, 3), axis=0))[1:]  # the two along which the origins lie
+    direction, origin = _morton(D[..., :2], 8), _morton(L[..., axes], 8)
+    return ((direction >> 6) << 22) | (origin << 6) | (direction & 63)
+
+
+def _morton(points: NDArray[np.float64], bits: int) -> Integers:
+    """Ranks of points (h, w, 2) along a Morton curve through their box of 2^bits cells across and down."""
+    low, size = points.min(axis=(0, 1)), np.ptp(points, axis=(0, 1))
+    cells = ((points - low) / np.where(size > 0, size, 1) * (2**bits - 1e-6)).astype(np.int64)
+    return sum((cells[..., axis] >> bit & 1) << (2 * bit + axis) for bit in range(bits) for axis in (0, 1))
+
+
+def _order(keys: Integers, width: int) -> Order:
+    pixels = np.argsort(keys, axis=None, kind="stable")
+    found = Order(*(part.astype(np.int32) for part in (pixels, pixels // width, pixels % width)))
+    for array in found:
+        array.flags.writeable = False
+    return found
+
+
+def _lattice(camera: IICamera | MapCamera) -> Lattice | None:
+    """The lenses of a camera; none of maps that tell of none."""
+    if camera.model is not None:
+        return camera.model.lens_lattice
+    return Lattice(camera.lenses, camera.ei_pixels, (0.0, 0.0), False) if camera.lenses != (1, 1) else None
+
+
+def _regular_cells(camera: IICamera | MapCamera) -> tuple[int, int] | None:
+    """(U, V) of a camera of several lenses over whole pixels."""
+    lenses = _lattice(camera)
+    regular = lenses is not None and (camera.model is None or camera.model.regular) and camera.lenses != (1, 1)
+    return (int(lenses.pitch[0]), int(lenses.pitch[1])) if lenses is not None and regular else None
