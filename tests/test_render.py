@@ -1,15 +1,17 @@
 """Pictures: the same to the bit however they are made, and what they cost."""
 
+import json
+
 import numpy as np
 import pytest
 from trace_scenes import UNIFORM, WHITE, body, box, floor, hall, lamp, sphere, sun, wall
 
-from ii_core import IICamera, add_sensor_noise, five_viewpoints, preset, view_image
+from ii_core import IICamera, add_sensor_noise, five_viewpoints, preset, read_maps, view_image, write_maps
 from ii_core.view import view_positions
 from raytrace_ii import Background, Scene, load_scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.rendering import render as rendering
-from raytrace_ii.rendering.tiles import tiles
+from raytrace_ii.rendering.tiles import ray_order, tiles
 from raytrace_ii.tracing.kernels import shade as kernels
 
 SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
@@ -346,3 +348,57 @@ def test_a_sky_alone_is_seen_where_nothing_is():
     assert shot.stats.rays == kinds(24 * 16)
     far = Scene(bodies=scene.bodies, background=UNIFORM, lights=[lamp((0, 0, 5))])
     assert (render(far, ONE_LENS, dtype="float32").picture.pixels == 1).all()
+
+
+REGULAR = IICamera(pixels=(96, 64), lenses=(12, 8), pixel_pitch_mm=0.1, gap_mm=2.0)
+HEXAGONAL = IICamera(pixels=(100, 61), lenses=(8, 5), pixel_pitch_mm=0.4, gap_mm=11.7, lattice="hexagonal")
+LINES = IICamera(pixels=(96, 64), lenses=(12, 64), pixel_pitch_mm=0.1, gap_mm=2.0)
+LARGE = IICamera(pixels=(400, 200), lenses=(2, 1), pixel_pitch_mm=0.1, gap_mm=20.0)
+
+
+@pytest.mark.parametrize("camera", [REGULAR, HEXAGONAL, LINES, LARGE, ONE_LENS])
+def test_every_pixel_of_a_tile_is_traced_once(camera):
+    for rays in (30, 1000, 4096):
+        for rows, cols in tiles(camera, rays):
+            order = ray_order(camera, rows, cols)
+            shape = rows.stop - rows.start, cols.stop - cols.start
+            np.testing.assert_array_equal(np.sort(order.pixels), np.arange(np.prod(shape)))
+            np.testing.assert_array_equal(np.ravel_multi_index(order[1:], shape), order.pixels)
+
+
+@pytest.mark.parametrize("camera", [REGULAR, LINES])
+def test_packets_are_of_one_place_under_neighbouring_lenses(camera):
+    u, v = camera.ei_pixels
+    for rows, cols in tiles(camera, 4096):
+        order = ray_order(camera, rows, cols)
+        m, n = (cols.start + order.columns).reshape(-1, 16), (rows.start + order.rows).reshape(-1, 16)
+        assert (np.ptp(m % u, axis=1) == 0).all() and (np.ptp(n % v, axis=1) == 0).all()
+        assert (np.ptp(m // u, axis=1) == 3).all() and (np.ptp(n // v, axis=1) == 3).all()
+
+
+def test_under_large_lenses_and_in_plain_pictures_packets_are_neighbouring_pixels():
+    for camera in (LARGE, ONE_LENS):
+        for rows, cols in tiles(camera, 4096):
+            order = ray_order(camera, rows, cols)
+            packets = order.rows.reshape(-1, 16), order.columns.reshape(-1, 16)
+            assert all((np.ptp(p, axis=1) == 3).all() for p in packets)
+
+
+def test_rays_of_maps_without_lenses_are_grouped_by_where_they_go(tmp_path):
+    """Maps of an II-camera that tell of no lenses: packets spread little more than those of its own."""
+    write_maps([REGULAR], tmp_path, format="exr")
+    sheet = json.loads((tmp_path / "camera.json").read_text())
+    bare = {"arrays": [{"samples": array["samples"]} for array in sheet["arrays"]]}
+    (tmp_path / "camera.json").write_text(json.dumps(bare))
+    (camera,) = read_maps(tmp_path)
+    L, D = REGULAR.rays()
+    D = D / np.linalg.norm(D, axis=-1, keepdims=True)
+
+    def spread(camera):
+        order = ray_order(camera, slice(0, 64), slice(0, 96)).pixels.reshape(-1, 16)
+        return [np.median(np.ptp(x.reshape(-1, 3)[order], axis=1).sum(axis=1)) for x in (L, D)]
+
+    (near, narrow), (own_near, own_narrow) = spread(camera), spread(REGULAR)
+    assert near < 2 * own_near and narrow <= own_narrow + 1e-6
+    scene = hall()
+    np.testing.assert_array_equal(render(scene, camera).picture.pixels, render(scene, REGULAR).picture.pixels)

@@ -67,7 +67,7 @@ def ray_order(camera: IICamera | MapCamera, rows: slice, cols: slice) -> Order:
     if lattice is None:
         assert isinstance(camera, MapCamera)
         return _order(_along_rays(camera, rows, cols), shape[1])
-    if max(lattice.pitch) > LARGE_LENS:
+    if max(lattice.pitch) > LARGE_LENS or lattice.lenses == (1, 1):
         return _in_cells(shape, (rows.start % SIDE, cols.start % SIDE), (1, 1))
     if cells := _regular_cells(camera):
         packet = cells[1] * SIDE, cells[0] * SIDE

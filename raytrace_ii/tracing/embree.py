@@ -135,7 +135,8 @@ class Tree:
         self.corners = self._vertices[: corners.size].reshape(-1, 3, 3)
         self._indices = np.arange(corners.size // 3 + _SPARE, dtype=np.uint32)
         some = self.corners[:: len(corners) // _SOME_FACES + 1]
-        self._edge = float(np.median(np.linalg.norm(some - np.roll(some, 1, axis=1), axis=2)))
+        edges = np.linalg.norm(some - np.roll(some, 1, axis=1), axis=2)
+        self._edge = float(np.median(edges)) if edges.size else 0.0
         f = library.functions
         self._scene = f.rtcNewScene(library.device)
         weakref.finalize(self, f.rtcReleaseScene, self._scene).atexit = False

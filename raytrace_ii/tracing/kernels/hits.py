@@ -18,7 +18,7 @@ def place_hits(origins, directions, corners, primitives, u, v, distances):
     u and v are kept within the face: Embree's robust rays hit edges from just beside them. Where the ray lies in
     the face's plane, Embree's numbers stay.
     """
-    for i in range(primitives.shape[0]):
+    for i in range(primitives.shape[0] if corners.shape[0] > 0 else 0):
         f = max(primitives[i], 0)
         x, y, z = np.float64(corners[f, 0, 0]), np.float64(corners[f, 0, 1]), np.float64(corners[f, 0, 2])
         ax, ay, az = corners[f, 1, 0] - x, corners[f, 1, 1] - y, corners[f, 1, 2] - z
@@ -28,7 +28,7 @@ def place_hits(origins, directions, corners, primitives, u, v, distances):
         px, py, pz = dy * bz - dz * by, dz * bx - dx * bz, dx * by - dy * bx
         qx, qy, qz = y * az - z * ay, z * ax - x * az, x * ay - y * ax
         turn = ax * px + ay * py + az * pz
-        inverse = 1.0 / turn
+        inverse = 1.0 / (turn if turn != 0.0 else 1.0)
         a = max((x * px + y * py + z * pz) * inverse, 0.0)
         b = max((dx * qx + dy * qy + dz * qz) * inverse, 0.0)
         t = (bx * qx + by * qy + bz * qz) * inverse
