@@ -1,4 +1,4 @@
-"""Embree in packets: the hits of single rays, for every width, order, thread and process; and what happens without."""
+"""Embree in packets: the hits of single rays for every width, order, thread and process; what happens without."""
 
 import os
 import subprocess
