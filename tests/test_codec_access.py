@@ -87,6 +87,38 @@ def test_a_component_that_was_coded_on_its_side():
         np.testing.assert_array_equal(decode_component(stream, (v, l)), whole[v, l])
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("options", ["", ":wavelet=53", ":lossless=1"])
+@pytest.mark.parametrize("size", [(20, 18, 4, 3), (150, 270, 2, 2), (1, 5, 3, 2), (3, 2, 37, 37)])
+def test_a_component_of_one_codestream_by_its_own_packets(size, options, dtype, monkeypatch):
+    """To the bit, whatever precincts, code blocks and groups there are, and no other plane is decoded."""
+    from codec.bitstream import jpeg2000
+
+    made = picture(*size)
+    made = made.with_pixels(made.pixels.astype(dtype) * (257 if dtype == np.uint16 else 1))
+    stream = encode(made, f"si-jpeg2000{options}", **({} if "lossless" in options else {"quality": 40}))
+    whole = component_images(decode(stream), "si")
+    decoded = []
+    real = jpeg2000.decode_planes
+    monkeypatch.setattr(
+        jpeg2000, "decode_planes", lambda s, shape, *a, **k: decoded.append(shape) or real(s, shape, *a, **k)
+    )
+    k, l, u, v = size
+    for place in {(0, 0), (u - 1, v - 1), (u // 2, v - 1)}:
+        np.testing.assert_array_equal(decode_component(stream, place), whole[place[1], place[0]])
+    np.testing.assert_array_equal(decode_frame(stream, u), whole[1, 0])
+    assert set(decoded) == {(3, l, k)}
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        damaged = bytearray(stream.payload)
+        for at in rng.integers(len(damaged), size=3):
+            damaged[at] ^= 1 << rng.integers(8)
+        try:
+            assert decode_component(replace(stream, payload=bytes(damaged)), (0, 0)).shape == (l, k, 3)
+        except ValueError as error:
+            assert "is damaged" in str(error)
+
+
 def test_b_pictures_and_other_orders():
     stream = coded("si-h264:gop=6,bframes=3,order=spiral")
     whole = component_images(decode(stream), "si")

@@ -12,11 +12,14 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Sequence
 from typing import Any
 
 import imagecodecs
 import numpy as np
 from numpy.typing import NDArray
+
+from .packets import Tile, new_tile_part, packets_of, tile_part
 
 MAX_COMPONENTS = 4095  # imagecodecs' limit; the standard's is 16384
 LEVELS = 5
@@ -85,6 +88,41 @@ def decode_planes(
     if planes.size != math.prod(coded) or planes.dtype.name != dtype:
         raise ValueError(f"its JPEG 2000 stream is {planes.shape} {planes.dtype}, {coded} {dtype} is needed")
     return planes.reshape(coded)[:, :, : shape[2]]
+
+
+def picked_planes(
+    stream: bytes, shape: tuple[int, int, int], dtype: str, picked: Sequence[int], *, wavelet: str, lossless: bool
+) -> NDArray[np.integer]:
+    """Decode some planes of a codestream from `encode_planes`, in rising order, by their packets alone.
+
+    Raises
+    ------
+    ValueError
+        If it is none for planes of that shape.
+    """
+    coded = (*shape[:2], max(2, shape[2]))
+    whole_codestream(stream, coded, dtype, wavelet=wavelet, lossless=lossless)  # its coding style is ours
+    start = _tile_start(stream)
+    tile = Tile(
+        components=coded[0],
+        height=coded[1],
+        width=coded[2],
+        levels=_levels(coded),
+        precinct=1 << 15 if lossless else 256,
+        by_component=lossless,
+    )
+    some = stream[:start] + new_tile_part(packets_of(tile_part(stream, start), tile, set(picked)))
+    return decode_planes(some, (len(picked), *shape[1:]), dtype, wavelet=wavelet, lossless=lossless)
+
+
+def _tile_start(stream: bytes) -> int:
+    """Position of the first tile-part, after the segments of the main header."""
+    at = 0
+    while at + 4 <= len(stream):
+        if int.from_bytes(stream[at : at + 2]) == SOT:
+            return at
+        at += 2 + max(2, int.from_bytes(stream[at + 2 : at + 4]))
+    raise ValueError("its JPEG 2000 stream has no tile")
 
 
 def whole_codestream(

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from ii_core import IIPicture
 from ii_core.jit import kernel
 
-from ..bitstream.jpeg2000 import MAX_COMPONENTS, decode_planes, encode_planes
+from ..bitstream.jpeg2000 import MAX_COMPONENTS, decode_planes, encode_planes, picked_planes
 from ..contract import Coder, Coding, Goal, Option, Options, Pixels
 from ..frames import Layout, layout
 from ..order import BY, ORDERS
@@ -169,6 +169,27 @@ class Separate(Volume):
         self.kind = kind
         self.name = f"{kind}-jpeg2000"
         self.about = f"All {NAMES[kind]}, each alone, JPEG 2000 at one slope for all, by OpenJPEG"
+
+    def decode_slice(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
+        """Decode one component image, by its own packets: its place in the grid, row by row, is ``index``."""
+        cut = self._cut(blank, options)
+        mode, step, colours, streams = _parts(payload, len(cut.groups))
+        sizes = np.cumsum([len(origins) for origins in cut.groups])
+        group = int(np.searchsorted(sizes, index, side="right"))
+        count = len(cut.groups[group])
+        place = index - int(sizes[group]) + count
+        shape = (3 * count, cut.shape.height, cut.shape.width)
+        dtype, wavelet = (cut.whole_dtype, "5/3") if mode == LOSSLESS else ("int16", cut.wavelet)
+        picked = [place, place + count, place + 2 * count]
+        planes = picked_planes(streams[group], shape, dtype, picked, wavelet=wavelet, lossless=mode == LOSSLESS)
+        alone = replace(cut, shape=replace(cut.shape, step_y=cut.shape.width, step_x=1))
+        pixels = np.empty((cut.shape.height * cut.shape.width, 3), blank.pixels.dtype)
+        planes, origin = planes.reshape(3, 1, *planes.shape[1:]), np.zeros(1, np.int64)
+        if mode == LOSSLESS:
+            _from_whole(planes, alone, origin, pixels)
+        else:
+            _from_real(planes, alone, origin, colours, step, pixels)
+        return pixels.reshape(cut.shape.height, cut.shape.width, 3)
 
 
 @dataclass(frozen=True, kw_only=True)

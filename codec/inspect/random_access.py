@@ -22,8 +22,9 @@ from ..bitstream.obu import temporal_units
 from ..checks import check_type, whole_pair
 from ..coders import video
 from ..coders.video import Video
+from ..coders.volume import Separate
 from ..contract import MAX_DECODED_PIXELS, Options, Pixels, find
-from ..frames import Film
+from ..frames import Film, layout
 from ..order import inverse, selection_order
 
 OBU_SEQUENCE_HEADER = 1
@@ -78,9 +79,9 @@ def sequence(coded: Encoded) -> Sequence:
         If the scheme codes no pseudo video sequence, or the stream does not hold as many packets as frames.
     """
     check_type("coded", coded, Encoded, "a coded picture")
-    coder = find(coded.scheme)
-    if not isinstance(coder, Video):
-        raise ValueError(f"scheme {coded.scheme} codes the picture as a whole: it has no frames to be had alone")
+    coder = _with_frames(coded)
+    if isinstance(coder, Separate):
+        raise ValueError(f"scheme {coded.scheme} codes no sequence: its frames are parts of one codestream")
     film = coder.film(blank_picture(coded.structure, coded.dtype), coded.options)
     if film.width * film.height > MAX_DECODED_PIXELS:
         raise ValueError(
@@ -128,6 +129,12 @@ def decode_frame(coded: Encoded, index: int) -> Pixels:
     """
     check_type("coded", coded, Encoded, "a coded picture")
     check_type("index", index, (int, np.integer), "a whole number")
+    coder = _with_frames(coded)
+    if isinstance(coder, Separate):
+        count = layout(coded.structure["lenses"], coded.structure["ei_pixels"], coder.kind).frames
+        if isinstance(index, bool) or not 0 <= index < count:
+            raise ValueError(f"frame index {index} is asked for: there are {count}, from 0")
+        return _slice(coder, coded, int(index))
     stream = sequence(coded)
     if isinstance(index, bool) or not 0 <= index < len(stream.packets):
         raise ValueError(f"frame index {index} is asked for: there are {len(stream.packets)}, from 0")
@@ -166,12 +173,31 @@ def decode_component(coded: Encoded, place: tuple[int, int]) -> Pixels:
     """
     check_type("coded", coded, Encoded, "a coded picture")
     col, row = whole_pair("place", place)
-    stream = sequence(coded)
-    layout = stream.film.layout
-    if not (0 <= row < layout.rows and 0 <= col < layout.cols):
-        raise ValueError(f"component image {place} is asked for: there are {layout.cols}×{layout.rows}, from (0, 0)")
-    order = selection_order(stream.film.order, layout.rows, layout.cols, stream.film.by)
-    return decode_frame(coded, int(inverse(order)[row * layout.cols + col]))
+    coder = _with_frames(coded)
+    grid = layout(coded.structure["lenses"], coded.structure["ei_pixels"], coder.kind)
+    if not (0 <= row < grid.rows and 0 <= col < grid.cols):
+        raise ValueError(f"component image {place} is asked for: there are {grid.cols}×{grid.rows}, from (0, 0)")
+    index = row * grid.cols + col
+    if isinstance(coder, Separate):
+        return _slice(coder, coded, index)
+    order = selection_order(str(coded.options["order"]), grid.rows, grid.cols, str(coded.options["by"]))
+    return decode_frame(coded, int(inverse(order)[index]))
+
+
+def _with_frames(coded: Encoded) -> Video | Separate:
+    """The coder of a coded picture, if it codes component images that can be decoded alone."""
+    coder = find(coded.scheme)
+    if not isinstance(coder, Video | Separate):
+        raise ValueError(f"scheme {coded.scheme} codes the picture as a whole: it has no frames to be had alone")
+    return coder
+
+
+def _slice(coder: Separate, coded: Encoded, index: int) -> Pixels:
+    """One component image of a scheme that codes each alone."""
+    try:
+        return coder.decode_slice(coded.payload, blank_picture(coded.structure, coded.dtype), coded.options, index)
+    except ValueError as error:
+        raise ValueError(f"the coded picture is damaged: {error}") from None
 
 
 def _pixels(frame: Any, film: Film, dtype: np.dtype[Any]) -> Pixels:
