@@ -265,10 +265,10 @@ def _git(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @lru_cache(maxsize=1024)
 def exists(commit: str) -> bool:
-    """Whether a commit is in this checkout's history; True without a whole history to ask."""
+    """Whether a commit is an ancestor of HEAD; True without a history. One of a rebased branch is none."""
     try:
         shallow = _git("rev-parse", "--is-shallow-repository")
-        return shallow.stdout.strip() != "false" or _git("cat-file", "-e", f"{commit}^{{commit}}").returncode == 0
+        return shallow.stdout.strip() != "false" or not _git("merge-base", "--is-ancestor", commit, "HEAD").returncode
     except (OSError, subprocess.SubprocessError):
         return True
 
