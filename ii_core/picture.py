@@ -30,6 +30,7 @@ from .jit import kernel
 
 DTYPES = ("uint8", "uint16", "float32")
 BINDING = "pixels_blake2b"  # the sidecar's entry that names the pixels it belongs to
+SAME_PITCH = 1e-7  # of the pitch: over ten thousand lenses a thousandth of one
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +95,10 @@ class IIPicture:
 
     def _check_irregular(self, camera: IICamera) -> None:
         u, v = self.ei_pixels
-        object.__setattr__(self, "ei_pixels", (float(u), float(v)))
+        given, kept = (float(u), float(v)), camera.ei_pixels
+        # A camera keeps nine digits of its pitch in pixels: more of them in a file mean the same.
+        same = all(abs(a - b) <= SAME_PITCH * b for a, b in zip(given, kept, strict=True))
+        object.__setattr__(self, "ei_pixels", kept if same else given)
         if camera.pixels != self.size or (camera.lenses, camera.ei_pixels) != (self.lenses, self.ei_pixels):
             raise ValueError(
                 f"the camera has {camera.pixels[0]}×{camera.pixels[1]} px and {camera.lenses} lenses of "

@@ -2,13 +2,15 @@
 
 import json
 import shutil
+import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset, sub_images, view_image
+from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset, resampled, sub_images, view_image
 from ii_core.files import read_image, write_image
 from ii_core.formats.formats import camera_views, read_pfm, view_disparity, write_hci, write_quilt, write_views
 from ii_core.formats.view_order import Arrangement, estimate
@@ -326,3 +328,51 @@ def test_disparity_needs_a_camera_and_its_own_depth(shot, tmp_path):
     with pytest.raises(ValueError, match=r"depth is \(4, 4\)"):
         write_hci(shot.picture, tmp_path, depth=np.zeros((4, 4)))
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("camera", "ei_pixels", "hexagonal"),
+    [
+        ("hexagonal", (16, 14), True),
+        ("hdtv", (24, 17), True),
+        ("setup1", (16, 16), False),
+        ("setup3", (64, 64), False),
+    ],
+)
+def test_import_says_what_is_cut_and_what_looks_hexagonal(tmp_path, camera, ei_pixels, hexagonal):
+    made = render(load_scene("twins"), preset(camera, scale=5 if camera == "hdtv" else 8), support=())
+    height, width = made.picture.pixels.shape[:2]
+    (u, v), source = ei_pixels, tmp_path / "raw.png"
+    pixels = np.pad(made.picture.pixels, ((0, -height % v + 3), (0, -width % u + 5), (0, 0)), mode="edge")
+    write_image(source, pixels)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        load_mosaic(source, ei_pixels)
+    texts = [str(warning.message) for warning in told]
+    assert any("5 columns at the right and 3 rows at the bottom are cut off" in text for text in texts)
+    assert any("looks hexagonal" in text for text in texts) == hexagonal
+    write_image(source, pixels[:-3, :-5])
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        load_mosaic(source, ei_pixels)
+    assert not any("cut off" in str(warning.message) for warning in told)
+
+
+def test_more_digits_than_a_camera_keeps_are_the_same_pitch():
+    camera = preset("plenoptic", scale=8)  # 512/37 px a lens
+    pixels = np.zeros((*camera.pixels[::-1], 3), np.uint8)
+    stated = replace(camera, lens_pitch_mm=13.84 * camera.pixel_pitch_mm * (1 + 1e-12))
+    kept = stated.ei_pixels[0]
+    for u in (kept, kept * (1 + 3e-12), 13.8400000001):
+        assert IIPicture(pixels, stated.lenses, (u, u), stated).ei_pixels == stated.ei_pixels
+    with pytest.raises(ValueError, match=r"the camera has .* the picture"):
+        IIPicture(pixels, stated.lenses, (13.841, 13.841), stated)
+
+
+def test_deshift_is_on_the_command_line(run, refused, tmp_path):
+    made = render(load_scene("apples"), preset("hexagonal", scale=8), support=()).picture
+    made.save(tmp_path / "h.png")
+    assert run("regular", tmp_path / "h.png", "--deshift", "-o", tmp_path / "r.png")[0] == 0
+    np.testing.assert_array_equal(IIPicture.load(tmp_path / "r.png").pixels, resampled(made, deshift=True)[0].pixels)
+    command = ("regular", tmp_path / "h.png", "--deshift", "--method", "rectangle", "-o", tmp_path / "s.png")
+    refused(run(*command), "deshift has no place in method rectangle")

@@ -29,6 +29,9 @@ def regular(
     method: Annotated[
         str, typer.Option(help="rectangle (no pixel changes) or resample (centred on lenses).")
     ] = "resample",
+    deshift: Annotated[
+        bool, typer.Option("--deshift", help="Resample: odd rows of a hexagonal array move under even ones.")
+    ] = False,
     mask: Annotated[Path | None, typer.Option(help="Write which pixels a lens owns, white, to this .png.")] = None,
     force: Force = False,
 ) -> None:
@@ -41,11 +44,13 @@ def regular(
     methods = {"rectangle": smallest_rectangle, "resample": resampled}
     if method not in methods:
         raise ValueError(f"unknown method {method!r}: known are {', '.join(methods)}")
+    if deshift and method != "resample":
+        raise ValueError(f"deshift has no place in method {method}: resample takes it")
     original = IIPicture.load(picture)
     files = [*picture_files(output, original.pixels.dtype.name), *image_file(mask, "uint8")]
     check_outputs(files, force)
     with spinner(f"{method} {picture.name}"):
-        made, owned = methods[method](original)
+        made, owned = resampled(original, deshift=True) if deshift else methods[method](original)
         made.save(output)
         if mask:
             write_image(mask, owned.astype(np.uint8) * 255)
