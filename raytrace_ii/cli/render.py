@@ -35,6 +35,9 @@ def render(
     ] = None,
     seed: Annotated[int, typer.Option(help="Of samples and noise.")] = 0,
     noise: Annotated[float, typer.Option(help="σ of sensor noise, in steps of 8 bits.")] = 0.0,
+    texture_filter: Annotated[
+        bool, typer.Option(help="Read image textures over a ray's width; --no-texture-filter reads them at a point.")
+    ] = True,
     bits: Annotated[int, typer.Option(help="8 or 16, for .png and .tif.")] = 8,
     support: Annotated[Exr, typer.Option(help="Write all support images to this .exr, as named channels.")] = None,
     depth: Annotated[Exr, typer.Option(help="Write z in mm from the pixel plane to this .exr.")] = None,
@@ -60,7 +63,7 @@ def render(
         raise ValueError(f"bits is {bits}: 8 or 16 is needed")
     if dask and workers is not None:
         raise ValueError("--workers are threads of this machine: with --dask there are none")
-    options = {**_sampling(samples, error), "seed": seed, "noise": noise}
+    options = {**_sampling(samples, error), "seed": seed, "noise": noise, "texture_filter": texture_filter}
     wanted = {"depth": depth, "ray_length": ray_length, "disparity": disparity, "normal": normal}
     wanted |= {"object_id": object_id, "shading_normal": shading_normal}
     extra = {name: path for name, path in wanted.items() if path is not None}

@@ -78,11 +78,13 @@ class Job:
     pose: NDArray[np.float64]
     dtype: str
     support: tuple[str, ...]
+    texture_filter: bool = True
     _local: threading.local = field(default_factory=threading.local, compare=False, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (
-            self.scene, self.camera, self.sampling, self.seed, self.pose, self.dtype, self.support
+            self.scene, self.camera, self.sampling, self.seed, self.pose, self.dtype, self.support,
+            self.texture_filter,
         )  # fmt: skip
 
     def tiles(self) -> list[Tile]:
@@ -121,7 +123,9 @@ class Job:
         if tracer is None:
             with _building:
                 _ = self.scene.packed
-            tracer = self._local.tracer = Tracer(self.scene, TILE_RAYS, self.pose, self._lobes())
+            tracer = self._local.tracer = Tracer(
+                self.scene, TILE_RAYS, self.pose, self._lobes(), self._footprint()
+            )  # fmt: skip
         tracer.begin()
         return tracer
 
@@ -131,6 +135,14 @@ class Job:
             self.sampling, self.sampling
         )  # fmt: skip
         return -(-LOBE_RAYS // least), most
+
+    def _footprint(self) -> tuple[float, float]:
+        """Width of a sample's ray at its origin, mm, and how much it grows a mm: its part of the pixel."""
+        if not self.texture_filter or not self.scene.packed.images:
+            return 0.0, 0.0
+        samples = self.sampling.least if isinstance(self.sampling, Adaptive) else self.sampling
+        width, spread = footprint(self.camera)
+        return width / samples**0.5, spread / samples**0.5
 
     def _support_room(self, rays: int) -> Support | None:
         """Support arrays for so many rays, None if no support image is wanted."""
@@ -187,6 +199,25 @@ class Job:
         codes = CURVES["uint8"]
         assert codes is not None
         return adaptive_mean(self.camera, wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, shoot)
+
+
+def footprint(camera: IICamera | MapCamera) -> tuple[float, float]:
+    """Distance of the rays of neighbouring pixels at their origins, mm, and how much it grows a mm of their way.
+
+    The median over the middle of the picture, so that pairs under two lenses do not count, and the mean of across and
+    down. Through a pinhole: 0, and the pixel pitch over the distance from pixel to pinhole.
+    """
+    columns, rows = camera.pixels
+    down, across = (slice(max(n // 2 - 32, 0), n // 2 + 32) for n in (rows, columns))
+    if isinstance(camera, MapCamera):
+        L, D, _ = camera.stored_rays(0, down, across)
+    else:
+        L, D = camera.rays(down, across)
+    length = np.linalg.norm(D, axis=-1, keepdims=True)
+    D = np.divide(D, length, out=np.zeros_like(D), where=length > 0)
+    steps = [[np.linalg.norm(np.diff(rays, axis=axis), axis=-1) for axis in (0, 1)] for rays in (L, D)]
+    width, spread = (float(np.mean([np.median(step) for step in two if step.size] or [0.0])) for two in steps)
+    return width, spread
 
 
 def check_disparity(camera: IICamera | MapCamera) -> None:

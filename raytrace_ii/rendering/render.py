@@ -119,6 +119,7 @@ def render(
     workers: int | None = None,
     executor: Any = None,
     pose: ArrayLike | None = None,
+    texture_filter: bool = True,
     support: tuple[str, ...] = SUPPORT,
     progress: Callable[[int, int], None] | None = None,
 ) -> Shot:
@@ -148,6 +149,10 @@ def render(
         What renders instead: threads, processes that share this machine's files, or a cluster. It stays open.
     pose : array_like, (4, 4), optional
         Rigid transform from the camera's frame to the scene's.
+    texture_filter : bool
+        Read images of textures, maps and skies over the width that a ray has where it meets them, each sample its
+        part of the pixel; see `job.footprint`. If not, at a point, which shows texels that are finer than pixels as
+        noise.
     support : tuple of str
         Which of depth, normal, object_id, ray_length, shading_normal, disparity and samples to keep.
     progress : callable, optional
@@ -165,7 +170,7 @@ def render(
         If worker processes die and are not replaced.
     """
     tally = _Tally()
-    job = _job(scene, camera, samples, error, seed, noise, dtype, pose, support)
+    job = _job(scene, camera, samples, error, seed, noise, dtype, pose, support, texture_filter)
     _check_means(workers, executor, progress)
     columns, rows = camera.pixels
     out: dict[str, NDArray[Any]] = {"pixels": np.empty((rows, columns, 3), dtype)}
@@ -200,6 +205,7 @@ def render_to(
     workers: int | None = None,
     executor: Any = None,
     pose: ArrayLike | None = None,
+    texture_filter: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Stats:
     """Ray trace into files band by band: pictures may be larger than memory.
@@ -229,7 +235,7 @@ def render_to(
     if not isinstance(support, Mapping | None):
         raise TypeError(f"support is {support!r}: a mapping of names to paths is needed")
     files = {name: _paths(value) for name, value in (support or {}).items()}
-    job = _job(scene, camera, samples, error, seed, noise, dtype, pose, tuple(files))
+    job = _job(scene, camera, samples, error, seed, noise, dtype, pose, tuple(files), texture_filter)
     _check_means(workers, executor, progress)
     if upright and camera.lenses != (1, 1):
         raise ValueError(f"only the picture of one lens is turned upright: this camera has {camera.lenses} lenses")
@@ -363,7 +369,7 @@ def _bands(
 
 def _job(
     scene: Scene, camera: IICamera | MapCamera, samples: Any, error: float, seed: int, noise: float, dtype: str,
-    pose: ArrayLike | None, support: tuple[str, ...],
+    pose: ArrayLike | None, support: tuple[str, ...], texture_filter: bool,
 ) -> Job:  # fmt: skip
     """A picture to be rendered, all of it checked."""
     check_scene(scene)
@@ -391,7 +397,9 @@ def _job(
         raise ValueError(f"unknown support image {', '.join(sorted(unknown))}: known are {known}")
     if "disparity" in support:
         check_disparity(camera)
-    return Job(scene, camera, sampling(samples, error), int(seed), rigid(pose), dtype, support)
+    if not isinstance(texture_filter, bool | np.bool_):
+        raise TypeError(f"texture_filter is {texture_filter!r}: True or False is needed")
+    return Job(scene, camera, sampling(samples, error), int(seed), rigid(pose), dtype, support, bool(texture_filter))
 
 
 def _short(value: Any) -> str:

@@ -54,6 +54,7 @@ def render_set(
     error: float = 0.5,
     seed: int = 0,
     noise: float = 0.0,
+    texture_filter: bool = True,
     bits: int = 8,
     workers: int | None = None,
     executor: Any = None,
@@ -100,6 +101,7 @@ def render_set(
     if cameras[0].model is None:
         raise ValueError("the maps do not say what camera they are of: there is no 2D projection to match")
     options = {"samples": samples, "error": error, "seed": seed, "noise": noise, "dtype": f"uint{bits}"}
+    options["texture_filter"] = texture_filter
     old = _read_manifest(folder, name)
     claims = _claims(folder, name, len(cameras), old, force)
     manifest = {**_header(name, cameras, options), "claims": claims, "scenes": {}, CONTACT: old.get(CONTACT)}

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.scene import Body, Light, Material, Scene, Vector, unit_rows
-from ..scene.textures import TextureTable
+from ..scene.textures import Image, TextureTable
 from .intersect import Intersector
 from .kernels.shade import DIRECTIONAL, LEAST_WEIGHT, POINT, SPOT
 
@@ -22,8 +22,8 @@ LIFT = 4e-6
 COLOUR, MIRROR, TRANSMISSION, ABSORPTION = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 SPECULAR, SHININESS, PRIORITY, LOCAL, TEXTURE, LEAST_HALF = 12, 13, 14, 15, 16, 17
 EMISSION, IOR, CUTOFF, NORMAL_MAP, NORMAL_SCALE = slice(18, 21), slice(21, 24), 24, 25, 26
-ROUGHNESS, METALLIC, GLOSS_MAP, EMISSION_MAP, ALPHA_BLEND = 27, 28, 29, 30, 31
-MATERIAL_COLUMNS = 32
+ROUGHNESS, METALLIC, GLOSS_MAP, EMISSION_MAP, ALPHA_BLEND, IMAGES = 27, 28, 29, 30, 31, 32
+MATERIAL_COLUMNS = 33
 
 MOST_NESTED = 8  # bodies whose bounds meet in one place that a ray keeps count of
 
@@ -78,6 +78,7 @@ class PackedScene:
         self.first_clear = first_clear
         looks = [body.material for body in bodies]
         self.mirrors = any(max(look.mirror) > 0 or look.metallic > 0 for look in looks)
+        self.images = sky.image is not None or any(isinstance(t, Image) for look in looks for t in look.textures)
         self.glossy = any(look.roughness > 0 and look.reflects for look in looks)
         self.blends = any(look.alpha_blend > 0 for look in looks)
         self.transmits = first_clear < len(bodies)
@@ -101,6 +102,7 @@ def _material_row(m: Material, textures: TextureTable) -> NDArray[np.float64]:
     row[LEAST_HALF] = (LEAST_WEIGHT / max(m.specular, LEAST_WEIGHT)) ** (1 / m.shininess)
     row[TEXTURE], row[NORMAL_MAP] = textures.index(m.texture), textures.index(m.normal_map)
     row[NORMAL_SCALE], row[CUTOFF], row[ALPHA_BLEND] = m.normal_scale, m.alpha_cutoff, m.alpha_blend
+    row[IMAGES] = any(isinstance(image, Image) for image in m.textures)
     row[ROUGHNESS], row[METALLIC] = m.roughness if m.reflects else 0.0, m.metallic
     row[GLOSS_MAP], row[EMISSION_MAP] = textures.index(m.metallic_roughness_map), textures.index(m.emission_map)
     return row

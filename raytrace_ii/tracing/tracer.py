@@ -168,9 +168,10 @@ class _Rays:
     pixels: NDArray[np.int32]
     inside: NDArray[np.int32]  # (n, nested)
     keys: NDArray[np.uint64]  # of no rows where nothing is rough
+    widths: NDArray[np.float32]  # of no rows for camera rays, or where images are not filtered
 
     @classmethod
-    def room(cls, n: int, nested: int, glossy: bool = False) -> _Rays:
+    def room(cls, n: int, nested: int, glossy: bool = False, widening: bool = False) -> _Rays:
         def rows() -> NDArray[np.float32]:
             return np.empty((n, 3), np.float32)
 
@@ -181,6 +182,7 @@ class _Rays:
             np.empty(n, np.int32),
             np.empty((n, nested), np.int32),
             np.empty(n * glossy, np.uint64),
+            np.empty(n * widening, np.float32),
         )
 
 
@@ -188,16 +190,19 @@ class Tracer:
     """Traces batches of up to ``capacity`` primary rays, keeping its work arrays between batches. One a thread.
 
     ``lobes`` is how many rays at most a camera ray sends over the lobe of a rough mirror, and how many samples of a
-    pixel share the lobe's places; later rays send one.
+    pixel share the lobe's places; later rays send one. ``footprint`` is how wide a ray is at its origin, mm, and by
+    how much it grows a mm of its way: images are filtered over it.
     """
 
     def __init__(
-        self, scene: Scene, capacity: int, pose: NDArray[np.float64], lobes: tuple[int, int] = (LOBE_RAYS, 1)
-    ) -> None:
+        self, scene: Scene, capacity: int, pose: NDArray[np.float64], lobes: tuple[int, int] = (LOBE_RAYS, 1),
+        footprint: tuple[float, float] = (0.0, 0.0),
+    ) -> None:  # fmt: skip
         self.scene: PackedScene = scene.packed
         self.max_depth = scene.max_depth
         self.pose = pose
         self.lobes = lobes
+        self.footprint = footprint if self.scene.images else (0.0, 0.0)
         self.begin()
         self._primary = _Rays.room(capacity, self.scene.nested, self.scene.glossy)
         # weights and pixels of rays that carry all light, one a pixel: read only
@@ -289,17 +294,18 @@ class Tracer:
         primitives, u, v, distances = self._hits(rays)
         spawn = spawn and (s.mirrors or s.transmits or s.blends)
         most = (lobe_rays if s.glossy else 1) + s.transmits + 2 * s.disperses + s.blends
-        following = _Rays.room(most * n if spawn else 0, s.nested, s.glossy)
+        following = _Rays.room(most * n if spawn else 0, s.nested, s.glossy, any(self.footprint))
         shadow, reach = self._shadow_room(n * len(s.lights))
         counts, lit = np.zeros(6, np.int64), np.zeros(len(s.lights), np.int64)
         spawned = kernels.shade(
             primitives, u, v, distances, rays.origins, rays.directions, rays.weights, rays.pixels, rays.inside,
-            rays.keys, s.corners, s.faces, s.normals, s.coordinates, s.object_of_face, s.materials,
+            rays.keys, rays.widths, s.corners, s.faces, s.normals, s.coordinates, s.object_of_face, s.materials,
             s.textures.table, s.textures.texels, s.textures.alphas, s.lights, s.background, s.fog, s.ambient, s.least,
-            lobe_rays, self.lobes[1], radiance,
+            lobe_rays, self.lobes[1], *self.footprint, radiance,
             shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels, shadow.inside,
             following.origins, following.directions, following.weights, following.pixels, following.inside,
-            following.keys, counts, lit, spawn, self.pose[:3, 3], self.pose[:3, 2], *(support or Support()).rows(),
+            following.keys, following.widths, counts, lit, spawn, self.pose[:3, 3], self.pose[:3, 2],
+            *(support or Support()).rows(),
         )  # fmt: skip
         self.count.rays.update({"reflection": int(counts[0]), "refraction": int(counts[1])})
         self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[2:5]), strict=True)))

@@ -39,9 +39,12 @@ LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) 
 # Columns of the material table and of the light table, as in packing.py.
 _MIRROR, _TRANSMISSION, _ABSORPTION, _SPECULAR, _SHININESS, _PRIORITY, _LOCAL = 3, 6, 9, 12, 13, 14, 15
 _TEXTURE, _LEAST_HALF, _EMISSION, _IOR, _CUTOFF, _NORMAL_MAP, _NORMAL_SCALE = 16, 17, 18, 21, 24, 25, 26
-_ROUGHNESS, _METALLIC, _GLOSS_MAP, _EMISSION_MAP, _ALPHA_BLEND = 27, 28, 29, 30, 31
+_ROUGHNESS, _METALLIC, _GLOSS_MAP, _EMISSION_MAP, _ALPHA_BLEND, _IMAGES = 27, 28, 29, 30, 31, 32
 _LIGHT_COLOUR, _CONE_AXIS, _CONE_SCALE, _CONE_OFFSET = 4, 7, 10, 11
 _SKY_IMAGE, _SKY_TURN, _SKY_INTENSITY = 10, 11, 12
+_LEVELS = 8  # of an image: how many coarser levels follow it in the table
+MOST_TAPS = 8  # along the longer axis of a filtered ellipse
+SHARPER = 0.5  # levels finer than the filter's width: bilinear reading of a level widens it again
 _LEAST, _MOST = 1e-150, 1e150  # between them squares and their sums neither vanish nor overflow
 
 
@@ -123,22 +126,28 @@ def start_separable_rays(x, y, z, rows, columns, rotation, shift, out_origins, o
 @kernel
 def shade(
     primitives, u, v, distances, origins, directions, weights, pixels, inside, keys,
-    corners, faces, normals, coordinates, object_of_face, materials, textures, texels, alphas, lights, background,
-    fog, ambient, least, lobe_rays, lobe_stride, radiance,
+    widths, corners, faces, normals, coordinates, object_of_face, materials, textures, texels, alphas, lights,
+    background, fog, ambient, least, lobe_rays, lobe_stride, first_width, spread, radiance,
     shadow_origins, shadow_directions, shadow_reach, shadow_colours, shadow_pixels, shadow_inside,
-    next_origins, next_directions, next_weights, next_pixels, next_inside, next_keys, counts, lit, spawn,
+    next_origins, next_directions, next_weights, next_pixels, next_inside, next_keys, next_widths, counts, lit,
+    spawn,
     eye, axis, depth, normal, object_id, ray_length, shading_normal,
 ):  # fmt: skip
     """Shade one generation of rays.
 
     Adds background, emitted and ambient light to ``radiance``; writes shadow rays with the light they would let
     through, n rows for each light, and, if ``spawn``, reflected and refracted rays; none weaker than ``least``.
-    ``inside`` lists the transmissive bodies that a ray runs in, −1 after the last. ``keys`` are places in the lobes
-    of rough mirrors, as `sampling.lobe_keys` gives them, of no length if there are none; up to ``lobe_rays`` rays go
-    over a lobe, whose places stand ``lobe_stride`` apart. ``fog`` is its colour and density, of no length if there is
-    none; it lies outside bodies, and before the sky not at all. Of each ray are noted, where there is room, the depth
-    from ``eye`` along the camera's ``axis``, the face's normal, the object, the ray's length and the normal of
-    shading.
+    ``inside`` lists the transmissive bodies that a ray runs in, −1 after the last. ``fog`` is its colour and density,
+    of no length if there is none; it lies outside bodies, and before the sky not at all.
+
+    ``keys`` are places in the lobes of rough mirrors, as `sampling.lobe_keys` gives them, of no length if there are
+    none; up to ``lobe_rays`` rays go over a lobe, whose places stand ``lobe_stride`` apart.
+
+    A ray is ``widths`` wide where it starts, ``first_width`` if they are of no length, and grows by ``spread`` a mm:
+    images are filtered over its width, not at all if both are 0.
+
+    Of each ray are noted, where there is room, the depth from ``eye`` along the camera's ``axis``, the face's normal,
+    the object, the ray's length and the normal of shading.
 
     Returns
     -------
@@ -163,7 +172,7 @@ def shade(
                 _put(shading_normal, pixel, 0.0, 0.0, 0.0)
             if depth.shape[0] > 0:
                 depth[pixel] = math.nan
-            b0, b1, b2 = _sky(background, textures, texels, dx, dy, dz)
+            b0, b1, b2 = _sky(background, textures, texels, dx, dy, dz, spread)
             radiance[pixel, 0] += w0 * b0
             radiance[pixel, 1] += w1 * b1
             radiance[pixel, 2] += w2 * b2
@@ -194,15 +203,19 @@ def shade(
             radiance[pixel, 1] += w1 * (1.0 - through) * fog[1]
             radiance[pixel, 2] += w2 * (1.0 - through) * fog[2]
             w0, w1, w2 = w0 * through, w1 * through, w2 * through
+        width = (widths[i] if widths.shape[0] > 0 else first_width) + spread * float(distances[i])
+        au, av, bu, bv = 0.0, 0.0, 0.0, 0.0
+        if width > 0.0 and materials[body, _IMAGES] > 0.0:
+            au, av, bu, bv = _footprint(corners, coordinates, f, width, dx, dy, dz, gx, gy, gz)
         if spawn and materials[body, _ALPHA_BLEND] > 0.0:
             # seen through to the share that is not there; the last generation takes it as there
-            there = _there(coordinates, textures, alphas, materials, body, f, u[i], v[i])
+            there = _there(coordinates, textures, alphas, materials, body, f, u[i], v[i], au, av, bu, bv)
             w = (1.0 - there) * max(w0, w1, w2)
             if w >= least:
                 _put_behind(next_origins, spawned, corners, faces, f, u[i], v[i], entering)
                 _put(next_directions, spawned, dx, dy, dz)
                 _put(next_weights, spawned, (1.0 - there) * w0, (1.0 - there) * w1, (1.0 - there) * w2)
-                _hand_on(next_pixels, next_inside, next_keys, spawned, pixel, inside, keys, i)
+                _hand_on(next_pixels, next_inside, next_keys, next_widths, spawned, pixel, inside, keys, width, i)
                 counts[PASSED] += 1
                 spawned += 1
             w0, w1, w2 = there * w0, there * w1, there * w2
@@ -214,7 +227,7 @@ def shade(
         if materials[body, _NORMAL_MAP] >= 0:
             nx, ny, nz = _mapped_normal(
                 corners, coordinates, textures, texels, f, u[i], v[i], int(materials[body, _NORMAL_MAP]),
-                materials[body, _NORMAL_SCALE], entering, nx, ny, nz, dx, dy, dz,
+                materials[body, _NORMAL_SCALE], entering, nx, ny, nz, dx, dy, dz, au, av, bu, bv,
             )  # fmt: skip
         if shading_normal.shape[0] > 0:
             side = 1.0 if entering else -1.0
@@ -229,7 +242,7 @@ def shade(
         own2 = w2 * materials[body, _EMISSION + 2]
         if materials[body, _EMISSION_MAP] >= 0:
             s0, s1, s2 = _interpolate(coordinates, f, u[i], v[i])
-            t0, t1, t2 = _image(textures, int(materials[body, _EMISSION_MAP]), texels, s0, s1)
+            t0, t1, t2 = _filtered(textures, int(materials[body, _EMISSION_MAP]), texels, s0, s1, au, av, bu, bv)
             own0, own1, own2 = own0 * t0, own1 * t1, own2 * t2
         local, metallic, rough = materials[body, _LOCAL], materials[body, _METALLIC], materials[body, _ROUGHNESS]
         specular, shininess, least_half = (
@@ -240,12 +253,17 @@ def shade(
         t0, t1, t2 = 1.0, 1.0, 1.0
         if materials[body, _TEXTURE] >= 0 and (local > 0.0 or metallic > 0.0):
             s0, s1, s2 = _interpolate(coordinates, f, u[i], v[i])
-            t0, t1, t2 = texture_colour(textures, int(materials[body, _TEXTURE]), texels, s0, s1, s2)
+            row = int(materials[body, _TEXTURE])
+            if width > 0.0 and textures[row, 0] == IMAGE:
+                t0, t1, t2 = _filtered(textures, row, texels, s0, s1, au, av, bu, bv)
+            else:
+                t0, t1, t2 = texture_colour(textures, row, texels, s0, s1, s2)
         k0, k1, k2 = materials[body, _MIRROR], materials[body, _MIRROR + 1], materials[body, _MIRROR + 2]
         if metallic > 0.0 or materials[body, _GLOSS_MAP] >= 0:
             if materials[body, _GLOSS_MAP] >= 0:
                 s0, s1, s2 = _interpolate(coordinates, f, u[i], v[i])
-                _, s1, s2 = _image(textures, int(materials[body, _GLOSS_MAP]), texels, s0, s1)
+                row = int(materials[body, _GLOSS_MAP])
+                _, s1, s2 = _filtered(textures, row, texels, s0, s1, au, av, bu, bv)
                 rough, metallic = rough * s1, metallic * s2
             local, clear = (1.0 - metallic) * local, (1.0 - metallic) * clear
             k0 = (1.0 - metallic) * k0 + metallic * materials[body, 0] * t0
@@ -327,7 +345,7 @@ def shade(
                     _put(next_origins, spawned, px - lift * gx, py - lift * gy, pz - lift * gz)
                     _put(next_directions, spawned, tx, ty, tz)
                     _put(next_weights, spawned, t0, t1, t2)
-                    _hand_on(next_pixels, next_inside, next_keys, spawned, pixel, inside, keys, i)
+                    _hand_on(next_pixels, next_inside, next_keys, next_widths, spawned, pixel, inside, keys, width, i)
                     _cross(next_inside, spawned, body, entering)
                     counts[REFRACTION] += 1
                     spawned += 1
@@ -346,7 +364,7 @@ def shade(
                 _put(next_origins, spawned, ox, oy, oz)
                 _put(next_directions, spawned, rx, ry, rz)
                 _put(next_weights, spawned, share * m0, share * m1, share * m2)
-                _hand_on(next_pixels, next_inside, next_keys, spawned, pixel, inside, keys, i)
+                _hand_on(next_pixels, next_inside, next_keys, next_widths, spawned, pixel, inside, keys, width, i)
                 next_keys[spawned] = _mix(keys[i] + np.uint64(j))
                 counts[REFLECTION] += 1
                 spawned += 1
@@ -359,7 +377,7 @@ def shade(
             _put(next_origins, spawned, ox, oy, oz)
             _put(next_directions, spawned, rx, ry, rz)
             _put(next_weights, spawned, m0, m1, m2)
-            _hand_on(next_pixels, next_inside, next_keys, spawned, pixel, inside, keys, i)
+            _hand_on(next_pixels, next_inside, next_keys, next_widths, spawned, pixel, inside, keys, width, i)
             counts[REFLECTION] += 1
             spawned += 1
         elif max(m0, m1, m2) > 0.0:
@@ -368,8 +386,10 @@ def shade(
 
 
 @inner_kernel
-def _hand_on(next_pixels, next_inside, next_keys, k, pixel, inside, keys, i):
-    """Give a spawned ray its pixel, the bodies that it runs in and its place in lobes."""
+def _hand_on(next_pixels, next_inside, next_keys, next_widths, k, pixel, inside, keys, width, i):
+    """Give a spawned ray its pixel, the bodies that it runs in, its place in lobes and its width."""
+    if next_widths.shape[0] > 0:
+        next_widths[k] = width
     next_pixels[k] = pixel
     for j in range(inside.shape[1]):
         next_inside[k, j] = inside[i, j]
@@ -571,7 +591,7 @@ def pass_clear_face(
         there = hit and not _cut_out(coordinates, textures, alphas, materials, body, f, u[i], v[i])
         past = 0.0  # the share that the body leaves free
         if there and materials[body, _ALPHA_BLEND] > 0.0:
-            past = 1.0 - _there(coordinates, textures, alphas, materials, body, f, u[i], v[i])
+            past = 1.0 - _there(coordinates, textures, alphas, materials, body, f, u[i], v[i], 0.0, 0.0, 0.0, 0.0)
         clear = there and _transmits(materials, body)
         if there and past == 0.0 and not clear:
             continue
@@ -789,12 +809,21 @@ def _cut_out(coordinates, textures, alphas, materials, body, f, u, v):
 
 
 @kernel
-def _there(coordinates, textures, alphas, materials, body, f, u, v):
+def _there(coordinates, textures, alphas, materials, body, f, u, v, au, av, bu, bv):
     """The share of a blended surface that is there: its factor times the texture's alpha, where it has one."""
     share, row = materials[body, _ALPHA_BLEND], int(materials[body, _TEXTURE])
     if row >= 0 and textures[row, 0] == IMAGE and textures[row, 4] >= 0.0:
         x, y, _ = _interpolate(coordinates, f, u, v)
-        share *= _alpha(textures, row, alphas, x, y)
+        taps, level, bu, bv = _filter(textures, row, au, av, bu, bv)
+        total = 0.0
+        for tap in range(taps):
+            s = (tap + 0.5) / taps - 0.5
+            near, far, part = _levels(row, level)
+            here = _alpha(textures, near, alphas, x + s * bu, y + s * bv)
+            if part > 0.0:
+                here += part * (_alpha(textures, far, alphas, x + s * bu, y + s * bv) - here)
+            total += here
+        share *= total / taps
     return share
 
 
@@ -818,7 +847,7 @@ def _put_behind(out, i, corners, faces, f, u, v, entering):
 
 @kernel
 def _mapped_normal(
-    corners, coordinates, textures, texels, f, u, v, row, scale, entering, nx, ny, nz, dx, dy, dz
+    corners, coordinates, textures, texels, f, u, v, row, scale, entering, nx, ny, nz, dx, dy, dz, au, av, bu, bv
 ):  # fmt: skip
     """The shading normal tilted by a normal map; untilted where that would turn it away from the viewer.
 
@@ -826,7 +855,7 @@ def _mapped_normal(
     averaged over a mesh's corners.
     """
     s, t, _ = _interpolate(coordinates, f, u, v)
-    x, y, z = _image(textures, row, texels, s, t)
+    x, y, z = _filtered(textures, row, texels, s, t, au, av, bu, bv)
     x, y, z = scale * (2.0 * x - 1.0), scale * (2.0 * y - 1.0), 2.0 * z - 1.0
     u1, v1 = coordinates[f, 1, 0] - coordinates[f, 0, 0], coordinates[f, 1, 1] - coordinates[f, 0, 1]
     u2, v2 = coordinates[f, 2, 0] - coordinates[f, 0, 0], coordinates[f, 2, 1] - coordinates[f, 0, 1]
@@ -895,20 +924,22 @@ def background_colour(background, dy):
 
 
 @inline_kernel
-def _sky(background, textures, texels, dx, dy, dz):
+def _sky(background, textures, texels, dx, dy, dz, spread):
     """Colour of the surroundings for a unit direction: of the equirectangular image, or of the gradient."""
     if background[_SKY_IMAGE] >= 0.0:
-        return _sky_image(background, textures, texels, dx, dy, dz)
+        return _sky_image(background, textures, texels, dx, dy, dz, spread)
     return background_colour(background, dy)
 
 
 @kernel
-def _sky_image(background, textures, texels, dx, dy, dz):
+def _sky_image(background, textures, texels, dx, dy, dz, spread):
     row = int(background[_SKY_IMAGE])
     half = 0.5 / textures[row, 3]  # of a texel: the top row does not run into the bottom one
     u = 0.5 + math.atan2(np.float64(dx), np.float64(dz)) / (2.0 * math.pi) - background[_SKY_TURN]
     v = 0.5 + math.asin(min(max(np.float64(dy), -1.0), 1.0)) / math.pi
-    r, g, b = _image(textures, row, texels, u, min(max(v, half), 1.0 - half))
+    v = min(max(v, half), 1.0 - half)
+    across = spread / (2.0 * math.pi * max(math.sqrt(dx * dx + dz * dz), spread, 1e-9))
+    r, g, b = _filtered(textures, row, texels, u, v, across, 0.0, 0.0, spread / math.pi)
     return background[_SKY_INTENSITY] * r, background[_SKY_INTENSITY] * g, background[_SKY_INTENSITY] * b
 
 
@@ -1104,6 +1135,77 @@ def _image(table, row, texels, u, v):
         green = w00 * pixels[a, 1] + w10 * pixels[b, 1] + w01 * pixels[c, 1] + w11 * pixels[d, 1]
         blue = w00 * pixels[a, 2] + w10 * pixels[b, 2] + w01 * pixels[c, 2] + w11 * pixels[d, 2]
     return red, green, blue
+
+
+@kernel
+def _footprint(corners, coordinates, f, width, dx, dy, dz, gx, gy, gz):
+    """How far a ray's cross-section of some width reaches over (u, v): across the plane of incidence, and in it.
+
+    A disc across the ray is an ellipse on the face (Heckbert 1986), longer by 1/cos in the plane of incidence.
+    """
+    ax, ay, az = _edge(corners, f, 1)
+    bx, by, bz = _edge(corners, f, 2)
+    mx, my, mz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    square = mx * mx + my * my + mz * mz
+    if square == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    px, py, pz = gy * dz - gz * dy, gz * dx - gx * dz, gx * dy - gy * dx
+    sine = math.sqrt(px * px + py * py + pz * pz)
+    if sine < 1e-6:
+        px, py, pz = ax, ay, az
+        sine = math.sqrt(px * px + py * py + pz * pz)
+    px, py, pz = px / sine, py / sine, pz / sine
+    qx, qy, qz = gy * pz - gz * py, gz * px - gx * pz, gx * py - gy * px
+    longer = width / max(abs(dx * gx + dy * gy + dz * gz), 1e-3)
+    u1, v1 = coordinates[f, 1, 0] - coordinates[f, 0, 0], coordinates[f, 1, 1] - coordinates[f, 0, 1]
+    u2, v2 = coordinates[f, 2, 0] - coordinates[f, 0, 0], coordinates[f, 2, 1] - coordinates[f, 0, 1]
+    # of a vector p in the face: p = i·a + j·b, i = (p × b)·m/m², j = (a × p)·m/m²
+    i = ((py * bz - pz * by) * mx + (pz * bx - px * bz) * my + (px * by - py * bx) * mz) * width / square
+    j = ((ay * pz - az * py) * mx + (az * px - ax * pz) * my + (ax * py - ay * px) * mz) * width / square
+    k = ((qy * bz - qz * by) * mx + (qz * bx - qx * bz) * my + (qx * by - qy * bx) * mz) * longer / square
+    l = ((ay * qz - az * qy) * mx + (az * qx - ax * qz) * my + (ax * qy - ay * qx) * mz) * longer / square
+    return i * u1 + j * u2, i * v1 + j * v2, k * u1 + l * u2, k * v1 + l * v2
+
+
+@kernel
+def _filter(table, row, au, av, bu, bv):
+    """Number of taps, level of each, and the way over (u, v) that they lie along: the longer of two diameters.
+
+    The level fits the shorter diameter, or the distance of the taps where there would be too many.
+    """
+    width, height = table[row, 2], table[row, 3]
+    a = math.sqrt((au * width) ** 2 + (av * height) ** 2)
+    b = math.sqrt((bu * width) ** 2 + (bv * height) ** 2)
+    if a > b:
+        a, b, bu, bv = b, a, au, av
+    taps = int(min(max(math.ceil(b / max(a, 1.0)), 1.0), MOST_TAPS))
+    level = math.log2(max(a, b / taps, 1.0)) - SHARPER
+    return taps, min(max(level, 0.0), table[row, _LEVELS]), bu, bv
+
+
+@inline_kernel
+def _levels(row, level):
+    """Rows of the levels above and below, and how far it is to the second."""
+    near = int(level)
+    return row + near, row + near + 1, level - near
+
+
+@kernel
+def _filtered(table, row, texels, u, v, au, av, bu, bv):
+    """Colour of an image over an ellipse about (u, v) of two diameters: means of its pyramid (Williams 1983)."""
+    taps, level, bu, bv = _filter(table, row, au, av, bu, bv)
+    near, far, part = _levels(row, level)
+    if taps == 1 and level == 0.0:
+        return _image(table, row, texels, u, v)
+    red, green, blue = 0.0, 0.0, 0.0
+    for tap in range(taps):
+        s = (tap + 0.5) / taps - 0.5
+        r, g, b = _image(table, near, texels, u + s * bu, v + s * bv)
+        if part > 0.0:
+            r1, g1, b1 = _image(table, far, texels, u + s * bu, v + s * bv)
+            r, g, b = r + part * (r1 - r), g + part * (g1 - g), b + part * (b1 - b)
+        red, green, blue = red + r, green + g, blue + b
+    return red / taps, green / taps, blue / taps
 
 
 @inner_kernel
