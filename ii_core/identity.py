@@ -12,7 +12,7 @@ from pathlib import Path
 
 # All that results depend on; command line, charts and validation messages are left out.
 LIBRARIES = (
-    "numpy", "numba", "embreex", "OpenImageIO", "scikit-image", "scipy", "av", "pillow", "imagecodecs",
+    "numpy", "numba", "embreex", "trimesh", "OpenImageIO", "scikit-image", "scipy", "av", "pillow", "imagecodecs",
     "bjontegaard",
 )  # fmt: skip
 

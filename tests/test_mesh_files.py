@@ -317,3 +317,46 @@ def test_damaged_ply_files(change, says, tmp_path):
     with pytest.raises(ValueError) as caught:
         read_model(tmp_path / "d.ply")
     assert str(caught.value).startswith("d.ply: ") and says in str(caught.value), str(caught.value)
+
+
+def test_rows_of_ply_whose_lengths_lie(tmp_path):
+    """trimesh gives every binary list the length of the first, and takes ASCII values to the end of their row."""
+    head = "ply\nformat {} 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+    head += "element face {}\nproperty list uchar int vertex_indices\nend_header\n"
+    corners = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 3)]
+    places = b"".join(struct.pack("<3f", x, y, 0) for x, y in corners)
+    # 17 + 13 + 21 bytes of lists are as long as three of the first
+    rows = struct.pack("<B4iB3iB5i", 4, 0, 1, 2, 3, 3, 3, 2, 4, 5, 0, 1, 2, 4, 3)
+    (tmp_path / "b.ply").write_bytes(head.format("binary_little_endian", 3).encode() + places + rows)
+    assert area(read_model(tmp_path / "b.ply").parts[0].mesh) == 4 + 1 + 5
+    text = head.format("ascii", 2) + "".join(f"{x} {y} 0 7\n\n" for x, y in corners)
+    (tmp_path / "a.ply").write_text(text + "3 0 1 2 3\n4 0 1 2 3\n")  # a triangle with a word too many
+    assert area(read_model(tmp_path / "a.ply").parts[0].mesh) == 2 + 4
+    (tmp_path / "a.ply").write_text(text + "3 0 1 2\n4 0 1 2\n")
+    with pytest.raises(ValueError, match="element face: the file does not hold 2 of it"):
+        read_model(tmp_path / "a.ply")
+
+
+# STL
+
+
+@pytest.mark.parametrize("kind", ["stl", "stl_ascii"])
+def test_damaged_stl_files(kind, tmp_path):
+    path = tmp_path / "d.stl"
+    trimesh.Trimesh(CORNERS, FACES, process=False).export(path, file_type=kind)
+    data = path.read_bytes()
+    assert len(read_model(path).parts[0].mesh.faces) == 4
+    path.write_bytes(data + b"\n")
+    assert len(read_model(path).parts[0].mesh.faces) == 4, "a byte more does no harm"
+    path.write_bytes(data[: len(data) // 2])
+    says = "corners, 0 of them readable" if kind == "stl_ascii" else "are needed: the file is cut off"
+    with pytest.raises(ValueError, match=rf"^d\.stl: has \d+ .*{says}"):
+        read_model(path)
+    if kind == "stl_ascii":
+        path.write_bytes(data.replace(b"vertex 3.0", b"vertex three"))
+        with pytest.raises(ValueError, match=r"^d\.stl: cannot be read as STL: [^\n]+$"):
+            read_model(path)
+        path.write_bytes(data.replace(b"solid ", b"solid vertex of "))
+        assert len(read_model(path).parts[0].mesh.faces) == 4
+        path.write_bytes(data + data)
+        assert len(read_model(path).parts[0].mesh.faces) == 8, "two solids"

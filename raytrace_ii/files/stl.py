@@ -1,8 +1,10 @@
-"""STL files, ASCII and binary: triangles and nothing else."""
+"""STL files, ASCII and binary: triangles, read through trimesh."""
 
 from __future__ import annotations
 
 import re
+import warnings
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +14,13 @@ from .beside import read_bytes
 from .corners import joined
 from .mesh_model import Model, Part
 
-HEADER, TRIANGLE = 84, np.dtype([("numbers", "<f4", (4, 3)), ("attribute", "<u2")])
-VERTEX = re.compile(rb"^\s*vertex\s+(\S+)\s+(\S+)\s+(\S+)\s*$", re.M | re.I)
+HEADER, TRIANGLE = 84, 50  # bytes
+NAME = re.compile(rb"^([ \t]*(?:end)?solid)[^\r\n]*", re.M | re.I)
+CORNER = re.compile(rb"^\s*vertex\b", re.M | re.I)
 
 
 def read_stl(path: Path) -> Model:
-    """The one part of an .stl file. Its normals, one a face, are left to the corners' order.
+    """The one part of an .stl file, smooth up to `corners.CREASE_DEG`; the file's normals, one a face, are not used.
 
     Raises
     ------
@@ -27,7 +30,7 @@ def read_stl(path: Path) -> Model:
         If it cannot be read.
     """
     data = read_bytes(path)
-    places = _ascii(data) if _is_text(data) else _binary(data)
+    places = _text(data) if _is_text(data) else _parsed(_whole(data))
     if not np.isfinite(places).all():
         raise ValueError("holds vertices that are not finite numbers")
     if not len(places):
@@ -37,28 +40,40 @@ def read_stl(path: Path) -> Model:
 
 
 def _is_text(data: bytes) -> bool:
-    """Whether a file is ASCII; some binary ones start with the word too, but are as long as their number says."""
+    """Whether a file is ASCII; some binary files start with the word too, but have the length of their count."""
     return data.lstrip()[:5].lower() == b"solid" and len(data) != _length(data)
 
 
 def _length(data: bytes) -> int:
-    count = int.from_bytes(data[80:HEADER], "little")
-    return HEADER + count * TRIANGLE.itemsize
+    return HEADER + TRIANGLE * int.from_bytes(data[80:HEADER], "little")
 
 
-def _binary(data: bytes) -> NDArray[np.float64]:
-    if len(data) < HEADER or len(data) < _length(data):
-        raise ValueError(f"has {len(data)} bytes, {max(_length(data), HEADER)} are needed: the file is cut off")
-    count = (_length(data) - HEADER) // TRIANGLE.itemsize
-    triangles = np.frombuffer(data, TRIANGLE, count, HEADER)
-    return triangles["numbers"][:, 1:].reshape(-1, 3).astype(np.float64)
+def _whole(data: bytes) -> bytes:
+    """A binary file up to its last triangle: trimesh refuses bytes after it."""
+    length = max(_length(data), HEADER)
+    if len(data) < length:
+        raise ValueError(f"has {len(data)} bytes, {length} are needed: the file is cut off")
+    return data[:length]
 
 
-def _ascii(data: bytes) -> NDArray[np.float64]:
-    corners = VERTEX.findall(data)
-    if len(corners) % 3 or len(corners) != len(re.findall(rb"\bvertex\b", data)):
-        raise ValueError(f"has {len(corners)} readable corners: three for each facet are needed")
-    try:
-        return np.array(corners).astype(np.float64).reshape(-1, 3)
-    except ValueError:
-        raise ValueError("holds corners that are no numbers") from None
+def _text(data: bytes) -> NDArray[np.float64]:
+    """Corners of an ASCII file, all of them: trimesh leaves out a solid without an end."""
+    places = _parsed(NAME.sub(rb"\1", data))  # trimesh takes a name with the word vertex for a corner
+    written = len(CORNER.findall(data))
+    if len(places) != written:
+        raise ValueError(f"has {written} corners, {len(places)} of them readable: the file is damaged or cut off")
+    return places
+
+
+def _parsed(data: bytes) -> NDArray[np.float64]:
+    """Corners (3 F, 3) of all triangles, one after another."""
+    from trimesh.exchange.stl import load_stl  # half a second that scenes without files need not wait for
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)  # numpy's for words that are no numbers
+        try:
+            loaded = load_stl(BytesIO(data))
+        except Exception as error:  # trimesh raises whatever its parsers do
+            raise ValueError(f"cannot be read as STL: {' '.join(str(error).split())}") from None
+    solids = [loaded] if "vertices" in loaded else loaded["geometry"].values()
+    return np.concatenate([np.empty((0, 3)), *(solid["vertices"] for solid in solids)])
