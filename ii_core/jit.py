@@ -53,6 +53,11 @@ def lean_kernel(function: Callable[..., Any], **options: Any) -> Any:
     return kernel(function, _nrt=False, error_model="numpy", fastmath={"contract"}, **options)
 
 
+def exact_kernel(function: Callable[..., Any]) -> Any:
+    """A lean kernel that rounds after every operation: the same to the bit on every CPU."""
+    return kernel(function, _nrt=False, error_model="numpy")
+
+
 def inline_kernel(function: Callable[..., Any]) -> Any:
     """A kernel's own helper, copied into its caller."""
     return numba.njit(nogil=True, inline="always")(function)

@@ -133,6 +133,7 @@ class Tree:
         self._vertices = np.empty(corners.size + _SPARE, np.float32)  # Embree keeps no copy
         self._vertices[: corners.size] = corners.reshape(-1)
         self.corners = self._vertices[: corners.size].reshape(-1, 3, 3)
+        self._faces = self.corners if len(corners) else np.zeros((1, 3, 3), np.float32)  # misses read the first
         self._indices = np.arange(corners.size // 3 + _SPARE, dtype=np.uint32)
         some = self.corners[:: len(corners) // _SOME_FACES + 1]
         edges = np.linalg.norm(some - np.roll(some, 1, axis=1), axis=2)
@@ -164,12 +165,12 @@ class Tree:
         reach: Floats,
         out: tuple[NDArray[np.int32], Floats, Floats, Floats],
     ) -> None:
-        """Fill row of the face (−1 on a miss), u, v and distance of the nearest hit.
+        """Fill row of the face (−1 on a miss), u, v and distance of the nearest hit, placed in float64.
 
         ``reach`` of no length is no end.
         """
         kernel = packet_kernels(self.library.width)[0]
-        kernel(*self._room("rtcIntersect"), origins, directions, reach, *out)
+        kernel(*self._room("rtcIntersect"), origins, directions, reach, self._faces, *out)
 
     def occluded(self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32]) -> None:
         """Fill 0 where something is hit within reach, −1 where not."""
@@ -180,8 +181,8 @@ class Tree:
         """Addresses, most spread and room for rays: of each call its own, for threads must not share it."""
         width = self.library.width
         active = _lines(1, np.int32)[0]
-        packet, one = _lines(PACKET_ROWS * width // 16 + 1, np.float32), _lines(PACKET_ROWS, np.float32)
-        packet, one = packet.reshape(-1)[: PACKET_ROWS * width].reshape(PACKET_ROWS, width), one.reshape(-1, 1)
+        packet, one = _lines(PACKET_ROWS * width // 16 + 1, np.float32), _lines(PACKET_ROWS // 16 + 1, np.float32)
+        packet, one = packet.reshape(-1), one.reshape(-1)
         addresses = [
             ctypes.cast(getattr(self.library.functions, f"{function}{n}"), ctypes.c_void_p).value or 0
             for n in (width, 1)

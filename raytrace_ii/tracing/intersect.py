@@ -16,7 +16,7 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from .embree import Tree, library
-from .kernels.hits import place_hits
+from .kernels.packets import place_hits
 
 Floats = NDArray[np.float32]
 _NO_REACH = np.empty(0, np.float32)
@@ -86,6 +86,7 @@ class SingleRays:
         found = self._scene.run(origins, directions, dists=dists, query="INTERSECT", output=True)
         for array, name in zip(out, ("primID", "u", "v", "tfar"), strict=True):
             array[:] = found[name]
+        place_hits(origins, directions, self.corners, *out)
 
     def occluded(self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32]) -> None:
         out[:] = self._scene.run(origins, directions, dists=reach.copy(), query="OCCLUDED")
@@ -96,6 +97,4 @@ def _nearest(tree: Tree | SingleRays, origins: Floats, directions: Floats, reach
     hits = Hits(np.empty(n, np.int32), *(np.empty(n, np.float32) for _ in range(3)))
     start = time.thread_time()
     tree.nearest(origins, directions, reach, hits)
-    seconds = time.thread_time() - start
-    place_hits(origins, directions, tree.corners, *hits)
-    return hits, seconds
+    return hits, time.thread_time() - start

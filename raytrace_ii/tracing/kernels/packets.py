@@ -2,6 +2,9 @@
 
 The addresses of Embree's functions are arguments, so that nothing of one process is kept in numba's cache. A packet
 is a matrix of 32-bit numbers: a row a quantity of `RTCRayN` and `RTCHitN`, a column a ray (`rtcore_ray.h`, Embree 4).
+
+Where in its face a ray hits is reckoned again in float64: Embree's u and v differ between instruction sets by up to
+4e-4; from ray and face alone they are the same whatever found the face, a packet, a single ray or another CPU.
 """
 
 from __future__ import annotations
@@ -14,12 +17,25 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from ii_core.jit import exact_kernel as kernel
 from ii_core.jit import inline_kernel
-from ii_core.jit import lean_kernel as kernel
 
 # Rows of a packet.
-_DIRECTION, _FAR, _MASK, _FLAGS, _U, _V, _FACE, _GEOMETRY, _INSTANCE = 4, 8, 9, 11, 15, 16, 17, 18, 19
-PACKET_ROWS = 24  # the hit ends with `instPrimID`, row 20; the rest is room to spare
+_NEAR, _DIRECTION, _TIME, _FAR, _MASK, _FLAGS, _U, _V, _FACE, _GEOMETRY, _INSTANCE = (
+    3,
+    4,
+    7,
+    8,
+    9,
+    11,
+    15,
+    16,
+    17,
+    18,
+    19,
+)
+_CORNERS = 24  # the hit ends with `instPrimID`, row 20; behind it room for the nine coordinates of the faces hit
+PACKET_ROWS = _CORNERS + 9
 _NO_END = np.float32(1e37)
 
 
@@ -58,18 +74,61 @@ _call: Any = intrinsic(_pointers_call)
 
 
 @inline_kernel
-def _fill(packet, numbers, lane, o, d, i, far):
+def place_hit(ox, oy, oz, dx, dy, dz, x, y, z, x1, y1, z1, x2, y2, z2):
+    """u, v and distance where a ray meets the plane of a face of three corners (Möller, Trumbore 1997).
+
+    u and v are kept within the face: Embree's robust rays hit edges from just beside them. The last value is False
+    if the ray lies in the plane.
+    """
+    x, y, z = np.float64(x), np.float64(y), np.float64(z)
+    ax, ay, az, bx, by, bz = x1 - x, y1 - y, z1 - z, x2 - x, y2 - y, z2 - z
+    dx, dy, dz = np.float64(dx), np.float64(dy), np.float64(dz)
+    x, y, z = ox - x, oy - y, oz - z
+    px, py, pz = dy * bz - dz * by, dz * bx - dx * bz, dx * by - dy * bx
+    qx, qy, qz = y * az - z * ay, z * ax - x * az, x * ay - y * ax
+    turn = ax * px + ay * py + az * pz
+    inverse = 1.0 / (turn if turn != 0.0 else 1.0)
+    u = max((x * px + y * py + z * pz) * inverse, 0.0)
+    v = max((dx * qx + dy * qy + dz * qz) * inverse, 0.0)
+    within = 1.0 / max(u + v, 1.0)
+    return u * within, v * within, max((bx * qx + by * qy + bz * qz) * inverse, 0.0), turn != 0.0
+
+
+@kernel
+def place_hits(origins, directions, corners, primitives, u, v, distances):
+    """Replace u, v and distance of every hit by those of `place_hit`, but for rays in the plane of their face."""
+    for i in range(primitives.shape[0]):
+        f = primitives[i]
+        if f < 0:
+            continue
+        a, b, t, sure = place_hit(
+            origins[i, 0], origins[i, 1], origins[i, 2], directions[i, 0], directions[i, 1], directions[i, 2],
+            corners[f, 0, 0], corners[f, 0, 1], corners[f, 0, 2],
+            corners[f, 1, 0], corners[f, 1, 1], corners[f, 1, 2],
+            corners[f, 2, 0], corners[f, 2, 1], corners[f, 2, 2],
+        )  # fmt: skip
+        if sure:
+            u[i], v[i], distances[i] = a, b, t
+
+
+@inline_kernel
+def _begin(packet, numbers, width):
+    """Set what stays the same from packet to packet: nearest distance, time, mask, flags, instance."""
+    for lane in range(width):
+        packet[_NEAR * width + lane] = np.float32(0)
+        packet[_TIME * width + lane] = np.float32(0)
+        numbers[_MASK * width + lane] = -1
+        numbers[_FLAGS * width + lane] = 0
+        numbers[_INSTANCE * width + lane] = -1
+
+
+@inline_kernel
+def _fill(packet, numbers, width, lane, o, d, i, far):
     for c in range(3):
-        packet[c, lane] = o[i, c]
-        packet[_DIRECTION + c, lane] = d[i, c]
-    packet[3, lane] = np.float32(0)
-    packet[7, lane] = np.float32(0)
-    packet[_FAR, lane] = far
-    numbers[_MASK, lane] = -1
-    numbers[_FLAGS, lane] = 0
-    numbers[_FACE, lane] = -1
-    numbers[_GEOMETRY, lane] = -1
-    numbers[_INSTANCE, lane] = -1
+        packet[c * width + lane] = o[i, c]
+        packet[(_DIRECTION + c) * width + lane] = d[i, c]
+    packet[_FAR * width + lane] = far
+    numbers[_GEOMETRY * width + lane] = -1
 
 
 @inline_kernel
@@ -77,9 +136,9 @@ def _spread(packet, first, width):
     """Sum of the sides of the box around a quantity of three rows."""
     total = np.float32(0)
     for c in range(first, first + 3):
-        low = high = packet[c, 0]
+        low = high = packet[c * width]
         for lane in range(1, width):
-            low, high = min(low, packet[c, lane]), max(high, packet[c, lane])
+            low, high = min(low, packet[c * width + lane]), max(high, packet[c * width + lane])
         total += high - low
     return total
 
@@ -87,62 +146,97 @@ def _spread(packet, first, width):
 @inline_kernel
 def _together(packet, calls, width):
     """Whether rays are near enough to each other for a packet."""
-    length = abs(packet[_DIRECTION, 0]) + abs(packet[_DIRECTION + 1, 0]) + abs(packet[_DIRECTION + 2, 0])
+    x, y, z = packet[_DIRECTION * width], packet[(_DIRECTION + 1) * width], packet[(_DIRECTION + 2) * width]
     near, narrow = _spread(packet, 0, width), _spread(packet, _DIRECTION, width)
-    return (near <= calls.near) & (narrow <= calls.narrow * length)
+    return (near <= calls.near) & (narrow <= calls.narrow * (abs(x) + abs(y) + abs(z)))
+
+
+@inline_kernel
+def _place(packet, numbers, width, corners):
+    """Put u, v and distance as `place_hit` gives them in place of Embree's: a loop without branches, for vectors."""
+    for lane in range(width):
+        f = numbers[_FACE * width + lane] if numbers[_GEOMETRY * width + lane] >= 0 else 0
+        for k in range(9):
+            packet[(_CORNERS + k) * width + lane] = corners[f, k // 3, k % 3]
+    for lane in range(width):
+        u, v, t, sure = place_hit(
+            packet[lane], packet[width + lane], packet[2 * width + lane],
+            packet[_DIRECTION * width + lane], packet[(_DIRECTION + 1) * width + lane],
+            packet[(_DIRECTION + 2) * width + lane],
+            packet[_CORNERS * width + lane], packet[(_CORNERS + 1) * width + lane],
+            packet[(_CORNERS + 2) * width + lane], packet[(_CORNERS + 3) * width + lane],
+            packet[(_CORNERS + 4) * width + lane], packet[(_CORNERS + 5) * width + lane],
+            packet[(_CORNERS + 6) * width + lane], packet[(_CORNERS + 7) * width + lane],
+            packet[(_CORNERS + 8) * width + lane],
+        )  # fmt: skip
+        packet[_U * width + lane] = u if sure else packet[_U * width + lane]
+        packet[_V * width + lane] = v if sure else packet[_V * width + lane]
+        packet[_FAR * width + lane] = t if sure else packet[_FAR * width + lane]
+
+
+@inline_kernel
+def _take(packet, numbers, width, lane, i, primitives, u, v, distances):
+    primitives[i] = numbers[_FACE * width + lane] if numbers[_GEOMETRY * width + lane] >= 0 else -1
+    u[i], v[i], distances[i] = packet[_U * width + lane], packet[_V * width + lane], packet[_FAR * width + lane]
 
 
 @cache
 def packet_kernels(width: int) -> tuple[Any, Any]:
     """The kernels for packets of so many rays: nearest hit, and whether anything is hit.
 
-    Rays go in groups of ``width`` in their order; a group that spreads too far is traced ray by ray.
+    Rays go in groups of ``width`` in their order; a group that spreads too far is traced ray by ray. u, v and
+    distance of misses mean nothing.
     """
 
     @kernel
     def nearest(
-        calls, active, packet, numbers, one, one_number, origins, directions, reach,
+        calls, active, packet, numbers, one, one_number, origins, directions, reach, corners,
         primitives, u, v, distances,
     ):  # fmt: skip
         n = origins.shape[0]
+        _begin(packet, numbers, width)
+        _begin(one, one_number, 1)
         for first in range(0, n, width):
             lanes = min(width, n - first)
             for lane in range(width):
                 i = first + min(lane, lanes - 1)
                 active[lane] = -1 if lane < lanes else 0
-                _fill(packet, numbers, lane, origins, directions, i, reach[i] if reach.shape[0] > 0 else _NO_END)
+                far = reach[i] if reach.shape[0] > 0 else _NO_END
+                _fill(packet, numbers, width, lane, origins, directions, i, far)
             if _together(packet, calls, width):
                 _call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
+                _place(packet, numbers, width, corners)
                 for lane in range(lanes):
-                    i = first + lane
-                    primitives[i], distances[i] = numbers[_FACE, lane], packet[_FAR, lane]
-                    u[i], v[i] = packet[_U, lane], packet[_V, lane]
+                    _take(packet, numbers, width, lane, first + lane, primitives, u, v, distances)
             else:
                 for i in range(first, first + lanes):
-                    _fill(one, one_number, 0, origins, directions, i, reach[i] if reach.shape[0] > 0 else _NO_END)
+                    far = reach[i] if reach.shape[0] > 0 else _NO_END
+                    _fill(one, one_number, 1, 0, origins, directions, i, far)
                     _call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
-                    primitives[i], distances[i] = one_number[_FACE, 0], one[_FAR, 0]
-                    u[i], v[i] = one[_U, 0], one[_V, 0]
+                    _place(one, one_number, 1, corners)
+                    _take(one, one_number, 1, 0, i, primitives, u, v, distances)
 
     @kernel
     def occluded(
         calls, active, packet, numbers, one, one_number, origins, directions, reach, found
     ):  # fmt: skip
         n = origins.shape[0]
+        _begin(packet, numbers, width)
+        _begin(one, one_number, 1)
         for first in range(0, n, width):
             lanes = min(width, n - first)
             for lane in range(width):
                 i = first + min(lane, lanes - 1)
                 active[lane] = -1 if lane < lanes else 0
-                _fill(packet, numbers, lane, origins, directions, i, reach[i])
+                _fill(packet, numbers, width, lane, origins, directions, i, reach[i])
             if _together(packet, calls, width):
                 _call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
                 for lane in range(lanes):
-                    found[first + lane] = 0 if packet[_FAR, lane] < 0 else -1
+                    found[first + lane] = 0 if packet[_FAR * width + lane] < 0 else -1
             else:
                 for i in range(first, first + lanes):
-                    _fill(one, one_number, 0, origins, directions, i, reach[i])
+                    _fill(one, one_number, 1, 0, origins, directions, i, reach[i])
                     _call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
-                    found[i] = 0 if one[_FAR, 0] < 0 else -1
+                    found[i] = 0 if one[_FAR] < 0 else -1
 
     return nearest, occluded
