@@ -28,7 +28,7 @@ from ii_core import IIPicture, add_sensor_noise, preset
 from ii_core.view import camera_of
 from metrics import DepthQuality, FocusDepth, depth_from_focus, linear_layers, q_depth
 from metrics.depth.focus import METHODS
-from metrics.depth.q_depth import virtual_camera_pixels
+from metrics.depth.virtual_camera import virtual_camera_pixels
 from metrics.plots.rd_chart import COLOURS, new_figure, save
 from raytrace_ii import Scene, Shot, load_scene, render
 

@@ -29,7 +29,7 @@ from benchmarks.records import Records, add_again, origin, with_commits
 from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, preset
 from metrics import depth_from_focus, linear_layers, q_angle, q_depth, q_global, q_view
-from metrics.depth.q_depth import virtual_camera_pixels
+from metrics.depth.virtual_camera import virtual_camera_pixels
 from metrics.plots.rd_chart import COLOURS, MARKERS, new_figure, save
 from metrics.view import LUMA, view_pair
 from raytrace_ii import Shot, load_scene, render

@@ -117,13 +117,26 @@ class IIPicture:
             u, v = self.ei_pixels
             raise ValueError(
                 f"the structure is not regular, elementary images of {u:.5g}×{v:.5g} px: "
-                "ii_core.regular brings the picture to a regular one"
+                "run `raytrace-ii regular`, or ii_core.resampled"
             )
 
     @property
     def size(self) -> Pair:
         """(M, N), pixels across and down."""
         return self.pixels.shape[1], self.pixels.shape[0]
+
+    @property
+    def light_field(self) -> NDArray[Any]:
+        """Pixels by lens and place under it, (L, K, V, U, 3): a view, or a copy of pixels that are not contiguous.
+
+        Raises
+        ------
+        ValueError
+            If the structure is not regular.
+        """
+        self.check_regular()
+        (k, l), (u, v) = self.lenses, self.ei_pixels
+        return np.ascontiguousarray(self.pixels).reshape(l, v, k, u, 3).transpose(0, 2, 1, 3, 4)
 
     def with_pixels(self, pixels: NDArray[Any]) -> IIPicture:
         """The same structure and camera over other pixels."""

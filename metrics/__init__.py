@@ -1,21 +1,26 @@
-"""How much of a picture survives coding: quality, rate–distortion, and charts of it."""
+"""Quality of decoded II-pictures, rate–distortion studies, and their charts."""
 
-from .angle import AngleQuality, q_angle_ssim, q_angle_ycbcr
+from .angle import q_angle_ssim, q_angle_ycbcr
+from .batch import measuring
+from .builtin_measures import MEASURES
 from .depth.focus import FocusDepth, depth_from_focus
 from .depth.layers import covering_layers, linear_layers, logarithmic_layers
-from .depth.q_depth import DepthQuality, q_depth
+from .depth.q_depth import q_depth
 from .global_angle import angle_axes, mean_q_angle, q_angle, q_global
-from .measures import MEASURES, measuring
+from .measure import Measure, Needs, known_measures, register_measure
+from .pair import PicturePair
 from .plots.depth_chart import depth_over_rate, depth_rate_chart
-from .plots.error_maps import error_map, plot_error_layers, plot_error_views
-from .plots.overview import PLOTS, plot_all, plot_angle, plot_depth, plot_pair, plot_views
+from .plots.error_maps import plot_error_layers
+from .plots.overview import plot_depth, plot_pair, plot_views
 from .plots.rd_chart import rd_chart
 from .plots.tables import summary_table, write_csv, write_latex
 from .point_log import PointLog
+from .quality import AngleQuality, DepthQuality, ViewQuality
+from .quality_report import Report, quality_rows, report
 from .rd import bd_psnr, bd_rate, rate_distortion
-from .report import Report, quality_rows, report
+from .sheets import PLOTS, plot_all, plot_angle, plot_error_views
 from .study import provenance, read_study, write_study
-from .view import ViewQuality, q_view
+from .view import error_map, q_view
 
 __all__ = [
     "MEASURES",
@@ -23,6 +28,9 @@ __all__ = [
     "AngleQuality",
     "DepthQuality",
     "FocusDepth",
+    "Measure",
+    "Needs",
+    "PicturePair",
     "PointLog",
     "Report",
     "ViewQuality",
@@ -34,6 +42,7 @@ __all__ = [
     "depth_over_rate",
     "depth_rate_chart",
     "error_map",
+    "known_measures",
     "linear_layers",
     "logarithmic_layers",
     "mean_q_angle",
@@ -56,6 +65,7 @@ __all__ = [
     "rate_distortion",
     "rd_chart",
     "read_study",
+    "register_measure",
     "report",
     "summary_table",
     "write_csv",

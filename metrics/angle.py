@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
-from ii_core.component import light_field
 
-from .global_angle import check_finite, check_pair, peak
+from .global_angle import angle_quality
+from .pair import PicturePair
+from .quality import AngleQuality
 from .view import LUMA, WINDOW
 
 Floats = NDArray[np.float64]
@@ -23,34 +23,6 @@ YCBCR = np.array([
 ])  # fmt: skip
 # Wang, Simoncelli and Bovik 2003: how much each scale counts, the finest first.
 SCALES = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
-
-
-@dataclass(frozen=True, eq=False)
-class AngleQuality:
-    """A quality of each sub-image.
-
-    Attributes
-    ----------
-    values : ndarray of float64, (V, U)
-    """
-
-    values: Floats
-
-    @property
-    def mean(self) -> float:
-        """Arithmetic mean over the sub-images."""
-        return float(self.values.mean())
-
-    @property
-    def worst(self) -> float:
-        """Of the worst sub-image: what a viewer who moves will meet."""
-        return float(self.values.min())
-
-    @property
-    def worst_view(self) -> tuple[int, int]:
-        """(u, v) of the worst sub-image, the first in reading order."""
-        v, u = np.unravel_index(self.values.argmin(), self.values.shape)
-        return int(u), int(v)
 
 
 def q_angle_ycbcr(reference: IIPicture, decoded: IIPicture) -> AngleQuality:
@@ -79,13 +51,19 @@ def q_angle_ycbcr(reference: IIPicture, decoded: IIPicture) -> AngleQuality:
     JPEG Pleno Light Field Coding common test conditions (the weights 6:1:1, from video coding).
     """
 
+    return angle_ycbcr(PicturePair(reference, decoded))
+
+
+def angle_ycbcr(pair: PicturePair) -> AngleQuality:
+    """`q_angle_ycbcr` of a pair."""
+
     def measure(a: Floats, b: Floats) -> float:
         mse = np.square((b - a) @ YCBCR.T).mean(axis=(0, 1))
         if np.array_equal(a, b):
             return float("inf")
         return float(np.dot([6, 1, 1], -10 * np.log10(np.maximum(mse, 1e-12))) / 8)
 
-    return _each(reference, decoded, measure)
+    return _each(pair, measure)
 
 
 def q_angle_ssim(reference: IIPicture, decoded: IIPicture, *, scales: int = 1) -> AngleQuality:
@@ -117,10 +95,14 @@ def q_angle_ssim(reference: IIPicture, decoded: IIPicture, *, scales: int = 1) -
     ----------
     Wang et al. 2004; Wang, Simoncelli and Bovik 2003, (7), with their exponents.
     """
-    if scales not in range(1, len(SCALES) + 1):
-        raise ValueError(f"scales is {scales}: 1 to {len(SCALES)} are needed")
-    check_pair(reference, decoded)
-    k, l = reference.lenses
+    if not isinstance(scales, int | np.integer) or not 1 <= scales <= len(SCALES):
+        raise ValueError(f"scales is {scales!r}: 1 to {len(SCALES)} are needed")
+    return angle_ssim(PicturePair(reference, decoded), scales=int(scales))
+
+
+def angle_ssim(pair: PicturePair, *, scales: int = 1) -> AngleQuality:
+    """`q_angle_ssim` of a pair."""
+    k, l = pair.reference.lenses
     needed = WINDOW * 2 ** (scales - 1)
     if min(k, l) < needed:
         raise ValueError(
@@ -140,22 +122,21 @@ def q_angle_ssim(reference: IIPicture, decoded: IIPicture, *, scales: int = 1) -
                 a, b = (_halved(x) for x in (a, b))
         return product
 
-    return _each(reference, decoded, measure)
+    return _each(pair, measure)
 
 
-def _each(reference: IIPicture, decoded: IIPicture, measure: Callable[[Floats, Floats], float]) -> AngleQuality:
-    """A measure of each pair of sub-images, in shares of the peak."""
-    check_pair(reference, decoded)
-    reference.check_regular()
-    if reference.pixels.dtype.kind == "f":
-        check_finite(reference, decoded)
-    fields = [light_field(p.pixels, p.lenses, p.ei_pixels) for p in (reference, decoded)]
-    (u_count, v_count), top = reference.ei_pixels, peak(reference.pixels.dtype)
+def _each(pair: PicturePair, measure: Callable[[Floats, Floats], float]) -> AngleQuality:
+    """Return a measure of each pair of sub-images, in shares of the peak."""
+    pair.reference.check_regular()
+    if pair.dtype.kind == "f":
+        pair.check_finite()
+    fields = [picture.light_field for picture in pair.pictures]
+    u_count, v_count = pair.reference.ei_pixels
     values = np.empty((v_count, u_count))
     for v, u in np.ndindex(values.shape):
-        a, b = (field[:, v, :, u].astype(np.float64) / top for field in fields)
+        a, b = (field[:, :, v, u].astype(np.float64) / pair.peak for field in fields)
         values[v, u] = measure(a, b)
-    return AngleQuality(values)
+    return angle_quality(values, pair.reference)
 
 
 def _ssim(a: Floats, b: Floats) -> tuple[float, float]:

@@ -12,6 +12,9 @@ from ii_core import IICamera, IIPicture
 from ii_core.component import light_field
 from ii_core.jit import kernel
 
+from .pair import PicturePair, peak
+from .quality import AngleQuality
+
 
 def q_global(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None = None) -> float:
     """PSNR of the whole picture, from the mean squared error pooled over all 3·M·N values.
@@ -38,11 +41,16 @@ def q_global(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None
     ----------
     Olsson 2008, (2.15)–(2.17).
     """
-    total, count = _squared_errors(reference, decoded, mask)
-    return float(psnr(total.sum(), 3 * count.sum(), reference.pixels.dtype))
+    return global_psnr(PicturePair(reference, decoded, mask=mask))
 
 
-def q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None = None) -> NDArray[np.float64]:
+def global_psnr(pair: PicturePair) -> float:
+    """`q_global` of a pair."""
+    total, count = _squared_errors(pair)
+    return float(psnr(total.sum(), 3 * count.sum(), pair.dtype))
+
+
+def q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None = None) -> AngleQuality:
     """PSNR of each sub-image: quality over the viewing angle.
 
     Parameters
@@ -52,9 +60,9 @@ def q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None 
 
     Returns
     -------
-    ndarray of float64, (V, U)
-        dB, pooled over the 3·K·L values of SI_{u,v}, or those of them that count; +inf where it is identical, NaN
-        where none counts. `angle_axes` has the angles.
+    AngleQuality
+        ``values`` in dB, (V, U), pooled over the 3·K·L values of SI_{u,v}, or those of them that count; +inf where it
+        is identical, NaN where none counts. ``u_deg`` and ``v_deg`` of a picture with a camera.
 
     Raises
     ------
@@ -65,9 +73,14 @@ def q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None 
     ----------
     Olsson 2008, (2.18).
     """
-    total, count = _squared_errors(reference, decoded, mask)
-    reference.check_regular()
-    return psnr(total, 3 * count, reference.pixels.dtype)
+    return angle_psnr(PicturePair(reference, decoded, mask=mask))
+
+
+def angle_psnr(pair: PicturePair) -> AngleQuality:
+    """`q_angle` of a pair."""
+    total, count = _squared_errors(pair)
+    pair.reference.check_regular()
+    return angle_quality(psnr(total, 3 * count, pair.dtype), pair.reference)
 
 
 def mean_q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None = None) -> float:
@@ -76,9 +89,13 @@ def mean_q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | 
     `q_global` is the PSNR of the errors pooled over all sub-images; +inf here if one sub-image is identical. Without
     those of which no pixel counts.
     """
-    values = q_angle(reference, decoded, mask=mask)
-    counted = values[~np.isnan(values)]
-    return float(counted.mean()) if counted.size else math.nan
+    return q_angle(reference, decoded, mask=mask).mean
+
+
+def angle_quality(values: NDArray[np.float64], picture: IIPicture) -> AngleQuality:
+    """Values of each sub-image, with the angles of the picture's camera if it has one."""
+    axes = () if picture.camera is None else angle_axes(picture.camera, erect=picture.erect)
+    return AngleQuality(values, *axes)
 
 
 def angle_axes(camera: IICamera, *, erect: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -109,64 +126,29 @@ def angle_axes(camera: IICamera, *, erect: bool = False) -> tuple[NDArray[np.flo
     return np.degrees(np.arctan(right)), np.degrees(np.arctan(up))
 
 
-def peak(dtype: np.dtype[Any]) -> float:
-    """The largest code value of a picture of this type."""
-    return 1.0 if dtype.kind == "f" else float(np.iinfo(dtype).max)
-
-
-def check_pair(reference: IIPicture, decoded: IIPicture) -> None:
-    """Raise ValueError unless both are II-pictures of the same structure and type."""
-    for name, picture in (("reference", reference), ("decoded", decoded)):
-        if not isinstance(picture, IIPicture):
-            raise ValueError(f"{name} is a {type(picture).__name__}: an IIPicture is needed")
-    reference.check_same_structure(decoded)
-
-
-def check_finite(reference: IIPicture, decoded: IIPicture, mask: ArrayLike | None = None) -> None:
-    """Raise ValueError naming the first pixel, in reading order, that counts and is not finite."""
-    counts = None if mask is None else np.asarray(mask)
-    for name, picture in (("reference", reference), ("decoded", decoded)):
-        for n, row in enumerate(picture.pixels):  # row by row: no mask of the picture's size
-            bad = np.flatnonzero(~np.isfinite(row).all(axis=1) & (True if counts is None else counts[n]))
-            if bad.size:
-                raise ValueError(f"{name} pixel ({bad[0]}, {n}) is {row[bad[0]]}: finite values are needed")
-
-
 def psnr(squared_error: Any, count: Any, dtype: np.dtype[Any]) -> NDArray[np.float64]:
     """20·log10(peak/√MSE) of summed squared errors over ``count`` values; NaN where nothing was counted."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return 10 * np.log10(peak(dtype) ** 2 * count / np.asarray(squared_error, dtype=np.float64))
 
 
-def check_mask(mask: ArrayLike, picture: IIPicture) -> NDArray[np.bool_]:
-    """The mask as an array; ValueError unless it is one of bool for every pixel of the picture."""
-    given = np.asarray(mask)
-    if given.dtype != bool or given.shape != picture.pixels.shape[:2]:
-        raise ValueError(
-            f"mask is {given.dtype} of shape {given.shape}: bool of shape {picture.pixels.shape[:2]} is needed"
-        )
-    return given
-
-
-def _squared_errors(
-    reference: IIPicture, decoded: IIPicture, mask: ArrayLike | None
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _squared_errors(pair: PicturePair) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Sum of squared errors of each sub-image and the pixels it is over, (V, U) both."""
-    check_pair(reference, decoded)
+    reference, decoded = pair.pictures
     structure: Any = reference.lenses, reference.ei_pixels
     if not reference.regular:
         structure = reference.size, (1, 1)
     a, b = light_field(reference.pixels, *structure), light_field(decoded.pixels, *structure)
     l, v, k, u, _ = a.shape
     total, count = np.zeros((v, u)), np.full((v, u), l * k)
-    if mask is None:
+    if pair.mask is None:
         sum_squared_errors(a.reshape(l, v, k, -1), b.reshape(l, v, k, -1), np.empty(3 * u), total)
     else:
-        counts = np.ascontiguousarray(check_mask(mask, reference)).reshape(l, v, k, u)
+        counts = np.ascontiguousarray(pair.mask).reshape(l, v, k, u)
         count[:] = 0
         sum_masked_errors(a, b, counts, total, count)
     if not math.isfinite(total.sum()):
-        check_finite(reference, decoded, mask)
+        pair.check_finite()
     return total, count
 
 

@@ -18,7 +18,7 @@ from ii_core import IIPicture
 from ii_core.files import write_json
 from ii_core.identity import library_versions
 
-from .measures import MEASURES
+from .measure import known_measures
 
 FORMAT, VERSION = "ii-rd-study", 1
 POOLING = "pooled MSE over R, G and B"
@@ -134,8 +134,8 @@ def unspelt(point: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def measures_of(points: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Names of the measures that every point has, in the order of MEASURES."""
-    return [name for name in MEASURES if all(name in point for point in points)]
+    """Return the names of the measures that every point has, in the order of their registration."""
+    return [name for name in known_measures() if all(name in point for point in points)]
 
 
 def spelt(value: Any) -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,60 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IIPicture, five_viewpoints, view_image
 from ii_core.view import camera_of
 
-from .global_angle import check_finite, check_mask, check_pair, peak, psnr
+from .global_angle import psnr
+from .pair import PicturePair, peak
+from .quality import ViewQuality
 
 WINDOW = 11  # pixels across the Gaussian of Wang 2004
 # BT.601, as MATLAB's rgb2gray, with which Wang's ssim.m is used.
 LUMA = np.array([0.2989, 0.5870, 0.1140])
-
-
-@dataclass(frozen=True, eq=False)
-class ViewQuality:
-    """Mean SSIM and PSNR of each view image.
-
-    Attributes
-    ----------
-    values : dict of str to float
-        MSSIM by view name; NaN where no window is valid throughout.
-    psnr : dict of str to float
-        dB over the valid pixels' R, G and B; +inf where they are identical, NaN where there are none.
-    pooled_psnr : float
-        Of the errors of all views together, dB.
-    """
-
-    values: dict[str, float]
-    psnr: dict[str, float]
-    pooled_psnr: float
-
-    @property
-    def mean(self) -> float:
-        """Arithmetic mean of MSSIM over the views that have one."""
-        return _mean(self.values)
-
-    @property
-    def mean_psnr(self) -> float:
-        """Arithmetic mean of PSNR over the views that have one, dB; at least ``pooled_psnr``."""
-        return _mean(self.psnr)
-
-    @property
-    def worst(self) -> float:
-        """MSSIM of the worst view."""
-        return min(_known(self.values).values(), default=math.nan)
-
-    @property
-    def worst_view(self) -> str | None:
-        """Name of the worst view by MSSIM, the first of equals; None if none has one."""
-        known = _known(self.values)
-        return min(known, key=known.__getitem__) if known else None
-
-
-def _known(values: dict[str, float]) -> dict[str, float]:
-    return {name: value for name, value in values.items() if not math.isnan(value)}
-
-
-def _mean(values: dict[str, float]) -> float:
-    known = _known(values).values()
-    return sum(known) / len(known) if known else math.nan
 
 
 def q_view(
@@ -107,9 +59,13 @@ def q_view(
     ----------
     Olsson 2008, (4.3).
     """
-    check_pair(reference, decoded)
-    camera = camera_of(reference)
-    k, l = reference.lenses
+    return view_quality(PicturePair(reference, decoded, mask=mask), viewpoints)
+
+
+def view_quality(pair: PicturePair, viewpoints: Mapping[str, ArrayLike] | None = None) -> ViewQuality:
+    """`q_view` of a pair."""
+    camera = camera_of(pair.reference)
+    k, l = pair.reference.lenses
     if min(k, l) < WINDOW:
         raise ValueError(f"{k}×{l} lenses give view images of {k}×{l} pixels: SSIM needs at least {WINDOW}×{WINDOW}")
     viewpoints = five_viewpoints(camera) if viewpoints is None else viewpoints
@@ -117,26 +73,48 @@ def q_view(
         raise ValueError("there are no viewpoints: at least one is needed")
     values, each, errors, counts = {}, {}, 0.0, 0
     for name, viewpoint in viewpoints.items():
-        a, b, valid = view_pair(reference, decoded, viewpoint, mask=mask)
+        a, b, valid = view_pair(pair, viewpoint)
         if not (np.isfinite(a[valid]).all() and np.isfinite(b[valid]).all()):
-            check_finite(reference, decoded, mask)
+            pair.check_finite()
         values[name] = _mssim(a, b, valid)
         squared = float(np.square(a[valid].astype(np.float64) - b[valid]).sum())
         each[name] = float(psnr(squared, 3 * valid.sum(), a.dtype))
         errors, counts = errors + squared, counts + 3 * int(valid.sum())
-    return ViewQuality(values, each, float(psnr(errors, counts, reference.pixels.dtype)))
+    return ViewQuality(values, each, float(psnr(errors, counts, pair.dtype)))
 
 
-def view_pair(
-    reference: IIPicture, decoded: IIPicture, viewpoint_mm: ArrayLike, *, mask: ArrayLike | None = None
-) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_]]:
-    """The same view image of both pictures, (L, K, 3) each, and where it is valid, (L, K)."""
-    other = reference.with_pixels(decoded.pixels)  # same structure, and surely the same camera
-    (a, valid), (b, _) = (view_image(picture, viewpoint_mm) for picture in (reference, other))
-    if mask is not None:
-        counted = np.repeat(check_mask(mask, reference)[..., None].astype(np.float32), 3, axis=2)
-        valid &= view_image(reference.with_pixels(counted), viewpoint_mm)[0][..., 0] == 1
+def view_pair(pair: PicturePair, viewpoint_mm: ArrayLike) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_]]:
+    """Return the same view image of both pictures, (L, K, 3) each, and where it is valid, (L, K)."""
+    (a, valid), (b, _) = (view_image(picture, viewpoint_mm) for picture in pair.pictures)
+    if pair.mask is not None:
+        counted = np.repeat(pair.mask[..., None].astype(np.float32), 3, axis=2)
+        valid &= view_image(pair.reference.with_pixels(counted), viewpoint_mm)[0][..., 0] == 1
     return a, b, valid
+
+
+def error_map(reference: IIPicture, decoded: IIPicture, viewpoint_mm: Any) -> NDArray[np.float64]:
+    """Return the root of the mean squared error over R, G and B at each pixel of a view image.
+
+    Parameters
+    ----------
+    reference, decoded : IIPicture
+        Of the same structure and type; the reference has a camera.
+    viewpoint_mm : array_like, (3,)
+        Camera coordinates, before the lens plane.
+
+    Returns
+    -------
+    ndarray of float64, (L, K)
+        In shares of the peak; NaN where the line of sight leaves the pixel array.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the pictures differ in structure or type, the reference has no camera, or the viewpoint is none.
+    """
+    a, b, valid = view_pair(PicturePair(reference, decoded), viewpoint_mm)
+    error = np.sqrt(np.square(a.astype(np.float64) - b).mean(axis=-1)) / peak(a.dtype)
+    return np.where(valid, error, np.nan)
 
 
 def _mssim(a: NDArray[Any], b: NDArray[Any], valid: NDArray[np.bool_]) -> float:

@@ -20,7 +20,7 @@ from metrics.depth.focus import (
 )
 from metrics.depth.kernels import choose, focus_cost, half_cost, pass_on, weigh
 from metrics.depth.layers import nearest_layer
-from metrics.depth.q_depth import virtual_camera_pixels
+from metrics.depth.virtual_camera import virtual_camera_pixels
 from raytrace_ii import Scene, render
 from raytrace_ii.scene.textures import Image
 

@@ -6,15 +6,12 @@ import pytest
 
 from ii_core import IICamera, IIPicture, five_viewpoints, view_image
 from ii_core.files import read_image, write_image
-from metrics import angle_axes, q_angle, q_depth
+from metrics import PLOTS, angle_axes, plot_all, plot_angle, q_angle, q_depth
 from metrics.plots.overview import (
-    PLOTS,
-    _angle_figure,
     _depth_figure,
     _pair_figure,
     _views_figure,
-    plot_all,
-    plot_angle,
+    angle_figure,
     plot_depth,
     plot_pair,
     plot_views,
@@ -38,7 +35,7 @@ def test_angle_map_lies_where_rays_go():
     pixels.reshape(8, 4, 12, 6, 3)[:, 3, :, 1] ^= 1
     pixels.reshape(8, 4, 12, 6, 3)[:, 0, :, 5] ^= 4
     b = a.with_pixels(pixels)
-    figure = _angle_figure(a, q_angle(a, b))
+    figure = angle_figure(q_angle(a, b))
     (mesh,) = figure.axes[0].collections
     u_deg, v_deg = angle_axes(a.camera)
     at = mesh.get_coordinates()  # corners of the cells
@@ -54,7 +51,7 @@ def test_angle_map_lies_where_rays_go():
 def test_angle_axes_without_a_camera_are_pixels_and_identical_pictures_are_no_error():
     a = picture()
     bare = IIPicture(a.pixels, a.lenses, a.ei_pixels)
-    axes = _angle_figure(bare, q_angle(bare, bare)).axes
+    axes = angle_figure(q_angle(bare, bare)).axes
     assert len(axes) == 1  # no scale for what has no value
     assert "px" in axes[0].get_xlabel() and axes[0].yaxis_inverted()  # row 0 on top, as in the picture
 

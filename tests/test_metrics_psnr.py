@@ -46,14 +46,14 @@ def test_black_against_white_uint16_is_exactly_0_db():
 def test_identical_pictures_are_infinitely_good():
     a = picture()
     assert q_global(a, a.with_pixels(a.pixels.copy())) == math.inf
-    assert (q_angle(a, a) == math.inf).all()
+    assert (q_angle(a, a).values == math.inf).all()
 
 
 def test_distortion_of_one_sub_image_shows_there_only():
     a = picture()
     pixels = a.pixels.copy()
     pixels.reshape(3, 7, 5, 4, 3)[:, 6, :, 1] ^= 1
-    q = q_angle(a, a.with_pixels(pixels))
+    q = q_angle(a, a.with_pixels(pixels)).values
     assert q.shape == (7, 4)
     assert q[6, 1] == pytest.approx(20 * math.log10(255), rel=1e-14)  # every value off by 1
     q[6, 1] = math.inf
@@ -62,7 +62,7 @@ def test_distortion_of_one_sub_image_shows_there_only():
 
 def test_pooling_and_averaging_are_different_rules():
     a, b = picture(), picture(seed=1)
-    q = q_angle(a, b)
+    q = q_angle(a, b).values
     # Same sums, pooled in another order.
     assert q_global(a, b) == pytest.approx(-10 * np.log10(np.mean(10 ** (-q / 10))), rel=1e-12)
     assert mean_q_angle(a, b) == q.mean() > q_global(a, b)
@@ -105,9 +105,9 @@ def test_different_structure_or_type_is_refused(metric):
         metric(a, IIPicture(a.pixels, (10, 3), (2, 7)))
     with pytest.raises(ValueError, match="uint8 against uint16"):
         metric(a, a.with_pixels(a.pixels.astype(np.uint16)))
-    with pytest.raises(ValueError, match="decoded is a ndarray"):
+    with pytest.raises(TypeError, match="decoded is a ndarray"):
         metric(a, a.pixels)
-    with pytest.raises(ValueError, match="reference is a ndarray"):
+    with pytest.raises(TypeError, match="reference is a ndarray"):
         metric(a.pixels, a)
 
 
@@ -131,7 +131,7 @@ def test_a_mask_counts_what_it_says(dtype):
     top = PEAKS[dtype] ** 2
     assert q_global(a, b, mask=mask) == pytest.approx(10 * np.log10(top / squares[mask].mean()), rel=1e-12)
     field = (slice(2, None, 7), slice(3, None, 4))  # SI_{3,2}
-    assert q_angle(a, b, mask=mask)[2, 3] == pytest.approx(
+    assert q_angle(a, b, mask=mask).values[2, 3] == pytest.approx(
         10 * np.log10(top / squares[field][mask[field]].mean()), rel=1e-12
     )
     np.testing.assert_allclose(q_angle(a, b, mask=np.ones_like(mask)), q_angle(a, b), rtol=1e-14)
@@ -141,7 +141,7 @@ def test_where_no_pixel_counts_there_is_no_quality():
     a, b = picture(), picture(seed=1)
     mask = np.ones((21, 20), bool)
     mask[2::7, 3::4] = False
-    q = q_angle(a, b, mask=mask)
+    q = q_angle(a, b, mask=mask).values
     assert np.isnan(q[2, 3]) and np.isfinite(q).sum() == 27
     assert mean_q_angle(a, b, mask=mask) == pytest.approx(q[np.isfinite(q)].mean(), rel=1e-14)
     nothing = np.zeros((21, 20), bool)

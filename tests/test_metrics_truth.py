@@ -79,7 +79,7 @@ def test_a_distortion_of_one_direction_is_seen_from_there_and_in_no_other_sub_im
     a = render(scene, camera, support=()).picture
     pixels = a.pixels.copy()
     pixels.reshape(8, 16, 16, 16, 3)[:, 5, :, 11] ^= 4
-    q = q_angle(a, a.with_pixels(pixels))
+    q = q_angle(a, a.with_pixels(pixels)).values
     assert q[5, 11] == pytest.approx(20 * math.log10(255 / 4), rel=1e-14)
     assert np.isinf(q).sum() == 255
 

@@ -136,7 +136,7 @@ def equal(folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> 
 
 def judged(made: Shot, focus: FocusDepth, decoded: IIPicture, coded: Any) -> dict[str, Any]:
     """Every quality of one decoded picture; over depth by the renderer's and by what focus tells."""
-    angle = q_angle(made.picture, decoded)
+    angle = q_angle(made.picture, decoded).values
     layers = q_depth(made.picture, decoded, **truth(made))
     guessed = q_depth(made.picture, decoded, depth=focus)
     return {

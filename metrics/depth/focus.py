@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IICamera, IIPicture
 from ii_core.view import camera_of, view_image, view_positions
 
-from ..global_angle import peak
+from ..pair import peak
 from . import kernels
 from .layers import Floats, check_layers, virtual_viewpoint
 

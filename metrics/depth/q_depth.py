@@ -2,86 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IICamera, IIPicture
-from ii_core.view import camera_of, view_positions
+from ii_core import IIPicture
+from ii_core.view import camera_of
 
-from ..global_angle import check_finite, check_mask, check_pair, peak, psnr
+from ..global_angle import psnr
+from ..pair import PicturePair
+from ..quality import DepthQuality
 from .focus import FocusDepth, depth_from_focus
-from .layers import check_layers, nearest_layer, virtual_viewpoint
-
-
-@dataclass(frozen=True, eq=False)
-class DepthQuality:
-    """PSNR of each depth layer.
-
-    Attributes
-    ----------
-    depth_mm : ndarray of float64, (layers,)
-        z of each layer in camera coordinates.
-    values : ndarray of float64, (layers,)
-        dB over the layer's own pixels; NaN where it has none, +inf where they are identical.
-    counts : ndarray of int64, (layers,)
-        View pixels in each layer.
-    outside : int
-        View pixels that hit something nearer or farther than all layers; they count nowhere. 0 if the depth is
-        estimated: it is always that of a layer, or none. 0 with the default layers too, but for depths at the pixel
-        array or behind it.
-    source : str
-        Where depth came from: ``given``, or ``focus`` with the method, as in ``focus (dissertation)``.
-    layer : ndarray of int64, (L', K)
-        Layer of each pixel that the virtual camera sees, −1 where it has none; L' is L, less the rows of lenses
-        that the camera does not see.
-    error : ndarray of float64, (L', K)
-        Root of the mean over R, G and B of the squared error at each of these pixels, in shares of the peak.
-    missing : int
-        View pixels without a depth: nothing is hit, or nothing tells the layers apart.
-    """
-
-    depth_mm: NDArray[np.float64]
-    values: NDArray[np.float64]
-    counts: NDArray[np.int64]
-    outside: int
-    source: str
-    layer: NDArray[np.int64]
-    error: NDArray[np.float64]
-    missing: int = 0
-
-    def error_map(self, layer: int) -> NDArray[np.float64]:
-        """The error at the pixels of one layer, NaN at all others, (L', K)."""
-        if not 0 <= layer < self.values.size:
-            raise ValueError(f"layer is {layer}: 0 to {self.values.size - 1} are needed")
-        return np.where(self.layer == layer, self.error, np.nan)
-
-    @property
-    def outside_share(self) -> float:
-        """Share of ``outside`` in the view pixels that have a depth; NaN if none has."""
-        hit = self.outside + int(self.counts.sum())
-        return self.outside / hit if hit else float("nan")
-
-    @property
-    def min(self) -> float:
-        """Of the layers that have pixels; NaN if none has."""
-        return float(np.min(self._held)) if self._held.size else float("nan")
-
-    @property
-    def mean(self) -> float:
-        """Of the layers that have pixels, each weighing the same; +inf if one of them is identical."""
-        return float(np.mean(self._held)) if self._held.size else float("nan")
-
-    @property
-    def max(self) -> float:
-        """Of the layers that have pixels; NaN if none has."""
-        return float(np.max(self._held)) if self._held.size else float("nan")
-
-    @property
-    def _held(self) -> NDArray[np.float64]:
-        return self.values[self.counts > 0]
+from .layers import check_layers, nearest_layer
+from .virtual_camera import seen_pixels
 
 
 def q_depth(
@@ -133,16 +67,21 @@ def q_depth(
     ----------
     Olsson 2008, (4.4)–(4.9).
     """
-    check_pair(reference, decoded)
+    return depth_quality(PicturePair(reference, decoded, mask=mask, depth=depth, layers_mm=layers_mm, method=method))
+
+
+def depth_quality(pair: PicturePair) -> DepthQuality:
+    """`q_depth` of a pair."""
+    reference, depth, layers_mm = pair.reference, pair.depth, pair.layers_mm
     camera = camera_of(reference)
-    n, m, lens_rows = _seen(camera, reference.erect)
+    n, m, lens_rows = seen_pixels(camera, reference.erect)
     counted = np.ones(np.broadcast_shapes(n.shape, m.shape), bool)
-    if mask is not None:
-        counted = check_mask(mask, reference)[n, m]
-    a, b = (np.where(counted[..., None], picture.pixels[n, m], 0) for picture in (reference, decoded))
+    if pair.mask is not None:
+        counted = pair.mask[n, m]
+    a, b = (np.where(counted[..., None], picture.pixels[n, m], 0) for picture in pair.pictures)
     squared_error = np.square(a.astype(np.float64) - b).sum(axis=-1)
     if not np.isfinite(squared_error).all():
-        check_finite(reference, decoded, mask)
+        pair.check_finite()
     if isinstance(depth, FocusDepth) and layers_mm is None:
         layers_mm = depth.layers_mm
     z = None
@@ -152,7 +91,7 @@ def q_depth(
             raise ValueError("depth is infinite at a pixel in view: NaN is needed where nothing is hit")
     layers = check_layers(layers_mm, camera, None if z is None else z[counted])
     if depth is None:
-        depth = depth_from_focus(reference, layers_mm=layers, method=method)
+        depth = depth_from_focus(reference, layers_mm=layers, method=pair.method)
     if isinstance(depth, FocusDepth):
         if depth.layer.shape != reference.lenses[::-1] or not np.array_equal(depth.layers_mm, layers):
             raise ValueError(
@@ -171,22 +110,16 @@ def q_depth(
     inside = layer >= 0
     counts = np.bincount(layer[inside], minlength=layers.size)
     total = np.bincount(layer[inside], weights=squared_error[inside], minlength=layers.size)
-    dtype = reference.pixels.dtype
     return DepthQuality(
         depth_mm=layers,
-        values=psnr(total, 3 * counts, dtype),
+        values=psnr(total, 3 * counts, pair.dtype),
         counts=counts,
         outside=outside,
         source=source,
         layer=layer,
-        error=np.where(counted, np.sqrt(squared_error / 3) / peak(dtype), np.nan),
+        error=np.where(counted, np.sqrt(squared_error / 3) / pair.peak, np.nan),
         missing=int((counted & missing).sum()),
     )
-
-
-def told_outside(share: float) -> str:
-    """The share of view pixels in no layer, in words."""
-    return "no view pixel has a depth" if np.isnan(share) else f"{share:.1%} of view pixels outside all layers"
 
 
 def _true_depth(depth: ArrayLike, picture: IIPicture) -> NDArray[Any]:
@@ -196,30 +129,3 @@ def _true_depth(depth: ArrayLike, picture: IIPicture) -> NDArray[Any]:
             f"depth is {z.dtype} of shape {z.shape}: numbers of shape {picture.pixels.shape[:2]} are needed"
         )
     return z
-
-
-def virtual_camera_pixels(camera: IICamera, *, erect: bool = False) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Row and column of the one pixel under each lens that the virtual camera sees, as an index of the picture.
-
-    Returns
-    -------
-    n, m : ndarray of int
-        Broadcast to (L, K), less the rows whose line ends off the pixel array (only an array higher than wide
-        has such rows).
-    """
-    n, m, _ = _seen(camera, erect)
-    return n, m
-
-
-def view_of(picture: IIPicture) -> NDArray[Any]:
-    """What the virtual camera sees: one pixel of the picture through each lens, (L', K, 3)."""
-    n, m = virtual_camera_pixels(camera_of(picture), erect=picture.erect)
-    return picture.pixels[n, m]
-
-
-def _seen(camera: IICamera, erect: bool) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """As `virtual_camera_pixels`, and the rows of lenses that are left."""
-    x, y = view_positions(camera, virtual_viewpoint(camera), erect=erect)
-    m, n = (np.floor(position + 0.5).astype(np.int64) for position in (x, y))
-    kept = np.flatnonzero((n >= 0) & (n < camera.pixels[1]))
-    return n[kept, None], m[None, :], kept

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..depth.layers import logarithmic
-from ..depth.q_depth import told_outside
+from ..quality import told_outside
 from .rd_chart import COLOURS, LINES, MARKERS, check_suffix, edges, new_figure, save, set_rate_axis
 
 EXTREMES = ("q_depth_min", "q_depth_mean", "q_depth_max")

@@ -1,19 +1,19 @@
-"""Pictures of errors: where in each view, and where in each depth layer."""
+"""Error maps of views and of depth layers."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IIPicture, five_viewpoints
-from ii_core.view import camera_of
+from ii_core import IIPicture
 
-from ..depth.q_depth import DepthQuality, view_of
-from ..global_angle import peak
-from ..view import view_pair
+from ..depth.virtual_camera import view_of
+from ..pair import peak
+from ..quality import DepthQuality
 from .rd_chart import new_figure, save
 
 COLOURS_OF_ERRORS = "magma"
@@ -21,48 +21,10 @@ PANELS = 12  # of a sheet of layers: more would be too small to see anything in
 Floats = NDArray[np.float64]
 
 
-def error_map(reference: IIPicture, decoded: IIPicture, viewpoint_mm: Any) -> Floats:
-    """Root of the mean squared error over R, G and B at each pixel of a view image.
-
-    Returns
-    -------
-    ndarray of float64, (L, K)
-        In shares of the peak; NaN where the line of sight leaves the pixel array.
-
-    Raises
-    ------
-    ValueError
-        If the pictures differ in structure or type, the reference has no camera, or the viewpoint is none.
-    """
-    reference.check_same_structure(decoded)
-    a, b, valid = view_pair(reference, decoded, viewpoint_mm)
-    error = np.sqrt(np.square(a.astype(np.float64) - b).mean(axis=-1)) / peak(a.dtype)
-    return np.where(valid, error, np.nan)
-
-
-def plot_error_views(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike[str]) -> None:
-    """Draw the error map of each of the five views, all in one scale, up to the 99th percentile.
-
-    Parameters
-    ----------
-    reference, decoded : IIPicture
-        Of the same structure and type; the reference has a camera.
-    path : path
-        .png, .pdf or .svg. Replaced, whole.
-
-    Raises
-    ------
-    ValueError
-        As `error_map`, or if the suffix is another.
-    """
-    save(_error_views_figure(reference, decoded), path)
-
-
-def _error_views_figure(reference: IIPicture, decoded: IIPicture) -> Any:
-    maps = {
-        name: 255 * error_map(reference, decoded, at) for name, at in five_viewpoints(camera_of(reference)).items()
-    }
-    k, l = reference.lenses
+def error_views_figure(shares: Mapping[str, Floats]) -> Any:
+    """Return the figure of `metrics.plot_error_views`, from the error map of each view by name, (L, K)."""
+    maps = {name: 255 * values for name, values in shares.items()}
+    l, k = next(iter(maps.values())).shape
     figure = new_figure(3 * len(maps) + 1, 3 * min(max(l / k, 0.2), 3) + 0.6)
     panels = figure.subplots(1, len(maps))
     top = _top(np.concatenate([m.ravel() for m in maps.values()]))

@@ -1,11 +1,9 @@
-"""Pictures of quality: over angle, over depth, view by view."""
+"""Charts of a quality over angle and over depth, and pictures of the views."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,55 +12,23 @@ from ii_core import IIPicture, five_viewpoints, view_image
 from ii_core.view import camera_of
 
 from ..depth.layers import logarithmic
-from ..depth.q_depth import DepthQuality, told_outside
-from ..global_angle import angle_axes, peak, q_angle
-from .error_maps import plot_error_layers, plot_error_views
+from ..pair import PicturePair, peak
+from ..quality import AngleQuality, DepthQuality, told_outside
 from .rd_chart import COLOURS, edges, new_figure, save
 
-PLOTS = (
-    "q_angle.png",
-    "views.png",
-    "errors_views.png",
-    "pair_reference.png",
-    "pair_decoded.png",
-    "q_depth.png",
-    "errors_depth.png",
-)
-"""The pictures that `plot_all` writes."""
 AMPLIFY = (32, 16, 8, 4, 2, 1)  # of differences: the first that keeps nine values in ten from clipping
 
 
-def plot_angle(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike[str]) -> None:
-    """Draw Q_angle as a heat map over the directions in which rays go.
-
-    Identical sub-images, of infinite quality, are hatched.
-
-    Parameters
-    ----------
-    reference, decoded : IIPicture
-        As for `q_angle`; with a camera the axes are degrees, else pixels of the elementary image.
-    path : path
-        .png, .pdf or .svg. Replaced, whole.
-
-    Raises
-    ------
-    ValueError
-        As `q_angle`, or if the suffix is another.
-
-    References
-    ----------
-    Olsson 2008, (2.18), Figure 4.6.
-    """
-    save(_angle_figure(reference, q_angle(reference, decoded)), path)
-
-
-def _angle_figure(reference: IIPicture, values: NDArray[np.float64]) -> Any:
+def angle_figure(quality: AngleQuality) -> Any:
+    """Return the figure of `metrics.plot_angle`."""
+    values = quality.values
     figure = new_figure(6.2, 5.2, "compressed")  # for axes of fixed shape
     axes: Any = figure.add_subplot()
     v, u = values.shape
     across, down = np.arange(u, dtype=float), np.arange(v, dtype=float)
-    if reference.camera is not None:
-        across, down = angle_axes(reference.camera, erect=reference.erect)
+    degrees = quality.u_deg is not None
+    if quality.u_deg is not None and quality.v_deg is not None:
+        across, down = quality.u_deg, quality.v_deg
         values = values[np.argsort(down)][:, np.argsort(across)]
         across, down = np.sort(across), np.sort(down)
     else:
@@ -85,7 +51,6 @@ def _angle_figure(reference: IIPicture, values: NDArray[np.float64]) -> Any:
     if finite.size:
         bar = figure.colorbar(map_, ax=axes, shrink=0.9)
         bar.set_label("PSNR of the sub-image [dB]")
-    degrees = reference.camera is not None
     axes.set_xlabel("horizontal viewing angle [°]" if degrees else "column u of the elementary image [px]")
     axes.set_ylabel("vertical viewing angle [°]" if degrees else "row v of the elementary image [px]")
     axes.set_aspect("equal")
@@ -188,8 +153,7 @@ def plot_views(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike
 
 
 def _views_figure(reference: IIPicture, decoded: IIPicture) -> Any:
-    reference.check_same_structure(decoded)
-    other = reference.with_pixels(decoded.pixels)
+    reference, other = PicturePair(reference, decoded).pictures
     views = five_viewpoints(camera_of(reference))
     k, l = reference.lenses
     pairs = [tuple(view_image(p, viewpoint)[0] for p in (reference, other)) for viewpoint in views.values()]
@@ -243,44 +207,6 @@ def _pair_figure(picture: IIPicture) -> Any:
         axes.set_title(f"for the {eye} eye", fontsize=10)
         axes.axis("off")
     return figure
-
-
-def plot_all(
-    reference: IIPicture, decoded: IIPicture, quality: DepthQuality | None, folder: str | os.PathLike[str]
-) -> list[Path]:
-    """Draw all of PLOTS that the pictures allow into a folder.
-
-    Returns
-    -------
-    list of path
-        ``q_angle.png`` of a regular structure; with a camera also ``views.png``, ``errors_views.png``,
-        ``pair_reference.png`` and ``pair_decoded.png``; ``q_depth.png`` and ``errors_depth.png`` if their quality
-        is given.
-
-    Raises
-    ------
-    ValueError
-        If the pictures differ in structure or type, or hold a pixel that is not finite.
-    OSError
-        If a file cannot be written.
-    """
-    other = reference.with_pixels(decoded.pixels)
-    seen = reference.regular and reference.camera is not None
-    works: list[tuple[bool, Callable[[Path], None]]] = [
-        (reference.regular, lambda path: plot_angle(reference, decoded, path)),
-        (seen, lambda path: plot_views(reference, decoded, path)),
-        (seen, lambda path: plot_error_views(reference, decoded, path)),
-        (seen, lambda path: plot_pair(reference, path)),
-        (seen, lambda path: plot_pair(other, path)),
-        (quality is not None, lambda path: plot_depth(cast(DepthQuality, quality), path)),
-        (quality is not None, lambda path: plot_error_layers(reference, cast(DepthQuality, quality), path)),
-    ]
-    paths = []
-    for name, (possible, draw) in zip(PLOTS, works, strict=True):
-        if possible:
-            paths.append(Path(folder, name))
-            draw(paths[-1])
-    return paths
 
 
 def _shown(pixels: NDArray[Any]) -> NDArray[np.float64]:

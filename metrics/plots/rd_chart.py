@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ii_core.files import atomic_path
 
-from ..measures import measure_of
+from ..measure import measure_of
 from .tables import check_measured
 
 # Okabe and Ito's colours, told apart by colour-blind readers too; their yellow is too pale on white.
@@ -127,7 +127,7 @@ def _draw(axes: Any, points: Sequence[Mapping[str, Any]], i: int, measure: str) 
     finite = [point for point in points if math.isfinite(point[measure])]
     met = sorted({(p["bpp"], p[measure]) for p in finite if p["reached"]})
     missed = sorted({(p["bpp"], p[measure]) for p in finite if not p["reached"]} - set(met))
-    lossless = sorted({p["bpp"] for p in points if p[measure] == math.inf})
+    lossless = sorted({p["bpp"] for p in points if p[measure] == measure_of(measure).best})
 
     label = points[0]["scheme"]
     floor = min((p["bpp"] for p in points if not p["reached"] and p["bpp"] > p["target_bpp"]), default=None)

@@ -10,7 +10,7 @@ from typing import Any
 
 from ii_core.files import atomic_path
 
-from ..measures import measure_of
+from ..measure import Measure, measure_of
 from ..rd import UndefinedDifference, bd_psnr, bd_rate
 from ..study import FIELDS, check_points, measures_of
 
@@ -83,14 +83,15 @@ def summary_table(
         else:
             row["gain"] = _gain(by_target[anchor], by_target[scheme], measure)
             a, b = (operating_points(points, name, measure) for name in (anchor, scheme))
-            row["BD-rate"] = _difference(bd_rate, a, b, 1, "%")
+            row["BD-rate"] = _difference(bd_rate, _growing(a, kind), _growing(b, kind), 1, "%")
             row[bd_quality] = _difference(bd_psnr, a, b, max(kind.digits - 1, 1), kind.unit)
         rows.append(row)
     return rows
 
 
 def check_measured(points: Sequence[Mapping[str, Any]], measure: str) -> None:
-    """Raise ValueError unless all points have the measure."""
+    """Raise ValueError unless the measure is registered and all points have it."""
+    measure_of(measure)
     if measure not in measures_of(points):
         raise ValueError(f"the study has no {measure}: it has {', '.join(measures_of(points))}")
 
@@ -102,6 +103,11 @@ def operating_points(points: Sequence[Mapping[str, Any]], scheme: str, measure: 
     once.
     """
     return sorted({(p["bpp"], p[measure]) for p in points if p["scheme"] == scheme and math.isfinite(p[measure])})
+
+
+def _growing(points: Points, measure: Measure) -> Points:
+    """Points whose quality grows with rate, as `bd_rate` needs it: negated where lower is better."""
+    return points if measure.higher_is_better else [(rate, -quality) for rate, quality in points]
 
 
 def _cell(point: Mapping[str, Any] | None, measure: str) -> str:

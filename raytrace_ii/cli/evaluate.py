@@ -156,13 +156,14 @@ def study(
 
 def _measures(text: str) -> list[str]:
     """Names of measures, each once; ``q_depth`` stands for its least, mean and greatest value."""
-    from metrics import MEASURES
+    from metrics import known_measures
 
     names = dict.fromkeys(
         name for given in text.split(",") for name in (OVER_DEPTH if given == "q_depth" else (given,))
     )
-    if unknown := [name for name in names if name not in MEASURES]:
-        raise ValueError(f"unknown measure {unknown[0]!r}: known are q_depth, {', '.join(MEASURES)}")
+    known = known_measures()
+    if unknown := [name for name in names if name not in known]:
+        raise ValueError(f"unknown measure {unknown[0]!r}: known are q_depth, {', '.join(known)}")
     return list(names)
 
 
@@ -202,7 +203,7 @@ def run_study(
         write_latex,
         write_study,
     )
-    from metrics.depth.q_depth import told_outside
+    from metrics.quality import told_outside
 
     from ..rendering.render import cores
 
@@ -235,9 +236,9 @@ def run_study(
 
 def about(measure: str) -> str:
     """What a table of this measure shows."""
-    from metrics import MEASURES
+    from metrics.measure import measure_of
 
-    kind = MEASURES[measure]
+    kind = measure_of(measure)
     unit = f" in {kind.unit}" if kind.unit else ""
     return f"{kind.text}{unit} at bits per pixel; gain and Bjøntegaard differences against jpeg2000"
 

@@ -1,0 +1,76 @@
+"""Measures of many decoded pictures against one reference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from ii_core import IIPicture
+
+from .depth.focus import FocusDepth, depth_from_focus
+from .measure import measure_of
+from .pair import PicturePair
+from .quality import DepthQuality
+
+
+def measuring(
+    reference: IIPicture,
+    names: Sequence[str],
+    *,
+    depth: ArrayLike | FocusDepth | None = None,
+    layers_mm: ArrayLike | None = None,
+    method: str = "dissertation",
+) -> Callable[[IIPicture], dict[str, Any]]:
+    """Return a function that measures decoded pictures; work that needs the reference alone is done once, here.
+
+    Parameters
+    ----------
+    reference : IIPicture
+    names : sequence of str
+        Registered measures, see `MEASURES`.
+    depth, layers_mm, method
+        As for `q_depth`, if a measure needs depth. Depth to be estimated is estimated here.
+
+    Returns
+    -------
+    callable
+        ``measure(decoded)`` gives a dict with every name's value. With a measure over depth it also holds
+        ``q_depth``, the value of every layer, ``depth_mm``, the layers, and ``depth_outside``, the share of view
+        pixels in no layer.
+
+    Raises
+    ------
+    TypeError
+        If reference is no `IIPicture`, or names are no sequence of text.
+    ValueError
+        If a name is unknown, or the reference does not meet a measure's needs: no camera, not regular, too few
+        lenses.
+    """
+    if isinstance(names, str | bytes) or not isinstance(names, Sequence):
+        raise TypeError(f"names are {names!r}: a list of measures is needed")
+    measures = [measure_of(name) for name in names]
+    pair = PicturePair(reference, reference, depth=depth, layers_mm=layers_mm, method=method)
+    for measure in measures:
+        if (reason := measure.needs.unmet(pair)) is not None:
+            raise ValueError(f"{measure.name}: {reason}")
+    if depth is None and any(measure.needs.depth for measure in measures):
+        pair = replace(pair, depth=depth_from_focus(reference, layers_mm=layers_mm, method=method))
+
+    def measure_decoded(decoded: IIPicture) -> dict[str, Any]:
+        compared = replace(pair, decoded=decoded)
+        results: dict[Any, Any] = {}
+        kept: dict[str, Any] = {}
+        for measure in measures:
+            if measure.compute not in results:
+                results[measure.compute] = measure.compute(compared)
+            kept[measure.name] = float(measure.value(results[measure.compute]))
+        for result in results.values():
+            if isinstance(result, DepthQuality):
+                kept |= {"q_depth": result.values.tolist(), "depth_mm": result.depth_mm.tolist()}
+                kept["depth_outside"] = result.outside_share
+        return kept
+
+    return measure_decoded

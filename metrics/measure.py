@@ -1,0 +1,171 @@
+"""Measure of the quality of a decoded picture: contract, needs and registry by name."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Any
+
+from .pair import PicturePair
+
+PLUGINS = "raytrace_ii.measures"  # entry points of installed packages
+
+
+@dataclass(frozen=True, kw_only=True)
+class Needs:
+    """What a measure needs of the pictures.
+
+    Parameters
+    ----------
+    regular : bool
+        Elementary images of whole pixels, so that there are sub-images.
+    camera : bool
+        Gap and pixel pitch, to look through the lenses.
+    lenses : int
+        The least number of lenses across and down.
+    all_pixels : bool
+        No mask.
+    depth : bool
+        A depth map, or straight lines of sight to estimate depth from focus.
+    """
+
+    regular: bool = False
+    camera: bool = False
+    lenses: int = 1
+    all_pixels: bool = False
+    depth: bool = False
+
+    def unmet(self, pair: PicturePair) -> str | None:
+        """Return the first need that the pair does not meet, as a reason to print; None if it meets all."""
+        picture, camera = pair.reference, pair.reference.camera
+        if self.regular and not picture.regular:
+            return "the structure is not regular: run `raytrace-ii regular`"
+        if self.all_pixels and pair.mask is not None:
+            return "needs all pixels, a mask leaves some out"
+        if self.camera and camera is None:
+            return "the picture has no camera: gap and pixel pitch are needed to look through its lenses"
+        if min(picture.lenses) < self.lenses:
+            (k, l), least = picture.lenses, self.lenses
+            return f"needs at least {least}×{least} lenses, the picture has {k}×{l}"
+        if self.depth and pair.depth is None and camera is not None and camera.front:
+            return f"a {camera.front[0].kind} before the lenses bends lines of sight: give a depth map"
+        return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measure:
+    """A number that says how good a decoded picture is.
+
+    Parameters
+    ----------
+    name : str
+        Key in records, tables and options.
+    compute : callable
+        ``compute(pair)`` of a `PicturePair`. Measures that share a ``compute`` share its one result.
+    value : callable
+        The number, from what ``compute`` returns.
+    text : str
+        What the number is, for captions.
+    label : str
+        Name on the axis of a chart; may hold mathtext. ``name`` if not given.
+    unit : str
+        Empty for shares.
+    digits : int
+        Decimals to print.
+    higher_is_better : bool
+    needs : Needs
+    """
+
+    name: str
+    compute: Callable[[PicturePair], Any]
+    value: Callable[[Any], float] = float
+    text: str
+    label: str = ""
+    unit: str = ""
+    digits: int = 2
+    higher_is_better: bool = True
+    needs: Needs = field(default_factory=Needs)
+
+    @property
+    def axis(self) -> str:
+        """Label of a chart's axis."""
+        label = self.label or self.name
+        return f"{label} [{self.unit}]" if self.unit else label
+
+    @property
+    def best(self) -> float:
+        """The infinite value of a picture without error, where the measure has one."""
+        return math.inf if self.higher_is_better else -math.inf
+
+    def shown(self, value: float) -> str:
+        """Return the number as a table prints it."""
+        return f"{value:.{self.digits}f}"
+
+
+MEASURES: dict[str, Measure] = {}
+"""Registered measures by name. `known_measures` includes those of installed packages."""
+
+
+def register_measure(measure: Measure) -> Measure:
+    """Add a measure, for `measuring`, `report`, studies, tables and charts.
+
+    Parameters
+    ----------
+    measure : Measure
+
+    Returns
+    -------
+    Measure
+        The same.
+
+    Raises
+    ------
+    TypeError
+        If it is no `Measure`.
+    ValueError
+        If its name is empty, not printable or taken.
+    """
+    if not isinstance(measure, Measure):
+        raise TypeError(f"measure is a {type(measure).__name__}: a Measure is needed")
+    if not (isinstance(measure.name, str) and measure.name.isidentifier()):
+        raise ValueError(f"measure name is {measure.name!r}: letters, digits and underscores are needed")
+    if MEASURES.get(measure.name, measure) != measure:
+        raise ValueError(f"measure name {measure.name!r} is taken: another name is needed")
+    MEASURES[measure.name] = measure
+    return measure
+
+
+def known_measures() -> dict[str, Measure]:
+    """Return all measures by name, those of installed packages too.
+
+    A package registers a measure by an entry point of the group ``raytrace_ii.measures`` that names a `Measure`.
+    """
+    _load_plugins()
+    return MEASURES
+
+
+@cache
+def _load_plugins() -> None:
+    for point in entry_points(group=PLUGINS):
+        try:
+            register_measure(point.load())
+        except Exception as error:  # whatever a foreign package raises must not stop the others
+            warnings.warn(f"measure {point.name} ({point.value}) is left out: {error}", stacklevel=3)
+
+
+def measure_of(name: str) -> Measure:
+    """Return the measure of a name.
+
+    Raises
+    ------
+    ValueError
+        If there is none; the message lists the known names.
+    """
+    known = known_measures()
+    if not isinstance(name, str) or name not in known:
+        raise ValueError(f"unknown measure {name!r}: known are {', '.join(known)}")
+    return known[name]
