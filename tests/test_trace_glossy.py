@@ -206,9 +206,10 @@ def test_a_blended_surface_throws_its_share_of_shadow():
     ground = body(wall(50, 500), colour=WHITE)
     scene = Scene(bodies=[high, low, ground], lights=[sun((0, 0, -1))], max_depth=4)
     left = 0.6 * (1 - alpha[..., None].astype(float))
+    # Embree's packet functions give u and v of shadow rays to 3e-6 here: alpha is off by 4e-6, light by 2.3e-6.
     for z, light in ((20.0, left**2), (55.0, left)):  # from before the panes, and from behind them
         seen = at_texels(scene, (2, 2), z)
-        np.testing.assert_allclose(seen, np.broadcast_to(light, (2, 2, 3)), rtol=1e-5, atol=1e-7)
+        np.testing.assert_allclose(seen, np.broadcast_to(light, (2, 2, 3)), rtol=0, atol=1e-5)
 
 
 def test_the_last_generation_takes_a_blended_surface_as_there():
