@@ -78,7 +78,7 @@ def test_decoding_repeats_the_encoder_to_the_bit():
     payload, encoded = source.coded(30 * lf.FRACTIONS)
     header, levels = stream.unpack(payload, picture.pixels.size // 3)
     field = lf.Field(header, source.grid, source.height, source.width)
-    for _ in lf.decoded_levels(field, levels):
+    for _ in lf.decoded_views(field, levels):
         pass
     np.testing.assert_array_equal(field.views, encoded.views)
     np.testing.assert_array_equal(field.disparities, encoded.disparities)

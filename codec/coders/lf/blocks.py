@@ -157,13 +157,37 @@ def guesses(job, by, bx, log):
 
 
 @lean
-def expected_mask(job, by, bx):
-    """The references of the block left or above, or all."""
+def from_where(job, by, bx, log, index):
+    """Where an index is the guess of: 1 the synthesis, 2 the block left, 3 the one above, 0 none."""
+    made, left, above = guesses(job, by, bx, log)
+    none = job.low - 1
+    if made > none and index == made:
+        return 1
+    if left > none and index == left:
+        return 2
+    return 3 if above > none and index == above else 0
+
+
+@lean
+def expected_mask(job, by, bx, where):
+    """The references of the block left or above, or all; and a context."""
+    left = above = np.int64(0)
     if bx > 0 and job.blocks[KIND, by, bx - 1] == EXPLICIT:
-        return np.int64(job.blocks[MASK, by, bx - 1])
+        left = np.int64(job.blocks[MASK, by, bx - 1])
     if by > 0 and job.blocks[KIND, by - 1, bx] == EXPLICIT:
-        return np.int64(job.blocks[MASK, by - 1, bx])
-    return (1 << job.references.shape[0]) - 1
+        above = np.int64(job.blocks[MASK, by - 1, bx])
+    expected = left
+    if left == 0 or (where == 3 and above):
+        expected = above
+    if expected == 0:
+        expected = (1 << job.references.shape[0]) - 1
+    return expected, at.SAME_MASK + 2 * where + (1 if left == above else 0)
+
+
+@lean
+def _made_context(made, left, none, log):
+    """By size, and whether the block left has the same index, another, or none."""
+    return at.MERGE + (log - 2) * 5 + (0 if left <= none else (1 if left == made else 2))
 
 
 @lean
@@ -205,7 +229,8 @@ def code_kind(coder, job, by, bx, log, kind, index, mask, direction):
             direction = _code_direction(coder, direction)
     else:
         index = _code_index(coder, job, by, bx, log, index)
-        mask = _code_mask(coder, job, by, bx, mask) if count > 1 else 1
+        where = from_where(job, by, bx, log, index)
+        mask = _code_mask(coder, job, by, bx, where, mask) if count > 1 else 1
     return kind, index, mask, direction
 
 
@@ -227,12 +252,13 @@ def _code_direction(coder, direction):
 def _code_index(coder, job, by, bx, log, index):
     made, left, above = guesses(job, by, bx, log)
     none = job.low - 1
-    if made > none and code_bit(coder, np.int64(at.MERGE), 1 if index == made else 0):
+    if made > none and code_bit(coder, _made_context(made, left, none, log), 1 if index == made else 0):
         return made
-    if left > none and left != made and code_bit(coder, np.int64(at.MERGE + 1), 1 if index == left else 0):
+    context = at.MERGE + (log - 2) * 5 + 3
+    if left > none and left != made and code_bit(coder, context, 1 if index == left else 0):
         return left
     new = above > none and above != made and above != left
-    if new and code_bit(coder, np.int64(at.MERGE + 2), 1 if index == above else 0):
+    if new and code_bit(coder, context + 1, 1 if index == above else 0):
         return above
     base = left if left > none else (above if above > none else (made if made > none else 0))
     size = code_number(coder, np.int64(at.DELTA), np.int64(14), np.int64(1), abs(index - base))
@@ -242,9 +268,9 @@ def _code_index(coder, job, by, bx, log, index):
 
 
 @lean
-def _code_mask(coder, job, by, bx, mask):
-    expected = expected_mask(job, by, bx)
-    if code_bit(coder, np.int64(at.SAME_MASK), 1 if mask == expected else 0):
+def _code_mask(coder, job, by, bx, where, mask):
+    expected, context = expected_mask(job, by, bx, where)
+    if code_bit(coder, context, 1 if mask == expected else 0):
         return expected
     count = job.references.shape[0]
     found = 0
@@ -278,7 +304,7 @@ def kind_cost(contexts, job, by, bx, log, kind, index, mask, direction):
     elif kind == EXPLICIT:
         bits += _index_cost(contexts, job, by, bx, log, index)
         if count > 1:
-            bits += mask_cost(contexts, job, by, bx, mask)
+            bits += mask_cost(contexts, job, by, bx, from_where(job, by, bx, log, index), mask)
     return bits
 
 
@@ -288,15 +314,16 @@ def _index_cost(contexts, job, by, bx, log, index):
     none = job.low - 1
     bits = np.float32(0)
     if made > none:
-        bits += bit_cost(contexts, np.int64(at.MERGE), 1 if index == made else 0)
+        bits += bit_cost(contexts, _made_context(made, left, none, log), 1 if index == made else 0)
         if index == made:
             return bits
+    context = at.MERGE + (log - 2) * 5 + 3
     if left > none and left != made:
-        bits += bit_cost(contexts, np.int64(at.MERGE + 1), 1 if index == left else 0)
+        bits += bit_cost(contexts, context, 1 if index == left else 0)
         if index == left:
             return bits
     if above > none and above != made and above != left:
-        bits += bit_cost(contexts, np.int64(at.MERGE + 2), 1 if index == above else 0)
+        bits += bit_cost(contexts, context + 1, 1 if index == above else 0)
         if index == above:
             return bits
     base = left if left > none else (above if above > none else (made if made > none else 0))
@@ -307,11 +334,11 @@ def _index_cost(contexts, job, by, bx, log, index):
 
 
 @lean
-def mask_cost(contexts, job, by, bx, mask):
+def mask_cost(contexts, job, by, bx, where, mask):
     """Bits that a set of references would take."""
-    same = mask == expected_mask(job, by, bx)
-    bits = bit_cost(contexts, np.int64(at.SAME_MASK), 1 if same else 0)
-    if same:
+    expected, context = expected_mask(job, by, bx, where)
+    bits = bit_cost(contexts, context, 1 if mask == expected else 0)
+    if mask == expected:
         return bits
     count = job.references.shape[0]
     found = 0

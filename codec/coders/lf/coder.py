@@ -19,8 +19,9 @@ from .. import clock
 from ..volume import principal_axes
 from . import arithmetic, planes, ranges, search, stream, synthesis
 from .blocks import code_blend, decode_view
-from .contexts import COUNT
+from .contexts import starting_contexts
 from .field import Field
+from .pyramid import Node
 from .search import Search
 from .stream import Header
 
@@ -28,7 +29,9 @@ FINEST, COARSEST = 0, 63
 FRACTIONS = 16  # of a quantiser, between which a rate is searched
 OCTAVE = -6.0 * FRACTIONS  # quantisers that double a size, about
 START = 34 * FRACTIONS
-WEIGHT = 0.15  # squared error a bit is worth, in squared steps
+WEIGHT = 0.1  # squared error a bit is worth, in squared steps
+# Quantisers by which each level is finer than the next, for more is predicted from it, and the first finer still.
+FINER_A_LEVEL, FINER_FIRST = 2.4, 2.0
 VIEW_BYTES = 24  # a sample's most
 
 
@@ -82,7 +85,7 @@ class LightField(Coder):
         header, levels = stream.unpack(payload, blank.pixels.size // 3)
         height, width, grid = _shape(blank)
         field = Field(header, grid, height, width)
-        for _ in decoded_levels(field, levels):
+        for _ in decoded_views(field, levels):
             pass
         pixels = np.empty(blank.pixels.shape, blank.pixels.dtype)
         for number in range(len(field.views)):
@@ -90,10 +93,29 @@ class LightField(Coder):
             planes.scatter(field.views, number, grid, row, col, header.axes, pixels.itemsize == 2, pixels)
         return pixels, clock.cpu_seconds() - started
 
+    def component(self, payload: bytes, blank: IIPicture, place: tuple[int, int]) -> Pixels:
+        """The sub-image (u, v), decoded with the levels above its own and those views of its level before it.
 
-def decoded_levels(field: Field, levels: list[bytes]) -> Iterator[int]:
-    """Decode one level after another."""
-    contexts = arithmetic.new_contexts(COUNT)
+        Raises
+        ------
+        ValueError
+            If the payload is damaged so far as it is read.
+        """
+        header, levels = stream.unpack(payload, blank.pixels.size // 3)
+        height, width, grid = _shape(blank)
+        field = Field(header, grid, height, width)
+        wanted = place[1], place[0]
+        for node in decoded_views(field, levels):
+            if (node.row, node.col) == wanted:
+                break
+        pixels = np.empty((height, width, 3), blank.pixels.dtype)
+        planes.scatter(field.views, field.number(wanted), (1, 1), 0, 0, header.axes, pixels.itemsize == 2, pixels)
+        return pixels
+
+
+def decoded_views(field: Field, levels: list[bytes]) -> Iterator[Node]:
+    """Decode one view after another, level by level."""
+    contexts = starting_contexts()
     for number, (nodes, data) in enumerate(zip(field.levels, levels, strict=True)):
         coder = arithmetic.reader(contexts, data)
         for node in nodes:
@@ -104,7 +126,7 @@ def decoded_levels(field: Field, levels: list[bytes]) -> Iterator[int]:
             if arithmetic.overrun(coder):
                 raise ValueError(f"level {number} of its light field ends early")
             field.finish(node, job, made)
-        yield number
+            yield node
 
 
 def _shape(picture: IIPicture) -> tuple[int, int, tuple[int, int]]:
@@ -149,11 +171,11 @@ class _Source:
     def coded(self, setting: float) -> tuple[bytes, Field]:
         """The payload at a quantiser, and what the decoder will make of it."""
         last = self.header.log_stride
-        offsets = [(last - level) + (2 if level == 0 else 0) for level in range(last + 1)]
+        offsets = [FINER_A_LEVEL * (last - level) + (FINER_FIRST if level == 0 else 0) for level in range(last + 1)]
         steps = tuple(max(1, round(128 * 2 ** ((setting / FRACTIONS - 8 - less) / 6))) for less in offsets)
         header = replace(self.header, steps=steps)
         field = Field(header, self.grid, self.height, self.width)
-        contexts, trial = arithmetic.new_contexts(COUNT), search.new_trial()
+        contexts, trial = starting_contexts(), search.new_trial()
         levels = []
         for nodes in field.levels:
             room = VIEW_BYTES * field.shape[0] * field.shape[1] + 1024
@@ -192,6 +214,7 @@ class _Source:
             weight=np.float32(WEIGHT * (job.step / 16) ** 2),
             least=3 if self.effort == 0 else 2,
             intra_tries=(1, 2, 3)[self.effort] if not references else 1,
+            planes=1 if self.effort == 0 else 3,
         )
 
 

@@ -43,44 +43,44 @@ def _place(y, x):
 def code_coefficients(coder, levels, plane, log):
     """Write or read levels[:n, :n], of which one at least is not zero; a reader finds only zeros there before."""
     n = 1 << log
-    kind = 1 if plane else 0
     last = n * n - 1
     while last > 0 and levels[SCANS[log, last] >> 5, SCANS[log, last] & 31] == 0:
         last -= 1
-    last = min(code_number(coder, LAST + (kind * 4 + log - 2) * 12, np.int64(12), np.int64(0), last), n * n - 1)
+    last = min(code_number(coder, LAST + (plane * 4 + log - 2) * 12, np.int64(12), np.int64(0), last), n * n - 1)
     for k in range(last, -1, -1):
         y, x = SCANS[log, k] >> 5, SCANS[log, k] & 31
         value = np.int64(levels[y, x])
         size = abs(value)
         near = _neighbourhood(levels, y, x, n)
         place = _place(y, x)
-        if k < last and not code_bit(
-            coder, SIGNIFICANT + ((kind * 4 + log - 2) * 4 + place) * 6 + near, 1 if size else 0
-        ):
+        context = SIGNIFICANT + ((plane * 4 + log - 2) * 4 + place) * 6 + near
+        if k < last and not code_bit(coder, context, 1 if size else 0):
             continue
-        context = (kind * 6 + near) * 2 + (1 if place == 0 else 0)
+        context = (plane * 6 + near) * 2 + (1 if place == 0 else 0)
         found = 1
         if code_bit(coder, ABOVE_ONE + context, 1 if size > 1 else 0):
             found = 2
             if code_bit(coder, ABOVE_TWO + context, 1 if size > 2 else 0):
-                found = 3 + min(code_number(coder, REST + kind * 16, np.int64(16), np.int64(0), size - 3), MOST_LEVEL)
+                found = 3 + min(
+                    code_number(coder, REST + plane * 16, np.int64(16), np.int64(0), size - 3), MOST_LEVEL
+                )
         levels[y, x] = -found if code_raw(coder, 1 if value < 0 else 0) else found
 
 
 @inner
-def _level_cost(contexts, size, near, place, kind, log, last):
+def _level_cost(contexts, size, near, place, plane, log, last):
     bits = np.float32(0)
     if not last:
-        bits += bit_cost(contexts, SIGNIFICANT + ((kind * 4 + log - 2) * 4 + place) * 6 + near, 1 if size else 0)
+        bits += bit_cost(contexts, SIGNIFICANT + ((plane * 4 + log - 2) * 4 + place) * 6 + near, 1 if size else 0)
         if size == 0:
             return bits
     bits += np.float32(1)
-    context = (kind * 6 + near) * 2 + (1 if place == 0 else 0)
+    context = (plane * 6 + near) * 2 + (1 if place == 0 else 0)
     bits += bit_cost(contexts, ABOVE_ONE + context, 1 if size > 1 else 0)
     if size > 1:
         bits += bit_cost(contexts, ABOVE_TWO + context, 1 if size > 2 else 0)
         if size > 2:
-            bits += number_cost(contexts, REST + kind * 16, np.int64(16), np.int64(0), size - 3)
+            bits += number_cost(contexts, REST + plane * 16, np.int64(16), np.int64(0), size - 3)
     return bits
 
 
@@ -96,7 +96,6 @@ def quantise(contexts, coefficients, plane, log, step, weight, levels):
         Squared error that a bit is worth.
     """
     n = 1 << log
-    kind = 1 if plane else 0
     nothing = np.float32(0)
     first = -1
     for y in range(n):
@@ -119,7 +118,7 @@ def quantise(contexts, coefficients, plane, log, step, weight, levels):
         if last < 0:
             if level == 0:
                 continue
-            cost = _level_cost(contexts, level, 0, _place(y, x), kind, log, True)
+            cost = _level_cost(contexts, level, 0, _place(y, x), plane, log, True)
             missed = size - np.float32(level) * step
             gain = size * size - missed * missed
             if level == 1 and gain < weight * (cost + HOPE):
@@ -130,11 +129,11 @@ def quantise(contexts, coefficients, plane, log, step, weight, levels):
         else:
             near, where = _neighbourhood(levels, y, x, n), _place(y, x)
             best = 0
-            cost = _level_cost(contexts, 0, near, where, kind, log, False)
+            cost = _level_cost(contexts, 0, near, where, plane, log, False)
             least = size * size + weight * cost
             kept, missed2 = cost, size * size
             for tried in range(max(1, level - 1), level + 1):
-                cost = _level_cost(contexts, tried, near, where, kind, log, False)
+                cost = _level_cost(contexts, tried, near, where, plane, log, False)
                 missed = size - np.float32(tried) * step
                 total = missed * missed + weight * cost
                 if total < least:
@@ -144,7 +143,7 @@ def quantise(contexts, coefficients, plane, log, step, weight, levels):
         levels[y, x] = -best if value < 0 else best
     if last < 0:
         return np.float32(0), nothing
-    bits += number_cost(contexts, LAST + (kind * 4 + log - 2) * 12, np.int64(12), np.int64(0), last)
+    bits += number_cost(contexts, LAST + (plane * 4 + log - 2) * 12, np.int64(12), np.int64(0), last)
     if error + weight * bits >= nothing:
         for y in range(n):
             for x in range(n):

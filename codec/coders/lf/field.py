@@ -34,7 +34,8 @@ class Field:
         self.views = np.zeros((grid[0] * grid[1], 3, *self.shape), np.int16)
         self.disparities = np.full((len(self.views), *self.shape), UNKNOWN, np.int16)
         self.work: Work = new_work()
-        self._last: Synthesis | None = None
+        nodes = [node for level in self.levels for node in level]
+        self.used = {place for node in nodes for place in (*node.references, *node.sources)}
 
     def number(self, place: Place) -> int:
         """Index of a view."""
@@ -64,7 +65,7 @@ class Field:
 
     def finish(self, node: Node, job: Job, made: Synthesis) -> None:
         """Note the disparity of a decoded view, for those that follow."""
-        if not self.header.sources or not len(made.sources):
+        if not len(made.sources) or (node.row, node.col) not in self.used:
             return
         synthesis.start(made, job.at, job.blocks, job.unit, job.synthesised)
         synthesis.refine(made, job.at, False)

@@ -18,6 +18,7 @@ from .blocks import (
     Work,
     code_tree,
     coded_context,
+    from_where,
     guesses,
     kind_cost,
     mark,
@@ -54,6 +55,9 @@ class Search(NamedTuple):
     least : int
         Binary logarithm of the least block.
     intra_tries : int
+        Intra modes that are coded on trial.
+    planes : int
+        Planes that count in the choice of disparity and references.
     """
 
     original: Any
@@ -61,6 +65,7 @@ class Search(NamedTuple):
     weight: Any
     least: Any
     intra_tries: Any
+    planes: Any
 
 
 class Trial(NamedTuple):
@@ -253,8 +258,9 @@ def _best_explicit(contexts, job, search, work, trial, y0, x0, log, tried):
     for t in range(number):
         index = tried[t]
         d = index * job.unit
+        where = from_where(job, by, bx, log, index)
         for r in range(count):
-            for p in range(3):
+            for p in range(search.planes):
                 for y in range(n):
                     for x in range(n):
                         work.predicted[p, y, x] = 0
@@ -277,8 +283,8 @@ def _best_explicit(contexts, job, search, work, trial, y0, x0, log, tried):
                         )
         index_bits = kind_cost(contexts, job, by, bx, log, np.int64(EXPLICIT), index, (1 << count) - 1, np.int64(0))
         if count > 1:
-            index_bits -= mask_cost(contexts, job, by, bx, (1 << count) - 1)
-        products = _products(moved, count, n)
+            index_bits -= mask_cost(contexts, job, by, bx, where, (1 << count) - 1)
+        products = _products(moved, count, n, search.planes)
         for mask in range(1, 1 << count):
             members = 0
             error = np.float32(0)
@@ -291,16 +297,16 @@ def _best_explicit(contexts, job, search, work, trial, y0, x0, log, tried):
                 members += (mask >> r) & 1
             total = error / np.float32(members * members) + search.weight * index_bits
             if total < best and count > 1:
-                total += search.weight * mask_cost(contexts, job, by, bx, mask)
+                total += search.weight * mask_cost(contexts, job, by, bx, where, mask)
             if total < best:
                 best, best_index, best_mask = total, index, mask
     return best_index, best_mask
 
 
 @inner
-def _dot(moved, r, s, n):
+def _dot(moved, r, s, n, planes):
     total = np.float32(0)
-    for p in range(3):
+    for p in range(planes):
         for y in range(n):
             for x in range(n):
                 total += np.float32(moved[r, p, y, x]) * np.float32(moved[s, p, y, x])
@@ -308,17 +314,17 @@ def _dot(moved, r, s, n):
 
 
 @lean
-def _products(moved, count, n):
+def _products(moved, count, n, planes):
     """Inner products of the references' differences, the lower triangle by rows."""
-    p00 = _dot(moved, 0, 0, n)
+    p00 = _dot(moved, 0, 0, n, planes)
     p10 = p11 = p20 = p21 = p22 = p30 = p31 = p32 = p33 = np.float32(0)
     if count > 1:
-        p10, p11 = _dot(moved, 1, 0, n), _dot(moved, 1, 1, n)
+        p10, p11 = _dot(moved, 1, 0, n, planes), _dot(moved, 1, 1, n, planes)
     if count > 2:
-        p20, p21, p22 = _dot(moved, 2, 0, n), _dot(moved, 2, 1, n), _dot(moved, 2, 2, n)
+        p20, p21, p22 = _dot(moved, 2, 0, n, planes), _dot(moved, 2, 1, n, planes), _dot(moved, 2, 2, n, planes)
     if count > 3:
-        p30, p31 = _dot(moved, 3, 0, n), _dot(moved, 3, 1, n)
-        p32, p33 = _dot(moved, 3, 2, n), _dot(moved, 3, 3, n)
+        p30, p31 = _dot(moved, 3, 0, n, planes), _dot(moved, 3, 1, n, planes)
+        p32, p33 = _dot(moved, 3, 2, n, planes), _dot(moved, 3, 3, n, planes)
     return p00, p10, p11, p20, p21, p22, p30, p31, p32, p33
 
 
