@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from codec import decode, encode
+from codec import decode, decode_component, encode
 from codec.coders.lf import coder as lf
 from codec.coders.lf import ranges, stream
 from codec.coders.lf.pyramid import pyramid
 from codec.contract import checked_options
-from ii_core import IIPicture
+from ii_core import IIPicture, sub_images
 
 
 def shifted_plane(disparity, grid=(5, 5), height=32, width=48, seed=0):
@@ -98,3 +98,39 @@ def test_few_bytes_do_not_claim_a_large_picture():
     payload = encode(picture, "si-lf:fast", qp=40).payload
     with pytest.raises(ValueError, match="too few for"):
         stream.unpack(payload, 1 << 31)
+
+
+@pytest.mark.parametrize("place", [(0, 0), (2, 1), (4, 3)])
+def test_one_view_alone_is_that_of_the_whole(place, monkeypatch):
+    """And what is decoded for it are the levels above and a part of its own."""
+    picture = shifted_plane((1, 1), grid=(4, 5))
+    coded = encode(picture, "si-lf", qp=34)
+    decoded = []
+    original = lf.decode_view
+    monkeypatch.setattr(lf, "decode_view", lambda *given: decoded.append(1) or original(*given))
+    alone = decode_component(coded, place)
+    nodes = [(node.col, node.row) for level in pyramid(4, 5, 3, 4, 6) for node in level]
+    assert len(decoded) == nodes.index(place) + 1
+    np.testing.assert_array_equal(alone, sub_images(decode(coded))[place[1], place[0]])
+
+
+@pytest.mark.parametrize("level", [0, 1, 2, 3])
+def test_a_level_that_ends_early_is_named(level):
+    picture = shifted_plane((1, 1), grid=(9, 9))
+    payload = encode(picture, "si-lf:fast", qp=12).payload
+    header, levels = stream.unpack(payload, picture.pixels.size // 3)
+    levels[level] = levels[level][: len(levels[level]) // 3]
+    damaged = stream.pack(header, levels, picture.pixels.size // 3)
+    blank = picture.with_pixels(np.zeros_like(picture.pixels))
+    with pytest.raises(ValueError, match=f"level {level} of its light field ends early"):
+        lf.LightField().decode(damaged, blank, checked_options(lf.LightField(), {}))
+
+
+def test_numbers_of_sixteen_bits_keep_more_than_eight():
+    """PSNR at the finest quantiser: an 8-bit picture has 58.9 dB at best."""
+    rng = np.random.default_rng(4)
+    pixels = rng.integers(0, 65536, (32, 48, 3)).astype(np.uint16)
+    picture = IIPicture(pixels, (12, 8), (4, 4))
+    decoded = decode(encode(picture, "si-lf", qp=0))
+    error = np.mean((decoded.pixels.astype(float) - pixels) ** 2)
+    assert 10 * np.log10(65535**2 / error) > 52

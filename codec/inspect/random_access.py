@@ -21,6 +21,7 @@ from ..bitstream import framing
 from ..bitstream.obu import temporal_units
 from ..checks import check_type, whole_pair
 from ..coders import video
+from ..coders.lf.coder import LightField
 from ..coders.video import Video
 from ..coders.volume import Separate
 from ..contract import MAX_DECODED_PIXELS, Options, Pixels, find
@@ -80,7 +81,7 @@ def sequence(coded: Encoded) -> Sequence:
     """
     check_type("coded", coded, Encoded, "a coded picture")
     coder = _with_frames(coded)
-    if isinstance(coder, Separate):
+    if isinstance(coder, Separate | LightField):
         raise ValueError(f"scheme {coded.scheme} codes no sequence: its frames are parts of one codestream")
     film = coder.film(blank_picture(coded.structure, coded.dtype), coded.options)
     if film.width * film.height > MAX_DECODED_PIXELS:
@@ -130,7 +131,7 @@ def decode_frame(coded: Encoded, index: int) -> Pixels:
     check_type("coded", coded, Encoded, "a coded picture")
     check_type("index", index, (int, np.integer), "a whole number")
     coder = _with_frames(coded)
-    if isinstance(coder, Separate):
+    if isinstance(coder, Separate | LightField):
         count = layout(coded.structure["lenses"], coded.structure["ei_pixels"], coder.kind).frames
         if isinstance(index, bool) or not 0 <= index < count:
             raise ValueError(f"frame index {index} is asked for: there are {count}, from 0")
@@ -178,22 +179,22 @@ def decode_component(coded: Encoded, place: tuple[int, int]) -> Pixels:
     if not (0 <= row < grid.rows and 0 <= col < grid.cols):
         raise ValueError(f"component image {place} is asked for: there are {grid.cols}×{grid.rows}, from (0, 0)")
     index = row * grid.cols + col
-    if isinstance(coder, Separate):
+    if isinstance(coder, Separate | LightField):
         return _slice(coder, coded, index)
     order = selection_order(str(coded.options["order"]), grid.rows, grid.cols, str(coded.options["by"]))
     return decode_frame(coded, int(inverse(order)[index]))
 
 
-def _with_frames(coded: Encoded) -> Video | Separate:
+def _with_frames(coded: Encoded) -> Video | Separate | LightField:
     """The coder of a coded picture, if it codes component images that can be decoded alone."""
     coder = find(coded.scheme)
-    if not isinstance(coder, Video | Separate):
+    if not isinstance(coder, Video | Separate | LightField):
         raise ValueError(f"scheme {coded.scheme} codes the picture as a whole: it has no frames to be had alone")
     return coder
 
 
-def _slice(coder: Separate, coded: Encoded, index: int) -> Pixels:
-    """One component image of a scheme that codes each alone."""
+def _slice(coder: Separate | LightField, coded: Encoded, index: int) -> Pixels:
+    """One component image of a scheme that codes each alone, or in levels."""
     try:
         return coder.decode_slice(coded.payload, blank_picture(coded.structure, coded.dtype), coded.options, index)
     except ValueError as error:

@@ -38,6 +38,7 @@ VIEW_BYTES = 24  # a sample's most
 class LightField(Coder):
     """Sub-images as views of a light field; docs/lf.md explains the stream."""
 
+    kind = "si"
     name = "si-lf"
     about = "Sub-images as a light field: a pyramid of views, disparity, synthesis at the decoder"
     dtypes: ClassVar[tuple[str, ...]] = ("uint8", "uint16")
@@ -93,8 +94,8 @@ class LightField(Coder):
             planes.scatter(field.views, number, grid, row, col, header.axes, pixels.itemsize == 2, pixels)
         return pixels, clock.cpu_seconds() - started
 
-    def component(self, payload: bytes, blank: IIPicture, place: tuple[int, int]) -> Pixels:
-        """The sub-image (u, v), decoded with the levels above its own and those views of its level before it.
+    def decode_slice(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
+        """One sub-image, counted row by row, decoded with the levels above its own and those views of its level before it.
 
         Raises
         ------
@@ -104,7 +105,7 @@ class LightField(Coder):
         header, levels = stream.unpack(payload, blank.pixels.size // 3)
         height, width, grid = _shape(blank)
         field = Field(header, grid, height, width)
-        wanted = place[1], place[0]
+        wanted = divmod(index, grid[1])
         for node in decoded_views(field, levels):
             if (node.row, node.col) == wanted:
                 break
@@ -171,7 +172,7 @@ class _Source:
     def coded(self, setting: float) -> tuple[bytes, Field]:
         """The payload at a quantiser, and what the decoder will make of it."""
         last = self.header.log_stride
-        offsets = [FINER_A_LEVEL * (last - level) + (FINER_FIRST if level == 0 else 0) for level in range(last + 1)]
+        offsets = [FINER_A_LEVEL * (last - level) + (0 if level else FINER_FIRST) for level in range(last + 1)]
         steps = tuple(max(1, round(128 * 2 ** ((setting / FRACTIONS - 8 - less) / 6))) for less in offsets)
         header = replace(self.header, steps=steps)
         field = Field(header, self.grid, self.height, self.width)
