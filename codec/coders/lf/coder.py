@@ -95,7 +95,7 @@ class LightField(Coder):
         return pixels, clock.cpu_seconds() - started
 
     def decode_slice(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
-        """One sub-image, counted row by row, decoded with the levels above its own and those views of its level before it.
+        """One sub-image, counted row by row, decoded with the levels above it and the views before it in its own.
 
         Raises
         ------
