@@ -8,10 +8,10 @@ BIN := $(VENV)/bin
 .PHONY: demo study test lint bench docs clean
 
 demo: $(VENV)/.installed
-	$(BIN)/python -m benchmarks.demo
+	$(BIN)/python examples/demo.py
 
 study: $(VENV)/.installed
-	$(BIN)/python -m benchmarks.study --publish
+	$(BIN)/python -m benchmarks run study --publish
 
 test: lint
 	$(BIN)/python -m pytest -n 2
@@ -23,7 +23,7 @@ lint: $(VENV)/.installed
 	$(BIN)/lint-imports
 
 bench: $(VENV)/.installed
-	$(BIN)/python -m benchmarks.speed
+	$(BIN)/python -m benchmarks run ratios
 
 docs: $(VENV)/.docs
 	$(BIN)/mkdocs build --strict -f docs/site/mkdocs.yml

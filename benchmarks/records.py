@@ -12,6 +12,7 @@ import hashlib
 import importlib.util
 import json
 import math
+import os
 import subprocess
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -65,7 +66,7 @@ class Records:
         RuntimeError
             If sources changed on disk meanwhile: the commit at the start is not that of all code that ran.
         """
-        begin, started = stamp(self.modules), time.perf_counter()
+        begin, started, cpu = stamp(self.modules), time.perf_counter(), cpu_seconds()
         result = json.loads(json.dumps(_finite(call())))
         record = {
             "format": FORMAT,
@@ -73,6 +74,7 @@ class Records:
             "key": plain(key),
             **begin,
             "seconds": round(time.perf_counter() - started, 2),
+            "cpu_seconds": round(cpu_seconds() - cpu, 2),
             "result": result,
         }
         stamp(self.modules)  # processes that the measurement started have loaded the same code
@@ -118,6 +120,11 @@ class Records:
     def rows(self, **only: Any) -> list[dict[str, Any]]:
         """Return key and result of the newest records as one dict each, with ``commit`` as `commit_of` gives it."""
         return [{**r["key"], **r["result"], "commit": commit_of(r)} for r in self.newest(**only)]
+
+
+def cpu_seconds() -> float:
+    """Return the CPU seconds of this process and of the child processes it has waited for."""
+    return sum(os.times()[:4])
 
 
 def add_again(parser: argparse.ArgumentParser) -> None:

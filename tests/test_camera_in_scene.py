@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from trace_scenes import WHITE, body, ramp, reflectance, sun, wall
 
-from benchmarks import camera_in_scene
+from benchmarks.accuracy import camera_in_scene
 from ii_core import IICamera
 from ii_core.optics import SphericalLenslet
 from raytrace_ii import Scene, render

@@ -17,7 +17,7 @@ SCRIPT = """
 import json, resource, sys, time
 from dataclasses import replace
 from pathlib import Path
-from benchmarks.fuzz import sample
+from benchmarks.coding.fuzz import sample
 from codec import decode, schemes
 
 CLAIMS = [

@@ -5,7 +5,7 @@ from itertools import combinations
 import pytest
 from matplotlib.figure import Figure
 
-from benchmarks.coders import LETTERS, offsets, summary, table, touch
+from benchmarks.coding.coders import LETTERS, offsets, summary, table, touch
 
 ROWS = [
     {"scene": scene, "scheme": scheme, "bd_rate": rate, "seconds": seconds, "commit": "abcdef0"}

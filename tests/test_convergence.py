@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from benchmarks import convergence
-from benchmarks.analytic import Ball, Floor, World, reflectance, still_life
+from benchmarks.accuracy import convergence
+from benchmarks.accuracy.analytic import Ball, Floor, World, reflectance, still_life
 from ii_core import preset
 from raytrace_ii import Light, Material, trace
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import demo, disparity
+from benchmarks.coding import disparity
+from examples import demo
 from ii_core import IIPicture, preset
 from ii_core.files import read_image
 

@@ -17,6 +17,7 @@ import codec
 import ii_core
 import metrics
 import raytrace_ii
+from benchmarks.registry import BENCHMARKS
 from codec import decode, encode
 from raytrace_ii.cli import app
 
@@ -147,8 +148,13 @@ def test_python_runs(page, folder, monkeypatch):
 
 @pytest.mark.parametrize("page", PAGES)
 def test_scripts_and_targets_exist(page):
-    for name in re.findall(r"\bbenchmarks\.([a-z_]+)", PAGES[page]):
-        assert importlib.util.find_spec(f"benchmarks.{name}"), f"{page}: benchmarks.{name}"
+    for name in re.findall(r"\b(?:benchmarks|examples)\.[a-z_]+(?:\.[a-z_]+)*", PAGES[page]):
+        assert importlib.util.find_spec(name), f"{page}: {name}"
+    for name in re.findall(r"python\s+-m\s+benchmarks\s+run\s+(\w+)", PAGES[page]):
+        assert name in BENCHMARKS or name == "NAME", f"{page}: python -m benchmarks run {name}"
+    assert not re.search(r"python\s+-m\s+benchmarks\.", PAGES[page]), f"{page}: type python -m benchmarks run NAME"
+    for path in re.findall(r"\b(?:benchmarks|examples)/[\w/]+\.py", PAGES[page]):
+        assert (ROOT / path).is_file(), f"{page}: {path}"
     targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M)
     for name in re.findall(r"`make ([a-z]+)`|^    make ([a-z]+)", PAGES[page], re.M):
         assert "".join(name) in targets, f"{page}: make {''.join(name)}"
@@ -168,7 +174,7 @@ def test_every_public_function_and_class_says_what_it_is(package):
 
 
 def test_the_study_page_and_the_readme_agree_with_the_records():
-    from benchmarks.readme import gain_table
+    from benchmarks.pages.readme import gain_table
 
     table = "\n".join(gain_table())
     assert table in PAGES["README.md"] and table in PAGES["docs/study.md"]

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks import fuzz
+from benchmarks.coding import fuzz
 
 
 def test_every_mutation_is_counted_and_the_same_again(capsys):

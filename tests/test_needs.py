@@ -1,10 +1,10 @@
-"""Leaving things out of scenes, and what counts as not to be told apart; figures come from `benchmarks.needs`."""
+"""Leaving things out of scenes, and what counts as not to be told apart; figures come from `needs`."""
 
 import numpy as np
 import pytest
 from trace_scenes import WHITE, body, floor, hall, sphere, sun
 
-from benchmarks import needs
+from benchmarks.speed import needs
 from ii_core import IIPicture, preset
 from raytrace_ii import Scene, trace
 from raytrace_ii.scene.textures import Checker, Image, VertexColours

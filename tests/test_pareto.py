@@ -1,9 +1,10 @@
-"""The bookkeeping of speed against accuracy; its figures come from `benchmarks.pareto` itself."""
+"""The bookkeeping of speed against accuracy; its figures come from `benchmarks.speed.pareto` itself."""
 
 import numpy as np
 import pytest
 
-from benchmarks import coding_docs, metrics_speed, pareto
+from benchmarks.pages import coding_docs
+from benchmarks.speed import metrics_speed, pareto
 from raytrace_ii import load_scene
 
 

@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from benchmarks import povray
-from benchmarks.analytic import still_life
+from benchmarks.accuracy import povray
+from benchmarks.accuracy.analytic import still_life
 from ii_core import preset
 
 

@@ -9,7 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import coders, fuzz, pages, povray, records
+from benchmarks import records
+from benchmarks.accuracy import povray
+from benchmarks.coding import coders, fuzz, rd
+from benchmarks.pages import tables
 from benchmarks.records import ALL, MISSING, Records, check, commit_of, origin, with_commits
 from ii_core import preset
 from ii_core.json_lines import append_record
@@ -33,16 +36,16 @@ def kept(monkeypatch):
 
 def test_pages_hold_what_the_records_give(kept):
     """Every table between marks, on every page. On b1dc540 no test compared coders, volume, cost, headers, speed …"""
-    assert pages.stale() == []
+    assert tables.stale() == []
 
 
 def test_a_changed_figure_and_an_unknown_mark_are_found(kept, tmp_path):
-    for page in {page for owner in pages.OWNERS for page, _ in pages.tables_of(owner)}:
+    for page in {page for owner in tables.OWNERS for page, _ in tables.tables_of(owner)}:
         (tmp_path / page).parent.mkdir(exist_ok=True)
         (tmp_path / page).write_text((ROOT / page).read_text())
     page = tmp_path / "docs/volume.md"
     page.write_text(page.read_text().replace("| apples | 2.412 |", "| apples | 2.413 |") + "<!-- new -->\n")
-    wrong = pages.stale(root=tmp_path)
+    wrong = tables.stale(root=tmp_path)
     assert [line.split(":")[0] for line in wrong] == ["docs/volume.md"] * 2
     assert "table apart" in wrong[0] and "no benchmark fills new" in wrong[1]
 
@@ -199,8 +202,8 @@ def test_seconds_to_decode_do_not_hold_those_of_the_measure(monkeypatch):
     """A measure that takes half a second: decoding 128×64 px takes a few milliseconds still."""
     picture = render(load_scene("cuboid"), preset("setup1", scale=64), support=()).picture
     monkeypatch.setattr(coders, "qualities", lambda scheme: [{"qp": 30}])
-    original = coders.q_global
-    monkeypatch.setattr(coders, "q_global", lambda a, b: (spend(0.5), original(a, b))[1])
+    original = rd.q_global
+    monkeypatch.setattr(rd, "q_global", lambda a, b: (spend(0.5), original(a, b))[1])
     _, (point,) = (coders.curve(picture, "si-h264") for _ in range(2))  # the first compiles
     assert point["decode_seconds"] < 0.3
 

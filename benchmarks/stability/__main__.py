@@ -1,8 +1,8 @@
-"""Hunt for where methods fail: ``python -m benchmarks.stability [case ...]``.
+"""Hunt for where methods fail: ``python -m benchmarks run stability [-- case ...]``.
 
 Every case sweeps one thing until it breaks; cases can be run one by one. Numbers go to
 ``benchmarks/results/stability.jsonl``, a chart and two strips of pictures beside it, and between the marks of
-``docs/stability.md``, with those of ``benchmarks.convergence``.
+``docs/stability.md``, with those of ``benchmarks.accuracy.convergence``.
 """
 
 from __future__ import annotations
@@ -13,18 +13,17 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks import convergence
-from benchmarks.pages import Tables, publish
-from benchmarks.records import RESULTS, Records, add_again, origin
+from benchmarks.accuracy import convergence
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import RESULTS, ROOT, Records, add_again, origin
 from benchmarks.stability import curves, depth, geometry, light, picture, pictures
 from benchmarks.stability.geometry import Row
 from ii_core.files import atomic_path, write_image
 from metrics.depth.focus import METHODS
 from metrics.plots.rd_chart import COLOURS
 
-ROOT = Path(__file__).parent.parent.parent
-MODULES = ("benchmarks.stability", "benchmarks.analytic", "benchmarks.map_precision", "benchmarks.depth_truth")
-RECORDS = Records("stability", MODULES)
+ACCURACY = tuple(f"benchmarks.accuracy.{name}" for name in ("analytic", "map_precision", "depth_truth"))
+RECORDS = Records("stability", ("benchmarks.stability", *ACCURACY))
 CASES: dict[str, Callable[[], list[Row]]] = {
     case.__name__: case
     for case in (

@@ -1,8 +1,8 @@
 """Where Bjøntegaard's figure fails: curves that hardly overlap, that dip, or that have few points.
 
 The truth is known, for the curves are cut out of measured ones, joined by monotone cubics (Fritsch and Carlson 1980)
-and taken as exact: those in ``rd_curves.json`` beside this file, by ``benchmarks.coders`` on two scenes. They are
-kept apart from its latest run: the limits found here are of the method, and must not move with the coders.
+and taken as exact: those in ``rd_curves.json`` beside this file, by ``benchmarks.coding.coders`` on two scenes. They
+are kept apart from its latest run: the limits found here are of the method, and must not move with the coders.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from benchmarks.coders import ANCHOR, climbing
+from benchmarks.coding.coders import ANCHOR
+from benchmarks.coding.rd import climbing
 from benchmarks.stability.geometry import Row
 from metrics import bd_psnr, bd_rate
 from metrics.rd import METHOD, UndefinedDifference

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import depth_truth
+from benchmarks.accuracy import depth_truth
 from benchmarks.stability.geometry import Row
 from ii_core import IIPicture, add_sensor_noise, preset
 from metrics import FocusDepth, depth_from_focus, linear_layers
@@ -123,7 +123,7 @@ def depth_highlight() -> list[Row]:
 
 
 def depth_noise() -> list[Row]:
-    """What `benchmarks.depth_truth` measured: pixels within a tenth of their depth, over noise, scene by scene."""
+    """What `depth_truth` measured: pixels within a tenth of their depth, over noise, scene by scene."""
     rows = [row for row in _kept() if row["scale"] == 8]
     return [
         {

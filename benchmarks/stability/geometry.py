@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.analytic import World, still_life
+from benchmarks.accuracy.analytic import World, still_life
 from ii_core import preset
 from raytrace_ii import Body, Light, Material, Scene, trace
 from raytrace_ii.shapes.primitives import Mesh, Plane, Sphere, rotation

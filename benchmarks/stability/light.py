@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.analytic import still_life
+from benchmarks.accuracy.analytic import still_life
 from benchmarks.stability.geometry import Row, ball, body, ground
 from raytrace_ii import Background, Light, Material, Scene, trace
 from raytrace_ii.shapes.primitives import Box, Mesh

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import map_precision
-from benchmarks.analytic import still_life
+from benchmarks.accuracy import map_precision
+from benchmarks.accuracy.analytic import still_life
 from benchmarks.stability.geometry import Row
 from codec import decode, encode
 from ii_core import IICamera, IIPicture, preset, view_image
@@ -17,7 +17,7 @@ from raytrace_ii import load_scene, render, trace
 
 
 def quantised_maps() -> list[Row]:
-    """What `benchmarks.map_precision` measured."""
+    """What `benchmarks.accuracy.map_precision` measured."""
     rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
     return [
         {

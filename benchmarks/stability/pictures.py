@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.analytic import still_life
+from benchmarks.accuracy.analytic import still_life
 from benchmarks.stability import depth, geometry, light
 from codec import decode, encode
 from ii_core import add_sensor_noise, preset, read_maps, view_image, write_maps

@@ -1,6 +1,6 @@
 """Every figure and table of Olsson 2008 again, from one command; and what lies beyond them.
 
-    python -m benchmarks.study [--scale N] [--only NAME,...] [--out DIR] [--force] [--list] [--publish]
+    python -m benchmarks run study [--scale N] [--only NAME,...] [--out DIR] [--force] [--list] [--publish]
 
 Each experiment is a few named steps, which can be run alone (``--only rates-apples``, ``--only 'views-*'``). What a
 step found is one line of ``DIR/NAME.jsonl``, with commit, machine, versions and parameters; lines are only added. A

@@ -7,10 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any
 
-from benchmarks.coders import qualities
-from codec import encode, timed_decode
+from benchmarks.coding.coders import qualities
+from benchmarks.coding.rd import rd_point
 from ii_core import IIPicture, preset
-from metrics import q_global
 from raytrace_ii import Shot, load_scene, render
 from raytrace_ii.rendering.render import cores
 
@@ -18,7 +17,7 @@ SCENES = ("apples", "twins", "car", "cuboid")
 RATES = (0.015, 0.03, 0.06, 0.15, 0.3, 0.63, 1.0, 1.5)  # bit per pixel, the range of Olsson 2008, §5.7.3
 BY_QUANTISER = ("si-hevc", "ei-hevc", "si-av1", "ei-av1", "si-vp9")
 # Modules that every coded point comes from, for `Step.uses`.
-CODED = ("benchmarks.study.coding", "benchmarks.coders")
+CODED = ("benchmarks.study.coding", "benchmarks.coding.coders", "benchmarks.coding.rd")
 # Missed by as much, a rate lies below what the scheme can reach; by less it only fell between two quantisers.
 FLOOR = 1.1
 # Setup 3 has 64×64 lenses; with fewer than 16×16 its views are too small for the window of MSSIM.
@@ -40,18 +39,17 @@ def setup3_scale(scale: int) -> int:
 
 def point(picture: IIPicture, scheme: str, goal: Mapping[str, Any], measure: Measure | None = None) -> dict[str, Any]:
     """One operating point: rate, quality, and CPU seconds of one run inside encoder and decoder."""
-    coded = encode(picture, scheme, **goal)
-    decoded = timed_decode(coded)
+    made = rd_point(picture, scheme, **goal)
     return {
         "scheme": scheme,
-        "target_bpp": goal.get("bpp", coded.bpp),
-        "bpp": coded.bpp,
-        "reached": coded.reached,
-        "runs": coded.runs,
-        "q_global": q_global(picture, decoded.picture),
-        **(measure(decoded.picture) if measure else {}),
-        "encode_seconds": coded.codec_seconds,
-        "decode_seconds": decoded.codec_seconds,
+        "target_bpp": goal.get("bpp", made.bpp),
+        "bpp": made.bpp,
+        "reached": made.reached,
+        "runs": made.runs,
+        "q_global": made.q_global,
+        **(measure(made.picture) if measure else {}),
+        "encode_seconds": made.encoder_seconds,
+        "decode_seconds": made.decoder_seconds,
     }
 
 

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import coders
-from benchmarks.coders import ANCHOR, climbing
-from benchmarks.pages import Tables, filled
+from benchmarks.coding import coders
+from benchmarks.coding.coders import ANCHOR
+from benchmarks.coding.rd import climbing
+from benchmarks.pages.tables import Tables, filled
 from benchmarks.records import ROOT, origin, with_commits
 from ii_core.files import atomic_path
 from metrics import bd_psnr, bd_rate
@@ -343,7 +344,7 @@ def gains_modern(results: Results) -> list[str]:
 
 
 def bjontegaard(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """All schemes of `benchmarks.coders`: rate against the dissertation's SI-PVS and JPEG 2000, and gain in dB."""
+    """All schemes of `coders`: rate against the dissertation's SI-PVS and JPEG 2000, and gain in dB."""
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     curves = {(row["scene"], row["scheme"]): pairs(row["points"]) for row in rows}
     lines, commits = ["| scheme | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"], []

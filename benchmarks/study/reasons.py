@@ -13,8 +13,8 @@ from typing import Any
 import av
 import numpy as np
 
-from benchmarks.bare import bare_encoder
-from benchmarks.bframes import QUANTISERS, curve
+from benchmarks.coding.bframes import QUANTISERS, curve
+from benchmarks.speed.bare import bare_encoder
 from codec import encode, register, schemes
 from codec.coders.video import Settings
 from codec.coders.x264 import H264
@@ -43,11 +43,11 @@ def steps(scale: int) -> list[Step]:
             shows=f"Table 5.6 with exhaustive search, {scene}",
             run=searches,
             parameters={"scene": scene, "scale": scale},
-            uses=(*CODED, "benchmarks.bare"),
+            uses=(*CODED, "benchmarks.speed.bare"),
         )
         for scene in ("apples", "twins")
     ]
-    uses = (*CODED, "benchmarks.bframes")
+    uses = (*CODED, "benchmarks.coding.bframes")
     given = {"scene": "apples", "scale": scale}
     older = [
         Step(

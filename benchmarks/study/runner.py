@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.records import code_hash, plain, stamp
+from benchmarks.records import code_hash, cpu_seconds, plain, stamp
 from ii_core.json_lines import append_record, read_records
 from metrics import provenance
 
@@ -84,11 +83,6 @@ def performed(step: Step, folder: Path) -> dict[str, Any]:
         "pictures": {path.name: digest_of(path) for path in pictures_of(step, folder)},
         "result": plain(result),
     }
-
-
-def cpu_seconds() -> float:
-    """Of this process and of those it has waited for."""
-    return sum(os.times()[:4])
 
 
 def pictures_of(step: Step, folder: Path) -> list[Path]:

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.records import ROOT
+from benchmarks.registry import BENCHMARKS, entry
 
 from .runner import Step
 
+DEMO = "examples.demo"
 # Script, what it is for, arguments. In this order: `coding_docs` and `readme` put on pages what others found.
 SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-    ("gallery", "Figures 3.6, 3.7, 5.9: every camera with its maps, all scenes", ()),
+    ("cameras", "Figures 3.6, 3.7, 5.9: every camera with its maps, all scenes", ()),
     ("concepts", "Figures 2.24, 5.4: component images, orders", ()),
     ("camera_in_scene", "Table 3.2: a camera of glass inside the scene", ()),
     ("demo", "the README's chart", ()),
@@ -34,7 +36,7 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("pareto", "speed against accuracy of rendering", ()),
     ("needs", "what each scene needs", ()),
     ("metrics_speed", "what metrics cost", ()),
-    ("speed", "ratios to bare libraries", ()),
+    ("ratios", "ratios to bare libraries", ()),
     ("readme", "tables of the README", ()),
 )
 
@@ -50,7 +52,7 @@ def steps(scale: int) -> list[Step]:
             shows=shows,
             run=script,
             parameters={"script": name, "arguments": arguments},
-            uses=(f"benchmarks.{name}",),
+            uses=(DEMO if name == "demo" else entry(BENCHMARKS[name].module),),
         )
         for i, (name, shows, arguments) in enumerate(SCRIPTS)
     ]
@@ -58,6 +60,7 @@ def steps(scale: int) -> list[Step]:
 
 def script(_folder: Path, *, script: str, arguments: tuple[str, ...]) -> dict[str, Any]:
     """Run it; what it found stands in its own file and on its own page."""
-    command = ["-m", f"benchmarks.{script}", *arguments]
+    program = ["examples/demo.py"] if script == "demo" else ["-m", "benchmarks", "run", script]
+    command = [*program, *arguments]
     subprocess.run([sys.executable, *command], cwd=ROOT, check=True)
     return {"command": " ".join(["python", *command])}

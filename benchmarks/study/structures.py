@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from benchmarks.headers import SIDES, duel
+from benchmarks.coding.headers import SIDES, duel
 from ii_core import preset
 from raytrace_ii import load_scene, render
 from raytrace_ii.rendering.render import cores
@@ -33,7 +33,7 @@ def steps(scale: int) -> list[Step]:
                         shows="Figure 5.12" if smaller == 1 else "(5.14), (5.15) for smaller pictures",
                         run=duels,
                         parameters={"scene": scene, "scale": scale * smaller, "sides": sides},
-                        uses=("benchmarks.headers",),
+                        uses=("benchmarks.coding.headers",),
                     )
                 )
     return found

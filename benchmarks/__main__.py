@@ -1,0 +1,63 @@
+"""Command line of the benchmarks: list them, run some.
+
+    python -m benchmarks list [NAME ...]
+    python -m benchmarks run NAME ... [OPTION ...]
+
+Options belong to the benchmark: ``python -m benchmarks run coders --scale 8``, ``run stability -- bd_overlap``; they
+need a single name. ``python -m benchmarks run NAME --help`` prints them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from benchmarks.registry import BENCHMARKS, Benchmark
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """List or run benchmarks."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    first = next((i for i, word in enumerate(given) if word.startswith("-") and i > 1), len(given))
+    words, options = given[:first], given[first:]
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("command", choices=("list", "run"), nargs="?", default="list")
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    asked = parser.parse_args(words)
+    if unknown := [name for name in asked.names if name not in BENCHMARKS]:
+        parser.error(f"there is no benchmark {unknown[0]!r}: known are {', '.join(sorted(BENCHMARKS))}")
+    if asked.command == "list":
+        if options:
+            parser.error(f"list takes names alone, not {options[0]}")
+        for name in asked.names or BENCHMARKS:
+            print(description(BENCHMARKS[name]))
+        return
+    if not asked.names:
+        parser.error("run needs a name: python -m benchmarks list prints them")
+    if options and len(asked.names) > 1:
+        parser.error(f"options such as {options[0]} need a single name: {len(asked.names)} were given")
+    for name in asked.names:
+        BENCHMARKS[name].run(options[1:] if options[:1] == ["--"] else options)
+
+
+def description(benchmark: Benchmark) -> str:
+    """Return name, summary, needs, cost and files of a benchmark, for people."""
+    spent = benchmark.minutes()
+    cost = "no times recorded" if spent is None else f"{'at least ' * spent[1]}{spent[0]:.1f} min by its records"
+    files = [f"benchmarks/results/{benchmark.records}"] * bool(benchmark.records)
+    files += benchmark.writes
+    return "\n".join(
+        [
+            f"{benchmark.name} ({benchmark.room}): {benchmark.summary()}",
+            f"    needs   {benchmark.needs or 'nothing besides'}",
+            f"    costs   {cost}",
+            f"    writes  {', '.join(files) or 'tables of all pages'}",
+        ]
+    )
+
+
+if __name__ == "__main__":
+    main()

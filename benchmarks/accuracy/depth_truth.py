@@ -1,0 +1,287 @@
+"""How well depth from focus finds the depth that the renderer knows, and what its errors do to Q_depth.
+
+    python -m benchmarks run depth_truth [--scale 2] [--scenes apples,cuboid]
+
+Errors are counted in depth layers over the view pixels that hit something within the 250 layers. They are also told
+apart by what is seen, the first that holds: ``clear``, a body that hands light on; ``mirror``, one that reflects;
+``edge``, one view pixel or less from a step in depth of more than a fifth, where what is seen is hidden from lenses
+nearby; ``flat``, without texture to go by (within a pixel of the elementary image luma changes by less than 3 steps
+of 8 bits); else ``textured``. Sensor noise is that of scale 8, where an array is 64 lenses wide. Numbers go to
+``benchmarks/results/depth_truth.jsonl``, the chart drawn from them to ``docs/images/depth_truth.png``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter, minimum_filter
+
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import ROOT, Records, add_again, origin, with_commits
+from codec import decode, encode
+from ii_core import IIPicture, add_sensor_noise, preset
+from ii_core.view import camera_of
+from metrics import DepthQuality, FocusDepth, depth_from_focus, linear_layers, q_depth
+from metrics.depth.focus import METHODS
+from metrics.depth.virtual_camera import virtual_camera_pixels
+from metrics.plots.rd_chart import COLOURS, new_figure, save
+from raytrace_ii import Scene, Shot, load_scene, render
+
+RECORDS, CHART = Records("depth_truth", ("benchmarks.accuracy.depth_truth",)), ROOT / "docs/images/depth_truth.png"
+SCALE = 2  # of the page
+SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
+KINDS = ("textured", "flat", "edge", "mirror", "clear")
+NOISES = (0, 1, 2, 4, 8)
+NOISE_SCALE = 8
+SURE = 0.5  # confidence
+FEW = 10  # pixels: the PSNR of a layer of fewer is left to chance
+BINS = np.geomspace(2.5, 250.5, 25)  # edges, in layers: what the chart pools
+BPP = 0.35  # of JPEG 2000, the distortion that Q_depth is asked about
+SHADES = {"dissertation": COLOURS[1], "robust": COLOURS[0], "true": "0.15"}
+
+
+def main() -> None:
+    """Measure, keep, print and draw."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=SCALE, help="divides setup1's lenses")
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    add_again(parser)
+    asked = parser.parse_args()
+    keys = [
+        {"scene": name, "scale": scale, "bpp": BPP}
+        for name in asked.scenes.split(",")
+        for scale in (NOISE_SCALE, asked.scale)
+    ]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda key=key: study(key["scene"], key["scale"]))
+    save(draw(data()), CHART)
+    publish(tables())
+
+
+def study(name: str, scale: int) -> dict[str, Any]:
+    """Errors of both methods on one picture, at the scale for noise with all noises; Q_depth at others."""
+    scene = load_scene(name)
+    shot = render(scene, preset("setup1", scale=scale), support=("depth", "object_id"))
+    kinds, rows = tell_apart(scene, shot), []
+    for noise in NOISES if scale == NOISE_SCALE else (0,):
+        found = estimates(add_sensor_noise(shot.picture, noise, seed=1))
+        for method, (depth, seconds) in found.items():
+            rows.append({"noise": noise, "method": method, **errors(depth, shot, kinds), "cpu_seconds": seconds})
+            say({"scene": name, "scale": scale, **rows[-1]})
+    return {"errors": rows, "q_depth": None if scale == NOISE_SCALE else quality(shot, found)}
+
+
+def data() -> dict[str, list[dict[str, Any]]]:
+    """Return the newest rows of errors and curves of Q_depth, of the scales on the page."""
+    kept = [row for row in RECORDS.rows(bpp=BPP) if row["scale"] in (NOISE_SCALE, SCALE)]
+    known = ("scene", "scale", "commit")
+    return {
+        "rows": [{**{k: row[k] for k in known}, **one} for row in kept for one in row["errors"]],
+        "q_depth": [{**{k: row[k] for k in known}, **row["q_depth"]} for row in kept if row["q_depth"]],
+    }
+
+
+def tables() -> Tables:
+    """Return the table of what is kept."""
+    return {("docs/metrics.md", "depth-truth"): table(data())}
+
+
+def table(data: dict[str, Any]) -> list[str]:
+    """Both methods, scene by scene, without noise."""
+    head = ("scene", "scale", "median", "90 %", "within 1 layer", "within 10 %", "Q_depth off")
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    commits = []
+    for row in data["rows"]:
+        if row["noise"] or row["method"] != METHODS[0]:
+            continue
+        both = [_only(data["rows"], **{**_key(row), "method": method})[0] for method in METHODS]
+        curve = _only(data["q_depth"], scene=row["scene"], scale=row["scale"])
+        off = [f"{curve[0][f'{method}_off_db']:.1f}" for method in METHODS] if curve else ["–", "–"]
+        cells = [
+            *(" → ".join(f"{r[key]:.0f}" for r in both) for key in ("median_layers", "p90_layers")),
+            *(" → ".join(f"{r[key]:.0%}" for r in both) for key in ("within_one_layer", "within_10_%")),
+            " → ".join(off) + (" dB" if curve else ""),
+        ]
+        lines.append(f"| {row['scene']} | {row['scale']} | " + " | ".join(cells) + " |")
+        commits.append([row["commit"]])
+    told = "Each cell: the dissertation's method → the robust one. Errors are in layers."
+    return [*with_commits(lines, commits), "", told, origin(data["rows"])]
+
+
+def _key(row: dict[str, Any]) -> dict[str, Any]:
+    return {name: row[name] for name in ("scene", "scale", "noise")}
+
+
+def estimates(picture: IIPicture) -> dict[str, tuple[FocusDepth, float]]:
+    """Depth by each method, and the CPU seconds it took."""
+    found = {}
+    for method in METHODS:
+        started = time.process_time()
+        depth = depth_from_focus(picture, method=method, layers_mm=linear_layers(camera_of(picture)))
+        found[method] = depth, time.process_time() - started
+    return found
+
+
+def say(row: dict[str, Any]) -> None:
+    """The gist of a row."""
+    shown = ("scene", "scale", "noise", "method", "median_layers", "p90_layers", "within_one_layer", "within_10_%")
+    print("  ".join(f"{row[k]:.3g}" if isinstance(row[k], float) else str(row[k]) for k in shown), flush=True)
+
+
+def errors(found: FocusDepth, shot: Shot, kinds: NDArray[np.int64]) -> dict[str, Any]:
+    """Errors of the estimate in layers, all together, by kind and where it is sure."""
+    camera = shot.picture.camera
+    assert camera is not None and shot.depth is not None
+    z = shot.depth[virtual_camera_pixels(camera)] / np.float64(camera.gap_mm)
+    with np.errstate(invalid="ignore"):
+        counted = (z >= 0.5) & (z < found.layers_mm.size + 0.5)
+    error = np.where(found.layer < 0, np.inf, np.abs(found.layer + 1 - np.floor(z + 0.5)))
+    near = np.abs(found.depth_mm / camera.gap_mm - z) < 0.1 * z
+    sure = counted & (found.confidence > SURE)
+    row: dict[str, Any] = {
+        "median_layers": float(np.median(error[counted])),
+        "p90_layers": float(np.quantile(error[counted], 0.9, method="higher")),
+        "within_one_layer": _share(error[counted] <= 1),
+        "within_10_%": _share(near[counted]),
+        "too_near": _share((found.layer + 2 < np.floor(z + 0.5))[counted]),
+        "without_depth": _share((found.layer < 0)[counted]),
+        "sure": float(sure.sum() / counted.sum()),
+        "within_10_%_where_sure": _share(near[sure]),
+    }
+    for i, kind in enumerate(KINDS):
+        here = counted & (kinds == i)
+        row[f"pixels_{kind}"] = int(here.sum())
+        row[f"within_one_layer_{kind}"] = _share(error[here] <= 1)
+        row[f"within_10_%_{kind}"] = _share(near[here])
+    return row
+
+
+def _share(right: NDArray[np.bool_]) -> float:
+    return float(right.mean()) if right.size else float("nan")
+
+
+def tell_apart(scene: Scene, shot: Shot) -> NDArray[np.int64]:
+    """Which of KINDS each view pixel is."""
+    assert shot.picture.camera is not None and shot.depth is not None and shot.object_id is not None
+    index = virtual_camera_pixels(shot.picture.camera)
+    z = shot.depth[index]
+    far = np.where(np.isnan(z), 1e6, z)
+    edge = maximum_filter(far, 3) > 1.2 * minimum_filter(far, 3)
+    luma = shot.picture.pixels.astype(np.float32) @ np.float32([0.299, 0.587, 0.114])
+    flat = (maximum_filter(luma, 3) - minimum_filter(luma, 3))[index] < 3
+    body = {body.name: body.material for body in scene.bodies}
+    materials = [body[name] for name in shot.object_names]
+    seen = shot.object_id[index]
+    mirror = np.array([max(m.mirror) > 0 for m in materials] + [False])[seen]  # −1, nothing, is the last
+    clear = np.array([max(m.transmission) > 0 for m in materials] + [False])[seen]
+    return np.select([clear, mirror, edge, flat], [4, 3, 2, 1], 0)
+
+
+def quality(shot: Shot, found: dict[str, tuple[FocusDepth, float]]) -> dict[str, Any]:
+    """Q_depth of a coded picture with true and with estimated depth."""
+    picture: IIPicture = shot.picture
+    decoded = decode(encode(picture, "jpeg2000", bpp=BPP))
+    true = q_depth(picture, decoded, depth=shot.depth, layers_mm=linear_layers(camera_of(picture)))
+    at = [round(float(x), 2) for x in np.sqrt(BINS[1:] * BINS[:-1])]
+    row: dict[str, Any] = {"layer": at, "true": pooled(true)}
+    for method, (depth, _) in found.items():
+        row[method] = pooled(q_depth(picture, decoded, depth=depth))
+        pairs = [(a, b) for a, b in zip(row["true"], row[method], strict=True) if a is not None and b is not None]
+        row[f"{method}_off_db"] = float(np.mean([abs(a - b) for a, b in pairs]))
+        row[f"{method}_bins_made_up"] = sum(b is not None for b in row[method]) - len(pairs)
+        print(f"Q_depth {method}: {row[f'{method}_off_db']:.2f} dB off in {len(pairs)} bins")
+    return row
+
+
+def pooled(quality: DepthQuality) -> list[float | None]:
+    """Q_depth of the layers within each of BINS together, None of fewer than FEW pixels."""
+    d = np.arange(1, quality.values.size + 1)
+    error = np.where(quality.counts > 0, quality.counts / 10 ** (quality.values / 10), 0.0)
+    counts, errors = (np.histogram(d, BINS, weights=w)[0] for w in (quality.counts, error))
+    return [
+        round(float(10 * np.log10(c / e)), 2) if c >= FEW and e > 0 else None
+        for c, e in zip(counts, errors, strict=True)
+    ]
+
+
+def draw(data: dict[str, Any]) -> Any:
+    """Above Q_depth with true and estimated depth, scene by scene; below, where depth is right and where not."""
+    figure = new_figure(15, 11)
+    upper, lower = figure.subfigures(2, 1, height_ratios=[3, 2])
+    panels = upper.subplots(2, 4)
+    for axes, curve in zip(panels.flat, data["q_depth"], strict=False):
+        for name, marker in (("true", "o"), ("dissertation", "s"), ("robust", "^")):
+            values = np.array([np.nan if v is None else v for v in curve[name]], float)
+            here = np.isfinite(values)  # a line goes on over bins that hold nothing
+            label = "true depth" if name == "true" else f"from focus, {name}"
+            layer = np.array(curve["layer"])[here]
+            axes.plot(
+                layer, values[here], marker=marker, color=SHADES[name], markersize=4, linewidth=1.3, label=label
+            )
+        axes.set_xscale("log")
+        axes.set_xticks([5, 10, 20, 50, 100, 200], ["5", "10", "20", "50", "100", "200"])
+        axes.minorticks_off()
+        off = ", ".join(f"{curve[f'{method}_off_db']:.1f}" for method in METHODS)
+        axes.set_title(f"{curve['scene']}: {off} dB off", loc="left", fontsize=10)
+    for axes in panels[:, 0]:
+        axes.set_ylabel(r"$Q_\mathrm{depth}$ [dB]")
+    for axes in panels[-1]:
+        axes.set_xlabel("depth layer d, pooled in 24 bins")
+    upper.suptitle(f"JPEG 2000 at {BPP} bit/pixel, scale {data['q_depth'][0]['scale']}", fontsize=11)
+    handles, names = panels[0, 0].get_legend_handles_labels()
+    upper.legend(handles, names, loc="outside lower right", ncols=3, frameon=False)
+
+    rows = data["rows"]
+    fine = [row for row in rows if row["scale"] != NOISE_SCALE] or rows
+    by_scene, by_kind, by_noise = lower.subplots(1, 3, width_ratios=[8, 5, 5])
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    _bars(by_scene, scenes, lambda name, method: _only(fine, scene=name, method=method)[0]["p90_layers"])
+    by_scene.set_yscale("log")
+    by_scene.set_ylabel("90 % of the errors are below [layers]")
+    kinds = {f"{kind}\n{_part(fine, kind):.0f} %": kind for kind in KINDS}
+    _bars(by_kind, list(kinds), lambda name, method: _pooled(_only(fine, method=method), kinds[name]))
+    by_kind.set_ylabel("depth right within 10 % [%]")
+    by_kind.set_title("all scenes, by what is seen (share of the views)", loc="left", fontsize=10)
+    coarse = [row for row in rows if row["scale"] == NOISE_SCALE]
+    _bars(by_noise, list(NOISES), lambda noise, method: 100 * np.mean(
+        [row["within_10_%"] for row in _only(coarse, noise=noise, method=method)]))  # fmt: skip
+    by_noise.set_xlabel("sensor noise σ [steps of 8 bits]")
+    by_noise.set_ylabel("depth right within 10 % [%]")
+    by_noise.set_title(f"all scenes, scale {NOISE_SCALE}", loc="left", fontsize=10)
+    for axes in (*panels.flat, by_scene, by_kind, by_noise):
+        axes.grid(True, axis="y", color="0.9", linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def _bars(axes: Any, groups: list[Any], value: Any) -> None:
+    for i, method in enumerate(METHODS):
+        heights = [value(group, method) for group in groups]
+        bars = axes.bar(np.arange(len(groups)) + 0.4 * i - 0.2, heights, 0.38, color=SHADES[method], label=method)
+        axes.bar_label(bars, [f"{height:.0f}" for height in heights], fontsize=8)
+    axes.set_xticks(range(len(groups)), groups, fontsize=9)
+
+
+def _only(rows: list[dict[str, Any]], **wanted: Any) -> list[dict[str, Any]]:
+    return [row for row in rows if all(row[key] == value for key, value in wanted.items())]
+
+
+def _part(rows: list[dict[str, Any]], kind: str) -> float:
+    """Percent of all view pixels that are of a kind."""
+    return 100 * sum(row[f"pixels_{kind}"] for row in rows) / sum(row[f"pixels_{k}"] for row in rows for k in KINDS)
+
+
+def _pooled(rows: list[dict[str, Any]], kind: str) -> float:
+    """Percent right of all pixels of a kind."""
+    held = [row for row in rows if row[f"pixels_{kind}"]]
+    right = sum(row[f"pixels_{kind}"] * row[f"within_10_%_{kind}"] for row in held)
+    return 100 * right / max(sum(row[f"pixels_{kind}"] for row in held), 1)
+
+
+if __name__ == "__main__":
+    main()

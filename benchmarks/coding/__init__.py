@@ -1,0 +1,1 @@
+"""Benchmarks of coders: rate, quality, header portions, cost and damaged input."""

@@ -1,0 +1,117 @@
+"""Why B pictures hurt in the dissertation's Table 5.5 and help elsewhere: one thing changed at a time.
+
+``python -m benchmarks run bframes --scale 4`` codes sub-images of four scenes with 0 to 3 and 7 B pictures between P
+pictures under several conditions. What is kept is the Bjøntegaard difference in PSNR to the same condition without
+B pictures, a row a scene and condition, in ``benchmarks/results/bframes.jsonl``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from benchmarks.coding.rd import climbing, rd_point
+from benchmarks.records import Records, add_again, origin, with_commits
+from ii_core import IIPicture, preset
+from metrics import bd_psnr
+from metrics.rd import UndefinedDifference
+from raytrace_ii import load_scene, render
+
+RECORDS = Records("bframes", ("benchmarks.coding.bframes", "benchmarks.coding.rd"))
+SCALE = 4  # of the page
+COUNTS = (1, 2, 3, 7)
+QUANTISERS = (21, 27, 33, 39, 45)
+RATES = (0.1, 0.2, 0.4, 0.8, 1.6)
+CQ = [{"qp": quantiser} for quantiser in QUANTISERS]
+# What is changed, the scheme, what it is asked for.
+CONDITIONS: list[tuple[str, str, list[dict[str, Any]]]] = [
+    ("constant quantiser, B coarser by 1.3, 4:2:0", "si-h264:rate=cq,chroma=420", CQ),
+    ("the same at 4:4:4", "si-h264:rate=cq", CQ),
+    ("B as fine as P", "si-h264:rate=cq,chroma=420,pbratio=1", CQ),
+    ("B coarser by 2", "si-h264:rate=cq,chroma=420,pbratio=2", CQ),
+    ("B predict B", "si-h264:rate=cq,chroma=420,pyramid=1", CQ),
+    ("B predict B, as fine as P", "si-h264:rate=cq,chroma=420,pyramid=1,pbratio=1", CQ),
+    ("GOP of 32", "si-h264:rate=cq,chroma=420,gop=32", CQ),
+    ("order row, not parallel", "si-h264:rate=cq,chroma=420,order=row", CQ),
+    ("an encoder in haste (veryfast)", "si-h264:rate=cq,chroma=420,preset=veryfast", CQ),
+    ("constant bit rate", "si-h264:chroma=420", [{"bpp": bpp} for bpp in RATES]),
+    ("rate factor, macroblock tree, B predict B", "si-h264:rate=crf,chroma=420,pyramid=1", CQ),
+    ("MPEG-2", "si-mpeg2", [{"qp": quantiser} for quantiser in (2, 4, 8, 14, 22)]),
+    ("HEVC, constant quantiser", "si-hevc:rate=cq,preset=medium,chroma=420", CQ),
+]
+
+
+def main() -> None:
+    """Measure, print and keep."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=SCALE, help="divides the number of lenses of setup1")
+    parser.add_argument("--scenes", default="apples,twins,car,cuboid")
+    parser.add_argument("--workers", type=int, default=1)
+    add_again(parser)
+    asked = parser.parse_args()
+    conditions = {name: rest for name, *rest in CONDITIONS}
+    for scene in asked.scenes.split(","):
+        keys = RECORDS.todo(
+            ({"scene": scene, "scale": asked.scale, "condition": name} for name in conditions), asked.again
+        )
+        if not keys:
+            continue
+        picture = render(load_scene(scene), preset("setup1", scale=asked.scale), noise=1.0, support=()).picture
+
+        def row(key: dict[str, Any], picture: IIPicture = picture) -> None:
+            scheme, goals = conditions[key["condition"]]
+            found = RECORDS.measure(key, lambda: {"scheme": scheme, "psnr": differences(picture, scheme, goals)})
+            print(f"{key['scene']:<8} {key['condition']:<44} {found['result']['psnr']}", flush=True)
+
+        with ThreadPoolExecutor(asked.workers) as pool:
+            list(pool.map(row, keys))
+
+
+def table() -> list[str]:
+    """Difference in dB against no B pictures, by condition and number."""
+    rows = RECORDS.rows(scale=SCALE)
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    lines = [f"| `setup1` at scale {SCALE} | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]
+    commits = []
+    for condition in dict.fromkeys(row["condition"] for row in rows):
+        own = {row["scene"]: row for row in rows if row["condition"] == condition}
+        cells = [" · ".join(map(_decibel, own[s]["psnr"].values())) if s in own else "–" for s in scenes]
+        lines.append(f"| {condition} | {' | '.join(cells)} |")
+        commits.append([row["commit"] for row in own.values()])
+    return [origin(rows), "", *with_commits(lines, commits)]
+
+
+def _decibel(value: float | None) -> str:
+    return "–" if value is None else f"{value:+.2f}"
+
+
+def differences(picture: IIPicture, scheme: str, asked: list[dict[str, Any]]) -> dict[str, float | None]:
+    """Number of B pictures to the mean difference in dB against none; None where the curves cannot be compared."""
+    most = 3 if "mpeg2" in scheme else max(COUNTS)
+    without = curve(picture, scheme, 0, asked)
+    out: dict[str, float | None] = {}
+    for count in COUNTS:
+        if count <= most:
+            try:
+                out[str(count)] = round(bd_psnr(*without, *curve(picture, scheme, count, asked)), 2)
+            except UndefinedDifference:
+                out[str(count)] = None
+    return out
+
+
+def curve(
+    picture: IIPicture, scheme: str, count: int, asked: list[dict[str, Any]]
+) -> tuple[list[float], list[float]]:
+    """Rates and PSNR with so many B pictures."""
+    comma = "," if ":" in scheme else ":"
+    points = []
+    for goal in asked:
+        point = rd_point(picture, f"{scheme}{comma}bframes={count}", **goal)
+        points.append({"bpp": point.bpp, "psnr": point.q_global})
+    kept = climbing(points)
+    return [point["bpp"] for point in kept], [point["psnr"] for point in kept]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,302 @@
+"""Every scheme and named setting against the dissertation's: rate at equal quality, and what it costs.
+
+    python -m benchmarks run coders [--scale 4] [--scenes apples,car] [--schemes 'si-h264,si-av1*'] [--workers 2]
+
+The four coding scenes are rendered and coded with everything that is registered and with the trials below. Every
+scheme on every scene is a row of ``benchmarks/results/coders.jsonl``, written when it is measured: a run that was
+stopped goes on where it was. ``python -m benchmarks run coding_docs`` draws charts and fills pages from the rows. The
+anchor is the dissertation's SI-PVS: H.264, one I picture and P pictures, 4:2:0, constant quantiser, parallel order.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from fnmatch import fnmatch
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.coding.rd import climbing, rd_point
+from benchmarks.records import Records, add_again, origin, with_commits
+from codec import parse_scheme, schemes
+from codec.contract import find
+from ii_core import IIPicture, preset
+from metrics import bd_rate
+from metrics.rd import UndefinedDifference
+from raytrace_ii import load_scene, render
+
+RECORDS = Records("coders", ("benchmarks.coding.coders", "benchmarks.coding.rd"))
+SCENES = ("apples", "twins", "car", "cuboid")
+ANCHOR = "si-h264:chroma=420,rate=cq"
+RATES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
+# Quantisers, by coder, that spread over the qualities of the anchor's.
+QUANTISERS = {
+    "h264": (16, 21, 26, 31, 36, 41, 46),
+    "hevc": (14, 19, 24, 29, 34, 39, 44),
+    "av1": (8, 18, 28, 38, 46, 54, 62),
+    "vp9": (8, 18, 28, 38, 46, 54, 62),
+    "avif": (8, 18, 28, 38, 46, 54, 62),
+    "mpeg2": (1, 2, 4, 7, 12, 20, 31),
+}
+LETTERS = 7  # points high, of labels in the chart
+NEAR = 0.1  # of the least rate: what the recommended setting may cost more
+# One thing changed at a time: what the defaults and presets were found by.
+TRIALS = (
+    "si-h264:rate=cq",
+    "si-h264:rate=cq,depth=10",
+    "si-h264:rate=crf",
+    "si-h264:rate=cq,bframes=3",
+    "si-h264:rate=cq,bframes=7,pyramid=1",
+    "si-h264:rate=crf,bframes=7,pyramid=1",
+    "si-h264:rate=crf,bframes=16,pyramid=1",
+    *(f"si-h264:rate=cq,order={order},by={by}" for order in ("row", "parallel", "zigzag", "spiral") for by in (
+        "rows", "columns") if (order, by) != ("parallel", "rows")),
+    "si-h264:balanced,merange=64",
+    "si-hevc:rate=cq",
+    "si-hevc:depth=8",
+    "si-hevc:chroma=420",
+    "si-hevc:bframes=0",
+    "si-hevc:bframes=8",
+    "si-hevc:merange=128",
+    "si-hevc:preset=veryslow",
+    "si-hevc:by=columns",
+    "si-av1:rate=cq",
+    "si-av1:depth=8",
+    "si-av1:by=columns",
+    "si-av1:preset=5",
+    "si-vp9:chroma=420",
+)  # fmt: skip
+
+
+def main() -> None:
+    """Measure the rows that are asked for and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    parser.add_argument(
+        "--schemes",
+        default="*",
+        help="only these, * for anything, options parted by semicolons: si-av1*,si-h264:balanced;merange=64",
+    )
+    parser.add_argument("--workers", type=int, default=1)
+    add_again(parser)
+    asked = parser.parse_args()
+    chosen = [one.replace(";", ",") for one in asked.schemes.split(",")]
+    names = [name for name in candidates() if name == ANCHOR or any(fnmatch(name, one) for one in chosen)]
+    if unknown := [one for one in chosen if not any(fnmatch(name, one) for name in names)]:
+        parser.error(f"no scheme {unknown[0]!r}: known are {', '.join(candidates())}")
+    for scene in asked.scenes.split(","):
+        keys = RECORDS.todo(({"scene": scene, "scale": asked.scale, "scheme": name} for name in names), asked.again)
+        print(f"{scene}: {len(keys)} of {len(names)} curves to measure", flush=True)
+        if keys:
+            picture = render(load_scene(scene), preset("setup1", scale=asked.scale), noise=1.0, support=()).picture
+            measure(picture, keys, asked.workers)
+    for line in table(studied(asked.scale)):
+        print(line)
+
+
+def measure(picture: IIPicture, keys: Sequence[Mapping[str, Any]], workers: int) -> None:
+    """Measure and record curves of one picture; an interrupt drops the curves not yet begun."""
+
+    done = count(1)
+
+    def row(key: Mapping[str, Any]) -> None:
+        record = RECORDS.measure(key, lambda: {"points": curve(picture, key["scheme"])})
+        print(f"{next(done)} of {len(keys)}: {key['scene']} {key['scheme']}, {record['seconds']:.1f} s", flush=True)
+
+    pool = ThreadPoolExecutor(workers)
+    try:
+        for future in [pool.submit(row, key) for key in keys]:
+            future.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def studied(scale: int) -> list[dict[str, Any]]:
+    """Return the newest row of every scene and scheme at a scale, compared with the scene's anchor."""
+    rows = RECORDS.rows(scale=scale)
+    anchors = {row["scene"]: row["points"] for row in rows if row["scheme"] == ANCHOR}
+    return [{**row, **compared(anchors[row["scene"]], row["points"])} for row in rows if row["scene"] in anchors]
+
+
+def candidates() -> list[str]:
+    """The anchor, every scheme that can trade rate for quality, its presets, and the trials."""
+    lossy = [name for name in schemes() if qualities(name)]
+    named = [f"{name}:{setting}" for name in lossy for setting in find(name).presets]
+    return list(dict.fromkeys([ANCHOR, *lossy, *named, *TRIALS]))
+
+
+def qualities(scheme: str) -> list[dict[str, Any]]:
+    """What to ask a scheme for, point by point; nothing of what is lossless."""
+    coder, options = parse_scheme(scheme)
+    if coder.lossless(options):
+        return []
+    standard = coder.name.partition("-")[2]
+    if standard in QUANTISERS:
+        return [{"qp": qp} for qp in QUANTISERS[standard]]
+    if coder.rate_control:
+        return [{"bpp": bpp} for bpp in RATES]
+    for key, bounds in (("qp", coder.qp_range), ("quality", coder.quality_range)):
+        if bounds is not None:
+            low, high = bounds
+            return [{key: type(low)(low + (high - low) * part)} for part in np.linspace(0.05, 0.95, len(RATES))]
+    return []
+
+
+def curve(picture: IIPicture, scheme: str) -> list[dict[str, float]]:
+    """Rate, PSNR and CPU seconds of one run of the coder, at every quality."""
+    points = []
+    for goal in qualities(scheme):
+        point = rd_point(picture, scheme, **goal)
+        points.append(
+            {
+                "bpp": point.bpp,
+                "psnr": point.q_global,
+                "codec_seconds": point.encoder_seconds or 0.0,
+                "encode_seconds": point.encode_seconds or 0.0,
+                "decode_seconds": point.decode_seconds,
+                "runs": point.runs,
+            }
+        )
+    return points
+
+
+def compared(anchor: list[dict[str, float]], points: list[dict[str, float]]) -> dict[str, Any]:
+    """Bjøntegaard rate against the anchor in percent, or why there is none; mean CPU seconds of a run."""
+    seconds = statistics.mean(point["codec_seconds"] for point in points)
+    pairs = [[(p["bpp"], p["psnr"]) for p in climbing(some)] for some in (anchor, points)]
+    try:
+        rate = bd_rate(*zip(*pairs[0], strict=True), *zip(*pairs[1], strict=True))
+        return {"bd_rate": round(rate, 2), "seconds": seconds}
+    except UndefinedDifference as error:
+        return {"bd_rate": None, "why": error.short, "seconds": seconds}
+
+
+def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Per scheme: the rate of every scene, their mean where all have one, and the mean seconds; best first."""
+    out = []
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    for scheme in dict.fromkeys(row["scheme"] for row in rows):
+        own = [row for row in rows if row["scheme"] == scheme]
+        rates = {**dict.fromkeys(scenes), **{row["scene"]: row["bd_rate"] for row in own}}
+        known = [rate for rate in rates.values() if rate is not None]
+        mean = statistics.mean(known) if len(known) == len(scenes) else None
+        seconds = statistics.mean(row["seconds"] for row in own)
+        commits = [row["commit"] for row in own]
+        out.append({"scheme": scheme, "rates": rates, "mean": mean, "seconds": seconds, "commits": commits})
+    return sorted(out, key=lambda row: (row["mean"] is None, row["mean"] or 0.0))
+
+
+def table(rows: list[dict[str, Any]]) -> list[str]:
+    """Lines of a Markdown table."""
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    lines = [f"| scheme | {' | '.join(scenes)} | mean | CPU s |", "|---" * (len(scenes) + 3) + "|"]
+    best = summary(rows)
+    for row in best:
+        cells = [_percent(row["rates"][scene]) for scene in scenes]
+        lines.append(f"| `{row['scheme']}` | {' | '.join(cells)} | {_percent(row['mean'])} | {row['seconds']:.2f} |")
+    return with_commits(lines, [row["commits"] for row in best])
+
+
+def _percent(rate: float | None) -> str:
+    return "–" if rate is None else f"{rate:+.0f} %"
+
+
+def front(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Those that nothing as quick is better than."""
+    best: list[dict[str, Any]] = []
+    for row in sorted((r for r in summary(rows) if r["mean"] is not None), key=lambda r: r["seconds"]):
+        if not best or row["mean"] < best[-1]["mean"]:
+            best.append(row)
+    return best
+
+
+def recommended(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Of the front, the quickest whose rate is within NEAR of the least."""
+    edge = front([row for row in rows if row["scheme"] not in TRIALS])
+    return next(row for row in edge if 100 + row["mean"] <= (1 + NEAR) * (100 + edge[-1]["mean"]))
+
+
+def together(shown: list[dict[str, Any]]) -> list[tuple[str, dict[str, Any]]]:
+    """A label for each point: names whose rates are alike, as a default's and a preset's, share one."""
+    groups: dict[Any, list[dict[str, Any]]] = {}
+    for row in shown:
+        groups.setdefault((row["scheme"].partition(":")[0], round(row["mean"])), []).append(row)
+    labels = []
+    for group in groups.values():
+        first = min(group, key=lambda row: len(row["scheme"]))
+        rest = [":" + row["scheme"].partition(":")[2] for row in group if row is not first]
+        labels.append((", ".join([first["scheme"], *rest]), first))
+    return labels
+
+
+def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
+    """Encode time against rate, with the front of what is worth its time."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    figure, axes = plt.subplots(figsize=(13, 10), constrained_layout=True)
+    colours = {"h264": "C0", "hevc": "C1", "av1": "C2", "vp9": "C4", "mpeg2": "C5"}
+    shapes = {"ei": "s", "ri": "^", "si": "o"}
+    shown = [row for row in summary(rows) if row["mean"] is not None and row["scheme"] not in TRIALS]
+    edge, pick = front([row for row in rows if row["scheme"] not in TRIALS]), recommended(rows)
+    named = [(names, (row["seconds"], 1 + row["mean"] / 100), row["scheme"]) for names, row in together(shown)]
+    for _, at, scheme in named:
+        kind, _, coder = scheme.partition(":")[0].partition("-")
+        axes.plot(*at, shapes.get(kind, "D"), color=colours.get(coder, "0.5"))
+    axes.plot(pick["seconds"], 1 + pick["mean"] / 100, "*k", markersize=16, zorder=0, label="recommended")
+    axes.legend(frameon=False)
+    axes.margins(x=0.12)
+    axes.step([r["seconds"] for r in edge], [1 + r["mean"] / 100 for r in edge], "k-", lw=0.8, where="post")
+    axes.set(xscale="log", yscale="log", xlabel="CPU seconds of one encoder run, mean over rates and scenes")
+    axes.set_ylabel("rate at equal PSNR, relative to the dissertation's SI-PVS")
+    measured = origin(rows).replace("`", "")
+    axes.set_title(f"Speed against accuracy, setup1 at scale {scale}; the line is the Pareto front\n{measured}")
+    ticks = [0.3, 0.4, 0.5, 0.6, 0.8, 1, 1.5, 2, 3, 5, 8, 12, 20, 30]
+    low, high = axes.get_ylim()
+    axes.set_yticks([tick for tick in ticks if low < tick < high])
+    axes.yaxis.set_major_formatter("{x:g} ×")
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.grid(alpha=0.3, which="both")
+    figure.canvas.draw()  # only now is it known where points lie
+    for (names, at, _), offset in zip(named, offsets(named, axes), strict=True):
+        axes.annotate(names, at, offset, textcoords="offset points", fontsize=LETTERS)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def offsets(named: list[tuple[str, tuple[float, float], str]], axes: Any) -> list[tuple[float, float]]:
+    """Where labels stand, in typographic points from theirs: the first place that nothing else takes."""
+    per_point = axes.figure.dpi / 72
+    spots = [axes.transData.transform(at) / per_point for _, at, _ in named]
+    taken = [(x - 4, y - 4, x + 4, y + 4) for x, y in spots]
+    found = []
+    for (names, _, _), (x, y) in zip(named, spots, strict=True):
+        width, height = 0.55 * LETTERS * len(names), 1.1 * LETTERS
+        places = [(side, 3 + step * height) for step in (0, -1.5, 1, -2.5, 2, -3.5) for side in (5, -5 - width)]
+        boxes = [(x + dx, y + dy, x + dx + width, y + dy + height) for dx, dy in places]
+        free = [not any(touch(box, other) for other in taken) for box in boxes]
+        best = free.index(True) if any(free) else 0
+        taken.append(boxes[best])
+        found.append(places[best])
+    return found
+
+
+def touch(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    """Whether two boxes (left, bottom, right, top) overlap."""
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,155 @@
+"""What coding costs: CPU time inside the coder, rearrangement apart, and peak memory, for every scheme.
+
+    python -m benchmarks run cost [--scale 2] [--scene apples] [--schemes si-h264,...] [--runs 3]
+
+Every scheme has a process of its own. After a small picture, which pays for imports and compiled kernels, the picture
+is coded and decoded ``runs`` times; medians of CPU time, and the growth of resident memory at its peak over what was
+there with the picture loaded, divided by the picture's own bytes (3 a pixel). Coded in the middle of the scheme's
+quantisers or qualities, in one run without search for a rate. Numbers go to ``benchmarks/results/cost.jsonl``, the
+table into ``docs/structure.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from benchmarks.coding.fuzz import sample
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import Records, add_again, origin, with_commits
+from codec import Encoded, encode, schemes, timed_decode
+from codec.contract import find
+from ii_core import IIPicture, preset
+from metrics import q_global
+from raytrace_ii import load_scene, render
+
+RECORDS = Records("cost", ("benchmarks.coding.cost", "benchmarks.coding.fuzz"))
+SCENE, SCALE, RUNS = "apples", 2, 3  # of the page
+PAGES = Path("/proc/self/statm")
+
+
+def main() -> None:
+    """Measure, print, keep and fill the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=SCALE)
+    parser.add_argument("--scene", default=SCENE)
+    parser.add_argument("--schemes", default=",".join(schemes()))
+    parser.add_argument("--runs", type=int, default=RUNS)
+    add_again(parser)
+    parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.one:
+        print(json.dumps(measured(arguments.one[0], IIPicture.load(arguments.one[1]), arguments.runs)))
+        return
+    picture_of = {"scene": arguments.scene, "scale": arguments.scale}
+    names = arguments.schemes.split(",")
+    keys = RECORDS.todo(({**picture_of, "scheme": name, "runs": arguments.runs} for name in names), arguments.again)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "picture.png"
+        if keys:
+            camera = preset("setup1", scale=arguments.scale)
+            render(load_scene(arguments.scene), camera, support=(), noise=1.0).picture.save(path)
+        for key in keys:
+            print(
+                RECORDS.measure(key, lambda key=key: apart(key["scheme"], path, arguments.runs))["result"], flush=True
+            )
+    publish(tables())
+
+
+def tables() -> Tables:
+    """Return the table of the page of structures."""
+    return {("docs/structure.md", "cost"): table(RECORDS.rows(scene=SCENE, scale=SCALE, runs=RUNS))}
+
+
+def apart(scheme: str, path: Path, runs: int) -> dict[str, Any]:
+    """Times and memory of one scheme in a process of its own."""
+    command = [sys.executable, "-m", "benchmarks.coding.cost", "--runs", str(runs), "--one", scheme, str(path)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def measured(scheme: str, picture: IIPicture, runs: int) -> dict[str, Any]:
+    """Times and memory of one scheme in this process."""
+    timed_decode(sample(scheme))
+    found: dict[str, list[float]] = {name: [] for name in ("encode", "encoder", "decode", "decoder")}
+    encode_peak = decode_peak = 0
+    for _ in range(runs):
+        before = reset_peak()
+        coded = in_the_middle(picture, scheme)
+        encode_peak = max(encode_peak, peak() - before)
+        before = reset_peak()
+        decoded = timed_decode(coded)
+        decode_peak = max(decode_peak, peak() - before)
+        assert coded.encode_seconds is not None and coded.codec_seconds is not None
+        found["encode"].append(coded.encode_seconds)
+        found["encoder"].append(coded.codec_seconds)
+        found["decode"].append(decoded.seconds)
+        found["decoder"].append(decoded.codec_seconds)
+        quality = q_global(picture, decoded.picture)
+        del decoded
+    size = picture.pixels.nbytes
+    return {
+        "bpp": coded.bpp,
+        "q_global": quality,
+        **{f"{name}_seconds": median(values) for name, values in found.items()},
+        "encode_peak": encode_peak / size,
+        "decode_peak": decode_peak / size,
+    }
+
+
+def in_the_middle(picture: IIPicture, scheme: str) -> Encoded:
+    """One run of the encoder, without search."""
+    coder = find(scheme)
+    if coder.lossless({key: option.default for key, option in coder.options.items()}):
+        return encode(picture, scheme)
+    if coder.qp_range:
+        return encode(picture, scheme, qp=sum(coder.qp_range) // 2)
+    if coder.quality_range:
+        low, high = coder.quality_range
+        return encode(picture, scheme, quality=type(low)((low + high) / 2))
+    return encode(picture, scheme, bpp=0.5)
+
+
+def reset_peak() -> int:
+    """Resident bytes now, which the peak is counted from."""
+    Path("/proc/self/clear_refs").write_text("5")
+    return peak()
+
+
+def peak() -> int:
+    """Most resident bytes since `reset_peak`."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmHWM"):
+            return int(line.split()[1]) * 1024
+    raise OSError("this system does not tell the peak of resident memory")
+
+
+def table(rows: list[dict[str, Any]]) -> list[str]:
+    """A row a scheme: CPU seconds, what is ours as shares of the coder's own, memory in pictures."""
+    lines = [
+        "| scheme | bpp | dB | encoder, s | ours, of that | decoder, s | ours, of encoder | ours, of decoder "
+        "| peak encoding | peak decoding |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for r in rows:
+        packing = r["encode_seconds"] - r["encoder_seconds"]
+        unpacking = r["decode_seconds"] - r["decoder_seconds"]
+        lossless = r["q_global"] is None
+        lines.append(
+            f"| `{r['scheme']}` | {r['bpp']:.3g} | {'lossless' if lossless else format(r['q_global'], '.1f')} | "
+            f"{r['encoder_seconds']:.2f} | {packing / r['encoder_seconds']:.0%} | {r['decoder_seconds']:.2f} | "
+            f"{unpacking / r['encoder_seconds']:.0%} | {unpacking / r['decoder_seconds']:.0%} | "
+            f"{r['encode_peak']:.1f} × | {r['decode_peak']:.1f} × |"
+        )
+    return [origin(rows), "", *with_commits(lines, [[r["commit"]] for r in rows])]
+
+
+if __name__ == "__main__":
+    main()

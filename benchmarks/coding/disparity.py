@@ -1,0 +1,80 @@
+"""Why a scene codes well or not: how far its points move between neighbouring sub-images, and how many vanish.
+
+    python -m benchmarks run disparity [--scale 2] [--scenes apples,cuboid]
+
+From the depth map alone: a point at distance z' from the lenses moves δP·z'/(Λ·δL) pixels from one sub-image to
+the next; it has no partner there if it leaves the picture or something nearer covers it. Numbers go to
+``benchmarks/results/disparity.jsonl``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.records import Records, add_again
+from ii_core import IICamera, preset, sub_images
+from raytrace_ii import load_scene, render
+
+RECORDS = Records("disparity", ("benchmarks.coding.disparity",))
+MOTION_RANGE = 16  # pixels, the coders' default
+
+
+def main() -> None:
+    """Print a table and keep it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--scenes", default="apples,cuboid")
+    add_again(parser)
+    asked = parser.parse_args()
+    keys = [{"scene": name, "scale": scale} for name in asked.scenes.split(",") for scale in asked.scale]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda key=key: analyse(key["scene"], key["scale"]))
+    for row in RECORDS.rows():
+        print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
+
+
+def analyse(name: str, scale: int) -> dict[str, float]:
+    """Disparities and partners between horizontal neighbours among the sub-images of the middle row."""
+    camera = preset("setup1", scale=scale)
+    shot = render(load_scene(name), camera, support=("depth",))
+    assert shot.depth is not None
+    middle = camera.ei_pixels[1] // 2
+    pixels = sub_images(shot.picture)[middle].astype(np.float32)
+    depth = sub_images(shot.picture.with_pixels(np.repeat(shot.depth[..., None], 3, axis=2)))[middle, ..., 0]
+    moved = disparity(camera, depth[:-1])
+    hit = np.isfinite(depth[:-1])
+    partner = has_partner(depth, moved)
+    return {
+        "median_px": float(np.median(moved[hit])),
+        "p90_px": float(np.percentile(moved[hit], 90)),
+        "beyond_motion_range": float((moved[hit] > MOTION_RANGE).mean()),
+        "without_partner": float(1 - partner.mean()),
+        "detail": float(np.abs(np.diff(pixels, axis=2)).mean()),
+    }
+
+
+def disparity(camera: IICamera, depth: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Pixels that a point at this z moves to the right from SI_u to SI_u+1."""
+    return (
+        camera.pixel_pitch_mm * (depth.astype(np.float64) - camera.gap_mm) / (camera.gap_mm * camera.lens_pitch_mm[0])
+    )
+
+
+def has_partner(depth: NDArray[np.float32], moved: NDArray[Any]) -> NDArray[np.bool_]:
+    """Whether the next sub-image shows the same point: the same depth, within 3 %, where the point should be."""
+    steps, rows, columns = moved.shape
+    hit = np.isfinite(moved)
+    there = np.rint(np.arange(columns) + np.where(hit, moved, 0)).astype(int)
+    inside = (there >= 0) & (there < columns)
+    s, r, _ = np.meshgrid(np.arange(steps), np.arange(rows), np.arange(columns), indexing="ij")
+    other = depth[1:][s, r, np.clip(there, 0, columns - 1)]
+    same = np.where(hit, np.abs(other - depth[:-1]) < 0.03 * depth[:-1], np.isnan(other))
+    return inside & same
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,262 @@
+"""Damage coded pictures at random and see that decoding never does worse than say so.
+
+    python -m benchmarks run fuzz [--mutations 4000] [--workers 2] [--schemes si-h264,...] [--seed 0]
+
+Every scheme's payload of a small picture is damaged past any checksum (bits flipped, bytes cut, repeated, replaced,
+put in from another scheme's stream, told to be of another size), and whole files likewise. Each must end in a picture
+of the right shape or a ValueError, in a second, in bounded memory. Workers are processes of their own with a limit on
+their memory, so that a crash is seen; what a worker died of, or took too long for, is kept with its number, from
+which ``--scheme S --only NUMBER`` makes it again. Counts and findings are rows of
+``benchmarks/results/fuzz.jsonl``, one a scheme; a run that was stopped goes on with the schemes that have none.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import Records, add_again, origin
+from codec import Encoded, decode, encode, schemes
+from codec.contract import find
+from ii_core import IIPicture
+
+RECORDS = Records("fuzz", ("benchmarks.coding.fuzz",))
+LENSES, EI = (16, 8), (4, 4)
+ENDS = {"picture": "a picture of the right shape", "refused": "a ValueError"}
+SLOW = 1.0  # seconds of CPU time that a refusal may take
+STUCK = 300  # seconds after which a worker is taken for stuck, however loaded the machine
+HEADROOM = 1 << 30  # bytes of address space beyond what a worker has after its first decoding
+
+
+def main() -> None:
+    """Damage, count, keep."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--mutations", type=int, default=4000, help="of each scheme")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--schemes", default=",".join(schemes()))
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--scheme", help=argparse.SUPPRESS)
+    parser.add_argument("--range", type=int, nargs=2, help=argparse.SUPPRESS)
+    parser.add_argument("--only", type=int, help=argparse.SUPPRESS)
+    add_again(parser)
+    arguments = parser.parse_args()
+    if arguments.scheme:
+        first, last = arguments.range or (arguments.only, arguments.only + 1)
+        work(arguments.scheme, arguments.seed, first, last)
+        return
+    seed, count = arguments.seed, arguments.mutations
+    if unknown := set(arguments.schemes.split(",")) - set(schemes()):
+        parser.error(f"no scheme {min(unknown)!r}: known are {', '.join(schemes())}")
+    keys = [{"scheme": name, "seed": seed, "mutations": count} for name in arguments.schemes.split(",")]
+
+    def row(key: dict[str, Any]) -> None:
+        record = RECORDS.measure(key, lambda: watched(key["scheme"], seed, count))
+        print(f"{key['scheme']}: {record['result']}", flush=True)
+
+    pool = ThreadPoolExecutor(arguments.workers)
+    try:
+        for future in [pool.submit(row, key) for key in RECORDS.todo(keys, arguments.again)]:
+            future.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+    publish(tables())
+
+
+def tables() -> Tables:
+    """Return the sum over all schemes as lines of the page of formats."""
+    rows = RECORDS.rows()
+    total = sum(sum(row["counts"].values()) for row in rows)
+    counts = Counter(kind for row in rows for kind, n in row["counts"].items() for _ in range(n))
+    longest = max(row["longest_seconds"] for row in rows)
+    ends = ", ".join(f"{counts[kind]} ended in {text}" for kind, text in ENDS.items() if counts[kind])
+    bad = total - sum(counts[kind] for kind in ENDS)
+    lines = [
+        f"{total} mutations over {len(rows)} schemes: {ends}, {bad} otherwise; the longest took {longest:.2f} CPU",
+        f"seconds. {origin(rows)}",
+    ]
+    return {("docs/formats.md", "fuzz"): lines}
+
+
+def watched(scheme: str, seed: int, count: int) -> dict[str, Any]:
+    """All mutations of one scheme, in a process that is started again where it dies."""
+    counts: Counter[str] = Counter()
+    findings: list[dict[str, Any]] = []
+    longest, first = 0.0, 0
+    while first < count:
+        command = [sys.executable, "-m", "benchmarks.coding.fuzz", "--scheme", scheme, "--seed", str(seed)]
+        with tempfile.TemporaryFile() as errors:
+            worker = subprocess.Popen(
+                [*command, "--range", str(first), str(count)], stdout=subprocess.PIPE, stderr=errors, text=True
+            )
+            assert worker.stdout is not None
+            with Watchdog(worker) as watchdog:
+                for line in worker.stdout:
+                    watchdog.seen()
+                    number, what, seconds = json.loads(line)
+                    counts[what.partition(":")[0]] += 1
+                    longest = max(longest, seconds)
+                    if what not in ("picture", "refused") or seconds > SLOW:
+                        findings.append({"number": number, "what": what, "seconds": seconds})
+                    first = number + 1
+            if first < count:
+                errors.seek(0)
+                last = errors.read().decode(errors="replace").strip().splitlines()[-1:]
+                what = "stuck" if watchdog.fired else f"died with {worker.wait()}"
+                counts[what] += 1
+                findings.append({"number": first, "what": what, "said": " ".join(last)[-300:]})
+                first += 1
+                if len(findings) > 50:
+                    break
+    return {"counts": dict(counts), "longest_seconds": longest, "findings": findings}
+
+
+class Watchdog:
+    """Kills a worker that has not been heard of for too long."""
+
+    def __init__(self, worker: subprocess.Popen[str]) -> None:
+        self.worker, self.fired, self._last = worker, False, time.monotonic()
+        self._pool = ThreadPoolExecutor(1)
+
+    def seen(self) -> None:
+        """It lives."""
+        self._last = time.monotonic()
+
+    def __enter__(self) -> Watchdog:
+        self._pool.submit(self._watch)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.worker.wait()
+        self._pool.shutdown()
+
+    def _watch(self) -> None:
+        while self.worker.poll() is None:
+            if time.monotonic() - self._last > STUCK:
+                self.fired = True
+                self.worker.kill()
+            time.sleep(0.2)
+
+
+def work(scheme: str, seed: int, first: int, last: int, *, limit: bool = True) -> None:
+    """Decode mutations by number, a line of JSON for each."""
+    coded = sample(scheme)
+    strangers = [sample(name).payload for name in ("si-h264", "jpeg2000")]
+    decode(coded)  # whatever a first decoding takes is no mutation's
+    room = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + HEADROOM
+    if limit:
+        resource.setrlimit(resource.RLIMIT_AS, (room, room))
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(first, last):
+            rng = np.random.default_rng((seed, number))
+            started = cpu_seconds()
+            what = attempt(coded, strangers, rng, Path(folder) / "mutant.ii")
+            print(json.dumps([number, what, round(cpu_seconds() - started, 6)]), flush=True)
+
+
+def cpu_seconds() -> float:
+    """Of this process and of the decoders it ran as processes of their own."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
+def sample(scheme: str) -> Encoded:
+    """A small picture with detail, coded in the middle of the scheme's range."""
+    coder = find(scheme)
+    (k, l), (u, v) = LENSES, EI
+    y, x = np.mgrid[: l * v, : k * u]
+    shade = 128 + 60 * np.sin(x / 5) * np.cos(y / 3) + 4 * np.random.default_rng(1).standard_normal((l * v, k * u))
+    picture = IIPicture(np.stack([shade, 255 - shade, shade / 2], axis=-1).astype(np.uint8), LENSES, EI)
+    name = f"{scheme}:gop=5" if "gop" in coder.options else scheme
+    if coder.lossless({key: option.default for key, option in coder.options.items()}):
+        return encode(picture, name)
+    if coder.rate_control:
+        return encode(picture, name, bpp=2)
+    assert coder.quality_range or coder.qp_range
+    if coder.quality_range:
+        low, high = coder.quality_range
+        return encode(picture, name, quality=type(low)((low + high) / 2))
+    assert coder.qp_range
+    return encode(picture, name, qp=sum(coder.qp_range) // 2)
+
+
+def attempt(coded: Encoded, strangers: list[bytes], rng: np.random.Generator, path: Path) -> str:
+    """What becomes of one mutation."""
+    try:
+        if rng.random() < 0.8:
+            mutant = replace(coded, payload=damaged(coded.payload, strangers, rng))
+            if rng.random() < 0.1:
+                mutant = replace(mutant, structure=other_structure(coded, rng))
+            picture = decode(mutant)
+        else:
+            mutant = replace(coded, structure=other_structure(coded, rng)) if rng.random() < 0.3 else coded
+            mutant.save(path)
+            if rng.random() < 0.8:
+                path.write_bytes(damaged(path.read_bytes(), strangers, rng))
+            picture = decode(path)
+    except ValueError:
+        return "refused"
+    except MemoryError:
+        return "error: MemoryError"
+    except Exception as error:
+        return f"error: {type(error).__name__}: {error}"
+    (k, l), (u, v) = picture.lenses, picture.ei_pixels
+    return "picture" if picture.pixels.shape == (l * v, k * u, 3) else f"error: shape {picture.pixels.shape}"
+
+
+def damaged(data: bytes, strangers: list[bytes], rng: np.random.Generator) -> bytes:
+    """Bytes after one to three accidents."""
+    mutant = bytearray(data)
+    for _ in range(rng.integers(1, 4)):
+        if not mutant:
+            break
+        at = int(rng.integers(len(mutant))) if rng.random() < 0.7 else int(rng.integers(min(64, len(mutant))))
+        length = int(min(2 ** rng.integers(0, 10), len(mutant) - at))
+        match rng.integers(8):
+            case 0:
+                for position in rng.integers(len(mutant), size=rng.integers(1, 9)):
+                    mutant[position] ^= 1 << rng.integers(8)
+            case 1:
+                mutant[at] = rng.choice([0, 1, 127, 128, 255])
+            case 2:
+                del mutant[at:]
+            case 3:
+                del mutant[at : at + length]
+            case 4:
+                mutant[at:at] = mutant[at : at + length]
+            case 5:
+                mutant[at : at + length] = rng.bytes(length)
+            case 6:
+                mutant[at : at + length] = bytes(length)
+            case 7:
+                stranger = strangers[rng.integers(len(strangers))]
+                start = int(rng.integers(len(stranger)))
+                mutant[at : at + length] = stranger[start : start + length]
+    return bytes(mutant)
+
+
+def other_structure(coded: Encoded, rng: np.random.Generator) -> dict[str, Any]:
+    """The structure with other counts: from off by one to beyond all memory."""
+    changed = {**coded.structure, "camera": None}
+    for key in ("lenses", "ei_pixels"):
+        factors = [1, 1, 1, 2, 3, 100, 1 << 10, 1 << 20]
+        changed[key] = [int(n * rng.choice(factors) + rng.integers(0, 2)) for n in changed[key]]
+    return changed
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("SVT_LOG", "0")
+    main()

@@ -1,0 +1,186 @@
+"""What structure alone costs: header portions measured, taken apart and predicted, and who codes better for it.
+
+    python -m benchmarks run headers [--scale 4] [--scene apples] [--schemes si-hevc,...] [--sides 16,64]
+
+The pictures of ``setup2`` with fewer lenses, elementary images of 16² to 256² pixels. For every scheme and structure:
+a black picture and the scene at the coarsest quantiser, and where the stream can be taken apart the bits of its
+parameter sets and slice headers. For H.264 besides: PSNR of sub-, elementary and ray-space images at the same rates,
+beside what (5.14) and (5.15) predict. Every scheme with every structure is a row of
+``benchmarks/results/headers.jsonl``; tables go into ``docs/structure.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import Records, add_again, origin, with_commits
+from codec import decode, encode, schemes
+from codec.inspect.header import coarsest, floor, frames, parts, si_below_ei, si_below_ri
+from ii_core import IIPicture, preset
+from metrics import q_global
+from raytrace_ii import load_scene, render
+
+RECORDS = Records("headers", ("benchmarks.coding.headers",))
+SCENE, SCALE = "apples", 4  # of the page
+SIDES = (16, 32, 64, 128, 256)
+RATES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
+KINDS = ("si", "ei", "ri")
+
+
+def main() -> None:
+    """Measure, print, keep and fill the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=SCALE)
+    parser.add_argument("--scene", default=SCENE)
+    parser.add_argument("--schemes", default=",".join(schemes()))
+    parser.add_argument("--sides", default=",".join(map(str, SIDES)))
+    add_again(parser)
+    asked = parser.parse_args()
+    picture_of = {"scene": asked.scene, "scale": asked.scale}
+    for side in map(int, asked.sides.split(",")):
+        keys: list[dict[str, Any]] = [
+            {"part": "floor", **picture_of, "side": side, "scheme": scheme} for scheme in asked.schemes.split(",")
+        ]
+        if asked.schemes == parser.get_default("schemes"):
+            keys.append({"part": "duel", **picture_of, "side": side})
+        if not (keys := RECORDS.todo(keys, asked.again)):
+            continue
+        camera = preset(f"setup2-{side}", scale=asked.scale)
+        picture = render(load_scene(asked.scene), camera, support=(), noise=1.0).picture
+        for key in keys:
+
+            def found(key: dict[str, Any] = key, picture: IIPicture = picture) -> dict[str, Any]:
+                return lowest(key["scheme"], picture) if key["part"] == "floor" else duel(picture)
+
+            print(key, RECORDS.measure(key, found)["result"], flush=True)
+    publish(tables())
+
+
+def lowest(scheme: str, picture: IIPicture) -> dict[str, Any]:
+    """The least a scheme can do with a structure: black, and with this picture."""
+    found: dict[str, Any] = {}
+    try:
+        black = floor(scheme, picture.lenses, picture.ei_pixels)
+        real = coarsest(picture, scheme)
+    except ValueError as error:
+        return {"refused": str(error)}
+    kind = scheme.partition("-")[0]
+    if kind in KINDS and "-" in scheme:
+        found["frames"] = frames(kind, picture.lenses, picture.ei_pixels)
+    found |= {"black_bpp": black.bpp, "floor_bpp": real.bpp, "floor_db": q_global(picture, decode(real))}
+    try:
+        bits = parts(black.coded)
+    except ValueError:
+        return found
+    return {**found, "parts": asdict(bits)}
+
+
+def duel(picture: IIPicture) -> dict[str, Any]:
+    """PSNR of the three kinds at the same rates, H.264 with the defaults; what was not reached is left out."""
+    psnr: dict[str, dict[float, float]] = {}
+    for kind in KINDS:
+        psnr[kind] = {}
+        for rate in RATES:
+            coded = encode(picture, f"{kind}-h264", bpp=rate)
+            if coded.reached:
+                psnr[kind][rate] = q_global(picture, decode(coded))
+    structure = picture.lenses, picture.ei_pixels
+    black = {kind: floor(f"{kind}-h264", *structure).bits for kind in KINDS}
+    found: dict[str, Any] = {
+        "psnr": {kind: {f"{r:g}": q for r, q in points.items()} for kind, points in psnr.items()}
+    }
+    for other, predicted in (("ei", si_below_ei(*structure)), ("ri", si_below_ri(*structure))):
+        both = psnr["si"].keys() & psnr[other].keys()
+        found[other] = {
+            "predicted": predicted,
+            "fewer_header_bits": black["si"] < black[other],
+            "gain_db": float(np.mean([psnr["si"][r] - psnr[other][r] for r in both])) if both else None,
+            "rates_both": sorted(both),
+            "lowest": {kind: min(psnr[kind], default=None) for kind in ("si", other)},
+        }
+    return found
+
+
+def tables() -> Tables:
+    """Return the tables of the page of structures."""
+    floors, duels = (RECORDS.rows(part=part, scene=SCENE, scale=SCALE) for part in ("floor", "duel"))
+    floors.sort(key=lambda row: (row["scheme"], row["side"]))
+    return {
+        ("docs/structure.md", mark): [origin(rows), "", *made(rows)]
+        for mark, made, rows in (
+            ("floors", floor_table, floors), ("parts", part_table, floors), ("duels", duel_table, duels)
+        )
+    }  # fmt: skip
+
+
+def floor_table(rows: list[dict[str, Any]]) -> list[str]:
+    """Black / scene at the coarsest, bpp, a column a structure."""
+    lines = ["| scheme | " + " | ".join(f"{side}²" for side in SIDES) + " |", "|---|" + "---|" * len(SIDES)]
+    commits = []
+    for scheme in dict.fromkeys(row["scheme"] for row in rows):
+        those = {row["side"]: row for row in rows if row["scheme"] == scheme}
+        cells = [floor_cell(those[side]) if side in those else "" for side in SIDES]
+        lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
+        commits.append([row["commit"] for row in those.values()])
+    return with_commits(lines, commits)
+
+
+def floor_cell(row: dict[str, Any]) -> str:
+    """Black / scene, and its PSNR."""
+    if "refused" in row:
+        return "–"
+    quality = "lossless" if row["floor_db"] is None else f"{row['floor_db']:.1f}"
+    return f"{row['black_bpp']:.2g} / {row['floor_bpp']:.2g} ({quality})"
+
+
+def part_table(rows: list[dict[str, Any]]) -> list[str]:
+    """Bits per frame of a black picture."""
+    lines = [
+        "| scheme | EI | frames | start codes, lengths | parameter sets | slice headers | the rest | bits a frame |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    shown = [row for row in rows if "parts" in row and row["side"] in (16, 64, 256)]
+    for row in shown:
+        p, j = row["parts"], row["frames"]
+        headers = "(in the rest)" if p["headers"] is None else f"{p['headers'] / j:.1f}"
+        total = sum(p[name] or 0 for name in ("framing", "parameters", "messages", "headers", "data"))
+        lines.append(
+            f"| `{row['scheme']}` | {row['side']}² | {j} | {p['framing'] / j:.1f} | {p['parameters'] / j:.1f} | "
+            f"{headers} | {(p['data'] + p['messages']) / j:.1f} | {total / j:.1f} |"
+        )
+    return with_commits(lines, [[row["commit"]] for row in shown])
+
+
+def duel_table(rows: list[dict[str, Any]]) -> list[str]:
+    """Prediction and outcome, SI against EI and RI."""
+    lines = [
+        "| EI | SI before EI by (5.14) | fewer bits black | mean gain | lowest rate SI, EI | SI before RI by (5.15) "
+        "| fewer bits black | mean gain | lowest rate RI |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        ei, ri = row["ei"], row["ri"]
+        cells = [yes(ei["predicted"]), yes(ei["fewer_header_bits"]), gain(ei)]
+        cells += [f"{ei['lowest']['si'] or '–'}, {ei['lowest']['ei'] or '–'}"]
+        cells += [yes(ri["predicted"]), yes(ri["fewer_header_bits"]), gain(ri), f"{ri['lowest']['ri'] or '–'}"]
+        lines.append(f"| {row['side']}² | " + " | ".join(cells) + " |")
+    return with_commits(lines, [[row["commit"]] for row in rows])
+
+
+def yes(value: bool) -> str:
+    """A word for a table."""
+    return "yes" if value else "no"
+
+
+def gain(row: dict[str, Any]) -> str:
+    """dB over so many rates."""
+    return "–" if row["gain_db"] is None else f"{row['gain_db']:+.1f} dB ({len(row['rates_both'])} rates)"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+"""What every order of every kind of component image promises, on the coding scenes, before anything is coded.
+
+    python -m benchmarks run orders [--scale 2] [--scenes apples,twins,car,cuboid]
+
+Correlation of consecutive frames, its spread, and residual energy, (5.3)–(5.7). Numbers go to
+``benchmarks/results/orders.jsonl``, the table into ``docs/structure.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import Records, add_again, origin, with_commits
+from codec.inspect.order_analysis import analyse_orders
+from codec.order import ORDERS
+from ii_core import preset
+from raytrace_ii import load_scene, render
+
+RECORDS = Records("orders", ("benchmarks.coding.orders",))
+SCALE = 2  # of the page
+
+
+def main() -> None:
+    """Measure, print, keep and fill the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=SCALE)
+    parser.add_argument("--scenes", default="apples,twins,car,cuboid")
+    add_again(parser)
+    asked = parser.parse_args()
+    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes.split(",")]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda key=key: analysed(**key))
+    print("\n".join(table(measured(asked.scale))))
+    publish(tables())
+
+
+def analysed(scene: str, scale: int) -> dict[str, Any]:
+    """All orders of all kinds of component images of one scene."""
+    shot = render(load_scene(scene), preset("setup1", scale=scale), support=(), noise=1.0)
+    return {"orders": [analysis.to_json() for analysis in analyse_orders(shot.picture)]}
+
+
+def measured(scale: int) -> list[dict[str, Any]]:
+    """A row an order, of the newest records of a scale."""
+    return [
+        {"scene": row["scene"], "commit": row["commit"], **one}
+        for row in RECORDS.rows(scale=scale)
+        for one in row["orders"]
+    ]
+
+
+def tables() -> Tables:
+    """Return the table of the page of structures."""
+    return {("docs/structure.md", "orders"): table(measured(SCALE))}
+
+
+def table(rows: list[dict[str, Any]]) -> list[str]:
+    """A row a scene and kind; a column an order: mean correlation, its spread, energy a sample."""
+    lines = ["| scene | images | " + " | ".join(ORDERS) + " |", "|---|---|" + "---|" * len(ORDERS)]
+    commits = []
+    for scene, kind in dict.fromkeys((row["scene"], row["kind"]) for row in rows):
+        those = {row["order"]: row for row in rows if (row["scene"], row["kind"]) == (scene, kind)}
+        best = max(those, key=lambda order: those[order]["correlation_mean"])
+        cells = []
+        for order in ORDERS:
+            r = those[order]
+            cell = f"{r['correlation_mean']:.3f} ± {r['correlation_sigma']:.3f}, {r['energy_per_sample']:.0f}"
+            cells.append(f"**{cell}**" if order == best else cell)
+        lines.append(f"| {scene} | {kind.upper()} | " + " | ".join(cells) + " |")
+        commits.append([row["commit"] for row in those.values()])
+    return [origin(rows), "", *with_commits(lines, commits)]
+
+
+if __name__ == "__main__":
+    main()

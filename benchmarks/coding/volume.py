@@ -1,0 +1,159 @@
+"""What the volume gains: SI-PVI against sub-images coded apart, JPEG 2000 on the plain picture and SI-PVS.
+
+    python -m benchmarks run volume [--scale 4] [--scenes apples cuboid]
+
+Rates against the dissertation's video setting (x264 IPPP, 4:2:0, constant quantiser, parallel order) are Bjøntegaard
+differences by RGB PSNR, over the qualities that both curves reach. Goes to ``benchmarks/results/volume.jsonl`` and
+into the tables of ``docs/volume.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+
+from benchmarks.coding.rd import rd_point
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import Records, add_again, origin, with_commits
+from codec import decode, encode
+from codec.bitstream.jpeg2000 import decode_planes, encode_planes, whole_codestream
+from codec.frames import layout
+from ii_core import IIPicture, component_images, preset
+from metrics import bd_rate
+from raytrace_ii import load_scene, render
+
+RECORDS = Records("volume", ("benchmarks.coding.volume", "benchmarks.coding.rd"))
+SCALE = 4  # of the page
+ANCHOR = "si-h264:rate=cq,chroma=420"
+# Settings by scheme: PSNR in dB, or quantisers.
+CURVES: dict[str, list[dict[str, Any]]] = {
+    ANCHOR: [{"qp": qp} for qp in (20, 29, 38, 47)],
+    "si-jp3d": [{"quality": q} for q in (17, 22, 27, 33)],
+    "si-sperr": [{"quality": q} for q in (17, 22, 27, 33)],
+    "si-jp3d:wavelet=53": [{"quality": q} for q in (17, 22, 27, 33)],
+    "si-jp3d:order=row": [{"quality": q} for q in (17, 22, 27, 33)],
+    "si-jpeg2000": [{"quality": q} for q in (17, 22, 27, 33)],
+    "ri-jp3d": [{"quality": q} for q in (17, 22, 27, 33)],
+    "ei-jp3d": [{"quality": q} for q in (17, 22, 27, 33)],
+    "jpeg2000": [{"bpp": r} for r in (0.05, 0.3, 1.0, 4.0)],
+    "htj2k": [{"qp": qp} for qp in (20, 29, 38, 47)],
+    "jpeg": [{"quality": q} for q in (2, 10, 40, 85)],
+    "jpegxl:fast": [{"quality": q} for q in (5, 20, 50, 85)],
+}
+LOSSLESS = ("si-jp3d", "si-jp3d:levels=1", "ri-jp3d", "ei-jp3d", "si-jpeg2000", "htj2k", "jpegxl:fast", "si-ffv1")
+
+
+def main() -> None:
+    """Measure, print and keep."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=SCALE)
+    parser.add_argument("--scenes", nargs="+", default=["apples", "cuboid"])
+    add_again(parser)
+    asked = parser.parse_args()
+    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda key=key: study(**key))
+    for scene in RECORDS.rows(scale=asked.scale):
+        for line in rows(scene["scene"], scene):
+            print(line, flush=True)
+    publish(tables())
+
+
+def study(scene: str, scale: int) -> dict[str, Any]:
+    """All of one scene."""
+    picture = render(load_scene(scene), preset("setup1", scale=scale), noise=1.0, support=()).picture
+    return {
+        "size": picture.size, "curves": curves(picture), "lossless_bpp": lossless(picture), "apart": apart(picture)
+    }  # fmt: skip
+
+
+def curves(picture: IIPicture) -> dict[str, list[tuple[float, float]]]:
+    """(bpp, RGB PSNR) of each scheme."""
+    found: dict[str, list[tuple[float, float]]] = {}
+    for scheme, settings in CURVES.items():
+        points = [rd_point(picture, scheme, **setting) for setting in settings]
+        found[scheme] = [(point.bpp, point.q_global) for point in points]
+    return found
+
+
+def lossless(picture: IIPicture) -> dict[str, float]:
+    """Bits per pixel to the bit."""
+    found = {}
+    for name in LOSSLESS:
+        coded = encode(
+            picture,
+            name if name.endswith("ffv1") else f"{name}:lossless=1" if ":" not in name else f"{name},lossless=1",
+        )
+        assert np.array_equal(decode(coded).pixels, picture.pixels), name
+        found[name] = coded.bpp
+    return found
+
+
+def apart(picture: IIPicture, squared_error: float = 10.0) -> dict[str, float]:
+    """What one codestream for all sub-images saves against one for each at the same squared error."""
+    shape = layout(picture.lenses, picture.ei_pixels, "si")
+    stack = component_images(picture, "si").reshape(shape.frames, shape.height, shape.width, 3)
+    planes = np.ascontiguousarray(np.moveaxis((stack.astype(np.int16) - 128) * 4, -1, 1))
+    size, head, error = 0, 0, 0.0
+    for slices in planes:
+        stream = encode_planes(slices, 16 * squared_error, wavelet="9/7")
+        whole = whole_codestream(stream, slices.shape, "int16", wavelet="9/7", lossless=False)
+        size += len(whole)
+        head += whole.index(b"\xff\x93")  # all before the data
+        back = decode_planes(stream, slices.shape, "int16", wavelet="9/7", lossless=False)
+        error += float(np.mean((back.astype(float) - slices) ** 2)) / len(planes) / 16
+    together = planes.reshape(-1, shape.height, shape.width)
+    stream = encode_planes(together, 16 * error, wavelet="9/7")
+    pixels = picture.size[0] * picture.size[1]
+    return {
+        "apart_bpp": 8 * size / pixels,
+        "headers_bpp": 8 * head / pixels,
+        "together_bpp": 8 * len(stream) / pixels,
+    }
+
+
+def rows(name: str, scene: dict[str, Any]) -> list[str]:
+    """The scene's lines of the table."""
+    anchor = list(zip(*scene["curves"][ANCHOR], strict=True))
+    lines = []
+    for scheme, points in scene["curves"].items():
+        curve = list(zip(*points, strict=True))
+        try:
+            gain = f"{bd_rate(*anchor, *curve):+.0f} %"
+        except ValueError:
+            gain = "no overlap"
+        low, high = points[0], points[-1]
+        if low[0] > high[0]:
+            low, high = high, low
+        spans = f"{low[0]:.3f}–{high[0]:.2f} | {low[1]:.1f}–{high[1]:.1f}"
+        exact = scene["lossless_bpp"].get(scheme)
+        lines.append(f"| {name} | `{scheme}` | {gain} | {spans} | {'' if exact is None else f'{exact:.2f}'} |")
+    return lines
+
+
+def tables() -> Tables:
+    """Return the tables of the page."""
+    scenes = RECORDS.rows(scale=SCALE)
+    table = ["| scene | scheme | rate | bpp | dB | lossless, bpp |", "|---|---|---|---|---|---|"]
+    apart_table = ["| scene | a stream each, bpp | of it headers | one stream, bpp |", "|---|---|---|---|"]
+    commits: list[list[str]] = []
+    for scene in scenes:
+        lines = rows(scene["scene"], scene)
+        table += lines
+        commits += [[scene["commit"]]] * len(lines)
+        a = scene["apart"]
+        apart_table.append(
+            f"| {scene['scene']} | {a['apart_bpp']:.3f} | {a['headers_bpp']:.3f} | {a['together_bpp']:.3f} "
+            f"({100 * (a['together_bpp'] / a['apart_bpp'] - 1):+.1f} %) |"
+        )
+    page, told = "docs/volume.md", origin(scenes)
+    return {
+        (page, "rates"): [told, "", *with_commits(table, commits)],
+        (page, "apart"): [told, "", *with_commits(apart_table, [[scene["commit"]] for scene in scenes])],
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Pictures and tables of README and docs, made from records and from code."""

@@ -1,0 +1,234 @@
+"""Draw ``docs/cameras.md``, every camera with its maps, a detail of its picture and a view.
+
+    python -m benchmarks run cameras
+
+*Apples* at an eighth of the lenses each way (a fifth for ``hdtv``), so that single pixels can be seen.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from benchmarks.accuracy import camera_in_scene, map_precision
+from benchmarks.records import RESULTS, ROOT, origin
+from ii_core import (
+    IICamera,
+    IIPicture,
+    camera_names,
+    five_viewpoints,
+    orthoscopic,
+    preset,
+    preset_cameras,
+    projection_camera,
+    stand_back,
+    sub_images,
+    view_image,
+)
+from ii_core.files import write_image
+from ii_core.regular import resampled
+from raytrace_ii import Scene, load_scene, render, scene_names
+
+DOCS, CAMERAS = ROOT / "docs", ROOT / "assets" / "cameras"
+PANEL = (320, 160)  # pixels across and down
+GAP = 6
+SCALES = {"hdtv": 5}
+# Where the camera stands, mm before the usual place: its front lens needs room.
+BACK = {"depth-control": 70, "grin-hexagonal-depth-control": 70, "plenoptic1": 150, "plenoptic2": 150}
+
+
+def main() -> None:
+    """Render all and write the page."""
+    scene = load_scene("apples")
+    folder = DOCS / "images" / "cameras"
+    folder.mkdir(parents=True, exist_ok=True)
+    text = [INTRODUCTION]
+    for name in (n for n in sorted(camera_names()) if not n.startswith("setup2")):
+        cameras = preset_cameras(name, scale=SCALES.get(name, 8))
+        write_image(folder / f"{name}.png", strip(scene, cameras[0], name))
+        text.append(entry(name, preset_cameras(name), cameras[0]))
+        print(name, flush=True)
+    text += [precision(), in_scene()]
+    write_image(DOCS / "images" / "scenes.png", all_scenes())
+    (DOCS / "cameras.md").write_text("\n".join(text), encoding="utf-8")
+
+
+INTRODUCTION = """# Cameras
+
+Every camera here is nothing but a location and a direction for every pixel. From left to right: the locations L
+over the whole array and the directions D of a few lenses, x, y and z as red, green and blue; the same few lenses of
+*Apples* rendered through them; and what a viewer sees from the front. `raytrace-ii camera NAME -o dir/` stores L and
+D as pictures, `raytrace-ii camera NAME --report` says what the camera can do. Made by
+`python -m benchmarks run cameras`, at an eighth of the lenses each way.
+"""
+
+
+def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
+    """Three lines of text and the strip of pictures."""
+    first = full[0]
+    u, v = first.ei_pixels
+    chain = " → ".join(e.kind for e in first.optics)
+    _, _, weight = shown.weighted_rays()
+    blocked = "" if weight is None or weight.all() else f", {1 - (weight > 0).mean():.0%} of the rays blocked"
+    arrays = f"{len(full)} arrays of " if len(full) > 1 else ""
+    facts = (
+        f"{arrays}{first.pixels[0]}×{first.pixels[1]} px, {first.lenses[0]}×{first.lenses[1]} lenses, "
+        f"{first.lattice}, {u:.4g}×{v:.4g} px each, α = {first.view_angle_deg:.1f}°; {chain}{blocked}"
+    )
+    sheet = json.loads((CAMERAS / f"{name}.json").read_text(encoding="utf-8"))
+    about = sheet["about"][:1].upper() + sheet["about"][1:]
+    picture = f"![L, D, detail and view of {name}](images/cameras/{name}.png)"
+    return f"\n## {name}\n\n{about}. {sheet['notes']}\n\n{facts}.\n\n{picture}\n"
+
+
+def all_scenes() -> NDArray[np.uint8]:
+    """What a viewer sees of every scene through setup 1's display, two in a row."""
+    pinhole, pose = projection_camera(preset("setup1"), 480)
+    pictures = [
+        orthoscopic(render(load_scene(name), pinhole, samples=9, pose=pose, support=()).picture).pixels
+        for name in sorted(scene_names())
+    ]
+    padded = [np.pad(p, ((0, GAP), (0, GAP), (0, 0)), constant_values=255) for p in pictures]
+    padded += [np.full_like(padded[0], 255)] * (len(padded) % 2)
+    rows = [np.concatenate(padded[i : i + 2], axis=1) for i in range(0, len(padded), 2)]
+    return np.concatenate(rows)[:-GAP, :-GAP]
+
+
+def precision() -> str:
+    """What storing a camera as pictures costs, from `benchmarks.accuracy.map_precision`."""
+    rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
+    shutil.copy(RESULTS / "map_precision.png", DOCS / "images" / "map_precision.png")
+    lines = [
+        "\n## Stored as pictures: which format is enough\n",
+        "Angle between stored and true direction, distance between stored and true location, and PSNR of the picture "
+        "rendered from the maps against that from float maps, at a quarter of the lenses each way:\n",
+        "| camera | format | bytes per ray | angle max · rms | location max · rms | PSNR apples · cuboid |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        psnr = [row[f"psnr_{scene}"] for scene in ("apples", "cuboid")]
+        shown = " · ".join("reference" if value is None else f"{value:.1f} dB" for value in psnr)
+        lines.append(
+            f"| {row['camera']} | {row['format']} | {row['bytes_per_pixel']:.2g} "
+            f"| {figure(row['angle_max_urad'])} · {figure(row['angle_rms_urad'])} µrad "
+            f"| {figure(row['place_max_um'])} · {figure(row['place_rms_um'])} µm | {shown} |"
+        )
+    return "\n".join([*lines, "", origin(rows), VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""])
+
+
+def in_scene() -> str:
+    """How the camera compares with one of glass inside the scene, from `benchmarks.accuracy.camera_in_scene`."""
+    (study,) = camera_in_scene.RECORDS.rows(scale=camera_in_scene.SCALE)
+    shutil.copy(RESULTS / "camera_in_scene.png", DOCS / "images" / "camera_in_scene.png")
+    lines = [
+        IN_SCENE,
+        "| *Apples* | aperture | triangles of the camera | as it is | Fresnel's losses added | no stray light |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {row['scene'].removeprefix('apples').lstrip(', ') or 'lit as usual'} | {row['aperture_of_pitch']:.2f} | "
+        f"{row['triangles_of_the_camera']} | {row['psnr_db']:.1f} dB | {row['psnr_with_fresnel_db']:.1f} dB | "
+        f"{row['psnr_direct_light_db']:.1f} dB |"
+        for row in study["rows"]
+        if row["what"] in ("picture", "tessellation")
+    ]
+    return "\n".join(
+        [*lines, "", origin([study]), "", "![both pictures and their differences](images/camera_in_scene.png)", ""]
+    )
+
+
+IN_SCENE = """
+## Against a camera of glass inside the scene
+
+The other way to simulate a camera is to put its lenses into the scene as bodies of glass and to start rays at the
+pixels. PSNR of that picture against the one through `spherical`'s L and D, which know no Fresnel loss, no stray light
+in the glass and no shadow of the camera on the scene: where those are the same, the faces of the lenses' meshes are
+what is left, 6 dB for every doubling. L and D take a third of the time or less, and exchange freely.
+"""
+
+
+def figure(value: float) -> str:
+    """Two or three digits that say something."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.2g}" if value > 1e-6 else "0"
+
+
+VERDICT = """**PNG-16** is enough for every picture that gets a sensor's noise, which alone leaves 47.5 dB: pixels
+change only where a ray grazes an edge. **EXR** is for pictures that must agree to the bit. **PNG-8** and **RGBE** are
+for looking at a camera, not for rendering with it: an error of a milliradian moves a point 100 mm away by a tenth of
+a millimetre, a whole lens of `setup1`. RGBE is the worst of all in spite of its bytes, for its eight bits are
+relative to the largest of the three numbers."""
+
+
+def strip(scene: Scene, camera: IICamera, name: str) -> NDArray[np.uint8]:
+    """L, D, a detail and a view side by side on white."""
+    pose = stand_back(camera) if camera.lenses == (1, 1) else np.eye(4)
+    pose[2, 3] -= BACK.get(name, 0)
+    picture = render(scene, camera, samples=16, pose=pose, support=()).picture
+    L, D, weight = camera.weighted_rays()
+    D = D / np.linalg.norm(D, axis=-1, keepdims=True)
+    on = np.ones(L.shape[:2], bool) if weight is None else weight > 0
+    block = middle(camera)
+    panels = [
+        fitted(as_colour(L, on), Image.Resampling.BOX),
+        fitted(as_colour(D, on)[block], Image.Resampling.NEAREST),
+        fitted(picture.pixels[block], Image.Resampling.NEAREST),
+        fitted(seen(picture, name), Image.Resampling.BICUBIC),
+    ]
+    width = len(panels) * (PANEL[0] + GAP) - GAP
+    page = np.full((PANEL[1], width, 3), 255, np.uint8)
+    for i, panel in enumerate(panels):
+        left = i * (PANEL[0] + GAP) + (PANEL[0] - panel.shape[1]) // 2
+        top = (PANEL[1] - panel.shape[0]) // 2
+        page[top : top + panel.shape[0], left : left + panel.shape[1]] = panel
+    return page
+
+
+def middle(camera: IICamera) -> tuple[slice, slice]:
+    """A block of about eight by four lenses, or everything if there are no more."""
+    (m, n), (u, v) = camera.pixels, camera.ei_pixels
+    width, height = (m, n) if camera.lenses == (1, 1) else (round(8 * u), round(4 * max(u, v)))
+    left, top = max(0, (m - width) // 2), max(0, (n - height) // 2)
+    if camera.regular and camera.lenses != (1, 1):
+        left, top = left // u * u, top // v * v
+    return slice(top, top + height), slice(left, left + width)
+
+
+def as_colour(values: NDArray[np.float64], on: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """x, y, z from least to greatest as red, green, blue; what has no extent stays dark, and blocked rays black."""
+    low, high = values[on].min(axis=0), values[on].max(axis=0)
+    share = (values - low) / np.where(high - low > 1e-9, high - low, np.inf)
+    return np.where(on[..., None], np.clip(255 * share, 0, 255), 0).astype(np.uint8)
+
+
+def seen(picture: IIPicture, name: str) -> NDArray[Any]:
+    """What a viewer sees from the front; with a main lens the middle sub-image, turned."""
+    if picture.lenses == (1, 1):
+        return orthoscopic(picture).pixels
+    if name.startswith("plenoptic") and name != "plenoptic":
+        stack = sub_images(picture)
+        view = stack[stack.shape[0] // 2, stack.shape[1] // 2][::-1, ::-1]
+    else:
+        if not picture.regular:
+            picture, _ = resampled(picture)
+        assert picture.camera is not None
+        view, _ = view_image(picture, five_viewpoints(picture.camera)["front"])
+    assert picture.camera is not None
+    across, down = picture.camera.lens_pitch_mm
+    unit = min(across, down)
+    return view.repeat(round(4 * across / unit), axis=1).repeat(round(4 * down / unit), axis=0)
+
+
+def fitted(pixels: NDArray[Any], how: Image.Resampling) -> NDArray[np.uint8]:
+    """Scaled to fit the panel."""
+    image = Image.fromarray(np.ascontiguousarray(pixels))
+    share = min(PANEL[0] / image.width, PANEL[1] / image.height)
+    return np.asarray(image.resize((max(1, round(image.width * share)), max(1, round(image.height * share))), how))
+
+
+if __name__ == "__main__":
+    main()

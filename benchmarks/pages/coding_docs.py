@@ -1,0 +1,60 @@
+"""Tables and charts of coders, in docs/coding.md and docs/speed_accuracy.md."""
+
+from __future__ import annotations
+
+import statistics
+from typing import Any
+
+from benchmarks.coding import bframes
+from benchmarks.coding.coders import ANCHOR, NEAR, TRIALS, chart, front, recommended, studied, table
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import RESULTS, ROOT, origin
+
+IMAGES = ROOT / "docs" / "images"
+SCALE = 4  # of the larger study; the smaller one is at full size
+
+
+def main() -> None:
+    """Fill the pages and draw the charts from the records."""
+    publish(tables())
+    for scale, name in ((SCALE, "coders.png"), (1, "coders_full.png")):
+        for folder in (RESULTS, IMAGES):
+            chart(studied(scale), scale, folder / name)
+
+
+def tables() -> Tables:
+    """Return all tables of schemes."""
+    coders, full = studied(SCALE), studied(1)
+    trials = [row for row in coders if row["scheme"] in {*TRIALS, ANCHOR}]
+    others = [row for row in coders if row["scheme"] not in TRIALS]
+    best = ", ".join(f"`{row['scheme']}`" for row in front(others))
+    page = "docs/coding.md"
+    return {
+        (page, "coders"): [*size(SCALE, others), "", *table(others), "", f"Nothing quicker is better than: {best}."],
+        (page, "full"): [*size(1, full), "", *table(full)],
+        (page, "trials"): [*size(SCALE, trials), "", *table(trials)],
+        (page, "bframes"): bframes.table(),
+        ("docs/speed_accuracy.md", "coding"): [*size(SCALE, others), "", *front_table(coders)],
+    }
+
+
+def front_table(rows: list[dict[str, Any]]) -> list[str]:
+    """What nothing quicker beats, the recommended setting in bold."""
+    lines = ["| take | rate at equal PSNR | CPU s of a run | CPU s to decode |", "|---|---|---|---|"]
+    pick = recommended(rows)["scheme"]
+    for row in front([row for row in rows if row["scheme"] not in TRIALS]):
+        points = [point for one in rows if one["scheme"] == row["scheme"] for point in one["points"]]
+        decode = statistics.mean(point["decode_seconds"] for point in points)
+        name = f"**`{row['scheme']}`**" if row["scheme"] == pick else f"`{row['scheme']}`"
+        lines.append(f"| {name} | {1 + row['mean'] / 100:.2f} × | {row['seconds']:.2f} | {decode:.2f} |")
+    return [*lines, "", f"In bold the quickest whose rate is within {NEAR:.0%} of the least."]
+
+
+def size(scale: int, rows: list[dict[str, Any]]) -> list[str]:
+    """Return what was coded, what the seconds are and who measured."""
+    conditions = f"Pictures of `setup1` at scale {scale}; CPU seconds of one run, mean over qualities and scenes."
+    return [conditions, origin(rows)]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,79 @@
+"""Gallery of reference scenes: a page of the viewer for each, and a still.
+
+    python -m benchmarks run gallery [--missing] [--stills] [--scale 4]
+
+Pages go to ``docs/gallery``. Git does not keep them; ``make docs`` writes those that are missing. With ``--stills`` a
+browser draws the stills, which git keeps, and ``docs/gallery/README.md`` is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from benchmarks.records import ROOT
+from benchmarks.speed.viewer import tab
+from ii_core import preset
+from ii_core.display.viewer import write_viewer
+from raytrace_ii import load_scene, render, scene_names
+
+GALLERY = ROOT / "docs" / "gallery"
+STILL = {"width": 1200, "height": 640}
+# State of the page in each still: what a stranger should see first.
+STILLS = {"apples": "#a=3", "cuboid": "#x=0.5&y=0.3", "objects": "#stereo=anaglyph&eyes=0.15", "mountains": "#f=0"}
+QUALITY = 80
+SAMPLES = 4
+SCALE = 4  # 128×64 lenses: pages of a megabyte
+INTRODUCTION = f"""# Gallery
+
+The reference scenes as pages of `raytrace-ii view`: stills here, pages that open in any browser, without a network,
+after `make docs` or `python -m benchmarks run gallery`. Each is *setup1* with a quarter of the lenses each way,
+{SAMPLES} samples a pixel, JPEG of quality {QUALITY}. *Mountains* and the ground behind the *Twins* are so far away
+that each lens sees them whole: no display of this kind can resolve them.
+"""
+
+
+def main() -> None:
+    """Write the pages, and the stills if the command line says so."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--stills", action="store_true", help="draw the stills and write the README, in a browser")
+    parser.add_argument("--scale", type=int, default=SCALE, help="divides the lenses of setup1")
+    parser.add_argument("--missing", action="store_true", help="leave pages as they are that exist")
+    asked = parser.parse_args()
+    for name in scene_names():
+        if asked.missing and page_of(name).exists():
+            continue
+        size = write_page(name, asked.scale)
+        print(f"{page_of(name)}: {size / 2**20:.1f} MB", flush=True)
+    if asked.stills:
+        draw_stills()
+
+
+def page_of(name: str) -> Path:
+    """Return the path of a scene's page."""
+    return GALLERY / f"{name}.html"
+
+
+def write_page(name: str, scale: int = SCALE) -> int:
+    """Render a scene and write its page; return its bytes."""
+    GALLERY.mkdir(parents=True, exist_ok=True)
+    shot = render(load_scene(name), preset("setup1", scale=scale), samples=SAMPLES, support=("depth",))
+    return write_viewer(page_of(name), shot.picture, depth=shot.depth, title=name, quality=QUALITY)
+
+
+def draw_stills() -> None:
+    """Draw a still of each page in a browser, and write the README that shows them."""
+    lines = [INTRODUCTION]
+    with tab(STILL) as page:
+        for name, about in scene_names().items():
+            page.goto(f"file://{page_of(name)}{STILLS.get(name, '#a=1.5')}")
+            page.evaluate("async () => { await ii.ready }")
+            page.wait_for_timeout(1000)
+            page.screenshot(path=GALLERY / f"{name}.jpg", type="jpeg", quality=85)
+            size = page_of(name).stat().st_size / 2**20
+            lines.append(f"## {name}\n\n{about}; a page of {size:.1f} MB.\n\n![{name}]({name}.jpg)\n")
+    (GALLERY / "README.md").write_text("\n".join(lines), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

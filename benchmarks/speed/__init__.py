@@ -1,0 +1,1 @@
+"""Benchmarks of time: rendering, metrics and the viewer, alone and against accuracy."""

@@ -1,0 +1,107 @@
+"""CPU time of this code and of an earlier commit's on the same pictures, in turns within one run.
+
+A process for each code, both started at once, render the same bands of full ``setup1`` with one thread, one after the
+other, never together. The earlier code comes from a git worktree in a temporary folder. Its process also makes again
+the calls of ``EmbreeScene.run`` that its render makes, on the same rays in the same order: Embree's bare time.
+
+As a script, ``python before.py SCENE BAND …``, it is one of these processes: a line of input is a task, "render" or
+"bare", the line of output its CPU seconds.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+COMMIT = "b1dc540"  # the last code that traced single rays in rows of pixels
+ROOT = Path(__file__).parents[2]
+BAND = 256  # rows of full setup1
+BANDS = {"hairdo": (7,)}  # a band of hair costs as much as four of others
+USUAL_BANDS = (2, 7, 12)
+
+
+def nanoseconds(scene: str, repeats: int) -> dict[str, list[float]]:
+    """CPU nanoseconds a pixel of ``now`` and ``before``, and of the earlier code's ``bare`` calls of Embree."""
+    bands = BANDS.get(scene, USUAL_BANDS)
+    pixels = 8192 * BAND * len(bands)
+    found: dict[str, list[float]] = {"now": [], "before": [], "bare": []}
+    with _worktree() as earlier, _process(ROOT, scene, bands) as now, _process(earlier, scene, bands) as before:
+        for _ in range(repeats):
+            for name, measure in (("now", now), ("before", before), ("bare", before)):
+                found[name].append(measure("bare" if name == "bare" else "render") / pixels * 1e9)
+    return found
+
+
+@contextmanager
+def _worktree() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder) / COMMIT
+        subprocess.run(["git", "-C", str(ROOT), "worktree", "add", "-q", "--detach", str(tree), COMMIT], check=True)
+        try:
+            yield tree
+        finally:
+            subprocess.run(["git", "-C", str(ROOT), "worktree", "remove", "--force", str(tree)], check=True)
+
+
+@contextmanager
+def _process(code: Path, scene: str, bands: tuple[int, ...]) -> Iterator[Callable[[str], float]]:
+    """A process with the code of a tree, and how to have a task measured by it."""
+    run = subprocess.Popen(
+        [sys.executable, str(Path(__file__)), scene, *map(str, bands)],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=code,
+        env={**os.environ, "PYTHONPATH": str(code), "PYTHONSAFEPATH": "1"},
+    )  # fmt: skip
+    assert run.stdin is not None and run.stdout is not None
+    to, back = run.stdin, run.stdout
+
+    def measure(task: str) -> float:
+        print(task, file=to, flush=True)
+        line = back.readline()
+        if not line:
+            raise RuntimeError(f"the process with the code of {code} died on the task {task!r}")
+        return float(line)
+
+    try:
+        measure("render")  # compiles
+        yield measure
+    finally:
+        to.close()
+        run.wait()
+
+
+def _serve(scene_name: str, bands: list[int]) -> None:
+    ii_core, raytrace_ii = importlib.import_module("ii_core"), importlib.import_module("raytrace_ii")
+    try:
+        job: Any = importlib.import_module("raytrace_ii.rendering.job")
+    except ModuleNotFoundError:
+        job = importlib.import_module("raytrace_ii.job")
+    whole = job.Job.tiles
+    job.Job.tiles = lambda self: [tile for tile in whole(self) if tile[0].start // BAND in bands]
+    scene, camera = raytrace_ii.load_scene(scene_name), ii_core.preset("setup1")
+
+    def shoot() -> None:
+        raytrace_ii.render(scene, camera, workers=1, support=())
+
+    calls: list[Callable[[], object]] = []
+    for task in map(str.strip, sys.stdin):
+        if task == "bare" and not calls:
+            calls = importlib.import_module("benchmarks.speed").recorded_calls(scene, shoot)
+        start = time.process_time()
+        if task == "bare":
+            for call in calls:
+                call()
+        else:
+            shoot()
+        print(time.process_time() - start, flush=True)
+
+
+if __name__ == "__main__":
+    _serve(sys.argv[1], [int(band) for band in sys.argv[2:]])

@@ -1,0 +1,409 @@
+"""What a scene needs: what leaving each thing out costs in quality and saves in time, and the least that will do.
+
+    python -m benchmarks run needs [--scale 16] [--scenes apples,car] [--rounds 5]
+
+Every picture is held against the full one, of the same samples, in 16 bits. *Not to be told apart* is what differs
+from it by no more than the reference set's own 8-bit picture does, with its sensor noise of one step: in PSNR, in the
+SSIM of the worst of five views, and in the error that one pixel in a thousand exceeds. The last is there for what is
+small and far off, which means hide. Of the things that a scene can do without, those that save most are left out
+first, as long as all that is left out together is not to be told apart. CPU time is the median over rounds in which
+every model is rendered once. Numbers go to ``benchmarks/results/needs.jsonl``, tables and chart to
+``docs/speed_accuracy.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from statistics import median
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import zoom
+
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import ROOT, Records, add_again, by_scene
+from benchmarks.speed.pareto import BASE, SCENES, at_depth, cut_scene, scene_text, sizes
+from ii_core import IICamera, IIPicture, add_sensor_noise, preset
+from ii_core.component import light_field
+from metrics import q_global, q_view
+from metrics.plots.rd_chart import COLOURS, new_figure, save
+from raytrace_ii import Body, Scene, Shot, render
+from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, VertexColours
+from raytrace_ii.tracing.intersect import Hits
+
+RECORDS = Records("needs", ("benchmarks.speed.needs", "benchmarks.speed.pareto"))
+CHART = ROOT / "docs/images/needs.png"
+PAGE, SCALE, ROUNDS = "docs/speed_accuracy.md", 16, 5
+RARE = 0.999  # share of pixels whose error is no greater than "one in a thousand exceeds"
+SHADOWS, FILTER = "shadows", "texture filtering"
+DEPTH, CUT = "bounces beyond {}", "triangles, × {:g}"
+CUTS = (0.25, 0.5)
+
+
+def main() -> None:
+    """Measure, keep, and fill the page once all scenes are there."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=SCALE)
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
+    add_again(parser)
+    asked = parser.parse_args()
+    keys = [{"scene": name, "scale": asked.scale, "rounds": asked.rounds} for name in asked.scenes.split(",")]
+    for key in RECORDS.todo(keys, asked.again):
+        record = RECORDS.measure(key, lambda key=key: study(key["scene"], key["scale"], key["rounds"]))
+        least = record["result"]["least"]
+        print(f"{key['scene']}: without {', '.join(least['without']) or 'nothing'}, {least['time']:+.0%}, "
+              f"{record['seconds']:.0f} s", flush=True)  # fmt: skip
+    if set(scenes := measured()) == set(SCENES):
+        save(draw(scenes), CHART)
+        publish(tables())
+
+
+def measured() -> dict[str, Any]:
+    """Return the newest row of every scene at the page's scale, in the order of SCENES."""
+    rows = {row["scene"]: row for row in RECORDS.rows(scale=SCALE, rounds=ROUNDS)}
+    return {name: rows[name] for name in SCENES if name in rows}
+
+
+def study(name: str, scale: int, rounds: int) -> dict[str, Any]:
+    """One scene: what it uses, what each thing is worth, and the least model."""
+    camera, parts = preset("setup1", scale=scale), has(name)
+    models = [build(name, without) for without in ((), *((part,) for part in parts))]
+    full, *others = (shoot(model, camera) for model in models)
+    limit = compared(full.picture, noisy(full.picture))
+    spent = seconds(models, camera, rounds)
+    left_out: list[dict[str, Any]] = [
+        {"what": part, **compared(full.picture, shot.picture)} for part, shot in zip(parts, others, strict=True)
+    ]
+    for row, ratio in zip(left_out, spent[1:], strict=True):
+        row["time"] = None if row["what"] == FILTER else ratio / spent[0] - 1  # the same kernel runs without it
+    least = least_model(name, camera, full.picture, left_out, limit)
+    whole, rest = seconds([models[0], build(name, least["without"])], camera, rounds)
+    least["time"] = rest / whole - 1
+    rays = {kind: count / full.stats.rays["primary"] for kind, count in full.stats.rays.items() if count}
+    return {
+        "rays": rays, "uses": uses(models[0]), "limit": limit, "left_out": left_out, "least": least,
+        "fewer": fewer(models[0], scale, full.picture, rounds),
+    }  # fmt: skip
+
+
+def has(name: str) -> list[str]:
+    """What could be left out of a scene, one by one."""
+    scene = build(name, ())
+    bounces = scene.packed.mirrors or scene.packed.transmits
+    return [
+        *([SHADOWS] if scene.lights else []),
+        *(part for part, without in WITHOUT.items() if without(scene) is not scene),
+        *([DEPTH.format(depth) for depth in range(scene.max_depth)] if bounces else []),
+        *([CUT.format(cut) for cut in CUTS] if sizes(scene_text(name)) else []),
+    ]
+
+
+def uses(scene: Scene) -> dict[str, int]:
+    """How many bodies have what."""
+    materials = [body.material for body in scene.bodies]
+    return {
+        "textures": sum(m.texture is not None for m in materials),
+        "normal maps": sum(m.normal_map is not None for m in materials),
+        "highlights": sum(m.specular > 0 for m in materials),
+        "mirrors": sum(max(m.mirror) > 0 for m in materials),
+        "glass": sum(m.transmissive for m in materials),
+        "smooth normals": sum(body.normals is not None for body in scene.bodies),
+        "cut-outs": sum(m.alpha_cutoff > 0 for m in materials),
+        "bodies": len(materials),
+        "lights": len(scene.lights),
+        "fog": int(scene.fog is not None),
+    }
+
+
+def build(name: str, without: Sequence[str]) -> Scene:
+    """A reference scene without these things, in the one order that lets them go together."""
+    cut = min([cut for cut in CUTS if CUT.format(cut) in without], default=1.0)
+    scene = loaded(name, cut)
+    for part, leave_out in WITHOUT.items():
+        scene = leave_out(scene) if part in without else scene
+    depths = [depth for depth in range(scene.max_depth) if DEPTH.format(depth) in without]
+    scene = at_depth(scene, min(depths)) if depths else scene
+    return unshadowed(scene) if SHADOWS in without else scene
+
+
+loaded = lru_cache(maxsize=len(CUTS) + 1)(cut_scene)
+
+
+def unshadowed(scene: Scene) -> Scene:
+    """As if nothing cast a shadow: no shadow ray is traced."""
+    free = replace(scene)  # with a tree of its own
+    none = np.empty(0, np.float32)
+
+    def clear(o: NDArray[Any]) -> tuple[Hits, float]:
+        return Hits(np.full(len(o), -1, np.int32), none, none, none), 0.0
+
+    vars(free.packed.intersector)["blocked"] = lambda o, d, reach: (np.full(len(o), -1, np.int32), 0.0)
+    if scene.packed.lets_through:
+        found = free.packed.intersector.nearest_clear  # the camera's rays still ask what they start in
+        vars(free.packed.intersector)["nearest_clear"] = lambda o, d, reach=None: (
+            found(o, d) if reach is None else clear(o)
+        )
+    return free
+
+
+def _bodies(change: Callable[[Body], Body]) -> Callable[[Scene], Scene]:
+    """A change of every body as one of the scene: the scene itself if nothing changes."""
+
+    def changed(scene: Scene) -> Scene:
+        bodies = [change(body) for body in scene.bodies]
+        return (
+            replace(scene, bodies=bodies)
+            if any(a is not b for a, b in zip(bodies, scene.bodies, strict=True))
+            else scene
+        )
+
+    return changed
+
+
+def _plain(body: Body) -> Body:
+    """The mean colour of its texture all over."""
+    texture = body.material.texture
+    if texture is None:
+        return body
+    mean = np.asarray(body.material.colour) * mean_colour(texture, body.texture_coordinates)
+    return replace(body, material=replace(body.material, texture=None, colour=tuple(mean), alpha_cutoff=0.0))
+
+
+def mean_colour(texture: Any, coordinates: Any) -> NDArray[np.float64]:
+    """Linear: of an image's pixels, of two colours, or of the vertices."""
+    if isinstance(texture, Image):
+        return texture.pixels.mean(axis=(0, 1), dtype=np.float64)
+    if isinstance(texture, VertexColours):
+        return np.asarray(coordinates, np.float64).mean(axis=0)
+    assert isinstance(texture, Checker | Stripes | Noise)
+    return np.mean(texture.colours, axis=0)
+
+
+def _unfiltered(body: Body) -> Body:
+    """Texels repeated 8 × 8: bilinear interpolation is left on an eighth of their width alone."""
+    texture = body.material.texture
+    if not isinstance(texture, Image):
+        return body
+    codes = None if texture.codes is None else texture.codes.repeat(8, axis=0).repeat(8, axis=1)
+    blocks = replace(texture, pixels=texture.pixels.repeat(8, axis=0).repeat(8, axis=1), codes=codes)
+    return replace(body, material=replace(body.material, texture=blocks))
+
+
+def _matt(body: Body) -> Body:
+    return replace(body, material=replace(body.material, specular=0.0)) if body.material.specular > 0 else body
+
+
+def _unmapped(body: Body) -> Body:
+    return replace(body, material=replace(body.material, normal_map=None)) if body.material.normal_map else body
+
+
+WITHOUT: dict[str, Callable[[Scene], Scene]] = {
+    "highlights": _bodies(_matt),
+    "textures": _bodies(_plain),
+    FILTER: _bodies(_unfiltered),
+    "normal maps": _bodies(_unmapped),
+    "smooth normals": _bodies(lambda body: body if body.normals is None else replace(body, normals=None)),
+    "fog": lambda scene: replace(scene, fog=None) if scene.fog else scene,
+}
+
+
+def shoot(scene: Scene, camera: IICamera) -> Shot:
+    return render(scene, camera, samples=BASE, dtype="uint16", support=(), workers=1)
+
+
+def seconds(scenes: Sequence[Scene], camera: IICamera, rounds: int) -> list[float]:
+    """Median CPU seconds of each, taken in turn so that a busy neighbour meets all."""
+    for scene in scenes:
+        scene.packed  # noqa: B018  # trees are built once and not counted
+    spent = [[shoot(scene, camera).stats.cpu_seconds for scene in scenes] for _ in range(rounds)]
+    return [median(times) for times in zip(*spent, strict=True)]
+
+
+def noisy(picture: IIPicture) -> IIPicture:
+    """A 16-bit picture as the reference set has it: rounded to 8 bits, with sensor noise of one step."""
+    coded = picture.with_pixels(np.rint(picture.pixels / 257).astype(np.uint8))
+    return picture.with_pixels(add_sensor_noise(coded, 1.0, seed=1).pixels.astype(np.uint16) * np.uint16(257))
+
+
+def compared(full: IIPicture, other: IIPicture) -> dict[str, float]:
+    """PSNR, mean and worst SSIM of five views, and the error in steps of 8 bits that one pixel in 1000 exceeds."""
+    views = q_view(full, other)
+    error = np.abs(full.pixels.astype(np.int32) - other.pixels).max(axis=2) / 257
+    rare = float(np.quantile(error, RARE))
+    return {"psnr": q_global(full, other), "q_view": views.mean, "worst": views.worst, "rare": rare}
+
+
+def alike(found: dict[str, float], limit: dict[str, float]) -> bool:
+    """Whether a picture is not to be told apart from the full one."""
+    good = found["psnr"] >= limit["psnr"] and found["worst"] >= limit["worst"]
+    return bool(good and found["rare"] <= limit["rare"])
+
+
+def least_model(
+    name: str, camera: IICamera, full: IIPicture, left_out: Sequence[dict[str, Any]], limit: dict[str, float]
+) -> dict[str, Any]:
+    """What can be left out together, those that save most first, with what is then left."""
+    without: list[str] = []
+    found = compared(full, full)
+    tried = [row for row in left_out if row["time"] is not None and alike(row, limit)]
+    for row in sorted(tried, key=lambda row: row["time"]):
+        more = [*without, row["what"]]
+        then = compared(full, shoot(build(name, more), camera).picture)
+        if alike(then, limit):
+            without, found = more, then
+    return {"without": _strongest(without), **found}
+
+
+def _strongest(without: Sequence[str]) -> list[str]:
+    """Without what something else already says: fewer bounces are in the fewest, a coarser cut in the coarsest."""
+    depths = [DEPTH.format(depth) for depth in range(99) if DEPTH.format(depth) in without]
+    cuts = [CUT.format(cut) for cut in sorted(CUTS) if CUT.format(cut) in without]
+    return [part for part in without if part not in depths[1:] and part not in cuts[1:]]
+
+
+def fewer(scene: Scene, scale: int, full: IIPicture, rounds: int) -> list[dict[str, Any]]:
+    """Half the lenses, or half the pixels of an elementary image, each way, brought back to all of them."""
+    camera, lenses = preset("setup1", scale=scale), preset("setup1", scale=2 * scale)
+    pixels = replace(camera, pixels=tuple(n // 2 for n in camera.pixels), pixel_pitch_mm=2 * camera.pixel_pitch_mm)
+    rows = []
+    for what, small, axes in (("lenses", lenses, (0, 2)), ("pixels a lens", pixels, (1, 3))):
+        times = [[shoot(scene, one).stats.cpu_seconds for one in (small, camera)] for _ in range(rounds)]
+        spent = median(a for a, _ in times) / median(b for _, b in times) - 1
+        picture = shoot(scene, small).picture
+        for kind in ("nearest", "linear"):
+            back = full.with_pixels(enlarged(picture, axes, linear=kind == "linear"))
+            rows.append({"what": what, "by": kind, **compared(full, back), "time": spent})
+    return rows
+
+
+def enlarged(picture: IIPicture, axes: tuple[int, int], *, linear: bool) -> NDArray[Any]:
+    """The pixels of a picture with twice the lenses (axes 0, 2 of [l, v, k, u]) or pixels a lens (1, 3) each way."""
+    field = light_field(picture.pixels, picture.lenses, picture.ei_pixels)
+    if linear:
+        factors = [2 if axis in axes else 1 for axis in range(5)]
+        field = np.rint(zoom(field.astype(np.float32), factors, order=1, mode="nearest", grid_mode=True))
+    else:
+        for axis in axes:
+            field = field.repeat(2, axis=axis)
+    l, v, k, u, _ = field.shape
+    return field.astype(picture.pixels.dtype).reshape(l * v, k * u, 3)
+
+
+def tables() -> Tables:
+    """Return the tables of what is kept."""
+    scenes, camera = measured(), preset("setup1", scale=SCALE)
+    (k, l), (m, n) = camera.lenses, camera.pixels
+    size = f"`setup1` at `scale={SCALE}`: {m}×{n} pixels, {k}×{l} lenses, {BASE} samples a pixel."
+    return {
+        (PAGE, "needs-size"): [size, by_scene(scenes)],
+        (PAGE, "uses"): uses_table(scenes),
+        (PAGE, "least"): least_table(scenes),
+        (PAGE, "needs"): needs_table(scenes),
+        (PAGE, "fewer"): fewer_table(scenes),
+    }
+
+
+def uses_table(scenes: dict[str, Any]) -> list[str]:
+    """Rays a camera ray by kind, and how many bodies have what."""
+    kinds = ("shadow", "reflection", "refraction", "passed")
+    what = [key for key in next(iter(scenes.values()))["uses"] if key not in ("bodies", "lights")]
+    lines = [f"| scene | {' | '.join(kinds)} | lights | {' | '.join(what)} |", "|---" * (len(what) + 6) + "|"]
+    for name, one in scenes.items():
+        rays = [f"{one['rays'][kind]:.2f}" if kind in one["rays"] else "–" for kind in kinds]
+        held = [str(one["uses"][key] or "–") for key in what]
+        lines.append(f"| {name} | {' | '.join(rays)} | {one['uses']['lights']} | {' | '.join(held)} |")
+    return lines
+
+
+def least_table(scenes: dict[str, Any]) -> list[str]:
+    """The limit and the least model of every scene."""
+    lines = [
+        "| scene | can do without | PSNR | SSIM, worst view | one pixel in 1000 off by | CPU time |",
+        "|---" * 6 + "|",
+    ]
+    for name, one in scenes.items():
+        least, limit = one["least"], one["limit"]
+        without, time = ", ".join(least["without"]) or "nothing", least["time"] if least["without"] else 0
+        db = "the same" if least["psnr"] is None else f"{least['psnr']:.1f} dB"
+        lines.append(
+            f"| {name} | {without} | {db} (≥ {limit['psnr']:.1f}) | {least['worst']:.4f} (≥ {limit['worst']:.4f}) | "
+            f"{least['rare']:.1f} steps (≤ {limit['rare']:.1f}) | {percent(time)} |"
+        )
+    return lines
+
+
+def needs_table(scenes: dict[str, Any]) -> list[str]:
+    """A row a thing left out, a column a scene: PSNR, SSIM, time; in bold what is not to be told apart."""
+    parts = [row["what"] for one in scenes.values() for row in one["left_out"]]
+    lines = [f"| without | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]
+    for part in sorted(dict.fromkeys(parts), key=_place):
+        cells = []
+        for one in scenes.values():
+            row = next((row for row in one["left_out"] if row["what"] == part), None)
+            cells.append("–" if row is None else cell(row, one["limit"]))
+        lines.append(f"| {part} | {' | '.join(cells)} |")
+    return lines
+
+
+def _place(part: str) -> tuple[int, str]:
+    order = [SHADOWS, *WITHOUT]
+    return (order.index(part) if part in order else len(order), part)
+
+
+def cell(row: dict[str, Any], limit: dict[str, float]) -> str:
+    db = "same" if row["psnr"] is None else f"{row['psnr']:.1f} dB"
+    text = f"{db}, {row['q_view']:.3f}" + ("" if row["time"] is None else f", {percent(row['time'])}")
+    return f"**{text}**" if row["psnr"] is None or alike(row, limit) else text
+
+
+def percent(share: float) -> str:
+    return f"{100 * share:+.0f} %".replace("-", "−")
+
+
+def fewer_table(scenes: dict[str, Any]) -> list[str]:
+    """Half the lenses and half the pixels."""
+    rows = [(row["what"], row["by"]) for row in next(iter(scenes.values()))["fewer"]]
+    lines = [f"| half the | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]
+    for i, (what, by) in enumerate(rows):
+        cells = [cell(one["fewer"][i], one["limit"]) for one in scenes.values()]
+        lines.append(f"| {what}, {by} | {' | '.join(cells)} |")
+    return lines
+
+
+def draw(scenes: dict[str, Any]) -> Any:
+    """A panel a scene: how far the picture is off without each thing, and what that saves."""
+    figure = new_figure(15, 8.5)
+    for axes, (name, one) in zip(figure.subplots(2, 4).flat, scenes.items(), strict=True):
+        rows = sorted(one["left_out"], key=lambda row: _place(row["what"]), reverse=True)
+        limit = one["limit"]["psnr"]
+        top = limit + 25  # the same picture has no PSNR: it stands at the edge
+        x = [top if row["psnr"] is None else min(row["psnr"], top) for row in rows]
+        good = [row["psnr"] is None or alike(row, one["limit"]) for row in rows]
+        for y, (at, fine, row) in enumerate(zip(x, good, rows, strict=True)):
+            axes.plot([0, at], [y, y], color="0.88", linewidth=1, zorder=1)
+            axes.plot(at, y, "o", color=COLOURS[2 if fine else 1], markersize=7, zorder=3)
+            saved = "" if row["time"] is None else percent(row["time"])
+            axes.annotate(saved, (top + 3, y), va="center", fontsize=8, annotation_clip=False)
+        axes.axvline(limit, color="0.4", linestyle=":", linewidth=1)
+        axes.set_yticks(range(len(rows)), [row["what"] for row in rows], fontsize=8)
+        axes.set_xlim(0, top + 1)
+        axes.set_title(name, loc="left", fontsize=11)
+        axes.set_title("CPU time", loc="right", fontsize=8)
+        axes.spines[["top", "right"]].set_visible(False)
+    for axes in figure.axes[4:]:
+        axes.set_xlabel("PSNR against the full picture [dB]")
+    for fine, label in ((2, "not to be told apart"), (1, "seen to be missing")):
+        figure.axes[0].plot([], [], "o", color=COLOURS[fine], label=label)
+    figure.axes[0].plot([], [], color="0.4", linestyle=":", label="the sensor's noise")
+    handles, names = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+if __name__ == "__main__":
+    main()

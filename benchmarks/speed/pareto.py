@@ -1,0 +1,333 @@
+"""Speed against accuracy: CPU time and error of every setting, scene by scene, and the setting to take.
+
+    python -m benchmarks run pareto [--scale 32] [--scenes apples,car]
+
+The error is PSNR in 16-bit sRGB against a reference of 64 samples a pixel, 12 bounces and, where the scene's file
+says how finely its shapes are cut, triangles half as large; time is CPU seconds of `render` without support images,
+the least of two or three. Samples a pixel, adaptive sampling to an error, recursion depth and tessellation are swept;
+settings that nothing beats in both are the Pareto front. Numbers and chart go to ``benchmarks/results/pareto.jsonl``
+and ``.png``, tables and chart to ``docs/speed_accuracy.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+import tempfile
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.accuracy.map_precision import RECORDS as MAPS
+from benchmarks.accuracy.map_precision import SCALE as MAPS_SCALE
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import RESULTS, ROOT, Records, add_again, by_scene, origin
+from ii_core import IICamera, IIPicture, preset
+from ii_core.files import atomic_path
+from metrics import q_global
+from metrics.plots.rd_chart import COLOURS
+from raytrace_ii import Scene, load_scene, render
+
+RECORDS, SCALE = Records("pareto", ("benchmarks.speed.pareto",)), 32  # of the page
+SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
+SAMPLES = (1, 2, 4, 9, 16)
+AT_DEPTHS = (1, 4, 16)  # samples at which other depths are tried
+DEPTHS = (0, 1, 2, 3, 4, 6, 8)
+ERRORS = (8.0, 4.0, 2.0, 1.0, 0.5)  # of adaptive sampling between LEAST and MOST, steps of 8 bits
+LEAST, MOST = 4, 16
+FINER = 2.0  # how much finer the reference's shapes are cut
+CUTS = (0.25, 0.5, 1.0, FINER)
+TRUE = {"samples": 64, "depth": 12}
+SENSOR_DB = 47.5  # PSNR of the sensor's own noise of one 8-bit step
+BASE = 4  # samples at which depth and cut are compared
+
+
+def main() -> None:
+    """Measure, print, keep, draw and fill the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=SCALE)
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    add_again(parser)
+    asked = parser.parse_args()
+    camera = preset("setup1", scale=asked.scale)
+    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes.split(",")]
+    for key in RECORDS.todo(keys, asked.again):
+        record = RECORDS.measure(key, lambda key=key: study(key["scene"], camera))
+        best = record["result"]["recommended"]
+        print(f"{key['scene']}: {best['setting']}, {best['psnr']:.1f} dB, {record['seconds']:.0f} s", flush=True)
+    if set(scenes := measured()) == set(SCENES):
+        chart(scenes, RESULTS / "pareto.png")
+        shutil.copy(RESULTS / "pareto.png", ROOT / "docs" / "images" / "pareto.png")
+        publish(tables())
+
+
+def measured() -> dict[str, Any]:
+    """Return the newest row of every scene at the page's scale, in the order of SCENES."""
+    rows = {row["scene"]: row for row in RECORDS.rows(scale=SCALE)}
+    return {name: rows[name] for name in SCENES if name in rows}
+
+
+def tables() -> Tables:
+    """Return the tables of the page."""
+    data, camera = measured(), preset("setup1", scale=SCALE)
+    (k, l), (m, n) = camera.lenses, camera.pixels
+    page = "docs/speed_accuracy.md"
+    return {
+        (page, "size"): [f"`setup1` at `scale={SCALE}`: {m}×{n} pixels, {k}×{l} lenses.", by_scene(data)],
+        (page, "recommended"): recommended_table(data),
+        (page, "samples"): samples_table(data),
+        (page, "depth"): depth_table(data),
+        (page, "cut"): cut_table(data),
+        (page, "maps"): maps_table(MAPS.rows(scale=MAPS_SCALE, camera="setup1")),
+    }
+
+
+def study(name: str, camera: IICamera) -> dict[str, Any]:
+    """All settings of one scene."""
+    scenes = {cut: cut_scene(name, cut) for cut in CUTS} if sizes(scene_text(name)) else {1.0: load_scene(name)}
+    finest, scene = scenes[max(scenes)], scenes[1.0]
+    truth = shoot(at_depth(finest, TRUE["depth"]), camera, TRUE["samples"])[0]
+    bounces = scene.packed.mirrors or scene.packed.transmits
+    rows: list[dict[str, Any]] = []
+
+    def add(sweep: str, scene: Scene, samples: int, error: float | None = None, cut: float = 1.0) -> None:
+        picture, seconds = shoot(scene, camera, samples if error is None else (LEAST, samples), error or 0.5)
+        setting = {"samples": samples, "depth": scene.max_depth if bounces else 0, "error": error, "cut": cut}
+        rows.append({"sweep": sweep, **setting, "seconds": seconds, "psnr": q_global(truth, picture)})
+
+    for depth in sorted({*DEPTHS, scene.max_depth}) if bounces else (scene.max_depth,):
+        for samples in SAMPLES if depth == scene.max_depth else AT_DEPTHS:
+            add("samples" if depth == scene.max_depth else "depth", at_depth(scene, depth), samples)
+    for error in ERRORS:
+        add("adaptive", scene, MOST, error)
+    for cut, other in scenes.items():
+        if cut != 1:
+            add("cut", other, BASE, cut=cut)
+    return {
+        "max_depth": scene.max_depth,
+        "bounces": bounces,
+        "faces": {str(cut): sum(len(body.faces) for body in other.bodies) for cut, other in scenes.items()},
+        "truth_repeats_to": q_global(truth, shoot(at_depth(finest, TRUE["depth"]), camera, 36, seed=1)[0]),
+        "rows": rows,
+        "front": (best := front(rows)),
+        "recommended": recommended([rows[i] for i in best]),
+    }
+
+
+def shoot(
+    scene: Scene, camera: IICamera, samples: int | tuple[int, int], error: float = 0.5, seed: int = 0
+) -> tuple[IIPicture, float]:
+    """The picture and its CPU seconds: the least of two, of three if it is quick, any if it is only to be true."""
+    most = samples if isinstance(samples, int) else samples[1]
+    timed = most <= max(SAMPLES)
+    shots = [
+        render(
+            scene,
+            camera,
+            samples=samples,
+            error=error,
+            seed=seed,
+            dtype="uint16",
+            support=(),
+            workers=1 if timed else None,
+        )
+        for _ in range((3 if most <= 2 else 2) if timed else 1)
+    ]
+    return shots[0].picture, min(shot.stats.cpu_seconds for shot in shots)
+
+
+def at_depth(scene: Scene, depth: int) -> Scene:
+    """The scene with another recursion depth and the same tree, which does not depend on it."""
+    other = scene.with_depth(depth)
+    vars(other)["packed"] = scene.packed
+    return other
+
+
+def scene_text(name: str) -> str:
+    return Path(str(files("assets") / "scenes" / f"{name}.toml")).read_text(encoding="utf-8")
+
+
+def sizes(text: str) -> list[str]:
+    """The objects of a scene file that say, or may say, how finely they are cut."""
+    return [block for block in re.split(r"(?m)^(?=\[\[object\]\])", text) if _cut(block, 2.0) != block]
+
+
+def _cut(block: str, factor: float) -> str:
+    """One object, ``factor`` times as finely cut."""
+    if re.search(r'(?m)^shape = "(sphere|cylinder|revolve)"', block):
+        if not re.search(r"(?m)^segments", block):
+            block = re.sub(r"(?m)^shape = .*$", r"\g<0>\nsegments = 96", block, count=1)
+        if '"revolve"' in block and not re.search(r"(?m)^steps", block):
+            block = re.sub(r"(?m)^shape = .*$", r"\g<0>\nsteps = 64", block, count=1)
+        block = re.sub(
+            r"(?m)^(segments|steps) = (\d+)", lambda m: f"{m[1]} = {max(4, round(int(m[2]) * factor))}", block
+        )
+    return re.sub(r"(?m)^cell_mm = ([\d.]+)", lambda m: f"cell_mm = {float(m[1]) / factor:g}", block)
+
+
+def cut_scene(name: str, factor: float) -> Scene:
+    """A reference scene with its shapes cut ``factor`` times as finely, where its file says how."""
+    if factor == 1:
+        return load_scene(name)
+    blocks = re.split(r"(?m)^(?=\[\[object\]\])", scene_text(name))
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(Path(str(files("assets") / "textures")), Path(folder) / "textures")
+        (Path(folder) / "scenes").mkdir()
+        path = Path(folder) / "scenes" / f"{name}.toml"
+        path.write_text("".join(_cut(block, factor) for block in blocks), encoding="utf-8")
+        return load_scene(path)
+
+
+def front(rows: Sequence[dict[str, Any]]) -> list[int]:
+    """Rows that no other beats in time and error, by time."""
+    best: list[int] = []
+    for i in sorted(range(len(rows)), key=lambda i: (rows[i]["seconds"], -rows[i]["psnr"])):
+        if not best or rows[i]["psnr"] > rows[best[-1]]["psnr"]:
+            best.append(i)
+    return best
+
+
+def recommended(best: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Of a front, the cheapest setting below the sensor's noise; if there is none, within 1 dB of the best."""
+    good = [row for row in best if row["psnr"] >= SENSOR_DB]
+    near = [row for row in best if row["psnr"] >= best[-1]["psnr"] - 1]
+    pick, rule = (good[0], "below the sensor's noise") if good else (near[0], "within 1 dB of the best")
+    return {**pick, "rule": rule, "setting": setting(pick)}
+
+
+def setting(row: dict[str, Any]) -> str:
+    """In words."""
+    how = f"{LEAST} to {MOST} samples, error {row['error']:g}" if row["error"] else f"{row['samples']} samples"
+    how = how.replace("1 samples", "1 sample") if row["samples"] == 1 else how
+    return how + (f", depth {row['depth']}" if row["depth"] else "") + (f", cut ×{row['cut']:g}" * (row["cut"] != 1))
+
+
+SWEEPS = {"samples": "o", "adaptive": "D", "depth": "v", "cut": "s"}
+NAMES = {
+    "samples": "1, 2, 4, 9, 16 samples", "adaptive": f"adaptive, {LEAST} to {MOST} samples",
+    "depth": "other recursion depths", "cut": f"triangles × ¼, ½, {FINER:g}, {BASE} samples",
+}  # fmt: skip
+
+
+def chart(data: dict[str, Any], target: Path) -> None:
+    """A panel a scene."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    figure = Figure(figsize=(14, 7.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    for axes, (name, one) in zip(figure.subplots(2, 4).flat, data.items(), strict=True):
+        rows = one["rows"]
+        best = [rows[i] for i in one["front"]]
+        axes.step(
+            [r["seconds"] for r in best], [r["psnr"] for r in best], where="post", color="0.75", linewidth=4, zorder=1
+        )
+        for i, (sweep, marker) in enumerate(SWEEPS.items()):
+            chosen = [r for r in rows if r["sweep"] == sweep]
+            joined = "-" if sweep in ("samples", "adaptive") else ""
+            axes.plot(
+                [r["seconds"] for r in chosen], [r["psnr"] for r in chosen], marker + joined, color=COLOURS[i],
+                markersize=4 if sweep == "depth" else 6, linewidth=1, label=NAMES[sweep],
+                zorder=2 if sweep == "depth" else 3,
+            )  # fmt: skip
+        pick = one["recommended"]
+        axes.plot(pick["seconds"], pick["psnr"], "*", color="black", markersize=15, zorder=4, label="recommended")
+        axes.axhline(SENSOR_DB, color="0.4", linestyle=":", linewidth=1)
+        axes.set_title(f"{name}: {pick['setting']}", loc="left", fontsize=9)
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(base=10, subs=(1, 2, 5)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.grid(True, color="0.92", linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    for axes in figure.axes[4:]:
+        axes.set_xlabel("CPU time [s]")
+    for axes in (figure.axes[0], figure.axes[4]):
+        axes.set_ylabel("PSNR [dB]")
+    handles = {label: h for axes in figure.axes for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(
+        [*handles.values(), figure.axes[0].plot([], [], color="0.75", linewidth=4)[0]], [*handles, "Pareto front"],
+        loc="outside lower center", ncols=6, frameon=False, fontsize=9,
+    )  # fmt: skip
+    with atomic_path(target) as temporary:
+        figure.savefig(temporary, dpi=120, format="png")
+
+
+def recommended_table(data: dict[str, Any]) -> list[str]:
+    """The pick of every scene, beside one sample."""
+    lines = ["| scene | take | PSNR | CPU time | by | one sample |", "|---|---|---|---|---|---|"]
+    for name, one in data.items():
+        pick = one["recommended"]
+        (first,) = [r for r in one["rows"] if r["sweep"] == "samples" and r["samples"] == 1]
+        lines.append(
+            f"| {name} | {pick['setting']} | {pick['psnr']:.1f} dB | {pick['seconds']:.2f} s | {pick['rule']} | "
+            f"{first['psnr']:.1f} dB, {first['seconds']:.2f} s |"
+        )
+    return lines
+
+
+def samples_table(data: dict[str, Any]) -> list[str]:
+    """PSNR over samples, and the nearest adaptive setting to the most of them."""
+    heads = " | ".join(f"{s}" for s in SAMPLES)
+    head = f"| scene | {heads} | adaptive to ½ step | its time / {MOST} samples |"
+    lines = [head, "|---" * (len(SAMPLES) + 3) + "|"]
+    for name, one in data.items():
+        plain = {r["samples"]: r for r in one["rows"] if r["sweep"] == "samples"}
+        (fine,) = [r for r in one["rows"] if r["error"] == min(ERRORS)]
+        cells = " | ".join(f"{plain[s]['psnr']:.1f}" for s in SAMPLES)
+        lines.append(f"| {name} | {cells} | {fine['psnr']:.1f} | {fine['seconds'] / plain[MOST]['seconds']:.2f} |")
+    return lines
+
+
+def depth_table(data: dict[str, Any]) -> list[str]:
+    """Recursion depth at BASE samples: PSNR and time."""
+    lines = [
+        "| scene | " + " | ".join(map(str, DEPTHS)) + " | the scene's |",
+        "|---" * (len(DEPTHS) + 2) + "|",
+    ]
+    for name, one in data.items():
+        if not one["bounces"]:
+            lines.append(f"| {name} |" + " |" * len(DEPTHS) + " nothing mirrors |")
+            continue
+        at = {r["depth"]: r for r in one["rows"] if r["samples"] == BASE and r["sweep"] in ("samples", "depth")}
+        cells = " | ".join(f"{at[d]['psnr']:.1f} dB, {at[d]['seconds']:.2f} s" for d in DEPTHS)
+        lines.append(f"| {name} | {cells} | {one['max_depth']} |")
+    return lines
+
+
+def cut_table(data: dict[str, Any]) -> list[str]:
+    """Tessellation at BASE samples."""
+    lines = ["| scene | " + " | ".join(f"×{cut:g}" for cut in CUTS) + " |", "|---" * (len(CUTS) + 1) + "|"]
+    for name, one in data.items():
+        if len(one["faces"]) == 1:
+            continue
+        cells = []
+        for cut in CUTS:
+            rows = [r for r in one["rows"] if r["cut"] == cut and r["samples"] == BASE and r["error"] is None]
+            (row,) = [r for r in rows if r["sweep"] in ("samples", "cut")]
+            cells.append(f"{one['faces'][str(cut)] / 1e3:.0f} k faces, {row['psnr']:.1f} dB, {row['seconds']:.2f} s")
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def maps_table(rows: list[dict[str, Any]]) -> list[str]:
+    """What `benchmarks.accuracy.map_precision` found for setup1."""
+    lines = ["| stored as | bytes a ray | largest angle off | apples | cuboid |", "|---|---|---|---|---|"]
+    for row in rows:
+        psnr = [
+            "exact" if p is None or not np.isfinite(p) else f"{p:.1f} dB"
+            for p in (row["psnr_apples"], row["psnr_cuboid"])
+        ]
+        cells = f"{row['bytes_per_pixel']:.2f} | {row['angle_max_urad']:.2g} µrad | {psnr[0]} | {psnr[1]}"
+        lines.append(f"| {row['format']} | {cells} |")
+    return [*lines, "", origin(rows)]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,200 @@
+"""How fast, as ratios taken within one run: ours against the library's bare call or a copy. ``make bench``.
+
+Everything is interleaved and the median taken, because machines drift. Numbers go to
+``benchmarks/results/speed.jsonl`` with the commit they were taken on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from fnmatch import fnmatch
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.records import Records, add_again
+from benchmarks.speed.bare import bare_encoder
+from benchmarks.speed.before import COMMIT, nanoseconds
+from codec import encode
+from ii_core import IIPicture, component_images, preset
+from raytrace_ii import load_scene, render, scene_names
+
+RECORDS = Records("speed", ("benchmarks.speed.ratios", "benchmarks.speed.bare", "benchmarks.speed.before"))
+REPEATS = 7
+LEAST_GAIN = {"apples": "≥ 2.8", "cuboid": "≥ 2.8"}
+
+
+def main() -> None:
+    """Measure what is asked for, print and keep."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", default="*", help="ratios by name, * for anything: 'render*,peak*'")
+    add_again(parser)
+    asked = parser.parse_args()
+    wanted = {
+        what: call for what, (_, call) in targets().items() if any(fnmatch(what, p) for p in asked.only.split(","))
+    }
+    for key in RECORDS.todo(({"what": what} for what in wanted), asked.again):
+
+        def row(call: Callable[[], list[float]] = wanted[key["what"]]) -> dict[str, Any]:
+            values = call()
+            return {"median": statistics.median(values), "all": values, "cpu_flags": cpu_flags()}
+
+        RECORDS.measure(key, row)
+    for found in measured():
+        span = f"({min(found['all']):.2f} … {max(found['all']):.2f})"
+        print(f"{found['what']:<52} {found['target']:>6}  {found['median']:.2f}   {span}")
+
+
+def measured() -> list[dict[str, Any]]:
+    """Return the newest row of each ratio, with its target, in the order of `targets`."""
+    rows = {row["what"]: row for row in RECORDS.rows()}
+    return [{"target": target, **rows[what]} for what, (target, _) in targets().items() if what in rows]
+
+
+def targets() -> dict[str, tuple[str, Callable[[], list[float]]]]:
+    """Return target and measurement of each ratio."""
+    every: list[tuple[str, str, Callable[[], list[float]]]] = [
+        *(
+            (f"render {name}: speed / {COMMIT}", LEAST_GAIN.get(name, "≥ 1.4"), lambda name=name: gain(name))
+            for name in scene_names()
+        ),
+        (f"render, mean of all: speed / {COMMIT}", "≥ 2.2", lambda: gains(gain)),
+        *(
+            (f"render {name}: CPU time / EmbreeScene.run", "", lambda name=name: bare_ratio(name))
+            for name in scene_names()
+        ),
+        ("render, mean of all: CPU time / EmbreeScene.run", "≤ 0.6", lambda: gains(bare_ratio)),
+        ("render apples: speed of 2 workers / 1 worker", "≥ 1.9", lambda: workers_ratio("apples")),
+        ("render cuboid: speed of 2 workers / 1 worker", "≥ 1.9", lambda: workers_ratio("cuboid")),
+        ("first picture of apples, nothing compiled, CPU s", "≤ 15", lambda: first_picture(cached=False)),
+        ("first picture of apples in a new process, CPU s", "≤ 2", lambda: first_picture(cached=True)),
+        ("II → EI / numpy copy, setup1", "≤ 2", lambda: rearrange_ratio("ei")),
+        ("II → SI / numpy copy, setup1", "≤ 2", lambda: rearrange_ratio("si")),
+        ("II → RI / numpy copy, setup1", "≤ 2", lambda: rearrange_ratio("ri")),
+        ("encode si-h264 / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("si-h264")),
+        ("encode ei-h264 / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("ei-h264")),
+        ("encode si-hevc / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("si-hevc")),
+        ("encode si-av1:fast / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("si-av1:fast")),
+        ("peak memory of rendering setup1 at full size, GiB", "≤ 0.5", peak_memory),
+    ]
+    return {what: (target, call) for what, target, call in every}
+
+
+@lru_cache
+def rendered(name: str) -> dict[str, list[float]]:
+    """CPU nanoseconds a pixel of bands of full setup1 at one sample, one thread: see `before.nanoseconds`."""
+    return nanoseconds(name, REPEATS)
+
+
+def gain(name: str) -> list[float]:
+    """Return how many times as fast a render is as that of the commit `before.COMMIT`, in CPU time."""
+    found = rendered(name)
+    return [before / now for before, now in zip(found["before"], found["now"], strict=True)]
+
+
+def bare_ratio(name: str) -> list[float]:
+    """Return CPU time of a render over that of Embree's single rays, the same rays in the order of that commit."""
+    found = rendered(name)
+    return [now / bare for now, bare in zip(found["now"], found["bare"], strict=True)]
+
+
+def gains(of: Callable[[str], list[float]]) -> list[float]:
+    """Return the geometric means of a ratio over all scenes."""
+    return [math.prod(turn) ** (1 / len(turn)) for turn in zip(*map(of, scene_names()), strict=True)]
+
+
+def workers_ratio(name: str) -> list[float]:
+    """Wall-clock speed of two workers against one, 8 Mpixel."""
+    scene, camera = load_scene(name), preset("setup1", scale=2)
+    render(scene, preset("setup1", scale=32))
+    one, two = (lambda n=n: render(scene, camera, workers=n) for n in (1, 2))
+    return [_wall(one) / _wall(two) for _ in range(REPEATS)]
+
+
+def rearrange_ratio(kind: str) -> list[float]:
+    """Time of a rearrangement at full setup1 against copying the same array."""
+    camera = preset("setup1")
+    pixels = np.random.default_rng(0).integers(0, 256, (camera.pixels[1], camera.pixels[0], 3), np.uint8)
+    picture = IIPicture(pixels, camera.lenses, camera.ei_pixels)
+    component_images(picture, kind)
+    return [_wall(lambda: component_images(picture, kind)) / _wall(pixels.copy) for _ in range(2 * REPEATS)]
+
+
+def encode_ratio(scheme: str) -> list[float]:
+    """CPU time of `encode` from picture to bytes against the encoder alone on frames that lie ready."""
+    scene = load_scene("apples")
+    picture = render(scene, preset("setup1", scale=4), noise=1.0, support=()).picture
+    bare = bare_encoder(picture, scheme, qp=30)
+    encode(picture, scheme, qp=30)
+    return [_cpu(lambda: encode(picture, scheme, qp=30)) / _cpu(bare) for _ in range(REPEATS)]
+
+
+def first_picture(*, cached: bool) -> list[float]:
+    """CPU seconds of a process from its start to a small picture, with kernels compiled before or not."""
+    script = (
+        "import time; from ii_core import preset; from raytrace_ii import load_scene, render;"
+        "render(load_scene('apples'), preset('setup1', scale=32)); print(time.process_time())"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
+
+        def shoot() -> float:
+            run = subprocess.run(
+                [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True
+            )
+            return float(run.stdout)
+
+        first = shoot()
+        return [shoot() for _ in range(3)] if cached else [first]
+
+
+def peak_memory() -> list[float]:
+    """GiB resident at most in a process that renders Apples at full setup1 and keeps picture and depth.
+
+    Linux's own mark: `getrusage` would begin with what this process holds, from which the other is started.
+    """
+    script = (
+        "from ii_core import preset; from raytrace_ii import load_scene, render;"
+        "shot = render(load_scene('apples'), preset('setup1'), support=('depth',));"
+        "marks = dict(line.split(':') for line in open('/proc/self/status'));"
+        "print(int(marks['VmHWM'].split()[0]) / 2**20)"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return [float(run.stdout)]
+
+
+def cpu_flags() -> list[str]:
+    """Return the instruction sets for vectors that this CPU has, of those that Embree and numba use."""
+    known = ("sse4_2", "avx", "avx2", "fma", "avx512f", "avx512dq", "avx512bw", "avx512vl")
+    try:
+        text = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        return []
+    flags = next((line.split() for line in text.splitlines() if line.startswith("flags")), [])
+    return [flag for flag in known if flag in flags]
+
+
+def _cpu(call: Callable[[], object]) -> float:
+    start = time.process_time()
+    call()
+    return time.process_time() - start
+
+
+def _wall(call: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    call()
+    return time.perf_counter() - start
+
+
+if __name__ == "__main__":
+    main()
