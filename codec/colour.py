@@ -23,13 +23,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core.colour import CB, CR, KB, KG, KR
 from ii_core.jit import kernel
 
 # 20 fractional bits: exact enough to round like the real numbers do.
 BITS = np.int32(20)
 HALF = np.int32(1 << 19)
-KR, KG, KB = 0.2126, 0.7152, 0.0722
-CB, CR = 1.8556, 1.5748
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import IICamera, Pair, whole_pair
+from .colour import srgb
 from .files import (
     RowWriter,
     atomic_paths,
@@ -276,8 +277,7 @@ def codes8(pixels: NDArray[Any]) -> NDArray[np.uint8]:
     if pixels.dtype == np.uint16:
         return ((pixels.astype(np.uint32) * 255 + 32767) // 65535).astype(np.uint8)
     x = np.clip(np.nan_to_num(pixels), 0, 1)
-    curve = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
-    return np.rint(255 * curve).astype(np.uint8)
+    return np.rint(255 * srgb(x)).astype(np.uint8)
 
 
 def add_sensor_noise(picture: IIPicture, sigma: float = 1.0, seed: int = 0) -> IIPicture:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
+from ii_core.colour import CB, CR, KB, KG, KR
 
 from .global_angle import angle_quality
 from .pair import PicturePair
@@ -17,9 +18,9 @@ from .view import LUMA, WINDOW
 Floats = NDArray[np.float64]
 # BT.709, full range: Y, Cb and Cr from R, G and B.
 YCBCR = np.array([
-    [0.2126, 0.7152, 0.0722],
-    [-0.2126 / 1.8556, -0.7152 / 1.8556, 0.5],
-    [0.5, -0.7152 / 1.5748, -0.0722 / 1.5748],
+    [KR, KG, KB],
+    [-KR / CB, -KG / CB, 0.5],
+    [0.5, -KG / CR, -KB / CR],
 ])  # fmt: skip
 # Wang, Simoncelli and Bovik 2003: how much each scale counts, the finest first.
 SCALES = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)

@@ -21,6 +21,7 @@ from trace_scenes import body, hall, wall
 from ii_core import IIPicture, preset
 from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.rendering import executors, job
+from raytrace_ii.tracing.packing import packed
 
 ROOT = Path(__file__).parents[1]
 CAMERA = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
@@ -178,9 +179,10 @@ def test_a_lost_scheduler_is_one_line(cluster, scene):
 
 
 def test_a_scene_travels_without_its_trees(scene):
-    assert scene.packed is not None
+    before = pickle.dumps(scene)
+    assert packed(scene) is packed(scene)
     again = pickle.loads(pickle.dumps(scene))
-    assert "packed" not in vars(again)
+    assert len(pickle.dumps(scene)) == len(before) and packed(again) is not packed(scene)
     small = preset("setup1", scale=128)
     np.testing.assert_array_equal(render(scene, small).picture.pixels, render(again, small).picture.pixels)
 

@@ -8,6 +8,7 @@ from trace_scenes import BLACK, UNIFORM, WHITE, body, box, wall
 
 from raytrace_ii import Background, Fog, Scene, load_scene, trace
 from raytrace_ii.scene.textures import VertexColours
+from raytrace_ii.tracing.packing import packed
 
 HAZE, DENSITY = (0.5, 0.6, 0.9), 0.03
 FOG = Fog(colour=HAZE, density_per_mm=DENSITY)
@@ -55,7 +56,7 @@ def test_a_scene_without_fog_is_the_limit_of_thin_fog():
     np.testing.assert_allclose(seen(bodies, fog=None), (0.8, 0.2, 0.1), rtol=1e-6)
     thin = Fog(colour=HAZE, density_per_mm=1e-12)
     np.testing.assert_allclose(seen(bodies, fog=thin), seen(bodies, fog=None), rtol=1e-6)
-    assert Scene(bodies=bodies).packed.fog.size == 0
+    assert packed(Scene(bodies=bodies)).fog.size == 0
 
 
 @pytest.mark.parametrize("density", [0, -1, math.nan, math.inf])

@@ -6,6 +6,7 @@ import pytest
 from benchmarks.pages import coding_docs
 from benchmarks.speed import metrics_speed, pareto
 from raytrace_ii import load_scene
+from raytrace_ii.tracing.packing import packed
 
 
 def row(seconds, psnr, **more):
@@ -36,7 +37,7 @@ def test_shapes_are_cut_as_often_as_asked():
 
 def test_another_depth_shares_the_tree():
     scene = load_scene("objects")
-    assert pareto.at_depth(scene, 2).packed is scene.packed and pareto.at_depth(scene, 2).max_depth == 2
+    assert packed(pareto.at_depth(scene, 2)) is packed(scene) and pareto.at_depth(scene, 2).max_depth == 2
 
 
 def test_one_setting_of_coding_and_of_evaluation_is_recommended():

@@ -17,6 +17,7 @@ from ii_core.files import read_channels, read_image
 from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.rendering import render_sets as reference
 from raytrace_ii.scene.hashing import content_hash
+from raytrace_ii.tracing.packing import packed
 
 CAMERA = preset("setup1", scale=64)
 NAMES = ("one", "two", "three")
@@ -178,7 +179,7 @@ def test_wrong_input_is_one_line(run, refused, tmp_path):
 def test_the_hash_of_a_scene_is_that_of_its_content():
     one, two = load_scene("apples"), load_scene("apples")
     assert content_hash(one) == content_hash(two)
-    assert one.packed is not None and content_hash(one) == content_hash(two), "Embree's trees do not count"
+    assert packed(one) is not None and content_hash(one) == content_hash(two), "Embree's trees do not count"
     hashes = {content_hash(one)}
     first = one.bodies[0]
     moved = np.array(first.vertices)

@@ -11,9 +11,11 @@ from trace_scenes import BLACK, WHITE, body, box, sphere, texture_at, wall
 from ii_core.files import read_image
 from raytrace_ii import Scene, trace
 from raytrace_ii.rendering.job import CURVES
-from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, TextureTable, image_texture, linear, normal_map
+from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, image_texture, linear, normal_map
 from raytrace_ii.shapes.primitives import rotation
 from raytrace_ii.tracing.kernels import shade as kernels
+from raytrace_ii.tracing.packing import packed
+from raytrace_ii.tracing.texture_table import TextureTable
 
 BOARD = Checker((WHITE, BLACK), (2.0, 2.0, 2.0))
 CLOUD = Noise((BLACK, WHITE), (1.0, 1.0, 1.0), contrast=1.0)
@@ -290,11 +292,11 @@ def test_stored_pixels_become_textures():
 
 def test_a_scene_pays_for_textures_only_if_it_has_some():
     plain, ball = Scene(bodies=[body(wall(5))]), sphere(1, 8)
-    assert plain.packed.coordinates.shape == (0, 3, 3) and plain.packed.normals.shape == (0, 3, 3)
-    assert plain.packed.textures.table.shape[0] == 0 and [len(t) for t in plain.packed.textures.texels] == [0, 0]
+    assert packed(plain).coordinates.shape == (0, 3, 3) and packed(plain).normals.shape == (0, 3, 3)
+    assert packed(plain).textures.table.shape[0] == 0 and [len(t) for t in packed(plain).textures.texels] == [0, 0]
     painted = Scene(bodies=[body(wall(5)), body(ball, coordinates=ball.vertices, texture=BOARD)])
-    assert painted.packed.coordinates.shape == (2 + len(ball.faces), 3, 3)
-    assert (painted.packed.coordinates[:2] == 0).all()
+    assert packed(painted).coordinates.shape == (2 + len(ball.faces), 3, 3)
+    assert (packed(painted).coordinates[:2] == 0).all()
 
 
 def test_each_texture_has_its_rows_and_its_own_texels():

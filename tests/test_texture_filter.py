@@ -9,8 +9,9 @@ from trace_scenes import BLACK, WHITE, body, sphere, sun, wall
 from ii_core import IICamera, preset
 from raytrace_ii import Background, Scene, render
 from raytrace_ii.rendering.job import footprint
-from raytrace_ii.scene.textures import Image, TextureTable, pyramid
+from raytrace_ii.scene.textures import Image
 from raytrace_ii.tracing.kernels.shade import _filter, _filtered, _footprint
+from raytrace_ii.tracing.texture_table import TextureTable, pyramid
 
 BOARD = Image(np.broadcast_to((np.add.outer(np.arange(64), np.arange(64)) % 2)[..., None], (64, 64, 3)).astype("f4"))
 CAMERA = preset("setup1", scale=64)

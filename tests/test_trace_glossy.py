@@ -11,6 +11,7 @@ from raytrace_ii import Background, Scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.scene.textures import Image
 from raytrace_ii.tracing.kernels.shade import glossy_direction
+from raytrace_ii.tracing.packing import packed
 
 SLOPE = Background(horizon=(0.5,) * 3, zenith=(1.0, 0.5, 0.0), nadir=(0.0, 0.5, 1.0))  # red grows straight with y
 GREY = Image(np.full((1, 1, 3), 0.5, np.float32))
@@ -239,7 +240,7 @@ def test_a_scene_that_is_not_glossy_keeps_no_keys():
     camera = IICamera(pixels=(8, 8), lenses=(2, 2), pixel_pitch_mm=0.1, gap_mm=1.0)
     for roughness, glossy in ((0.0, False), (0.5, True)):
         scene = Scene(bodies=[body(wall(20), mirror=WHITE, roughness=roughness)])
-        assert scene.packed.glossy == glossy
+        assert packed(scene).glossy == glossy
         stats = render(scene, camera).stats
         assert stats.rays["reflection"] + stats.skipped["reflection"] == 64 * (16 if glossy else 1)
-    assert not Scene(bodies=[body(wall(20), roughness=0.5)]).packed.glossy, "nothing reflects"
+    assert not packed(Scene(bodies=[body(wall(20), roughness=0.5)])).glossy, "nothing reflects"

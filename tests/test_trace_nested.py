@@ -9,6 +9,7 @@ from trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, lamp, reflecta
 from raytrace_ii import Scene, trace
 from raytrace_ii.scene.textures import Image
 from raytrace_ii.shapes.primitives import Mesh
+from raytrace_ii.tracing.packing import packed
 
 GLASS, WATER, ICE = 1.5, 1.33, 1.31
 
@@ -108,11 +109,11 @@ def test_a_ray_keeps_count_of_as_many_bodies_as_can_meet():
     plain = body(wall(50))
     ball = [body(sphere(2, 12), at=(x, 0, 20), transmission=WHITE) for x in (0, 10, 20)]
     touching = body(sphere(3, 12), at=(5, 0, 20), transmission=WHITE)  # both neighbours at once
-    assert [Scene(bodies=[plain, *some]).packed.nested for some in ([], ball, [*ball, touching])] == [0, 1, 3]
-    assert not Scene(bodies=[plain, *ball]).packed.passes and Scene(bodies=[plain, *ball, touching]).packed.passes
+    assert [packed(Scene(bodies=[plain, *some])).nested for some in ([], ball, [*ball, touching])] == [0, 1, 3]
+    assert not packed(Scene(bodies=[plain, *ball])).passes and packed(Scene(bodies=[plain, *ball, touching])).passes
     many = [slab(10 + 0.1 * i, 20 + 0.1 * i, 1.01) for i in range(20)]
     crowded = Scene(bodies=many, background=UNIFORM)
-    assert crowded.packed.nested == 8
+    assert packed(crowded).nested == 8
     assert np.isfinite(trace(crowded, [(0, 0, 0)], [(0, 0, 1)]).radiance).all()
 
 

@@ -9,6 +9,7 @@ from trace_scenes import BLACK, UNIFORM, WHITE, body, floor, hall, lamp, sphere,
 from raytrace_ii import Background, Scene, trace
 from raytrace_ii.scene.textures import Image, normal_map
 from raytrace_ii.shapes.primitives import Mesh, rotation
+from raytrace_ii.tracing.packing import packed
 
 FLAT = Image(np.full((2, 2, 3), (0.5, 0.5, 1.0), np.float32))
 
@@ -201,7 +202,7 @@ def test_a_cut_out_in_a_mirror_and_in_glass():
 
 def test_a_scene_without_cut_outs_pays_nothing_for_them():
     whole = body(wall(20), coordinates=np.zeros((4, 3)), texture=HALF, colour=RED)
-    packed = Scene(bodies=[whole]).packed
-    assert not packed.passes and not packed.lets_through and packed.opaque_faces == 2
+    arrays = packed(Scene(bodies=[whole]))
+    assert not arrays.passes and not arrays.lets_through and arrays.opaque_faces == 2
     seen = trace(Scene(bodies=[whole], ambient=WHITE), [(-5, 0, 0)], [(0, 0, 1)])
     assert seen.object_id[0] == 0 and seen.count.rays["passed"] == 0

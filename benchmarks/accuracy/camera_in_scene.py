@@ -26,6 +26,7 @@ from ii_core.files import write_image
 from ii_core.optics import Bundle, LensModel, SphericalLenslet, Under
 from metrics import q_global
 from raytrace_ii import Background, Body, Material, Scene, Shot, load_scene, render
+from raytrace_ii.tracing.packing import packed
 
 RECORDS, SCALE = Records("camera_in_scene", ("benchmarks.accuracy.camera_in_scene",)), 16  # of the page
 GLASS = (1.0, 1.0, 1.0)
@@ -162,7 +163,7 @@ def compare(scene: Scene, camera: IICamera, segments: int, samples: int, *, smoo
     """
     started = time.perf_counter()
     scene_with, pixels = in_scene(scene, camera, segments, smooth=smooth)
-    _ = scene_with.packed
+    _ = packed(scene_with)
     built = time.perf_counter() - started
 
     def shot(what: Scene, through: IICamera) -> Shot:

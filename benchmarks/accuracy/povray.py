@@ -28,6 +28,7 @@ from benchmarks.accuracy.analytic import Array, Ball, Floor, World, still_life
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import RESULTS, ROOT, Records, add_again, origin, with_commits
 from ii_core import IICamera, preset
+from ii_core.colour import srgb
 from ii_core.files import write_image
 from raytrace_ii import Light, Material, trace
 
@@ -122,8 +123,7 @@ def _psnr(error: Array) -> float:
 
 
 def _coded(light: Array) -> NDArray[np.uint8]:
-    x = np.clip(light, 0, 1)
-    return np.rint(255 * np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)).astype(np.uint8)
+    return np.rint(255 * srgb(np.clip(light, 0, 1))).astype(np.uint8)
 
 
 def version() -> str:

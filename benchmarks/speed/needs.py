@@ -34,6 +34,7 @@ from metrics.plots.rd_chart import COLOURS, new_figure, save
 from raytrace_ii import Body, Scene, Shot, render
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, VertexColours
 from raytrace_ii.tracing.intersect import Hits
+from raytrace_ii.tracing.packing import packed
 
 RECORDS = Records("needs", ("benchmarks.speed.needs", "benchmarks.speed.pareto"))
 CHART = ROOT / "docs/images/needs.png"
@@ -94,7 +95,7 @@ def study(name: str, scale: int, rounds: int) -> dict[str, Any]:
 def has(name: str) -> list[str]:
     """What could be left out of a scene, one by one."""
     scene = build(name, ())
-    bounces = scene.packed.mirrors or scene.packed.transmits
+    bounces = packed(scene).mirrors or packed(scene).transmits
     return [
         *([SHADOWS] if scene.lights else []),
         *(part for part, without in WITHOUT.items() if without(scene) is not scene),
@@ -142,10 +143,10 @@ def unshadowed(scene: Scene) -> Scene:
     def clear(o: NDArray[Any]) -> tuple[Hits, float]:
         return Hits(np.full(len(o), -1, np.int32), none, none, none), 0.0
 
-    vars(free.packed.intersector)["blocked"] = lambda o, d, reach: (np.full(len(o), -1, np.int32), 0.0)
-    if scene.packed.lets_through:
-        found = free.packed.intersector.nearest_clear  # the camera's rays still ask what they start in
-        vars(free.packed.intersector)["nearest_clear"] = lambda o, d, reach=None: (
+    vars(packed(free).intersector)["blocked"] = lambda o, d, reach: (np.full(len(o), -1, np.int32), 0.0)
+    if packed(scene).lets_through:
+        found = packed(free).intersector.nearest_clear  # the camera's rays still ask what they start in
+        vars(packed(free).intersector)["nearest_clear"] = lambda o, d, reach=None: (
             found(o, d) if reach is None else clear(o)
         )
     return free
@@ -219,7 +220,7 @@ def shoot(scene: Scene, camera: IICamera) -> Shot:
 def seconds(scenes: Sequence[Scene], camera: IICamera, rounds: int) -> list[float]:
     """Median CPU seconds of each, taken in turn so that a busy neighbour meets all."""
     for scene in scenes:
-        scene.packed  # noqa: B018  # trees are built once and not counted
+        packed(scene)  # trees are built once and not counted
     spent = [[shoot(scene, camera).stats.cpu_seconds for scene in scenes] for _ in range(rounds)]
     return [median(times) for times in zip(*spent, strict=True)]
 

@@ -31,6 +31,7 @@ from ii_core.files import atomic_path
 from metrics import q_global
 from metrics.plots.rd_chart import COLOURS
 from raytrace_ii import Scene, load_scene, render
+from raytrace_ii.tracing.packing import packed, share
 
 RECORDS, SCALE = Records("pareto", ("benchmarks.speed.pareto",)), 32  # of the page
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
@@ -91,7 +92,7 @@ def study(name: str, camera: IICamera) -> dict[str, Any]:
     scenes = {cut: cut_scene(name, cut) for cut in CUTS} if sizes(scene_text(name)) else {1.0: load_scene(name)}
     finest, scene = scenes[max(scenes)], scenes[1.0]
     truth = shoot(at_depth(finest, TRUE["depth"]), camera, TRUE["samples"])[0]
-    bounces = scene.packed.mirrors or scene.packed.transmits
+    bounces = packed(scene).mirrors or packed(scene).transmits
     rows: list[dict[str, Any]] = []
 
     def add(sweep: str, scene: Scene, samples: int, error: float | None = None, cut: float = 1.0) -> None:
@@ -143,7 +144,7 @@ def shoot(
 def at_depth(scene: Scene, depth: int) -> Scene:
     """The scene with another recursion depth and the same tree, which does not depend on it."""
     other = scene.with_depth(depth)
-    vars(other)["packed"] = scene.packed
+    share(scene, other)
     return other
 
 

@@ -17,7 +17,7 @@ from ii_core import preset
 from raytrace_ii import Body, Light, Material, Scene, trace
 from raytrace_ii.shapes.primitives import Mesh, Plane, Sphere, rotation
 from raytrace_ii.tracing import packing
-from raytrace_ii.tracing.packing import LIFT
+from raytrace_ii.tracing.packing import LIFT, packed
 
 Row = dict[str, Any]
 WHITE = Material(colour=(1.0, 1.0, 1.0))
@@ -213,7 +213,7 @@ def huge_beside_tiny(balls: int = 500, segments: int = 46) -> list[Row]:
         overhead = Light(kind="directional", vector=(0, -1, 0), colour=(1, 1, 1))
         scene = Scene(bodies=[grains, *floor], lights=[overhead])
         started = time.process_time()
-        scene.packed  # noqa: B018  # builds the tree
+        packed(scene)  # builds the tree
         built = time.process_time() - started
         trace(scene, o, d)
         started = time.process_time()

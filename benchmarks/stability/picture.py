@@ -11,6 +11,7 @@ from benchmarks.accuracy.analytic import still_life
 from benchmarks.stability.geometry import Row
 from codec import decode, encode
 from ii_core import IICamera, IIPicture, preset, view_image
+from ii_core.colour import srgb
 from ii_core.regular import resampled
 from metrics import q_global
 from raytrace_ii import load_scene, render, trace
@@ -54,8 +55,7 @@ def _unit(vectors: Any) -> Any:
 
 
 def _srgb(light: Any) -> Any:
-    c = np.clip(light.astype(np.float64), 0, 1)
-    return np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
+    return srgb(np.clip(light.astype(np.float64), 0, 1))
 
 
 def _finite(value: float | None) -> float | None:

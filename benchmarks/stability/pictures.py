@@ -12,6 +12,7 @@ from benchmarks.accuracy.analytic import still_life
 from benchmarks.stability import depth, geometry, light
 from codec import decode, encode
 from ii_core import add_sensor_noise, preset, read_maps, view_image, write_maps
+from ii_core.colour import srgb
 from metrics.depth.focus import METHODS
 from raytrace_ii import Body, Scene, load_scene, render, trace
 from raytrace_ii.shapes.primitives import rotation
@@ -75,4 +76,4 @@ def _seen(scene: Scene, towards: tuple[float, float, float], half: float, size: 
     x, y = np.meshgrid(across, -across)
     d = np.stack([x * half, y * half, np.ones_like(x)], axis=-1) + np.asarray(towards) / towards[2] - [0, 0, 1]
     seen = np.clip(trace(scene, np.zeros_like(d), d).radiance.reshape(size, size, 3), 0, 1)
-    return np.rint(255 * np.where(seen < 0.0031308, 12.92 * seen, 1.055 * seen ** (1 / 2.4) - 0.055)).astype(np.uint8)
+    return np.rint(255 * srgb(seen)).astype(np.uint8)

@@ -24,6 +24,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..colour import KB, KG, KR
+
 Floats = NDArray[np.float32]
 Read = Callable[[int, int], NDArray[Any]]
 
@@ -141,7 +143,7 @@ def _pair(read: Read, shape: tuple[int, int], axis: int) -> tuple[Floats, Floats
 
 def _grey(view: NDArray[Any], shrink: int) -> Floats:
     """Luma in 8-bit codes, squares of pixels averaged."""
-    grey = view.astype(np.float32) @ np.array([0.2126, 0.7152, 0.0722], np.float32)
+    grey = view.astype(np.float32) @ np.array([KR, KG, KB], np.float32)
     grey *= np.float32(255 if view.dtype.kind == "f" else 255 / np.iinfo(view.dtype).max)
     height, width = (side // shrink for side in grey.shape)
     return grey[: height * shrink, : width * shrink].reshape(height, shrink, width, shrink).mean((1, 3))

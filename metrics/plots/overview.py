@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture, five_viewpoints, view_image
+from ii_core.colour import srgb
 from ii_core.view import camera_of
 
 from ..depth.layers import logarithmic
@@ -214,4 +215,4 @@ def _shown(pixels: NDArray[Any]) -> NDArray[np.float64]:
     share = np.clip(pixels / peak(pixels.dtype), 0, 1)
     if pixels.dtype.kind != "f":
         return share
-    return np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)
+    return srgb(share)

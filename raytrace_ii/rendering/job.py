@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IICamera, MapCamera
+from ii_core.colour import srgb
 
 from ..scene.scene import Scene
 from ..tracing.kernels import shade as kernels
 from ..tracing.kernels.sampling import lobe_keys
+from ..tracing.packing import packed
 from ..tracing.sampling import Adaptive, Sampling, adaptive_mean, fixed_places
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
 from .tiles import Order, Tile, ray_order, tiles
@@ -31,13 +33,11 @@ SUPPORT_IMAGES = {
     "disparity": ("f4", ()),
     "samples": ("i4", ()),
 }
-_building = threading.Lock()  # Embree's tree is built once, however many threads come first
 
 
 def _curve(peak: int, samples: int) -> NDArray[np.float64]:
-    """Integer sRGB codes, not yet rounded, at even steps of linear light (IEC 61966-2-1)."""
-    x = np.linspace(0, 1, samples)
-    return peak * np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+    """Integer sRGB codes, not yet rounded, at even steps of linear light."""
+    return peak * srgb(np.linspace(0, 1, samples))
 
 
 # Straight lines between the samples are off by less than 0.01 of a code.
@@ -121,8 +121,6 @@ class Job:
         """This thread's own, counting from 0."""
         tracer: Tracer | None = getattr(self._local, "tracer", None)
         if tracer is None:
-            with _building:
-                _ = self.scene.packed
             tracer = self._local.tracer = Tracer(
                 self.scene, TILE_RAYS, self.pose, self._lobes(), self._footprint()
             )  # fmt: skip
@@ -138,7 +136,7 @@ class Job:
 
     def _footprint(self) -> tuple[float, float]:
         """Width of a sample's ray at its origin, mm, and how much it grows a mm: its part of the pixel."""
-        if not self.texture_filter or not self.scene.packed.images:
+        if not self.texture_filter or not packed(self.scene).images:
             return 0.0, 0.0
         samples = self.sampling.least if isinstance(self.sampling, Adaptive) else self.sampling
         width, spread = footprint(self.camera)
@@ -173,7 +171,7 @@ class Job:
 
     def _keys(self, m: NDArray[Any], n: NDArray[Any], first: int, count: int) -> NDArray[np.uint64] | None:
         """Keys of ``count`` samples of each pixel, if the scene is glossy."""
-        if not self.scene.packed.glossy:
+        if not packed(self.scene).glossy:
             return None
         keys = np.empty(m.size * count, np.uint64)
         lobe_keys(self.seed, m.reshape(-1), n.reshape(-1), self.camera.pixels[0], first, count, keys)

@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .textures import Image, Texture, VertexColours
-
-if TYPE_CHECKING:
-    from ..tracing.packing import PackedScene
 
 Vector = tuple[float, float, float]
 
@@ -379,17 +375,6 @@ class Scene:
     def with_depth(self, max_depth: int) -> Scene:
         """The same scene with another recursion depth."""
         return replace(self, max_depth=max_depth)
-
-    @cached_property
-    def packed(self) -> PackedScene:
-        """The arrays that kernels read, and Embree's tree, built on first use."""
-        from ..tracing.packing import PackedScene
-
-        return PackedScene(self)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Without Embree's tree, which cannot be sent to another process and is built there anew."""
-        return {name: value for name, value in vars(self).items() if name != "packed"}
 
     @property
     def bounds_mm(self) -> NDArray[np.float64]:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.scene import Body, Light, Material, Scene, Vector, unit_rows
-from ..scene.textures import Image, TextureTable
+from ..scene.textures import Image
 from .intersect import Intersector
 from .kernels.shade import DIRECTIONAL, LEAST_WEIGHT, POINT, SPOT
+from .texture_table import TextureTable
 
 # Spawned rays start this share of the face's largest coordinate off the face: float32 places a hit to about
 # 1e-7 of it, and from 1e-6 on no ray meets its own face again.
@@ -26,6 +29,25 @@ ROUGHNESS, METALLIC, GLOSS_MAP, EMISSION_MAP, ALPHA_BLEND, IMAGES = 27, 28, 29, 
 MATERIAL_COLUMNS = 33
 
 MOST_NESTED = 8  # bodies whose bounds meet in one place that a ray keeps count of
+
+_kept: WeakKeyDictionary[Scene, PackedScene] = WeakKeyDictionary()
+_building = threading.Lock()  # Embree's tree is built once, however many threads come first
+
+
+def packed(scene: Scene) -> PackedScene:
+    """Return the arrays and trees of a scene: built on first use, kept as long as the scene, never sent elsewhere."""
+    with _building:
+        found = _kept.get(scene)
+        if found is None:
+            found = _kept[scene] = PackedScene(scene)
+        return found
+
+
+def share(scene: Scene, other: Scene) -> None:
+    """Let another scene use the arrays and trees of this one: the same but for its recursion depth."""
+    found = packed(scene)
+    with _building:
+        _kept[other] = found
 
 
 class PackedScene:

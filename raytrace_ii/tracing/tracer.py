@@ -14,7 +14,7 @@ from ..scene.scene import Scene
 from .intersect import Hits
 from .kernels import shade as kernels
 from .kernels.sampling import lobe_keys
-from .packing import PackedScene
+from .packing import PackedScene, packed
 
 KINDS = ("primary", "shadow", "reflection", "refraction")
 _NO_ROWS = np.empty(0, np.int32)
@@ -95,7 +95,7 @@ def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: Array
     tracer = Tracer(scene, n, rigid(pose))
     seen = {name: np.empty((n, *shape), dtype) for name, (dtype, shape) in RECORDED.items()}
     radiance = np.zeros((n, 3), np.float32)
-    keys = np.empty(n if scene.packed.glossy else 0, np.uint64)
+    keys = np.empty(n if packed(scene).glossy else 0, np.uint64)
     lobe_keys(0, np.arange(len(keys)), np.zeros(len(keys), np.int64), max(n, 1), 0, 1, keys)
     tracer.run(locations, directions, radiance, Support(**seen), keys=keys if len(keys) else None)
     return Traced(radiance=radiance, count=tracer.count, **seen)
@@ -198,7 +198,7 @@ class Tracer:
         self, scene: Scene, capacity: int, pose: NDArray[np.float64], lobes: tuple[int, int] = (LOBE_RAYS, 1),
         footprint: tuple[float, float] = (0.0, 0.0),
     ) -> None:  # fmt: skip
-        self.scene: PackedScene = scene.packed
+        self.scene: PackedScene = packed(scene)
         self.max_depth = scene.max_depth
         self.pose = pose
         self.lobes = lobes

@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from ii_core.colour import LINEAR
 from ii_core.jit import inline_kernel, inner_kernel
 from ii_core.jit import lean_kernel as kernel
 
@@ -31,10 +32,6 @@ _GRADIENTS = np.array(
     + [[1, 1, 0], [-1, 1, 0], [0, -1, 1], [0, -1, -1]],
     dtype=np.float64,
 )
-
-_CODES = np.arange(256) / 255
-# sRGB codes of 8 bits as linear light (IEC 61966-2-1).
-LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 # Columns of the material table and of the light table, as in packing.py.
 _MIRROR, _TRANSMISSION, _ABSORPTION, _SPECULAR, _SHININESS, _PRIORITY, _LOCAL = 3, 6, 9, 12, 13, 14, 15
