@@ -24,7 +24,7 @@ from raytrace_ii.files.toml_schema import (  # fmt: skip
     ObjectTable,
     SceneFile,
 )
-from raytrace_ii.shapes.modelling import _Part
+from raytrace_ii.shapes.implicit_parts import Part
 
 DOCS = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text(encoding="utf-8")
 MODELS = {
@@ -34,7 +34,7 @@ MODELS = {
     "material": MaterialTable,
     "object": ObjectTable,
     "mesh": MeshFile,
-    "parts": _Part,
+    "parts": Part,
     **{
         f"{kind} {name}": model
         for kind, models in (("light", LIGHTS), ("texture", TEXTURES), ("shape", SHAPES), ("part", SHAPE_PARTS))
@@ -68,7 +68,7 @@ def test_every_table_of_a_file_has_its_section():
 def test_every_key_is_documented_with_its_default_and_no_other(name):
     fields = dict(MODELS[name].model_fields)
     if name.startswith("part "):
-        fields = {key: field for key, field in fields.items() if key not in _Part.model_fields}
+        fields = {key: field for key, field in fields.items() if key not in Part.model_fields}
     documented = dict(SECTIONS[name])
     assert len(documented) == len(SECTIONS[name]), "a key twice"
     assert set(documented) == set(fields)

@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, ValidationError, model_validator
 
 from ..scene.textures import Colour, srgb_colour
-from ..shapes.modelling import PARTS, AnyShape
+from ..shapes.any_shape import AnyShape
+from ..shapes.implicit_parts import PARTS
 from ..shapes.primitives import Mesh, Point3
 from .validation_messages import line, words
 

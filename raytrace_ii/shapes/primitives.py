@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, m
 Point2 = tuple[float, float]
 Point3 = tuple[float, float, float]
 Sizes = tuple[PositiveFloat, PositiveFloat, PositiveFloat]
+NotNegative = Annotated[float, Field(ge=0)]
 
 
 @dataclass(frozen=True, eq=False)

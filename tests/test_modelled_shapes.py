@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 from test_shapes import corners, face_normals, merged
 
 from raytrace_ii import load_scene
-from raytrace_ii.shapes.modelling import AnyShape
+from raytrace_ii.shapes.any_shape import AnyShape
 from raytrace_ii.tracing.kernels import shade as kernels
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
