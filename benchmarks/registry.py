@@ -162,6 +162,7 @@ BENCHMARKS = {
             writes=("docs/formats.md",),
             tables="benchmarks.coding.fuzz",
         ),
+        Benchmark(module="benchmarks.pages.make_textures", writes=("assets/textures/*",)),
         Benchmark(module="benchmarks.pages.focus_patterns", writes=(f"{IMAGES}/focus_patterns.*",)),
         Benchmark(
             module="benchmarks.pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)

@@ -2,7 +2,11 @@
 
 from .camera import IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
-from .formats.formats import find_views, load_mosaic, picture_of, write_hci, write_quilt, write_views
+from .formats.find import find_views, picture_of
+from .formats.hci import write_hci
+from .formats.mosaic import load_mosaic
+from .formats.quilt import write_quilt
+from .formats.views import write_views
 from .maps import MapCamera, read_maps, write_maps
 from .picture import IIPicture, add_sensor_noise
 from .presets import camera_names, preset, preset_cameras

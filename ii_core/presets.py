@@ -9,6 +9,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import assets
+
 from .camera import IICamera
 from .files import read_json
 from .optics import Scaling, scaled_chain
@@ -145,7 +147,7 @@ def _times(lengths: tuple[float, ...], scale: int) -> Any:
 
 
 def _folder() -> Path:
-    return Path(str(files("assets") / "cameras"))
+    return Path(str(files(assets) / "cameras"))
 
 
 def _read(path: Path) -> Mapping[str, Any]:

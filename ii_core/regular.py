@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import IICamera, Pair, whole_pair
+from .component import light_field
 from .jit import kernel
 from .lattice import Lattice
 from .optics import FrontElement, Lens, Lenslet, LensModel, Pinhole, SphericalLenslet
@@ -105,7 +106,7 @@ def from_smallest_rectangle(picture: IIPicture, camera: IICamera) -> tuple[IIPic
             f"the camera's smallest rectangles are {k}×{l} of {u}×{v} px, the picture has "
             f"{picture.lenses[0]}×{picture.lenses[1]} of {picture.ei_pixels[0]}×{picture.ei_pixels[1]}"
         )
-    source = np.ascontiguousarray(picture.pixels).reshape(l, v, k, u, 3)
+    source = light_field(picture.pixels, picture.lenses, picture.ei_pixels)
     pixels = np.zeros((height, width, 3), source.dtype)
     _over_rows(height, lambda first, last: put_back(source, owner, left, top, first, last, pixels))
     return IIPicture(pixels, (k, l), camera.ei_pixels, camera, picture.erect), owner >= 0

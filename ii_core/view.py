@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .camera import IICamera
-from .component import sub_images
+from .component import picture_pixels, sub_images
 from .picture import IIPicture
 
 
@@ -209,10 +209,12 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
 def orthoscopic(picture: IIPicture) -> IIPicture:
     """Every elementary image rotated by 180°: pseudoscopic to orthoscopic and back."""
     picture.check_regular()
-    (k, l), (u, v) = picture.lenses, picture.ei_pixels
-    field = picture.pixels.reshape(l, v, k, u, 3)[:, ::-1, :, ::-1]
-    turned = np.ascontiguousarray(field).reshape(picture.pixels.shape)
-    return IIPicture(turned, picture.lenses, picture.ei_pixels, picture.camera, not picture.erect)
+    return IIPicture(turned_pixels(picture), picture.lenses, picture.ei_pixels, picture.camera, not picture.erect)
+
+
+def turned_pixels(picture: IIPicture) -> NDArray[Any]:
+    """Return the pixels with every elementary image rotated by 180°, (N, M, 3)."""
+    return picture_pixels(picture.light_field[:, :, ::-1, ::-1], "ei")
 
 
 def camera_of(picture: IIPicture) -> IICamera:

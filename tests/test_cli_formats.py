@@ -5,7 +5,7 @@ import pytest
 
 from ii_core import IIPicture, preset, sub_images
 from ii_core.files import read_image
-from ii_core.formats.formats import read_pfm
+from ii_core.formats.pfm import read_pfm
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_refused(run, refused, shot, tmp_path):
     out = tmp_path / "o.png"
     refused(run("export", shot, "--to", "cube", "-o", out), "unknown layout 'cube': known are views, hci")
     refused(run("export", shot, "--depth", shot, "-o", out), "depth has no place in layout views")
-    refused(run("export", shot, "--to", "quilt", "--row", 16, "-o", out), "row 16 of views is asked for")
+    refused(run("export", shot, "--to", "quilt", "--row", 16, "-o", out), "row is 16: the picture has 16 rows")
     refused(run("components", shot, "--type", "vi", "-o", out), "unknown component image 'vi'")
     refused(run("import", shot, "-o", out), "is no folder and its name says no _qsCxRaA")
     refused(run("import", shot, "--grid", "9by9", "-o", out), "grid is '9by9'")

@@ -12,8 +12,12 @@ from hypothesis import strategies as st
 
 from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset, resampled, sub_images, view_image
 from ii_core.files import read_image, write_image
-from ii_core.formats.formats import camera_views, read_pfm, view_disparity, write_hci, write_quilt, write_views
-from ii_core.formats.view_order import Arrangement, estimate
+from ii_core.formats.grid import camera_views
+from ii_core.formats.hci import view_disparity, write_hci
+from ii_core.formats.order import Arrangement, estimate
+from ii_core.formats.pfm import read_pfm
+from ii_core.formats.quilt import write_quilt
+from ii_core.formats.views import write_views
 from raytrace_ii import load_scene, render
 
 counts = st.integers(1, 5)
@@ -42,7 +46,7 @@ def shot():
 @settings(max_examples=30)
 def test_view_folders_come_back_to_the_bit(tmp_path_factory, structure, dtype, erect):
     folder, picture = tmp_path_factory.mktemp("v"), noise(*structure, dtype, erect)
-    assert write_views(picture, folder) == structure[2] * structure[3]
+    assert write_views(picture, folder) == folder
     if min(structure[2:]) > 1:
         back, order = picture_of(find_views(folder))
         assert order.basis == "given"
@@ -51,7 +55,7 @@ def test_view_folders_come_back_to_the_bit(tmp_path_factory, structure, dtype, e
         with pytest.raises(ValueError, match="do not hold a row and a column number: give the grid"):
             find_views(folder)
         back, _ = picture_of(
-            find_views(folder, grid=(structure[3], structure[2])), flip_down=False, flip_across=False
+            find_views(folder, grid=(structure[2], structure[3])), flip_down=False, flip_across=False
         )
         same(back, IIPicture(in_camera_order(picture), picture.lenses, picture.ei_pixels))
 
@@ -280,12 +284,12 @@ def test_one_view_and_none(tmp_path):
     refuse("holds one view", tmp_path)
     write_image(tmp_path / "q.png", np.zeros((3, 4, 3), np.uint8))
     refuse("one view", tmp_path / "q.png", grid=(1, 1))
-    refuse("cannot hold 5×1 tiles", tmp_path / "q.png", grid=(1, 5))
+    refuse("cannot hold 5×1 tiles", tmp_path / "q.png", grid=(5, 1))
     refuse("no folder and its name says no _qsCxRaA", tmp_path / "q.png")
 
 
 def test_grids_that_do_not_fit(folder):
-    refuse("a grid of 4×2 views is asked for: 6 are there", folder, grid=(4, 2))
+    refuse("grid is 4×2 views, columns × rows: 6 are there", folder, grid=(4, 2))
 
 
 def test_hci_without_parameters_needs_a_square(tmp_path):
@@ -299,7 +303,7 @@ def test_hci_without_parameters_needs_a_square(tmp_path):
 def test_hci_with_wrong_parameters(tmp_path):
     write_hci(noise(2, 2, 3, 2), tmp_path)
     (tmp_path / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 4\nnum_cams_y = 2\n")
-    refuse("a grid of 2×4 views is asked for: 6 are there", tmp_path)
+    refuse("grid is 4×2 views, columns × rows: 6 are there", tmp_path)
     (tmp_path / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = many\n")
     refuse("does not say num_cams_x", tmp_path)
 
@@ -319,7 +323,8 @@ def test_lenses_that_do_not_fit_a_mosaic(tmp_path):
     write_image(tmp_path / "m.png", np.zeros((7, 9, 3), np.uint8))
     with pytest.raises(ValueError, match="lenses of 10×2 px do not fit"):
         load_mosaic(tmp_path / "m.png", (10, 2))
-    assert load_mosaic(tmp_path / "m.png", (4, 3)).lenses == (2, 2)
+    with pytest.warns(UserWarning, match="1 columns at the right and 1 rows at the bottom are cut off"):
+        assert load_mosaic(tmp_path / "m.png", (4, 3)).lenses == (2, 2)
 
 
 def test_disparity_needs_a_camera_and_its_own_depth(shot, tmp_path):

@@ -24,7 +24,7 @@ from ii_core import (
     IICamera, IIPicture, preset, write_hci, write_maps, write_quilt, write_views)
 from ii_core.display.film import write_animation
 from ii_core.files import write_image, write_json
-from ii_core.formats.formats import write_pfm
+from ii_core.formats.pfm import write_pfm
 from metrics import write_csv, write_latex
 from ii_core.display.viewer import write_viewer
 from metrics.plots.rd_chart import new_figure, save

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from ii_core import IICamera, camera_names, five_viewpoints, preset, preset_cameras
+from ii_core import IICamera, camera_names, design, five_viewpoints, preset, preset_cameras
 from ii_core import properties as ii
 
 ROUNDING = 1e-12  # relative: a few operations in double precision
@@ -147,14 +147,14 @@ def test_solve_round_trip(pixel_pitch, gap_to_pitch, count, names):
         lens_pitch_mm=pitch, gap_mm=gap, pixel_pitch_mm=pixel_pitch, ei_pixels=count,
         view_angle_deg=math.degrees(2 * math.atan(pitch / (2 * gap))),
     )  # fmt: skip
-    found = ii.solve(**{name: truth[name] for name in names})
+    found = design.solve(**{name: truth[name] for name in names})
     # The angle near 180° of a short gap holds the gap to 1e-16·δL/Λ·π/2 only.
     assert found == pytest.approx(truth, rel=1e-10)
     assert list(found) == list(FIVE)
 
 
 def test_solve_setup_3():
-    found = ii.solve(pixel_pitch_mm=0.0061, ei_pixels=64, gap_mm=0.730748718)
+    found = design.solve(pixel_pitch_mm=0.0061, ei_pixels=64, gap_mm=0.730748718)
     assert found["lens_pitch_mm"] == pytest.approx(0.3904) and found["view_angle_deg"] == pytest.approx(
         29.9117, abs=1e-4
     )
@@ -195,7 +195,7 @@ def test_solve_setup_3():
 )  # fmt: skip
 def test_solve_refuses_in_one_error(given, message):
     with pytest.raises(ValueError, match=re.escape(message)):
-        ii.solve(**given)
+        design.solve(**given)
 
 
 def crossing(camera, m, n, places=((0.25, 0.5), (0.75, 0.5))):
@@ -291,14 +291,14 @@ def test_diffraction_against_pixels():
     spot = ii.properties(camera, wavelength_mm=5e-4)["diffraction"]
     assert spot["spot_mm"] == pytest.approx(5e-4 * 0.182687179 / 0.0976) and not spot["limits"]
     fine = replace(camera, pixel_pitch_mm=0.0005, lens_pitch_mm=None)
-    assert ii.properties(fine)["diffraction"]["limits"] and "diffraction limits" in ii.report(fine)
+    assert ii.properties(fine)["diffraction"]["limits"] and "diffraction limits" in design.report(fine)
     assert ii.properties(preset("pinhole2d"))["diffraction"] is None
 
 
 @pytest.mark.parametrize("name", sorted(camera_names()))
 def test_every_camera_has_a_report(name):
     camera = preset_cameras(name)[0]
-    text = ii.report(camera)
+    text = design.report(camera)
     assert camera.name in text and max(map(len, text.splitlines())) <= 118
     p = ii.properties(camera)
     assert f"{p['view_angle_deg'][0]:.4g}°" in text and f"{p['map_bytes']['exr'] / 1e6:.4g} MB" in text
@@ -308,11 +308,11 @@ def test_every_camera_has_a_report(name):
 
 
 def test_report_says_what_is_particular():
-    assert "No parallax down" in ii.report(preset("hpo"))
-    assert "Not regular" in ii.report(preset("hdtv")) and "under no lens" in ii.report(preset("hdtv"))
-    assert "40 mm from the lenses" in ii.report(preset("resolution-priority"))
-    assert "imaged by what stands in front" in ii.report(preset("depth-control"))
-    assert "just touch" in ii.report(preset("plenoptic1"))
-    assert "a lone pinhole" in ii.report(preset("pinhole2d")) and "One view" in ii.report(preset("pinhole2d"))
+    assert "No parallax down" in design.report(preset("hpo"))
+    assert "Not regular" in design.report(preset("hdtv")) and "under no lens" in design.report(preset("hdtv"))
+    assert "40 mm from the lenses" in design.report(preset("resolution-priority"))
+    assert "imaged by what stands in front" in design.report(preset("depth-control"))
+    assert "just touch" in design.report(preset("plenoptic1"))
+    assert "a lone pinhole" in design.report(preset("pinhole2d")) and "One view" in design.report(preset("pinhole2d"))
     single = lens_camera(lenses=(1, 1))
-    assert "18 mm from the lenses" in ii.report(single) and "One view" in ii.report(single)
+    assert "18 mm from the lenses" in design.report(single) and "One view" in design.report(single)

@@ -19,7 +19,7 @@ ANIMATIONS = (".mp4", ".gif", ".webp")
 QUALITY_CRF = 18  # of x264: no loss that eyes find
 
 
-def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], *, fps: int = 25) -> int:
+def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], *, fps: int = 25) -> Path:
     """Write frames as a film (H.264 in MP4) or as a picture that moves for ever (GIF, WebP).
 
     Parameters
@@ -33,8 +33,8 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.ui
 
     Returns
     -------
-    int
-        How many frames were written.
+    Path
+        The file.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.ui
         count = _film(temporary, frames, fps) if kind == ".mp4" else _picture(temporary, frames, fps, kind)
         if not count:
             raise ValueError("there are no frames: at least one is needed")
-    return count
+    return Path(path)
 
 
 def _film(path: Path, frames: Iterable[NDArray[np.uint8]], fps: int) -> int:

@@ -67,7 +67,7 @@ def import_(
     ei_pixels: Annotated[
         str | None, typer.Option(help="U×V pixels under each lens, as 15x15: the source is a lenslet picture.")
     ] = None,
-    grid: Annotated[str | None, typer.Option(help="Rows×columns of views, as 9x9, where names do not say.")] = None,
+    grid: Annotated[str | None, typer.Option(help="Columns × rows of views, as 9x9, where names do not say.")] = None,
     transposed: Annotated[
         bool | None, typer.Option("--transposed/--not-transposed", help="The first number runs across.")
     ] = None,
@@ -115,7 +115,7 @@ def export(
     """Write an II-picture as other light field programs read it."""
     from ii_core import write_hci, write_quilt, write_views
     from ii_core.files import read_depth, write_image
-    from ii_core.formats.formats import quilt_path
+    from ii_core.formats.quilt import quilt_path
 
     if to not in ("views", "hci", "quilt", "mosaic"):
         raise ValueError(f"unknown layout {to!r}: known are views, hci, quilt, mosaic")
@@ -126,11 +126,12 @@ def export(
         check_folder(output, force)
         with spinner(f"export {picture.name}"):
             if to == "views":
-                count = write_views(original, output)
+                write_views(original, output)
             else:
                 z = None if depth is None else read_depth(depth, size=original.size)
-                count = write_hci(original, output, depth=z)
-        say(f"{output}: {count} views of {original.lenses[0]}×{original.lenses[1]} px")
+                write_hci(original, output, depth=z)
+        (k, l), (u, v) = original.lenses, original.ei_pixels
+        say(f"{output}: {u * v} views of {k}×{l} px")
         return
     target = quilt_path(output, original) if to == "quilt" else output
     check_outputs(image_file(target, original.pixels.dtype.name), force)

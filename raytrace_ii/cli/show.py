@@ -109,29 +109,33 @@ def display(
     how the integral-imaging display itself looks from one place; parallax: a film around the viewing zone.
     """
     from ii_core import IIPicture
-    from ii_core.display import panel as display
+    from ii_core.display.lenticular import lenticular
+    from ii_core.display.look import with_assumed_camera
+    from ii_core.display.quilt import quilt
+    from ii_core.display.simulate import display_simulation
     from ii_core.files import write_image
+    from ii_core.formats.quilt import quilt_name
 
     kinds = ("quilt", "lenticular", "simulation", "parallax")
     if kind not in kinds:
         raise ValueError(f"unknown kind {kind!r}: known are {', '.join(kinds)}")
     pixels, grid = pair("size", size), pair("tiles", tiles)
     if kind == "quilt":
-        output = output.with_name(f"{output.stem}_qs{grid[0]}x{grid[1]}a{pixels[0] / pixels[1]:.4g}{output.suffix}")
+        output = quilt_name(output, grid, pixels[0] / pixels[1])
     if kind == "parallax":
         check_outputs([output], force)
         _film(picture, output, pixels, depth, cone, frames, fps)
         return
     check_outputs(image_file(output, "uint8"), force)
-    original = display.with_assumed_camera(IIPicture.load(picture))
+    original = with_assumed_camera(IIPicture.load(picture))
     options: dict[str, Any] = {"size": pixels, "depth_mm": depth, "cone": cone}
     with spinner(f"{kind} of {picture.name}"):
         if kind == "quilt":
-            made = display.quilt(original, grid, **options)
+            made = quilt(original, grid, **options)
         elif kind == "lenticular":
-            made = display.lenticular(original, pitch_px=pitch, slope=slope, centre_px=centre, **options)
+            made = lenticular(original, pitch_px=pitch, slope=slope, centre_px=centre, **options)
         else:
-            made = display.display_simulation(original, _eye(original, at), size=pixels, fill=fill)
+            made = display_simulation(original, _eye(original, at), size=pixels, fill=fill)
         write_image(output, made)
     say(f"{output}: {made.shape[1]}×{made.shape[0]} px")
 
@@ -140,16 +144,16 @@ def _film(
     picture: Path, output: Path, size: tuple[int, int], depth: float | None, cone: float, count: int, fps: int
 ) -> None:
     from ii_core import IIPicture
-    from ii_core.display import panel as display
     from ii_core.display.film import write_animation
+    from ii_core.display.look import focused_view, viewpoints_around, with_assumed_camera
 
-    original = display.with_assumed_camera(IIPicture.load(picture))
-    places = display.viewpoints_around(original, count, cone=cone)
+    original = with_assumed_camera(IIPicture.load(picture))
+    places = viewpoints_around(original, count, cone=cone)
     with progress_bar(f"film {picture.name}") as report:
 
         def frames() -> Iterator[Any]:
             for done, place in enumerate(places, 1):
-                yield display.focused_view(original, place, size=size, depth_mm=depth)
+                yield focused_view(original, place, size=size, depth_mm=depth)
                 report(done, count, "")
 
         write_animation(output, frames(), fps=fps)

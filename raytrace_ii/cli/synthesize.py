@@ -51,7 +51,7 @@ def camera(
         raise ValueError("no camera is named: see raytrace-ii cameras")
     arrays = preset_cameras(name, scale=scale)
     if output is None or report:
-        from ii_core.properties import report as describe
+        from ii_core.design import report as describe
 
         say("\n\n".join(describe(array) for array in arrays))
     if output is not None:
@@ -70,7 +70,7 @@ MEASURES = {
 
 
 def _print_solution(text: str) -> None:
-    from ii_core.properties import solve
+    from ii_core.design import solve
 
     given: dict[str, Any] = {}
     for item in text.split(","):

@@ -25,7 +25,7 @@ from PIL import Image
 from ...files import atomic_path
 from ...picture import IIPicture, codes8
 from ...view import camera_of, five_viewpoints, view_image
-from ..panel import ASSUMED_ANGLE_DEG, with_assumed_camera
+from ..look import ASSUMED_ANGLE_DEG, with_assumed_camera
 
 PAGE_SIDE = 2048  # the largest texture every WebGL2 takes
 PREVIEW_SIDE = 512

@@ -1,4 +1,7 @@
-"""Draw the textures of the reference scenes: ``python -m assets.make_textures``. Same numbers, same bytes."""
+"""Draw the textures of the reference scenes: ``python -m benchmarks.pages.make_textures``.
+
+The same numbers give the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -147,4 +150,4 @@ TEXTURES = {
 
 if __name__ == "__main__":
     for name, draw in TEXTURES.items():
-        write_image(Path(__file__).parent / "textures" / f"{name}.png", draw())
+        write_image(Path(__file__).parents[2] / "assets" / "textures" / f"{name}.png", draw())

@@ -61,12 +61,12 @@ class Arrangement:
     basis: str = "assumed"
 
     def grid(self, shape: tuple[int, int]) -> tuple[int, int]:
-        """(rows, columns) of a grid of that many views along a and b."""
-        return (shape[1], shape[0]) if self.transposed else shape
+        """Return (columns, rows) of a grid of that many views along a and b."""
+        return shape if self.transposed else (shape[1], shape[0])
 
     def place(self, a: int, b: int, shape: tuple[int, int]) -> tuple[int, int]:
         """(row, column) of view (a, b) as the cameras stood, from the top left."""
-        rows, cols = self.grid(shape)
+        cols, rows = self.grid(shape)
         row, col = (b, a) if self.transposed else (a, b)
         return rows - 1 - row if self.flip_down else row, cols - 1 - col if self.flip_across else col
 

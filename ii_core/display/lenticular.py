@@ -1,0 +1,66 @@
+"""Interlaced picture for a panel under slanted cylindrical lenses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Pair, positive, whole_pair
+from ..picture import IIPicture
+from .look import display_views
+
+
+def lenticular(
+    picture: IIPicture,
+    *,
+    size: Pair,
+    pitch_px: float,
+    slope: float = 0.0,
+    centre_px: float = 0.0,
+    views: int = 48,
+    depth_mm: float | None = None,
+    cone: float = 1.0,
+) -> NDArray[np.uint8]:
+    """Views interlaced for a panel under slanted cylindrical lenses: every subpixel has a view of its own.
+
+    A subpixel at column x and row y, red a third of a pixel left of green and blue a third right, lies at the share
+    t of its lens; behind a lens the rightmost view lies on the left::
+
+        t = (x + slope · y − centre_px) / pitch_px  mod 1,   view = views − 1 − ⌊t · views⌋
+
+    Parameters
+    ----------
+    size : (width, height)
+        Of the panel, in pixels.
+    pitch_px : float
+        From lens to lens along a row, in pixels.
+    slope : float
+        Pixels by which the lenses lean to the left from one row to the one below.
+    centre_px : float
+        Column, in the top row, of a border between two lenses; pixel centres are at whole numbers.
+    views : int
+        How many are made; more than 3 · pitch_px are not told apart.
+
+    Returns
+    -------
+    ndarray of uint8, (height, width, 3)
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of range.
+    """
+    width, height = whole_pair("size", size)
+    positive("pitch_px", pitch_px)
+    if not (math.isfinite(slope) and math.isfinite(centre_px)):
+        raise ValueError(f"slope {slope}, centre {centre_px}: finite numbers are needed")
+    y, x, channel = np.ogrid[:height, :width, :3]
+    t = ((x + (channel - 1) / 3 + slope * y - centre_px) / pitch_px) % 1.0
+    number = views - 1 - np.minimum((t * views + 1e-6).astype(np.int32), views - 1)  # ties go one way everywhere
+    out = np.empty((height, width, 3), np.uint8)
+    made = display_views(picture, views, size=(width, height), depth_mm=depth_mm, cone=cone)
+    for i, view in enumerate(made):
+        np.copyto(out, view, where=number == i)
+    return out

@@ -1,0 +1,36 @@
+"""Quilt of a display: views through the viewing zone as tiles of one picture, for Looking Glass displays."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Pair, whole_pair
+from ..formats.quilt import quilt_pixels
+from ..picture import IIPicture
+from .look import display_views
+
+
+def quilt(
+    picture: IIPicture, tiles: Pair, *, size: Pair, depth_mm: float | None = None, cone: float = 1.0
+) -> NDArray[np.uint8]:
+    """Views as tiles of one picture, as Looking Glass displays take them: the leftmost at the bottom left.
+
+    Parameters
+    ----------
+    tiles : (columns, rows)
+    size : (width, height)
+        Of a tile, in pixels.
+    depth_mm : float, optional
+        The plane that appears in the display's own plane.
+    cone : float
+        Share of the viewing zone that the views span.
+
+    Returns
+    -------
+    ndarray of uint8, (rows · height, columns · width, 3)
+    """
+    columns, rows = whole_pair("tiles", tiles)
+    width, height = whole_pair("size", size)
+    views = display_views(picture, columns * rows, size=(width, height), depth_mm=depth_mm, cone=cone)
+    return quilt_pixels(views, (columns, rows))

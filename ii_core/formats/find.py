@@ -1,0 +1,75 @@
+"""Import of a light field: find its views, find their order, make the II-picture."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..camera import Pair
+from ..picture import IIPicture
+from ..view import turned_pixels
+from .grid import Views
+from .order import Arrangement, estimate
+from .quilt import quilt_views
+from .views import folder_views
+
+
+def find_views(source: str | os.PathLike[str], *, grid: Pair | None = None) -> Views:
+    """Return the views of a folder or of a quilt.
+
+    Parameters
+    ----------
+    source : path
+        A folder, or a picture file whose name says ``_qsCxRaA``.
+    grid : (columns, rows), optional
+        Of views with only one number in their names; of a quilt's tiles, if its name does not say.
+
+    Raises
+    ------
+    ValueError
+        If there are no views, only one, some are missing, numbers have gaps, or file types are mixed.
+    OSError
+        If it cannot be read.
+    """
+    path = Path(source)
+    if path.is_dir():
+        return folder_views(path, grid)
+    return quilt_views(path, grid)
+
+
+def picture_of(
+    views: Views, *, transposed: bool | None = None, flip_down: bool | None = None, flip_across: bool | None = None
+) -> tuple[IIPicture, Arrangement]:
+    """Return the II-picture whose sub-images are the views, and the order that they were found to have.
+
+    Parameters
+    ----------
+    views : Views
+    transposed, flip_down, flip_across : bool, optional
+        See `Arrangement`; what is given is not looked for.
+
+    Raises
+    ------
+    ValueError
+        If views differ in size or type.
+    OSError
+        If one cannot be read.
+    """
+    given = {"transposed": transposed, "flip_down": flip_down, "flip_across": flip_across}
+    chosen: Any = {name: value for name, value in given.items() if value is not None}
+    order = estimate(views.read, views.shape, Arrangement(**chosen), views.known | set(chosen))
+    first = views.read(0, 0)
+    height, width = first.shape[:2]
+    cols, rows = order.grid(views.shape)
+    pixels = np.empty((height * rows, width * cols, 3), first.dtype)
+    for a, b in np.ndindex(*views.shape):
+        row, col = order.place(a, b, views.shape)
+        pixels[row::rows, col::cols] = views.read(a, b)
+    picture = IIPicture(pixels, (width, height), (cols, rows))
+    if views.structure is None:
+        return picture, order
+    known = IIPicture.from_structure_json(pixels, views.structure)
+    return (known.with_pixels(turned_pixels(known)) if known.erect else known), order

@@ -1,0 +1,110 @@
+"""Grid of views: what every reader finds, and the views of an II-picture in camera order."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Pair
+from ..files import read_image
+from ..picture import IIPicture
+from .order import Read
+
+WHOLE_ORDER = frozenset(("transposed", "flip_down", "flip_across"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Views:
+    """A grid of views as it was found.
+
+    Parameters
+    ----------
+    shape : (int, int)
+        Views along the first and the second number.
+    read : callable
+        Gives view (a, b) as (T, S, 3), checked against the others.
+    known : frozenset of str
+        Which parts of an `Arrangement` the layout settles, at their defaults.
+    structure : dict, optional
+        What `write_views` left of the picture that the views came from.
+    """
+
+    shape: tuple[int, int]
+    read: Read
+    known: frozenset[str] = frozenset()
+    structure: dict[str, Any] | None = None
+
+
+def listed(files: list[Path], grid: Pair, known: frozenset[str]) -> Views:
+    """Return the views of a list, row by row; ``grid`` is (columns, rows)."""
+    cols, rows = grid
+    if rows < 1 or cols < 1 or rows * cols != len(files):
+        raise ValueError(f"grid is {cols}×{rows} views, columns × rows: {len(files)} are there")
+    if len(files) == 1:
+        raise ValueError(f"one view, {files[0]}, is no light field: at least two are needed")
+    return Views(shape=(rows, cols), read=checked_reader(lambda i, j: files[i * cols + j], read_view), known=known)
+
+
+def checked_reader(path_of: Callable[[int, int], Path], read: Callable[[Path], NDArray[Any]]) -> Read:
+    """Return a reader that holds every view against the first it read."""
+    known: list[tuple[Path, tuple[int, ...], np.dtype[Any]]] = []
+
+    def checked(a: int, b: int) -> NDArray[Any]:
+        path = path_of(a, b)
+        pixels = read(path)
+        if not known:
+            known.append((path, pixels.shape, pixels.dtype))
+        first, shape, dtype = known[0]
+        if pixels.shape != shape:
+            sizes = [f"{s[1]}×{s[0]} px" for s in (pixels.shape, shape)]
+            raise ValueError(f"view {path} has {sizes[0]}, {first.name} {sizes[1]}: all must be of one size")
+        if pixels.dtype != dtype:
+            raise ValueError(f"view {path} is {pixels.dtype}, {first.name} {dtype}: all must be of one type")
+        return pixels
+
+    return checked
+
+
+def read_view(path: str | os.PathLike[str]) -> NDArray[Any]:
+    """A picture as (T, S, 3): grey three times, an alpha channel left out if it says nothing.
+
+    Raises
+    ------
+    ValueError
+        If it has another number of channels, or is transparent somewhere.
+    OSError
+        If it cannot be read.
+    """
+    pixels = read_image(path)
+    channels = pixels.shape[2]
+    if channels == 4:
+        opaque = 1.0 if pixels.dtype.kind == "f" else np.iinfo(pixels.dtype).max
+        if (pixels[..., 3] != opaque).any():
+            raise ValueError(f"{path} is transparent in places: views must be opaque")
+        return pixels[..., :3]
+    if channels == 1:
+        return np.repeat(pixels, 3, axis=2)
+    if channels != 3:
+        raise ValueError(f"{path} has {channels} channels: 1, 3 or 4 are needed")
+    return pixels
+
+
+def camera_views(picture: IIPicture) -> Iterator[tuple[int, int, NDArray[Any]]]:
+    """(row, column, view) in camera order from the top left, each view (L, K, 3).
+
+    Raises
+    ------
+    ValueError
+        If the structure is not regular.
+    """
+    picture.check_regular()
+    u, v = picture.ei_pixels
+    for row, col in np.ndindex(v, u):
+        below, right = (v - 1 - row, u - 1 - col) if picture.erect else (row, col)
+        yield row, col, picture.pixels[below::v, right::u]

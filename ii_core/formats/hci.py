@@ -1,0 +1,130 @@
+"""HCI layout: ``input_Cam000.png`` …, ``parameters.cfg`` and a disparity map.
+
+References
+----------
+K. Honauer et al., "A dataset and evaluation methodology for depth estimation on 4D light fields", 2016.
+"""
+
+from __future__ import annotations
+
+import configparser
+import math
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Pair
+from ..files import atomic_path, read_text, write_image
+from ..picture import IIPicture
+from .grid import WHOLE_ORDER, Views, camera_views, listed
+from .pfm import write_pfm
+
+HCI_VIEW = re.compile(r"input_Cam(\d+)\.\w+")
+MAX_CONFIG = 1 << 20  # bytes of a parameters.cfg; those of the benchmark have a thousand
+
+
+def hci_views(folder: Path, files: list[Path], grid: Pair | None) -> Views:
+    """Return the views of a folder in this layout; ``grid`` is (columns, rows), else by ``parameters.cfg``."""
+    return listed(files, grid or _hci_grid(folder, len(files)), known=WHOLE_ORDER)
+
+
+def _hci_grid(folder: Path, count: int) -> Pair:
+    """(columns, rows) by the folder's parameters.cfg, or a square."""
+    config = configparser.ConfigParser(interpolation=None)
+    try:
+        if os.path.lexists(folder / "parameters.cfg"):
+            config.read_string(read_text(folder / "parameters.cfg", MAX_CONFIG))
+        if config.has_section("extrinsics"):
+            return config.getint("extrinsics", "num_cams_x"), config.getint("extrinsics", "num_cams_y")
+    except (configparser.Error, ValueError) as error:
+        raise ValueError(f"{folder / 'parameters.cfg'} does not say num_cams_x and num_cams_y: {error}") from None
+    side = math.isqrt(count)
+    if side * side != count:
+        raise ValueError(f"{folder} holds {count} views, no square, and no parameters.cfg: give the grid")
+    return side, side
+
+
+def write_hci(picture: IIPicture, folder: str | os.PathLike[str], *, depth: NDArray[Any] | None = None) -> Path:
+    """The layout of the HCI benchmark: ``input_Cam000.png`` …, ``parameters.cfg`` and, with depth, a disparity map.
+
+    ``gt_disp_lowres.pfm`` holds the disparity of the view at row V//2, column U//2; see `view_disparity`.
+    ``parameters.cfg`` says what is true of an II-picture: views are parallel projections, without focal length.
+
+    Parameters
+    ----------
+    picture : IIPicture
+        Of 8 or 16 bit.
+    depth : ndarray, (N, M), optional
+        Scene z of every pixel, mm, NaN where nothing is.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    ValueError
+        If the picture is of floats, or depth is given and does not fit or the picture has no camera.
+    OSError
+        If a file cannot be written.
+    """
+    picture.check_regular()
+    folder = Path(folder)
+    disparity = None if depth is None else view_disparity(picture, depth)
+    (k, l), (u, v) = picture.lenses, picture.ei_pixels
+    config = configparser.ConfigParser()
+    config["intrinsics"] = {"image_resolution_x_px": str(k), "image_resolution_y_px": str(l)}
+    config["extrinsics"] = {"num_cams_x": str(u), "num_cams_y": str(v)}
+    if disparity is not None and np.isfinite(disparity).any():
+        low, high = float(np.nanmin(disparity)), float(np.nanmax(disparity))
+        config["meta"] = {"disp_min": repr(low), "disp_max": repr(high)}
+    for row, col, view in camera_views(picture):
+        write_image(folder / f"input_Cam{row * u + col:03}.png", view)
+    with atomic_path(folder / "parameters.cfg") as temporary, temporary.open("w", encoding="utf-8") as file:
+        config.write(file)
+    if disparity is not None:
+        write_pfm(folder / "gt_disp_lowres.pfm", disparity)
+    return folder
+
+
+def view_disparity(picture: IIPicture, depth: NDArray[Any]) -> NDArray[np.float32]:
+    """Disparity of the view at row V//2, column U//2 of a rendered picture, pixels per step between views.
+
+    d = −δP·(z − Λ) / (Λ·δL): a point on the lens plane stays where it is in all views; what lies behind, and in an
+    II-picture all does, moves along with the viewer, hence the sign. Into the next view to the right a point at
+    column x goes to x − d. NaN where nothing is hit.
+
+    Parameters
+    ----------
+    picture : IIPicture
+        With its camera.
+    depth : ndarray, (N, M)
+        Scene z of every pixel, mm.
+
+    Returns
+    -------
+    ndarray of float32, (L, K)
+
+    Raises
+    ------
+    ValueError
+        If the depth map is of another size, the picture has no camera, or something stands before its lenses, which
+        bends rays so that no such formula holds.
+    """
+    camera = picture.camera
+    if camera is None or camera.front:
+        what = "has no camera" if camera is None else "was taken through a lens before the array"
+        raise ValueError(f"the picture {what}: its disparity does not follow from depth")
+    if depth.shape != picture.pixels.shape[:2]:
+        raise ValueError(f"depth is {depth.shape}: {picture.pixels.shape[:2]} is needed")
+    u, v = picture.ei_pixels
+    row, col = v // 2, u // 2
+    below, right = (v - 1 - row, u - 1 - col) if picture.erect else (row, col)
+    z = depth[below::v, right::u].astype(np.float64) - camera.origin_mm[2]
+    step = camera.pixel_pitch_mm / (camera.gap_mm * camera.lens_pitch_mm[0])
+    return (-(z - camera.gap_mm) * step).astype(np.float32)

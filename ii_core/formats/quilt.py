@@ -1,0 +1,120 @@
+"""Quilt: tiles of views along one line, the leftmost at the bottom left, rows upward; ``name_qsCxRaA.png``."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Pair
+from ..files import write_image
+from ..picture import IIPicture
+from .grid import WHOLE_ORDER, Views, camera_views, read_view
+
+QUILT = re.compile(r"_qs(\d+)x(\d+)(?:a(\d+(?:\.\d+)?))?")
+
+
+def quilt_views(path: Path, grid: Pair | None) -> Views:
+    """Return the views of a quilt; ``grid`` is (columns, rows) of tiles, else by its name."""
+    match = QUILT.search(path.stem)
+    if match is None and grid is None:
+        raise ValueError(f"{path} is no folder and its name says no _qsCxRaA: its grid of tiles is needed")
+    cols, rows = grid or (int(match[1]), int(match[2]))  # type: ignore[index]
+    pixels = read_view(path)
+    height, width = pixels.shape[:2]
+    if not (1 <= rows <= height and 1 <= cols <= width):
+        raise ValueError(f"{path} of {width}×{height} px cannot hold {cols}×{rows} tiles")
+    if rows * cols == 1:
+        raise ValueError(f"{path} holds one view: a light field needs at least two")
+    tile_height, tile_width = height // rows, width // cols
+
+    def tile(_: int, number: int) -> NDArray[Any]:
+        up, right = divmod(number, cols)
+        top = height - (up + 1) * tile_height
+        return pixels[top : top + tile_height, right * tile_width : (right + 1) * tile_width]
+
+    return Views(shape=(1, rows * cols), read=tile, known=WHOLE_ORDER)
+
+
+def quilt_pixels(views: Iterable[NDArray[Any]], tiles: Pair) -> NDArray[Any]:
+    """Lay views, from left to right, out as the tiles of one picture.
+
+    Parameters
+    ----------
+    views : iterable of ndarray, (height, width, 3)
+        Columns · rows of them.
+    tiles : (columns, rows)
+
+    Returns
+    -------
+    ndarray, (rows · height, columns · width, 3)
+    """
+    columns, rows = tiles
+    out = None
+    for number, view in enumerate(views):
+        if out is None:
+            height, width, _ = view.shape
+            out = np.empty((rows, height, columns, width, 3), view.dtype)
+        out[rows - 1 - number // columns, :, number % columns] = view
+    assert out is not None
+    return out.reshape(rows * height, columns * width, 3)
+
+
+def quilt_name(path: str | os.PathLike[str], tiles: Pair, aspect: float) -> Path:
+    """Return the path with tiles and aspect of a view behind its stem, ``_qsCxRaA``."""
+    path = Path(path)
+    return path.with_name(f"{QUILT.sub('', path.stem)}_qs{tiles[0]}x{tiles[1]}a{aspect:.4g}{path.suffix}")
+
+
+def write_quilt(picture: IIPicture, path: str | os.PathLike[str], *, row: int | None = None) -> Path:
+    """One row of views as a quilt, left to right from the bottom left.
+
+    Parameters
+    ----------
+    path : path
+        ``_qsCxRaA`` is put behind its stem unless it is there.
+    row : int, optional
+        Row of views; the middle one, V//2, if not given.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        If there is no such row.
+    OSError
+        If it cannot be written.
+    """
+    picture.check_regular()
+    (k, l), (u, v) = picture.lenses, picture.ei_pixels
+    chosen = v // 2 if row is None else row
+    if not 0 <= chosen < v:
+        raise ValueError(f"row is {row}: the picture has {v} rows of views, from 0")
+    target = quilt_path(path, picture)
+    views = (view for at, _, view in camera_views(picture) if at == chosen)
+    write_image(target, quilt_pixels(views, _tiles(u, (k, l))))
+    return target
+
+
+def quilt_path(path: str | os.PathLike[str], picture: IIPicture) -> Path:
+    """Return the name under which `write_quilt` writes: tiles and aspect behind the stem."""
+    picture.check_regular()
+    (k, l), (u, _) = picture.lenses, picture.ei_pixels
+    pitch = picture.camera.lens_pitch_mm if picture.camera else (1.0, 1.0)
+    return quilt_name(path, _tiles(u, (k, l)), k * pitch[0] / (l * pitch[1]))
+
+
+def _tiles(views: int, size: Pair) -> Pair:
+    """(columns, rows) of so many tiles that make the quilt as nearly square as can be."""
+    divisors = [n for n in range(1, views + 1) if views % n == 0]
+    down = min(divisors, key=lambda n: abs(math.log(views / n * size[0] / (n * size[1]))))
+    return views // down, down

@@ -1,0 +1,116 @@
+"""Folder of views: pictures with two numbers in their names."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..camera import Pair
+from ..files import read_json, write_image, write_json
+from ..picture import IIPicture
+from .grid import WHOLE_ORDER, Views, camera_views, checked_reader, listed, read_view
+from .hci import HCI_VIEW, hci_views
+
+PICTURES = (".png", ".tif", ".tiff", ".exr", ".hdr", ".jpg", ".jpeg", ".ppm", ".pgm", ".bmp", ".webp")
+NUMBER = re.compile(r"-?\d+\.\d+|\d+")
+STRUCTURE = "structure.json"
+LISTED = 5  # of many missing views, how many a message names
+
+
+def folder_views(folder: Path, grid: Pair | None) -> Views:
+    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in PICTURES and path.is_file())
+    if not files:
+        raise ValueError(f"{folder} holds no pictures: known are {', '.join(PICTURES)}")
+    hci = [path for path in files if HCI_VIEW.fullmatch(path.name)]
+    if hci:
+        return hci_views(folder, hci, grid)
+    families = Counter(NUMBER.sub("#", path.stem) for path in files)
+    family = families.most_common(1)[0][0]
+    members = [path for path in files if NUMBER.sub("#", path.stem) == family]
+    if len(suffixes := sorted({path.suffix.lower() for path in members})) > 1:
+        raise ValueError(f"views in {folder} are of mixed types {', '.join(suffixes)}: one is needed")
+    if len(members) == 1:
+        raise ValueError(f"{folder} holds one view, {members[0].name}: a light field needs at least two")
+    return _numbered(folder, members, grid)
+
+
+def _numbered(folder: Path, members: list[Path], grid: Pair | None) -> Views:
+    """Views whose names hold two numbers that make a grid, or one and a grid that is given."""
+    fields = list(zip(*(NUMBER.findall(path.stem) for path in members), strict=True))
+    whole = [tuple(map(int, field)) for field in fields if all(text.isdigit() for text in field)]
+    varying = [field for field in whole if len(set(field)) > 1]
+    if grid is not None:
+        serial = [field for field in varying if len(set(field)) == len(members)]
+        in_order = sorted(zip(serial[0], members, strict=True)) if serial else [(0, path) for path in members]
+        return listed([path for _, path in in_order], grid, known=frozenset(("transposed",)))
+    pairs = [
+        (len(set(a)) * len(set(b)), a, b)
+        for a, b in itertools.combinations(varying, 2)
+        if len(set(zip(a, b, strict=True))) == len(members)
+    ]
+    if not pairs:
+        raise ValueError(
+            f"the {len(members)} names in {folder} like {members[0].name} do not hold a row and a column number: "
+            "give the grid"
+        )
+    size, a, b = min(pairs, key=lambda pair: pair[0])
+    table = dict(zip(zip(a, b, strict=True), members, strict=True))
+    first, second = sorted(set(a)), sorted(set(b))
+    if size > len(members):
+        missing = [place for place in itertools.product(first, second) if place not in table]
+        some = ", ".join(map(str, missing[:LISTED])) + (" …" if len(missing) > LISTED else "")
+        raise ValueError(f"{len(missing)} of {size} views are missing in {folder}: {some}")
+    for numbers in (first, second):
+        steps = set(np.diff(numbers).tolist())
+        if len(steps) > 1:
+            raise ValueError(f"view numbers in {folder} have gaps: {', '.join(map(str, numbers))}")
+    shape = len(first), len(second)
+    return Views(
+        shape=shape,
+        read=checked_reader(lambda i, j: table[first[i], second[j]], read_view),
+        **_written(folder, shape),
+    )
+
+
+def _written(folder: Path, shape: tuple[int, int]) -> dict[str, Any]:
+    """What `write_views` knows of its own folder: order and structure."""
+    path = folder / STRUCTURE
+    if not os.path.lexists(path):
+        return {}
+    try:
+        structure = read_json(path)
+        u, v = structure["ei_pixels"]
+    except (ValueError, TypeError, KeyError) as error:
+        raise ValueError(f"{path} is no structure of an II-picture: {error!r}") from None
+    if (v, u) != shape:
+        raise ValueError(f"{path} says {v}×{u} views, {shape[0]}×{shape[1]} are there")
+    return {"structure": structure, "known": WHOLE_ORDER}
+
+
+def write_views(picture: IIPicture, folder: str | os.PathLike[str]) -> Path:
+    """Every view as ``view_ROW_COLUMN.png`` (``.exr`` of float pictures), and the structure beside them.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written.
+    """
+    picture.check_regular()
+    folder = Path(folder)
+    suffix = ".exr" if picture.pixels.dtype.kind == "f" else ".png"
+    digits = max(2, len(str(max(picture.ei_pixels) - 1)))
+    for row, col, view in camera_views(picture):
+        write_image(folder / f"view_{row:0{digits}}_{col:0{digits}}{suffix}", view)
+    write_json(folder / STRUCTURE, picture.structure_json())
+    return folder
