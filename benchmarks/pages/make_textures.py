@@ -148,6 +148,12 @@ TEXTURES = {
     "tartan": tartan,
 }
 
-if __name__ == "__main__":
+
+def main() -> None:
+    """Write all of them."""
     for name, draw in TEXTURES.items():
         write_image(Path(__file__).parents[2] / "assets" / "textures" / f"{name}.png", draw())
+
+
+if __name__ == "__main__":
+    main()
