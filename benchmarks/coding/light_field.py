@@ -1,0 +1,132 @@
+"""`si-lf` against the best of the other schemes: rate at equal PSNR, its tools one by one, and CPU time.
+
+    python -m benchmarks.light_field [--pictures car,car-9x9] [--again missing]
+
+Pictures are four scenes through `setup1` at scale 8, and two fields of 9×9 views of 120×56 pixels with disparity of
+both signs, made from four samples a pixel: the camera's gap is 32/3 of that of `setup1`, and each view is cut one
+column or row further on than its neighbour. Every scheme is run at five quantisers. Numbers go to
+``benchmarks/results/light_field.jsonl``, tables to ``docs/lf.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from benchmarks.pages import Tables, publish
+from benchmarks.records import Records, add_again, origin
+from codec import encode, timed_decode
+from ii_core import IIPicture, preset
+from metrics import bd_rate, q_global
+from metrics.rd import UndefinedDifference
+from raytrace_ii import load_scene, render
+
+RECORDS = Records("light_field", ("benchmarks.light_field",))
+SCENES = ("apples", "twins", "car", "cuboid")
+FIELDS = ("car-9x9", "apples-9x9")
+OURS = ("si-lf", "si-lf:sources=0")
+QUANTISERS = {
+    "si-lf": (18, 25, 32, 39, 46),
+    "si-avif:best": (18, 28, 38, 48, 58),
+    "si-hevc:best": (14, 20, 26, 32, 38),
+}
+OTHERS = ("si-avif:best", "si-hevc:best")
+VIEWS, GAP = 9, 6  # views a side; the field's disparity is that of the scene through this much more gap
+
+
+def main() -> None:
+    """Measure, print, keep and fill the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pictures", default=",".join(SCENES + FIELDS))
+    add_again(parser)
+    asked = parser.parse_args()
+    names = asked.pictures.split(",")
+    keys = [{"picture": name, "scheme": scheme} for scheme in (OURS[0], *OTHERS, *OURS[1:]) for name in names]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda key=key: curve(picture(key["picture"]), key["scheme"]))
+        print(key, flush=True)
+    publish(tables())
+
+
+@cache
+def picture(name: str) -> IIPicture:
+    """A picture of this benchmark."""
+    if name in SCENES:
+        return render(load_scene(name), preset("setup1", scale=8)).picture
+    camera = preset("setup1", scale=4)
+    k, l = camera.lenses
+    camera = replace(
+        camera,
+        pixels=(VIEWS * k, VIEWS * l),
+        pixel_pitch_mm=camera.pixel_pitch_mm * 16 / VIEWS,
+        gap_mm=camera.gap_mm * GAP * 16 / VIEWS,
+    )
+    field = render(load_scene(name.removesuffix("-9x9")), camera, samples=4).picture.pixels
+    field = field.reshape(l, VIEWS, k, VIEWS, 3)
+    half = VIEWS // 2
+    rows, cols = l - 2 * half, k - 2 * half
+    cut = np.empty((rows, VIEWS, cols, VIEWS, 3), np.uint8)
+    for v in range(VIEWS):
+        for u in range(VIEWS):
+            cut[:, v, :, u] = field[v : v + rows, v, u : u + cols, u]
+    return IIPicture(cut.reshape(rows * VIEWS, cols * VIEWS, 3), (cols, rows), (VIEWS, VIEWS))
+
+
+def curve(original: IIPicture, scheme: str) -> dict[str, Any]:
+    """Rate, PSNR and CPU microseconds a pixel at each quantiser."""
+    width, height = original.size
+    points = []
+    for qp in QUANTISERS[scheme if scheme in QUANTISERS else scheme.partition(":")[0]]:
+        coded = encode(original, scheme, qp=qp)
+        decoding = timed_decode(coded)
+        points.append(
+            {
+                "qp": qp,
+                "bpp": coded.bpp,
+                "psnr": q_global(original, decoding.picture),
+                "encode_us": 1e6 * (coded.encode_seconds or 0) / (width * height),
+                "decode_us": 1e6 * decoding.seconds / (width * height),
+            }
+        )
+    return {"points": points}
+
+
+def tables() -> Tables:
+    """The tables of docs/lf.md."""
+    rows = RECORDS.rows()
+    curves = {(row["picture"], row["scheme"]): row["points"] for row in rows}
+    names = [name for name in SCENES + FIELDS if (name, "si-lf") in curves]
+    against = ["| picture | " + " | ".join(f"`{other}`" for other in OTHERS) + " | encode µs | decode µs |"]
+    against.append("|---|" + "---|" * (len(OTHERS) + 2))
+    tools = ["| picture | synthesis off |", "|---|---|"]
+    for name in names:
+        ours = curves[name, "si-lf"]
+        cells = [_difference(curves.get((name, other)), ours) for other in OTHERS]
+        times = [f"{np.median([point[key] for point in ours]):.1f}" for key in ("encode_us", "decode_us")]
+        against.append(f"| {name} | {' | '.join(cells + times)} |")
+        tools.append(f"| {name} | {_difference(ours, curves.get((name, OURS[1])))} |")
+    said = [origin(rows)]
+    return {("docs/lf.md", "lf-against"): [*against, "", *said], ("docs/lf.md", "lf-tools"): [*tools, "", *said]}
+
+
+def _difference(anchor: Any, tested: Any) -> str:
+    """Rate of ``tested`` at equal PSNR."""
+    if anchor is None or tested is None:
+        return "–"
+    try:
+        difference = bd_rate(*((_column(points, key)) for points in (anchor, tested) for key in ("bpp", "psnr")))
+    except UndefinedDifference:
+        return "–"
+    return f"{difference:+.0f} %".replace("-", "−")
+
+
+def _column(points: list[dict[str, float]], key: str) -> list[float]:
+    return [point[key] for point in points]
+
+
+if __name__ == "__main__":
+    main()
