@@ -134,3 +134,9 @@ def test_numbers_of_sixteen_bits_keep_more_than_eight():
     decoded = decode(encode(picture, "si-lf", qp=0))
     error = np.mean((decoded.pixels.astype(float) - pixels) ** 2)
     assert 10 * np.log10(65535**2 / error) > 52
+
+
+def test_too_many_views_are_refused_before_long_work():
+    picture = IIPicture(np.zeros((256, 256, 3), np.uint8), (1, 1), (256, 256))
+    with pytest.raises(ValueError, match="the picture has 256×256 views: at most 16384"):
+        encode(picture, "si-lf", qp=30)

@@ -32,6 +32,7 @@ START = 34 * FRACTIONS
 WEIGHT = 0.1  # squared error a bit is worth, in squared steps
 # Quantisers by which each level is finer than the next, for more is predicted from it, and the first finer still.
 FINER_A_LEVEL, FINER_FIRST = 2.4, 2.0
+MOST_VIEWS = 1 << 14
 VIEW_BYTES = 24  # a sample's most
 
 
@@ -61,7 +62,8 @@ class LightField(Coder):
         return {"numba": numba.__version__}
 
     def check(self, picture: IIPicture, options: Options) -> None:
-        """Any size will do."""
+        """Any size will do that has no more views than there is patience for."""
+        _check_views(picture)
 
     def encode(self, picture: IIPicture, options: Options, goal: Goal) -> Coding:
         """A rate is met by trying quantisers."""
@@ -83,6 +85,7 @@ class LightField(Coder):
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
         """Level by level; a level that ends early is damage."""
         started = clock.cpu_seconds()
+        _check_views(blank)
         header, levels = stream.unpack(payload, blank.pixels.size // 3)
         height, width, grid = _shape(blank)
         field = Field(header, grid, height, width)
@@ -102,6 +105,7 @@ class LightField(Coder):
         ValueError
             If the payload is damaged so far as it is read.
         """
+        _check_views(blank)
         header, levels = stream.unpack(payload, blank.pixels.size // 3)
         height, width, grid = _shape(blank)
         field = Field(header, grid, height, width)
@@ -128,6 +132,13 @@ def decoded_views(field: Field, levels: list[bytes]) -> Iterator[Node]:
                 raise ValueError(f"level {number} of its light field ends early")
             field.finish(node, job, made)
             yield node
+
+
+def _check_views(picture: IIPicture) -> None:
+    """Each view takes a millisecond, however small it is."""
+    u, v = picture.ei_pixels
+    if u * v > MOST_VIEWS:
+        raise ValueError(f"the picture has {u}×{v} views: at most {MOST_VIEWS} are coded as a light field")
 
 
 def _shape(picture: IIPicture) -> tuple[int, int, tuple[int, int]]:

@@ -32,7 +32,7 @@ class Field:
         self.levels = pyramid(*grid, header.log_stride, MOST_REFERENCES, header.sources)
         self.shape = -(-height // 4) * 4, -(-width // 4) * 4
         self.views = np.zeros((grid[0] * grid[1], 3, *self.shape), np.int16)
-        self.disparities = np.full((len(self.views), *self.shape), UNKNOWN, np.int16)
+        self.disparities = np.zeros((len(self.views), *self.shape), np.int16)
         self.work: Work = new_work()
         nodes = [node for level in self.levels for node in level]
         self.used = {place for node in nodes for place in (*node.references, *node.sources)}
@@ -43,6 +43,7 @@ class Field:
 
     def job(self, node: Node) -> tuple[Job, Synthesis]:
         """All that coding of a view needs, its synthesis' disparity included."""
+        self.disparities[self.number((node.row, node.col))] = UNKNOWN
         references, sources = (self._offsets(node, places) for places in (node.references, node.sources))
         unit = self._unit(references)
         made = new_synthesis(self.views, self.disparities, sources)
