@@ -157,6 +157,12 @@ BENCHMARKS = {
             tables="benchmarks.coding.volume",
         ),
         Benchmark(
+            module="benchmarks.coding.light_field",
+            records="light_field.jsonl",
+            writes=("docs/lf.md",),
+            tables="benchmarks.coding.light_field",
+        ),
+        Benchmark(
             module="benchmarks.coding.fuzz",
             records="fuzz.jsonl",
             writes=("docs/formats.md",),

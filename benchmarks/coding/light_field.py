@@ -1,6 +1,6 @@
 """`si-lf` against the best of the other schemes: rate at equal PSNR, its tools one by one, and CPU time.
 
-    python -m benchmarks.light_field [--pictures car,car-9x9] [--again missing]
+    python -m benchmarks run light_field [--pictures car,car-9x9] [--again missing]
 
 Pictures are four scenes through `setup1` at scale 8, and two fields of 9×9 views of 120×56 pixels with disparity of
 both signs, made from four samples a pixel: the camera's gap is 32/3 of that of `setup1`, and each view is cut one
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.pages import Tables, publish
+from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, add_again, origin
 from codec import encode, timed_decode
 from ii_core import IIPicture, preset
@@ -25,7 +25,7 @@ from metrics import bd_rate, q_global
 from metrics.rd import UndefinedDifference
 from raytrace_ii import load_scene, render
 
-RECORDS = Records("light_field", ("benchmarks.light_field",))
+RECORDS = Records("light_field", ("benchmarks.coding.light_field",))
 SCENES = ("apples", "twins", "car", "cuboid")
 FIELDS = ("car-9x9", "apples-9x9")
 OURS = ("si-lf", "si-lf:sources=0")
