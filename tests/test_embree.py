@@ -236,6 +236,22 @@ def test_a_picture_does_not_hang_on_the_packets(monkeypatch):
         np.testing.assert_array_equal(usual.depth, other.depth)
 
 
+def test_a_scene_keeps_its_corners_once():
+    """Embree reads those of the packed scene, all trees the same ones, and nothing behind their room."""
+    scene = Scene(bodies=[body(wall(20)), body(sphere(2, 24), at=(0, 0, 12), transmission=(1, 1, 1))])
+    packed = scene.packed
+    trees = [packed.intersector._all, packed.intersector._opaque, packed.intersector._clear]
+    assert packed.corners.base is not None
+    for tree in trees:
+        assert np.shares_memory(tree.corners, packed.corners)
+        assert tree.corners.nbytes + 16 <= packed.corners.base.nbytes - (
+            tree.corners.ctypes.data - packed.corners.base.ctypes.data
+        )
+    bare = np.ones((5, 3, 3), np.float32)
+    assert not np.shares_memory(embree.with_spare(bare), bare)
+    np.testing.assert_array_equal(embree.with_spare(bare), bare)
+
+
 def test_no_faces_and_one_face():
     none = np.empty((0, 3, 3), np.float32)
     origins, directions = camera_rays(20, 0.001)

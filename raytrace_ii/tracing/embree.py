@@ -130,9 +130,7 @@ class Tree:
 
     def __init__(self, library: Library, corners: Floats, robust: bool) -> None:
         self.library = library
-        self._vertices = np.empty(corners.size + _SPARE, np.float32)  # Embree keeps no copy
-        self._vertices[: corners.size] = corners.reshape(-1)
-        self.corners = self._vertices[: corners.size].reshape(-1, 3, 3)
+        self.corners = with_spare(corners)  # Embree keeps no copy
         self._faces = self.corners if len(corners) else np.zeros((1, 3, 3), np.float32)  # misses read the first
         self._indices = np.arange(corners.size // 3 + _SPARE, dtype=np.uint32)
         some = self.corners[:: len(corners) // _SOME_FACES + 1]
@@ -144,7 +142,7 @@ class Tree:
         f.rtcSetSceneFlags(self._scene, _ROBUST if robust else 0)
         geometry = f.rtcNewGeometry(library.device, _TRIANGLE)
         for kind, layout, array, rows in (
-            (_VERTEX, _FLOAT3, self._vertices, corners.size // 3),
+            (_VERTEX, _FLOAT3, self.corners, corners.size // 3),
             (_INDEX, _UINT3, self._indices, len(corners)),
         ):
             f.rtcSetSharedGeometryBuffer(geometry, kind, 0, layout, array.ctypes.data, 0, 12, rows)
@@ -193,6 +191,18 @@ class Tree:
             np.float32(NEAR[function] * self._edge), np.float32(NARROW[function]),
         )  # fmt: skip
         return calls, active, packet, packet.view(np.int32), one, one.view(np.int32)
+
+
+def with_spare(corners: Floats) -> Floats:
+    """Return corners (F, 3, 3), copied if no memory that may be read follows behind them."""
+    base = corners.base
+    if isinstance(base, np.ndarray) and corners.flags.c_contiguous and corners.dtype == np.float32:
+        end = corners.ctypes.data + corners.nbytes + _SPARE * corners.itemsize
+        if base.flags.c_contiguous and end <= base.ctypes.data + base.nbytes:
+            return corners
+    room = np.empty(corners.size + _SPARE, np.float32)
+    room[: corners.size] = corners.reshape(-1)
+    return room[: corners.size].reshape(corners.shape)
 
 
 def _lines(count: int, dtype: Any) -> NDArray[Any]:

@@ -15,7 +15,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from .embree import Tree, library
+from .embree import Tree, library, with_spare
 from .kernels.packets import place_hits
 
 Floats = NDArray[np.float32]
@@ -34,11 +34,13 @@ class Hits(NamedTuple):
 class Intersector:
     """Embree trees over (F, 3, 3) float32 face corners, of which the first ``opaque`` faces block light wholly.
 
-    ``robust`` keeps rays from slipping between faces that share an edge. ``about`` says what traces the rays.
+    ``robust`` keeps rays from slipping between faces that share an edge. ``about`` says what traces the rays, and
+    ``corners`` are the trees' own: a caller needs no second copy.
     """
 
     def __init__(self, corners: Floats, opaque: int, *, robust: bool = True) -> None:
         self.opaque = opaque
+        self.corners = corners = with_spare(corners)
         embree = library()
         self.about = embree if isinstance(embree, str) else embree.about
 

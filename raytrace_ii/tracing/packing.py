@@ -28,6 +28,7 @@ EMISSION, IOR, CUTOFF, NORMAL_MAP, NORMAL_SCALE = slice(18, 21), slice(21, 24), 
 ROUGHNESS, METALLIC, GLOSS_MAP, EMISSION_MAP, ALPHA_BLEND, IMAGES = 27, 28, 29, 30, 31, 32
 MATERIAL_COLUMNS = 33
 
+_SOME_FACES = 1 << 16
 MOST_NESTED = 8  # bodies whose bounds meet in one place that a ray keeps count of
 
 _kept: WeakKeyDictionary[Scene, PackedScene] = WeakKeyDictionary()
@@ -108,6 +109,7 @@ class PackedScene:
         self.lets_through = opaque < len(bodies)  # shadow rays do not end at every face
         self.passes = self.nested > 1 or any(body.material.alpha_cutoff > 0 for body in bodies)
         self.intersector = Intersector(self.corners, self.opaque_faces)
+        self.corners = self.intersector.corners
 
 
 def _lets_through(body: Body) -> bool:
@@ -192,11 +194,14 @@ def _per_corner(values: Sequence[NDArray[Any] | None], bodies: Sequence[Body]) -
     """Vertex values gathered to (F, 3, 3) float32, zero where a body has none; of no faces if none has any."""
     if all(value is None for value in values):
         return np.empty((0, 3, 3), np.float32)
-    parts = [
-        np.zeros((len(b.faces), 3, 3), np.float32) if v is None else np.asarray(v, np.float32)[np.asarray(b.faces)]
-        for v, b in zip(values, bodies, strict=True)
-    ]
-    return np.ascontiguousarray(np.concatenate(parts))
+    out = np.zeros((sum(len(b.faces) for b in bodies) + 1, 3, 3), np.float32)[:-1]  # Embree reads a little farther
+    first = 0
+    for value, body in zip(values, bodies, strict=True):
+        last = first + len(body.faces)
+        if value is not None:
+            np.take(np.asarray(value, np.float32), np.asarray(body.faces), axis=0, out=out[first:last], mode="clip")
+        first = last
+    return out
 
 
 def _light_row(light: Light) -> list[float]:
@@ -220,11 +225,18 @@ def _face_table(corners: NDArray[np.float32]) -> NDArray[np.float32]:
     The pull takes a hit about as far towards the middle of its face as the lift takes it off the face, as a share
     of the way.
     """
-    p = corners.astype(np.float64)
+    out = np.empty((len(corners), 5), np.float32)
+    for first in range(0, len(corners), _SOME_FACES):  # in float64 all at once would take ten times the table
+        some = slice(first, first + _SOME_FACES)
+        out[some] = _face_rows(corners[some].astype(np.float64))
+    return out
+
+
+def _face_rows(p: NDArray[np.float64]) -> NDArray[np.float64]:
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
     lift = LIFT * np.abs(p).max(axis=(1, 2))
     longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
     pull = np.minimum(np.divide(lift, longest, out=np.zeros_like(lift), where=longest > 0), 0.25)
-    return np.column_stack([unit, lift, pull]).astype(np.float32)
+    return np.column_stack([unit, lift, pull])
