@@ -10,9 +10,9 @@ from ii_core import IICamera, add_sensor_noise, five_viewpoints, preset, read_ma
 from ii_core.view import view_positions
 from raytrace_ii import Background, Scene, load_scene, render, trace
 from raytrace_ii.rendering import job
-from raytrace_ii.rendering import render as rendering
 from raytrace_ii.rendering.tiles import ray_order, tiles
 from raytrace_ii.tracing.kernels import shade as kernels
+from raytrace_ii.tracing.support_images import SUPPORT, SUPPORT_IMAGES
 
 SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 OFF_CENTRE = [(3.0, -2.0, -60.0), (40.0, 25.0, -55.0), (-9.0, 7.0, -300.0)]  # the second leaves the picture
@@ -28,7 +28,7 @@ def encoded(radiance, dtype="uint8"):
 
 def assert_same(a, b):
     np.testing.assert_array_equal(a.picture.pixels, b.picture.pixels)
-    for name in rendering.SUPPORT:
+    for name in SUPPORT:
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
     assert a.stats.rays == b.stats.rays
 
@@ -176,11 +176,11 @@ def test_rays_by_row_and_column_make_the_same_picture(monkeypatch):
     scene, camera, pose = hall(), preset("setup1", scale=64), np.eye(4)
     pose[:3, :3] = [[0.96, 0, 0.28], [0, 1, 0], [-0.28, 0, 0.96]]
     pose[:3, 3] = 1, -2, 0.5
-    by_row = render(scene, camera, pose=pose, support=tuple(rendering.SUPPORT_IMAGES))
+    by_row = render(scene, camera, pose=pose, support=tuple(SUPPORT_IMAGES))
     monkeypatch.setattr(IICamera, "separable_rays", lambda *block: None)
-    one_by_one = render(scene, camera, pose=pose, support=tuple(rendering.SUPPORT_IMAGES))
+    one_by_one = render(scene, camera, pose=pose, support=tuple(SUPPORT_IMAGES))
     np.testing.assert_array_equal(by_row.picture.pixels, one_by_one.picture.pixels)
-    for name in rendering.SUPPORT_IMAGES:
+    for name in SUPPORT_IMAGES:
         np.testing.assert_array_equal(getattr(by_row, name), getattr(one_by_one, name))
     assert len(np.unique(by_row.picture.pixels)) > 20
 

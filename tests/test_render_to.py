@@ -12,7 +12,7 @@ from ii_core import IICamera, IIPicture, orthoscopic, preset, stand_back
 from ii_core.files import read_about, read_channels, read_depth, read_image
 from raytrace_ii import Scene, render, render_to
 from raytrace_ii.rendering import job
-from raytrace_ii.rendering import render as rendering
+from raytrace_ii.tracing.support_images import SUPPORT_IMAGES
 
 SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
 TALL = IICamera(pixels=(40, 150), lenses=(4, 15), pixel_pitch_mm=0.4, gap_mm=6.0)  # two bands of noise and a piece
@@ -74,9 +74,9 @@ def test_one_file_for_all_support_images(scene, tmp_path):
     render_to(None, scene, SMALL, support=dict.fromkeys(ALL, path))
     assert [p.name for p in tmp_path.iterdir()] == ["all.exr"], "no picture was asked for"
     shot, stored = render(scene, SMALL, support=ALL), read_channels(path)
-    assert set(stored) == {channel for names in rendering.CHANNELS.values() for channel in names}
-    for name, channels in rendering.CHANNELS.items():
-        for i, channel in enumerate(channels):
+    assert set(stored) == {channel for image in SUPPORT_IMAGES.values() for channel in image.channels}
+    for name, image in SUPPORT_IMAGES.items():
+        for i, channel in enumerate(image.channels):
             expected = np.atleast_3d(getattr(shot, name))[..., i]
             np.testing.assert_array_equal(stored[channel], expected.astype(np.float32))
     np.testing.assert_array_equal(read_depth(path), shot.depth)
@@ -210,7 +210,7 @@ import resource, sys
 import numpy as np
 from ii_core import IICamera
 from raytrace_ii import Body, Material, Scene, render, render_to
-from raytrace_ii.rendering.render import SUPPORT
+from raytrace_ii.tracing.support_images import SUPPORT
 
 corners = np.array([[-9e3, -9e3, 50], [9e3, -9e3, 50], [0, 9e3, 50]])
 scene = Scene(bodies=[Body(name="wall", vertices=corners, faces=np.array([[0, 2, 1]]), material=Material())])

@@ -23,17 +23,6 @@ from .tiles import Order, Tile, ray_order, tiles
 
 TILE_RAYS = 65536  # enough that numpy's overhead vanishes, few enough that work arrays stay in cache
 
-# Support images: name, type and how many numbers a pixel.
-SUPPORT_IMAGES = {
-    "depth": ("f4", ()),
-    "normal": ("f4", (3,)),
-    "object_id": ("i4", ()),
-    "ray_length": ("f4", ()),
-    "shading_normal": ("f4", (3,)),
-    "disparity": ("f4", ()),
-    "samples": ("i4", ()),
-}
-
 
 def _curve(peak: int, samples: int) -> NDArray[np.float64]:
     """Integer sRGB codes, not yet rounded, at even steps of linear light."""

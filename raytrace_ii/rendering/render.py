@@ -20,30 +20,14 @@ from ii_core.picture import NOISE_ROWS, noisy_rows, picture_rows, sidecar
 
 from ..scene.scene import Scene
 from ..tracing.sampling import sampling
+from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES, UNITS
 from ..tracing.tracer import RayCount, check_scene, rigid
 from .executors import Tile, check_executor, cores, run
-from .job import CURVES, SUPPORT_IMAGES, Block, Job, check_disparity
+from .job import CURVES, Block, Job, check_disparity
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 MOST_WORKERS = 1024
 MOST_NOISE = 1e6  # steps of 8 bits; 255 is white
-SUPPORT = ("depth", "normal", "object_id")  # those kept unless others are asked for
-# What the channels of support images are called in an EXR file that holds several.
-CHANNELS = {
-    "depth": ("depth.Z",),
-    "normal": ("normal.X", "normal.Y", "normal.Z"),
-    "object_id": ("objectId",),
-    "ray_length": ("rayLength",),
-    "shading_normal": ("shadingNormal.X", "shadingNormal.Y", "shadingNormal.Z"),
-    "disparity": ("disparity",),
-    "samples": ("samples",),
-}
-UNITS = (
-    "depth.Z: z in mm in the camera's frame, from its pixel plane; rayLength: mm from the ray's origin, pinhole or "
-    "place on the lens; normal: unit vectors of the faces, outward, in the scene's frame; shadingNormal: as shaded; "
-    "disparity: pixels to the right from one elementary image to the next on the right; nothing hit: NaN, normal 0, "
-    "objectId -1; objectId is a place in objectNames"
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,8 +159,7 @@ def render(
     columns, rows = camera.pixels
     out: dict[str, NDArray[Any]] = {"pixels": np.empty((rows, columns, 3), dtype)}
     for name in support:
-        kind, shape = SUPPORT_IMAGES[name]
-        out[name] = np.empty((rows, columns, *shape), kind)
+        out[name] = np.empty((rows, columns, *SUPPORT_IMAGES[name].shape), SUPPORT_IMAGES[name].dtype)
     with closing(_rendered(job, job.tiles(), workers, executor, progress, tally)) as blocks:
         for block in blocks:
             for name, array in block.arrays.items():
@@ -276,7 +259,7 @@ def _outputs(
         about = {"objectNames": json.dumps([body.name for body in job.scene.bodies]), "units": UNITS}
         for target, file in zip(unique, temporaries[len(pair) :], strict=True):
             names = [name for name in files if target in files[name]]
-            channels = [channel for name in names for channel in CHANNELS[name]]
+            channels = [channel for name in names for channel in SUPPORT_IMAGES[name].channels]
             writer = image_rows(
                 file, camera.pixels, len(channels), "float32", names=channels if len(names) > 1 else (), about=about,
                 named=target,
@@ -430,4 +413,4 @@ def _check_means(workers: int | None, executor: Any, progress: Any) -> None:
     check_executor(executor, workers)
 
 
-__all__ = ["CHANNELS", "SUPPORT", "SUPPORT_IMAGES", "Shot", "Stats", "cores", "render", "render_to"]
+__all__ = ["Shot", "Stats", "cores", "render", "render_to"]

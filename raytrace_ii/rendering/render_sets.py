@@ -23,14 +23,14 @@ from ii_core.picture import sidecar
 from ..files.load import load_scene
 from ..scene.hashing import content_hash, file_hash
 from ..scene.scene import Scene
+from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES
 from .contact_sheet import contact_sheet
-from .job import SUPPORT_IMAGES, check_disparity
+from .job import check_disparity
 from .render import Stats, render_to
 
 SETS = {"reference": ("apples", "car", "cuboid", "dolphin", "hairdo", "mountains", "objects", "twins")}
 MANIFEST, CONTACT = "manifest.json", "contact.png"
 FLAT_PIXELS, FLAT_SAMPLES = 1024, 4  # across, and a pixel
-FLAT_SUPPORT = ("depth", "normal", "object_id")
 
 Progress = Callable[[str, int, int], None]
 
@@ -145,7 +145,7 @@ def _products(
         yield f"support{number}", _Product((support,), content_hash("support", *seen, list(images)), survey)
     pinhole, pose = projection_camera(cameras[0].model, FLAT_PIXELS)
     flat, behind = folder / f"{title}_flat.png", folder / f"{title}_flat_support.exr"
-    images = dict.fromkeys(FLAT_SUPPORT, behind)
+    images = dict.fromkeys(SUPPORT, behind)
     project = partial(
         render_to, flat, scene, pinhole, pose=pose, upright=True, support=images, samples=FLAT_SAMPLES, **means
     )

@@ -15,17 +15,10 @@ from .intersect import Hits
 from .kernels import shade as kernels
 from .kernels.sampling import lobe_keys
 from .packing import PackedScene, packed
+from .support_images import RECORDED
 
 KINDS = ("primary", "shadow", "reflection", "refraction")
 _NO_ROWS = np.empty(0, np.int32)
-# Support images that the tracer fills: type and how many numbers a ray.
-RECORDED = {
-    "depth": ("f4", ()),
-    "normal": ("f4", (3,)),
-    "object_id": ("i4", ()),
-    "ray_length": ("f4", ()),
-    "shading_normal": ("f4", (3,)),
-}
 LOBE_RAYS = 16  # over the lobe of a rough mirror, for each pixel
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
@@ -93,7 +86,7 @@ def trace(scene: Scene, locations: ArrayLike, directions: ArrayLike, pose: Array
         )
     n = locations.size // 3
     tracer = Tracer(scene, n, rigid(pose))
-    seen = {name: np.empty((n, *shape), dtype) for name, (dtype, shape) in RECORDED.items()}
+    seen = {name: np.empty((n, *image.shape), image.dtype) for name, image in RECORDED.items()}
     radiance = np.zeros((n, 3), np.float32)
     keys = np.empty(n if packed(scene).glossy else 0, np.uint64)
     lobe_keys(0, np.arange(len(keys)), np.zeros(len(keys), np.int64), max(n, 1), 0, 1, keys)
@@ -113,20 +106,21 @@ class Support:
 
     @classmethod
     def empty(cls, shape: tuple[int, ...], names: Collection[str]) -> Support:
-        return cls(**{n: np.empty((*shape, *RECORDED[n][1]), RECORDED[n][0]) for n in RECORDED if n in names})
+        return cls(**{n: np.empty((*shape, *i.shape), i.dtype) for n, i in RECORDED.items() if n in names})
 
     def clear(self) -> None:
         """As if no ray hit anything."""
-        nothing = {"depth": np.nan, "normal": 0, "object_id": -1, "ray_length": np.nan, "shading_normal": 0}
         for name, array in vars(self).items():
             if array is not None:
-                array[...] = nothing[name]
+                array[...] = RECORDED[name].missed
 
     def rows(self) -> list[NDArray[Any]]:
         """One row per ray; arrays of no rows are not wanted."""
         return [
-            np.empty((0, *shape), dtype) if (array := getattr(self, name)) is None else array.reshape(-1, *shape)
-            for name, (dtype, shape) in RECORDED.items()
+            np.empty((0, *i.shape), i.dtype)
+            if (array := getattr(self, name)) is None
+            else array.reshape(-1, *i.shape)
+            for name, i in RECORDED.items()
         ]
 
 
