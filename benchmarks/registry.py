@@ -231,6 +231,7 @@ BENCHMARKS = {
             ),
             tables="benchmarks.speed.needs",
         ),
+        Benchmark(module="benchmarks.speed.texture_filter", records="texture_filter.jsonl"),
         Benchmark(
             module="benchmarks.speed.metrics_speed",
             records="metrics_speed.jsonl",

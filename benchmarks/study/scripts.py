@@ -35,6 +35,7 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("stability", "where methods fail", ()),
     ("pareto", "speed against accuracy of rendering", ()),
     ("needs", "what each scene needs", ()),
+    ("texture_filter", "what filtered textures cost and bring", ()),
     ("metrics_speed", "what metrics cost", ()),
     ("ratios", "ratios to bare libraries", ()),
     ("readme", "tables of the README", ()),
