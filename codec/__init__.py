@@ -1,4 +1,4 @@
-"""Coding: II-pictures to bitstreams and back, by pseudo video sequences and by JPEG 2000."""
+"""Coding of II-pictures: pseudo video sequences, volumes, light fields and whole pictures."""
 
 from .api import Encoded, decode, encode, timed_decode
 from .coders.ffv1 import Ffv1
@@ -13,10 +13,11 @@ from .coders.volume import Separate, Volume
 from .coders.vp9 import Vp9
 from .coders.x264 import H264
 from .coders.x265 import Hevc
-from .contract import options, parse_scheme, register, schemes
+from .contract import Coder, Goal, Option, options, parse_scheme, register, schemes
 from .inspect.extract import extract
 from .inspect.order_analysis import analyse_orders
 from .inspect.random_access import decode_component, decode_frame
+from .search import Axis, CodingResult, Run, meet_size
 
 for _kind in ("ei", "si", "ri"):
     for _video in (H264, Hevc, Av1, Vp9, Ffv1):
@@ -31,15 +32,23 @@ register(Avif("si"))
 register(LightField())
 
 __all__ = [
+    "Axis",
+    "Coder",
+    "CodingResult",
     "Encoded",
+    "Goal",
+    "Option",
+    "Run",
     "analyse_orders",
     "decode",
     "decode_component",
     "decode_frame",
     "encode",
     "extract",
+    "meet_size",
     "options",
     "parse_scheme",
+    "register",
     "schemes",
     "timed_decode",
 ]

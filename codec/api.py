@@ -1,4 +1,4 @@
-"""Coded pictures: making one, keeping it in a file, decoding it."""
+"""Coding and decoding of II-pictures, and the ``.ii`` file."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ii_core.camera import whole_pair
 
 from . import container, file_header
 from .checks import check_type, whole
-from .coders.clock import cpu_seconds
+from .clock import cpu_seconds
 from .contract import MAX_DECODED_PIXELS, MAX_PIXELS, Goal, Value, check_picture, checked_goal, find, parse_scheme
-from .rate import within
+from .search import within
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -30,30 +30,29 @@ class Encoded:
     options : mapping
         Every option of the scheme.
     payload : bytes
-        What the scheme's decoder reads, stream headers included. Messages of the encoder to the reader that no
-        decoder needs are left out.
+        Input of the scheme's decoder, stream headers included. Messages of the encoder that no decoder needs are left
+        out.
     structure : mapping
         `IIPicture.structure_json` of the picture.
     dtype : str
         Pixel type of the picture.
     target_bpp : float or None
-        The rate asked for, if one was.
+        The target rate, if there was one.
     qp : int or None
-        The quantiser asked for, if one was.
+        The given quantiser, if there was one.
     quality : float or None
-        The quality asked for, if one was.
+        The given quality, if there was one.
     reached : bool
-        False if the rate misses ``target_bpp`` by more than 2 %: it lies beyond what the coder can do here, and this
-        is the nearest.
+        False if the rate misses ``target_bpp`` by more than 2 %; it is then the nearest that the coder reaches.
     runs : int
         Number of encoder runs. None if read from a file.
     encode_seconds : float or None
-        CPU time of all of `encode`, rearrangement and every run: that of the calling thread and of an encoder's own
-        threads. None if read from a file.
+        CPU time of `encode`: rearrangement and all runs, in the calling thread and the encoder's own threads. None if
+        read from a file.
     codec_seconds : float or None
-        The part of it inside the encoder, for the run that was kept alone: the coder's own time (5.16).
+        CPU time inside the encoder, for the run that was kept (5.16). None if read from a file.
     versions : mapping
-        Libraries that did the work. Empty if read from a file.
+        Versions of the libraries in use. Empty if read from a file.
     """
 
     scheme: str
@@ -100,7 +99,7 @@ class Encoded:
         TypeError
             If ``path`` is no path.
         OSError
-            If it cannot be written.
+            If the file cannot be written.
         """
         check_type("path", path, (str, os.PathLike), "a path")
         container.write(path, file_header.values(self), self.payload)
@@ -143,22 +142,28 @@ def encode(
     bpp: float | None = None,
     qp: int | None = None,
     quality: float | None = None,
+    **options: Value,
 ) -> Encoded:
-    """Code an II-picture at a rate, a quantiser or a quality, or to the bit with a lossless scheme.
+    """Code an II-picture at a rate, a quantiser or a quality, or lossless.
+
+    Exactly one of ``bpp``, ``qp`` and ``quality`` is needed, none of them for lossless coding.
 
     Parameters
     ----------
     picture : IIPicture
-        Of a pixel type the scheme takes.
+        Of a pixel type that the scheme takes.
     scheme : str
         ``name`` or ``name:preset,option=value,…``; see `schemes` and `options`.
     bpp : float
-        Bits of the ``.ii`` file per pixel of the II-picture. `Encoded.reached` is whether it was met within 2 %.
+        Target: bits of the ``.ii`` file per pixel of the II-picture. `Encoded.reached` is whether it was met within
+        2 %.
     qp : int
         Quantiser, in the scheme's range and on its scale.
     quality : float
-        Quality, in the scheme's range and on its scale. Exactly one of the three is needed, none of them with what
-        codes lossless.
+        Quality, in the scheme's range and on its scale.
+    **options
+        Options of the scheme, as ``gop=32``. ``preset`` names a preset of the scheme, as ``preset="best"``; any other
+        value of it is the encoder's own option ``preset``.
 
     Raises
     ------
@@ -166,12 +171,12 @@ def encode(
         If an argument is unknown or out of range, or the scheme cannot take the picture; before any long work.
     """
     started = cpu_seconds()
-    coder, options = parse_scheme(scheme)
-    goal = checked_goal(coder, options, bpp, qp, quality)
-    check_picture(coder, options, picture)
+    coder, settings = parse_scheme(scheme, **options)
+    goal = checked_goal(coder, settings, bpp, qp, quality)
+    check_picture(coder, settings, picture)
     coded = Encoded(
         scheme=coder.name,
-        options=options,
+        options=settings,
         payload=b"",
         structure=picture.structure_json(),
         dtype=picture.pixels.dtype.name,
@@ -180,22 +185,22 @@ def encode(
         quality=goal.quality,
         versions=coder.versions,
     )
-    coding = coder.encode(picture, options, _payload_goal(goal, coded))
-    coded = replace(coded, payload=coding.run.payload, runs=coding.runs)
+    result = coder.encode(picture, settings, _payload_goal(goal, coded))
+    coded = replace(coded, payload=result.run.payload, runs=result.runs)
     return replace(
         coded,
         reached=_reached(coded),
         encode_seconds=cpu_seconds() - started,
-        codec_seconds=coding.run.codec_seconds,
+        codec_seconds=result.run.codec_seconds,
     )
 
 
-# What is asked of a coder where the header alone takes more than the target: the least it can do.
+# Target of the payload where the header alone takes more than the target of the file.
 LEAST_BPP = 1e-9
 
 
 def _payload_goal(goal: Goal, coded: Encoded) -> Goal:
-    """The goal for the payload: a target rate counts the whole file."""
+    """Return the goal for the payload: a target rate counts the whole file."""
     if goal.bpp is None:
         return goal
     width, height = coded.size
@@ -206,9 +211,9 @@ def _payload_goal(goal: Goal, coded: Encoded) -> Goal:
 
 @dataclass(frozen=True, kw_only=True)
 class Decoding:
-    """A decoded picture and what it cost, in seconds of CPU time.
+    """A decoded picture and its cost.
 
-    ``seconds`` is all of it, ``codec_seconds`` the part inside the decoder (5.16); the rest is rearrangement.
+    ``seconds`` is the CPU time of all of it, ``codec_seconds`` that inside the decoder (5.16).
     """
 
     picture: IIPicture
@@ -223,8 +228,8 @@ def decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = MAX_DEC
     ----------
     coded : Encoded or path
     max_pixels : int
-        Pixels of the largest picture to decode. It bounds the memory that a forged file can take: up to 10 bytes a
-        pixel, with SPERR 22. 2²⁷ by default, 2³¹ at most.
+        Largest number of pixels to decode, 2²⁷ by default, 2³¹ at most. It bounds the memory that a forged file can
+        take: up to 10 bytes per pixel, with SPERR 22.
 
     Raises
     ------
@@ -239,7 +244,7 @@ def decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = MAX_DEC
 
 
 def timed_decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = MAX_DECODED_PIXELS) -> Decoding:
-    """`decode`, with its cost."""
+    """Decode as `decode` does, and measure CPU time."""
     started = cpu_seconds()
     check_type("coded", coded, (Encoded, str, os.PathLike), "a coded picture or a path")
     path = None
@@ -251,7 +256,7 @@ def timed_decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = M
     width, height = blank.size
     if width * height > whole("max_pixels", max_pixels, 1, MAX_PIXELS):
         raise ValueError(
-            f"{name} has {width}×{height} pixels: at most {max_pixels} are decoded, max_pixels allows more"
+            f"{name} has {width}×{height} pixels: at most {max_pixels} are decoded, raise max_pixels (--max-pixels)"
         )
     try:
         pixels, codec_seconds = coder.decode(coded.payload, blank, coded.options)
@@ -262,11 +267,11 @@ def timed_decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = M
 
 
 def blank_picture(structure: Any, dtype: str) -> IIPicture:
-    """A picture of that structure whose pixels take no memory, all zero and read-only."""
+    """Return a picture of a structure whose pixels are zero, read-only and take no memory."""
     lenses, ei_pixels = (
         structure.get(key) if isinstance(structure, Mapping) else None for key in ("lenses", "ei_pixels")
     )
     (k, l), (u, v) = whole_pair("lenses", lenses), whole_pair("ei_pixels", ei_pixels)
     if k * u * l * v > MAX_PIXELS:
-        raise ValueError(f"a picture of {k * u}×{l * v} pixels is claimed: at most {MAX_PIXELS} are allowed")
+        raise ValueError(f"a picture of {k * u}×{l * v} pixels is stated: at most {MAX_PIXELS} are allowed")
     return IIPicture.from_structure_json(np.broadcast_to(np.zeros((), dtype), (l * v, k * u, 3)), dict(structure))

@@ -1,12 +1,15 @@
-"""What a coder is, what it is asked for, and how one is found by name."""
+"""Contract, options and registry of coders."""
 
 from __future__ import annotations
 
 import operator
 import sys
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,22 +18,22 @@ from numpy.typing import NDArray
 from ii_core import IIPicture
 
 from .checks import check_type
-from .rate import Run
+from .search import CodingResult
 
 Value = int | float | str
 Options = Mapping[str, Value]
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Pixels of a picture: six gigabytes.
+# Largest number of pixels of a picture: 6 GiB of RGB with 8 bit.
 MAX_PIXELS = 1 << 31
-# Pixels of a picture that is decoded without an explicit limit: 16384×8192, four times the full setup 1. Decoders
-# take up to 10 bytes a pixel, SPERR 22 (docs/structure.md, cost).
+# Largest number of pixels that is decoded by default: 16384×8192, four times the full setup 1. Decoders take up to
+# 10 bytes per pixel, SPERR 22 (docs/structure.md, cost).
 MAX_DECODED_PIXELS = 1 << 27
 
 
 @dataclass(frozen=True, kw_only=True)
 class Option:
-    """One option of a scheme: a choice among names, or a number, a whole one unless its bounds are floats."""
+    """Option of a scheme: a choice among names, or a number; a whole number unless its bounds are floats."""
 
     about: str
     default: Value
@@ -40,14 +43,22 @@ class Option:
 
     @property
     def allowed(self) -> str:
-        """What a value may be, for messages."""
+        """Allowed values, for messages."""
         return "one of " + ", ".join(self.choices) if self.choices else _allowed((self.low, self.high))
 
     def parse(self, name: str, value: Any) -> Value:
-        """The value of text or of JSON, or a ValueError that says what is allowed."""
+        """Return the value of a text, of JSON or of a keyword.
+
+        Raises
+        ------
+        ValueError
+            If it is not allowed.
+        """
         bounds = self.low, self.high
+        if isinstance(value, bool) and bounds == (0, 1) and not self.choices:
+            value = int(value)
         if self.choices:
-            # A number is as good as its text: options have become choices that were numbers in older files.
+            # Numbers are accepted for their text: some choices were numbers in older files.
             found: Value | None = str(value) if str(value) in self.choices else None
         else:
             found = _within(_number(value, bounds) if isinstance(value, str) else value, bounds)
@@ -58,59 +69,49 @@ class Option:
 
 @dataclass(frozen=True, kw_only=True)
 class Goal:
-    """What a picture is to be coded for: one of these, or none for lossless coding."""
+    """Target of coding: exactly one of rate, quantiser and quality, or none for lossless coding."""
 
     bpp: float | None = None
     qp: int | None = None
     quality: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Coding:
-    """What a coder hands back: the run it keeps, and how many it took to get there."""
-
-    run: Run
-    runs: int = 1
-
-
 class Coder(ABC):
-    """The contract every coder keeps.
+    """Contract of coders: pixels of an II-picture to bytes and back.
 
-    A coder turns the pixels of an II-picture into bytes and back. It is stateless: everything it needs to decode is
-    in the bytes, the structure and type of the picture, and the options. It must
+    A coder is stateless. It decodes from the payload, the structure, the pixel type and the options alone. It must
 
-    - take any structure of K×L lenses over U×V pixels from 1×1 up that `check` lets pass, in the pixel types of
-      ``dtypes``, and refuse the rest with a ValueError before any long work;
-    - encode the same picture with the same options to the same bytes, always, also beside itself in another thread;
-    - meet ``bpp`` within 2 % where it can, and else return the nearest it can reach;
-    - return the very pixels where `lossless` says so;
-    - raise ValueError, in bounded memory, from bytes that are not a whole stream of its own for that picture;
-    - return pixels of the shape and type it was given;
-    - count nothing for free: `encode`'s payload is all that `decode` reads besides structure, type and options;
-    - decode what it wrote in earlier versions: an option that is added later has, for the decoder, the default that
-      means what was done before.
+    - take every structure of K×L lenses over U×V pixels that `check` accepts, in the pixel types of ``dtypes``, and
+      refuse others with a ValueError before long work;
+    - write the same bytes for the same picture and options, also in several threads at once;
+    - meet ``bpp`` within 2 % if it can, else return the nearest size it reaches;
+    - return the original pixels where `lossless` is true;
+    - raise ValueError, in bounded memory, for bytes that are no whole stream of this coder for this picture;
+    - return pixels of the shape and type of the picture;
+    - put everything that `decode` reads into the payload, except structure, pixel type and options;
+    - decode streams of earlier versions: the default of a later option means the earlier behaviour.
 
     Attributes
     ----------
     name : str
-        What the scheme is called.
+        Name of the scheme.
     about : str
-        One line on what it does.
+        Description in one line.
     options : mapping of str to Option
     presets : mapping of str to options
-        Names for settings, each a few options: ``scheme:name``.
+        Named sets of options: ``scheme:name``.
     dtypes : tuple of str
-        Pixel types it takes with some of its options; `check` refuses those that do not go with the options given.
+        Pixel types that some options accept; `check` refuses types that the given options do not accept.
     rate_control : bool
-        Whether it takes ``bpp``.
+        Whether the coder takes ``bpp``.
     qp_range : (int, int) or None
-        The quantisers it takes, on its own scale, larger is coarser.
+        Range of quantisers on the coder's own scale; larger is coarser.
     quality_range : (number, number) or None
-        The qualities it takes, on its own scale; whole numbers only, unless the bounds are floats.
+        Range of qualities on the coder's own scale; whole numbers unless the bounds are floats.
     scale_about : str
-        What the numbers of ``qp`` or ``quality`` are.
+        Meaning of ``qp`` or ``quality``.
     versions : mapping of str to str
-        The libraries that do the work.
+        Names and versions of the libraries in use.
     """
 
     name: str
@@ -129,52 +130,81 @@ class Coder(ABC):
         """Name to version."""
 
     def lossless(self, options: Options) -> bool:
-        """Whether these options code to the bit; then neither rate nor quantiser nor quality can be asked for."""
+        """Return whether coding with these options is lossless; it then takes no goal."""
         return bool(options.get("lossless", 0))
 
     @abstractmethod
     def check(self, picture: IIPicture, options: Options) -> None:
-        """Raise ValueError for a structure or pixel type this coder cannot take with these options."""
+        """Raise ValueError for a structure or pixel type that the coder cannot take with these options."""
 
     @abstractmethod
-    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> Coding:
-        """``goal`` holds one number, within its range, or none if `lossless`."""
+    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
+        """Code a picture. ``goal`` holds one number within its range, or none if `lossless`."""
 
     @abstractmethod
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
-        """Pixels, and the seconds of CPU time spent inside the decoder.
+        """Return pixels, and the seconds of CPU time inside the decoder.
 
-        ``blank`` has the structure and pixel type, and no pixels to speak of: memory for those is taken only once
-        the stream has shown that it holds such a picture.
+        ``blank`` has the structure and pixel type of the picture; its pixels are zeros that take no memory. A decoder
+        takes memory for the pixels only after the stream has shown that it holds such a picture.
         """
 
+
+ENTRY_POINTS = "raytrace_ii.coders"
 
 _CODERS: dict[str, Coder] = {}
 
 
 def register(coder: Coder) -> None:
-    """Make a coder known by its name.
+    """Add a coder to the known schemes, under its name.
+
+    Installed packages register coders by entry points of the group ``raytrace_ii.coders``, each a `Coder`, its
+    class, or a list of them.
 
     Raises
     ------
+    TypeError
+        If ``coder`` is no `Coder`.
     ValueError
         If the name is taken.
     """
+    check_type("coder", coder, Coder, "an instance of codec.Coder")
     if coder.name in _CODERS:
         raise ValueError(f"scheme {coder.name!r} is registered already")
     _CODERS[coder.name] = coder
 
 
+@cache
+def _load_plugins() -> None:
+    """Register the coders of installed packages, once; a package that fails is a warning."""
+    for entry in entry_points(group=ENTRY_POINTS):
+        try:
+            found = entry.load()
+            for coder in found if isinstance(found, list | tuple) else [found]:
+                register(coder() if isinstance(coder, type) else coder)
+        except Exception as error:
+            warnings.warn(f"coder plugin {entry.name} ({entry.value}) is not loaded: {error}", stacklevel=2)
+
+
 def find(name: str) -> Coder:
-    """Return the coder of a name; for an unknown one raise ValueError with the known."""
+    """Return the coder of a scheme.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the name is no text, or unknown.
+    """
     check_type("scheme", name, str, "a name")
+    if name not in _CODERS:
+        _load_plugins()
     if name not in _CODERS:
         raise ValueError(f"unknown scheme {name!r}: known are {', '.join(sorted(_CODERS))}")
     return _CODERS[name]
 
 
 def schemes() -> dict[str, str]:
-    """Name of every scheme to one line on what it does, and its named settings."""
+    """Return the name of every scheme and its description in one line, presets included."""
+    _load_plugins()
     return {
         name: ". ".join([coder.about, *(["Presets: " + ", ".join(coder.presets)] if coder.presets else [])])
         for name, coder in sorted(_CODERS.items())
@@ -182,7 +212,7 @@ def schemes() -> dict[str, str]:
 
 
 def options(scheme: str) -> dict[str, str]:
-    """What can be asked of a scheme: bpp, qp or quality, options as ``name=default``, presets.
+    """Return what a scheme takes: bpp, qp or quality, options as ``name=default``, presets.
 
     Raises
     ------
@@ -201,38 +231,54 @@ def options(scheme: str) -> dict[str, str]:
     return lines
 
 
-def parse_scheme(scheme: str) -> tuple[Coder, dict[str, Value]]:
-    """A coder and its options from ``name`` or ``name:preset,option=value,option=value``.
+def parse_scheme(scheme: str, **options: Value) -> tuple[Coder, dict[str, Value]]:
+    """Return a coder and all its options.
+
+    Parameters
+    ----------
+    scheme : str
+        ``name`` or ``name:preset,option=value,option=value``.
+    **options
+        Options by name. ``preset`` names a preset of the scheme; any other value of it is the encoder's own option
+        ``preset``, as in ``si-hevc:preset=veryslow``.
 
     Raises
     ------
     ValueError
-        If the name, a preset or an option is unknown, or a value is not allowed.
+        If the name, a preset or an option is unknown or given twice, or a value is not allowed.
     """
     if not isinstance(scheme, str):
         raise ValueError(f"scheme is {scheme!r}: a name is needed")
     name, colon, text = scheme.partition(":")
     coder = find(name)
     given: dict[str, Value] = {}
-    preset: Options | None = None
+    presets: list[str] = []
     for item in text.split(",") if colon else ():
         key, equals, value = item.partition("=")
-        if not equals:
-            if key not in coder.presets:
-                known = ", ".join(coder.presets) or "none"
-                raise ValueError(f"scheme {scheme!r}: {item!r} is no option=value and no preset: known are {known}")
-            if preset is not None:
-                raise ValueError(f"scheme {scheme!r}: {item!r} is a second preset")
-            preset = coder.presets[key]
-            continue
-        if key in given:
+        if equals and key in given:
             raise ValueError(f"scheme {scheme!r}: option {key} is given twice")
-        given[key] = value
-    return coder, checked_options(coder, {**(preset or {}), **given})
+        if equals:
+            given[key] = value
+        else:
+            presets.append(item)
+    for key, keyword in options.items():
+        if key == "preset" and isinstance(keyword, str) and (keyword in coder.presets or key not in coder.options):
+            presets.append(keyword)
+        elif key in given:
+            raise ValueError(f"scheme {scheme!r}: option {key} is given twice")
+        else:
+            given[key] = keyword
+    for item in presets:
+        if item not in coder.presets:
+            known = ", ".join(coder.presets) or "none"
+            raise ValueError(f"scheme {scheme!r}: {item!r} is no option=value and no preset: known are {known}")
+    if len(presets) > 1:
+        raise ValueError(f"scheme {scheme!r}: {presets[1]!r} is a second preset")
+    return coder, checked_options(coder, {**(coder.presets[presets[0]] if presets else {}), **given})
 
 
 def checked_options(coder: Coder, given: Mapping[str, Any]) -> dict[str, Value]:
-    """All options of a coder: those given, checked, and the others' defaults."""
+    """Return all options of a coder: the given ones, checked, and defaults for the others."""
     if unknown := set(given) - set(coder.options):
         known = ", ".join(coder.options) or "none"
         raise ValueError(f"scheme {coder.name} has no option {', '.join(sorted(unknown))}: known are {known}")
@@ -243,19 +289,19 @@ def checked_options(coder: Coder, given: Mapping[str, Any]) -> dict[str, Value]:
 
 
 def checked_goal(coder: Coder, options: Options, bpp: Any, qp: Any, quality: Any) -> Goal:
-    """The goal, or a ValueError: exactly one number of those the coder takes, none if it is lossless."""
+    """Return the goal; raise ValueError unless one number is given that the coder takes, or none if lossless."""
     given = {name: value for name, value in (("bpp", bpp), ("qp", qp), ("quality", quality)) if value is not None}
     takes = {"bpp": coder.rate_control, "qp": coder.qp_range is not None, "quality": coder.quality_range is not None}
     if coder.lossless(options):
         takes = {}
     known = [name for name, taken in takes.items() if taken]
     if foreign := set(given) - set(known):
-        instead = f"give {' or '.join(known)} instead" if known else "it codes lossless, nothing is asked for"
+        instead = f"give {' or '.join(known)} instead" if known else "it is lossless, leave it out"
         raise ValueError(f"scheme {coder.name} takes no {', '.join(sorted(foreign))} here: {instead}")
     if len(given) != (1 if known else 0):
         exactly = known[0] if len(known) == 1 else f"exactly one of {' and '.join(known)}"
-        told = " and ".join(f"{name} is {given.get(name)}" for name in known)
-        raise ValueError(f"{told}: {exactly} is needed")
+        state = " and ".join(f"{name} is {given.get(name)}" for name in known)
+        raise ValueError(f"{state}: {exactly} is needed")
     if bpp is not None:
         if not is_number(bpp) or not 0 < bpp <= sys.float_info.max:
             raise ValueError(f"bpp is {bpp!r}: a positive number is needed")
@@ -269,7 +315,7 @@ def checked_goal(coder: Coder, options: Options, bpp: Any, qp: Any, quality: Any
 
 
 def check_picture(coder: Coder, options: Options, picture: Any) -> None:
-    """Raise ValueError for what is no picture, or none that the coder takes."""
+    """Raise ValueError unless the argument is a picture that the coder takes."""
     if not isinstance(picture, IIPicture):
         raise ValueError(f"picture is {type(picture).__name__}: an IIPicture is needed")
     if picture.pixels.dtype.name not in coder.dtypes:
@@ -300,7 +346,7 @@ def _number(text: str, bounds: tuple[float, float]) -> float | None:
 
 
 def _within(value: Any, bounds: tuple[float, float]) -> float | None:
-    """The number, a float or an int as the bounds are, if it is one within them."""
+    """Return the number within bounds, a float or an int as the bounds are; None if it is outside."""
     if not is_number(value) or not bounds[0] <= value <= bounds[1]:
         return None
     if _fractions(bounds):
@@ -312,5 +358,5 @@ def _within(value: Any, bounds: tuple[float, float]) -> float | None:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a number and no truth value."""
+    """Return whether a value is a number and no truth value."""
     return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)

@@ -14,14 +14,14 @@ import pytest
 from PIL import Image
 
 from codec import Encoded, decode, decode_component, decode_frame, encode, schemes
-from codec.coders.video import Video
+from codec.coders.pseudo_video import PseudoVideo, decoded_frames
 from codec.contract import find
 from codec.inspect.extract import extract, suffixes
 from codec.inspect.random_access import sequence
 from codec.order import selection_order
 from ii_core import IIPicture, component_images
 
-VIDEOS = sorted(n for n in schemes() if isinstance(find(n), Video))
+VIDEOS = sorted(n for n in schemes() if isinstance(find(n), PseudoVideo))
 STILLS = sorted(set(schemes()) - set(VIDEOS))
 FFPROBE = shutil.which("ffprobe")
 
@@ -176,11 +176,9 @@ def samples(frame, width, height):
 @pytest.mark.parametrize("scheme", VIDEOS)
 def test_streams_are_files_that_ffmpeg_decodes_to_the_same(scheme, tmp_path):
     """Every frame of every container is the one that our own decoding puts into the picture."""
-    from codec.coders import video
-
     stream = coded(f"{scheme}:gop=5" if "gop" in find(scheme).options else scheme)
     taken = sequence(stream)
-    own = list(video.decoded_frames(taken.coder, stream.payload, taken.film))
+    own = list(decoded_frames(taken.coder, stream.payload, taken.film))
     for suffix in suffixes(stream):
         path = tmp_path / f"out{suffix}"
         shown = extract(stream, path)

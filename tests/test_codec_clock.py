@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from codec import parse_scheme
-from codec.coders.clock import TASKS, OwnThreads, cpu_seconds
+from codec.clock import TASKS, OwnThreads, cpu_seconds
 from codec.coders.video import open_encoder
 from ii_core import IIPicture
 

@@ -10,11 +10,11 @@ from test_codec_contract import finest, psnr, quick, textured
 from codec import decode, encode, schemes
 from codec.bitstream import framing
 from codec.bitstream.obu import temporal_units
-from codec.coders.video import Video, _packets
+from codec.coders.pseudo_video import PseudoVideo, stream_packets
 from codec.contract import find, parse_scheme
 from ii_core import IIPicture
 
-VIDEO = [name for name in schemes() if isinstance(find(name), Video)]
+VIDEO = [name for name in schemes() if isinstance(find(name), PseudoVideo)]
 SI = [name for name in VIDEO if name.startswith("si-")]
 
 
@@ -67,7 +67,7 @@ def keys(scheme, picture):
     coder, options = parse_scheme(scheme)
     context = av.CodecContext.create(coder.decoder, "r")
     film = coder.film(picture, options)
-    packets = [*_packets(coder, context, coded.payload, film), None]
+    packets = [*stream_packets(coder, context, coded.payload, film), None]
     return [number for number, frame in enumerate(f for p in packets for f in context.decode(p)) if frame.key_frame]
 
 

@@ -68,6 +68,34 @@ def test_what_is_wrong_is_said(scheme, message):
     assert message in str(caught.value)
 
 
+def test_options_are_keywords_too():
+    coded = encode(PICTURE, "si-hevc", preset="fast", gop=4, depth=8, bpp=1)
+    assert coded.payload == encode(PICTURE, "si-hevc:fast,gop=4,depth=8", bpp=1).payload
+    assert coded.options["preset"] == find("si-hevc").presets["fast"]["preset"]
+    assert parse_scheme("si-hevc", preset="veryslow")[1]["preset"] == "veryslow"  # x265's own
+    assert parse_scheme("si-av1", preset=6)[1]["preset"] == 6
+    assert parse_scheme("si-av1:gop=8", preset="best")[1].items() >= {"gop": 8, "preset": 2}.items()
+    assert parse_scheme("htj2k", lossless=True)[1]["lossless"] == 1
+
+
+@pytest.mark.parametrize(
+    ("scheme", "keywords", "message"),
+    [
+        ("si-h264:gop=4", {"gop": 8}, "option gop is given twice"),
+        ("si-h264", {"speed": 3}, "scheme si-h264 has no option speed: known are order, by, gop"),
+        ("si-h264", {"gop": True}, "option gop is True: a whole number from 0"),
+        ("si-h264", {"gop": None}, "option gop is None: a whole number from 0"),
+        ("si-h264:fast", {"preset": "best"}, "'best' is a second preset"),
+        ("si-vp9", {"preset": "swift"}, "'swift' is no option=value and no preset: known are fast, balanced, best"),
+        ("si-av1", {"preset": "swift"}, "option preset is 'swift': a whole number from 0 to 7 is needed"),
+    ],
+)
+def test_what_is_wrong_with_keywords_is_said(scheme, keywords, message):
+    with pytest.raises(ValueError) as caught:
+        encode(PICTURE, scheme, bpp=1, **keywords)
+    assert message in str(caught.value)
+
+
 def test_only_pictures_are_coded():
     with pytest.raises(ValueError, match="picture is ndarray: an IIPicture is needed"):
         encode(PICTURE.pixels, "jpeg2000", bpp=1)

@@ -1,18 +1,151 @@
-"""Meeting a rate by trying settings, on coders that are formulas."""
+"""Search of a setting whose stream has a target size, on coders that are formulas."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codec.rate import Run
-from codec.search import MAX_RUNS, nearest_setting
+from codec.search import Axis, Run, Trial, bracket, meet_rate, meet_size, size_miss, trials
+
+
+class Fake:
+    """Rate control whose size is a function of its target."""
+
+    def __init__(self, size_of, coarsest=1, finest=10**6):
+        self.size_of, self.limits, self.asked = size_of, (coarsest, finest), []
+
+    def search(self, target):
+        def run(size):
+            return Run(bytes(round(size)), 0.0)
+
+        def at(ask):
+            self.asked.append(ask)
+            return run(self.size_of(ask))
+
+        found = meet_rate(at, target, coarsest=lambda: run(self.limits[0]), finest=lambda: run(self.limits[1]))
+        return len(found.run.payload), found.runs
+
+
+def test_an_obedient_coder_runs_once():
+    assert Fake(lambda ask: ask).search(1000) == (1000, 1)
+
+
+@pytest.mark.parametrize("error", [0.85, 0.97, 1.03, 1.2])
+def test_a_proportional_miss_is_corrected_once(error):
+    size, runs = Fake(lambda ask: error * ask).search(10_000)
+    assert abs(size - 10_000) <= 200
+    assert runs == 2
+
+
+@pytest.mark.parametrize("power", [0.6, 1.6])
+def test_a_crooked_coder_is_met_within_the_reruns(power):
+    size, runs = Fake(lambda ask: 1.15 * 10_000 * (ask / 10_000) ** power).search(10_000)
+    assert abs(size - 10_000) <= 200
+    assert runs <= 4
+
+
+def test_a_floor_is_settled_by_one_run_at_it():
+    coder = Fake(lambda ask: max(ask, 5000), coarsest=4900)
+    assert coder.search(1000) == (4900, 2)
+
+
+def test_a_ceiling_close_by_is_noticed_when_asking_more_gives_no_more():
+    coder = Fake(lambda ask: min(ask, 900), finest=905)
+    assert coder.search(1000) == (905, 3)
+
+
+def test_a_coder_that_goes_below_its_coarsest_quantiser_is_followed():
+    size, runs = Fake(lambda ask: 1.4 * ask, coarsest=5000).search(1000)
+    assert abs(size - 1000) <= 20
+    assert runs == 3
+
+
+def test_a_limit_beyond_the_target_does_not_end_the_search():
+    size, _ = Fake(lambda ask: 1.5 * ask, coarsest=10).search(10_000)
+    assert abs(size - 10_000) <= 200
+
+
+def test_a_coder_that_never_obeys_is_left_alone_in_time():
+    sizes = iter([1100, 950, 1060, 930, 0, 0])
+    size, runs = Fake(lambda ask: next(sizes)).search(1000)
+    assert size == 950
+    assert runs <= 6
+
+
+def by_quantiser(size_of, target, *, step=0.05, octave=6.0):
+    axis = Axis(low=0, high=51, start=30.6, octave=-octave, step=step, overshoot=0, runs=5)
+    found = meet_size(lambda q: Run(range(round(size_of(q))), 0.0), target, axis)
+    return len(found.run.payload), found.runs
+
+
+@pytest.mark.parametrize("octave", [3.0, 6.0, 14.0])
+@pytest.mark.parametrize("target", [400, 10_000, 150_000])
+def test_a_quantiser_is_found_whatever_the_slope(octave, target):
+    found, runs = by_quantiser(lambda q: 1e4 * 2 ** ((30 - q) / octave), target)
+    if 1e4 * 2 ** (-21 / octave) <= target <= 1e4 * 2 ** (30 / octave):
+        assert found == pytest.approx(target, rel=0.02)
+    assert runs <= 5
+
+
+def test_a_target_beyond_the_range_takes_the_end_of_it():
+    assert by_quantiser(lambda q: 1000 * 2 ** ((30 - q) / 6), 1) == (round(1000 * 2 ** (-21 / 6)), 2)
+
+
+def test_a_search_starts_from_known_trials():
+    """The share of frames at the finer of two quantisers: its size is known at 0 and at 1."""
+
+    def miss(run):
+        return size_miss(run, 10_500)
+
+    ends = [Trial(share, miss(Run(range(size), 0.0)), None) for share, size in ((0.0, 10_000), (1.0, 11_000))]
+    axis = Axis(low=0.0, high=1.0, start=0.5, octave=1.0, runs=4)
+    more = list(trials(lambda share: Run(range(round(1e4 + 1e3 * share**1.5)), 0.0), miss, axis, known=ends))
+    assert len(more[-1].result.payload) == pytest.approx(10_500, rel=0.02)
+    assert len(more) == 1  # a tenth between the ends: the first interpolation is within 2 %
+    assert 0.4 < more[0].setting < 0.6
+
+
+def test_no_bracket_where_all_sizes_lie_on_one_side():
+    axis = Axis(low=0, high=51, start=30, octave=-6)
+    tried = [Trial(20, -1.0, None), Trial(30, -2.0, None)]
+    assert bracket(tried, axis) is None
+    assert bracket([*tried, Trial(10, 0.5, None)], axis) == (tried[0], Trial(10, 0.5, None))
+
+
+@pytest.mark.parametrize(("octave", "step"), [(3.0, 0.0), (-3.0, 0.0), (7.0, 1.0), (-7.0, 1.0), (-9.0, 0.25)])
+@given(st.floats(100, 1e6), st.floats(0.5, 2.0))
+def test_one_search_serves_both_directions_and_whole_and_real_settings(octave, step, target, slope):
+    """The mirrored axis is searched by the mirrored settings; on a grid the result is one of the two neighbours."""
+
+    def size(setting):
+        return round(1e4 * 2 ** (setting / (slope * abs(octave))))
+
+    def settings(sign):
+        visited = []
+
+        def run(setting):
+            visited.append(sign * setting)
+            return Run(range(size(sign * setting)), 0.0)
+
+        low, high = sorted((sign * -64, sign * 64))
+        axis = Axis(low=low, high=high, start=0.0, octave=sign * abs(octave), step=step)
+        meet_size(run, target, axis)
+        return visited
+
+    assert settings(1) == pytest.approx(settings(-1))
+    assert all(step == 0 or (setting / step).is_integer() for setting in settings(1))
+    best = min(settings(1), key=lambda s: abs(np.log(size(s) / target)))
+    ends = size(-64), size(64)
+    if ends[0] <= target <= ends[1]:
+        met = abs(size(best) / target - 1) <= 0.02
+        assert met or (step and abs(np.log2(size(best) / target)) * slope * abs(octave) <= step)
 
 
 def search(size, target, **kwargs):
     """The size found and the runs it took, for a coder that makes ``size(setting)`` bytes (none are really there)."""
-    run, runs = nearest_setting(lambda setting: Run(range(int(size(setting))), 0.0), target, **kwargs)
-    return len(run.payload), runs
+    finest = kwargs.pop("finest", None)
+    found = meet_size(lambda setting: Run(range(int(size(setting))), 0.0), target, Axis(**kwargs), finest=finest)
+    return len(found.run.payload), found.runs
 
 
 DB = {"low": 0.0, "high": 60.0, "start": 33.0, "octave": 3.0}
@@ -32,7 +165,7 @@ def test_smooth_coders_are_met_in_a_few_runs(octave, bend, target):
 
 
 def test_whole_settings_end_at_the_nearest():
-    found, runs = search(lambda q: 100 * 1.1**q, 1000 * 1.05, low=0, high=63, start=40, octave=6, whole=True)
+    found, runs = search(lambda q: 100 * 1.1**q, 1000 * 1.05, low=0, high=63, start=40, octave=6, step=1)
     assert found == int(100 * 1.1**25)  # 1083; 24 makes 985
     assert runs <= 6
 
@@ -65,4 +198,4 @@ def test_what_is_finer_than_the_finest_setting_is_tried_where_it_may_help():
 def test_a_coder_that_jumps_past_the_target_is_left_alone_in_time():
     found, runs = search(lambda db: 100 if db < 31.4 else 900, 500, **DB)
     assert found in (100, 900)
-    assert runs <= MAX_RUNS
+    assert runs <= Axis(**DB).runs

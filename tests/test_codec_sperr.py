@@ -33,12 +33,12 @@ def field(shape=(6, 20, 30)):
 def test_a_stream_without_its_header_is_decoded_as_the_library_does(step):
     """Header for header what the library wrote, and the same volume from the other process."""
     volume = field()
-    part = sperr_stream.coded(volume, step)
+    part = sperr_stream.encode_volume(volume, step)
     whole = imagecodecs.sperr_encode(
         volume, 8 * len(part.stream) / volume.size, "bpp", chunks=volume.shape, numthreads=1
     )
     expected = imagecodecs.sperr_decode(whole, shape=volume.shape, dtype=np.float32)
-    (decoded,), _ = sperr_stream.decoded([part], volume.shape)
+    (decoded,), _ = sperr_stream.decode_volumes([part], volume.shape)
     # The library's own stream may go on for up to 64 bits that round up its words.
     assert np.sqrt(np.mean((decoded - expected) ** 2)) < 0.02 * step
     assert sperr_stream.squared_error(part, volume) == pytest.approx(np.mean((decoded - volume) ** 2), rel=1e-5)
@@ -48,9 +48,9 @@ def test_a_stream_without_its_header_is_decoded_as_the_library_does(step):
 def test_cut_streams_beat_rounded_ones(step, monkeypatch):
     """At the length that a wide step takes the error is well below that of the step."""
     volume = field((16, 32, 32))
-    cut = sperr_stream.coded(volume, step)
+    cut = sperr_stream.encode_volume(volume, step)
     library = bytes(imagecodecs.sperr_encode(volume, step / 1.5, "pwe", chunks=volume.shape, numthreads=1))
-    rounded, bits = sperr_stream._taken_apart(library, volume.shape)
+    rounded, bits = sperr_stream._split(library, volume.shape)
     assert len(cut.stream) == math.ceil(bits / 8)
     error = sperr_stream.squared_error(cut, volume)
     monkeypatch.setattr(sperr_stream, "BIT_PLANES", library[sperr_stream._LIBRARY.size - 9])
@@ -120,23 +120,23 @@ def test_a_header_that_lies_is_refused(at, value, said):
 
 def test_what_ends_the_library_ends_not_this_process(monkeypatch):
     """A whole stream of another size makes the library abort."""
-    part = sperr_stream.coded(field(), 4.0)
+    part = sperr_stream.encode_volume(field(), 4.0)
     monkeypatch.setattr(sperr_stream, "_whole", lambda part, shape: b"\0" * 40)
     with pytest.raises(ValueError, match="does not decode"):
-        sperr_stream.decoded([part], (6, 20, 30))
+        sperr_stream.decode_volumes([part], (6, 20, 30))
 
 
 def test_a_worker_that_cannot_start_is_not_the_file_s_fault(monkeypatch):
-    part = sperr_stream.coded(field(), 4.0)
+    part = sperr_stream.encode_volume(field(), 4.0)
     monkeypatch.setattr(sperr_worker, "__file__", "/nowhere/sperr_worker.py")
     with pytest.raises(ChildProcessError, match=r"SPERR decoder does not start: .*sperr_worker"):
-        sperr_stream.decoded([part], (6, 20, 30))
+        sperr_stream.decode_volumes([part], (6, 20, 30))
 
 
 def test_the_worker_needs_nothing_of_this_package(tmp_path):
     """It is run by its path, without the folder it lies in, whose modules have names like `header`."""
     volume = field()
-    part = sperr_stream.coded(volume, 1.0)
+    part = sperr_stream.encode_volume(volume, 1.0)
     stream = sperr_stream._whole(part, volume.shape)
     request = sperr_worker.HEAD.pack(*volume.shape, 1) + sperr_worker.LENGTH.pack(len(stream)) + stream
     copy = tmp_path / "elsewhere.py"

@@ -8,7 +8,8 @@ import pytest
 from test_codec_contract import large, psnr, textured
 
 from codec import decode, encode
-from codec.bitstream.jpeg2000 import decode_planes, encode_planes, whole_codestream
+from codec.bitstream.jpeg2000 import whole_codestream
+from codec.coders.planes import decode_planes, encode_planes
 from codec.coders.volume import GROUP, MAX_SLICES, principal_axes
 from codec.frames import layout
 from ii_core import IIPicture

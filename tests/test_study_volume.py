@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.study import claims, volume_model
+from codec import encode
 from ii_core import IIPicture
 from metrics import q_global
 
@@ -71,3 +72,14 @@ def test_a_lead_is_taken_at_the_rates_there_are():
     beyond = [{"scheme": "b", "bpp": rate, "q_global": -99} for rate in (0.09, 1.7)]
     assert claims.lead(mine, "a", [*its, *beyond], "b") == pytest.approx(6)
     assert claims.lead(mine, "a", beyond, "b") is None
+
+
+def test_our_three_colours_count_their_streams_alone():
+    """Three codings of one picture would count the header of a file three times."""
+    bpp = 3.0
+    _, size, _ = volume_model.by_ours(PICTURE, bpp)
+    colours = [np.repeat(PIXELS[..., c : c + 1], 3, axis=2) for c in range(3)]
+    coded = [
+        encode(IIPicture(grey, PICTURE.lenses, PICTURE.ei_pixels), volume_model.VOLUME, bpp=bpp) for grey in colours
+    ]
+    assert size == sum(len(one.payload) for one in coded) < sum(one.nbytes for one in coded)

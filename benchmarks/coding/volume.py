@@ -18,7 +18,8 @@ from benchmarks.coding.rd import rd_point
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, add_again, origin, with_commits
 from codec import decode, encode
-from codec.bitstream.jpeg2000 import decode_planes, encode_planes, whole_codestream
+from codec.bitstream.jpeg2000 import whole_codestream
+from codec.coders.planes import decode_planes, encode_planes
 from codec.frames import layout
 from ii_core import IIPicture, component_images, preset
 from metrics import bd_rate

@@ -129,5 +129,5 @@ def by_ours(picture: IIPicture, bpp: float) -> tuple[NDArray[np.uint8], int, flo
         grey = np.repeat(picture.pixels[..., colour : colour + 1], 3, axis=2)
         coded = encode(IIPicture(grey, picture.lenses, picture.ei_pixels), VOLUME, bpp=bpp)
         decoded[..., colour] = decode(coded).pixels[..., 0]
-        total, seconds = total + coded.nbytes, seconds + (coded.codec_seconds or 0.0)
+        total, seconds = total + len(coded.payload), seconds + (coded.codec_seconds or 0.0)
     return decoded, total, seconds

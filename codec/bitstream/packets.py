@@ -1,7 +1,7 @@
 """Packets of a JPEG 2000 tile, and a codestream of some of its components (ISO/IEC 15444-1, Annex B).
 
 One tile, one layer, components of one size, code blocks of 64×64, packets resolution by resolution: the codestreams
-that `codec.bitstream.jpeg2000` writes. Packet headers are read for the lengths alone; no coefficient is decoded.
+that `codec.bitstream.jpeg2000` writes. The reader takes the lengths from packet headers and decodes no coefficient.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 BLOCK = 64
 SOT_BYTES, SOD = 12, b"\xff\x93"
-MAX_BITS = 40  # of a code block's length; more is damage
+MAX_BITS = 40  # of the length of a code block; longer ones are damage
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,8 +37,16 @@ class Tile:
     precinct: int
     by_component: bool
 
+    def packet_count(self) -> int:
+        """Return the number of packets, which is also their least size in bytes: an empty packet has one."""
+        sides = [
+            (_halved(self.height, self.levels - r), _halved(self.width, self.levels - r))
+            for r in range(self.levels + 1)
+        ]
+        return self.components * sum(-(-h // self.precinct) * -(-w // self.precinct) for h, w in sides)
+
     def packets(self) -> Iterator[tuple[int, list[tuple[int, int]]]]:
-        """Component of each packet and the code blocks, (rows, columns), of each subband in it, in stream order."""
+        """Yield, in stream order, a packet's component and the code blocks (rows, columns) of its subbands."""
         for resolution in range(self.levels + 1):
             precincts = list(self._precincts(resolution))
             if self.by_component:
@@ -71,7 +79,7 @@ def _halved(side: int, times: int) -> int:
 
 
 def _blocks(length: int, index: int, side: int) -> int:
-    """Code blocks along one axis of a precinct's part of a subband."""
+    """Return the number of code blocks along one axis of a precinct in a subband."""
     return -(-max(0, min(length - index * side, side)) // BLOCK)
 
 
@@ -156,7 +164,7 @@ def _passes(bits: _Bits) -> int:
 
 
 class _Bits:
-    """Bits of a packet header: after a byte of FF the next has seven (B.10.1)."""
+    """Bits of a packet header: a byte after FF has seven (B.10.1)."""
 
     def __init__(self, data: bytes, at: int) -> None:
         self.data, self.at, self.left, self.byte = data, at, 0, 0
@@ -189,7 +197,7 @@ class _Node:
 
 
 class _TagTree:
-    """A tag tree (B.10.2): values of a grid, of which every 2×2 share a minimum one level up."""
+    """Tag tree (B.10.2): values of a grid; a parent holds the minimum of its 2×2 children."""
 
     def __init__(self, rows: int, cols: int) -> None:
         self.nodes: list[dict[tuple[int, int], _Node]] = []
@@ -200,7 +208,7 @@ class _TagTree:
             rows, cols = -(-rows // 2), -(-cols // 2)
 
     def below(self, bits: _Bits, row: int, col: int, threshold: int) -> bool:
-        """Whether the value of a leaf is below a threshold, as far as bits have to be read for that."""
+        """Return whether a leaf's value is below a threshold, reading as few bits as that takes."""
         low = 0
         for level in reversed(range(len(self.nodes))):
             node = self.nodes[level][row >> level, col >> level]

@@ -1,4 +1,4 @@
-"""FFV1: every picture to the bit, RGB of 8 and 16 bit."""
+"""FFV1 by FFmpeg: lossless coding of RGB with 8 and 16 bit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .video import COMMON, Settings, Video
 
 
 class Ffv1(Video):
-    """Component images of one kind, each without loss; statistics, not pictures, are carried from one to the next."""
+    """Component images of one kind without loss; frames share statistics of the entropy coder, not pixels."""
 
     standard = "FFV1"
     encoder = "ffv1"
@@ -27,15 +27,15 @@ class Ffv1(Video):
     }
 
     def lossless(self, options: Options) -> bool:
-        """Always."""
+        """Return True."""
         return True
 
     def format(self, options: Options, dtype: str) -> Format:
-        """RGB as it is."""
+        """Return RGB; colours are not converted."""
         return RGB8 if dtype == "uint8" else RGB16
 
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
-        """Version 1 of the format for 8 bit, which has no slices and takes any size; 16 bit need version 3."""
+        """Return version 1 of the format for 8 bit, which has no slices and takes any size; 16 bit need version 3."""
         version = {"level": "1"} if film.format == RGB8 else {"level": "3", "slices": "1", "slicecrc": "0"}
         parameters = {"g": str(options["gop"] or (1 << 30)), "coder": "1", "context": str(options["context"])}
         return Settings(parameters=version | parameters)

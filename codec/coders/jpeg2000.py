@@ -1,4 +1,4 @@
-"""JPEG 2000 Part 1 on the II-picture as it lies: the reference everything is compared with."""
+"""JPEG 2000 Part 1 on the whole II-picture: the anchor of comparisons."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from PIL.Jpeg2KImagePlugin import Jpeg2KImageFile
 
 from ii_core import IIPicture
 
-from ..contract import Coder, Coding, Goal, Options
-from ..rate import Run, nearest_rate
+from ..contract import Coder, Goal, Options
+from ..search import CodingResult, Run, meet_rate
 
 LEVELS = 5
 RAW_BPP = 24
-LOSSLESS = 0.0  # the compression ratio that OpenJPEG takes for none
+LOSSLESS = 0.0  # OpenJPEG's compression ratio for lossless coding
 COARSEST = 1e9
 
 
 class Jpeg2000(Coder):
     """CDF 5/3, five levels, one tile, one layer, reversible colour transform, by OpenJPEG through Pillow.
 
-    The payload is the raw codestream. Pillow has no 16-bit RGB there, so that only 8 bit are taken.
+    The payload is the raw codestream. 8 bit only, since Pillow has no RGB of 16 bit.
 
     References
     ----------
@@ -45,27 +45,26 @@ class Jpeg2000(Coder):
         return {"pillow": PIL.__version__, "openjpeg": str(features.version("jpg_2000"))}
 
     def check(self, picture: IIPicture, options: Options) -> None:
-        """Any size will do."""
+        """Accept any size."""
 
-    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> Coding:
-        """A rate at or above that of lossless coding gives the lossless picture."""
+    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
+        """Meet a rate; a rate above that of lossless coding gives the lossless picture."""
         assert goal.bpp is not None
         width, height = picture.size
         raw_bytes = width * height * RAW_BPP / 8
         at_ratio = partial(_encode, picture.pixels)
-        run, runs = nearest_rate(
+        return meet_rate(
             lambda size: at_ratio(min(raw_bytes / size, COARSEST)),
             width * height * goal.bpp / 8,
             coarsest=lambda: at_ratio(COARSEST),
             finest=lambda: at_ratio(LOSSLESS),
         )
-        return Coding(run=run, runs=runs)
 
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[NDArray[np.uint8], float]:
-        """Refuses a stream of another size before it takes memory."""
+        """Decode; a stream of another size is refused before it takes memory."""
         started = time.thread_time()
         try:
-            # The file class itself, since `Image.open` refuses large pictures by a limit global to the process.
+            # Not `Image.open`, which refuses large pictures by a limit that is global to the process.
             with Jpeg2KImageFile(io.BytesIO(payload)) as image:
                 if image.size != blank.size or image.mode != "RGB":
                     raise ValueError(f"its JPEG 2000 stream is {image.size} {image.mode}, {blank.size} RGB is needed")
@@ -76,7 +75,7 @@ class Jpeg2000(Coder):
 
 
 def _encode(pixels: NDArray[np.uint8], ratio: float) -> Run:
-    """One run of the encoder at a compression ratio against 24 bit per pixel."""
+    """Run the encoder at a compression ratio against 24 bits per pixel."""
     image = Image.fromarray(pixels)
     started = time.thread_time()
     out = io.BytesIO()
@@ -86,7 +85,7 @@ def _encode(pixels: NDArray[np.uint8], ratio: float) -> Run:
         no_jp2=True,
         quality_mode="rates",
         quality_layers=[ratio],
-        # OpenJPEG refuses to halve a side of one pixel.
+        # OpenJPEG does not halve a side of one pixel.
         num_resolutions=min(LEVELS, int(math.log2(min(image.size)))) + 1,
         irreversible=False,
         mct=1,

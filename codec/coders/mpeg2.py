@@ -1,17 +1,18 @@
-"""MPEG-2 by FFmpeg, as the first coders of integral images used it (Yeom et al. 2004)."""
+"""MPEG-2 by FFmpeg, as in the first coders of integral images (Yeom et al. 2004)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import ClassVar
 
 from ..contract import Option, Options
 from ..frames import Film
-from ..rate import Run, nearest_rate
+from ..search import CodingResult, Run, meet_rate
+from .pseudo_video import Source
 from .video import COMMON, Settings, Video
 
 FINEST, COARSEST = 1, 31
-FRAME_RATE = 25  # the standard knows few
+FRAME_RATE = 25  # the standard allows a few rates
 MAX_BIT_RATE = 1 << 30
 
 
@@ -36,22 +37,22 @@ class Mpeg2(Video):
     }
 
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
-        """The same quantiser in every macroblock."""
+        """Return settings with one quantiser in every macroblock."""
         scale = f"{quantiser:g}"
         return _settings(options, {"qmin": scale, "qmax": scale, "mbqmin": scale})
 
-    def meet(self, target: float, film: Film, options: Options, run: Callable[[Settings], Run]) -> tuple[Run, int]:
-        """By FFmpeg's rate control."""
+    def meet(self, target: float, source: Source[Settings]) -> CodingResult:
+        """Meet a target by FFmpeg's rate control."""
 
         def at_rate(size: float) -> Run:
-            bits = round(min(max(8 * size / film.frames * FRAME_RATE, 1), MAX_BIT_RATE))
-            return run(_settings(options, {"qmin": str(FINEST), "qmax": str(COARSEST)}, bits))
+            bits = round(min(max(8 * size / source.film.frames * FRAME_RATE, 1), MAX_BIT_RATE))
+            return source.run(_settings(source.options, {"qmin": str(FINEST), "qmax": str(COARSEST)}, bits))
 
-        return nearest_rate(
+        return meet_rate(
             at_rate,
             target,
-            coarsest=lambda: run(self.constant(COARSEST, film, options)),
-            finest=lambda: run(self.constant(FINEST, film, options)),
+            coarsest=lambda: source.run_at(COARSEST),
+            finest=lambda: source.run_at(FINEST),
             reruns=10,
         )
 
@@ -61,7 +62,7 @@ def _settings(options: Options, rate: Mapping[str, str], bit_rate: int | None = 
         "g": str(options["gop"] or 600),
         "bf": str(options["bframes"]),
         "sc_threshold": "1000000000",
-        "flags": "+cgop",  # no B picture looks over the end of its group
+        "flags": "+cgop",  # closed groups: no B picture refers beyond its group
         **rate,
     }
     return Settings(parameters=parameters, bit_rate=bit_rate)

@@ -26,10 +26,9 @@ from PIL.JpegImagePlugin import JpegImageFile
 from ii_core import IIPicture
 
 from ..bitstream.jpeg2000 import without_comments
-from ..contract import Coder, Coding, Goal, Option, Options, Pixels
-from ..rate import Run
-from ..search import nearest_setting
-from .clock import cpu_seconds
+from ..clock import cpu_seconds
+from ..contract import Coder, Goal, Option, Options, Pixels
+from ..search import Axis, CodingResult, Run, meet_size
 
 LOSSLESS = Option(about="1 to code to the bit", default=0, low=0, high=1)
 
@@ -39,52 +38,51 @@ class Still(Coder):
 
     Attributes
     ----------
-    search : dict
-        The settings among which `codec.search.nearest_setting` meets a rate.
+    axis : Axis
+        Settings that meet a rate.
     """
 
-    search: ClassVar[dict[str, Any]]
+    axis: ClassVar[Axis]
 
     def check(self, picture: IIPicture, options: Options) -> None:
         """Any size will do."""
 
-    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> Coding:
-        """A rate at or above that of lossless coding gives the lossless picture, where there is such coding."""
+    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
+        """Meet a goal; a rate above that of lossless coding, if there is one, gives the lossless picture."""
         pixels = np.ascontiguousarray(picture.pixels)
-        at_setting = partial(self._timed, pixels, options)
+        at_setting = partial(self._timed_run, pixels, options)
         if self.lossless(options):
-            return Coding(run=at_setting(None))
+            return CodingResult(run=at_setting(None))
         if goal.bpp is None:
-            return Coding(run=at_setting(goal.quality if goal.qp is None else goal.qp))
-        run, runs = nearest_setting(
+            return CodingResult(run=at_setting(goal.quality if goal.qp is None else goal.qp))
+        return meet_size(
             at_setting,
             goal.bpp * picture.size[0] * picture.size[1] / 8,
-            **self.search,
+            self.axis,
             finest=partial(at_setting, None) if "lossless" in self.options else None,
         )
-        return Coding(run=run, runs=runs)
 
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
         """Refuses a stream of another size before it takes memory."""
         started = cpu_seconds()
-        pixels = self._decoded(payload, blank, options)
+        pixels = self._run_decoder(payload, blank, options)
         if pixels.shape != blank.pixels.shape or pixels.dtype != blank.pixels.dtype:
             raise ValueError(
                 f"its picture is {pixels.shape} {pixels.dtype}, {blank.pixels.shape} {blank.pixels.dtype} is needed"
             )
         return pixels, cpu_seconds() - started
 
-    def _timed(self, pixels: NDArray[Any], options: Options, setting: float | None) -> Run:
+    def _timed_run(self, pixels: NDArray[Any], options: Options, setting: float | None) -> Run:
         started = cpu_seconds()
-        payload = self._encoded(pixels, options, setting)
+        payload = self._run_encoder(pixels, options, setting)
         return Run(payload, cpu_seconds() - started)
 
     @abstractmethod
-    def _encoded(self, pixels: NDArray[Any], options: Options, setting: float | None) -> bytes:
+    def _run_encoder(self, pixels: NDArray[Any], options: Options, setting: float | None) -> bytes:
         """One run of the encoder; None is lossless."""
 
     @abstractmethod
-    def _decoded(self, payload: bytes, blank: IIPicture, options: Options) -> Pixels:
+    def _run_decoder(self, payload: bytes, blank: IIPicture, options: Options) -> Pixels:
         """One run of the decoder."""
 
 
@@ -115,7 +113,7 @@ class Jpeg(Still):
     }
     quality_range: ClassVar[tuple[float, float] | None] = (1.0, 100.0)
     scale_about = "libjpeg's quality"
-    search: ClassVar[dict[str, Any]] = {"low": 1.0, "high": 100.0, "start": 20.0, "octave": 25.0}
+    axis = Axis(low=1.0, high=100.0, start=20.0, octave=25.0)
     max_side = 65500  # libjpeg's
     # Every block has a DC coefficient of at least a bit: six blocks in 16×16 pixels at 4:2:0.
     pixels_a_byte = 8 * 256 // 6
@@ -131,7 +129,7 @@ class Jpeg(Still):
             width, height = picture.size
             raise ValueError(f"the picture has {width}×{height} pixels: JPEG takes {self.max_side} a side at most")
 
-    def _encoded(self, pixels: NDArray[Any], options: Options, setting: float | None) -> bytes:
+    def _run_encoder(self, pixels: NDArray[Any], options: Options, setting: float | None) -> bytes:
         assert setting is not None
         out = io.BytesIO()
         Image.fromarray(pixels).save(
@@ -143,7 +141,7 @@ class Jpeg(Still):
         )
         return out.getvalue()
 
-    def _decoded(self, payload: bytes, blank: IIPicture, options: Options) -> Pixels:
+    def _run_decoder(self, payload: bytes, blank: IIPicture, options: Options) -> Pixels:
         width, height = blank.size
         if len(payload) * self.pixels_a_byte < width * height:
             raise ValueError(f"its JPEG stream of {len(payload)} bytes cannot hold {width}×{height} pixels")
@@ -175,14 +173,14 @@ class JpegXl(Still):
     presets: ClassVar[Mapping[str, Options]] = {"fast": {"effort": 3}, "best": {"effort": 9}}
     quality_range: ClassVar[tuple[float, float] | None] = (0.0, 100.0)
     scale_about = "libjxl's quality: 90 is distance 1, 100 is lossless"
-    search: ClassVar[dict[str, Any]] = {"low": 0.0, "high": 99.9, "start": 30.0, "octave": 25.0}
+    axis = Axis(low=0.0, high=99.9, start=30.0, octave=25.0)
 
     @property
     def versions(self) -> dict[str, str]:
         """imagecodecs and its libjxl."""
         return {"imagecodecs": imagecodecs.__version__, "libjxl": imagecodecs.jpegxl_version().split()[-1]}
 
-    def _encoded(self, pixels: NDArray[Any], options: Options, setting: float | None) -> bytes:
+    def _run_encoder(self, pixels: NDArray[Any], options: Options, setting: float | None) -> bytes:
         how: dict[str, Any] = {"lossless": True}
         if setting is not None and setting < 100:
             how = {"distance": jpegxl_distance(setting)}
@@ -190,7 +188,7 @@ class JpegXl(Still):
         stream = imagecodecs.jpegxl_encode(pixels, effort=effort, usecontainer=False, numthreads=1, **how)
         return jpegxl_codestream(bytes(stream))
 
-    def _decoded(self, payload: bytes, blank: IIPicture, options: Options) -> Pixels:
+    def _run_decoder(self, payload: bytes, blank: IIPicture, options: Options) -> Pixels:
         if (size := jpegxl_size(payload)) != blank.size:
             raise ValueError(f"its JPEG XL stream is {size}, {blank.size} is needed")
         try:
@@ -255,7 +253,7 @@ class Htj2k(Still):
     options: ClassVar[Mapping[str, Option]] = {"lossless": LOSSLESS}
     qp_range: ClassVar[tuple[int, int] | None] = (0, 60)
     scale_about = "OpenJPH's base step is 0.625·2^(qp/6) 8-bit codes"
-    search: ClassVar[dict[str, Any]] = {"low": 6.0, "high": 60.0, "start": 40.0, "octave": -5.0}
+    axis = Axis(low=6.0, high=60.0, start=40.0, octave=-5.0)
     levels = 5
 
     @property
@@ -263,14 +261,14 @@ class Htj2k(Still):
         """imagecodecs and its OpenJPH."""
         return {"imagecodecs": imagecodecs.__version__, "openjph": imagecodecs.htj2k_version().split()[-1]}
 
-    def _encoded(self, pixels: NDArray[Any], options: Options, setting: float | None) -> bytes:
+    def _run_encoder(self, pixels: NDArray[Any], options: Options, setting: float | None) -> bytes:
         step = 0.0 if setting is None else min(0.625 * 2 ** (setting / 6) / 256, 1.0)
         stream = imagecodecs.htj2k_encode(
             pixels, step, rgb=True, planar=False, resolutions=self.levels, reversible=setting is None
         )
         return b"\xff\x4f" + without_comments(bytes(stream)[2:])
 
-    def _decoded(self, payload: bytes, blank: IIPicture, options: Options) -> Pixels:
+    def _run_decoder(self, payload: bytes, blank: IIPicture, options: Options) -> Pixels:
         if not _htj2k_head(blank).match(payload) or not payload.endswith(b"\xff\xd9"):
             raise ValueError(f"its HTJ2K stream is no whole one of ours for {blank.size} {blank.pixels.dtype}")
         try:

@@ -1,4 +1,4 @@
-"""AV1 by SVT-AV1, which takes 4:2:0 only."""
+"""AV1 by SVT-AV1, 4:2:0 only."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import ClassVar
 
 from ..contract import Option, Options
 from ..frames import Film
-from .video import COMMON, DEPTH, Settings, Video
+from .pseudo_video import DEPTH
+from .video import COMMON, Settings, Video
 
-# It would tell its settings on the error stream at every start: errors only.
+# Errors only: by default it prints its settings to the error stream at every start.
 os.environ.setdefault("SVT_LOG", "1")
 
 
@@ -20,7 +21,7 @@ class Av1(Video):
     standard = "AV1"
     encoder = "libsvtav1"
     decoder = "libdav1d"
-    # It takes 4, and then runs out of room for what noise needs.
+    # SVT-AV1 accepts sides of 4, and then overflows its buffer with noise.
     min_side = 8
     max_side = 8192
     min_coded_frame = 4
@@ -32,13 +33,13 @@ class Av1(Video):
     options: ClassVar[Mapping[str, Option]] = {
         **COMMON,
         "rate": Option(
-            about="what is kept constant: a rate factor, by which pictures that predict others are finer, or the "
-            "quantiser of each level of the hierarchy",
+            about="constant rate factor, with finer pictures where others are predicted from them, or constant "
+            "quantiser in each level of the hierarchy",
             default="crf",
             choices=("crf", "cq"),
         ),
-        # From 8 on it fails small frames of noise: errors beyond 100 at the finest factor.
-        "preset": Option(about="SVT-AV1's, 0 is the greatest effort", default=4, low=0, high=7),
+        # From 8 on small frames of noise come back wrong: errors above 100 codes at the finest factor.
+        "preset": Option(about="SVT-AV1's preset, 0 is the greatest effort", default=4, low=0, high=7),
         "depth": DEPTH,
         "threads": Option(about="levels of parallelism; the bytes do not depend on it", default=1, low=1, high=6),
     }
@@ -50,7 +51,7 @@ class Av1(Video):
     }
 
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
-        """A constant rate factor, or quantiser."""
+        """Return a constant rate factor, or quantiser."""
         parameters = [
             f"crf={quantiser:g}:keyint={options['gop'] or -1}:lp={options['threads']}:scd=0",
             *(["aq-mode=0"] if options["rate"] == "cq" else []),

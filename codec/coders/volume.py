@@ -1,20 +1,19 @@
-"""The volume: component images as slices, a wavelet along the slice axis, JPEG 2000 within slices.
+"""Volumes: component images as slices, a wavelet along the slice axis, JPEG 2000 within slices.
 
-The nearest there is to JPEG 2000 Part 10 (JP3D), of which no packaged implementation exists, on the standard's own
-parts: a dyadic CDF 9/7 or 5/3 along the slices (`codec.coders.lifting`), then all slices of all bands and colours as
-components of one JPEG 2000 codestream (`codec.bitstream.jpeg2000`). A slice is scaled by the synthesis gain of its
-band, so that the one rate control that serves them all, equal slope, sees errors as large as they will be in the
-picture. Part 10's code blocks of three dimensions are not in it.
+The scheme approximates JPEG 2000 Part 10 (JP3D), of which no packaged implementation exists. It applies a dyadic CDF
+9/7 or 5/3 along the slices (`codec.coders.lifting`), and codes all slices of all bands and colours as components of
+one JPEG 2000 codestream (`codec.coders.planes`). Each slice is scaled by the synthesis gain of its band: rate control
+then compares errors as large as they are in the picture. Part 10's three-dimensional code blocks are missing.
 
-Colours are turned to the picture's own principal axes (a rotation, so that no error grows); lossless coding takes the
-standard's reversible colour transform and reversible 5/3 instead.
+Colours are rotated to the principal axes of the picture's colours; a rotation keeps the size of errors. Lossless
+coding uses the reversible colour transform and the reversible 5/3 of the standard.
 
-Without the wavelet along the slices the same code makes each component image a JPEG 2000 picture of its own, at one
-slope for all.
+Without the wavelet along the slices, each component image is a JPEG 2000 picture of its own, at one slope for all.
 """
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -28,35 +27,33 @@ from numpy.typing import NDArray
 from ii_core import IIPicture
 from ii_core.jit import kernel
 
-from ..bitstream.jpeg2000 import MAX_COMPONENTS, decode_planes, encode_planes, picked_planes
-from ..contract import Coder, Coding, Goal, Option, Options, Pixels
+from ..clock import cpu_seconds
+from ..contract import Coder, Goal, Option, Options, Pixels
 from ..frames import Layout, layout
 from ..order import BY, ORDERS
-from ..rate import Run
-from ..search import nearest_setting
+from ..search import Axis, CodingResult, Run, meet_size
 from . import lifting
-from .clock import cpu_seconds
+from .planes import MAX_COMPONENTS, decode_planes, encode_planes, picked_planes
 
 NAMES = {"ei": "elementary images", "si": "sub-images", "ri": "ray-space images"}
 
-# Slices that one codestream holds in three colours. More make several volumes, of a length the wavelet halves evenly.
+# Largest number of slices in one codestream, in three colours. More slices make volumes of GROUP slices each.
 MAX_SLICES = MAX_COMPONENTS // 3
 GROUP = 1024
 
-# The range of qualities, and what about doubles the size.
+# Range of qualities, and the change that about doubles the size.
 COARSEST_DB, FINEST_DB, DB_AN_OCTAVE = 0.0, 70.0, 3.0
-# Beyond, lossless coding of 8-bit pixels is not far.
+# Largest quality to search, by bits of a pixel: lossless coding takes little more.
 NEARLY_LOSSLESS_DB = {8: 55.0, 16: 70.0}
 START_DB = 33.0  # at one bit per pixel
-# Coefficients are rounded to whole numbers before they are coded, in steps so fine that at most this part of the
-# error allowed is theirs. Finer ones would only be coded to be cut away.
+# Largest part of the allowed error that comes from rounding coefficients to whole numbers before coding.
 ROUNDING = 0.005
-# 2^-2 is fine enough for 70 dB, and leaves 16 bits room for the gains of eight levels.
+# Binary logarithms of the rounding step. 2^-2 suffices for 70 dB, and 16 bits hold the gains of eight levels.
 FINEST_STEP, COARSEST_STEP = -2, 8
 
 LOSSLESS, LOSSY = 0, 1
 _HEAD = struct.Struct("<Bb9h")
-_UNIT = 1 << 14  # of the colour matrix in the header
+_UNIT = 1 << 14  # unit of the colour matrix in the header
 _LENGTH = struct.Struct("<I")
 
 
@@ -94,37 +91,32 @@ class Volume(Coder):
         return {"imagecodecs": imagecodecs.__version__, "openjpeg": imagecodecs.jpeg2k_version().split()[-1]}
 
     def check(self, picture: IIPicture, options: Options) -> None:
-        """Any size will do."""
+        """Accept any size."""
 
-    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> Coding:
-        """A rate at or above that of lossless coding gives the lossless picture."""
+    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
+        """Meet a goal; a rate above that of lossless coding gives the lossless picture."""
         cut = self._cut(picture, options)
         pixels = np.ascontiguousarray(picture.pixels).reshape(-1, 3)
         exact = partial(_encode_lossless, pixels, cut)
         if options["lossless"]:
-            return Coding(run=exact())
+            return CodingResult(run=exact())
         colours = principal_axes(pixels)
         at_quality = partial(_encode_lossy, pixels, cut, colours)
         if goal.quality is not None:
-            return Coding(run=at_quality(goal.quality))
+            return CodingResult(run=at_quality(goal.quality))
         assert goal.bpp is not None
-        run, runs = nearest_setting(
-            at_quality,
-            goal.bpp * pixels.shape[0] / 8,
+        axis = Axis(
             low=COARSEST_DB,
             high=NEARLY_LOSSLESS_DB[cut.bits],
-            start=START_DB + DB_AN_OCTAVE * np.log2(goal.bpp),
+            start=START_DB + DB_AN_OCTAVE * math.log2(goal.bpp),
             octave=DB_AN_OCTAVE,
-            finest=exact,
         )
-        return Coding(run=run, runs=runs)
+        return meet_size(at_quality, goal.bpp * pixels.shape[0] / 8, axis, finest=exact)
 
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
-        """Group by group; a codestream is of the size that the structure says, whatever its bytes are."""
+        """Decode group by group; the structure gives the size of each codestream."""
         frames = layout(blank.lenses, blank.ei_pixels, self.kind).frames
-        if (
-            len(payload) < frames
-        ):  # before anything as long as that is laid out; every slice has packets in three planes
+        if len(payload) < 3 * frames:  # a slice has at least one packet in each of three planes
             raise ValueError(f"its JPEG 2000 stream of {len(payload)} bytes cannot hold {frames} slices")
         cut = self._cut(blank, options)
         mode, step, colours, streams = _parts(payload, len(cut.groups))
@@ -171,7 +163,7 @@ class Separate(Volume):
         self.about = f"All {NAMES[kind]}, each alone, JPEG 2000 at one slope for all, by OpenJPEG"
 
     def decode_slice(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
-        """Decode one component image, by its own packets: its place in the grid, row by row, is ``index``."""
+        """Decode one component image by its own packets; ``index`` counts the grid row by row."""
         cut = self._cut(blank, options)
         mode, step, colours, streams = _parts(payload, len(cut.groups))
         sizes = np.cumsum([len(origins) for origins in cut.groups])
@@ -194,7 +186,7 @@ class Separate(Volume):
 
 @dataclass(frozen=True, kw_only=True)
 class _Cut:
-    """How a picture is cut into slices, and transformed along them."""
+    """Slices of a picture, and the transform along them."""
 
     shape: Layout
     groups: list[NDArray[np.int64]]
@@ -204,17 +196,17 @@ class _Cut:
 
     @property
     def whole_dtype(self) -> str:
-        """What holds the coefficients of lossless coding: up to four bits more than the pixels."""
+        """Type of the coefficients of lossless coding, which have up to four bits more than pixels."""
         return "int16" if self.bits == 8 else "int32"
 
     def scales(self, count: int, step: int) -> NDArray[np.float32]:
-        """What each slice's coefficients are multiplied by, for a rounding step of 2^step in 8-bit codes."""
+        """Return the factor of each slice's coefficients for a rounding step of 2^step in 8-bit codes."""
         gains = lifting.synthesis_gains(self.wavelet, self.levels, count)
         return gains * np.float32(2.0 ** (8 - self.bits - step))
 
 
 def principal_axes(pixels: NDArray[np.integer]) -> NDArray[np.int16]:
-    """The rotation to the picture's own colours, rows by falling variance, in units of 2^-14.
+    """Return the rotation to the principal axes of colours, rows by falling variance, in units of 2^-14.
 
     Parameters
     ----------
@@ -222,7 +214,7 @@ def principal_axes(pixels: NDArray[np.integer]) -> NDArray[np.int16]:
     """
     flat = pixels.reshape(-1, 3)
     sums, products = np.zeros(3, np.int64), np.zeros((3, 3), np.int64)
-    for some in np.array_split(flat, len(flat) // (1 << 18) + 1):  # sums of whole numbers, so that no order matters
+    for some in np.array_split(flat, len(flat) // (1 << 18) + 1):  # integer sums: exact in any order
         colours = [np.ascontiguousarray(some[:, c], np.int64) for c in range(3)]
         sums += [c.sum() for c in colours]
         products += [[(a * b).sum() for b in colours] for a in colours]
@@ -248,7 +240,7 @@ def _encode_lossless(pixels: NDArray[Any], cut: _Cut) -> Run:
 
 
 def _encode_lossy(pixels: NDArray[Any], cut: _Cut, colours: NDArray[np.int16], quality: float) -> Run:
-    """Coded for a PSNR in dB."""
+    """Code for a PSNR in dB."""
     error = 255**2 / 10 ** (quality / 10)  # in 8-bit codes
     step = int(np.clip(np.floor(np.log2(12 * ROUNDING * error) / 2), FINEST_STEP, COARSEST_STEP))
     matrix, factors = colours.astype(np.float32) / _UNIT, lifting.steps(cut.wavelet)
@@ -292,7 +284,7 @@ def _from_real(
 
 
 def lines(shape: Layout) -> Iterator[tuple[int, int]]:
-    """Each line of the slices, and how far its first pixel is from that of its slice."""
+    """Yield each line of the slices and the offset of its first pixel from that of the slice."""
     return ((y, y * shape.step_y) for y in range(shape.height))
 
 
@@ -308,7 +300,7 @@ def _parts(payload: bytes, groups: int) -> tuple[int, int, NDArray[np.int16], li
         raise ValueError(f"its volume has {len(payload)} bytes: its header alone has {_HEAD.size}")
     mode, step, *numbers = _HEAD.unpack_from(payload)
     if mode not in (LOSSLESS, LOSSY) or not FINEST_STEP <= step <= COARSEST_STEP:
-        raise ValueError(f"its volume is of an unknown kind ({mode}, {step})")
+        raise ValueError(f"its volume has an unknown mode or step ({mode}, {step})")
     streams: list[bytes] = []
     at = _HEAD.size
     while at + _LENGTH.size <= len(payload) and len(streams) < groups:
@@ -316,7 +308,7 @@ def _parts(payload: bytes, groups: int) -> tuple[int, int, NDArray[np.int16], li
         at = start + _LENGTH.unpack_from(payload, at)[0]
         streams.append(payload[start:at])
     if at != len(payload) or len(streams) != groups:
-        raise ValueError(f"its volume does not consist of {groups} codestreams and no more")
+        raise ValueError(f"its volume does not consist of exactly {groups} codestreams")
     return mode, step, np.array(numbers, np.int16).reshape(3, 3), streams
 
 
@@ -336,7 +328,7 @@ def gather_real(pixels, origins, step_x, middle, matrix, rows):
 
 @kernel
 def scatter_real(rows, origins, step_x, middle, matrix, pixels):
-    """The inverse of `gather_real`, rounded and clipped; the matrix is a rotation."""
+    """Invert `gather_real`, rounded and clipped; the matrix is a rotation."""
     width = rows.shape[1] // 3
     top = np.float32(2 * middle - 1)
     for j in range(origins.size):
@@ -364,7 +356,7 @@ def to_whole(rows, scales, planes, y):
 
 @kernel
 def to_real(planes, scales, y, rows):
-    """The inverse of `to_whole`."""
+    """Invert `to_whole`."""
     width = rows.shape[1] // 3
     for j in range(rows.shape[0]):
         for c in range(3):
@@ -387,7 +379,7 @@ def gather_whole(pixels, origins, step_x, middle, rows):
 
 @kernel
 def scatter_whole(rows, origins, step_x, middle, pixels):
-    """The inverse of `gather_whole`; what lies beyond the pixels' range comes from damage alone."""
+    """Invert `gather_whole`; only damaged streams leave the range of pixels."""
     width = rows.shape[1] // 3
     for j in range(origins.size):
         for x in range(width):

@@ -1,14 +1,14 @@
-"""VP9 by libvpx, in one pass: its notes for a second do not reach Python."""
+"""VP9 by libvpx in one pass: PyAV does not expose first-pass statistics."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import ClassVar
 
 from ..contract import Option, Options
 from ..frames import Film
-from ..rate import Run, nearest, nearest_quantiser, nearest_rate, straddling, within
+from ..search import CodingResult, Run, bracket, meet_rate, met, nearest, size_miss, within
+from .pseudo_video import Source
 from .video import COMMON, Settings, Video, chroma, fine_rate
 
 
@@ -32,41 +32,34 @@ class Vp9(Video):
     presets: ClassVar[Mapping[str, Options]] = {"fast": {"speed": 4}, "balanced": {"speed": 1}, "best": {"speed": 0}}
 
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
-        """A constant quality."""
+        """Return a constant quality."""
         return _settings(options, {"crf": f"{quantiser:g}", "b": "0", "lossless": str(int(quantiser == 0))})
 
-    def meet(self, target: float, film: Film, options: Options, run: Callable[[Settings], Run]) -> tuple[Run, int]:
-        """By the quality; its steps are coarse, so that the rest is done by a rate between two of them."""
-        runs = nearest_quantiser(
-            lambda quantiser: run(self.constant(quantiser, film, options)),
-            target,
-            low=0,
-            high=63,
-            step=1,
-            octave=self.octave,
-        )
-        best, pair = nearest(runs.values(), target), straddling(runs, target)
-        if within(len(best.payload), target) or pair is None:
-            return best, len(runs)
-        fine, coarse = pair
+    def meet(self, target: float, source: Source[Settings]) -> CodingResult:
+        """Meet a target by the quality; then by rate control between two qualities; then by two sequences."""
+        tried = self.quantisers(target, source)
+        best, pair = nearest(tried), bracket(tried, self.axis(source.options))
+        if met(best.miss) or pair is None or pair[1].setting > pair[0].setting:
+            return CodingResult(run=best.result, runs=len(tried))
+        coarse, fine = pair
 
         def at_rate(size: float) -> Run:
-            kilobits, frame_rate = fine_rate(size, film)
-            bounds = {"qmin": f"{fine:g}", "qmax": f"{coarse:g}"}
-            return run(_settings(options, bounds, frame_rate, 1000 * kilobits))
+            kilobits, frame_rate = fine_rate(size, source.film)
+            bounds = {"qmin": f"{fine.setting:g}", "qmax": f"{coarse.setting:g}"}
+            return source.run(_settings(source.options, bounds, frame_rate, 1000 * kilobits))
 
-        better, more = nearest_rate(at_rate, target, coarsest=lambda: runs[coarse], finest=lambda: runs[fine])
-        if within(len(better.payload), target):
-            return better, len(runs) + more
-        found, tried = self.between(runs, target, film, options, run)
-        return nearest([better, found], target), tried + more
+        rated = meet_rate(at_rate, target, coarsest=lambda: coarse.result, finest=lambda: fine.result)
+        if within(len(rated.run.payload), target):
+            return CodingResult(run=rated.run, runs=len(tried) + rated.runs)
+        mixed = self.between(tried, target, source)
+        best_run = min(rated.run, mixed.run, key=lambda run: abs(size_miss(run, target)))
+        return CodingResult(run=best_run, runs=rated.runs + mixed.runs)
 
-    def mixed(self, fine: float, coarse: float, frames: int, film: Film, options: Options) -> Settings:
-        """Two sequences one after the other: there is one more I picture."""
-        if not 0 < frames < film.frames:
-            return self.constant(fine if frames else coarse, film, options)
-        then = self.constant(coarse, film, options)
-        return replace(self.constant(fine, film, options), frames=frames, then=then)
+    def mixed(
+        self, fine: float, coarse: float, frames: int, film: Film, options: Options
+    ) -> list[tuple[Film, Settings]]:
+        """Return two sequences one after the other."""
+        return self.two_sequences(fine, coarse, frames, film, options)
 
 
 def _settings(

@@ -1,17 +1,17 @@
 """H.264 by x264.
 
-The default is the dissertation's structure: one I picture, then P pictures only, no B, motion range 16, constant bit
-rate. Frames are 4:4:4 in full range; everything runs in the calling thread, since x264 makes another stream with
-every number of threads.
+The default is the dissertation's structure: one I picture, then P pictures, no B pictures, motion range 16, constant
+bit rate. Frames are 4:4:4 in full range. One thread is the default, since x264's bytes depend on the number of
+threads.
 """
 
 from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import ClassVar
 
@@ -19,18 +19,19 @@ import av
 
 from ..contract import Option, Options
 from ..frames import Film
-from ..rate import TOLERANCE, Run, nearest_rate
-from .video import COMMON, MAX_KBIT, THREADS, Settings, Video, chroma, fine_rate
+from ..search import TOLERANCE, CodingResult, Run, meet_rate
+from .pseudo_video import Source
+from .video import COMMON, MAX_KBIT, THREADS, Settings, Video, chroma, fine_rate, two_passes
 
-COARSEST, LOSSLESS = 51, 0  # quantisers; at 4:4:4 and 8 bit x264 takes 0 for lossless coding of YCbCr
+COARSEST, LOSSLESS = 51, 0  # quantisers; 0 is lossless coding of YCbCr at 4:4:4 and 8 bit
 
-# From here on lossless coding is tried first: where it takes what is asked, or less, quantisers from 1 up take more
-# bytes for a worse picture, and rate control would choose among them.
+# From this target on lossless coding is tried first. Where it meets the target, quantisers from 1 up take more bytes
+# for a worse picture, and rate control would choose among them.
 NEARLY_LOSSLESS_BPP = 2.0
 
-# Constant bit rate: at the frame rate of `fine_rate` the sequence is over before x264's long-term control wakes. The
-# buffer alone rules, and frames count in it, not seconds. x264 keeps it between half and 0.8 full: started between
-# them it ends about as full, and the sequence has the size asked for.
+# Constant bit rate: at the frame rate of `fine_rate` the sequence ends before x264's long-term control starts. Only
+# the buffer limits the rate. x264 keeps it between 0.5 and 0.8 full; a buffer that starts in between ends about as
+# full, so that the sequence has the target size.
 BUFFER_FRAMES = 32
 BUFFER_START = 0.65
 
@@ -46,9 +47,9 @@ class H264(Video):
     standard = "H.264"
     encoder = "libx264"
     decoder = "h264"
-    # A three-byte start code, a header, one byte.
+    # Start code of three bytes, header, one byte of data.
     min_coded_frame = 5
-    # Start code, headers, one skipped macroblock: the smallest P frame x264 writes.
+    # The smallest P frame of x264: start code, headers, one skipped macroblock.
     min_frame_bytes = 10
     quantiser_step = 0.05
     qp_range = (LOSSLESS, COARSEST)
@@ -58,14 +59,14 @@ class H264(Video):
         "bframes": Option(about="B pictures between P pictures, always as many", default=0, low=0, high=16),
         "merange": Option(about="motion range in pixels", default=16, low=16, high=128),
         "rate": Option(
-            about="how a rate is met: constant bit rate, constant quantiser, constant rate factor with macroblock "
-            "tree, two passes",
+            about="rate control: constant bit rate, constant quantiser, constant rate factor with macroblock tree, "
+            "two passes",
             default="cbr",
             choices=("cbr", "cq", "crf", "2pass"),
         ),
         "pyramid": Option(about="whether B pictures predict B pictures", default=0, low=0, high=1),
         "pbratio": Option(about="quantiser step of B over that of P pictures", default=1.3, low=0.5, high=4.0),
-        "preset": Option(about="x264's, the effort", default="medium", choices=SPEEDS),
+        "preset": Option(about="x264's preset, the effort", default="medium", choices=SPEEDS),
         "chroma": chroma("444"),
         "depth": Option(about="bits of a sample inside the coder", default="8", choices=("8", "10")),
         "threads": THREADS,
@@ -78,63 +79,64 @@ class H264(Video):
     }
 
     def step(self, options: Options) -> float:
-        """A constant quantiser is a whole number."""
+        """Return 1 for a constant quantiser, which is a whole number."""
         return 1.0 if options["rate"] == "cq" else self.quantiser_step
 
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
-        """A constant quantiser, or rate factor."""
+        """Return a constant quantiser, or rate factor."""
         if options["rate"] == "crf":
             return _settings(options, film, f"crf={quantiser:g}")
-        return _settings(options, film, f"qp={_fixed(quantiser, options)}")
+        return _settings(options, film, f"qp={_qp(quantiser, options)}")
 
-    def mixed(self, fine: float, coarse: float, frames: int, film: Film, options: Options) -> Settings:
-        """By a zone of its own for the first frames."""
+    def mixed(
+        self, fine: float, coarse: float, frames: int, film: Film, options: Options
+    ) -> list[tuple[Film, Settings]]:
+        """Return one sequence whose first frames are a zone with a quantiser of its own."""
         settings = self.constant(coarse, film, options)
-        finer = f"q={_fixed(fine, options)}" if options["rate"] == "cq" else f"b={2 ** ((coarse - fine) / 6):.4f}"
+        finer = f"q={_qp(fine, options)}" if options["rate"] == "cq" else f"b={2 ** ((coarse - fine) / 6):.4f}"
         parameters = settings.parameters["x264-params"] + f":zones=0,{max(0, frames - 1)},{finer}"
-        return replace(settings, parameters={**settings.parameters, "x264-params": parameters})
+        return [(film, replace(settings, parameters={**settings.parameters, "x264-params": parameters}))]
 
-    def meet(self, target: float, film: Film, options: Options, run: Callable[[Settings], Run]) -> tuple[Run, int]:
-        """By the rate control asked for."""
+    def meet(self, target: float, source: Source[Settings]) -> CodingResult:
+        """Meet a target by the rate control of the options."""
+        film, options = source.film, source.options
         if options["rate"] in ("crf", "cq"):
-            return super().meet(target, film, options, run)
+            return super().meet(target, source)
 
         def at_rate(size: float) -> Run:
             if options["rate"] == "cbr":
-                return run(_settings(options, film, *_constant_rate(size, film)))
-            with tempfile.TemporaryDirectory() as folder:
-                try:
-                    return _two_passes(size, film, options, run, Path(folder) / "notes")
-                except av.error.ExternalError:  # x264 knows after the first pass that the rate is too low for it
-                    return run(self.constant(COARSEST, film, options))
+                return source.run(_settings(options, film, *_constant_rate(size, film)))
+            try:
+                return _two_passes(size, source)
+            except av.error.ExternalError:  # after the first pass x264 refuses a rate that is too low
+                return source.run_at(COARSEST)
 
-        finest = cache(lambda: run(self.constant(LOSSLESS, film, options)))
+        finest = cache(lambda: source.run_at(LOSSLESS))
         pixels = film.frames * film.layout.height * film.layout.width
         near = 8 * target >= NEARLY_LOSSLESS_BPP * pixels
         if near and len(finest().payload) <= (1 + TOLERANCE) * target:
-            return finest(), 1
-        coarsest = partial(run, self.constant(COARSEST, film, options))
-        kept, runs = nearest_rate(at_rate, target, coarsest=coarsest, finest=finest)
-        return kept, runs + near
+            return CodingResult(run=finest())
+        found = meet_rate(at_rate, target, coarsest=lambda: source.run_at(COARSEST), finest=finest)
+        return CodingResult(run=found.run, runs=found.runs + near)
 
     def trimmed(self, packet: bytes) -> bytes:
-        """The packet without x264's message to the reader: over 600 bytes of settings that no decoder needs."""
+        """Return the packet without x264's SEI message: over 600 bytes of settings that no decoder needs."""
         return without_sei(packet)
 
 
 def _settings(options: Options, film: Film, rate: str, frame_rate: int = 25) -> Settings:
-    # Its macroblock tree reads what nobody wrote where rows of macroblocks are not whole vectors.
+    # x264's macroblock tree reads uninitialised memory unless rows are a multiple of 8 macroblocks.
     tree = options["rate"] == "crf" and -(-film.width // 16) % 8 == 0
     pyramid = "normal" if options["pyramid"] else "none"
     parameters = [
         f"keyint={options['gop'] or 'infinite'}:min-keyint=1:scenecut=0",
         f"bframes={options['bframes']}:b-adapt=0:b-pyramid={pyramid}:pbratio={options['pbratio']}",
-        # One search for every range: x264's default search would not go beyond 16 whatever the range.
+        # The same search for every range: x264's default search stays within 16 pixels.
         f"me=umh:merange={options['merange']}:mvrange=512",
         f"weightp=0:psy=0:mbtree={int(tree)}",
         *(["rc-lookahead=250:aq-mode=0"] if options["rate"] == "crf" else []),
-        # To hold a rate x264 would go beyond the standard's coarsest quantiser, and drop residuals altogether.
-        f"qpmax={_fixed(COARSEST, options)}",
+        # Without a limit x264 exceeds the standard's coarsest quantiser to hold a rate, and drops residuals.
+        f"qpmax={_qp(COARSEST, options)}",
         rate,
     ]
     return Settings(
@@ -144,29 +146,32 @@ def _settings(options: Options, film: Film, rate: str, frame_rate: int = 25) -> 
     )
 
 
-def _fixed(quantiser: float, options: Options) -> int:
-    """x264's own number for it, which at 10 bit begins 12 further; 0 stays lossless."""
+def _qp(quantiser: float, options: Options) -> int:
+    """Return x264's number of a quantiser: 12 more at 10 bit; 0 stays lossless."""
     return round(quantiser) + (12 if options["depth"] == "10" and quantiser > 0 else 0)
 
 
 def _constant_rate(size: float, film: Film) -> tuple[str, int]:
-    """x264's parameters and the frame rate that make a sequence of ``size`` bytes."""
+    """Return x264's parameters and the frame rate for a sequence of ``size`` bytes."""
     rate, frame_rate = fine_rate(size, film)
-    # Half the sequence at most: a buffer that holds more binds nothing.
+    # At most half the sequence: a larger buffer does not limit the rate.
     frames = min(BUFFER_FRAMES, max(1.0, film.frames / 2))
     buffer = max(1, round(min(8 * size / film.frames * frames / 1000, MAX_KBIT)))
     return f"bitrate={rate}:vbv-maxrate={rate}:vbv-bufsize={buffer}:vbv-init={BUFFER_START}", frame_rate
 
 
-def _two_passes(size: float, film: Film, options: Options, run: Callable[[Settings], Run], notes: Path) -> Run:
-    kilobits, frame_rate = fine_rate(size, film)
-    rate = f"bitrate={kilobits}:stats={notes}"
-    first, second = (run(_settings(options, film, f"{rate}:pass={number}", frame_rate)) for number in (1, 2))
-    return Run(second.payload, first.codec_seconds + second.codec_seconds)
+def _two_passes(size: float, source: Source[Settings]) -> Run:
+    kilobits, frame_rate = fine_rate(size, source.film)
+    with tempfile.TemporaryDirectory() as folder:
+        rate = f"bitrate={kilobits}:stats={Path(folder) / 'statistics'}"
+        first, second = (
+            _settings(source.options, source.film, f"{rate}:pass={number}", frame_rate) for number in (1, 2)
+        )
+        return two_passes(source, first, second)
 
 
 def without_sei(packet: bytes) -> bytes:
-    """The packet without supplemental messages."""
+    """Return an Annex B packet without supplemental enhancement information (SEI)."""
     starts = [match.start() for match in START_CODE.finditer(packet)]
     units = [packet[start:end] for start, end in zip(starts, [*starts[1:], len(packet)], strict=True)]
     return b"".join(unit for unit in units if START_CODE.sub(b"", unit, count=1)[0] & 31 != NAL_SEI)

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
 from ..contract import Option, Options
 from ..frames import Film
-from ..rate import Run, nearest_rate
-from .video import COMMON, DEPTH, MAX_KBIT, THREADS, Settings, Video, chroma
+from ..search import CodingResult, Run, meet_rate
+from .pseudo_video import DEPTH, Source
+from .video import COMMON, MAX_KBIT, THREADS, Settings, Video, chroma, two_passes
 from .x264 import SPEEDS
 
 FINEST, COARSEST = 0, 51
-FRAME_RATE = 250  # it takes no more than a few hundred
+FRAME_RATE = 250  # x265 allows a few hundred
 
 
 class Hevc(Video):
@@ -25,7 +26,7 @@ class Hevc(Video):
     encoder = "libx265"
     decoder = "hevc"
     min_side = 16
-    # A picture one block wide it predicts from memory that nobody wrote, apart from what a decoder does.
+    # x265 predicts pictures one block wide from uninitialised memory, and decoders then differ from it.
     min_width = 24
     min_coded_frame = 6
     min_frame_bytes = 10
@@ -37,11 +38,11 @@ class Hevc(Video):
         "bframes": Option(about="B pictures between P pictures, always as many", default=4, low=0, high=16),
         "merange": Option(about="motion range in pixels", default=57, low=16, high=128),
         "rate": Option(
-            about="how a rate is met: constant rate factor, constant quantiser, two passes",
+            about="rate control: constant rate factor, constant quantiser, two passes",
             default="crf",
             choices=("crf", "cq", "2pass"),
         ),
-        "preset": Option(about="x265's, the effort", default="slow", choices=SPEEDS),
+        "preset": Option(about="x265's preset, the effort", default="slow", choices=SPEEDS),
         "chroma": chroma("444"),
         "depth": DEPTH,
         "threads": THREADS,
@@ -54,53 +55,52 @@ class Hevc(Video):
     }
 
     def step(self, options: Options) -> float:
-        """A constant quantiser is a whole number."""
+        """Return 1 for a constant quantiser, which is a whole number."""
         return 1.0 if options["rate"] == "cq" else self.quantiser_step
 
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
-        """A constant rate factor, or quantiser."""
+        """Return a constant rate factor, or quantiser."""
         return _settings(options, film, f"qp={round(quantiser)}" if options["rate"] == "cq" else f"crf={quantiser:g}")
 
-    def mixed(self, fine: float, coarse: float, frames: int, film: Film, options: Options) -> Settings:
-        """By a zone of its own for the first frames."""
+    def mixed(
+        self, fine: float, coarse: float, frames: int, film: Film, options: Options
+    ) -> list[tuple[Film, Settings]]:
+        """Return one sequence whose first frames are a zone with a quantiser of its own."""
         settings = self.constant(coarse, film, options)
         finer = f"q={round(fine)}" if options["rate"] == "cq" else f"b={2 ** ((coarse - fine) / 6):.4f}"
         parameters = settings.parameters["x265-params"] + f":zones=0,{max(0, frames - 1)},{finer}"
-        return replace(settings, parameters={**settings.parameters, "x265-params": parameters})
+        return [(film, replace(settings, parameters={**settings.parameters, "x265-params": parameters}))]
 
-    def meet(self, target: float, film: Film, options: Options, run: Callable[[Settings], Run]) -> tuple[Run, int]:
-        """By the rate control asked for."""
-        if options["rate"] != "2pass":
-            return super().meet(target, film, options, run)
+    def meet(self, target: float, source: Source[Settings]) -> CodingResult:
+        """Meet a target by the rate control of the options."""
+        if source.options["rate"] != "2pass":
+            return super().meet(target, source)
 
         def at_rate(size: float) -> Run:
-            kilobits = max(1, round(min(8 * size / film.frames * FRAME_RATE / 1000, MAX_KBIT)))
+            kilobits = max(1, round(min(8 * size / source.film.frames * FRAME_RATE / 1000, MAX_KBIT)))
             with tempfile.TemporaryDirectory() as folder:
-                rate = f"bitrate={kilobits}:stats={Path(folder) / 'notes'}"
+                rate = f"bitrate={kilobits}:stats={Path(folder) / 'statistics'}"
                 first, second = (
-                    run(_settings(options, film, f"{rate}:pass={number}", FRAME_RATE)) for number in (1, 2)
+                    _settings(source.options, source.film, f"{rate}:pass={number}", FRAME_RATE) for number in (1, 2)
                 )
-            return Run(second.payload, first.codec_seconds + second.codec_seconds)
+                return two_passes(source, first, second)
 
-        return nearest_rate(
-            at_rate,
-            target,
-            coarsest=lambda: run(self.constant(COARSEST, film, options)),
-            finest=lambda: run(self.constant(FINEST, film, options)),
+        return meet_rate(
+            at_rate, target, coarsest=lambda: source.run_at(COARSEST), finest=lambda: source.run_at(FINEST)
         )
 
 
 def _settings(options: Options, film: Film, rate: str, frame_rate: int = 25) -> Settings:
     block = max(size for size in (16, 32, 64) if size == 16 or (size < film.width and size <= film.height))
-    # Its macroblock tree writes whole vectors of 16×16 blocks, beyond the end of rows that are none.
+    # x265's coding unit tree writes beyond the end of rows unless they are a multiple of 8 blocks of 16×16.
     tree = options["rate"] != "cq" and -(-film.width // 16) % 8 == 0
-    # One frame at a time and no pool: the bytes are the same always.
+    # One frame at a time and no pool of threads: the bytes are reproducible.
     pools = "none" if options["threads"] == 1 else options["threads"]
     parameters = [
         f"keyint={options['gop'] or -1}:min-keyint=1:scenecut=0:open-gop=0",
         f"bframes={options['bframes']}:b-adapt=0:rc-lookahead=40",
         f"merange={options['merange']}:ctu={block}",
-        # To weigh pictures against each other it reads memory that nobody wrote: other bytes every time.
+        # Weighted prediction reads uninitialised memory: the bytes would differ from run to run.
         "weightp=0:weightb=0",
         f"psy-rd=0:psy-rdoq=0:aq-mode=0:cutree={int(tree)}:pools={pools}:wpp={int(pools != 'none')}:frame-threads=1",
         "info=0:log-level=none",

@@ -37,7 +37,9 @@ from ii_core.files import atomic_path
 
 from ..api import Encoded
 from ..checks import check_type
-from ..coders.video import Video, decoder_of, open_encoder
+from ..coders.ffv1 import Ffv1
+from ..coders.pseudo_video import PseudoVideo, open_decoder
+from ..coders.video import open_encoder
 from ..contract import find
 from .random_access import DEMUXERS, Sequence, sequence
 
@@ -128,7 +130,7 @@ def extract(coded: Encoded, path: str | os.PathLike[str]) -> Extracted:
         raise ValueError(f"the stream of scheme {coded.scheme} does not go into {path.name}: possible are {known}")
     coder = find(coded.scheme)
     with atomic_path(path) as temporary:
-        if not isinstance(coder, Video):
+        if not isinstance(coder, PseudoVideo):
             boxed = suffix in (".jp2", ".jph") and coded.payload[:2] == b"\xff\x4f"
             temporary.write_bytes(_jp2(coded) if boxed else coded.payload)
             return Extracted(frames=1, size=coded.size, image=coded.size)
@@ -178,7 +180,7 @@ def _demuxer(stream: Sequence) -> Any:
 def suffixes(coded: Encoded) -> tuple[str, ...]:
     """Endings of the files that `extract` can make of a coded picture, the usual one first."""
     coder = find(coded.scheme)
-    if isinstance(coder, Video):
+    if isinstance(coder, PseudoVideo):
         found = CONTAINERS[coder.standard] + BARE.get(coder.standard, ())
         usual = ".avif" if coder.encoder == "libaom" else found[0]
         return (usual, *(suffix for suffix in found if suffix != usual))
@@ -211,7 +213,7 @@ def _mux(stream: Sequence, path: Path) -> None:
 def _stream(stream: Sequence, out: Any) -> tuple[Any, Any]:
     """An output stream that describes the packets, and what must outlive it."""
     coder = stream.coder
-    if coder.standard == "FFV1":
+    if isinstance(coder, Ffv1):
         # No file to copy the description from: the encoder that made the packets makes it again.
         target: Any = out.add_stream(coder.encoder, rate=RATE)
         settings = coder.constant(0, stream.film, stream.options)
@@ -232,7 +234,7 @@ def _stream(stream: Sequence, out: Any) -> tuple[Any, Any]:
 
 def _display_order(stream: Sequence) -> Many[int]:
     """When each packet's frame is shown, by asking the decoder."""
-    context = decoder_of(stream.coder, stream.film)
+    context = open_decoder(stream.coder, stream.film)
     if stream.first:
         context.extradata = stream.first
     order: list[int] = []

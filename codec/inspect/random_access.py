@@ -20,9 +20,8 @@ from ..api import Encoded, blank_picture
 from ..bitstream import framing
 from ..bitstream.obu import temporal_units
 from ..checks import check_type, whole_pair
-from ..coders import video
 from ..coders.lf.coder import LightField
-from ..coders.video import Video
+from ..coders.pseudo_video import PseudoVideo, copy_plane, decoded_frames
 from ..coders.volume import Separate
 from ..contract import MAX_DECODED_PIXELS, Options, Pixels, find
 from ..frames import Film, layout
@@ -46,7 +45,7 @@ class Sequence:
 
     Parameters
     ----------
-    coder : Video
+    coder : PseudoVideo
     options : mapping
     film : Film
         The frames of the whole picture.
@@ -56,7 +55,7 @@ class Sequence:
         One a frame.
     """
 
-    coder: Video
+    coder: PseudoVideo[Any]
     options: Options
     film: Film
     first: bytes
@@ -145,7 +144,7 @@ def decode_frame(coded: Encoded, index: int) -> Pixels:
     data = [packet.data for packet in part]
     payload = framing.pack(stream.first, data) if stream.coder.framed else b"".join(data)
     try:
-        frames = video.decoded_frames(stream.coder, payload, film)
+        frames = decoded_frames(stream.coder, payload, film)
         frame = next(itertools.islice(frames, index - start, None), None)
     except av.FFmpegError as error:
         raise ValueError(f"the coded picture is damaged: {error.strerror}") from None
@@ -185,10 +184,10 @@ def decode_component(coded: Encoded, place: tuple[int, int]) -> Pixels:
     return decode_frame(coded, int(inverse(order)[index]))
 
 
-def _with_frames(coded: Encoded) -> Video | Separate | LightField:
+def _with_frames(coded: Encoded) -> PseudoVideo[Any] | Separate | LightField:
     """The coder of a coded picture, if it codes component images that can be decoded alone."""
     coder = find(coded.scheme)
-    if not isinstance(coder, Video | Separate | LightField):
+    if not isinstance(coder, PseudoVideo | Separate | LightField):
         raise ValueError(f"scheme {coded.scheme} codes the picture as a whole: it has no frames to be had alone")
     return coder
 
@@ -208,7 +207,7 @@ def _pixels(frame: Any, film: Film, dtype: np.dtype[Any]) -> Pixels:
     single = replace(film, layout=alone)
     planes = single.batch()
     for plane, target in zip(frame.planes, planes, strict=True):
-        video.copy_plane(plane, target[0])
+        copy_plane(plane, target[0])
     pixels = np.empty((height, width, 3), dtype)
     single.scatter(planes, np.zeros(1, np.int64), pixels)
     return np.ascontiguousarray(pixels.swapaxes(0, 1)) if film.layout.turned else pixels

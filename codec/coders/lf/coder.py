@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -12,10 +13,9 @@ from numpy.typing import NDArray
 
 from ii_core import IIPicture
 
-from ...contract import Coder, Coding, Goal, Option, Options, Pixels
-from ...rate import Run
-from ...search import nearest_setting
-from .. import clock
+from ... import clock
+from ...contract import Coder, Goal, Option, Options, Pixels
+from ...search import Axis, CodingResult, Run, meet_size
 from ..volume import principal_axes
 from . import arithmetic, planes, ranges, search, stream, synthesis
 from .blocks import code_blend, decode_view
@@ -65,22 +65,20 @@ class LightField(Coder):
         """Any size will do that has no more views than there is patience for."""
         _check_views(picture)
 
-    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> Coding:
-        """A rate is met by trying quantisers."""
+    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
+        """Meet a rate by a search of the quantiser."""
         source = _Source(picture, options)
         if goal.qp is not None:
-            return Coding(run=source.run(goal.qp * FRACTIONS))
+            return CodingResult(run=source.run(goal.qp * FRACTIONS))
         assert goal.bpp is not None
-        run, runs = nearest_setting(
-            source.run,
-            goal.bpp * source.count / 8,
+        axis = Axis(
             low=FINEST * FRACTIONS,
             high=COARSEST * FRACTIONS,
-            start=START + OCTAVE * np.log2(min(max(goal.bpp, 1e-3), 100) * 10),
+            start=START + OCTAVE * math.log2(min(max(goal.bpp, 1e-3), 100) * 10),
             octave=OCTAVE,
-            whole=True,
+            step=1,
         )
-        return Coding(run=run, runs=runs)
+        return meet_size(source.run, goal.bpp * source.count / 8, axis)
 
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
         """Level by level; a level that ends early is damage."""

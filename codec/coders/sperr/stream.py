@@ -1,12 +1,10 @@
-"""Volumes to SPECK streams and back, by SPERR.
+"""SPECK streams of volumes by SPERR.
 
-How long a stream is to be is asked of the library's quantiser: so long as it is at a step. To this length SPECK's
-embedded stream is then cut, since what is cut has a wider zero than what is rounded to a step: a smaller error where
-steps are wide, a slightly larger one where they are fine and few coefficients are zero.
+The length of a stream is SPERR's output size at the step; the embedded stream is truncated to it. A truncated stream
+has a wider dead zone than a quantised one: its error is smaller at wide steps, and slightly larger at fine ones.
 
-The library trusts its input and ends the process where that is wrong. Its streams are therefore kept without their
-headers, which are made again from what is known, and are decoded in a process of their own:
-`codec.coders.sperr.worker`.
+SPERR aborts the process on malformed streams. Payloads therefore hold streams without SPERR's headers, which are
+rebuilt from the structure, and streams decode in a subprocess with limits: `codec.coders.sperr.worker`.
 """
 
 from __future__ import annotations
@@ -23,60 +21,60 @@ import imagecodecs
 import numpy as np
 from numpy.typing import NDArray
 
-from ..clock import spent_elsewhere
+from ...clock import spent_elsewhere
 from . import worker
 
 Shape = tuple[int, ...]
 
-LEAST_SLICES = 2  # of fewer the library makes pictures, or ends
+LEAST_SLICES = 2  # SPERR codes a single slice as a picture, or aborts
 LARGEST_MEAN, LARGEST_STEP = 512.0, 2.0**20  # in 8-bit codes
-BIT_PLANES = 32  # of every stream that is to be cut
+BIT_PLANES = 32  # of every stream before truncation
 
-# The library's own header: version, kind (three dimensions of floats), columns, rows and slices, length of the rest;
-# whether all is constant, mean, step of the last bit plane; bit planes, bits. Of a constant, count and value.
+# SPERR's header: version, kind (three dimensions of floats), columns, rows and slices, length of the rest; flag of a
+# constant volume, mean, step of the last bit plane; bit planes, bits. A constant volume has a count and a value.
 _LIBRARY = struct.Struct("<BB3IIBddBQ")
-_COUNTED = 18  # where what its length counts begins
+_COUNTED = 18  # position from which the length counts
 _CONSTANT = struct.Struct("<19xQd")
 _VERSION, _KIND, _USUAL, _ALL_THE_SAME = 0, 0x60, 0x80, 0x81
 
-# What the worker may take, by the clock and on a busy machine: it limits its own CPU time.
+# Limits of the worker by the wall clock, for a busy machine; it limits its own CPU time.
 SECONDS, SECONDS_A_SAMPLE = 120.0, 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """One volume: its mean and an embedded stream, the last bit plane of which has a step; or its mean alone."""
+    """One coded volume: mean, step of the last bit plane, embedded stream; a constant has no stream."""
 
     mean: float
     step: float
     stream: bytes
 
 
-def coded(volume: NDArray[np.float32], step: float) -> Part:
-    """A volume of at least `LEAST_SLICES` cut to as many bytes as a step takes."""
+def encode_volume(volume: NDArray[np.float32], step: float) -> Part:
+    """Code a volume of at least `LEAST_SLICES` slices at a step."""
     encoded = partial(imagecodecs.sperr_encode, volume, chunks=volume.shape, numthreads=1)
-    # Asked for a largest error, the library takes 3/2 of it for the step, and a list of what exceeds it follows.
-    part, bits = _taken_apart(bytes(encoded(step / 1.5, "pwe")), volume.shape)
+    # For a largest error SPERR uses a step of 3/2 times the error, and appends a list of outliers.
+    part, bits = _split(bytes(encoded(step / 1.5, "pwe")), volume.shape)
     if bits == 0:
         return Part(mean=part.mean, step=0.0, stream=b"")
     length = -(-bits // 8)
-    part, _ = _taken_apart(bytes(encoded(8 * length / volume.size, "bpp")), volume.shape, BIT_PLANES)
+    part, _ = _split(bytes(encoded(8 * length / volume.size, "bpp")), volume.shape, BIT_PLANES)
     return Part(mean=part.mean, step=part.step, stream=part.stream[:length])
 
 
-def decoded(parts: list[Part], shape: Shape) -> tuple[list[NDArray[np.float32]], float]:
-    """The volumes of parts, and the CPU seconds of decoding them.
+def decode_volumes(parts: list[Part], shape: Shape) -> tuple[list[NDArray[np.float32]], float]:
+    """Return the volumes of parts, and the CPU seconds of decoding them.
 
     Raises
     ------
     ValueError
-        If a part is none of ours, or the library does not take it.
+        If a part is damaged.
     ChildProcessError
         If the worker does not start.
     """
     for part in parts:
         _check(part)
-    streams = [_whole(part, shape) for part in parts if part.stream]
+    streams = [_with_header(part, shape) for part in parts if part.stream]
     volumes, seconds = _by_worker(streams, shape) if streams else (np.empty((0, *shape), np.float32), 0.0)
     remaining = iter(volumes)
     constants = [None if part.stream else np.broadcast_to(np.float32(part.mean), shape) for part in parts]
@@ -84,9 +82,9 @@ def decoded(parts: list[Part], shape: Shape) -> tuple[list[NDArray[np.float32]],
 
 
 def squared_error(part: Part, volume: NDArray[np.float32]) -> float:
-    """Of what was just coded, and can be trusted."""
+    """Return the mean squared error of a part that was just coded; it decodes in this process."""
     if part.stream:
-        whole = _whole(part, volume.shape)
+        whole = _with_header(part, volume.shape)
         error = imagecodecs.sperr_decode(whole, shape=volume.shape, dtype=np.float32, numthreads=1)
         error -= volume
     else:
@@ -100,12 +98,12 @@ def _check(part: Part) -> None:
         raise ValueError(f"its SPERR stream has {len(part.stream)} bytes, a step {part.step}, a mean {part.mean}")
 
 
-def _taken_apart(whole: bytes, shape: Shape, planes: int | None = None) -> tuple[Part, int]:
-    """A stream of the library's without its header, and its bits; what follows them is left in place."""
+def _split(whole: bytes, shape: Shape, planes: int | None = None) -> tuple[Part, int]:
+    """Return a stream of SPERR without its header, and its number of bits; outliers after them stay in place."""
     head = whole[: _LIBRARY.size].ljust(_LIBRARY.size, b"\0")
     version, kind, *sizes, _, state, mean, step, bit_planes, bits = _LIBRARY.unpack(head)
     if (version, kind, *sizes) != (_VERSION, _KIND, *shape[::-1]) or state not in (_USUAL, _ALL_THE_SAME):
-        raise RuntimeError(f"{imagecodecs.sperr_version()} writes another header than was foreseen")
+        raise RuntimeError(f"{imagecodecs.sperr_version()} writes another header than expected")
     if state == _ALL_THE_SAME:
         return Part(mean=_CONSTANT.unpack_from(whole)[1], step=0.0, stream=b""), 0
     if planes not in (None, bit_planes):
@@ -113,8 +111,8 @@ def _taken_apart(whole: bytes, shape: Shape, planes: int | None = None) -> tuple
     return Part(mean=mean, step=step, stream=whole[_LIBRARY.size :]), bits
 
 
-def _whole(part: Part, shape: Shape) -> bytes:
-    """A stream as the library reads it, which finds zeros, not the end of its memory, beyond what there is."""
+def _with_header(part: Part, shape: Shape) -> bytes:
+    """Return a stream with SPERR's header; its number of bits lets SPERR read zeros beyond the truncated end."""
     size, beyond = _LIBRARY.size - _COUNTED + len(part.stream), 2 * math.prod(shape)
     bits = 8 * len(part.stream) + beyond
     head = (_VERSION, _KIND, *shape[::-1], size, _USUAL, part.mean, part.step, BIT_PLANES, bits)

@@ -1,0 +1,333 @@
+"""Pseudo video sequences: component images as the frames of a video stream."""
+
+from __future__ import annotations
+
+import itertools
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Generic, TypeVar
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from ii_core import IIPicture
+
+from ..bitstream import framing
+from ..bitstream.obu import temporal_units
+from ..clock import cpu_seconds
+from ..colour import Format, ycbcr
+from ..contract import Coder, Goal, Option, Options, Pixels
+from ..frames import Film, layout
+from ..order import BY, ORDERS
+from ..search import Axis, CodingResult, Run, Trial, bracket, met, nearest, size_miss, trials
+
+NAMES = {"ei": "Elementary images", "si": "Sub-images", "ri": "Ray-space images"}
+
+ORDER: dict[str, Option] = {
+    "order": Option(about="of the component images", default="parallel", choices=tuple(ORDERS)),
+    "by": Option(about="whether the order goes by rows or by columns", default="rows", choices=BY),
+}
+DEPTH = Option(about="bits of a sample inside the coder", default="10", choices=("8", "10"))
+
+MAX_TARGET = 1e18  # bytes; upper cap on the target size
+CHUNK = 1 << 16  # bytes of a stream parsed at once
+# Budgets of encoder runs: for the quantiser, and for the share of frames coded finer.
+QUANTISER_RUNS, SHARE_RUNS = 5, 4
+START = 0.6  # of the range of quantisers, from the finest: the first trial
+
+Settings = TypeVar("Settings")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Packets:
+    """Packets of one run of an encoder.
+
+    ``first`` is what a decoder needs before them, ``seconds`` the CPU time inside the encoder.
+    """
+
+    packets: list[bytes]
+    first: bytes = b""
+    seconds: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source(Generic[Settings]):
+    """A picture as frames, coded by one run of an encoder after another."""
+
+    coder: PseudoVideo[Settings]
+    pixels: NDArray[Any]
+    film: Film
+    options: Options
+
+    def run(self, settings: Settings) -> Run:
+        """Code all frames with the same settings."""
+        return self.run_parts([(self.film, settings)])
+
+    def run_at(self, quantiser: float) -> Run:
+        """Code all frames at a quantiser."""
+        return self.run(self.coder.constant(quantiser, self.film, self.options))
+
+    def run_parts(self, parts: list[tuple[Film, Settings]]) -> Run:
+        """Code sequences that follow one another, each with its own settings."""
+        runs = [self.coder.run_encoder(self.pixels, film, settings) for film, settings in parts]
+        packets = [packet for run in runs for packet in run.packets]
+        payload = framing.pack(runs[0].first, packets) if self.coder.framed else b"".join(packets)
+        return Run(payload, sum(run.seconds for run in runs))
+
+
+class PseudoVideo(Coder, Generic[Settings]):
+    """Component images of one kind as a pseudo video sequence.
+
+    A subclass sets the attributes and implements `constant` and `run_encoder`. ``Settings`` is its type of encoder
+    settings.
+
+    Attributes
+    ----------
+    standard : str
+        Standard of the stream.
+    encoder : str
+        Name of the encoder library.
+    decoder : str
+        FFmpeg's name of the decoder.
+    framed : bool
+        Whether the payload needs a table of packets (`codec.bitstream.framing`); else it is the stream itself.
+    min_side, max_side, min_width : int
+        Limits of a frame in pixels. Smaller frames are padded, or transposed if that suffices.
+    min_coded_frame : int
+        Least bytes of a coded frame in any such stream. Shorter streams are refused before memory is taken.
+    min_frame_bytes : int
+        Least bytes of a frame that the encoder writes. Lower rates are not searched.
+    octave : float
+        Quantiser steps that about halve the rate.
+    quantiser_step : float
+        Finest step of the quantiser; see `step`.
+    relabel : str
+        FFmpeg bitstream filter that writes the colour matrix of the frames, for streams that name another one.
+
+    References
+    ----------
+    Olsson 2008, §5.5.1 (5.1), §5.5.3 (5.8)–(5.10), §5.7.
+    """
+
+    standard: ClassVar[str]
+    encoder: ClassVar[str]
+    decoder: ClassVar[str]
+    framed: ClassVar[bool] = False
+    min_side: ClassVar[int] = 1
+    min_width: ClassVar[int] = 1
+    max_side: ClassVar[int] = 16384
+    min_coded_frame: ClassVar[int] = 1
+    min_frame_bytes: ClassVar[int] = 1
+    octave: ClassVar[float] = 6.0
+    quantiser_step: ClassVar[float] = 1.0
+    relabel: ClassVar[str] = ""
+    presets: ClassVar[Mapping[str, Options]] = {}
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        self.name = f"{kind}-{type(self).__name__.lower()}"
+        self.about = f"{NAMES[kind]} as a pseudo video sequence, {self.standard} by {self.encoder}"
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """PyAV and its libavcodec."""
+        return {"av": av.__version__, "libavcodec": ".".join(map(str, av.library_versions["libavcodec"]))}
+
+    @abstractmethod
+    def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
+        """Return the settings for a quantiser, on the coder's own scale."""
+
+    @abstractmethod
+    def run_encoder(self, pixels: NDArray[Any], film: Film, settings: Settings) -> Packets:
+        """Code the frames of a film once."""
+
+    def step(self, options: Options) -> float:
+        """Return the distance of neighbouring quantisers."""
+        return self.quantiser_step
+
+    def meet(self, target: float, source: Source[Settings]) -> CodingResult:
+        """Meet a target size in bytes: by the quantiser, unless a subclass has a better way."""
+        return self.between(self.quantisers(target, source), target, source)
+
+    def quantisers(self, target: float, source: Source[Settings]) -> list[Trial[Run]]:
+        """Return trials of quantisers that approach a target."""
+        return list(trials(source.run_at, lambda run: size_miss(run, target), self.axis(source.options)))
+
+    def axis(self, options: Options) -> Axis:
+        """Return the quantisers to search."""
+        assert self.qp_range is not None
+        low, high = self.qp_range
+        return Axis(
+            low=low,
+            high=high,
+            start=low + START * (high - low),
+            octave=-self.octave,
+            step=self.step(options),
+            overshoot=0.0,
+            runs=QUANTISER_RUNS,
+        )
+
+    def between(self, tried: list[Trial[Run]], target: float, source: Source[Settings]) -> CodingResult:
+        """Meet a target between two quantisers: the first frames take the finer one, the rest the coarser one."""
+        best, pair = nearest(tried), bracket(tried, self.axis(source.options))
+        if met(best.miss) or pair is None or pair[1].setting > pair[0].setting:
+            return CodingResult(run=best.result, runs=len(tried))
+        coarse, fine = pair
+        if self.mixed(fine.setting, coarse.setting, 1, source.film, source.options) is None:
+            return CodingResult(run=best.result, runs=len(tried))
+
+        def at_share(share: float) -> Run:
+            frames = round(share * source.film.frames)
+            parts = self.mixed(fine.setting, coarse.setting, frames, source.film, source.options)
+            assert parts is not None
+            return source.run_parts(parts)
+
+        axis = Axis(low=0.0, high=1.0, start=0.5, octave=1.0, runs=SHARE_RUNS)
+        ends = [Trial(0.0, coarse.miss, coarse.result), Trial(1.0, fine.miss, fine.result)]
+        more = list(trials(at_share, lambda run: size_miss(run, target), axis, known=ends))
+        return CodingResult(run=nearest([best, *more]).result, runs=len(tried) + len(more))
+
+    def mixed(
+        self, fine: float, coarse: float, frames: int, film: Film, options: Options
+    ) -> list[tuple[Film, Settings]] | None:
+        """Return sequences with one quantiser in the first frames and another in the rest; None if impossible."""
+        return None
+
+    def two_sequences(
+        self, fine: float, coarse: float, frames: int, film: Film, options: Options
+    ) -> list[tuple[Film, Settings]]:
+        """Return two sequences one after the other, for `mixed`; they cost one more I picture."""
+        parts = [(replace(film, stop=frames), fine), (replace(film, start=frames), coarse)]
+        return [(part, self.constant(quantiser, part, options)) for part, quantiser in parts if part.frames]
+
+    def format(self, options: Options, dtype: str) -> Format:
+        """Return the colour format of frames for a pixel type."""
+        return ycbcr(str(options.get("chroma", "420")), int(options.get("depth", 8)))
+
+    def film(self, picture: IIPicture, options: Options) -> Film:
+        """Return the frames of a picture, at the size that the encoder needs."""
+        shape = layout(picture.lenses, picture.ei_pixels, self.kind)
+        form = self.format(options, picture.pixels.dtype.name)
+        if shape.width < self.min_width <= shape.height:  # transposed frames need no padding
+            shape = shape.transposed()
+        even = 2 if form.chroma == "420" else 1
+        sides = max(shape.width, self.min_width, self.min_side), max(shape.height, self.min_side)
+        width, height = (-(-side // even) * even for side in sides)
+        by, order = str(options["by"]), str(options["order"])
+        return Film(layout=shape, order=order, by=by, format=form, width=width, height=height)
+
+    def check(self, picture: IIPicture, options: Options) -> None:
+        """Refuse frames larger than the encoder takes."""
+        film = self.film(picture, options)
+        if max(film.width, film.height) > self.max_side:
+            raise ValueError(
+                f"frames of scheme {self.name} would have {film.width}×{film.height} pixels: "
+                f"at most {self.max_side}×{self.max_side} are allowed"
+            )
+
+    def encode(self, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
+        """Write one stream with its parameter sets in band."""
+        film = self.film(picture, options)
+        source = Source(coder=self, pixels=np.ascontiguousarray(picture.pixels), film=film, options=options)
+        if goal.bpp is None:
+            return CodingResult(run=source.run_at(goal.qp or 0))
+        target = min(goal.bpp * picture.size[0] * picture.size[1] / 8, MAX_TARGET)
+        if target < self.min_frame_bytes * film.frames:  # headers alone exceed it
+            assert self.qp_range is not None
+            return CodingResult(run=source.run_at(self.qp_range[1]))
+        return self.meet(target, source)
+
+    def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
+        """Decode frame by frame, at most one batch in memory."""
+        try:
+            return _decode(self, payload, self.film(blank, options), blank.pixels)
+        except av.FFmpegError as error:
+            raise ValueError(f"its {self.standard} stream does not decode ({error.strerror})") from None
+
+
+def _decode(coder: PseudoVideo[Any], payload: bytes, film: Film, blank: NDArray[Any]) -> tuple[Pixels, float]:
+    if len(payload) < coder.min_coded_frame * film.frames:  # before memory is taken for the sequence
+        raise ValueError(f"its {coder.standard} stream of {len(payload)} bytes cannot hold {film.frames} frames")
+    frames = decoded_frames(coder, payload, film)
+    started = cpu_seconds()
+    first = next(frames, None)
+    seconds, done = cpu_seconds() - started, 0
+    if first is None:
+        raise ValueError(f"its {coder.standard} stream holds no frames")
+    # A first frame of the right size has decoded: take memory for the others.
+    frames, origins, planes = itertools.chain([first], frames), film.origins(), film.batch()
+    pixels = np.empty((0, 0, 3), blank.dtype)
+    while True:
+        started = cpu_seconds()
+        batch = list(itertools.islice(frames, len(planes[0])))
+        seconds += cpu_seconds() - started
+        if not batch:
+            break
+        if done == 0:
+            pixels = np.empty(blank.shape, blank.dtype)
+        if done + len(batch) > film.frames:
+            raise ValueError(f"its {coder.standard} stream has more than {film.frames} frames")
+        for index, frame in enumerate(batch):
+            for plane, target in zip(frame.planes, planes, strict=True):
+                copy_plane(plane, target[index])
+        film.scatter(planes, origins[done : done + len(batch)], pixels)
+        done += len(batch)
+    if done < film.frames:
+        raise ValueError(f"its {coder.standard} stream has {done} frames, {film.frames} are needed")
+    return pixels, seconds
+
+
+def open_decoder(coder: PseudoVideo[Any], film: Film) -> Any:
+    """Return the decoder, ready for packets."""
+    context: Any = av.CodecContext.create(coder.decoder, "r")
+    context.thread_count = 1
+    # Refuse larger frames before they take memory. The decoder counts what it allocates: whole blocks, and rows
+    # padded for vector instructions.
+    coded = (-(-film.width // 128) * 128) * (-(-film.height // 128) * 128)
+    context.options = {"max_pixels": str(coded), "err_detect": "explode"}
+    if coder.framed:  # the packets do not carry the size
+        context.width, context.height = film.width, film.height
+    return context
+
+
+def decoded_frames(coder: PseudoVideo[Any], payload: bytes, film: Film) -> Iterator[Any]:
+    """Yield the frames of a stream in display order, each checked for its size."""
+    context = open_decoder(coder, film)
+    for packet in stream_packets(coder, context, payload, film):
+        yield from _checked(coder, context.decode(packet), film)
+    yield from _checked(coder, context.decode(None), film)
+
+
+def stream_packets(coder: PseudoVideo[Any], context: Any, payload: bytes, film: Film) -> Iterator[Any]:
+    """Yield the packets of a payload for a decoder."""
+    if coder.decoder == "libdav1d":
+        for unit in temporal_units(payload):
+            yield av.Packet(bytes(unit))
+        return
+    if coder.framed:
+        first, packets = framing.unpack(payload, film.frames)
+        if first:
+            context.extradata = first
+        for packet in packets:
+            yield av.Packet(bytes(packet))
+        return
+    view = memoryview(payload)
+    for start in range(0, len(view), CHUNK):
+        yield from context.parse(view[start : start + CHUNK])
+    yield from context.parse(None)
+
+
+def _checked(coder: PseudoVideo[Any], frames: list[Any], film: Film) -> list[Any]:
+    needed = film.width, film.height, film.format.name
+    for frame in frames:
+        found = frame.width, frame.height, frame.format.name.replace("yuvj", "yuv")
+        if found != needed:
+            raise ValueError(f"its {coder.standard} stream has frames of {found}, {needed} needed")
+    return frames
+
+
+def copy_plane(plane: Any, target: NDArray[Any]) -> None:
+    """Copy the samples of a decoded plane without the padding of its lines."""
+    target[:] = np.ndarray(target.shape, target.dtype, plane, strides=(plane.line_size, target.itemsize))
