@@ -77,7 +77,7 @@ def test_more_slices_than_a_codestream_holds_make_several_volumes():
     assert layout(lenses, ei_pixels, "ei").frames > MAX_SLICES > GROUP
     coded = encode(picture, "ei-jp3d:lossless=1")
     np.testing.assert_array_equal(decode(coded).pixels, picture.pixels)
-    with pytest.raises(ValueError, match="does not consist of 2 codestreams"):
+    with pytest.raises(ValueError, match="does not consist of exactly 2 codestreams"):
         decode(replace(coded, payload=coded.payload + b"\0"))
 
 
@@ -86,6 +86,22 @@ def test_more_than_lossless_takes_is_lossless():
     coded = encode(picture, "si-jp3d", bpp=100)
     np.testing.assert_array_equal(decode(coded).pixels, picture.pixels)
     assert coded.payload == encode(picture, "si-jp3d:lossless=1").payload
+
+
+@pytest.mark.parametrize("shape", [(3, 16, 16), (1, 257, 511), (6, 1, 700), (3, 40, 1), (2, 600, 300)])
+@pytest.mark.parametrize("lossless", [False, True])
+def test_a_stream_has_a_byte_for_every_packet(shape, lossless):
+    """Planes of zeros have empty packets alone, the least there is."""
+    wavelet = "5/3" if lossless else "9/7"
+    stream = encode_planes(np.zeros(shape, np.int16), 0.0 if lossless else 1e6, wavelet=wavelet)
+    assert not decode_planes(stream, shape, "int16", wavelet=wavelet, lossless=lossless).any()
+
+
+def test_a_stream_too_short_for_its_packets_is_refused_before_memory_is_taken():
+    """A forged size of 4096×2048 needs 3·(128 + 32 + 8 + 2 + 1 + 1) packets."""
+    stream = encode_planes(np.zeros((3, 256, 256), np.int16), 1e6, wavelet="9/7")
+    with pytest.raises(ValueError, match="its packets alone have 516"):
+        decode_planes(stream, (3, 2048, 4096), "int16", wavelet="9/7", lossless=False)
 
 
 @pytest.mark.parametrize("value", [0, 255])
@@ -99,9 +115,9 @@ def test_a_constant_picture_costs_little_and_comes_back(value):
 @pytest.mark.parametrize(
     ("at", "value", "said"),
     [
-        (0, 7, "unknown kind"),
-        (1, 120, "unknown kind"),
-        (20, 255, "does not consist of 1 codestreams"),
+        (0, 7, "unknown mode or step"),
+        (1, 120, "unknown mode or step"),
+        (20, 255, "does not consist of exactly 1 codestreams"),
         (24 + 7, 200, "coding style"),  # number of layers
         (24 + 9, 31, "coding style"),  # levels
     ],
