@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .files.load import load_scene, scene_names
+    from .rendering.options import RenderOptions
     from .rendering.render import Shot, Stats, render, render_to
     from .scene.scene import Background, Body, Fog, Light, Material, Scene
     from .tracing.tracer import trace
@@ -18,6 +19,7 @@ __all__ = [
     "Fog",
     "Light",
     "Material",
+    "RenderOptions",
     "Scene",
     "Shot",
     "Stats",
@@ -28,7 +30,12 @@ __all__ = [
     "trace",
 ]
 
-_HOMES = {"load_scene": "files.load", "scene_names": "files.load", "trace": "tracing.tracer"}
+_HOMES = {
+    "load_scene": "files.load",
+    "scene_names": "files.load",
+    "trace": "tracing.tracer",
+    "RenderOptions": "rendering.options",
+}
 _HOMES |= dict.fromkeys(["Shot", "Stats", "render", "render_to"], "rendering.render")
 
 

@@ -1,10 +1,15 @@
 """Calls with arguments of the wrong type: TypeError or ValueError that names the argument, before any work."""
 
+from dataclasses import fields
+from functools import partial
+
 import numpy as np
 import pytest
 
 from ii_core import preset
-from raytrace_ii import load_scene, render, render_to, trace
+from raytrace_ii import RenderOptions, load_scene, render, render_to, trace
+from raytrace_ii.rendering.options import RenderKeywords
+from raytrace_ii.rendering.render_sets import render_set
 
 CAMERA = preset("setup1", scale=128)
 
@@ -73,6 +78,20 @@ def test_render(scene, argument):
     more = [None] if argument == "support" else []
     for value in [*wrong(argument), *more]:
         check(lambda value: render(**{**arguments, argument: value}), argument, value)
+
+
+def test_an_unknown_option_is_named_with_those_there_are(scene, tmp_path):
+    """One class holds the options of three functions; type checkers read the same names."""
+    names = [field.name for field in fields(RenderOptions)]
+    assert sorted(RenderKeywords.__annotations__) == sorted(names)
+    for call in (partial(render, scene, CAMERA), partial(render_to, tmp_path / "p.png", scene, CAMERA)):
+        with pytest.raises(TypeError, match=r"^unknown option sample: known are samples, error, seed, .*pose$"):
+            call(sample=4)
+    with pytest.raises(TypeError, match=r"^unknown option pose: known are samples, .*executor$"):
+        render_set("reference", tmp_path, [CAMERA], poses=[None], pose=None)
+    with pytest.raises(ValueError, match="seed is -1"):
+        render_set("reference", tmp_path, [CAMERA], poses=[None], seed=-1)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("value", ["text", None, [], Odd(), {}, np.zeros(3)])

@@ -12,6 +12,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from ii_core.files import read_channels, read_image, write_image
 
+from ..tracing.support_images import SUPPORT_IMAGES
+
 WIDTH, GAP, LINE = 480, 8, 22  # of a panel, between panels, for a name
 COLUMNS = 2
 
@@ -30,7 +32,7 @@ def contact_sheet(path: Path, panels: Sequence[tuple[str, Path, Path]]) -> None:
 
 def _panel(title: str, picture: NDArray[Any], support: dict[str, NDArray[Any]]) -> NDArray[np.uint8]:
     """A name, the picture, and small beside it depth (near is bright), normals and objects."""
-    normal = np.stack([support[f"normal.{axis}"] for axis in "XYZ"], axis=-1)
+    normal = np.stack([support[name] for name in SUPPORT_IMAGES["normal"].channels], axis=-1)
     small = (WIDTH - 2 * GAP) // 3
     images = _depth(support["depth.Z"]), _normal(normal), _ids(support["objectId"])
     beside = [_fitted(image, small) for image in images]

@@ -9,10 +9,10 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise
 from ii_core.files import RowWriter, atomic_paths, check_type, image_rows
@@ -22,12 +22,12 @@ from ..scene.scene import Scene
 from ..tracing.sampling import sampling
 from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES, UNITS
 from ..tracing.tracer import RayCount, check_scene, rigid
-from .executors import Tile, check_executor, cores, run
-from .job import CURVES, Block, Job, check_disparity
+from .executors import Tile, cores, run
+from .job import Block, Job, check_disparity
+from .options import RenderKeywords, RenderOptions, check_keywords
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
-MOST_WORKERS = 1024
-MOST_NOISE = 1e6  # steps of 8 bits; 255 is white
+Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,17 +95,9 @@ def render(
     scene: Scene,
     camera: IICamera | MapCamera,
     *,
-    samples: int | tuple[int, int] = 1,
-    error: float = 0.5,
-    seed: int = 0,
-    noise: float = 0.0,
-    dtype: str = "uint8",
-    workers: int | None = None,
-    executor: Any = None,
-    pose: ArrayLike | None = None,
-    texture_filter: bool = True,
     support: tuple[str, ...] = SUPPORT,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
+    **options: Unpack[RenderKeywords],
 ) -> Shot:
     """Ray trace a scene through a camera.
 
@@ -113,34 +105,13 @@ def render(
 
     Parameters
     ----------
-    samples : int or (least, most)
-        Rays per pixel: 1 goes through the pixel's centre, more are spread over the pixel, one in each cell of a
-        grid, by a hash of ``seed`` and the pixel. They stay under the pixel's own lens. Over an aperture they are
-        spread likewise. Of a pair, pixels get the least and then more, up to the most, until they are within
-        ``error``. Stored maps have their own number.
-    error : float
-        Target of adaptive sampling: standard error of a pixel, in steps of 8 bits, estimated from its samples and
-        its neighbours under the same lens; see `sampling` for how, and for what that does not see.
-    seed : int
-        For samples and noise.
-    noise : float
-        σ of monochromatic sensor noise, in steps of 8 bits; see `add_sensor_noise`.
-    dtype : {"uint8", "uint16", "float32"}
-        Integers are sRGB, floats linear light.
-    workers : int, optional
-        Threads; as many as cores if not given.
-    executor : concurrent.futures.Executor or dask.distributed.Client, optional
-        What renders instead: threads, processes that share this machine's files, or a cluster. It stays open.
-    pose : array_like, (4, 4), optional
-        Rigid transform from the camera's frame to the scene's.
-    texture_filter : bool
-        Read images of textures, maps and skies over the width that a ray has where it meets them, each sample its
-        part of the pixel; see `job.footprint`. If not, at a point, which shows texels that are finer than pixels as
-        noise.
     support : tuple of str
         Which of depth, normal, object_id, ray_length, shading_normal, disparity and samples to keep.
     progress : callable, optional
         Called with blocks done and blocks in all, from the calling thread.
+    **options
+        Fields of `RenderOptions`: ``samples``, ``error``, ``seed``, ``noise``, ``dtype``, ``workers``, ``executor``,
+        ``pose`` and ``texture_filter``.
 
     Returns
     -------
@@ -154,19 +125,19 @@ def render(
         If worker processes die and are not replaced.
     """
     tally = _Tally()
-    job = _job(scene, camera, samples, error, seed, noise, dtype, pose, support, texture_filter)
-    _check_means(workers, executor, progress)
+    wanted = _options(scene, camera, options, progress)
+    job = _job(scene, camera, wanted, support)
     columns, rows = camera.pixels
-    out: dict[str, NDArray[Any]] = {"pixels": np.empty((rows, columns, 3), dtype)}
+    out: dict[str, NDArray[Any]] = {"pixels": np.empty((rows, columns, 3), job.dtype)}
     for name in support:
         out[name] = np.empty((rows, columns, *SUPPORT_IMAGES[name].shape), SUPPORT_IMAGES[name].dtype)
-    with closing(_rendered(job, job.tiles(), workers, executor, progress, tally)) as blocks:
+    with closing(_rendered(job, job.tiles(), wanted, progress, tally)) as blocks:
         for block in blocks:
             for name, array in block.arrays.items():
                 out[name][block.rows, block.cols] = array
     picture = IIPicture(out["pixels"], camera.lenses, camera.ei_pixels, camera.model, camera.erect)
     return Shot(
-        picture=add_sensor_noise(picture, noise, seed) if noise else picture,
+        picture=add_sensor_noise(picture, wanted.noise, wanted.seed) if wanted.noise else picture,
         **{name: out.get(name) for name in SUPPORT_IMAGES},
         object_names=[body.name for body in scene.bodies],
         stats=tally.stats(),
@@ -180,16 +151,8 @@ def render_to(
     *,
     support: Mapping[str, Paths] | None = None,
     upright: bool = False,
-    samples: int | tuple[int, int] = 1,
-    error: float = 0.5,
-    seed: int = 0,
-    noise: float = 0.0,
-    dtype: str = "uint8",
-    workers: int | None = None,
-    executor: Any = None,
-    pose: ArrayLike | None = None,
-    texture_filter: bool = True,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
+    **options: Unpack[RenderKeywords],
 ) -> Stats:
     """Ray trace into files band by band: pictures may be larger than memory.
 
@@ -218,17 +181,17 @@ def render_to(
     if not isinstance(support, Mapping | None):
         raise TypeError(f"support is {support!r}: a mapping of names to paths is needed")
     files = {name: _paths(value) for name, value in (support or {}).items()}
-    job = _job(scene, camera, samples, error, seed, noise, dtype, pose, tuple(files), texture_filter)
-    _check_means(workers, executor, progress)
+    wanted = _options(scene, camera, options, progress)
+    job = _job(scene, camera, wanted, tuple(files))
     if upright and camera.lenses != (1, 1):
         raise ValueError(f"only the picture of one lens is turned upright: this camera has {camera.lenses} lenses")
     strips = _strips(job.tiles())
     tiles = [tile for strip in (reversed(strips) if upright else strips) for tile in strip]
     with _outputs(job, picture, files, upright) as (stack, writers):
-        blocks = stack.enter_context(closing(_rendered(job, tiles, workers, executor, progress, tally)))
+        blocks = stack.enter_context(closing(_rendered(job, tiles, wanted, progress, tally)))
         for top, band in _bands(blocks, camera.pixels, upright):
-            if noise:
-                band["pixels"] = noisy_rows(band["pixels"], top, noise, seed)
+            if wanted.noise:
+                band["pixels"] = noisy_rows(band["pixels"], top, wanted.noise, wanted.seed)
             for write, names in writers:
                 rows = [np.atleast_3d(band[name]) for name in names]
                 joined = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2, dtype=np.float32)
@@ -301,10 +264,10 @@ class _Tally:
 
 
 def _rendered(
-    job: Job, tiles: Sequence[Tile], workers: int | None, executor: Any, progress: Any, tally: _Tally
+    job: Job, tiles: Sequence[Tile], options: RenderOptions, progress: Progress | None, tally: _Tally
 ) -> Generator[Block, None, None]:
     """The blocks in their order, counted and told."""
-    with closing(run(job, tiles, workers=workers, executor=executor)) as blocks:
+    with closing(run(job, tiles, workers=options.workers, executor=options.executor)) as blocks:
         for done, block in enumerate(blocks, 1):
             tally.add(block)
             yield block
@@ -350,29 +313,24 @@ def _bands(
         held = [(first if backwards else cut, left)] if len(left["pixels"]) else []
 
 
-def _job(
-    scene: Scene, camera: IICamera | MapCamera, samples: Any, error: float, seed: int, noise: float, dtype: str,
-    pose: ArrayLike | None, support: tuple[str, ...], texture_filter: bool,
-) -> Job:  # fmt: skip
-    """A picture to be rendered, all of it checked."""
+def _options(scene: Any, camera: Any, options: RenderKeywords, progress: Any) -> RenderOptions:
+    """The options, after what is to be rendered is known to be a scene and a camera."""
     check_scene(scene)
     if not isinstance(camera, IICamera | MapCamera):
         raise TypeError(f"camera is a {type(camera).__name__}: an IICamera or a MapCamera is needed")
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress is {progress!r}: a function of blocks done and blocks in all is needed")
+    check_keywords(options, RenderKeywords)
+    return RenderOptions(**options)
+
+
+def _job(scene: Scene, camera: IICamera | MapCamera, options: RenderOptions, support: tuple[str, ...]) -> Job:
+    """A picture to be rendered, all of it checked."""
+    samples = options.samples
     if isinstance(camera, MapCamera):
         if samples not in (1, camera.stored_samples):
             raise ValueError(f"samples is {samples}: the maps hold {camera.stored_samples} for each pixel")
         samples = camera.stored_samples
-    if not isinstance(seed, int | np.integer) or not 0 <= seed < 1 << 63:
-        raise ValueError(f"seed is {_short(seed)}: a whole number of at least 0 and below 2⁶³ is needed")
-    for name, value in (("error", error), ("noise", noise)):
-        if not isinstance(value, int | float | np.number):
-            raise TypeError(f"{name} is {value!r}: a number is needed")
-    if not 0 <= noise <= MOST_NOISE:
-        raise ValueError(f"noise sigma is {_short(noise)}: a number from 0 to {MOST_NOISE} is needed")
-    if not isinstance(dtype, str):
-        raise TypeError(f"dtype is {dtype!r}: one of the names {', '.join(CURVES)} is needed")
-    if dtype not in CURVES:
-        raise ValueError(f"unknown pixel type {dtype!r}: known are {', '.join(CURVES)}")
     if isinstance(support, str) or not all(isinstance(name, str) for name in _items("support", support)):
         raise TypeError(f"support is {support!r}: a sequence of names is needed")
     if unknown := set(support) - set(SUPPORT_IMAGES):
@@ -380,15 +338,10 @@ def _job(
         raise ValueError(f"unknown support image {', '.join(sorted(unknown))}: known are {known}")
     if "disparity" in support:
         check_disparity(camera)
-    if not isinstance(texture_filter, bool | np.bool_):
-        raise TypeError(f"texture_filter is {texture_filter!r}: True or False is needed")
-    return Job(scene, camera, sampling(samples, error), int(seed), rigid(pose), dtype, support, bool(texture_filter))
-
-
-def _short(value: Any) -> str:
-    """A value for a message; a number of 400 digits is not read by anyone."""
-    text = repr(value)
-    return text if len(text) < 40 else f"{text[:20]}… ({len(text)} characters)"
+    return Job(
+        scene, camera, sampling(samples, options.error), int(options.seed), rigid(options.pose), options.dtype,
+        support, bool(options.texture_filter),
+    )  # fmt: skip
 
 
 def _items(name: str, value: Any) -> Iterator[Any]:
@@ -403,14 +356,6 @@ def _path(name: str, value: Any) -> str:
     if not isinstance(value, str | os.PathLike) or not isinstance(path := os.fspath(value), str):
         raise TypeError(f"{name} is {value!r}: a path is needed")
     return path
-
-
-def _check_means(workers: int | None, executor: Any, progress: Any) -> None:
-    if progress is not None and not callable(progress):
-        raise TypeError(f"progress is {progress!r}: a function of blocks done and blocks in all is needed")
-    if workers is not None and (not isinstance(workers, int | np.integer) or not 1 <= workers <= MOST_WORKERS):
-        raise ValueError(f"workers is {_short(workers)}: a whole number from 1 to {MOST_WORKERS} is needed")
-    check_executor(executor, workers)
 
 
 __all__ = ["Shot", "Stats", "cores", "render", "render_to"]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
@@ -26,10 +26,12 @@ from ..scene.scene import Scene
 from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES
 from .contact_sheet import contact_sheet
 from .job import check_disparity
+from .options import RenderOptions, SetKeywords, check_keywords
 from .render import Stats, render_to
 
 SETS = {"reference": ("apples", "car", "cuboid", "dolphin", "hairdo", "mountains", "objects", "twins")}
 MANIFEST, CONTACT = "manifest.json", "contact.png"
+PICTURE_OPTIONS = ("samples", "error", "seed", "noise", "dtype", "texture_filter")
 FLAT_PIXELS, FLAT_SAMPLES = 1024, 4  # across, and a pixel
 
 Progress = Callable[[str, int, int], None]
@@ -50,16 +52,10 @@ def render_set(
     cameras: Sequence[IICamera | MapCamera],
     *,
     poses: Sequence[ArrayLike | None],
-    samples: int | tuple[int, int] = 1,
-    error: float = 0.5,
-    seed: int = 0,
-    noise: float = 0.0,
-    texture_filter: bool = True,
     bits: int = 8,
-    workers: int | None = None,
-    executor: Any = None,
     force: bool = False,
     progress: Progress | None = None,
+    **options: Unpack[SetKeywords],
 ) -> dict[str, Any]:
     """Render a set of scenes, or what is left of it.
 
@@ -81,8 +77,9 @@ def render_set(
         Replace files of these names that no manifest accounts for.
     progress : callable, optional
         Called with the file being made, blocks done and blocks in all.
-
-    Other parameters are those of `render`.
+    **options
+        Fields of `RenderOptions`: ``samples``, ``error``, ``seed``, ``noise``, ``texture_filter``, ``workers`` and
+        ``executor``.
 
     Returns
     -------
@@ -100,12 +97,13 @@ def render_set(
         raise ValueError(f"unknown set {name!r}: known are {', '.join(SETS)}")
     if cameras[0].model is None:
         raise ValueError("the maps do not say what camera they are of: there is no 2D projection to match")
-    options = {"samples": samples, "error": error, "seed": seed, "noise": noise, "dtype": f"uint{bits}"}
-    options["texture_filter"] = texture_filter
+    check_keywords(options, SetKeywords)
+    wanted = RenderOptions(**options, dtype=f"uint{bits}")
+    of_pictures = {field: getattr(wanted, field) for field in PICTURE_OPTIONS}
     old = _read_manifest(folder, name)
     claims = _claims(folder, name, len(cameras), old, force)
-    manifest = {**_header(name, cameras, options), "claims": claims, "scenes": {}, CONTACT: old.get(CONTACT)}
-    means = {"workers": workers, "executor": executor}
+    manifest = {**_header(name, cameras, of_pictures), "claims": claims, "scenes": {}, CONTACT: old.get(CONTACT)}
+    means = {"workers": wanted.workers, "executor": wanted.executor}
     _write_manifest(folder, manifest, old)
     for title in SETS[name]:
         scene = load_scene(title)
@@ -113,7 +111,7 @@ def render_set(
         entry: dict[str, Any] = {"hash": scene_hash, "products": {}}
         known = old.get("scenes", {}).get(title, {}).get("products", {})
         manifest["scenes"][title] = entry
-        for kind, product in _products(folder, title, scene, scene_hash, cameras, poses, options, means):
+        for kind, product in _products(folder, title, scene, scene_hash, cameras, poses, of_pictures, means):
             if not _is_done(product, known.get(kind)):
                 report = _reporter(progress, product.files[0].name)
                 entry["products"][kind] = _record(product, product.make(progress=report))
