@@ -1,6 +1,6 @@
 """Integral imaging's nouns: cameras, pictures, component images, view images."""
 
-from .camera import IICamera
+from .camera import Camera, IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
 from .formats.find import find_views, picture_of
 from .formats.hci import write_hci
@@ -14,6 +14,7 @@ from .regular import from_smallest_rectangle, resampled, smallest_rectangle
 from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stand_back, view_image
 
 __all__ = [
+    "Camera",
     "IICamera",
     "IIPicture",
     "MapCamera",

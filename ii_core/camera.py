@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,28 @@ from .optics import Bundle, Element, FrontElement, LensModel, Under, chain, unit
 Pair = tuple[int, int]
 MOST_ALONG, MOST_PIXELS = 1 << 20, 1 << 34  # of a camera; a hundred times the largest picture in use
 Floats = NDArray[np.float64]
+
+
+class Camera(Protocol):
+    """What `IICamera` and `MapCamera` have in common: one pixel array, its lenses and its rays.
+
+    ``erect`` tells that elementary images stand upright; ``model`` is the camera as parameters, None of maps alone.
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def pixels(self) -> Pair: ...
+    @property
+    def lenses(self) -> Pair: ...
+    @property
+    def ei_pixels(self) -> tuple[Any, Any]: ...
+    @property
+    def erect(self) -> bool: ...
+    @property
+    def model(self) -> IICamera | None: ...
+    def rays(self, rows: slice = ..., cols: slice = ...) -> tuple[Floats, Floats]:
+        """L and D, (h, w, 3), of the first sample of a block of pixels."""
 
 
 @dataclass(frozen=True, kw_only=True)

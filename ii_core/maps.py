@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .camera import IICamera, whole_pair
+from .camera import Floats, IICamera, whole_pair
 from .files import image_header, read_image, read_json, write_image, write_json
 
 FORMATS = {
@@ -224,6 +224,11 @@ class MapCamera:
     def stored_samples(self) -> int:
         """Rays per pixel."""
         return len(self.maps)
+
+    def rays(self, rows: slice = slice(None), cols: slice = slice(None)) -> tuple[Floats, Floats]:
+        """L and D, (h, w, 3), of the first sample of a block of pixels."""
+        L, D, _ = self.stored_rays(0, rows, cols)
+        return L, D
 
     def stored_rays(self, sample: int, rows: slice = slice(None), cols: slice = slice(None)) -> Rays:
         """L, D and the share of light, or None for all, of one sample of a block of pixels."""

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trace_scenes import hall
 
-from ii_core import IICamera, preset, preset_cameras, read_maps, write_maps
+from ii_core import Camera, IICamera, preset, preset_cameras, read_maps, write_maps
 from ii_core.files import read_image, write_image
 from ii_core.maps import FORMATS, _widened, decode, encode
 from raytrace_ii import render
@@ -35,6 +35,18 @@ def test_codes_are_right_to_half_a_step_and_exact_at_both_ends(low, extent, shar
     rounding = 8 * np.spacing(max(abs(low), abs(high)))
     assert back[0, 0] == low and abs(back[0, 1] - high) <= rounding
     assert abs(back[0, 2] - values[0, 2]) <= (high - low) / (steps - 1) / 2 + rounding
+
+
+def test_maps_have_rays_as_any_camera_does(tmp_path):
+    """Half a float32 of 25 mm, which EXR holds; the same block by the same call of the protocol."""
+    write_maps([SMALL], tmp_path, format="exr")
+    block = slice(3, 9), slice(5, 20)
+    cameras: list[Camera] = [SMALL, *read_maps(tmp_path)]
+    (L, D), (l, d) = (camera.rays(*block) for camera in cameras)
+    assert L.shape == l.shape == (6, 15, 3)
+    np.testing.assert_allclose(l, L, atol=1e-6)
+    np.testing.assert_allclose(d / np.linalg.norm(d, axis=2, keepdims=True), D / np.linalg.norm(
+        D, axis=2, keepdims=True), atol=1e-6)  # fmt: skip
 
 
 CAMERAS = ["setup1", "grin", "hexagonal", "hpo", "depth-control", "plenoptic1", "spherical"]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IICamera, MapCamera
+from ii_core import Camera, IICamera, MapCamera
 from ii_core.colour import srgb
 
 from ..scene.scene import Scene
@@ -188,7 +188,7 @@ class Job:
         return adaptive_mean(self.camera, wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, shoot)
 
 
-def footprint(camera: IICamera | MapCamera) -> tuple[float, float]:
+def footprint(camera: Camera) -> tuple[float, float]:
     """Distance of the rays of neighbouring pixels at their origins, mm, and how much it grows a mm of their way.
 
     The median over the middle of the picture, so that pairs under two lenses do not count, and the mean of across and
@@ -196,10 +196,7 @@ def footprint(camera: IICamera | MapCamera) -> tuple[float, float]:
     """
     columns, rows = camera.pixels
     down, across = (slice(max(n // 2 - 32, 0), n // 2 + 32) for n in (rows, columns))
-    if isinstance(camera, MapCamera):
-        L, D, _ = camera.stored_rays(0, down, across)
-    else:
-        L, D = camera.rays(down, across)
+    L, D = camera.rays(down, across)
     length = np.linalg.norm(D, axis=-1, keepdims=True)
     D = np.divide(D, length, out=np.zeros_like(D), where=length > 0)
     steps = [[np.linalg.norm(np.diff(rays, axis=axis), axis=-1) for axis in (0, 1)] for rays in (L, D)]
@@ -207,7 +204,7 @@ def footprint(camera: IICamera | MapCamera) -> tuple[float, float]:
     return width, spread
 
 
-def check_disparity(camera: IICamera | MapCamera) -> None:
+def check_disparity(camera: Camera) -> None:
     """Raise ValueError unless neighbouring lenses of a camera see a point at a known distance from each other."""
     model, named = camera.model, f"camera {camera.name!r}"
     if model is None:
@@ -218,7 +215,7 @@ def check_disparity(camera: IICamera | MapCamera) -> None:
         raise ValueError(f"disparity: {named} has a lens before its array: pixels per lens do not follow from depth")
 
 
-def disparity(camera: IICamera | MapCamera, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+def disparity(camera: Camera, depth: NDArray[np.float32]) -> NDArray[np.float32]:
     """How far a point at depth z moves from one elementary image to the next on the right, in pixels to the right.
 
     ±Λ·δL / ((z − z₀ − Λ)·δP), negative if elementary images are erect; z₀ is where the pixel array stands. Downwards

@@ -16,7 +16,7 @@ from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
-from ii_core import IICamera, MapCamera, projection_camera
+from ii_core import Camera, IICamera, MapCamera, projection_camera
 from ii_core.files import read_json, write_json
 from ii_core.picture import sidecar
 
@@ -150,7 +150,7 @@ def _products(
     yield "flat", _Product((flat, behind), content_hash("flat", release, scene_hash, pinhole, pose), project)
 
 
-def support_images(camera: IICamera | MapCamera) -> list[str]:
+def support_images(camera: Camera) -> list[str]:
     """All support images that a camera has, but for the number of samples."""
     names = [name for name in SUPPORT_IMAGES if name != "samples"]
     try:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IICamera, MapCamera
+from ii_core import Camera
 from ii_core.lattice import Lattice
 
 SIDE = 4  # lenses, or pixels, across and down a packet of 16 rays
@@ -34,7 +34,7 @@ class Order(NamedTuple):
     columns: NDArray[np.int32]
 
 
-def tiles(camera: IICamera | MapCamera, rays: int, *, whole_lenses: bool = False) -> Iterator[Tile]:
+def tiles(camera: Camera, rays: int, *, whole_lenses: bool = False) -> Iterator[Tile]:
     """Tiles of at most so many rays, in rows of tiles; of a regular camera they hold whole packets.
 
     ``whole_lenses`` keeps the pixels under one lens of a regular camera together, even if they are more.
@@ -57,7 +57,7 @@ def _span(most: int, cell: int, whole: bool) -> int:
     return cell if whole else most
 
 
-def ray_order(camera: IICamera | MapCamera, rows: slice, cols: slice) -> Order:
+def ray_order(camera: Camera, rows: slice, cols: slice) -> Order:
     """The order of the rays of a tile: by place under the lens, then by blocks of 4×4 lenses.
 
     Under large lenses, or a single one, by blocks of 4×4 pixels; for maps without lenses by direction and origin.
@@ -65,7 +65,6 @@ def ray_order(camera: IICamera | MapCamera, rows: slice, cols: slice) -> Order:
     shape = rows.stop - rows.start, cols.stop - cols.start
     lattice = _lattice(camera)
     if lattice is None:
-        assert isinstance(camera, MapCamera)
         return _order(_along_rays(camera, rows, cols), shape[1])
     if max(lattice.pitch) > LARGE_LENS or lattice.lenses == (1, 1):
         return _in_cells(shape, (rows.start % SIDE, cols.start % SIDE), (1, 1))
@@ -97,9 +96,9 @@ def _keys(k: Integers, l: Integers, u: Integers, v: Integers) -> Integers:
     return ((place * (packet.max() + 1) + packet) * SIDE + l % SIDE) * SIDE + k % SIDE
 
 
-def _along_rays(camera: MapCamera, rows: slice, cols: slice) -> Integers:
+def _along_rays(camera: Camera, rows: slice, cols: slice) -> Integers:
     """Ranks of pixels by coarse direction, by origin, and by fine direction, each along a Morton curve."""
-    L, D, _ = camera.stored_rays(0, rows, cols)
+    L, D = camera.rays(rows, cols)
     D = D / np.maximum(np.abs(D).sum(axis=2, keepdims=True), 1e-300)
     axes = np.argsort(np.ptp(L.reshape(-1, 3), axis=0))[1:]  # the two along which the origins lie
     direction, origin = _morton(D[..., :2], 8), _morton(L[..., axes], 8)
@@ -121,14 +120,14 @@ def _order(keys: Integers, width: int) -> Order:
     return found
 
 
-def _lattice(camera: IICamera | MapCamera) -> Lattice | None:
+def _lattice(camera: Camera) -> Lattice | None:
     """The lenses of a camera; none of maps that tell of none."""
     if camera.model is not None:
         return camera.model.lens_lattice
     return Lattice(camera.lenses, camera.ei_pixels, (0.0, 0.0), False) if camera.lenses != (1, 1) else None
 
 
-def _regular_cells(camera: IICamera | MapCamera) -> tuple[int, int] | None:
+def _regular_cells(camera: Camera) -> tuple[int, int] | None:
     """(U, V) of a camera of several lenses over whole pixels."""
     lenses = _lattice(camera)
     regular = lenses is not None and (camera.model is None or camera.model.regular) and camera.lenses != (1, 1)
