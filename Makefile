@@ -26,6 +26,7 @@ bench: $(VENV)/.installed
 	$(BIN)/python -m benchmarks run ratios
 
 docs: $(VENV)/.docs
+	$(BIN)/python -m benchmarks run gallery --missing
 	$(BIN)/mkdocs build --strict -f docs/site/mkdocs.yml
 
 $(VENV)/.docs: $(VENV)/.installed

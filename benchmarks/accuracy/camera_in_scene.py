@@ -5,7 +5,7 @@
 In the scene stand plano-convex lenslets of glass, one triangle mesh each, with black walls between them, before a
 black box that holds the pixels, from which rays start. The other camera is a `SphericalLenslet`, which the scene
 never sees. Both are traced by the same renderer along the same samples. Numbers go to
-``benchmarks/results/camera_in_scene.jsonl``, the two pictures beside it.
+``benchmarks/results/camera_in_scene.jsonl``, the pictures to ``docs/images/camera_in_scene.jpg``.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.records import RESULTS, Records, add_again
+from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.records import Records, add_again
 from ii_core import IICamera, preset
-from ii_core.files import write_image
 from ii_core.optics import Bundle, LensModel, SphericalLenslet, Under
 from metrics import q_global
 from raytrace_ii import Background, Body, Material, Scene, Shot, load_scene, render
@@ -272,7 +272,7 @@ def study(scale: int) -> dict[str, Any]:
     shares = transmitted(camera)
     stray = {name: stray_light(c, 16) for name, c in (("preset", camera), ("full aperture", wide))}
     print(f"Fresnel lets {shares[0]:.4f} to {shares[1]:.4f} through; stray light {stray}")
-    write_image(RESULTS / "camera_in_scene.png", side_by_side(pictures))
+    write_picture(IMAGES / "camera_in_scene.jpg", side_by_side(pictures))
     numbers = {"fresnel_transmits": shares, "stray_light": stray, "rows": rows, "cpu_ratio": times}
     return {"camera": camera.to_json(), **numbers}
 

@@ -6,7 +6,8 @@ Balls of ever more segments (h = 2π/segments is the side of a triangle on a bal
 tracer in closed form: distance from the true surface, depth, normal, radiance and PSNR of a picture with shadow,
 mirror and glass. Then lenses of triangles: where they put the image of a point on the axis against Gauss, and where
 single rays end against Snell. The order of convergence is the slope of a straight line through the logarithms.
-Numbers and chart go to ``benchmarks/results/convergence.jsonl`` and ``.png``.
+Numbers and chart go to ``benchmarks/results/convergence.jsonl`` and
+``docs/images/convergence.png``.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ from numpy.typing import NDArray
 
 from benchmarks.accuracy.analytic import Array, Ball, World, still_life
 from benchmarks.accuracy.camera_in_scene import lens_bodies
-from benchmarks.records import RESULTS, Records, add_again
+from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.records import Records, add_again
 from ii_core import IICamera, preset
-from ii_core.files import atomic_path
 from ii_core.optics import SphericalLenslet
 from metrics.plots.rd_chart import COLOURS
 from raytrace_ii import Body, Light, Material, Scene, trace
@@ -66,7 +67,7 @@ def main() -> None:
         for row in result[part]:
             print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
     print("orders", result["orders"], result["lens_orders"])
-    chart(result, RESULTS / "convergence.png")
+    chart(result, IMAGES / "convergence.png")
 
 
 def measured(finest: int = FINEST) -> dict[str, Any]:
@@ -337,8 +338,8 @@ def chart(result: dict[str, Any], path: Path) -> None:
         axes.legend(frameon=False, fontsize=8, loc="lower right" if axes is picture else "lower left")
     picture.set_ylim(bottom=0)
     geometry.set_ylim(bottom=1e-7)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=130, format="png")
+    figure.savefig(path, dpi=130)
+    write_picture(path, path)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
+from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, add_again, origin, with_commits
 from codec import decode, encode
@@ -59,6 +60,7 @@ def main() -> None:
     for key in RECORDS.todo(keys, asked.again):
         RECORDS.measure(key, lambda key=key: study(key["scene"], key["scale"]))
     save(draw(data()), CHART)
+    write_picture(CHART, CHART)
     publish(tables())
 
 

@@ -4,7 +4,7 @@
 
 For each format the largest and the root mean square angle between stored and true direction (µrad), the same for
 locations (µm), and the PSNR of *Apples* and *Cuboid* rendered from the maps against float maps. Numbers and chart go
-to ``benchmarks/results/map_precision.jsonl`` and ``.png``.
+to ``benchmarks/results/map_precision.jsonl`` and ``docs/images/map_precision.png``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.records import RESULTS, Records, add_again, number
+from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.records import Records, add_again, number
 from ii_core import IICamera, preset, read_maps, write_maps
 from ii_core.maps import FORMATS
 from metrics import q_global
@@ -59,7 +60,7 @@ def main() -> None:
             RECORDS.measure(key, row)
     for line in RECORDS.rows(scale=asked.scale):
         print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in line.items()))
-    chart(RECORDS.rows(scale=SCALE), RESULTS / "map_precision.png")
+    chart(RECORDS.rows(scale=SCALE), IMAGES / "map_precision.png")
 
 
 def stored(camera: IICamera, format: str) -> tuple[Any, int]:
@@ -114,6 +115,7 @@ def chart(rows: list[dict[str, Any]], path: Path) -> None:
         axes.plot([], [], "s", color=colours[name], label=name)
     axes.legend(fontsize="small")
     figure.savefig(path, dpi=120)
+    write_picture(path, path)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ POV-Ray knows balls and planes in closed form, and its ``mesh_camera`` takes one
 triangles: from their centroids along their normals, which is a way to hand over any L and D. Its picture is held
 against ours (triangles) and against `analytic` (closed form, as itself): PSNR of linear light by object, and a
 picture of the difference. Needs ``povray`` on the path (Debian: ``apt-get install povray``); without it the script
-says so and ends. Numbers and pictures go to ``benchmarks/results/povray.jsonl`` and ``.png``.
+says so and ends. Numbers and pictures go to ``benchmarks/results/povray.jsonl`` and ``docs/images/povray.jpg``.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.accuracy.analytic import Array, Ball, Floor, World, still_life
+from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import RESULTS, ROOT, Records, add_again, origin, with_commits
+from benchmarks.records import ROOT, Records, add_again, origin, with_commits
 from ii_core import IICamera, preset
 from ii_core.colour import srgb
-from ii_core.files import write_image
 from raytrace_ii import Light, Material, trace
 
 RECORDS = Records("povray", ("benchmarks.accuracy.povray", "benchmarks.accuracy.analytic"))
@@ -70,8 +70,7 @@ def main() -> None:
             print("  ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
     if len(pictures) == 2:
         gap = np.full((8, pictures[0].shape[1], 3), 255, np.uint8)
-        write_image(RESULTS / "povray.png", np.concatenate([pictures[0], gap, pictures[1]]))
-        shutil.copy(RESULTS / "povray.png", DOCS / "images" / "povray.png")
+        write_picture(IMAGES / "povray.jpg", np.concatenate([pictures[0], gap, pictures[1]]))
     publish(tables())
 
 

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.coding.rd import climbing, rd_point
+from benchmarks.pages.pictures import write_picture
 from benchmarks.records import Records, add_again, origin, with_commits
 from codec import parse_scheme, schemes
 from codec.contract import find
@@ -274,6 +275,7 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
         axes.annotate(names, at, offset, textcoords="offset points", fontsize=LETTERS)
     figure.savefig(path, dpi=110)
     plt.close(figure)
+    write_picture(path, path)
 
 
 def offsets(named: list[tuple[str, tuple[float, float], str]], axes: Any) -> list[tuple[float, float]]:

@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from benchmarks.accuracy import camera_in_scene, map_precision
-from benchmarks.records import RESULTS, ROOT, origin
+from benchmarks.pages.pictures import write_picture
+from benchmarks.records import ROOT, origin
 from ii_core import (
     IICamera,
     IIPicture,
@@ -30,7 +30,6 @@ from ii_core import (
     sub_images,
     view_image,
 )
-from ii_core.files import write_image
 from ii_core.regular import resampled
 from raytrace_ii import Scene, load_scene, render, scene_names
 
@@ -50,11 +49,11 @@ def main() -> None:
     text = [INTRODUCTION]
     for name in (n for n in sorted(camera_names()) if not n.startswith("setup2")):
         cameras = preset_cameras(name, scale=SCALES.get(name, 8))
-        write_image(folder / f"{name}.png", strip(scene, cameras[0], name))
+        write_picture(folder / f"{name}.png", strip(scene, cameras[0], name))
         text.append(entry(name, preset_cameras(name), cameras[0]))
         print(name, flush=True)
     text += [precision(), in_scene()]
-    write_image(DOCS / "images" / "scenes.png", all_scenes())
+    write_picture(DOCS / "images" / "scenes.jpg", all_scenes())
     (DOCS / "cameras.md").write_text("\n".join(text), encoding="utf-8")
 
 
@@ -102,7 +101,6 @@ def all_scenes() -> NDArray[np.uint8]:
 def precision() -> str:
     """What storing a camera as pictures costs, from `benchmarks.accuracy.map_precision`."""
     rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
-    shutil.copy(RESULTS / "map_precision.png", DOCS / "images" / "map_precision.png")
     lines = [
         "\n## Stored as pictures: which format is enough\n",
         "Angle between stored and true direction, distance between stored and true location, and PSNR of the picture "
@@ -124,7 +122,6 @@ def precision() -> str:
 def in_scene() -> str:
     """How the camera compares with one of glass inside the scene, from `benchmarks.accuracy.camera_in_scene`."""
     (study,) = camera_in_scene.RECORDS.rows(scale=camera_in_scene.SCALE)
-    shutil.copy(RESULTS / "camera_in_scene.png", DOCS / "images" / "camera_in_scene.png")
     lines = [
         IN_SCENE,
         "| *Apples* | aperture | triangles of the camera | as it is | Fresnel's losses added | no stray light |",
@@ -138,7 +135,7 @@ def in_scene() -> str:
         if row["what"] in ("picture", "tessellation")
     ]
     return "\n".join(
-        [*lines, "", origin([study]), "", "![both pictures and their differences](images/camera_in_scene.png)", ""]
+        [*lines, "", origin([study]), "", "![both pictures and their differences](images/camera_in_scene.jpg)", ""]
     )
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 from benchmarks.coding import bframes
 from benchmarks.coding.coders import ANCHOR, NEAR, TRIALS, chart, front, recommended, studied, table
+from benchmarks.pages.pictures import IMAGES
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import RESULTS, ROOT, origin
+from benchmarks.records import origin
 
-IMAGES = ROOT / "docs" / "images"
 SCALE = 4  # of the larger study; the smaller one is at full size
 
 
@@ -18,8 +18,7 @@ def main() -> None:
     """Fill the pages and draw the charts from the records."""
     publish(tables())
     for scale, name in ((SCALE, "coders.png"), (1, "coders_full.png")):
-        for folder in (RESULTS, IMAGES):
-            chart(studied(scale), scale, folder / name)
+        chart(studied(scale), scale, IMAGES / name)
 
 
 def tables() -> Tables:

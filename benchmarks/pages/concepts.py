@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
+from benchmarks.pages.pictures import write_picture
 from benchmarks.records import ROOT
 from codec.order import ORDERS, selection_order
 from ii_core import (
@@ -54,6 +55,7 @@ def save(name: str, figure: Any) -> None:
     """Write it and say so."""
     figure.savefig(FOLDER / f"{name}.png", dpi=110, bbox_inches="tight", facecolor="white")
     plt.close(figure)
+    write_picture(FOLDER / f"{name}.png", FOLDER / f"{name}.png")
     print(FOLDER / f"{name}.png", flush=True)
 
 

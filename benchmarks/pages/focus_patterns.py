@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.pages.pictures import write_picture
 from benchmarks.records import ROOT
 from ii_core import preset
 from metrics import linear_layers
@@ -28,6 +29,7 @@ def main() -> None:
     _filter(weights)
     _whole_pixels(steps)
     save(figure, CHART)
+    write_picture(CHART, CHART)
 
 
 def _patterns(axes: Any) -> None:

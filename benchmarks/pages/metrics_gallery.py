@@ -9,9 +9,13 @@ coded picture, three schemes at five rates for Q_depth over rate; true depth. Th
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from benchmarks.pages.focus_patterns import main as draw_patterns
+from benchmarks.pages.pictures import write_picture
 from benchmarks.records import ROOT
 from codec import decode, encode, timed_decode
 from ii_core import preset
@@ -42,14 +46,24 @@ def main() -> None:
     shot = render(load_scene("apples"), preset("setup1", scale=4), noise=1.0, support=("depth",))
     picture, decoded = shot.picture, decode(encode(shot.picture, "si-h264", bpp=0.15))
     plot_angle(picture, decoded, IMAGES / "q_angle.png")
-    plot_views(picture, decoded, IMAGES / "views.png")
-    plot_error_views(picture, decoded, IMAGES / "errors_views.png")
+    photograph("views", lambda path: plot_views(picture, decoded, path))
+    photograph("errors_views", lambda path: plot_error_views(picture, decoded, path))
     truth: Any = {"depth": shot.depth, "layers_mm": linear_layers(camera_of(picture))}
-    plot_error_layers(picture, q_depth(picture, decoded, **truth), IMAGES / "errors_depth.png")
+    photograph("errors_depth", lambda path: plot_error_layers(picture, q_depth(picture, decoded, **truth), path))
     measure = measuring(picture, ["q_depth_min", "q_depth_mean", "q_depth_max", "q_view"], **truth)
     records = rate_distortion(picture, SCHEMES, RATES, encode=encode, decode=timed_decode, measure=measure)
     write_study(STUDY, "Apples", records, {"scale": 4, "noise": 1.0}, picture=picture)
     depth_rate_chart(read_study(STUDY), IMAGES / "q_depth_rate.png")
+    for path in sorted(IMAGES.glob("*.png")):
+        write_picture(path, path)
+
+
+def photograph(name: str, draw: Callable[[Path], Any]) -> None:
+    """Write a figure that holds photographs, as JPEG."""
+    with TemporaryDirectory() as folder:
+        drawn = Path(folder) / "figure.png"
+        draw(drawn)
+        write_picture(IMAGES / f"{name}.jpg", drawn)
 
 
 if __name__ == "__main__":

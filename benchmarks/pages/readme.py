@@ -10,15 +10,15 @@ from __future__ import annotations
 import shutil
 
 from benchmarks.coding import disparity
+from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, commit_of, origin, with_commits
 from benchmarks.speed import ratios
 from metrics import read_study, summary_table
 
 RESULTS = ROOT / "benchmarks" / "results"
-IMAGES = ROOT / "docs" / "images"
 SIZES = {"demo": "4096×2048, 256×128 lenses (the demo)", "full": "8192×4096, 512×256 lenses (full `setup1`)"}
-SHOWN = ("apples_detail.png", "apples_view_front.png", "apples_projection.png", "cuboid_projection.png")
+SHOWN = ("apples_detail.png", "apples_view_front.png")
 
 
 def main() -> None:
@@ -27,9 +27,9 @@ def main() -> None:
     for run in SIZES:
         for study in sorted((ROOT / "out" / run).glob("*_rd.json")):
             shutil.copy(study, RESULTS / f"{run}_{study.name}")
-            shutil.copy(study.with_suffix(".png"), IMAGES / f"{run}_{study.stem}.png")
+            write_picture(IMAGES / f"{run}_{study.stem}.png", study.with_suffix(".png"))
     for name in SHOWN:
-        shutil.copy(ROOT / "out" / "demo" / name, IMAGES / name)
+        write_picture(IMAGES / name, ROOT / "out" / "demo" / name)
     publish(tables())
 
 

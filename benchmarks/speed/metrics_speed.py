@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
+from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, add_again, origin, with_commits
 from codec import decode, encode
@@ -55,8 +56,9 @@ def main() -> None:
     for key in RECORDS.todo(keys, asked.again):
         RECORDS.measure(key, lambda name=key["accuracy"]: {"points": accuracy(name)})
     kept = data()
-    save(draw(kept), CHART)
-    save(draw_front(kept["accuracy"]), FRONT)
+    for figure, path in ((draw(kept), CHART), (draw_front(kept["accuracy"]), FRONT)):
+        save(figure, path)
+        write_picture(path, path)
     publish(tables())
 
 

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import zoom
 
+from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, add_again, by_scene
 from benchmarks.speed.pareto import BASE, SCENES, at_depth, cut_scene, scene_text, sizes
@@ -61,6 +62,7 @@ def main() -> None:
               f"{record['seconds']:.0f} s", flush=True)  # fmt: skip
     if set(scenes := measured()) == set(SCENES):
         save(draw(scenes), CHART)
+        write_picture(CHART, CHART)
         publish(tables())
 
 

@@ -6,7 +6,7 @@ The error is PSNR in 16-bit sRGB against a reference of 64 samples a pixel, 12 b
 says how finely its shapes are cut, triangles half as large; time is CPU seconds of `render` without support images,
 the least of two or three. Samples a pixel, adaptive sampling to an error, recursion depth and tessellation are swept;
 settings that nothing beats in both are the Pareto front. Numbers and chart go to ``benchmarks/results/pareto.jsonl``
-and ``.png``, tables and chart to ``docs/speed_accuracy.md``.
+and tables to ``docs/speed_accuracy.md``, the chart to ``docs/images/pareto.png``.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ import numpy as np
 
 from benchmarks.accuracy.map_precision import RECORDS as MAPS
 from benchmarks.accuracy.map_precision import SCALE as MAPS_SCALE
+from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import RESULTS, ROOT, Records, add_again, by_scene, origin
+from benchmarks.records import Records, add_again, by_scene, origin
 from ii_core import IICamera, IIPicture, preset
-from ii_core.files import atomic_path
 from metrics import q_global
 from metrics.plots.rd_chart import COLOURS
 from raytrace_ii import Scene, load_scene, render
@@ -61,8 +61,7 @@ def main() -> None:
         best = record["result"]["recommended"]
         print(f"{key['scene']}: {best['setting']}, {best['psnr']:.1f} dB, {record['seconds']:.0f} s", flush=True)
     if set(scenes := measured()) == set(SCENES):
-        chart(scenes, RESULTS / "pareto.png")
-        shutil.copy(RESULTS / "pareto.png", ROOT / "docs" / "images" / "pareto.png")
+        chart(scenes, IMAGES / "pareto.png")
         publish(tables())
 
 
@@ -256,8 +255,8 @@ def chart(data: dict[str, Any], target: Path) -> None:
         [*handles.values(), figure.axes[0].plot([], [], color="0.75", linewidth=4)[0]], [*handles, "Pareto front"],
         loc="outside lower center", ncols=6, frameon=False, fontsize=9,
     )  # fmt: skip
-    with atomic_path(target) as temporary:
-        figure.savefig(temporary, dpi=120, format="png")
+    figure.savefig(target, dpi=120)
+    write_picture(target, target)
 
 
 def recommended_table(data: dict[str, Any]) -> list[str]:

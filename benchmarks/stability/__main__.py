@@ -1,24 +1,23 @@
 """Hunt for where methods fail: ``python -m benchmarks run stability [-- case ...]``.
 
 Every case sweeps one thing until it breaks; cases can be run one by one. Numbers go to
-``benchmarks/results/stability.jsonl``, a chart and two strips of pictures beside it, and between the marks of
-``docs/stability.md``, with those of ``benchmarks.accuracy.convergence``.
+``benchmarks/results/stability.jsonl``, pictures to ``docs/images``, tables to ``docs/stability.md``,
+with those of ``benchmarks.accuracy.convergence``.
 """
 
 from __future__ import annotations
 
 import argparse
-import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from benchmarks.accuracy import convergence
+from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import RESULTS, ROOT, Records, add_again, origin
+from benchmarks.records import Records, add_again, origin
 from benchmarks.stability import curves, depth, geometry, light, picture, pictures
 from benchmarks.stability.geometry import Row
-from ii_core.files import atomic_path, write_image
 from metrics.depth.focus import METHODS
 from metrics.plots.rd_chart import COLOURS
 
@@ -58,15 +57,13 @@ def main() -> None:
     for key in RECORDS.todo(({"case": name} for name in asked), arguments.again):
         record = RECORDS.measure(key, lambda name=key["case"]: {"rows": CASES[name]()})
         print(f"{key['case']}: {record['seconds']:.0f} s", flush=True)
-    write_image(RESULTS / "stability_pictures.png", pictures.rendering())
-    write_image(RESULTS / "stability_pictures_2.png", pictures.coding_and_depth())
+    write_picture(IMAGES / "stability_pictures.png", pictures.rendering())
+    write_picture(IMAGES / "stability_pictures_2.png", pictures.coding_and_depth())
     cases = {name: row["rows"] for name, row in measured().items()}
     if missing := set(CASES) - set(cases):
         print(f"the page waits for {', '.join(sorted(missing))}")
         return
-    chart(cases, RESULTS / "stability.png")
-    for name in ("stability.png", "stability_pictures.png", "stability_pictures_2.png", "convergence.png"):
-        shutil.copy(RESULTS / name, ROOT / "docs" / "images" / name)
+    chart(cases, IMAGES / "stability.png")
     publish(tables())
 
 
@@ -209,8 +206,8 @@ def chart(cases: Mapping[str, list[Row]], target: Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
         if len(names) > 1:
             axes.legend(frameon=False, fontsize=8)
-    with atomic_path(target) as temporary:
-        figure.savefig(temporary, dpi=110, format="png")
+    figure.savefig(target, dpi=110)
+    write_picture(target, target)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from benchmarks.coding import coders
 from benchmarks.coding.coders import ANCHOR
 from benchmarks.coding.rd import climbing
+from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, filled
 from benchmarks.records import ROOT, origin, with_commits
 from ii_core.files import atomic_path
@@ -50,7 +50,8 @@ def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Pat
     everything = {path.stem: records(kept, path.stem) for path in sorted(kept.glob("*.jsonl"))}
     best = {name: largest(some) for name, some in everything.items()}
     copy_pictures(folder, images, best)
-    draw_all({name: record["result"] for name, record in best.items()}, images)
+    for path in draw_all({name: record["result"] for name, record in best.items()}, images):
+        write_picture(path, path)
     text = page.read_text(encoding="utf-8")
     for (_, mark), lines in tables(kept).items():
         text = filled(text, mark, lines)
@@ -77,7 +78,7 @@ def copy_pictures(folder: Path, images: Path, best: Mapping[str, Mapping[str, An
     for record in best.values():
         for name, digest in record["pictures"].items():
             if (folder / name).exists() and digest_of(folder / name) == digest:
-                shutil.copy(folder / name, images / name)
+                write_picture(images / name, folder / name)
 
 
 def keep(new: Path, old: Path) -> None:

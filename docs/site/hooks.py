@@ -1,7 +1,7 @@
 """What the site does to the pages of docs/, so that the same pages read well in the repository.
 
-A link out of docs/, to a script or to measured numbers, leads to that file: the site carries it along. A public name
-that the reference lacks is a warning.
+A link out of docs/, to a script or to measured numbers, leads to that file: the site carries it along. A still of the
+gallery leads to its page, which `make docs` makes. A public name that the reference lacks is a warning.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 OUTWARD = re.compile(r"\]\((?P<path>(?:\.\./)+[^)#\s]+)")
+STILL = re.compile(r"!\[\w+\]\((?P<name>\w+)\.jpg\)")
 log = logging.getLogger("mkdocs.hooks.docs")
 
 
@@ -32,6 +33,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
             files.append(File.generated(config, uri, abs_src_path=str(path)))
         return f"]({'../' * page.file.src_uri.count('/')}{uri}"
 
+    if page.file.src_uri == "gallery/README.md":
+        markdown = STILL.sub(r"[\g<0>](\g<name>.html)", markdown)
     return OUTWARD.sub(inside, markdown)
 
 
