@@ -1,0 +1,208 @@
+"""Structure-aware fuzzing of every reader.
+
+    python -m benchmarks.stability.fuzz [--cases 20000] [--workers 2] [--readers sidecar,PLY] [--seed 0]
+    python -m benchmarks.stability.fuzz --reader PLY --only 4711 --keep FOLDER
+
+A case is made from (reader, seed, number) alone: a valid file whose values, lengths, counts, types, lines or bytes
+are changed. Reading it must end in a valid object or in one line of ValueError, OSError, or a TypeError that our own
+code raises, in 10 s of CPU time and 2 GB of memory. Anything else is a finding, kept with its number. Cases run in
+worker processes, so that a crash is seen. A row a reader is appended to ``benchmarks/results/fuzz_readers.jsonl``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+import traceback
+import warnings
+import zlib
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.fuzz import Watchdog, cpu_seconds
+from benchmarks.pages import Tables, publish
+from benchmarks.records import ROOT, Records, add_again, origin
+
+from .readers import READERS, Read
+
+RECORDS = Records("fuzz_readers", ("benchmarks.stability.fuzz", "benchmarks.fuzz"))
+GOOD = "object", "refused"
+MOST_SECONDS = 10  # of CPU time a case
+MOST_BYTES = 2 << 30  # of memory a case
+MOST_TEXT = 1000  # characters of a message
+MOST_FINDINGS = 50  # of a reader that are kept
+
+
+def main() -> None:
+    """Run all readers, or one case."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=20000, help="of each reader")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--readers", help="names, separated by semicolons; all if not given")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--reader", choices=READERS, help="run in this process, without records")
+    parser.add_argument("--range", type=int, nargs=2, help=argparse.SUPPRESS)
+    parser.add_argument("--only", type=int, help="one case of --reader, with its traceback")
+    parser.add_argument("--keep", type=Path, help="folder for the files of this case")
+    add_again(parser)
+    arguments = parser.parse_args()
+    if arguments.only is not None:
+        with tempfile.TemporaryDirectory() as folder:
+            kept = arguments.keep or Path(folder)
+            kept.mkdir(parents=True, exist_ok=True)
+            print(case(arguments.reader, arguments.seed, arguments.only, kept)())
+        return
+    if arguments.reader:
+        work(arguments.reader, arguments.seed, *arguments.range)
+        return
+    names = arguments.readers.split(";") if arguments.readers else list(READERS)
+    if unknown := set(names) - set(READERS):
+        parser.error(f"no reader {min(unknown)!r}: known are {', '.join(READERS)}")
+    keys = [{"reader": name, "seed": arguments.seed, "cases": arguments.cases} for name in names]
+
+    def row(key: dict[str, Any]) -> None:
+        record = RECORDS.measure(key, lambda: watched(key["reader"], key["seed"], key["cases"]))
+        print(f"{key['reader']}: {record['result']}", flush=True)
+
+    pool = ThreadPoolExecutor(arguments.workers)
+    try:
+        for future in [pool.submit(row, key) for key in RECORDS.todo(keys, arguments.again)]:
+            future.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+    publish(tables())
+
+
+def tables() -> Tables:
+    """Return the table of the page of stability."""
+    rows = {row["reader"]: row for row in RECORDS.rows()}  # the newest number of cases of each reader
+    lines = [
+        "| reader | cases | valid object | refused in one line | findings | longest, CPU s | most memory, MB |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name, row in rows.items():
+        counts = row["counts"]
+        good = [counts.get(kind, 0) for kind in GOOD]
+        bad = sum(counts.values()) - sum(good)
+        cells = [
+            name,
+            sum(counts.values()),
+            *good,
+            bad,
+            f"{row['longest_seconds']:.2f}",
+            f"{row['most_megabytes']:.0f}",
+        ]
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return {("docs/stability.md", "fuzz-readers"): [*lines, "", origin(rows.values())]}
+
+
+def watched(name: str, seed: int, count: int) -> dict[str, Any]:
+    """Run all cases of a reader, in a process that is started again where it dies."""
+    counts: Counter[str] = Counter()
+    findings: list[dict[str, Any]] = []
+    longest, most, first = 0.0, 0.0, 0
+    while first < count:
+        command = [sys.executable, "-m", "benchmarks.stability.fuzz", "--reader", name, "--seed", str(seed)]
+        with tempfile.TemporaryFile() as errors:
+            worker = subprocess.Popen(
+                [*command, "--range", str(first), str(count)],
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+                cwd=ROOT,
+            )
+            assert worker.stdout is not None
+            with Watchdog(worker) as watchdog:
+                for line in worker.stdout:
+                    watchdog.seen()
+                    number, what, seconds, megabytes = json.loads(line)
+                    counts[what.partition(":")[0]] += 1
+                    longest, most, first = max(longest, seconds), max(most, megabytes), number + 1
+                    if what not in GOOD:
+                        findings.append({"number": number, "what": what})
+            if first < count:
+                errors.seek(0)
+                last = errors.read().decode(errors="replace").strip().splitlines()[-1:]
+                what = "stuck" if watchdog.fired else f"died with {worker.wait()}"
+                counts[what] += 1
+                findings.append({"number": first, "what": what, "said": " ".join(last)[-300:]})
+                first += 1
+        if len(findings) > MOST_FINDINGS:
+            break
+    return {"counts": dict(counts), "longest_seconds": longest, "most_megabytes": most, "findings": findings}
+
+
+def work(name: str, seed: int, first: int, last: int) -> None:
+    """Run cases by number, a line of JSON for each; the system kills the process at a limit of CPU time."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(-2, 0):  # what a first case takes is no case's own
+            outcome(case(name, seed, number, Path(folder)))
+        room = _address_space() + MOST_BYTES
+        resource.setrlimit(resource.RLIMIT_AS, (room, room))
+        for number in range(first, last):
+            read = case(name, seed, number, Path(folder))
+            before, started = _peak(reset=True), cpu_seconds()
+            resource.setrlimit(resource.RLIMIT_CPU, (int(started) + 1 + MOST_SECONDS, resource.RLIM_INFINITY))
+            what = outcome(read)
+            took, more = cpu_seconds() - started, (_peak() - before) / 1e6
+            print(json.dumps([number, what, round(took, 3), round(more, 1)]), flush=True)
+
+
+def case(name: str, seed: int, number: int, folder: Path) -> Read:
+    """Write the files of a case into a folder and return the call that reads them."""
+    rng = np.random.default_rng((seed, zlib.crc32(name.encode()), number + 2))
+    return READERS[name](rng, folder)
+
+
+def outcome(read: Read) -> str:
+    """Return "object", "refused", or the error that is a finding."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            read()
+    except (ValueError, OSError) as error:
+        return _worded(error)
+    except TypeError as error:
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        ours = (frame.line or "").startswith("raise TypeError") and Path(frame.filename).is_relative_to(ROOT)
+        return _worded(error) if ours else f"error: {_said(error)}"
+    except Exception as error:
+        return f"error: {_said(error)}"
+    return "object"
+
+
+def _worded(error: Exception) -> str:
+    text = str(error)
+    if "\n" in text or not text.strip():
+        return f"wording: {_said(error)}"
+    return f"long: {_said(error)}" if len(text) > MOST_TEXT else "refused"
+
+
+def _said(error: Exception) -> str:
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__} in {Path(frame.filename).name}, {frame.name}: {str(error)[:150]!r}"
+
+
+def _address_space() -> int:
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+
+
+def _peak(*, reset: bool = False) -> int:
+    """Return the process's peak of resident memory, bytes, since it was last reset."""
+    if reset:
+        Path("/proc/self/clear_refs").write_text("5")
+    status = Path("/proc/self/status").read_text()
+    return int(status.partition("VmHWM:")[2].split()[0]) * 1024
+
+
+if __name__ == "__main__":
+    main()
