@@ -11,6 +11,7 @@ import numpy as np
 
 from ii_core import IIPicture
 from ii_core.camera import whole_pair
+from ii_core.files import one_line
 
 from . import container, file_header
 from .checks import check_type, whole
@@ -120,7 +121,7 @@ class Encoded:
         try:
             return _from_file(header, payload)
         except (ValueError, TypeError, OverflowError) as error:
-            raise ValueError(f"{os.fspath(path)} is damaged: {error}") from None
+            raise ValueError(f"{os.fspath(path)} is damaged: {one_line(error)}") from None
 
 
 def _from_file(header: container.Header, payload: bytes) -> Encoded:
@@ -261,7 +262,7 @@ def timed_decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = M
     try:
         pixels, codec_seconds = coder.decode(coded.payload, blank, coded.options)
     except ValueError as error:
-        raise ValueError(f"{name} is damaged: {error}") from None
+        raise ValueError(f"{name} is damaged: {one_line(error)}") from None
     picture = blank.with_pixels(pixels)
     return Decoding(picture=picture, seconds=cpu_seconds() - started, codec_seconds=codec_seconds)
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ii_core.files import atomic_path
+from ii_core.files import atomic_path, check_file
 
 from .bitstream.compact import leb128, read_leb128, read_values, write_values
 
@@ -98,9 +98,10 @@ def read(path: str | os.PathLike[str]) -> tuple[Header, bytes]:
     ValueError
         If the file is something else, cut short, longer than it says, or damaged anywhere.
     OSError
-        If the file cannot be read.
+        If the file cannot be read, or is a folder, pipe or device.
     """
     path = Path(path)
+    check_file(path)
     with path.open("rb") as file:
         frame = _frame(path, file)
         text, payload = file.read(frame.header), file.read(frame.payload)

@@ -55,6 +55,7 @@ PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 BAND = 64  # rows in memory at a time when a file is checked
 MAX_TEXT = 16 << 20  # bytes of a JSON or configuration file; a sidecar has under ten thousand
 MAX_DIGITS = 20  # of whole numbers in JSON: all of 64 bits
+MAX_MESSAGE = 600  # characters of an error that quotes what a file holds
 NOT_WHOLE = "the file does not hold what was written to it, as if the disk were full"
 
 
@@ -78,6 +79,12 @@ def check_name(path: str | os.PathLike[str]) -> None:
         os.fspath(path).encode("utf-8")
     except UnicodeEncodeError:
         raise ValueError(f"{os.fspath(path)!r} is no UTF-8 name: rename the file or its folder") from None
+
+
+def one_line(text: object) -> str:
+    """A message as one line of at most about `MAX_MESSAGE` characters, the middle of a longer one left out."""
+    line, half = " ".join(str(text).split()), MAX_MESSAGE // 2
+    return line if len(line) <= MAX_MESSAGE else f"{line[:half]} … {line[-half:]}"
 
 
 def read_text(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> str:
@@ -370,7 +377,7 @@ def read_image(path: str | os.PathLike[str], *, size: tuple[int, int] | None = N
             )
         pixels = source.read_image(_oiio_type(spec))
         if pixels is None:
-            raise OSError(f"cannot read {path}: {source.geterror()}")
+            raise OSError(f"cannot read {path}: {one_line(source.geterror())}")
     return pixels
 
 
@@ -412,7 +419,7 @@ def _opened(path: Path) -> Iterator[Any]:
     plain.attribute("oiio:UnassociatedAlpha", 1)  # left alone it multiplies what PNG stores by alpha
     source = oiio.ImageInput.open(str(path), plain)
     if not source:
-        raise OSError(f"cannot read {path}: {oiio.geterror()}")
+        raise OSError(f"cannot read {path}: {one_line(oiio.geterror())}")
     try:
         yield source
     finally:

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from .files import check_file
+
 try:
     import fcntl
 except ImportError:  # not on Windows, where two processes must not write one file
@@ -35,9 +37,12 @@ def read_records(path: Path, format: str, version: int) -> list[dict[str, Any]]:
     ------
     ValueError
         If another line is no record of this format and version.
+    OSError
+        If the file is a folder, pipe or device.
     """
     if not path.exists():
         return []
+    check_file(path)
     found = []
     for number, line in enumerate(path.read_bytes().splitlines(keepends=True), 1):
         if not line.endswith(b"\n"):
@@ -46,6 +51,8 @@ def read_records(path: Path, format: str, version: int) -> list[dict[str, Any]]:
             record = json.loads(line)
         except ValueError as error:
             raise ValueError(f"{path}, line {number}: {error}") from None
+        except RecursionError:
+            raise ValueError(f"{path}, line {number}: nested too deeply") from None
         if not isinstance(record, dict) or (record.get("format"), record.get("version")) != (format, version):
             raise ValueError(f'{path}, line {number}: no record: needs "format": "{format}", "version": {version}')
         found.append(record)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .camera import Floats, IICamera, whole_pair
-from .files import image_header, read_image, read_json, write_image, write_json
+from .files import image_header, one_line, read_image, read_json, write_image, write_json
 
 FORMATS = {
     "png16": (".png", "uint16"),
@@ -260,7 +261,7 @@ def read_maps(folder: str | os.PathLike[str]) -> tuple[MapCamera, ...]:
             raise ValueError('no camera maps: "arrays" with at least one is needed')
         return tuple(_map_camera(sheet, array, path.parent) for array in sheet["arrays"])
     except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
-        raise ValueError(f"{path}: {error.args[0] if error.args else error}") from None
+        raise ValueError(f"{path}: {one_line(error.args[0] if error.args else error)}") from None
 
 
 def _map_camera(sheet: Mapping[str, Any], array: Mapping[str, Any], folder: Path) -> MapCamera:
@@ -287,6 +288,10 @@ def _map_camera(sheet: Mapping[str, Any], array: Mapping[str, Any], folder: Path
     return MapCamera((width, height), lenses, ei, bool(sheet.get("erect", False)), model, name, maps)
 
 
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, int | float) and abs(value) < np.inf
+
+
 def _inside(folder: Path, name: str) -> Path:
     """A file of the folder; ValueError if the name leads out of it."""
     if not isinstance(name, str) or not (folder / name).resolve().is_relative_to(folder.resolve()):
@@ -305,7 +310,7 @@ def _map(pair: Mapping[str, Any], name: str, folder: Path, size: tuple[int, int]
     box = entry.get("box", [[0.0, 1.0]] * 3)
     if integer and "box" not in entry:
         raise ValueError(f"{entry['file']} holds codes: its box is needed")
-    if np.shape(box) != (3, 2) or not np.isfinite(np.array(box, float)).all() or not steps > 0:
+    if np.shape(box) != (3, 2) or not all(_is_finite(x) for x in (steps, *chain(*box))) or not steps > 0:
         raise ValueError(
             f"{entry['file']}: C is {steps}, box {box}: a positive C and three pairs of numbers are needed"
         )

@@ -23,6 +23,7 @@ from .files import (
     image_rows,
     image_types,
     json_text,
+    one_line,
     pixel_digest,
     read_image,
     read_json,
@@ -234,7 +235,7 @@ class IIPicture:
         try:
             picture = cls.from_structure_json(nothing, data)
         except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
-            raise ValueError(f"{sidecar(path)}: {error}") from None
+            raise ValueError(f"{sidecar(path)}: {one_line(error)}") from None
         picture = picture.with_pixels(read_image(path))
         if data.get(BINDING) not in (None, pixel_digest(picture.pixels)):
             raise ValueError(

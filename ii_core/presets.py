@@ -12,7 +12,7 @@ from typing import Any
 import assets
 
 from .camera import IICamera
-from .files import read_json
+from .files import one_line, read_json
 from .optics import Scaling, scaled_chain
 
 ALIASES = {"setup2": "setup2-16"}
@@ -67,7 +67,7 @@ def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IIC
         members = data["cameras"] if data.get("kind") == "set" else [data]
         return tuple(scaled(IICamera.from_json({"name": path.stem, **member}), scale) for member in members)
     except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
-        raise ValueError(f"{path if Path(name).suffix else name}: {error}") from None
+        raise ValueError(f"{path if Path(name).suffix else name}: {one_line(error)}") from None
 
 
 def scaled(camera: IICamera, scale: int) -> IICamera:

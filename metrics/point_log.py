@@ -14,7 +14,7 @@ from ii_core import IIPicture
 from ii_core.identity import library_versions, source_hash
 from ii_core.json_lines import append_record, read_records
 
-from .study import picture_json, spelt, unspelt
+from .study import check_points, picture_json, spelt, unspelt
 
 FORMAT, VERSION = "ii-rd-point", 1
 PACKAGES = ("ii_core", "codec", "metrics")  # what a point depends on
@@ -46,11 +46,11 @@ class PointLog:
             "conditions": {name: _plain(value) for name, value in conditions.items()},
         }
         self._same = hashlib.sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()
-        self.known: dict[tuple[str, float], dict[str, Any]] = {}
-        for line in read_records(self.path, FORMAT, VERSION):
-            if line.get("same") == self._same:
-                point = unspelt(line["point"])
-                self.known[point["scheme"], point["target_bpp"]] = point
+        self.known = {
+            (point["scheme"], point["target_bpp"]): point
+            for same, point in read_points(self.path)
+            if same == self._same
+        }
 
     def keep(self, point: dict[str, Any]) -> None:
         """Append a point."""
@@ -59,6 +59,24 @@ class PointLog:
     def remove(self) -> None:
         """Remove the file: the study holds all points."""
         self.path.unlink(missing_ok=True)
+
+
+def read_points(path: Path) -> list[tuple[str, dict[str, Any]]]:
+    """Return the points of a file, each with the hash of what it depends on.
+
+    Raises
+    ------
+    ValueError
+        If a line is no point.
+    """
+    found = []
+    for number, line in enumerate(read_records(path, FORMAT, VERSION), 1):
+        try:
+            check_points([line.get("point")])
+            found.append((str(line.get("same")), unspelt(line["point"])))
+        except ValueError as error:
+            raise ValueError(f"{path}, line {number}: {error}") from None
+    return found
 
 
 def _plain(value: Any) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 import os
 import platform
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ii_core import IIPicture
-from ii_core.files import write_json
+from ii_core.files import one_line, read_json, write_json
 from ii_core.identity import library_versions
 
 from .measure import known_measures
@@ -103,8 +102,8 @@ def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
     OSError
         If it cannot be read.
     """
+    study = read_json(path)
     try:
-        study = json.loads(Path(path).read_bytes().decode("utf-8"))
         if not isinstance(study, dict) or study.get("format") != FORMAT or study.get("version") != VERSION:
             raise ValueError(f'not a study: needs "format": "{FORMAT}", "version": {VERSION}')
         if missing := {"picture", "points"} - set(study):
@@ -113,12 +112,10 @@ def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
             raise ValueError("not a study: picture is to be an object, points a list")
         check_points(study["points"])
         study["points"] = [unspelt(point) for point in study["points"]]
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path} is no UTF-8 text: {error}") from None
     except RecursionError:
         raise ValueError(f"{path}: not a study: it is nested too deeply") from None
     except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
+        raise ValueError(f"{path}: {one_line(error)}") from None
     return study
 
 

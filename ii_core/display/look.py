@@ -15,6 +15,7 @@ from ..picture import IIPicture, codes8
 from ..view import camera_of, five_viewpoints, view_positions
 
 ASSUMED_ANGLE_DEG = 20.0
+MOST_FRAMES = 3000  # of a film: two minutes at 25 a second
 
 
 def with_assumed_camera(picture: IIPicture) -> IIPicture:
@@ -154,7 +155,15 @@ def viewpoints_across(picture: IIPicture, count: int, *, cone: float = 1.0) -> N
 
 
 def viewpoints_around(picture: IIPicture, count: int, *, cone: float = 0.9) -> NDArray[np.float64]:
-    """Viewpoints along an ellipse in the viewing zone, for a loop without an end, (count, 3)."""
+    """Viewpoints along an ellipse in the viewing zone, for a loop without an end, (count, 3).
+
+    Raises
+    ------
+    ValueError
+        If there are none, or more than `MOST_FRAMES`, or the cone is no share.
+    """
+    if count > MOST_FRAMES:
+        raise ValueError(f"{count} frames: at most {MOST_FRAMES} are made")
     if count < 1 or not 0 < cone <= 1:
         raise ValueError(f"{count} viewpoints in {cone} of the zone: at least 1 in a share from 0 to 1 are needed")
     angles = 2 * math.pi * np.arange(count) / count

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Pair
-from ..files import atomic_path, read_text, write_image
+from ..files import atomic_path, one_line, read_text, write_image
 from ..picture import IIPicture
 from .grid import WHOLE_ORDER, Views, camera_views, listed
 from .pfm import write_pfm
@@ -41,7 +41,8 @@ def _hci_grid(folder: Path, count: int) -> Pair:
         if config.has_section("extrinsics"):
             return config.getint("extrinsics", "num_cams_x"), config.getint("extrinsics", "num_cams_y")
     except (configparser.Error, ValueError) as error:
-        raise ValueError(f"{folder / 'parameters.cfg'} does not say num_cams_x and num_cams_y: {error}") from None
+        path = folder / "parameters.cfg"
+        raise ValueError(f"{path} does not say num_cams_x and num_cams_y: {one_line(error)}") from None
     side = math.isqrt(count)
     if side * side != count:
         raise ValueError(f"{folder} holds {count} views, no square, and no parameters.cfg: give the grid")

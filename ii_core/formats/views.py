@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..camera import Pair
-from ..files import read_json, write_image, write_json
+from ..files import one_line, read_json, write_image, write_json
 from ..picture import IIPicture
 from .grid import WHOLE_ORDER, Views, camera_views, checked_reader, listed, read_view
 from .hci import HCI_VIEW, hci_views
@@ -87,7 +87,7 @@ def _written(folder: Path, shape: tuple[int, int]) -> dict[str, Any]:
         structure = read_json(path)
         u, v = structure["ei_pixels"]
     except (ValueError, TypeError, KeyError) as error:
-        raise ValueError(f"{path} is no structure of an II-picture: {error!r}") from None
+        raise ValueError(f"{path} is no structure of an II-picture: {one_line(repr(error))}") from None
     if (v, u) != shape:
         raise ValueError(f"{path} says {v}×{u} views, {shape[0]}×{shape[1]} are there")
     return {"structure": structure, "known": WHOLE_ORDER}

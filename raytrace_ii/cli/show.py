@@ -99,7 +99,7 @@ def display(
     ] = 0.0,
     at: Annotated[str | None, typer.Option(help="Simulation: where the eye is, mm: x,y,z.")] = None,
     fill: Annotated[float, typer.Option(help="Simulation: diameter of a lens as a share of the pitch.")] = 1.0,
-    frames: Annotated[int, typer.Option(help="Parallax: views around the viewing zone.")] = 60,
+    frames: Annotated[int, typer.Option(help="Parallax: views around the viewing zone, at most 3000.")] = 60,
     fps: Annotated[int, typer.Option(help="Parallax: frames a second.")] = 25,
     force: Force = False,
 ) -> None:

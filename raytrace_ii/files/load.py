@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from ii_core.files import check_file
+from ii_core.files import check_file, one_line
 
 from ..scene.scene import Background, Body, Fog, Light, Material, Scene, Vector, unit_rows
 from ..scene.textures import (
@@ -117,15 +117,15 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
         try:
             scene, models = _alone(path, model), {path: model}
         except ValueError as error:
-            raise ValueError(f"{path.name}: {error}") from None
+            raise ValueError(f"{path.name}: {one_line(error)}") from None
     else:
         loader = _Loader(path)
         try:
             scene, models = loader.scene(parse(path.read_text(encoding="utf-8"))), loader.models
         except ValueError as error:
-            raise ValueError(f"{path}: {error}") from None
+            raise ValueError(f"{path}: {one_line(error)}") from None
         except OSError as error:
-            raise type(error)(f"{path}: {error}") from None
+            raise type(error)(f"{path}: {one_line(error)}") from None
     for file, model in models.items():
         if model.left_out:
             named, more = model.left_out[:MOST_NAMED], len(model.left_out) - MOST_NAMED
@@ -166,11 +166,11 @@ def read_model(path: Path) -> Model:
         return model
     except ValidationError as error:
         first = error.errors()[0]
-        raise ValueError(f"{path.name}: {line(error, first['loc'], words(first))}") from None
+        raise ValueError(f"{path.name}: {one_line(line(error, first['loc'], words(first)))}") from None
     except ValueError as error:
-        raise ValueError(f"{path.name}: {error}") from None
+        raise ValueError(f"{path.name}: {one_line(error)}") from None
     except OSError as error:
-        raise type(error)(f"{path.name}: {error}") from None
+        raise type(error)(f"{path.name}: {one_line(error)}") from None
     except MemoryError:
         raise ValueError(f"{path.name}: needs more memory than there is") from None
 

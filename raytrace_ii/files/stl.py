@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import warnings
 from io import BytesIO
@@ -69,6 +70,9 @@ def _parsed(data: bytes) -> NDArray[np.float64]:
     """Corners (3 F, 3) of all triangles, one after another."""
     from trimesh.exchange.stl import load_stl  # half a second that scenes without files need not wait for
 
+    log = logging.getLogger("trimesh")
+    if not log.handlers:  # else Python prints a traceback of each normal that trimesh cannot read
+        log.addHandler(logging.NullHandler())
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)  # numpy's for words that are no numbers
         try:

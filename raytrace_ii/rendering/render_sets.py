@@ -232,7 +232,7 @@ def _read_manifest(folder: Path, name: str) -> dict[str, Any]:
 def _is_well_formed(manifest: dict[str, Any]) -> bool:
     """Whether whatever a manifest holds is of the type that this module writes."""
     claims, scenes = manifest.get("claims", []), manifest.get("scenes", {})
-    if not isinstance(claims, list) or not isinstance(scenes, dict):
+    if not isinstance(claims, list) or not isinstance(scenes, dict) or not all(isinstance(c, str) for c in claims):
         return False
     products = [scene.get("products", {}) if isinstance(scene, dict) else None for scene in scenes.values()]
     if not all(isinstance(made, dict) for made in products):

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import resource
 import subprocess
 import sys
@@ -163,8 +164,29 @@ def case(name: str, seed: int, number: int, folder: Path) -> Read:
     return READERS[name](rng, folder)
 
 
+class _Printed(logging.Handler):
+    """Keeps what `logging` would print because nobody listens."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.lines: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a line."""
+        self.lines.append(f"{record.name}: {record.getMessage()[:150]}")
+
+
 def outcome(read: Read) -> str:
-    """Return "object", "refused", or the error that is a finding."""
+    """Return "object", "refused", or what is a finding: an error, or a line of a library's log on the screen."""
+    before, logging.lastResort = logging.lastResort, (printed := _Printed())
+    try:
+        end = _end(read)
+    finally:
+        logging.lastResort = before
+    return f"printed: {printed.lines[0]}" if printed.lines else end
+
+
+def _end(read: Read) -> str:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

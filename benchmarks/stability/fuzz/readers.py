@@ -20,11 +20,10 @@ from codec.file_header import values
 from ii_core import IIPicture, preset
 from ii_core.files import write_image
 from ii_core.formats.formats import find_views, load_mosaic, picture_of, read_pfm
-from ii_core.json_lines import read_records
 from ii_core.maps import read_maps, write_maps
 from ii_core.presets import preset_cameras
-from metrics.point_log import FORMAT, VERSION
-from metrics.study import read_study, unspelt
+from metrics.point_log import read_points
+from metrics.study import read_study
 from raytrace_ii import load_scene
 from raytrace_ii.files.beside import read_texture
 from raytrace_ii.files.load import read_model
@@ -38,7 +37,7 @@ from .trees import json_text, mutated, pick, toml_text
 Read = Callable[[], object]
 Case = Callable[[Generator, Path], Read]
 READERS: dict[str, Case] = {}
-CODED = ("jpeg2000", "si-h264", "si-jpeg2000", "ei-jpeg", "si-ffv1")  # quick schemes, of different options
+CODED = ("jpeg2000", "si-h264", "si-jpeg2000", "jpeg", "si-ffv1")  # quick schemes, of different options
 
 
 def reader(name: str) -> Callable[[Case], Case]:
@@ -361,7 +360,7 @@ def study(rng: Generator, folder: Path) -> Read:
     path = folder / "points.jsonl"
     rows = [json.dumps(seeds.POINT_LINE), json_text(mutated(seeds.POINT_LINE, rng, (seeds.STUDY,)))]
     path.write_bytes(_as_file("\n".join(rows) + pick(rng, ("\n", "")), rng))
-    return lambda: [unspelt(line["point"]) for line in read_records(path, FORMAT, VERSION)]
+    return partial(read_points, path)
 
 
 @reader("manifest")
