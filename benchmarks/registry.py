@@ -169,6 +169,12 @@ BENCHMARKS = {
             tables="benchmarks.coding.fuzz",
         ),
         Benchmark(module="benchmarks.pages.make_textures", writes=("assets/textures/*",)),
+        Benchmark(
+            module="benchmarks.stability.fuzz_readers",
+            records="fuzz_readers.jsonl",
+            writes=("docs/stability.md",),
+            tables="benchmarks.stability.fuzz_readers.__main__",
+        ),
         Benchmark(module="benchmarks.pages.focus_patterns", writes=(f"{IMAGES}/focus_patterns.*",)),
         Benchmark(
             module="benchmarks.pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)

@@ -10,9 +10,9 @@ import zlib
 import numpy as np
 import pytest
 
-from benchmarks.stability.fuzz import __main__ as fuzz
-from benchmarks.stability.fuzz import containers, seeds, trees
-from benchmarks.stability.fuzz.readers import READERS
+from benchmarks.stability.fuzz_readers import __main__ as fuzz
+from benchmarks.stability.fuzz_readers import containers, seeds, trees
+from benchmarks.stability.fuzz_readers.readers import READERS
 from raytrace_ii.files.load import read_model
 
 CASES = 100
@@ -20,7 +20,7 @@ CASES = 100
 
 @pytest.mark.parametrize("name", READERS)
 def test_short_run(name, tmp_path):
-    """On b1dc540 there was no reader of which cases were made but the coders' (benchmarks.fuzz)."""
+    """On b1dc540 there was no reader of which cases were made but the coders' (benchmarks.coding.fuzz)."""
     found = {}
     for number in range(CASES):
         end = fuzz.outcome(fuzz.case(name, 1, number, tmp_path))
@@ -88,7 +88,7 @@ def test_limits_of_time_and_memory_are_findings():
     """A case that takes too much memory is a MemoryError; the system kills one that takes too long."""
     script = """
 import itertools
-from benchmarks.stability.fuzz import __main__ as fuzz
+from benchmarks.stability.fuzz_readers import __main__ as fuzz
 fuzz.MOST_SECONDS = 1
 ends = [lambda: None, lambda: None, lambda: bytearray(3 << 30), lambda: all(True for _ in itertools.count())]
 fuzz.READERS["toy"] = lambda rng, folder: ends.pop(0)

@@ -1,7 +1,7 @@
 """Structure-aware fuzzing of every reader.
 
-    python -m benchmarks.stability.fuzz [--cases 20000] [--workers 2] [--readers sidecar,PLY] [--seed 0]
-    python -m benchmarks.stability.fuzz --reader PLY --only 4711 --keep FOLDER
+    python -m benchmarks.stability.fuzz_readers [--cases 20000] [--workers 2] [--readers sidecar,PLY] [--seed 0]
+    python -m benchmarks.stability.fuzz_readers --reader PLY --only 4711 --keep FOLDER
 
 A case is made from (reader, seed, number) alone: a valid file whose values, lengths, counts, types, lines or bytes
 are changed. Reading it must end in a valid object or in one line of ValueError, OSError, or a TypeError that our own
@@ -28,13 +28,13 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.fuzz import Watchdog, cpu_seconds
-from benchmarks.pages import Tables, publish
+from benchmarks.coding.fuzz import Watchdog, cpu_seconds
+from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, add_again, origin
 
 from .readers import READERS, Read
 
-RECORDS = Records("fuzz_readers", ("benchmarks.stability.fuzz", "benchmarks.fuzz"))
+RECORDS = Records("fuzz_readers", ("benchmarks.stability.fuzz_readers", "benchmarks.coding.fuzz"))
 GOOD = "object", "refused"
 MOST_SECONDS = 10  # of CPU time a case
 MOST_BYTES = 2 << 30  # of memory a case
@@ -111,7 +111,7 @@ def watched(name: str, seed: int, count: int) -> dict[str, Any]:
     findings: list[dict[str, Any]] = []
     longest, most, first = 0.0, 0.0, 0
     while first < count:
-        command = [sys.executable, "-m", "benchmarks.stability.fuzz", "--reader", name, "--seed", str(seed)]
+        command = [sys.executable, "-m", "benchmarks.stability.fuzz_readers", "--reader", name, "--seed", str(seed)]
         with tempfile.TemporaryFile() as errors:
             worker = subprocess.Popen(
                 [*command, "--range", str(first), str(count)],

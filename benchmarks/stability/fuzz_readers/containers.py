@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from numpy.random import Generator
 
-from benchmarks.fuzz import damaged
+from benchmarks.coding.fuzz import damaged
 
 from .trees import pick
 

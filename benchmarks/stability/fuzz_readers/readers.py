@@ -13,13 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from benchmarks.fuzz import sample
+from benchmarks.coding.fuzz import sample
 from codec import decode
 from codec.container import write
 from codec.file_header import values
 from ii_core import IIPicture, preset
 from ii_core.files import write_image
-from ii_core.formats.formats import find_views, load_mosaic, picture_of, read_pfm
+from ii_core.formats.find import find_views, picture_of
+from ii_core.formats.mosaic import load_mosaic
+from ii_core.formats.pfm import read_pfm
 from ii_core.maps import read_maps, write_maps
 from ii_core.presets import preset_cameras
 from metrics.point_log import read_points

@@ -1,0 +1,165 @@
+"""What fuzzing of the readers found, each as the smallest case that shows it."""
+
+import json
+import logging
+import os
+
+import numpy as np
+import pytest
+
+from benchmarks.stability.fuzz_readers import seeds
+from benchmarks.stability.fuzz_readers.__main__ import case, outcome
+from benchmarks.stability.fuzz_readers.containers import png_changed
+from codec import Encoded, decode, encode
+from codec.container import write
+from codec.file_header import values
+from ii_core import IIPicture
+from ii_core.display.look import MOST_FRAMES, viewpoints_around
+from ii_core.files import MAX_MESSAGE, one_line, read_image, write_image
+from ii_core.formats.find import find_views
+from ii_core.json_lines import read_records
+from ii_core.maps import read_maps
+from ii_core.presets import preset_cameras
+from metrics.point_log import read_points
+from metrics.study import read_study
+from raytrace_ii.files.load import read_model
+from raytrace_ii.rendering.render_sets import _read_manifest
+
+
+def refusal(call, *arguments):
+    """Return the message of a ValueError or OSError, which must be one line of bounded length."""
+    with pytest.raises((ValueError, OSError)) as caught:
+        call(*arguments)
+    message = str(caught.value)
+    assert "\n" not in message and len(message) < MAX_MESSAGE + 200
+    return message
+
+
+def test_libraries_of_pictures_complain_in_one_line(tmp_path):
+    """OpenImageIO's messages have up to four lines; the command line joined them, the library did not."""
+    path = tmp_path / "a.png"
+    said = set()
+    for number in range(40):
+        path.write_bytes(png_changed(seeds.png_files()[0], np.random.default_rng(number)))
+        try:
+            read_image(path)
+        except (ValueError, OSError) as error:
+            said.add(str(error))
+    assert any("PNG library error" in message for message in said)
+    assert not any("\n" in message for message in said)
+
+
+def test_parameters_cfg_complains_in_one_line(tmp_path):
+    for i in range(4):
+        write_image(tmp_path / f"input_Cam{i:03}.png", seeds.pixels())
+    (tmp_path / "parameters.cfg").write_text("image_resolution_x_px = 16\n")
+    assert "parameters.cfg does not say num_cams_x" in refusal(find_views, tmp_path)
+
+
+@pytest.mark.parametrize("value", ["a" * 5000, [[0] * 3000]])
+def test_long_values_are_not_quoted_whole(value, tmp_path):
+    picture = tmp_path / "p.png"
+    picture.write_bytes(seeds.png_files()[0])
+    sidecar = {**seeds.structures()[0], "lenses": value}
+    (tmp_path / "p.png.json").write_text(json.dumps(sidecar))
+    assert "two whole numbers are needed" in refusal(IIPicture.load, picture)
+    camera = {**seeds.camera_trees()["multi-focus"], "optics": [{"kind": "lenslet", "focal_mm": [value]}]}
+    (tmp_path / "camera.json").write_text(json.dumps(camera))
+    assert "lenslet: focal_mm" in refusal(preset_cameras, tmp_path / "camera.json")
+    tree, _ = seeds.gltf()
+    (tmp_path / "a.gltf").write_text(json.dumps({**tree, "accessors": value}))
+    assert "accessors" in refusal(read_model, tmp_path / "a.gltf")
+
+
+def test_one_line_keeps_both_ends():
+    assert one_line("a\n b\t c") == "a b c"
+    line = one_line("begin " + "x" * 5000 + " end")
+    assert line.startswith("begin") and line.endswith("end") and len(line) < MAX_MESSAGE + 5
+
+
+@pytest.mark.parametrize("box", [[["0", "1"]] * 3, [[0, True], [0, None], [0, 1]], [[0, 1e999], [0, 1], [0, 1]]])
+def test_box_of_maps_holds_numbers(box, tmp_path):
+    """numpy takes "0.5" for a number, so a box of texts was loaded and failed with its first rays."""
+    for name in "LD":
+        write_image(tmp_path / f"{name}.png", seeds.pixels(kind="uint16"))
+    sample = {name: {"file": f"{name}.png", "C": 65536, "box": box} for name in "LD"}
+    (tmp_path / "camera.json").write_text(json.dumps({"arrays": [{"samples": [sample]}]}))
+    assert "three pairs of numbers are needed" in refusal(read_maps, tmp_path)
+
+
+@pytest.mark.parametrize("claim", [3, None, {"a": 1}])
+def test_claims_of_a_manifest_are_names(claim, tmp_path):
+    (tmp_path / "manifest.json").write_text(json.dumps({**seeds.MANIFEST, "claims": [claim]}))
+    assert "is damaged" in refusal(_read_manifest, tmp_path, "reference")
+
+
+@pytest.mark.parametrize("point", [None, 3, [], {"scheme": "si-h264"}, "missing"])
+def test_lines_of_a_point_log_are_points(point, tmp_path):
+    line = {**seeds.POINT_LINE, "point": point}
+    if point == "missing":
+        del line["point"]
+    (tmp_path / "p.jsonl").write_text(json.dumps(seeds.POINT_LINE) + "\n" + json.dumps(line) + "\n")
+    assert "p.jsonl, line 2: points[0]" in refusal(read_points, tmp_path / "p.jsonl")
+
+
+def test_records_nested_too_deeply(tmp_path):
+    (tmp_path / "p.jsonl").write_text("[" * 100_000 + "\n")
+    assert "line 1: nested too deeply" in refusal(read_records, tmp_path / "p.jsonl", "ii-record", 1)
+
+
+def test_studies_are_read_within_bounds(tmp_path):
+    path = tmp_path / "s.json"
+    path.write_text(json.dumps(seeds.STUDY).replace("0.0991", "9" * 30))
+    assert "a number of 30 digits" in refusal(read_study, path)
+    path.write_bytes(b" " * ((16 << 20) + 1))
+    assert "longer than 16 MiB" in refusal(read_study, path)
+    path.write_bytes(b'"\xff"')
+    assert "no UTF-8" in refusal(read_study, path)
+    path.unlink()
+    os.mkfifo(path)
+    assert "pipe" in refusal(read_study, path)
+
+
+def coded_picture(**header):
+    coded = encode(IIPicture(seeds.pixels(), (4, 2), (4, 4)), "jpeg2000", bpp=2)
+    return values(coded), coded.payload
+
+
+def test_target_of_zero_in_a_coded_file(tmp_path):
+    header, payload = coded_picture()
+    header[7] = {"bpp": 0}
+    write(tmp_path / "p.ii", header, payload)
+    assert Encoded.load(tmp_path / "p.ii").reached is False
+
+
+def test_names_in_a_coded_file_are_quoted_in_one_short_line(tmp_path):
+    for scheme, options in (("a" * 5000, {}), ("si-h264", {"a\nb": 1})):
+        header, payload = coded_picture()
+        header[6], header[7] = scheme, options
+        write(tmp_path / "p.ii", header, payload)
+        assert "is damaged" in refusal(decode, tmp_path / "p.ii")
+
+
+def test_coded_pictures_are_no_pipes(tmp_path):
+    """Opening a pipe waits for a writer, for ever."""
+    os.mkfifo(tmp_path / "p.ii")
+    assert "pipe" in refusal(decode, tmp_path / "p.ii")
+
+
+def test_normals_that_are_no_numbers_print_nothing(tmp_path, monkeypatch):
+    """trimesh logs a traceback, which Python prints where nobody listens."""
+    monkeypatch.setattr(logging.root, "handlers", [])
+    text = seeds.stl_files()[1].decode().replace("facet normal 0 0 1", "facet normal 0 0 up", 1)
+    (tmp_path / "a.stl").write_text(text)
+    assert outcome(lambda: read_model(tmp_path / "a.stl")) == "object"
+
+
+def test_films_have_a_stated_limit():
+    picture = IIPicture(seeds.pixels(), (4, 2), (4, 4))
+    assert f"at most {MOST_FRAMES}" in refusal(viewpoints_around, picture, 10**9)
+
+
+def test_cases_that_failed(tmp_path):
+    """By their numbers, as long as the makers of cases stay as they are; the tests above hold anyhow."""
+    for name, seed, number in ((".ii header", 3, 16), ("study", 3, 650), ("study", 3, 1202), ("manifest", 3, 10)):
+        assert outcome(case(name, seed, number, tmp_path)) in ("object", "refused")
