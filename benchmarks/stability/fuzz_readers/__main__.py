@@ -1,7 +1,7 @@
 """Structure-aware fuzzing of every reader.
 
-    python -m benchmarks.stability.fuzz_readers [--cases 20000] [--workers 2] [--readers sidecar,PLY] [--seed 0]
-    python -m benchmarks.stability.fuzz_readers --reader PLY --only 4711 --keep FOLDER
+    python -m benchmarks run fuzz_readers [--cases 20000] [--workers 2] [--readers "sidecar;PLY"] [--seed 0]
+    python -m benchmarks run fuzz_readers --reader PLY --only 4711 --keep FOLDER
 
 A case is made from (reader, seed, number) alone: a valid file whose values, lengths, counts, types, lines or bytes
 are changed. Reading it must end in a valid object or in one line of ValueError, OSError, or a TypeError that our own
@@ -102,7 +102,7 @@ def tables() -> Tables:
             f"{row['most_megabytes']:.0f}",
         ]
         lines.append("| " + " | ".join(map(str, cells)) + " |")
-    return {("docs/stability.md", "fuzz-readers"): [*lines, "", origin(rows.values())]}
+    return {("docs/stability.md", "fuzz-readers"): [*lines, "", origin(rows.values())] if rows else []}
 
 
 def watched(name: str, seed: int, count: int) -> dict[str, Any]:
