@@ -1,4 +1,4 @@
-"""CPU time of a thread and of the encoders it drives, some of which work in threads of their own."""
+"""CPU time of a thread and of the encoders' threads that work for it."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ _opening = threading.Lock()
 
 
 def cpu_seconds() -> float:
-    """CPU seconds of the calling thread, and of the encoders' threads that worked for it until `OwnThreads.end`."""
+    """Return CPU seconds of the calling thread and of encoders' threads, the latter up to `OwnThreads.end`."""
     return time.thread_time() + getattr(_elsewhere, "seconds", 0.0)
 
 
 def spent_elsewhere(seconds: float) -> None:
-    """Count CPU seconds that something else took for the calling thread."""
+    """Add CPU seconds of another thread or process to those of the calling thread."""
     _elsewhere.seconds = getattr(_elsewhere, "seconds", 0.0) + seconds
 
 
 class OwnThreads:
-    """The threads that an encoder starts when it is opened, watched for the CPU time they take.
+    """Threads that an encoder starts when it is opened, with their CPU time.
 
-    Linux tells the time of each thread. Elsewhere the process, less the calling thread, is taken for it.
+    Linux has a clock for each thread. Elsewhere the time of the process less the calling thread is used.
 
-    SVT-AV1, if it may, as root may, makes its threads and the one that calls it real-time tasks of the highest
-    priority, for good: whatever else the machine does starves. They are put back.
+    As root, SVT-AV1 makes its threads and the calling thread real-time tasks of the highest priority, which starves
+    other processes. `OwnThreads` restores the priority.
 
     Parameters
     ----------
@@ -48,9 +48,9 @@ class OwnThreads:
             raised |= self._ids
 
     def end(self) -> None:
-        """Count what they took; to be called while they still live, that is before the encoder is closed."""
+        """Add the CPU time of the threads; call it before the encoder is closed."""
         if os.path.isdir(TASKS):
-            # A Python thread that was just starting then had no number yet to know it by.
+            # Leave out Python threads that had no native id when the encoder was opened.
             ours = self._ids - {thread.native_id for thread in threading.enumerate()}
             seconds = sum(_seconds_of(number) for number in ours)
         else:
@@ -60,7 +60,7 @@ class OwnThreads:
 
 @contextmanager
 def _usual_priority() -> Iterator[set[int]]:
-    """Give the calling thread, and those whose numbers are put in, the priority back that it has now."""
+    """Restore the present priority of the calling thread, also for the thread numbers added to the yielded set."""
     if not hasattr(os, "sched_setscheduler"):
         yield set()
         return
@@ -70,12 +70,12 @@ def _usual_priority() -> Iterator[set[int]]:
         yield others
     finally:
         for number in {0, *others}:
-            with suppress(ProcessLookupError, PermissionError):  # it has ended; a sandbox allows no such call at all
+            with suppress(ProcessLookupError, PermissionError):  # the thread has ended, or a sandbox forbids the call
                 os.sched_setscheduler(number, *usual)
 
 
 def _seconds_of(number: int) -> float:
-    """CPU seconds of a thread; none of one that has ended, which was not the encoder's then."""
+    """Return CPU seconds of a thread; 0 for a thread that has ended, which is none of the encoder's."""
     try:
         # The identity of a Linux thread's CPU clock: its complemented number, "per thread", "scheduler's".
         return time.clock_gettime(~number << 3 | 6)

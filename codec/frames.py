@@ -1,7 +1,7 @@
-"""II-picture ↔ pseudo video sequence: component images in an order, as planes, a batch of frames at a time.
+"""Frames of pseudo video sequences: II-picture ↔ planes of component images, in batches.
 
-The picture is never rearranged as a whole. A batch is gathered straight from the interleaved RGB picture into the
-planes an encoder reads, and scattered straight back from what a decoder wrote; see `codec.colour` for the colours.
+A batch is gathered directly from the interleaved RGB picture into the planes of an encoder, and scattered directly
+from the planes of a decoder. The picture is never rearranged as a whole. `codec.colour` converts colours.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from .order import selection_order
 Pair = tuple[int, int]
 Planes = list[NDArray[Any]]
 
-# A batch holds about as much as a core's own cache, and no more frames than is worth the objects around them.
+# Limits of a batch: about the cache of a core, and a number of frames whose objects cost little.
 BATCH_BYTES = 8 << 20
 BATCH_FRAMES = 128
 
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """Where the pixels of each component image lie in the picture; steps count pixels in row-major order."""
+    """Positions of the pixels of component images in the picture; steps count pixels in row-major order."""
 
     rows: int
     cols: int
@@ -43,7 +43,7 @@ class Layout:
 
     @property
     def frames(self) -> int:
-        """J, how many component images there are."""
+        """Number J of component images."""
         return self.rows * self.cols
 
     def origins(self, order: str, by: str = "rows") -> NDArray[np.int64]:

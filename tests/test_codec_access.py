@@ -92,16 +92,16 @@ def test_a_component_that_was_coded_on_its_side():
 @pytest.mark.parametrize("size", [(20, 18, 4, 3), (150, 270, 2, 2), (1, 5, 3, 2), (3, 2, 37, 37)])
 def test_a_component_of_one_codestream_by_its_own_packets(size, options, dtype, monkeypatch):
     """To the bit, whatever precincts, code blocks and groups there are, and no other plane is decoded."""
-    from codec.bitstream import jpeg2000
+    from codec.coders import planes
 
     made = picture(*size)
     made = made.with_pixels(made.pixels.astype(dtype) * (257 if dtype == np.uint16 else 1))
     stream = encode(made, f"si-jpeg2000{options}", **({} if "lossless" in options else {"quality": 40}))
     whole = component_images(decode(stream), "si")
     decoded = []
-    real = jpeg2000.decode_planes
+    real = planes.decode_planes
     monkeypatch.setattr(
-        jpeg2000, "decode_planes", lambda s, shape, *a, **k: decoded.append(shape) or real(s, shape, *a, **k)
+        planes, "decode_planes", lambda s, shape, *a, **k: decoded.append(shape) or real(s, shape, *a, **k)
     )
     k, l, u, v = size
     for place in {(0, 0), (u - 1, v - 1), (u // 2, v - 1)}:

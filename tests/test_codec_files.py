@@ -213,7 +213,11 @@ def structure(**changes):
     ],
 )
 def test_headers_with_a_right_checksum_are_not_believed(coded, tmp_path, change):
-    refused(tmp_path / "forged.ii", first_file(header_of(coded, **change), coded.payload), "forged.ii is damaged")
+    refused(
+        tmp_path / "forged.ii",
+        first_file(header_of(coded, **change), coded.payload),
+        "forged.ii (is damaged|has .* decoded)",
+    )
 
 
 GOOD = [6, 4, 4, 4, False, "uint8", "si-h264", {"qp": 30, "gop": 4}, None]

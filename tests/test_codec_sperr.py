@@ -121,7 +121,7 @@ def test_a_header_that_lies_is_refused(at, value, said):
 def test_what_ends_the_library_ends_not_this_process(monkeypatch):
     """A whole stream of another size makes the library abort."""
     part = sperr_stream.encode_volume(field(), 4.0)
-    monkeypatch.setattr(sperr_stream, "_whole", lambda part, shape: b"\0" * 40)
+    monkeypatch.setattr(sperr_stream, "_with_header", lambda part, shape: b"\0" * 40)
     with pytest.raises(ValueError, match="does not decode"):
         sperr_stream.decode_volumes([part], (6, 20, 30))
 
@@ -137,7 +137,7 @@ def test_the_worker_needs_nothing_of_this_package(tmp_path):
     """It is run by its path, without the folder it lies in, whose modules have names like `header`."""
     volume = field()
     part = sperr_stream.encode_volume(volume, 1.0)
-    stream = sperr_stream._whole(part, volume.shape)
+    stream = sperr_stream._with_header(part, volume.shape)
     request = sperr_worker.HEAD.pack(*volume.shape, 1) + sperr_worker.LENGTH.pack(len(stream)) + stream
     copy = tmp_path / "elsewhere.py"
     copy.write_bytes(Path(sperr_worker.__file__).read_bytes())

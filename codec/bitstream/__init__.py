@@ -1,1 +1,1 @@
-"""Bitstream parsing and framing; nothing here encodes or decodes."""
+"""Parsing and framing of bitstreams."""

@@ -1,7 +1,8 @@
-"""Packets in one payload, for the coders whose packets cannot be told apart in a row.
+"""Table of packets, for streams whose packets have no start codes.
 
-A payload is a table and then the bytes. The table says how many bytes of what the decoder needs first, how many
-packets, and their sizes, each as LEB128 (seven bits a byte, least first, the highest bit set on all but the last).
+A payload is a table, the decoder's parameters and the packets. The table holds the size of the parameters, the number
+of packets and their sizes, each in LEB128 (seven bits per byte, least first, the highest bit set on all but the
+last).
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ from .compact import leb128, read_leb128
 
 
 def pack(first: bytes, packets: Sequence[bytes]) -> bytes:
-    """One payload."""
+    """Return a payload of decoder parameters and packets."""
     table = b"".join(leb128(number) for number in (len(first), len(packets), *map(len, packets)))
     return b"".join([table, first, *packets])
 
 
 def unpack(payload: bytes, count: int) -> tuple[bytes, list[memoryview]]:
-    """What comes first, and the packets.
+    """Return the decoder parameters and the packets of a payload.
 
     Raises
     ------

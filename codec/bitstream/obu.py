@@ -1,4 +1,4 @@
-"""Where the frames of an AV1 stream begin: its open bitstream units (OBUs), as far as their headers."""
+"""Temporal units of AV1 streams, from the headers of open bitstream units (OBUs)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ TEMPORAL_DELIMITER = 2
 
 
 def temporal_units(payload: bytes) -> Iterator[memoryview]:
-    """The parts of a low-overhead stream that each show one frame.
+    """Yield the parts of a low-overhead stream that show one frame each.
 
     Raises
     ------
@@ -21,7 +21,7 @@ def temporal_units(payload: bytes) -> Iterator[memoryview]:
         if at == 0 and kind != TEMPORAL_DELIMITER:
             break
         if kind == TEMPORAL_DELIMITER:
-            if at > start + 2:  # a delimiter of two bytes alone shows nothing; older `si-avif` files have them
+            if at > start + 2:  # older `si-avif` files hold delimiters without a frame
                 yield view[start:at]
             start = at
         extension, has_size = payload[at] >> 2 & 1, payload[at] >> 1 & 1

@@ -1,4 +1,4 @@
-"""Extraction: the coded stream of an ``.ii`` file as a file that other players and viewers open, not coded again.
+"""Extraction of the coded stream of an ``.ii`` file into a container that other programs open, without coding again.
 
 =================  ===========================================================================================
 schemes            files
@@ -13,8 +13,8 @@ schemes            files
 whole pictures     what their payload is: ``.j2k`` or, in its boxes, ``.jp2``; ``.jpg``, ``.jxl``, ``.jph``
 =================  ===========================================================================================
 
-Frames are coded frames in the order of the sequence, 25 a second, which means nothing. Where the encoder needs it, a
-coded frame is larger than its component image or lies on its side; `extract` says so. HEVC streams get a conformance
+Files show the coded frames in the order of the sequence, at an arbitrary 25 frames per second. Some encoders need
+frames larger than the component image, or transposed; `extract` reports this. HEVC streams get a conformance
 window, by which players show the component image alone. Streams of libaom get the matrix that they hold, BT.709.
 """
 
@@ -170,7 +170,7 @@ def _for_others(stream: Sequence) -> tuple[Sequence, tuple[int, int]]:
 
 
 def _demuxer(stream: Sequence) -> Any:
-    """FFmpeg's view of the stream, which describes it to filters and containers."""
+    """Return FFmpeg's demuxer of the stream, whose description filters and containers need."""
     if stream.coder.standard in FOURCC:
         return av.open(io.BytesIO(_ivf(stream)), format="ivf")
     data = b"".join(packet.data for packet in stream.packets)
@@ -233,7 +233,7 @@ def _stream(stream: Sequence, out: Any) -> tuple[Any, Any]:
 
 
 def _display_order(stream: Sequence) -> Many[int]:
-    """When each packet's frame is shown, by asking the decoder."""
+    """Return the display time of each packet's frame, from the decoder."""
     context = open_decoder(stream.coder, stream.film)
     if stream.first:
         context.extradata = stream.first

@@ -1,10 +1,9 @@
-"""The header portion H: what of a stream describes the coding and not the picture (5.11)–(5.15).
+"""Header portion H of a stream (5.11)–(5.15).
 
 The stream is the payload of the ``.ii`` file. The file's own header, some 50 bytes, is no part of H.
 
-Three ways to see it: a black picture at the coarsest quantiser holds little else; a stream taken apart tells the bits
-of its parameter sets and, for H.264, of every slice header; and the number of frames alone says which kind of
-component image can reach the lower rate.
+`floor` measures H by a black picture at the coarsest quantiser. `parts` counts the bits of parameter sets and, for
+H.264, of slice headers. `si_below_ei` and `si_below_ri` compare kinds of component images by their number of frames.
 """
 
 from __future__ import annotations
@@ -27,18 +26,18 @@ Pair = tuple[int, int]
 
 @dataclass(frozen=True, kw_only=True)
 class Parts:
-    """Bits of a stream by what they are for.
+    """Bits of a stream by purpose.
 
     Parameters
     ----------
     framing : int
-        Start codes, unit headers, length fields, delimiters and padding: where one unit ends and the next begins.
+        Start codes, unit headers, length fields, delimiters and padding.
     parameters : int
         Parameter sets, sequence headers.
     messages : int
-        What no decoder needs.
+        Messages that no decoder needs.
     headers : int or None
-        Slice headers; None where they are not taken apart and count as data.
+        Slice headers; None where they are not parsed and count as data.
     data : int
         The rest, macroblock headers and motion included.
     units : int
@@ -59,7 +58,7 @@ class Parts:
 
 
 def parts(coded: Encoded) -> Parts:
-    """Bits of a coded picture's stream by what they are for; they add up to the size of its payload.
+    """Return the bits of a coded picture's stream by purpose; they add up to the size of its payload.
 
     Raises
     ------
@@ -79,7 +78,7 @@ def parts(coded: Encoded) -> Parts:
 
 @dataclass(frozen=True, kw_only=True)
 class Floor:
-    """The least a scheme can write for a structure.
+    """Least bits of a scheme for a structure.
 
     Parameters
     ----------
@@ -111,9 +110,9 @@ class Floor:
 
 
 def floor(scheme: str, lenses: Pair, ei_pixels: Pair) -> Floor:
-    """The header portion of a scheme and structure, measured: a black picture coded at the coarsest quantiser.
+    """Measure the header portion of a scheme and structure: a black picture coded at the coarsest quantiser.
 
-    Schemes without quantiser are asked for their worst quality, or for no bits at all.
+    Schemes without a quantiser use their worst quality, else their least rate.
 
     Raises
     ------
@@ -130,7 +129,7 @@ def floor(scheme: str, lenses: Pair, ei_pixels: Pair) -> Floor:
 
 
 def coarsest(picture: IIPicture, scheme: str) -> Encoded:
-    """A picture at the coarsest quantiser, the worst quality or, if neither can be asked for, the least rate."""
+    """Code a picture at the coarsest quantiser, else the worst quality, else the least rate."""
     check_type("scheme", scheme, str, "a name")
     coder = find(scheme.partition(":")[0])
     if coder.qp_range is not None:
@@ -147,13 +146,13 @@ def frames(kind: str, lenses: Pair, ei_pixels: Pair) -> int:
 
 
 def si_below_ei(lenses: Pair, ei_pixels: Pair) -> bool:
-    """Whether sub-images have the smaller header portion than elementary images: U·V < √(M·N) (5.14)."""
+    """Return whether sub-images have the smaller header portion than elementary images: U·V < √(M·N) (5.14)."""
     (k, l), (u, v) = lenses, ei_pixels
     return u * v < math.sqrt(k * u * l * v)
 
 
 def si_below_ri(lenses: Pair, ei_pixels: Pair) -> bool:
-    """Whether sub-images have the smaller header portion than ray-space images: U < L (5.15).
+    """Return whether sub-images have the smaller header portion than ray-space images: U < L (5.15).
 
     An RI has K rows, by (2.14), so that its frames have U·K pixels against K·L of a sub-image. For square elementary
     images that is U < √N; the dissertation, which gives an RI L rows, has U < √M.
@@ -235,7 +234,7 @@ def _h264(stream: bytes) -> Parts:
 
 
 def _h264_sequence(r: _Bits) -> dict[str, int]:
-    """What of a sequence parameter set the slice headers depend on (7.3.2.1.1)."""
+    """Return the fields of a sequence parameter set that slice headers depend on (7.3.2.1.1)."""
     profile = r.u(8)
     r.u(16)
     r.ue()
@@ -278,7 +277,7 @@ def _skip_scaling_list(r: _Bits, size: int) -> None:
 
 
 def _h264_picture(r: _Bits) -> dict[str, int]:
-    """What of a picture parameter set the slice headers depend on (7.3.2.2)."""
+    """Return the fields of a picture parameter set that slice headers depend on (7.3.2.2)."""
     r.ue()
     r.ue()
     found = {"cabac": r.u(1), "poc_of_field": r.u(1)}

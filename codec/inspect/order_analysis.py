@@ -1,8 +1,7 @@
-"""What an order promises before anything is coded: correlation and residual energy of consecutive frames.
+"""Correlation and residual energy of consecutive frames, for orders of component images.
 
-A frame PVS_j is taken as its R, G and B values all together. Sums run over the picture where it lies, line by line,
-so that nothing of its size is copied; each pair of component images that follow one another in several orders is
-looked at once.
+A frame PVS_j is the vector of all its R, G and B values. Sums run over the picture line by line, without a copy. A
+pair of component images that is consecutive in several orders is summed once.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""Into a pseudo video sequence: its packets, where pictures start that need no other, one frame without the rest.
+"""Random access to component images: packets, groups of pictures, single frames.
 
-A stream coded with ``gop=`` starts afresh every so many frames. To see one component image, a decoder is given the
-packets from the start of its group to the start of the next and nothing else. Where groups start is read from the
-stream itself.
+A stream coded with ``gop=`` has an I picture every so many frames. One component image is decoded from the packets of
+its group of pictures alone. The starts of groups are read from the stream.
 """
 
 from __future__ import annotations
