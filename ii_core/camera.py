@@ -15,10 +15,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checks import Pair, finite, one_of, positive, whole_pair
 from .lattice import LATTICES, Lattice
 from .optics import Bundle, Element, FrontElement, LensModel, Under, chain, unit_disk
 
-Pair = tuple[int, int]
 MOST_ALONG, MOST_PIXELS = 1 << 20, 1 << 34  # of a camera; a hundred times the largest picture in use
 Floats = NDArray[np.float64]
 
@@ -114,12 +114,11 @@ class IICamera:
             )
         else:
             given = self.lens_pitch_mm
-            both = tuple(given) if isinstance(given, Sequence) else (given,) * 2
+            both = tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else (given,) * 2
             if len(both) != 2:
                 raise ValueError(f"lens_pitch_mm is {given!r}: one length, or two, across and down, are needed")
             put("lens_pitch_mm", tuple(positive("lens_pitch_mm", length) for length in both))
-        if self.lattice not in LATTICES:
-            raise ValueError(f"unknown lattice {self.lattice!r}: known are {', '.join(LATTICES)}")
+        one_of(*LATTICES)("lattice", self.lattice)
         for field, count in (("lens_offset_mm", 2), ("origin_mm", 3)):
             put(field, finite(field, getattr(self, field), count))
         model, front = chain(self.optics)
@@ -373,31 +372,3 @@ def _inside(name: str, value: ArrayLike) -> Floats:
     if place.shape[-1:] != (2,) or not ((place >= 0) & (place <= 1)).all():
         raise ValueError(f"{name} must hold positions (right, down), each in [0, 1]")
     return place
-
-
-def positive(name: str, value: Any) -> float:
-    """A length, or a ValueError that names it."""
-    number = float(value)
-    if not 0 < number < math.inf:
-        raise ValueError(f"{name} is {number:g}: a positive length in mm is needed")
-    return number
-
-
-def finite(name: str, value: Any, count: int) -> tuple[Any, ...]:
-    """So many finite numbers, or a ValueError that names them."""
-    numbers = tuple(float(x) for x in value)
-    if len(numbers) != count or not all(map(math.isfinite, numbers)):
-        raise ValueError(f"{name} is {value}: {count} finite numbers are needed")
-    return numbers
-
-
-def whole_pair(name: str, value: Any) -> Pair:
-    """A pair of counts ≥ 1, or a ValueError that names it."""
-    try:
-        a, b = value
-        across, down = int(a), int(b)
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} is {value!r}: two whole numbers are needed") from None
-    if (across, down) != (a, b) or across < 1 or down < 1:
-        raise ValueError(f"{name} is {a}×{b}: two whole numbers of at least 1 are needed")
-    return across, down

@@ -19,30 +19,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import checks
 from .camera import Pair
 from .jit import kernel
 from .picture import IIPicture
 
 KINDS = ("ei", "si", "ri")
 _AXES = {"ei": (0, 2, 1, 3, 4), "si": (1, 3, 0, 2, 4), "ri": (1, 0, 2, 3, 4)}  # of the light field
+KIND = checks.instance(str)
 SMALL = 1 << 20  # bytes below which starting threads costs more than it saves
 
 
+@checks.checked(picture=checks.instance(IIPicture))
 def elementary_images(picture: IIPicture) -> NDArray[Any]:
     """All elementary images, (L, K, V, U, 3), a copy: ``[l, k]`` is EI_{k,l} (2.12)."""
     return component_images(picture, "ei")
 
 
+@checks.checked(picture=checks.instance(IIPicture))
 def sub_images(picture: IIPicture) -> NDArray[Any]:
     """All sub-images, (V, U, L, K, 3), a copy: ``[v, u]`` is SI_{u,v} (2.13)."""
     return component_images(picture, "si")
 
 
+@checks.checked(picture=checks.instance(IIPicture))
 def ray_space_images(picture: IIPicture) -> NDArray[Any]:
     """All ray-space images, (V, L, K, U, 3), a copy: ``[v, l]`` is RI_{v,l} (2.14)."""
     return component_images(picture, "ri")
 
 
+@checks.checked(picture=checks.instance(IIPicture), kind=KIND)
 def component_images(picture: IIPicture, kind: str) -> NDArray[Any]:
     """The stack of one kind, ``"ei"``, ``"si"`` or ``"ri"``; see the function named after it.
 
@@ -56,6 +62,7 @@ def component_images(picture: IIPicture, kind: str) -> NDArray[Any]:
     return _permute(light_field(picture.pixels, picture.lenses, picture.ei_pixels), kind, split=True)
 
 
+@checks.checked(stack=checks.array, kind=KIND)
 def picture_pixels(stack: NDArray[Any], kind: str) -> NDArray[Any]:
     """Picture pixels, (N, M, 3), from a stack of component images: the inverse of `component_images`.
 
@@ -66,7 +73,7 @@ def picture_pixels(stack: NDArray[Any], kind: str) -> NDArray[Any]:
     """
     _check_kind(kind)
     if stack.ndim != 5 or stack.shape[-1] != 3:
-        raise ValueError(f"component images are {stack.shape}: five axes, the last of length 3, are needed")
+        raise ValueError(f"stack of component images is {stack.shape}: five axes, the last of length 3, are needed")
     field = _permute(stack, kind, split=False)
     l, v, k, u, _ = field.shape
     return field.reshape(l * v, k * u, 3)

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import checks
 from .camera import Floats, IICamera, whole_pair
 from .files import image_header, one_line, read_image, read_json, write_image, write_json
 
@@ -38,6 +39,7 @@ Box = list[list[float]]
 Rays = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]
 
 
+@checks.checked(folder=checks.path, cameras=checks.list_of(IICamera), format=checks.text)
 def write_maps(
     cameras: Sequence[IICamera],
     folder: str | os.PathLike[str],
@@ -241,6 +243,7 @@ class MapCamera:
         return L, D, (~dark).astype(np.float64) if dark.any() else None
 
 
+@checks.checked(folder=checks.path)
 def read_maps(folder: str | os.PathLike[str]) -> tuple[MapCamera, ...]:
     """Cameras from a folder of maps, one a pixel array.
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import checks
 from .camera import IICamera, Pair, whole_pair
 from .colour import srgb
 from .files import (
@@ -67,6 +68,8 @@ class IIPicture:
 
     def __post_init__(self) -> None:
         pixels, camera = self.pixels, self.camera
+        if camera is not None:
+            checks.instance(IICamera)("camera", camera)
         if not isinstance(pixels, np.ndarray) or pixels.ndim != 3 or pixels.shape[2] != 3:
             shape = getattr(pixels, "shape", type(pixels).__name__)
             raise ValueError(f"pixels are {shape}: an array of shape (N, M, 3) is needed")
@@ -281,6 +284,7 @@ def codes8(pixels: NDArray[Any]) -> NDArray[np.uint8]:
     return np.rint(255 * srgb(x)).astype(np.uint8)
 
 
+@checks.checked(picture=checks.instance(IIPicture), sigma=checks.number, seed=checks.whole)
 def add_sensor_noise(picture: IIPicture, sigma: float = 1.0, seed: int = 0) -> IIPicture:
     """The picture with monochromatic sensor noise: one N(0, σ) sample per pixel added to R, G and B alike.
 
@@ -297,6 +301,8 @@ def add_sensor_noise(picture: IIPicture, sigma: float = 1.0, seed: int = 0) -> I
     """
     if not 0 <= sigma < np.inf:
         raise ValueError(f"noise sigma is {sigma}: at least 0 is needed")
+    if seed < 0:
+        raise ValueError(f"seed is {seed}: at least 0 is needed")
     source = picture.pixels
     if sigma == 0:
         return picture

@@ -11,6 +11,7 @@ from typing import Any
 
 import assets
 
+from . import checks
 from .camera import IICamera
 from .files import one_line, read_json
 from .optics import Scaling, scaled_chain
@@ -23,6 +24,7 @@ def camera_names() -> dict[str, str]:
     return {path.stem: str(_read(path).get("about", "")) for path in _folder().glob("*.json")}
 
 
+@checks.checked(name=checks.path, scale=checks.number)
 def preset(name: str | os.PathLike[str], *, scale: int = 1) -> IICamera:
     """A camera by name, or from a JSON file.
 
@@ -50,6 +52,7 @@ def preset(name: str | os.PathLike[str], *, scale: int = 1) -> IICamera:
     return cameras[0]
 
 
+@checks.checked(name=checks.path, scale=checks.number)
 def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IICamera, ...]:
     """All cameras of a name: one, or those of a camera array, of moving lenslets or of stacked sensors.
 

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import checks
 from .camera import IICamera, Pair, whole_pair
 from .component import light_field
 from .jit import kernel
@@ -32,6 +33,7 @@ Mask = NDArray[np.bool_]
 BLOCK = 64  # rows of pixels whose owners are sought at a time
 
 
+@checks.checked(picture=checks.instance(IIPicture))
 def smallest_rectangle(picture: IIPicture) -> tuple[IIPicture, Mask]:
     """Around each lens the smallest rectangle of whole pixels, of one size for all, that holds all pixels it owns.
 
@@ -72,6 +74,7 @@ def smallest_rectangle(picture: IIPicture) -> tuple[IIPicture, Mask]:
     return regular, owned.reshape(l * v, k * u)
 
 
+@checks.checked(picture=checks.instance(IIPicture), camera=checks.instance(IICamera))
 def from_smallest_rectangle(picture: IIPicture, camera: IICamera) -> tuple[IIPicture, Mask]:
     """The inverse of `smallest_rectangle`.
 
@@ -112,6 +115,7 @@ def from_smallest_rectangle(picture: IIPicture, camera: IICamera) -> tuple[IIPic
     return IIPicture(pixels, (k, l), camera.ei_pixels, camera, picture.erect), owner >= 0
 
 
+@checks.checked(picture=checks.instance(IIPicture), ei_pixels=checks.whole_pair)
 def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: bool = False) -> tuple[IIPicture, Mask]:
     """Every lens's own cell sampled anew on a grid of U×V points that is centred on the lens.
 

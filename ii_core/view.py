@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import checks
 from .camera import IICamera
 from .component import picture_pixels, sub_images
 from .picture import IIPicture
 
 
+@checks.checked(picture=checks.instance(IIPicture), viewpoint_mm=checks.numbers, interpolation=checks.text)
 def view_image(
     picture: IIPicture, viewpoint_mm: ArrayLike, *, interpolation: str = "linear"
 ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
@@ -66,6 +68,7 @@ def view_image(
     return pixels, valid
 
 
+@checks.checked(camera=checks.instance(IICamera), viewpoint_mm=checks.numbers)
 def view_positions(
     camera: IICamera, viewpoint_mm: ArrayLike, *, erect: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -79,7 +82,7 @@ def view_positions(
     """
     e = np.asarray(viewpoint_mm, dtype=np.float64)
     if e.shape != (3,) or not np.isfinite(e).all():
-        raise ValueError(f"viewpoint {viewpoint_mm!r}: three finite coordinates in mm are needed")
+        raise ValueError(f"viewpoint_mm is {viewpoint_mm!r}: three finite coordinates in mm are needed")
     plane = camera.origin_mm[2] + camera.gap_mm
     if not e[2] < plane:
         raise ValueError(
@@ -96,6 +99,7 @@ def view_positions(
     return x, y
 
 
+@checks.checked(camera=checks.instance(IICamera))
 def five_viewpoints(camera: IICamera) -> dict[str, NDArray[np.float64]]:
     """Front, up, down, left and right: viewpoints from which every lens shows its own elementary image.
 
@@ -129,6 +133,7 @@ def five_viewpoints(camera: IICamera) -> dict[str, NDArray[np.float64]]:
     }
 
 
+@checks.checked(camera=checks.instance(IICamera), across=checks.whole)
 def projection_camera(camera: IICamera, across: int) -> tuple[IICamera, NDArray[np.float64]]:
     """A 2D pinhole camera that sees the scene through the whole of a display, and where it stands.
 
@@ -148,6 +153,8 @@ def projection_camera(camera: IICamera, across: int) -> tuple[IICamera, NDArray[
     pose : ndarray, (4, 4)
         From the pinhole camera's frame to the II-camera's.
     """
+    if across < 1:
+        raise ValueError(f"across is {across}: at least 1 pixel is needed")
     (width, height), gap = camera.size_mm, camera.lenses[0] * camera.gap_mm
     pinhole = IICamera(
         name="projection",
@@ -161,8 +168,11 @@ def projection_camera(camera: IICamera, across: int) -> tuple[IICamera, NDArray[
     return pinhole, pose
 
 
+@checks.checked(camera=checks.instance(IICamera), plane_mm=checks.number)
 def stand_back(camera: IICamera, plane_mm: float = 0.0) -> NDArray[np.float64]:
     """The pose in which a camera of one lens has the plane z = ``plane_mm`` fill its picture, edge to edge."""
+    if not math.isfinite(plane_mm):
+        raise ValueError(f"plane_mm is {plane_mm}: a finite number is needed")
     pose = np.eye(4)
     pose[2, 3] = plane_mm - 2 * camera.gap_mm
     return pose
@@ -173,6 +183,7 @@ def _rotation(tangent: float, half_over_r: float) -> float:
     return math.acos(min(1.0, half_over_r / math.hypot(1, tangent))) - math.atan2(1, tangent)
 
 
+@checks.checked(picture=checks.instance(IIPicture), depth_mm=checks.number)
 def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
     """The scene focused on one plane by shifting and adding sub-images.
 
@@ -188,7 +199,7 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
     """
     camera = camera_of(picture)
     if not camera.gap_mm <= depth_mm < math.inf:
-        raise ValueError(f"depth {depth_mm} mm is not beyond the lens plane at {camera.gap_mm:g} mm")
+        raise ValueError(f"depth_mm {depth_mm:g} is not beyond the lens plane at {camera.gap_mm:g} mm")
     stack = sub_images(picture)
     v_count, u_count, rows, cols, _ = stack.shape
     sign = -1.0 if picture.erect else 1.0
@@ -206,6 +217,7 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
     return (total / np.maximum(weight, 1)).astype(np.float32)
 
 
+@checks.checked(picture=checks.instance(IIPicture))
 def orthoscopic(picture: IIPicture) -> IIPicture:
     """Every elementary image rotated by 180°: pseudoscopic to orthoscopic and back."""
     picture.check_regular()

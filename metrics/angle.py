@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IIPicture
+from ii_core import IIPicture, checks
 from ii_core.colour import CB, CR, KB, KG, KR
 
 from .global_angle import angle_quality
@@ -67,6 +67,7 @@ def angle_ycbcr(pair: PicturePair) -> AngleQuality:
     return _each(pair, measure)
 
 
+@checks.checked(scales=checks.whole)
 def q_angle_ssim(reference: IIPicture, decoded: IIPicture, *, scales: int = 1) -> AngleQuality:
     """SSIM of each sub-image, or with 5 ``scales`` its MS-SSIM.
 

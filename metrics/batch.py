@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ii_core import IIPicture
+from ii_core import IIPicture, checks
 
 from .depth.focus import FocusDepth, depth_from_focus
 from .measure import measure_of
@@ -16,6 +16,7 @@ from .pair import PicturePair
 from .quality import DepthQuality
 
 
+@checks.checked(names=checks.sequence, layers_mm=checks.numbers, method=checks.text)
 def measuring(
     reference: IIPicture,
     names: Sequence[str],
@@ -49,8 +50,8 @@ def measuring(
         If a name is unknown, or the reference does not meet a measure's needs: no camera, not regular, too few
         lenses.
     """
-    if isinstance(names, str | bytes) or not isinstance(names, Sequence):
-        raise TypeError(f"names are {names!r}: a list of measures is needed")
+    if bad := [name for name in names if not isinstance(name, str)]:
+        raise TypeError(f"names hold {bad[0]!r}: text is needed")
     measures = [measure_of(name) for name in names]
     pair = PicturePair(reference, reference, depth=depth, layers_mm=layers_mm, method=method)
     for measure in measures:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IICamera, IIPicture
+from ii_core import IICamera, IIPicture, checks
 from ii_core.component import light_field
 from ii_core.jit import kernel
 
@@ -98,6 +98,7 @@ def angle_quality(values: NDArray[np.float64], picture: IIPicture) -> AngleQuali
     return AngleQuality(values, *axes)
 
 
+@checks.checked(camera=checks.instance(IICamera))
 def angle_axes(camera: IICamera, *, erect: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """In which direction the rays of each column u and row v of an elementary image go.
 

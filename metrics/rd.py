@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IIPicture
+from ii_core import IIPicture, checks
 
 from .global_angle import q_global
 
@@ -33,6 +33,7 @@ class UndefinedDifference(ValueError):
 Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
+@checks.checked(rates_a=checks.numbers, quality_a=checks.numbers, rates_b=checks.numbers, quality_b=checks.numbers)
 def bd_rate(rates_a: ArrayLike, quality_a: ArrayLike, rates_b: ArrayLike, quality_b: ArrayLike) -> float:
     """Mean difference in rate at equal quality of curve b against curve a.
 
@@ -80,6 +81,7 @@ def bd_rate(rates_a: ArrayLike, quality_a: ArrayLike, rates_b: ArrayLike, qualit
     return float(bjontegaard.bd_rate(*a, *b, method=METHOD, require_matching_points=False, min_overlap=0))
 
 
+@checks.checked(rates_a=checks.numbers, quality_a=checks.numbers, rates_b=checks.numbers, quality_b=checks.numbers)
 def bd_psnr(rates_a: ArrayLike, quality_a: ArrayLike, rates_b: ArrayLike, quality_b: ArrayLike) -> float:
     """Mean difference in quality at equal rate of curve b against curve a.
 
@@ -155,6 +157,14 @@ def _check_overlap(
         )
 
 
+@checks.checked(
+    picture=checks.instance(IIPicture),
+    schemes=checks.list_of(str),
+    rates=checks.numbers_in_a_row,
+    encode=checks.callable_,
+    decode=checks.callable_,
+    workers=checks.whole,
+)
 def rate_distortion(
     picture: IIPicture,
     schemes: Sequence[str],

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import cast
 
-from ii_core import IIPicture, five_viewpoints
+from ii_core import IIPicture, checks, five_viewpoints
 from ii_core.view import camera_of
 
 from .global_angle import q_angle
@@ -30,6 +30,7 @@ PLOTS = (
 """The pictures that `plot_all` writes."""
 
 
+@checks.checked(path=checks.path)
 def plot_angle(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike[str]) -> None:
     """Draw Q_angle as a heat map over the directions in which rays go.
 
@@ -54,6 +55,7 @@ def plot_angle(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike
     save(angle_figure(q_angle(reference, decoded)), path)
 
 
+@checks.checked(path=checks.path)
 def plot_error_views(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike[str]) -> None:
     """Draw the error map of each of the five views, all in one scale, up to the 99th percentile.
 
@@ -74,6 +76,7 @@ def plot_error_views(reference: IIPicture, decoded: IIPicture, path: str | os.Pa
     save(error_views_figure({name: error_map(reference, decoded, at) for name, at in views.items()}), path)
 
 
+@checks.checked(quality=checks.instance(DepthQuality), folder=checks.path)
 def plot_all(
     reference: IIPicture, decoded: IIPicture, quality: DepthQuality | None, folder: str | os.PathLike[str]
 ) -> list[Path]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ii_core import IIPicture
+from ii_core import IIPicture, checks
 from ii_core.files import one_line, read_json, write_json
 from ii_core.identity import library_versions
 
@@ -36,6 +36,9 @@ PACKAGES = ("ii_core", "raytrace_ii", "codec", "metrics", "assets", "benchmarks"
 CODE = (*(f":(top){package}" for package in PACKAGES), ":(top)pyproject.toml", ":(top,exclude)benchmarks/results")
 
 
+@checks.checked(
+    path=checks.path, picture_name=checks.text, records=checks.sequence, picture=checks.instance(IIPicture)
+)
 def write_study(
     path: str | os.PathLike[str],
     picture_name: str,
@@ -92,6 +95,7 @@ def picture_json(name: str, picture: IIPicture) -> dict[str, Any]:
     }
 
 
+@checks.checked(path=checks.path)
 def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read what `write_study` wrote; ``["points"]`` equal its records, infinite qualities too.
 
@@ -163,7 +167,7 @@ def check_points(records: Any) -> None:
     """Raise ValueError unless every record has all FIELDS, each of its kind."""
     for i, record in enumerate(records):
         if not isinstance(record, Mapping):
-            raise ValueError(f"points[{i}] is {_short(record)}: an object is needed")
+            raise ValueError(f"points[{i}] of the records is {_short(record)}: an object is needed")
         if missing := set(FIELDS) - set(record):
             raise ValueError(f"points[{i}] has no {', '.join(sorted(missing))}")
         for name, (kind, right) in KINDS.items():
@@ -215,3 +219,13 @@ def _git() -> dict[str, Any] | None:
         return {"commit": git("rev-parse", "HEAD"), "dirty": bool(git("status", "--porcelain", "--", *CODE))}
     except (OSError, subprocess.SubprocessError):
         return None
+
+
+def is_study(name: str, value: Any) -> None:
+    """Rule: a study as `read_study` gives it."""
+    checks.mapping(name, value)
+    points, picture = value.get("points"), value.get("picture")
+    if not isinstance(points, list) or not isinstance(picture, Mapping) or "name" not in picture:
+        raise checks.refuse(name, value, "what read_study gives, with points and picture,")
+    if not all(isinstance(point, Mapping) for point in points):
+        raise checks.refuse(f"{name}['points']", points, "a list of dicts")

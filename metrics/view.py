@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IIPicture, five_viewpoints, view_image
+from ii_core import IIPicture, checks, five_viewpoints, view_image
 from ii_core.view import camera_of
 
 from .global_angle import psnr
@@ -21,6 +21,7 @@ WINDOW = 11  # pixels across the Gaussian of Wang 2004
 LUMA = np.array([0.2989, 0.5870, 0.1140])
 
 
+@checks.checked(viewpoints=checks.mapping)
 def q_view(
     reference: IIPicture,
     decoded: IIPicture,
@@ -92,6 +93,7 @@ def view_pair(pair: PicturePair, viewpoint_mm: ArrayLike) -> tuple[NDArray[Any],
     return a, b, valid
 
 
+@checks.checked(viewpoint_mm=checks.numbers)
 def error_map(reference: IIPicture, decoded: IIPicture, viewpoint_mm: Any) -> NDArray[np.float64]:
     """Return the root of the mean squared error over R, G and B at each pixel of a view image.
 

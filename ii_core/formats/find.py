@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import checks
 from ..camera import Pair
 from ..picture import IIPicture
 from ..view import turned_pixels
@@ -17,6 +18,7 @@ from .quilt import quilt_views
 from .views import folder_views
 
 
+@checks.checked(source=checks.path, grid=checks.whole_pair)
 def find_views(source: str | os.PathLike[str], *, grid: Pair | None = None) -> Views:
     """Return the views of a folder or of a quilt.
 
@@ -40,6 +42,7 @@ def find_views(source: str | os.PathLike[str], *, grid: Pair | None = None) -> V
     return quilt_views(path, grid)
 
 
+@checks.checked(views=checks.instance(Views))
 def picture_of(
     views: Views, *, transposed: bool | None = None, flip_down: bool | None = None, flip_across: bool | None = None
 ) -> tuple[IIPicture, Arrangement]:

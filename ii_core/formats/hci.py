@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import checks
 from ..camera import Pair
 from ..files import atomic_path, one_line, read_text, write_image
 from ..picture import IIPicture
@@ -49,6 +50,7 @@ def _hci_grid(folder: Path, count: int) -> Pair:
     return side, side
 
 
+@checks.checked(picture=checks.instance(IIPicture), folder=checks.path, depth=checks.array)
 def write_hci(picture: IIPicture, folder: str | os.PathLike[str], *, depth: NDArray[Any] | None = None) -> Path:
     """The layout of the HCI benchmark: ``input_Cam000.png`` …, ``parameters.cfg`` and, with depth, a disparity map.
 

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import checks
 from ..camera import Pair
 from ..picture import IIPicture
 from .grid import read_view
 
 
+@checks.checked(path=checks.path, ei_pixels=checks.whole_pair)
 def load_mosaic(path: str | os.PathLike[str], ei_pixels: Pair) -> IIPicture:
     """A lenslet picture of integer pitch, as it is.
 

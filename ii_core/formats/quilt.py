@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import checks
 from ..camera import Pair
 from ..files import write_image
 from ..picture import IIPicture
@@ -72,6 +73,7 @@ def quilt_name(path: str | os.PathLike[str], tiles: Pair, aspect: float) -> Path
     return path.with_name(f"{QUILT.sub('', path.stem)}_qs{tiles[0]}x{tiles[1]}a{aspect:.4g}{path.suffix}")
 
 
+@checks.checked(picture=checks.instance(IIPicture), path=checks.path, row=checks.whole)
 def write_quilt(picture: IIPicture, path: str | os.PathLike[str], *, row: int | None = None) -> Path:
     """One row of views as a quilt, left to right from the bottom left.
 

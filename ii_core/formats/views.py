@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import checks
 from ..camera import Pair
 from ..files import one_line, read_json, write_image, write_json
 from ..picture import IIPicture
@@ -93,6 +94,7 @@ def _written(folder: Path, shape: tuple[int, int]) -> dict[str, Any]:
     return {"structure": structure, "known": WHOLE_ORDER}
 
 
+@checks.checked(picture=checks.instance(IIPicture), folder=checks.path)
 def write_views(picture: IIPicture, folder: str | os.PathLike[str]) -> Path:
     """Every view as ``view_ROW_COLUMN.png`` (``.exr`` of float pictures), and the structure beside them.
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IICamera, IIPicture
+from ii_core import IICamera, IIPicture, checks
 from ii_core.view import camera_of, view_image, view_positions
 
 from ..pair import peak
@@ -65,6 +65,16 @@ class FocusDepth:
     method: str
 
 
+@checks.checked(
+    picture=checks.instance(IIPicture),
+    layers_mm=checks.numbers,
+    method=checks.text,
+    base=checks.numbers,
+    reference=checks.numbers,
+    weights=checks.numbers,
+    interpolation=checks.text,
+    workers=checks.whole,
+)
 def depth_from_focus(
     picture: IIPicture,
     *,

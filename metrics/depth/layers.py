@@ -7,20 +7,21 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IICamera
+from ii_core import IICamera, checks
 
 LAYERS = 250
 ALIKE = 1e-6  # depths that differ by less than this share of them differ by the rounding of a float32 map
 Floats = NDArray[np.float64]
 
 
+@checks.checked(camera=checks.instance(IICamera), count=checks.whole)
 def linear_layers(camera: IICamera, count: int = LAYERS) -> Floats:
     """Layers at z = d·f from the pixel array, d = 1 … count, with f = Λ in the pinhole approximation, mm.
 
     The dissertation's layers. They end at count·Λ, 46 mm in `setup1` and 366 mm at its scale 8.
     """
     if count < 1:
-        raise ValueError(f"{count} layers: at least 1 is needed")
+        raise ValueError(f"count is {count} layers: at least 1 is needed")
     return np.arange(1.0, count + 1) * camera.gap_mm + camera.origin_mm[2]
 
 
@@ -29,15 +30,17 @@ def virtual_viewpoint(camera: IICamera) -> Floats:
     return np.array([0.0, 0.0, camera.gap_mm * (1 - camera.lenses[0])]) + camera.origin_mm
 
 
+@checks.checked(near_mm=checks.number, far_mm=checks.number, count=checks.whole)
 def logarithmic_layers(near_mm: float, far_mm: float, count: int = LAYERS) -> Floats:
     """Layers from near to far in equal ratios, mm."""
     if not 0 < near_mm < far_mm < math.inf:
-        raise ValueError(f"layers from {near_mm} to {far_mm} mm: 0 < near < far is needed")
+        raise ValueError(f"near_mm is {near_mm}, far_mm {far_mm}: 0 < near < far is needed")
     if count < 1:
-        raise ValueError(f"{count} layers: at least 1 is needed")
+        raise ValueError(f"count is {count} layers: at least 1 is needed")
     return np.geomspace(near_mm, far_mm, count)
 
 
+@checks.checked(camera=checks.instance(IICamera), depth_mm=checks.numbers, count=checks.whole)
 def covering_layers(camera: IICamera, depth_mm: ArrayLike | None = None, count: int = LAYERS) -> Floats:
     """Layers in equal ratios over all depths of a picture, mm; `q_depth`'s and `depth_from_focus`'s default.
 

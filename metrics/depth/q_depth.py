@@ -7,17 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IIPicture
+from ii_core import IIPicture, checks
 from ii_core.view import camera_of
 
 from ..global_angle import psnr
 from ..pair import PicturePair
 from ..quality import DepthQuality
-from .focus import FocusDepth, depth_from_focus
+from .focus import METHODS, FocusDepth, depth_from_focus
 from .layers import check_layers, nearest_layer
 from .virtual_camera import seen_pixels
 
 
+@checks.checked(layers_mm=checks.numbers, method=checks.one_of(*METHODS))
 def q_depth(
     reference: IIPicture,
     decoded: IIPicture,

@@ -10,14 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core import checks
+
 from ..depth.layers import logarithmic
 from ..quality import told_outside
+from ..study import is_study
 from .rd_chart import COLOURS, LINES, MARKERS, check_suffix, edges, new_figure, save, set_rate_axis
 
 EXTREMES = ("q_depth_min", "q_depth_mean", "q_depth_max")
 Floats = NDArray[np.float64]
 
 
+@checks.checked(study=is_study, scheme=checks.text)
 def depth_over_rate(study: Mapping[str, Any], scheme: str) -> tuple[Floats, Floats, Floats]:
     """Q_depth of a scheme as a function of rate and depth.
 
@@ -56,6 +60,7 @@ def depth_over_rate(study: Mapping[str, Any], scheme: str) -> tuple[Floats, Floa
     return np.array(rates), layers, np.array([points[rate]["q_depth"] for rate in rates], np.float64)
 
 
+@checks.checked(study=is_study, path=checks.path)
 def depth_rate_chart(study: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
     """Draw Q_depth(r): for every scheme an image over rate and depth, and below it min, mean and max over rate.
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IIPicture
+from ii_core import IIPicture, checks
 
 from ..depth.virtual_camera import view_of
 from ..pair import peak
@@ -37,6 +37,7 @@ def error_views_figure(shares: Mapping[str, Floats]) -> Any:
     return figure
 
 
+@checks.checked(reference=checks.instance(IIPicture), quality=checks.instance(DepthQuality), path=checks.path)
 def plot_error_layers(reference: IIPicture, quality: DepthQuality, path: str | os.PathLike[str]) -> None:
     """Draw where in each depth layer the errors are: a panel a layer, over the virtual camera's view in grey.
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IIPicture, five_viewpoints, view_image
+from ii_core import IIPicture, checks, five_viewpoints, view_image
 from ii_core.colour import srgb
 from ii_core.view import camera_of
 
@@ -58,6 +58,7 @@ def angle_figure(quality: AngleQuality) -> Any:
     return figure
 
 
+@checks.checked(quality=checks.instance(DepthQuality), path=checks.path)
 def plot_depth(quality: DepthQuality, path: str | os.PathLike[str]) -> None:
     """Draw Q_depth over depth, and below it how many pixels of the view each layer has.
 
@@ -128,6 +129,7 @@ def _squared(quality: DepthQuality) -> NDArray[np.float64]:
     return quality.counts[held] / 10 ** (quality.values[held] / 10)
 
 
+@checks.checked(path=checks.path)
 def plot_views(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike[str]) -> None:
     """Draw the five view images of both pictures, and their difference, amplified.
 
@@ -178,6 +180,7 @@ def _views_figure(reference: IIPicture, decoded: IIPicture) -> Any:
     return figure
 
 
+@checks.checked(picture=checks.instance(IIPicture), path=checks.path)
 def plot_pair(picture: IIPicture, path: str | os.PathLike[str]) -> None:
     """Draw a cross-eyed pair: the right eye's view on the left, the left eye's on the right.
 

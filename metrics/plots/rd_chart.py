@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core import checks
 from ii_core.files import atomic_path
 
 from ..measure import measure_of
+from ..study import is_study
 from .tables import check_measured
 
 # Okabe and Ito's colours, told apart by colour-blind readers too; their yellow is too pale on white.
@@ -24,6 +26,7 @@ LINES = ("-", "--", "-.")
 SUFFIXES = (".png", ".pdf", ".svg")
 
 
+@checks.checked(study=is_study, path=checks.path, measure=checks.text)
 def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str], *, measure: str = "q_global") -> None:
     """Draw a quality over rate, a line a scheme.
 

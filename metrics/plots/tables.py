@@ -8,15 +8,17 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ii_core import checks
 from ii_core.files import atomic_path
 
 from ..measure import Measure, measure_of
 from ..rd import UndefinedDifference, bd_psnr, bd_rate
-from ..study import FIELDS, check_points, measures_of
+from ..study import FIELDS, check_points, is_study, measures_of
 
 Points = list[tuple[float, float]]
 
 
+@checks.checked(path=checks.path, records=checks.sequence)
 def write_csv(path: str | os.PathLike[str], records: Sequence[Mapping[str, Any]]) -> None:
     """Write records as a table, one row a point, for spreadsheets. Qualities of single layers are left to the JSON.
 
@@ -38,6 +40,7 @@ def write_csv(path: str | os.PathLike[str], records: Sequence[Mapping[str, Any]]
             writer.writerow({**record, "options": options})
 
 
+@checks.checked(study=is_study, anchor=checks.text, measure=checks.text)
 def summary_table(
     study: Mapping[str, Any], *, anchor: str = "jpeg2000", measure: str = "q_global"
 ) -> list[dict[str, str]]:
@@ -160,6 +163,7 @@ def latex_text(text: str) -> str:
     return "".join(LATEX.get(letter, letter) for letter in text)
 
 
+@checks.checked(path=checks.path, rows=checks.list_of(Mapping), caption=checks.text)
 def write_latex(path: str | os.PathLike[str], rows: Sequence[Mapping[str, str]], caption: str = "") -> None:
     """Write rows of text as a LaTeX table, of nothing but what LaTeX itself has.
 

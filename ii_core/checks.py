@@ -1,0 +1,191 @@
+"""Checks of arguments: rules by kind of value, and a decorator that applies them; errors name the argument."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
+from typing import Any, TypeVar
+
+import numpy as np
+
+Pair = tuple[int, int]
+Rule = Callable[[str, Any], Any]  # raises TypeError or ValueError that names the argument
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def checked(**rules: Rule) -> Callable[[Function], Function]:
+    """Decorate a public function: check each named argument by its rule before the call.
+
+    An argument equal to its default, None say, is not checked. Parameters of wrong values, as opposed to wrong types,
+    remain the function's own to refuse.
+    """
+
+    def decorate(function: Function) -> Function:
+        signature = inspect.signature(function)
+        defaults = {name: parameter.default for name, parameter in signature.parameters.items()}
+
+        @wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            for name, value in signature.bind(*args, **kwargs).arguments.items():
+                if name in rules and value is not defaults[name]:
+                    rules[name](name, value)
+            return function(*args, **kwargs)
+
+        return call  # type: ignore[return-value]
+
+    return decorate
+
+
+def _short(value: Any) -> str:
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of more digits than Python prints
+        text = "an integer of thousands of digits"
+    return text if len(text) <= 60 else f"{text[:59]}…"
+
+
+def refuse(name: str, value: Any, needed: str) -> TypeError:
+    """Return the TypeError that says what an argument is and what is needed."""
+    return TypeError(f"{name} is {_short(value)}, a {type(value).__name__}: {needed} is needed")
+
+
+def instance(*kinds: type) -> Rule:
+    """Rule: an object of one of these classes."""
+    names = " or ".join(kind.__name__ for kind in kinds)
+
+    def rule(name: str, value: Any) -> None:
+        if not isinstance(value, kinds):
+            raise TypeError(f"{name} is a {type(value).__name__}: an {names} is needed")
+
+    return rule
+
+
+def path(name: str, value: Any) -> None:
+    """Rule: text, or a path object."""
+    if not isinstance(value, str | os.PathLike) or "\0" in os.fspath(value):
+        raise refuse(name, value, "a path")
+
+
+def text(name: str, value: Any) -> None:
+    """Rule: text."""
+    if not isinstance(value, str):
+        raise refuse(name, value, "text")
+
+
+def one_of(*known: str) -> Rule:
+    """Rule: one of these names."""
+
+    def rule(name: str, value: Any) -> None:
+        if not isinstance(value, str) or value not in known:
+            raise ValueError(f"unknown {name} {_short(value)}: known are {', '.join(known)}")
+
+    return rule
+
+
+def number(name: str, value: Any) -> float:
+    """Rule: a real number that a float can hold; return it."""
+    if not isinstance(value, int | float | np.integer | np.floating) and not (
+        isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu"
+    ):
+        raise refuse(name, value, "a number")
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{name} is too large: a number below {np.finfo(float).max:.3g} is needed") from None
+
+
+def whole(name: str, value: Any) -> int:
+    """Rule: a whole number of 64 bits; return it."""
+    if isinstance(value, float) and not value.is_integer():
+        raise ValueError(f"{name} is {value:g}: a whole number is needed")
+    if not isinstance(value, int | np.integer):
+        raise refuse(name, value, "a whole number")
+    if not -(2**63) <= value < 2**63:
+        raise ValueError(f"{name} is too large: a whole number of 64 bits is needed")
+    return int(value)
+
+
+def numbers(name: str, value: Any) -> None:
+    """Rule: an array of real numbers, or what numpy makes one of."""
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise TypeError(f"{name} is {_short(value)}, no array of numbers: {error}") from None
+    if array.dtype.kind not in "bfiu":
+        raise refuse(name, value, "an array of numbers")
+
+
+def numbers_in_a_row(name: str, value: Any) -> None:
+    """Rule: numbers, one after another."""
+    numbers(name, value)
+    if np.ndim(value) != 1:
+        raise refuse(name, value, "a list of numbers")
+
+
+def array(name: str, value: Any) -> None:
+    """Rule: a numpy array of numbers."""
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "bfiu":
+        raise refuse(name, value, "an array of numbers")
+
+
+def sequence(name: str, value: Any) -> None:
+    """Rule: a list, but no text."""
+    if isinstance(value, str | bytes) or not isinstance(value, Sequence):
+        raise refuse(name, value, "a list")
+
+
+def list_of(*kinds: type) -> Rule:
+    """Rule: a list, not empty, of objects of these classes."""
+    names = " or ".join(kind.__name__ for kind in kinds)
+
+    def rule(name: str, value: Any) -> None:
+        sequence(name, value)
+        if not value or not all(isinstance(item, kinds) for item in value):
+            raise refuse(name, value, f"a list of one or more {names}")
+
+    return rule
+
+
+def mapping(name: str, value: Any) -> None:
+    """Rule: a dict."""
+    if not isinstance(value, Mapping):
+        raise refuse(name, value, "a dict")
+
+
+def callable_(name: str, value: Any) -> None:
+    """Rule: a function."""
+    if not callable(value):
+        raise refuse(name, value, "a function")
+
+
+def positive(name: str, value: Any) -> float:
+    """Return a positive, finite length in mm; TypeError or ValueError that names it otherwise."""
+    given = number(name, value)
+    if not 0 < given < math.inf:
+        raise ValueError(f"{name} is {given:g}: a positive length in mm is needed")
+    return given
+
+
+def finite(name: str, value: Any, count: int) -> tuple[Any, ...]:
+    """Return so many finite numbers; TypeError or ValueError that names them otherwise."""
+    if isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray):
+        raise refuse(name, value, f"{count} finite numbers")
+    found = tuple(number(name, x) for x in value)
+    if len(found) != count or not all(map(math.isfinite, found)):
+        raise ValueError(f"{name} is {value}: {count} finite numbers are needed")
+    return found
+
+
+def whole_pair(name: str, value: Any) -> Pair:
+    """Return a pair of counts ≥ 1, across and down; ValueError that names it otherwise."""
+    try:
+        a, b = value
+        across, down = int(a), int(b)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} is {_short(value)}: two whole numbers are needed") from None
+    if (across, down) != (a, b) or across < 1 or down < 1:
+        raise ValueError(f"{name} is {a}×{b}: two whole numbers of at least 1 are needed")
+    return across, down
