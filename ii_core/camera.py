@@ -19,6 +19,7 @@ from .checks import Pair, finite, one_of, positive, whole_pair
 from .lattice import LATTICES, Lattice
 from .optics import Bundle, Element, FrontElement, LensModel, Under, chain, unit_disk
 
+LEAST_PITCH = 1e-6  # pixels from lens to lens: shorter ones are rounded to nothing
 MOST_ALONG, MOST_PIXELS = 1 << 20, 1 << 34  # of a camera; a hundred times the largest picture in use
 Floats = NDArray[np.float64]
 
@@ -118,6 +119,9 @@ class IICamera:
             if len(both) != 2:
                 raise ValueError(f"lens_pitch_mm is {given!r}: one length, or two, across and down, are needed")
             put("lens_pitch_mm", tuple(positive("lens_pitch_mm", length) for length in both))
+        if min(self.lens_pitch_mm) < LEAST_PITCH * self.pixel_pitch_mm:
+            pitch = min(self.lens_pitch_mm)
+            raise ValueError(f"lens_pitch_mm is {pitch:g}: at least {LEAST_PITCH:g} of pixel_pitch_mm is needed")
         one_of(*LATTICES)("lattice", self.lattice)
         for field, count in (("lens_offset_mm", 2), ("origin_mm", 3)):
             put(field, finite(field, getattr(self, field), count))

@@ -71,6 +71,15 @@ def test_long_values_are_not_quoted_whole(value, tmp_path):
     assert "accessors" in refusal(read_model, tmp_path / "a.gltf")
 
 
+def test_pixels_far_larger_than_lenses(tmp_path):
+    """The pitch in pixels was rounded to zero, by which rays were divided."""
+    camera = {**seeds.camera_trees()["hexagonal"], "pixel_pitch_mm": 6.1e27}
+    (tmp_path / "camera.json").write_text(json.dumps(camera))
+    assert "lens_pitch_mm is 0.0845241: at least 1e-06 of pixel_pitch_mm" in refusal(
+        preset_cameras, tmp_path / "camera.json"
+    )
+
+
 def test_one_line_keeps_both_ends():
     assert one_line("a\n b\t c") == "a b c"
     line = one_line("begin " + "x" * 5000 + " end")
@@ -161,5 +170,11 @@ def test_films_have_a_stated_limit():
 
 def test_cases_that_failed(tmp_path):
     """By their numbers, as long as the makers of cases stay as they are; the tests above hold anyhow."""
-    for name, seed, number in ((".ii header", 3, 16), ("study", 3, 650), ("study", 3, 1202), ("manifest", 3, 10)):
+    for name, seed, number in (
+        (".ii header", 3, 16),
+        ("study", 3, 650),
+        ("study", 3, 1202),
+        ("manifest", 3, 10),
+        ("camera", 0, 204),
+    ):
         assert outcome(case(name, seed, number, tmp_path)) in ("object", "refused")
