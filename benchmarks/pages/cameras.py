@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import json
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -59,16 +60,21 @@ def main() -> None:
 
 INTRODUCTION = """# Cameras
 
-Every camera here is nothing but a location and a direction for every pixel. From left to right: the locations L
-over the whole array and the directions D of a few lenses, x, y and z as red, green and blue; the same few lenses of
-*Apples* rendered through them; and what a viewer sees from the front. `raytrace-ii camera NAME -o dir/` stores L and
-D as pictures, `raytrace-ii camera NAME --report` says what the camera can do. Made by
-`python -m benchmarks run cameras`, at an eighth of the lenses each way.
+A camera is a location and a direction for every pixel. Each strip shows, from left to right:
+
+1. the locations L over the whole array, with x, y and z as red, green and blue;
+2. the directions D of a few lenses, in the same colours;
+3. the same few lenses of *Apples*, rendered through L and D;
+4. the view of a viewer in front of the display.
+
+`raytrace-ii camera NAME -o dir/` stores L and D as pictures. `raytrace-ii camera NAME --report`
+prints properties and limits of a camera. The pictures have an eighth of the lenses each way
+(`python -m benchmarks run cameras`). The [glossary](glossary.md) lists the terms.
 """
 
 
 def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
-    """Three lines of text and the strip of pictures."""
+    """Return heading, text, properties and the strip of pictures."""
     first = full[0]
     u, v = first.ei_pixels
     chain = " → ".join(e.kind for e in first.optics)
@@ -82,7 +88,8 @@ def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
     sheet = json.loads((CAMERAS / f"{name}.json").read_text(encoding="utf-8"))
     about = sheet["about"][:1].upper() + sheet["about"][1:]
     picture = f"![L, D, detail and view of {name}](images/cameras/{name}.png)"
-    return f"\n## {name}\n\n{about}. {sheet['notes']}\n\n{facts}.\n\n{picture}\n"
+    text, facts = (fill(text, 100, break_on_hyphens=False) for text in (f"{about}. {sheet['notes']}", f"{facts}."))
+    return f"\n## {name}\n\n{text}\n\n{facts}\n\n{picture}\n"
 
 
 def all_scenes() -> NDArray[np.uint8]:
@@ -103,8 +110,9 @@ def precision() -> str:
     rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
     lines = [
         "\n## Stored as pictures: which format is enough\n",
-        "Angle between stored and true direction, distance between stored and true location, and PSNR of the picture "
-        "rendered from the maps against that from float maps, at a quarter of the lenses each way:\n",
+        "Errors of maps stored as pictures, at a quarter of the lenses each way: angle between stored and",
+        "true direction, distance between stored and true location, and PSNR of the picture against that of",
+        "float maps.\n",
         "| camera | format | bytes per ray | angle max · rms | location max · rms | PSNR apples · cuboid |",
         "|---|---|---|---|---|---|",
     ]
@@ -116,7 +124,7 @@ def precision() -> str:
             f"| {figure(row['angle_max_urad'])} · {figure(row['angle_rms_urad'])} µrad "
             f"| {figure(row['place_max_um'])} · {figure(row['place_rms_um'])} µm | {shown} |"
         )
-    return "\n".join([*lines, "", origin(rows), VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""])
+    return "\n".join([*lines, "", origin(rows), "", VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""])
 
 
 def in_scene() -> str:
@@ -142,10 +150,12 @@ def in_scene() -> str:
 IN_SCENE = """
 ## Against a camera of glass inside the scene
 
-The other way to simulate a camera is to put its lenses into the scene as bodies of glass and to start rays at the
-pixels. PSNR of that picture against the one through `spherical`'s L and D, which know no Fresnel loss, no stray light
-in the glass and no shadow of the camera on the scene: where those are the same, the faces of the lenses' meshes are
-what is left, 6 dB for every doubling. L and D take a third of the time or less, and exchange freely.
+A second way to simulate a camera is to model its lenses as bodies of glass in the scene, and to
+start rays at the pixels. The table gives PSNR of that picture against the picture through L and D
+of `spherical`. L and D do not include Fresnel losses, stray light in the glass, and the shadow of
+the camera on the scene. Without these effects, the remaining difference comes from the faces of the
+lenses' meshes: 6 dB for every doubling. L and D take at most a third of the time, and can be
+exchanged as files.
 """
 
 
@@ -154,11 +164,11 @@ def figure(value: float) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.2g}" if value > 1e-6 else "0"
 
 
-VERDICT = """**PNG-16** is enough for every picture that gets a sensor's noise, which alone leaves 47.5 dB: pixels
-change only where a ray grazes an edge. **EXR** is for pictures that must agree to the bit. **PNG-8** and **RGBE** are
-for looking at a camera, not for rendering with it: an error of a milliradian moves a point 100 mm away by a tenth of
-a millimetre, a whole lens of `setup1`. RGBE is the worst of all in spite of its bytes, for its eight bits are
-relative to the largest of the three numbers."""
+VERDICT = """**PNG-16** is sufficient for all pictures with sensor noise, which alone gives 47.5 dB: pixels
+change only where a ray grazes an edge. **EXR** is for pictures that must agree to the bit.
+**PNG-8** and **RGBE** are for viewing a camera, not for rendering. An error of a milliradian moves
+a point 100 mm away by a tenth of a millimetre, a whole lens of `setup1`. RGBE is the worst format
+in spite of its size, because its eight bits are relative to the largest of the three numbers."""
 
 
 def strip(scene: Scene, camera: IICamera, name: str) -> NDArray[np.uint8]:
