@@ -116,12 +116,13 @@ def test_round_trip(scheme):
     assert decoded.pixels.flags.writeable
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+SIXTEEN_BITS = [scheme for scheme in SCHEMES if "uint16" in find(scheme).dtypes]
+
+
+@pytest.mark.parametrize("scheme", SIXTEEN_BITS)
 def test_sixteen_bits_come_back(scheme):
     """To the bit where a scheme, or an option of it, is lossless."""
     coder = find(scheme)
-    if "uint16" not in coder.dtypes:
-        return
     pixels = textured(16, 8, 4, 4).pixels.astype(np.uint16)
     rng = np.random.default_rng(2)
     picture = IIPicture(pixels * 256 + rng.integers(0, 256, pixels.shape, np.uint16), (16, 8), (4, 4))
@@ -210,14 +211,14 @@ def test_an_unreachable_rate_gives_the_nearest_and_says_so(scheme, bpp, side):
     decode(coded)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("dtype", ["uint16", "float32"])
+@pytest.mark.parametrize(
+    ("scheme", "dtype"), [(s, t) for s in SCHEMES for t in ("uint16", "float32") if t not in find(s).dtypes]
+)
 def test_pixel_types_it_does_not_take_are_refused(scheme, dtype):
     picture = IIPicture(np.zeros((4, 4, 3), dtype), (2, 2), (2, 2))
-    takes = find(scheme).dtypes
-    if dtype not in takes:
-        with pytest.raises(ValueError, match=f"pixels are {dtype}: scheme {scheme} takes {', '.join(takes)}"):
-            encode(picture, scheme, **medium(scheme))
+    takes = ", ".join(find(scheme).dtypes)
+    with pytest.raises(ValueError, match=f"pixels are {dtype}: scheme {scheme} takes {takes}"):
+        encode(picture, scheme, **medium(scheme))
 
 
 @pytest.mark.parametrize("scheme", RATED)

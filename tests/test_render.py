@@ -85,9 +85,8 @@ def test_same_bits_for_any_workers_and_tiles(samples, hall_scene, monkeypatch):
         assert_same(whole, render(hall_scene, SMALL, workers=2, **options))
 
 
-def test_tiles_cover_every_pixel_once(monkeypatch):
+def test_tiles_cover_every_pixel_once():
     for tile in (1, 7, 24, 25, 100, 10**6):
-        monkeypatch.setattr(job, "TILE_RAYS", tile)
         seen = np.zeros((16, 24), int)
         for rows, cols in tiles(ONE_LENS, tile):
             seen[rows, cols] += 1
