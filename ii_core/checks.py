@@ -138,13 +138,13 @@ def sequence(name: str, value: Any) -> None:
 
 
 def list_of(*kinds: type) -> Rule:
-    """Rule: a list, not empty, of objects of these classes."""
+    """Rule: a list of objects of these classes; it may be empty."""
     names = " or ".join(kind.__name__ for kind in kinds)
 
     def rule(name: str, value: Any) -> None:
         sequence(name, value)
-        if not value or not all(isinstance(item, kinds) for item in value):
-            raise refuse(name, value, f"a list of one or more {names}")
+        if not all(isinstance(item, kinds) for item in value):
+            raise refuse(name, value, f"a list of {names}")
 
     return rule
 

@@ -73,6 +73,8 @@ def write_maps(
     ----------
     Olsson 2008, (3.11), (3.12).
     """
+    if not cameras:
+        raise ValueError("cameras is empty: at least one is needed")
     check_format(format)
     first = cameras[0]
     if any((c.pixels, c.lenses) != (first.pixels, first.lenses) for c in cameras):
