@@ -238,7 +238,7 @@ def test_a_failing_coder_says_where_and_stops_the_rest():
 )
 def test_nonsense_is_refused_before_coding(schemes, rates, workers, message):
     with pytest.raises(ValueError, match=message):
-        rate_distortion(picture(), schemes, rates, encode=None, decode=None, workers=workers)
+        rate_distortion(picture(), schemes, rates, encode=len, decode=len, workers=workers)
 
 
 def write_study(path, records, **options):
