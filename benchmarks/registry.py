@@ -237,7 +237,12 @@ BENCHMARKS = {
             ),
             tables="benchmarks.speed.needs",
         ),
-        Benchmark(module="benchmarks.speed.texture_filter", records="texture_filter.jsonl"),
+        Benchmark(
+            module="benchmarks.speed.texture_filter",
+            records="texture_filter.jsonl",
+            writes=("docs/speed_accuracy.md", f"{IMAGES}/texture_filter.*"),
+            tables="benchmarks.speed.texture_filter",
+        ),
         Benchmark(
             module="benchmarks.speed.metrics_speed",
             records="metrics_speed.jsonl",
