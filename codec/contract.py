@@ -296,7 +296,7 @@ def checked_goal(coder: Coder, options: Options, bpp: Any, qp: Any, quality: Any
         takes = {}
     known = [name for name, taken in takes.items() if taken]
     if foreign := set(given) - set(known):
-        instead = f"give {' or '.join(known)} instead" if known else "it is lossless, leave it out"
+        instead = f"give {' or '.join(known)} instead" if known else "it codes lossless, leave it out"
         raise ValueError(f"scheme {coder.name} takes no {', '.join(sorted(foreign))} here: {instead}")
     if len(given) != (1 if known else 0):
         exactly = known[0] if len(known) == 1 else f"exactly one of {' and '.join(known)}"

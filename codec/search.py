@@ -93,7 +93,7 @@ class Axis:
 
 def within(size: float, target: float) -> bool:
     """Whether a size meets a target."""
-    return abs(size - target) <= TOLERANCE * target  # a file may state a target of 0
+    return target > 0 and abs(size / target - 1) <= TOLERANCE  # a file may state 0; infinity is never met
 
 
 def size_miss(run: Run, target: float) -> float:
