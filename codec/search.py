@@ -102,8 +102,8 @@ def size_miss(run: Run, target: float) -> float:
 
 
 def met(miss: float) -> bool:
-    """Whether a miss is within `TOLERANCE`."""
-    return math.log2(1 - TOLERANCE) <= miss <= math.log2(1 + TOLERANCE)
+    """Whether a miss is within `TOLERANCE`, less what logarithms round, so that `within` agrees."""
+    return math.log2(1 - TOLERANCE) + 1e-12 < miss < math.log2(1 + TOLERANCE) - 1e-12
 
 
 def trials(
