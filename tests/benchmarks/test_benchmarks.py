@@ -1,0 +1,102 @@
+"""Registry and command line of the benchmarks: none is left out, files are where it says, bad arguments are named."""
+
+import importlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks import __main__ as command
+from benchmarks.registry import BENCHMARKS, entry, newest, source
+from benchmarks.study.scripts import SCRIPTS
+
+ROOT = Path(__file__).parents[2]
+# Modules with a ``main`` that others start: a process of `ratios`.
+HELPERS = {"benchmarks.__main__"}
+
+
+def test_every_program_is_registered_once():
+    programs = {
+        path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".")
+        for path in (ROOT / "benchmarks").rglob("*.py")
+        if "\ndef main(" in path.read_text(encoding="utf-8")
+    }
+    assert {entry(one.module) for one in BENCHMARKS.values()} == programs - HELPERS
+    for one in BENCHMARKS.values():
+        assert callable(importlib.import_module(entry(one.module)).main) and one.summary()
+
+
+def test_every_file_of_results_and_every_picture_has_one_owner():
+    for folder, endings in (("benchmarks/results", {".json", ".jsonl"}), ("docs", {".png", ".jpg", ".webp", ".svg"})):
+        owned = [
+            path.relative_to(ROOT).as_posix()
+            for one in BENCHMARKS.values()
+            for pattern in (*one.writes, f"benchmarks/results/{one.records}")
+            if pattern.startswith(folder)
+            for path in ROOT.glob(pattern)
+            if path.suffix in endings
+        ]
+        there = [p.relative_to(ROOT).as_posix() for p in (ROOT / folder).rglob("*") if p.suffix in endings]
+        assert sorted(owned) == sorted(there)
+
+
+@pytest.mark.parametrize("one", [one for one in BENCHMARKS.values() if one.tables], ids=lambda one: one.name)
+def test_pages_are_those_of_the_tables(one):
+    pages = {page for page, _ in importlib.import_module(one.tables).tables()}
+    assert pages == {pattern for pattern in one.writes if pattern.endswith(".md")}
+
+
+def test_cost_is_that_of_the_newest_records(monkeypatch, tmp_path):
+    monkeypatch.setattr("benchmarks.registry.RESULTS", tmp_path)
+    rows = [
+        {"key": {"row": 1}, "cpu_seconds": 999.0, "result": {}},
+        {"key": {"row": 1}, "seconds": 99.0, "cpu_seconds": 30.0, "result": {}},
+        {"key": {"row": 2}, "seconds": 60.0, "result": {}},
+    ]
+    (tmp_path / "orders.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert len(newest(tmp_path / "orders.jsonl")) == 2
+    assert BENCHMARKS["orders"].minutes() == (1.5, False)
+    rows.append({"key": {"row": 3}, "seconds": None, "result": {"encode_seconds": 30.0}})
+    (tmp_path / "orders.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert BENCHMARKS["orders"].minutes() == (2.0, True)
+    assert "at least 2.0 min" in command.description(BENCHMARKS["orders"])
+
+
+def test_list_names_all_and_imports_none():
+    script = "import sys, benchmarks.__main__ as m; m.main(['list']); sys.exit('matplotlib' in sys.modules)"
+    run = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
+    assert run.returncode == 0
+    heads = [line.split(" (")[0] for line in run.stdout.splitlines() if not line.startswith(" ")]
+    assert heads == list(BENCHMARKS)
+
+
+def test_run_hands_options_on(monkeypatch):
+    seen = []
+    monkeypatch.setattr("benchmarks.coding.orders.main", lambda: seen.append(sys.argv))
+    monkeypatch.setattr("benchmarks.stability.__main__.main", lambda: seen.append(sys.argv))
+    command.main(["run", "orders", "--scale", "8"])
+    command.main(["run", "stability", "--", "bd_dents"])
+    command.main(["run", "orders", "stability"])
+    assert [words[1:] for words in seen] == [["--scale", "8"], ["bd_dents"], [], []]
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["run", "coder"], "no benchmark 'coder'"),
+        (["run"], "run needs a name"),
+        (["run", "orders", "cost", "--scale", "8"], "need a single name"),
+        (["list", "orders", "--scale"], "list takes names alone"),
+    ],
+)
+def test_wrong_arguments_are_named(words, says, capsys):
+    with pytest.raises(SystemExit) as stop:
+        command.main(words)
+    assert stop.value.code == 2 and says in capsys.readouterr().err
+
+
+def test_scripts_of_the_study_are_registered():
+    assert {name for name, *_ in SCRIPTS} <= {*BENCHMARKS, "demo"}
+    assert all(source(one.module).is_file() for one in BENCHMARKS.values())

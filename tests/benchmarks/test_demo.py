@@ -1,0 +1,58 @@
+"""The main job, small, and the README's example: both as a user runs them."""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.coding import disparity
+from examples import demo
+from ii_core import IIPicture, preset
+from ii_core.files import read_image
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_the_demo_leaves_everything_it_promises(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["demo", "--scale", "16", "--scenes", "apples", "-o", str(tmp_path)])
+    demo.main()
+    assert "apples" in capsys.readouterr().out
+    picture = IIPicture.load(tmp_path / "apples.png")
+    assert picture.lenses == (32, 16) and picture.ei_pixels == (16, 16)
+    views = [f"view_{name}" for name in ("front", "up", "down", "left", "right")]
+    for name in ("depth", "detail", "sub_images", "projection", "rd", *views):
+        assert read_image(tmp_path / f"apples_{name}.png").std() > 1, name
+    points = json.loads((tmp_path / "apples_rd.json").read_text())["points"]
+    assert [(p["scheme"], p["target_bpp"]) for p in points] == [(s, r) for s in demo.SCHEMES for r in demo.RATES]
+    # elementary images cost ten bytes a frame before they say anything: 10·8/256 bpp
+    floored = [p for p in points if p["scheme"] == "ei-h264" and p["target_bpp"] < 0.3]
+    assert floored and not any(p["reached"] for p in floored)
+    best = {s: max(p["q_global"] for p in points if p["scheme"] == s) for s in demo.SCHEMES}
+    assert best["si-h264"] > best["jpeg2000"] + 3  # several dB, even with so few lenses
+
+
+def test_the_readme_example_runs(tmp_path, monkeypatch, capsys):
+    code = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    assert code is not None
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(compile(code[1], "README.md", "exec"), names)
+    assert re.search(r"bpp: \d\d\.\d dB", capsys.readouterr().out)
+    assert names["L"].shape == names["D"].shape == (16, 64, 3)
+    assert names["shot"].depth.shape == names["shot"].object_id.shape == names["shot"].picture.pixels.shape[:2]
+    assert names["shot"].normal.shape == names["shot"].picture.pixels.shape
+    assert names["vi"].shape == (32, 64, 3) and names["valid"].all()
+    assert names["decoded"].pixels.shape == names["shot"].picture.pixels.shape
+
+
+def test_disparity_between_sub_images():
+    camera = preset("setup1", scale=1)
+    # by hand: 10 mm behind the lenses, 2·tan(α/2)/(U·δL) = 0.342 px per mm
+    moved = disparity.disparity(camera, np.float32(10 + camera.gap_mm))
+    assert abs(moved - 3.42) < 0.01  # the hand has three figures
+    depth = np.full((2, 1, 4), 5.0, np.float32)
+    assert disparity.has_partner(depth, np.ones((1, 1, 4))).tolist() == [[[True, True, True, False]]]
+    depth[1, 0, 2] = 3.0  # something nearer stands where the second point goes
+    assert disparity.has_partner(depth, np.ones((1, 1, 4))).tolist() == [[[True, False, True, False]]]

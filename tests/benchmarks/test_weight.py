@@ -1,0 +1,80 @@
+"""What git carries stays light, and pictures of pages are as `write_picture` leaves them."""
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from benchmarks.pages.pictures import WIDEST, write_picture
+
+ROOT = Path(__file__).parents[2]
+FILE, RECORDS, TREE = 1.0, 2.0, 15.0  # MB
+
+
+def tracked():
+    run = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True)
+    if run.returncode:
+        pytest.skip("no git work tree: what is tracked is unknown")
+    return [path for path in run.stdout.split("\0") if path and (ROOT / path).is_file()]
+
+
+def heavy(sizes):
+    """What is too heavy, a line each, of sizes in bytes by path."""
+    wrong = []
+    for path, size in sizes.items():
+        record = path.startswith("benchmarks/results/") and path.endswith(".jsonl")
+        if size > (limit := RECORDS if record else FILE) * 1e6:
+            why = "records only grow" if record else "every clone carries it for ever"
+            wrong.append(f"{path} has {size / 1e6:.1f} MB, at most {limit:g} may be committed: {why}")
+    if (total := sum(sizes.values()) / 1e6) > TREE:
+        wrong.append(
+            f"tracked files have {total:.1f} MB, at most {TREE:g} are wanted in a clone: "
+            "write pictures by benchmarks.pages.pictures, build what can be built"
+        )
+    return wrong
+
+
+def test_tracked_files_are_light():
+    """On b1dc540 the tree had 27 MB, a page of the gallery 1.6."""
+    assert heavy({path: (ROOT / path).stat().st_size for path in tracked()}) == []
+
+
+def test_heavy_files_are_named():
+    assert heavy({"a.png": 10**6, "benchmarks/results/a.jsonl": 2 * 10**6}) == []
+    (line,) = heavy({"a.png": 1_200_000})
+    assert line.startswith("a.png has 1.2 MB, at most 1 may be committed")
+    (line,) = heavy({f"{i}.png": 900_000 for i in range(17)})
+    assert line.startswith("tracked files have 15.3 MB, at most 15")
+
+
+def test_no_picture_is_there_twice_and_none_is_wider_than_shown():
+    """On b1dc540 ten charts stood in benchmarks/results and in docs/images."""
+    seen = {}
+    for path in tracked():
+        if path.startswith(("docs/", "benchmarks/")) and path.endswith((".png", ".jpg")):
+            data = (ROOT / path).read_bytes()
+            if path.startswith("docs/images/cameras/"):  # cameras that differ in time or kind alone look alike
+                data += path.encode()
+            assert seen.setdefault(data, path) == path, f"{path} is {seen[data]}"
+            with Image.open(ROOT / path) as picture:
+                assert picture.width <= WIDEST, f"{path} is {picture.width} pixels wide, {WIDEST} are shown"
+
+
+def test_charts_get_a_palette_and_photographs_keep_their_colours(tmp_path):
+    chart = np.full((20, 2000, 4), 255, np.uint8)
+    chart[5:15, :, :3] = (255, 0, 0)
+    Image.fromarray(chart).save(tmp_path / "chart.png")
+    write_picture(tmp_path / "chart.png", tmp_path / "chart.png")
+    with Image.open(tmp_path / "chart.png") as picture:
+        assert (picture.mode, picture.size) == ("P", (1500, 15))
+        assert picture.convert("RGB").getpixel((700, 7)) == (255, 0, 0)
+        assert picture.convert("RGB").getpixel((700, 0)) == (255, 255, 255)
+    noise = np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8)
+    write_picture(tmp_path / "photo.png", noise)
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "photo.png")), noise)
+    write_picture(tmp_path / "photo.jpg", np.repeat(np.repeat(noise[:4, :4], 16, 0), 16, 1))
+    assert Image.open(tmp_path / "photo.jpg").format == "JPEG"
+    with pytest.raises(ValueError, match=r"\.png or \.jpg, not .*photo\.gif"):
+        write_picture(tmp_path / "photo.gif", noise)

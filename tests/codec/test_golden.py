@@ -1,0 +1,110 @@
+"""Files coded once and kept: every scheme goes on decoding what it wrote before.
+
+``pytest tests/codec/test_golden.py --make-golden`` codes what a new scheme lacks; what is there is never replaced.
+"""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from codec import Encoded, decode, encode, schemes
+from codec.contract import find
+from ii_core import IICamera, IIPicture
+from ii_core.files import read_image, write_image, write_json
+
+FOLDER = Path(__file__).parents[1] / "golden"
+TOTAL_BYTES = 200_000
+# Codes that a decoder may be off by. The video standards but MPEG-2, and reversible wavelets, say what comes out to
+# the bit; inverse cosine transforms, floating wavelets and colour conversion inside a library may round otherwise
+# with the next version or processor.
+ROUNDING = {"mpeg2": 2, "jpeg": 2, "jpegxl": 2, "avif": 1, "jp3d": 1, "sperr": 1, "htj2k": 1, "jpeg2000": 1}
+
+
+def original():
+    """Something of everything: gradients, an edge, noise; 8×8 lenses of 4×4 px."""
+    y, x = np.mgrid[:32, :32]
+    shade = 128 + 90 * np.sin(x / 6) * np.cos(y / 9) + np.random.default_rng(2).standard_normal((32, 32))
+    pixels = np.stack([shade, 255 - shade, np.where(x > y, shade / 2, 200)], axis=-1)
+    camera = IICamera(pixels=(32, 32), lenses=(8, 8), pixel_pitch_mm=0.0061, gap_mm=0.18, name="golden")
+    return IIPicture(np.clip(pixels, 0, 255).astype(np.uint8), (8, 8), (4, 4), camera)
+
+
+def compact():
+    """A file of the second version: ray-space images, options not at default, a camera with optics of its own."""
+    picture = original()
+    camera = replace(picture.camera, optics=("pinhole", {"kind": "lens", "z_mm": 30.5, "focal_mm": 25}))
+    return encode(replace(picture, camera=camera), "ri-h264:order=spiral,gop=8,pbratio=1.25", bpp=5.3)
+
+
+def coded(scheme):
+    """At a quality that leaves something to be wrong about."""
+    coder = find(scheme)
+    if coder.lossless({key: option.default for key, option in coder.options.items()}):
+        return encode(original(), scheme)
+    if coder.rate_control:
+        return encode(original(), scheme, bpp=4)
+    if coder.qp_range:
+        return encode(original(), scheme, qp=sum(coder.qp_range) // 2)
+    low, high = coder.quality_range
+    return encode(original(), scheme, quality=type(low)((low + high) / 2))
+
+
+def test_one_has_the_compact_header(request):
+    path = FOLDER / "compact-header.ii"
+    if request.config.getoption("--make-golden") and not path.exists():
+        compact().save(path)
+        write_image(path.with_suffix(".png"), decode(path).pixels)
+    coded = Encoded.load(path)
+    assert path.read_bytes()[4] == 2
+    assert (coded.scheme, coded.dtype, coded.target_bpp) == ("ri-h264", "uint8", 5.3)
+    assert {key: coded.options[key] for key in ("order", "gop", "pbratio")} == {
+        "order": "spiral", "gop": 8, "pbratio": 1.25
+    }  # fmt: skip
+    assert coded.structure == compact().structure
+
+
+@pytest.mark.parametrize("scheme", sorted(schemes()))
+def test_every_scheme_has_one(scheme, request):
+    path = FOLDER / f"{scheme}.ii"
+    if request.config.getoption("--make-golden") and not path.exists():
+        made = coded(scheme)
+        made.save(path)
+        write_image(path.with_suffix(".png"), decode(made).pixels)
+    assert path.exists(), f"make {path.name} with --make-golden and commit it"
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.ii")), ids=lambda path: path.stem)
+def test_old_files_decode_to_the_same_pixels(path):
+    picture, expected = decode(path), read_image(path.with_suffix(".png"))
+    coder = Encoded.load(path).scheme.rpartition("-")[2]
+    off = np.abs(picture.pixels.astype(int) - expected)
+    assert off.max() <= ROUNDING.get(coder, 0)
+    assert off.mean() < 0.1
+    assert picture.lenses == (8, 8) and picture.ei_pixels == (4, 4)
+    assert picture.camera is not None and picture.camera.name == "golden"
+
+
+@pytest.mark.parametrize("scheme", sorted(schemes()))
+def test_defaults_of_options_stay(scheme, request):
+    """Files leave out options at their default (`codec.file_header`): another default would decode them otherwise."""
+    path = FOLDER / "defaults.json"
+    kept = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    now = {name: option.default for name, option in find(scheme).options.items()}
+    if request.config.getoption("--make-golden"):
+        kept[scheme] = now | kept.get(scheme, {})
+        write_json(path, dict(sorted(kept.items())))
+    assert scheme in kept, "add its defaults with --make-golden and commit them"
+    assert now == kept[scheme]
+
+
+def test_old_ray_space_images_keep_their_order():
+    """Files of the first version have the grid transposed; see `codec.file_header`."""
+    assert Encoded.load(FOLDER / "ri-h264.ii").options["by"] == "columns"
+    assert Encoded.load(FOLDER / "compact-header.ii").options["by"] == "rows"
+
+
+def test_they_stay_small():
+    assert sum(path.stat().st_size for path in FOLDER.iterdir()) < TOTAL_BYTES

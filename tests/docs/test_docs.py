@@ -1,0 +1,180 @@
+"""README, CHANGELOG and docs/: links lead somewhere, command lines parse, Python runs, names exist.
+
+Every block of ```python runs, top to bottom of its page with one set of names, in a folder that holds a small
+``apples.png``, its coding ``apples.ii`` and ``decoded.png``. Python that is not to run is written without the word.
+"""
+
+import importlib.util
+import itertools
+import os
+import re
+from pathlib import Path
+
+import pytest
+import typer
+
+import codec
+import ii_core
+import metrics
+import raytrace_ii
+from benchmarks.registry import BENCHMARKS
+from codec import decode, encode
+from raytrace_ii.cli import app
+
+ROOT = Path(__file__).parents[2]
+PAGES = {
+    path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+    for path in (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md")))
+}
+FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.M | re.S)
+COMMANDS = typer.main.get_command(app).commands
+
+
+def python_blocks(text):
+    return [code for language, code in FENCED.findall(text) if language == "python"]
+
+
+def prose(text):
+    """The text without blocks and spans of code."""
+    return re.sub(r"`[^`\n]+`", "", re.sub(r"^    .*$", "", FENCED.sub("", text), flags=re.M))
+
+
+def anchors(text):
+    """What headings can be reached by, as code hosts and our site name them."""
+    heads = re.findall(r"^#+ (.+)$", FENCED.sub("", text), re.M)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_to_files_and_headings_that_are_there(page):
+    for target in re.findall(r"\]\(([^)\s]+)\)", prose(PAGES[page])):
+        if re.match(r"https?://", target):
+            continue
+        file, _, anchor = target.partition("#")
+        path = (ROOT / page).parent / file if file else ROOT / page
+        assert path.exists(), f"{page}: {target}: no such file"
+        if anchor:
+            assert anchor in anchors(path.read_text(encoding="utf-8")), f"{page}: {target}: no such heading"
+
+
+def written_commands(text):
+    """Command lines in blocks, and fragments in running text, each with whether it is whole."""
+    blocks = [line.strip() for line in re.findall(r"^    .*$", text, re.M)]
+    blocks += [line.strip() for _, code in FENCED.findall(text) for line in code.splitlines()]
+    for line in blocks:
+        if line.startswith("raytrace-ii "):
+            yield re.split(r"\s{2,}|\s#", line)[0], True
+    for span in re.findall(r"`(raytrace-ii [^`]+)`", re.sub(r"^    .*$", "", FENCED.sub("", text), flags=re.M)):
+        yield " ".join(span.split()), False
+
+
+def variants(line):
+    """``a | b`` is one or the other; what stands in brackets may be given."""
+    words, choices = re.sub(r"[\[\]]", "", line).split()[1:], []
+    for i, word in enumerate(words):
+        if word == "|":
+            continue
+        if i and words[i - 1] == "|":
+            choices[-1].append(word)
+        else:
+            choices.append([word])
+    return [list(words) for words in itertools.product(*choices)]
+
+
+def test_variants_of_a_line():
+    assert variants("raytrace-ii export a.png --to views | hci [-o B]") == [
+        ["export", "a.png", "--to", "views", "-o", "B"],
+        ["export", "a.png", "--to", "hci", "-o", "B"],
+    ]
+
+
+def complaint(words, whole):
+    """What the command says to these words, or None; files and values are not looked at, options and counts are."""
+    name, *rest = words
+    if name == "COMMAND":
+        return None
+    if name not in COMMANDS:
+        return f"no command {name!r}"
+    try:
+        COMMANDS[name].make_context(name, [word for word in rest if word != "--help"])
+    except typer.exceptions.TyperException as error:
+        missing = type(error).__name__ == "MissingParameter"
+        return None if missing and not whole else error.format_message()
+    return None
+
+
+def test_the_check_of_commands_finds_what_is_wrong():
+    assert complaint(["render", "apples", "-o", "a.png"], True) is None
+    assert complaint(["render", "--dask", "HOST:PORT"], False) is None
+    assert "-o" in complaint(["render", "apples"], True)
+    assert "--scales" in complaint(["render", "--scales", "8"], False)
+    assert "integer" in complaint(["render", "apples", "-o", "a.png", "--scale", "x"], True)
+    assert "rendr" in complaint(["rendr"], False)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_parse(page):
+    for line, whole in written_commands(PAGES[page]):
+        for words in variants(line):
+            assert complaint(words, whole) is None, f"{page}: {line}"
+
+
+def test_commands_are_found():
+    found = [line for line, _ in written_commands(PAGES["README.md"])]
+    assert len(found) > 15
+    assert {words[0] for line in found for words in variants(line)} >= COMMANDS.keys() - {"export"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A small picture and its coding, under the names that pages use."""
+    folder = tmp_path_factory.mktemp("docs")
+    picture = raytrace_ii.render(raytrace_ii.load_scene("apples"), ii_core.preset("setup1", scale=32)).picture
+    picture.save(folder / "apples.png")
+    coded = encode(picture, "si-h264", qp=30)
+    coded.save(folder / "apples.ii")
+    decode(coded).save(folder / "decoded.png")
+    return folder
+
+
+@pytest.mark.parametrize("page", [page for page, text in PAGES.items() if python_blocks(text)])
+def test_python_runs(page, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    names = {"__name__": page}
+    for code in python_blocks(PAGES[page]):
+        line = PAGES[page][: PAGES[page].index(code)].count("\n")
+        exec(compile("\n" * line + code, page, "exec"), names)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_scripts_and_targets_exist(page):
+    for name in re.findall(r"\b(?:benchmarks|examples)\.[a-z_]+(?:\.[a-z_]+)*", PAGES[page]):
+        assert importlib.util.find_spec(name), f"{page}: {name}"
+    for name in re.findall(r"python\s+-m\s+benchmarks\s+run\s+(\w+)", PAGES[page]):
+        assert name in BENCHMARKS or name == "NAME", f"{page}: python -m benchmarks run {name}"
+    assert not re.search(r"python\s+-m\s+benchmarks\.", PAGES[page]), f"{page}: type python -m benchmarks run NAME"
+    for path in re.findall(r"\b(?:benchmarks|examples)/[\w/]+\.py", PAGES[page]):
+        assert (ROOT / path).is_file(), f"{page}: {path}"
+    targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M)
+    for name in re.findall(r"`make ([a-z]+)`|^    make ([a-z]+)", PAGES[page], re.M):
+        assert "".join(name) in targets, f"{page}: make {''.join(name)}"
+
+
+def test_every_page_is_in_the_site():
+    config = (ROOT / "docs" / "site" / "mkdocs.yml").read_text(encoding="utf-8")
+    pages = {os.path.relpath(page, "docs") for page in PAGES if page.startswith("docs/")}
+    assert set(re.findall(r": (\S+\.md)$", config, re.M)) == pages
+
+
+@pytest.mark.parametrize("package", [ii_core, raytrace_ii, codec, metrics])
+def test_every_public_function_and_class_says_what_it_is(package):
+    """The reference shows no name without a docstring."""
+    public = {name: getattr(package, name) for name in package.__all__}
+    assert not [name for name, value in public.items() if callable(value) and not value.__doc__]
+
+
+def test_the_study_page_and_the_readme_agree_with_the_records():
+    from benchmarks.pages.readme import gain_table
+
+    table = "\n".join(gain_table())
+    assert table in PAGES["README.md"] and table in PAGES["docs/study.md"]

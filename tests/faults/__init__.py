@@ -1,0 +1,1 @@
+"""Bad input, full disks, kills and wrong arguments, across packages."""

@@ -1,0 +1,260 @@
+"""Embree in packets: the hits of single rays for every width, order, thread and process; what happens without."""
+
+import os
+import subprocess
+import sys
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+from ii_core import IICamera
+from raytrace_ii import Scene, render
+from raytrace_ii.tracing import embree
+from raytrace_ii.tracing.embree import CONFIGURATION, Library, Tree, library
+from raytrace_ii.tracing.intersect import Intersector, SingleRays
+from raytrace_ii.tracing.kernels.packets import place_hits
+from tests.support.trace_scenes import body, hall, lamp, sphere, sun, wall
+
+SMALL = IICamera(pixels=(128, 64), lenses=(16, 8), pixel_pitch_mm=0.1, gap_mm=2.0)
+NARROWER = {"isa=avx2": 8, "isa=sse4.2": 4}
+NO_REACH = np.empty(0, np.float32)
+
+
+def opened(configuration):
+    found = embree._opened(configuration, os.getpid())
+    if isinstance(found, str) or (configuration and found.width != NARROWER[configuration]):
+        pytest.skip(f"this CPU has no {configuration}: {found}")
+    return found
+
+
+def soup(n=400, seed=0):
+    """Small triangles about the origin."""
+    generator = np.random.default_rng(seed)
+    return (generator.normal(size=(n, 1, 3)) + generator.normal(0, 0.2, (n, 3, 3))).astype(np.float32)
+
+
+def camera_rays(n, spread, seed=0):
+    generator = np.random.default_rng(seed)
+    origins = np.array([0, 0, -6]) + spread * generator.normal(size=(n, 3))
+    directions = np.array([0, 0, 1]) + (0.2 + spread) * generator.uniform(-1, 1, (n, 3))
+    return origins.astype(np.float32), directions.astype(np.float32)
+
+
+def room(n):
+    return np.full(n, -7, np.int32), *np.full((3, n), np.nan, np.float32)
+
+
+@pytest.mark.parametrize("configuration", ["", *NARROWER])
+@pytest.mark.parametrize("spread", [0.001, 0.05, 1.0], ids=["packets", "some", "single"])
+@pytest.mark.parametrize("n", [0, 1, 3, 15, 16, 17, 1000])
+def test_hits_are_those_of_single_rays(configuration, spread, n):
+    """Counts that leave lanes empty, rays that spread too far for a packet, directions of any length."""
+    corners, (origins, directions) = soup(), camera_rays(n, spread)
+    packets, single = Tree(opened(configuration), corners, True), SingleRays(corners, True)
+    for reach in (NO_REACH, np.linspace(4, 7, n, dtype=np.float32)):
+        found, expected = room(n), room(n)
+        packets.nearest(origins, directions, reach, found)
+        single.nearest(origins, directions, reach, expected)
+        np.testing.assert_array_equal(found[0], expected[0])
+        hit = found[0] >= 0
+        assert hit.any() or n < 15
+        for a, b in zip(found, expected, strict=True):
+            np.testing.assert_array_equal(a[hit], b[hit])
+        blocked, expected_blocked = np.full(n, -7, np.int32), np.full(n, -7, np.int32)
+        if len(reach) == n:
+            packets.occluded(origins, directions, reach, blocked)
+            single.occluded(origins, directions, reach, expected_blocked)
+            np.testing.assert_array_equal(blocked, expected_blocked)
+            np.testing.assert_array_equal(blocked == 0, hit)
+
+
+def test_rays_without_a_direction_miss_and_harm_no_neighbour():
+    """NaN, infinite and zero rays in a packet beside good ones."""
+    corners, (origins, directions) = soup(), camera_rays(160, 0.001)
+    tree = Tree(opened(""), corners, True)
+    whole = room(160)
+    tree.nearest(origins, directions, NO_REACH, whole)
+    bad = np.arange(160) % 5 == 0
+    for value in (np.nan, np.inf, 0.0):
+        spoiled, found = directions.copy(), room(160)
+        spoiled[bad] = value
+        tree.nearest(origins, spoiled, NO_REACH, found)
+        assert (found[0][bad] == -1).all()
+        for a, b in zip(found, whole, strict=True):
+            np.testing.assert_array_equal(a[~bad & (whole[0] >= 0)], b[~bad & (whole[0] >= 0)])
+
+
+def test_threads_do_not_share_room():
+    """A shared buffer once gave a thousandth of wrong hits."""
+    corners = soup(2000)
+    tree = Tree(opened(""), corners, True)
+    rays = [camera_rays(5000, 0.01, seed) for seed in range(16)]
+
+    def hits(some):
+        found = room(5000)
+        tree.nearest(*some, NO_REACH, found)
+        return found[0]
+
+    alone = [hits(some) for some in rays]
+    with ThreadPoolExecutor(8) as pool:
+        for _ in range(5):
+            for a, b in zip(pool.map(hits, rays), alone, strict=True):
+                np.testing.assert_array_equal(a, b)
+
+
+def test_place_of_a_hit_is_that_of_ray_and_plane():
+    """From any numbers of Embree's, against float64 by numpy; misses stay as they are."""
+    corners, (origins, directions) = soup(), camera_rays(1000, 0.05)
+    found = room(1000)
+    Tree(opened(""), corners, True).nearest(origins, directions, NO_REACH, found)
+    faces, u, v, t = found
+    hit = faces >= 0
+    for function in (place_hits, place_hits.py_func):
+        a, b, c = u.copy(), v.copy(), t.copy()
+        a[hit] += 1e-3
+        function(origins, directions, corners, faces, a, b, c)
+        p = corners[faces[hit]].astype(float)
+        place = p[:, 0] + a[hit, None] * (p[:, 1] - p[:, 0]) + b[hit, None] * (p[:, 2] - p[:, 0])
+        along = origins[hit].astype(float) + c[hit, None] * directions[hit].astype(float)
+        np.testing.assert_allclose(place, along, atol=2e-6)
+        assert (a[hit] >= 0).all() and (b[hit] >= 0).all() and (a[hit] + b[hit] <= 1 + 1e-7).all()
+        np.testing.assert_array_equal(a[~hit], u[~hit])
+
+
+def test_a_ray_in_the_plane_of_its_face_keeps_embrees_numbers():
+    corners = np.array([[[0, 0, 0], [1, 0, 0], [0, 0, 1]]], np.float32)
+    found = np.zeros(1, np.int32), *(np.full(1, x, np.float32) for x in (0.25, 0.5, 3.0))
+    for function in (place_hits, place_hits.py_func):
+        function(np.float32([[0.2, 0, -3]]), np.float32([[0, 0, 1]]), corners, *found)
+        assert [float(x[0]) for x in found[1:]] == [0.25, 0.5, 3.0]
+
+
+def in_process(configuration, *lines):
+    script = "\n".join(
+        [
+            "import sys; sys.path.insert(0, 'tests')",
+            "from test_embree import *",
+            *lines,
+        ]
+    )
+    environment = {**os.environ, CONFIGURATION: configuration, "PYTHONPATH": os.pathsep.join(sys.path)}
+    run = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
+    return run.stdout.split("\n")[:-1]
+
+
+def test_narrower_cpus_and_embreex_give_the_same_picture(tmp_path):
+    """AVX2, SSE and embreex's single rays, in processes of their own; stats say which it was."""
+    shot = render(hall(), SMALL)
+    assert shot.stats.embree == library().about
+    for configuration, says in (("isa=avx2", "packets of 8"), ("isa=sse4.2", "packets of 4"), ("embreex", "embreex")):
+        file = tmp_path / "other.npy"
+        about = in_process(
+            configuration,
+            "shot = render(hall(), SMALL)",
+            f"np.save({str(file)!r}, shot.picture.pixels)",
+            "print(shot.stats.embree)",
+        )
+        assert says in about[0]
+        np.testing.assert_array_equal(np.load(file), shot.picture.pixels)
+
+
+@pytest.mark.parametrize("reason", ["version", "layout", "configuration", "library"])
+def test_an_unknown_library_falls_back_to_embreex_and_says_so(reason, monkeypatch):
+    embree._opened.cache_clear()
+    try:
+        if reason == "version":
+            monkeypatch.setattr(embree, "KNOWN_VERSIONS", range(50000, 60000))
+            says = "Embree's version 4"
+        elif reason == "layout":  # as if hits stood elsewhere in the packet
+            monkeypatch.setattr(embree, "_layouts_hold", lambda library: False)
+            says = "wrong hits"
+        elif reason == "library":
+            monkeypatch.setattr(embree, "_file", lambda: "/nowhere/libembree4.so")
+            says = "cannot be called directly"
+        else:
+            monkeypatch.setenv(CONFIGURATION, "embreex")
+            says = "is set to embreex"
+        assert says in library()
+        shot = render(hall(), SMALL)
+        assert says in shot.stats.embree and "single rays by embreex" in shot.stats.embree
+    finally:
+        embree._opened.cache_clear()
+    monkeypatch.undo()
+    np.testing.assert_array_equal(render(hall(), SMALL).picture.pixels, shot.picture.pixels)
+
+
+def test_a_wrong_layout_is_noticed(monkeypatch):
+    good = library()
+    assert isinstance(good, Library) and embree._layouts_hold(good)
+
+    class Shifted(Tree):
+        def nearest(self, origins, directions, reach, out):
+            super().nearest(origins, directions, reach, (out[0], out[2], out[1], out[3]))  # u and v exchanged
+
+    monkeypatch.setattr(embree, "Tree", Shifted)
+    assert not embree._layouts_hold(good)
+
+
+@pytest.mark.parametrize("start", ["fork", "spawn"])
+def test_processes_give_the_same_picture(start):
+    """A forked process has Embree's memory without its threads: it opens a device of its own."""
+    here = render(hall(), SMALL, workers=2)
+    with ProcessPoolExecutor(2, mp_context=get_context(start)) as pool:
+        there = render(hall(), SMALL, executor=pool)
+    np.testing.assert_array_equal(here.picture.pixels, there.picture.pixels)
+    assert there.stats.embree == here.stats.embree
+
+
+def test_kernels_are_kept_on_disk(tmp_path, monkeypatch):
+    """They call addresses of this process, which must not get into the cache: another process would crash."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    lines = (
+        "from raytrace_ii.tracing.kernels.packets import packet_kernels",
+        "from raytrace_ii.tracing.intersect import Intersector",
+        "i = Intersector(soup(), 400); o, d = camera_rays(100, 0.001)",
+        "print(i.nearest(o, d)[0].faces.tolist(), i.blocked(o, d, np.full(100, 9, np.float32))[0].tolist())",
+        "print(sum(sum(k.stats.cache_hits.values()) for k in packet_kernels(library().width)))",
+    )
+    first, second = in_process("", *lines), in_process("", *lines)
+    assert first[0] == second[0]
+    assert (first[1], second[1]) == ("0", "2")
+
+
+def test_a_picture_does_not_hang_on_the_packets(monkeypatch):
+    """Every ray alone, or every group a packet however wide: the picture is the same."""
+    scene = Scene(
+        bodies=[body(sphere(2, 24), at=(0, 0, 12)), body(wall(20, 60))], lights=[sun((1, 2, -3)), lamp((3, 5, 2))]
+    )
+    usual = render(scene, SMALL)
+    for bound in (-1.0, 1e30):
+        monkeypatch.setattr(embree, "NEAR", dict.fromkeys(embree.NEAR, bound))
+        monkeypatch.setattr(embree, "NARROW", dict.fromkeys(embree.NARROW, bound))
+        other = render(scene, SMALL)
+        np.testing.assert_array_equal(usual.picture.pixels, other.picture.pixels)
+        np.testing.assert_array_equal(usual.depth, other.depth)
+
+
+def test_a_scene_keeps_its_corners_once():
+    """Embree reads those of the packed scene, all trees the same ones, and nothing behind their room."""
+    scene = Scene(bodies=[body(wall(20)), body(sphere(2, 24), at=(0, 0, 12), transmission=(1, 1, 1))])
+    packed = scene.packed
+    trees = [packed.intersector._all, packed.intersector._opaque, packed.intersector._clear]
+    assert packed.corners.base is not None
+    for tree in trees:
+        assert np.shares_memory(tree.corners, packed.corners)
+        assert tree.corners.nbytes + 16 <= packed.corners.base.nbytes - (
+            tree.corners.ctypes.data - packed.corners.base.ctypes.data
+        )
+    bare = np.ones((5, 3, 3), np.float32)
+    assert not np.shares_memory(embree.with_spare(bare), bare)
+    np.testing.assert_array_equal(embree.with_spare(bare), bare)
+
+
+def test_no_faces_and_one_face():
+    none = np.empty((0, 3, 3), np.float32)
+    origins, directions = camera_rays(20, 0.001)
+    assert (Intersector(none, 0).nearest(origins, directions)[0].faces == -1).all()
+    one = Intersector(np.float32([[[-9, -9, 0], [9, -9, 0], [0, 18, 0]]]), 1)
+    assert (one.nearest(origins, directions)[0].faces == 0).all()

@@ -1,0 +1,193 @@
+"""Adaptive samples: where they lie, who gets them, what error is left."""
+
+import numpy as np
+import pytest
+
+from ii_core import IICamera, optics, preset
+from raytrace_ii import Scene, render, trace
+from raytrace_ii.rendering import job
+from raytrace_ii.scene.textures import Checker, Noise
+from raytrace_ii.tracing.kernels import sampling as sample_kernels
+from tests.support.trace_scenes import BLACK, UNIFORM, WHITE, body, hall, sphere, wall
+
+SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
+ONE_LENS = IICamera(pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0)
+CODES = job.CURVES["uint8"]
+
+
+def codes(linear):
+    """8-bit sRGB, not rounded."""
+    return np.interp(linear, np.linspace(0, 1, len(CODES)), CODES)
+
+
+def adaptive(scene, camera, least=4, most=64, **more):
+    return render(scene, camera, samples=(least, most), dtype="float32", **{"support": ("samples",), **more})
+
+
+def half_plane(z=20.0):
+    """White beside black, the border a slanted line through the picture's middle."""
+    turned = body(wall(z, 100), turn=(0, 0, 20), colour=WHITE)
+    half = type(wall(z))(turned.vertices + np.array([94, 34.2, 0]), turned.faces)
+    return Scene(bodies=[body(half, colour=WHITE)], ambient=WHITE)
+
+
+@pytest.mark.parametrize("pair", [0, 1])
+def test_first_samples_of_every_power_of_two_lie_one_in_each_cell_of_every_grid(pair):
+    m, n = np.array([3, 4, 8191]), np.array([5, 5, 77])
+    for bits in range(9):
+        out = np.empty((3 << bits, 2))
+        sample_kernels.places(7, m, n, 8192, 0, 1 << bits, pair, out)
+        for points in out.reshape(3, -1, 2):
+            assert (points >= 0).all() and (points < 1).all()
+            for across in range(bits + 1):
+                cells = (points * [1 << across, 1 << (bits - across)]).astype(int)
+                assert len(np.unique(cells, axis=0)) == 1 << bits
+
+
+def test_places_come_in_any_portions_and_differ_by_seed_pixel_and_pair():
+    m, n = np.arange(40) % 8, np.arange(40) // 8
+
+    def places(seed, first, count, pair):
+        out = np.empty((40 * count, 2))
+        sample_kernels.places(seed, m, n, 8, first, count, pair, out)
+        return out.reshape(40, count, 2)
+
+    whole = places(1, 0, 16, 1)
+    np.testing.assert_array_equal(whole[:, 5:11], places(1, 5, 6, 1))
+    assert len(np.unique(whole[:, 0], axis=0)) == 40
+    for other in (places(2, 0, 16, 1), places(1, 0, 16, 0)):
+        assert (whole != other).mean() > 0.99
+    # neither pair tells of the other: correlations of 640 places, five standard errors of 1/√640
+    both = np.concatenate([places(1, 0, 16, 0), whole], axis=2).reshape(-1, 4)
+    assert np.abs(np.corrcoef(both.T)[:2, 2:]).max() < 5 / np.sqrt(640)
+
+
+def test_a_flat_scene_stays_at_the_least():
+    shot = adaptive(Scene(bodies=[body(wall(20, 100), colour=(0.3, 0.6, 0.9))], ambient=WHITE), SMALL)
+    assert shot.stats.samples == {4: 128 * 64} and shot.stats.mean_samples == 4
+    assert shot.stats.rays["primary"] == 4 * 128 * 64
+    np.testing.assert_allclose(shot.picture.pixels[0, 0], (0.3, 0.6, 0.9), rtol=1e-6)
+
+
+def test_an_edge_gets_the_most_and_its_surroundings_the_least():
+    shot = adaptive(half_plane(), ONE_LENS, error=1.0)
+    share = shot.picture.pixels[..., 0]
+    edge = (share > 0.02) & (share < 0.98)
+    assert edge.sum() > 10
+    assert (shot.samples[edge] == 64).all()
+    near = np.zeros_like(edge)
+    for i in (-1, 0, 1):
+        for j in (-1, 0, 1):
+            near |= np.roll(edge, (i, j), (0, 1))
+    assert (shot.samples[~near] == 4).mean() > 0.95, "away from the edge nothing is added"
+    beside = near & ~edge
+    assert (shot.samples[beside] > 4).mean() > 0.5, "next to it a second round looks for it"
+
+
+def test_neighbours_under_another_lens_do_not_count():
+    """Every elementary image is of one colour, the next of another: nothing differs under any one lens."""
+    pitch = SMALL.lens_pitch_mm[0]
+    board = wall(SMALL.gap_mm + 1e-3, 100)
+    tiles = body(
+        board, coordinates=board.vertices, colour=WHITE, texture=Checker((WHITE, BLACK), (pitch, pitch, 1000))
+    )
+    shot = adaptive(Scene(bodies=[tiles], ambient=WHITE), SMALL)
+    assert len(np.unique(shot.picture.pixels)) == 2, "lenses alternate"
+    assert shot.stats.samples == {4: 128 * 64}
+
+
+@pytest.mark.parametrize("which", ["noise", "hall"])
+def test_pixels_that_stopped_are_within_the_target(which):
+    """Against 400 samples, whose own error is about a tenth of a step."""
+    scene, camera = hall(), IICamera(pixels=(64, 32), lenses=(8, 4), pixel_pitch_mm=0.78, gap_mm=11.7)
+    if which == "noise":
+        board = wall(30, 100)
+        cloud = Noise(((0.2, 0.1, 0.05), (0.8, 0.9, 1.0)), (3, 3, 3), octaves=3)
+        scene = Scene(bodies=[body(board, coordinates=board.vertices, colour=WHITE, texture=cloud)], ambient=WHITE)
+    truth = codes(render(scene, camera, samples=400, seed=9, dtype="float32", support=()).picture.pixels)
+    for error in (2.0, 4.0):
+        shot = adaptive(scene, camera, most=256, error=error, seed=1)
+        off = np.abs(codes(shot.picture.pixels) - truth).max(axis=-1)
+        done = shot.samples < 256
+        assert done.mean() > 0.5
+        assert off[done].mean() < error and np.sqrt((off[done] ** 2).mean()) < 1.2 * error
+        # and a fixed number that leaves as much error takes more samples
+        fixed = render(scene, camera, samples=int(shot.stats.mean_samples), seed=1, dtype="float32", support=())
+        rms = [np.sqrt(((codes(p) - truth) ** 2).mean()) for p in (shot.picture.pixels, fixed.picture.pixels)]
+        assert rms[0] < rms[1]
+
+
+def test_what_no_sample_meets_is_missed():
+    """The blind spot that the module names: a speck between all samples of a pixel and its neighbours."""
+    speck = body(sphere(0.002, 24), at=(0.05, 0.05, 20), colour=BLACK)
+    scene = Scene(bodies=[speck, body(wall(30, 500), colour=WHITE)], ambient=WHITE)
+    assert set(adaptive(scene, ONE_LENS).stats.samples) == {4}
+
+
+def test_aperture_and_pixel_are_sampled_together():
+    """Out of focus an edge is soft over many pixels: they get samples where a pinhole's do not."""
+    lens = optics.Lenslet(focal_mm=1.2, aperture_mm=1.0)
+    soft = IICamera(pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0, optics=(lens,))
+    sharp_count = (adaptive(half_plane(), ONE_LENS).samples > 4).sum()
+    shot = adaptive(half_plane(), soft)
+    assert (shot.samples > 4).sum() > 1.5 * sharp_count
+    truth = render(half_plane(), soft, samples=1024, seed=9, dtype="float32", support=()).picture.pixels
+    off = np.abs(codes(shot.picture.pixels) - codes(truth)).max(axis=-1)
+    # one pixel in a hundred stops too soon, where black and white fall alike into all four quarters
+    assert off[shot.samples < 64].mean() < 0.5
+
+
+HEXAGONAL = IICamera(pixels=(100, 61), lenses=(8, 5), pixel_pitch_mm=0.4, gap_mm=11.7, lattice="hexagonal")
+
+
+@pytest.mark.parametrize("camera", [SMALL, HEXAGONAL, ONE_LENS], ids=["regular", "hexagonal", "2d"])
+def test_same_bits_for_any_workers_and_tiles(camera, monkeypatch):
+    scene = hall()
+    options = {"samples": (4, 16), "error": 2.0, "seed": 3, "support": ("samples", "depth", "ray_length")}
+    whole = render(scene, camera, workers=1, **options)
+    assert {4, 8, 16} == set(whole.stats.samples)
+    for tile in (None, 300, 5000):
+        if tile:
+            monkeypatch.setattr(job, "TILE_RAYS", tile)
+        other = render(scene, camera, workers=3, **options)
+        np.testing.assert_array_equal(whole.picture.pixels, other.picture.pixels)
+        for name in options["support"]:
+            np.testing.assert_array_equal(getattr(whole, name), getattr(other, name))
+        assert whole.stats.samples == other.stats.samples
+
+
+def test_support_images_are_those_of_the_first_sample():
+    scene = hall()
+    shot = adaptive(scene, SMALL, seed=5, support=("depth", "normal", "object_id", "ray_length"))
+    m, n = np.meshgrid(np.arange(128), np.arange(64))
+    place = np.empty((128 * 64, 2))
+    sample_kernels.places(5, m.ravel(), n.ravel(), 128, 0, 1, 0, place)
+    seen = trace(scene, *SMALL.rays(sample=place.reshape(64, 128, 2)))
+    for name in ("depth", "normal", "object_id", "ray_length"):
+        np.testing.assert_array_equal(getattr(shot, name).reshape(getattr(seen, name).shape), getattr(seen, name))
+
+
+@pytest.mark.parametrize(
+    ("samples", "error", "says"),
+    [
+        ((4, 2), 0.5, r"samples is \(4, 2\): two powers of 2 are needed"),
+        ((2, 16), 0.5, "at least 4"),
+        ((4, 48), 0.5, "two powers of 2"),
+        ((4, 8, 16), 0.5, "two powers of 2"),
+        ((4, 16.0), 0.5, "samples is 16.0: a whole number"),
+        ((4, 1 << 20), 0.5, "from 1 to 65536"),
+        ((4, 16), 0.0, "error is 0.0: a positive number of 8-bit steps"),
+        ((4, 16), float("nan"), "error is nan"),
+    ],
+)
+def test_what_cannot_be_is_refused(samples, error, says):
+    with pytest.raises(ValueError, match=says):
+        render(Scene(bodies=[body(wall(5))], background=UNIFORM), ONE_LENS, samples=samples, error=error)
+
+
+def test_stored_maps_have_their_own_number(tmp_path):
+    from ii_core import read_maps, write_maps
+
+    write_maps([ONE_LENS], tmp_path, format="exr")
+    with pytest.raises(ValueError, match=r"samples is \(4, 16\): the maps hold 1"):
+        render(Scene(bodies=[body(wall(5))]), read_maps(tmp_path)[0], samples=(4, 16))

@@ -1,0 +1,145 @@
+"""Images read over the width of a ray: means that are known, and fewer errors than points make."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ii_core import IICamera, preset
+from raytrace_ii import Background, Scene, render
+from raytrace_ii.rendering.job import footprint
+from raytrace_ii.scene.textures import Image
+from raytrace_ii.tracing.kernels.shade import _filter, _filtered, _footprint
+from raytrace_ii.tracing.texture_table import TextureTable, pyramid
+from tests.support.trace_scenes import BLACK, WHITE, body, sphere, sun, wall
+
+BOARD = Image(np.broadcast_to((np.add.outer(np.arange(64), np.arange(64)) % 2)[..., None], (64, 64, 3)).astype("f4"))
+CAMERA = preset("setup1", scale=64)
+
+
+def glowing(mesh, image, **more):
+    coordinates = np.column_stack([mesh.uv, np.zeros(len(mesh.uv))])
+    return body(mesh, coordinates=coordinates, colour=BLACK, emission=WHITE, emission_map=image, **more)
+
+
+@pytest.mark.parametrize("shape", [(8, 8), (7, 5), (1, 9), (6, 1), (33, 20)])
+def test_levels_of_a_pyramid_are_means_over_area(shape):
+    """Every level has the image's mean, odd sizes too, and its texels are the integrals over theirs."""
+    image = np.random.default_rng(0).random((*shape, 3), np.float32)
+    levels = pyramid(image)
+    assert levels[-1].shape == (1, 1, 3)
+    for level in levels:
+        np.testing.assert_allclose(level.mean(axis=(0, 1)), image.mean(axis=(0, 1)), rtol=1e-5)
+    fine = np.repeat(np.repeat(image.astype(float), levels[0].shape[0], axis=0), levels[0].shape[1], axis=1)
+    rows, columns = levels[0].shape[:2]
+    blocks = fine.reshape(rows, fine.shape[0] // rows, columns, fine.shape[1] // columns, 3)
+    np.testing.assert_allclose(levels[0], blocks.mean(axis=(1, 3)), rtol=1e-5)
+
+
+def test_a_width_of_a_texel_or_less_reads_the_image_itself():
+    packed = TextureTable([BOARD])
+    assert _filter(packed.table, 0, 1 / 64, 0.0, 0.0, 0.5 / 64)[:2] == (1, 0.0)
+    assert _filter(packed.table, 0, 0.0, 0.0, 0.0, 0.0)[:2] == (1, 0.0)
+
+
+def test_a_wide_ray_sees_the_mean():
+    packed = TextureTable([BOARD])
+    for width in (0.5, 1.0, 20.0):
+        colour = _filtered(packed.table, 0, packed.texels, 0.3, 0.6, width, 0.0, 0.0, width)
+        np.testing.assert_allclose(colour, 0.5, atol=1e-6)
+
+
+def test_a_long_ellipse_is_read_along_its_length():
+    """Stripes across the long axis are averaged, those along it are kept: no isotropic level could do both."""
+    stripes = np.broadcast_to((np.arange(64) % 16 < 8)[:, None, None], (64, 64, 3)).astype(np.float32)
+    packed = TextureTable([Image(stripes), Image(np.ascontiguousarray(stripes.swapaxes(0, 1)))])
+    narrow, wide = 1 / 64, 16 / 64
+    second = int(packed.table[0, 8]) + 1  # after the first's levels
+    ellipse = (0.5, 1 - 4.5 / 64, wide, 0.0, 0.0, narrow)
+    along = [_filtered(packed.table, row, packed.texels, *ellipse)[0] for row in (0, second)]
+    assert along[0] > 0.99 and along[1] == pytest.approx(0.5, abs=0.07), along
+
+
+@pytest.mark.parametrize("slant", [0.0, 0.5, 1.2])
+def test_the_footprint_is_where_the_rays_beside_it_meet_the_face(slant):
+    """Diameters over (u, v) against neighbouring parallel rays, in the plane of incidence and across it."""
+    mesh = wall(20.0)
+    corners = mesh.vertices[mesh.faces].astype(np.float32)
+    coordinates = np.zeros_like(corners)
+    coordinates[..., :2] = mesh.uv[mesh.faces]
+    ahead = np.array([math.sin(slant), 0.0, math.cos(slant)])
+    across_u, across_v, along_u, along_v = _footprint(corners, coordinates, 0, 0.2, *ahead, 0.0, 0.0, -1.0)
+    ways = {tuple(np.round(np.abs(way), 9)) for way in ((across_u, across_v), (along_u, along_v))}
+    # the wall is 100 mm wide: u and v grow by 1/100 a mm
+    truth = {(0.0, 0.002), (round(0.002 / math.cos(slant), 9), 0.0)}
+    if slant:
+        assert ways == truth
+    else:  # straight on, any two directions square to each other will do
+        lengths = [math.hypot(across_u, across_v), math.hypot(along_u, along_v)]
+        np.testing.assert_allclose(lengths, 0.002, rtol=1e-6)
+
+
+def test_the_footprint_of_a_camera_is_its_pixel():
+    """Through pinholes the pixel pitch over the gap, on the axis; a camera of parallel rays has a width instead."""
+    width, spread = footprint(CAMERA)
+    assert width == 0 and spread == pytest.approx(CAMERA.pixel_pitch_mm / CAMERA.gap_mm, rel=0.05)
+    rods = ({"kind": "lenticular"},)
+    lenticular = IICamera(pixels=(64, 64), lenses=(4, 64), pixel_pitch_mm=0.1, gap_mm=3.0, optics=rods)
+    width, spread = footprint(lenticular)
+    assert width == pytest.approx(0.05) and spread == pytest.approx(0.1 / 3 / 2, rel=0.1)
+
+
+def test_a_checker_finer_than_pixels_is_grey():
+    """Cells of 0.3 mm at 60 mm, where a pixel is 1.6 mm wide; read at points it is anything."""
+    board = Image(np.tile(BOARD.pixels, (2, 2, 1)))
+    scene = Scene(bodies=[glowing(wall(60, 20), board)])
+    kept = np.s_[20:-20, 40:-40]
+    filtered, points = (
+        render(scene, CAMERA, dtype="float32", texture_filter=on).picture.pixels[kept] for on in (True, False)
+    )
+    assert points.std() > 0.15
+    np.testing.assert_allclose(filtered[filtered > 0], 0.5, atol=0.02)
+
+
+@pytest.mark.parametrize("kind", ["slanted", "mirrored", "sky", "normals", "blended"])
+def test_errors_against_many_samples_fall(kind):
+    """Of one sample and of four, by at least a third, wherever an image is read."""
+    size = (512, 1024) if kind == "sky" else (128, 256)
+    dots = np.random.default_rng(7).random(size) > 0.5
+    noise = np.repeat((dots * 0.8 + 0.1)[..., None], 3, axis=2).astype(np.float32)
+    paper, light = Image(noise), Background(horizon=(0.5,) * 3)
+    mesh = wall(0, 25)
+    uv = np.column_stack([mesh.uv, np.zeros(4)])
+    if kind == "slanted":
+        scene = Scene(bodies=[glowing(mesh, paper, at=(0, 0, 50), turn=(0, 55, 0))])
+    elif kind == "mirrored":
+        mirror = body(wall(40, 40), mirror=WHITE, turn=(0, 0, 0))
+        scene = Scene(bodies=[mirror, glowing(mesh, paper, at=(0, 0, -20))], background=light)
+    elif kind == "sky":
+        scene = Scene(bodies=[body(sphere(2, 24), at=(0, 0, 30))], background=Background(image=paper))
+    elif kind == "normals":
+        flat = np.broadcast_to(np.float32([0.5, 0.5, 1.0]), noise.shape).copy()
+        flat[..., 0] = 0.4 * noise[..., 0] + 0.3
+        shiny = body(mesh, at=(0, 0, 50), coordinates=uv, normal_map=Image(flat))
+        scene = Scene(bodies=[shiny], ambient=(0.1,) * 3, lights=[sun((1, 0.5, -1))])
+    else:
+        veil = Image(np.ones((128, 256, 3), np.float32), alpha=np.ascontiguousarray(noise[..., 0]))
+        pane = body(mesh, at=(0, 0, 50), coordinates=uv, texture=veil, alpha_blend=1.0, colour=WHITE)
+        scene = Scene(bodies=[pane], background=light, ambient=(1.0,) * 3)
+    options = {"dtype": "float32", "support": ()}
+    truth = render(scene, CAMERA, samples=256, texture_filter=False, **options).picture.pixels
+
+    def error(samples, on):
+        shot = render(scene, CAMERA, samples=samples, texture_filter=on, **options)
+        return float(np.sqrt(((shot.picture.pixels - truth) ** 2).mean()))
+
+    for samples in (1, 4):
+        filtered, points = error(samples, True), error(samples, False)
+        assert filtered < 0.67 * points, (samples, filtered, points)
+
+
+def test_scenes_without_images_do_not_change():
+    ball = body(sphere(5, 24), at=(0, 0, 30), mirror=(0.5,) * 3)
+    plain = Scene(bodies=[ball], background=Background(horizon=WHITE))
+    a, b = (render(plain, CAMERA, texture_filter=on).picture.pixels for on in (True, False))
+    np.testing.assert_array_equal(a, b)

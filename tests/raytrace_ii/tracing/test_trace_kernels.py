@@ -1,0 +1,148 @@
+"""Compiled kernels against their Python source, through whole scenes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ii_core import preset
+from raytrace_ii import trace
+from raytrace_ii.scene.textures import Image
+from raytrace_ii.tracing.kernels import shade as kernels
+from tests.support.trace_scenes import WHITE, body, hall, sphere, wall
+
+NAMES = (
+    "start_rays",
+    "shade",
+    "add_unblocked",
+    "pass_faces",
+    "pass_clear_face",
+    "start_inside",
+    "tell_inside",
+)
+
+
+def crowded():
+    """The hall, its camera in water, with more water in the glass, a prism's colours and a wall half cut out."""
+    mesh, alpha = wall(25, 9), np.array([[0, 1], [1, 0]], np.float32)
+    sieve = body(
+        mesh,
+        coordinates=np.column_stack([mesh.uv, np.zeros(4)]),
+        texture=Image(np.ones((2, 2, 3), np.float32), alpha=alpha),
+        normal_map=Image(np.full((1, 1, 3), (0.6, 0.5, 0.9), np.float32)),
+        alpha_cutoff=0.5,
+    )
+    water = body(sphere(6, 24), at=(0, -1, 31), transmission=WHITE, ior=(1.32, 1.33, 1.35), priority=-1)
+    sea = body(sphere(20, 24), transmission=WHITE, ior=1.33, absorption_per_mm=(0.01, 0, 0))
+    scene = hall(max_depth=4)
+    return replace(scene, bodies=[*scene.bodies, sieve, water, sea])
+
+
+@pytest.mark.parametrize("glass", [True, False])
+def test_tracing_in_python_sees_the_same(glass, monkeypatch):
+    """Python keeps float32 where numba goes on in float64: the same rays but for a rare one on an edge."""
+    scene = hall(max_depth=4)
+    if not glass:  # without it shadows take the shorter way
+        bodies = [body for body in scene.bodies if not body.material.transmissive]
+        scene = replace(scene, bodies=bodies)
+    assert (agree(scene, monkeypatch).count.rays["refraction"] > 0) == glass
+
+
+def test_passing_in_python_sees_the_same(monkeypatch):
+    compiled = agree(crowded(), monkeypatch)
+    assert compiled.count.rays["passed"] > 600 and compiled.count.rays["refraction"] > 600
+
+
+def agree(scene, monkeypatch):
+    """Trace with compiled kernels and with their source; the first comes back."""
+    camera = preset("setup1", scale=64)
+    m, n = np.random.default_rng(0).integers(0, camera.pixels, (600, 2)).T
+    compiled = trace(scene, *camera.rays_at(m, n))
+    for name in NAMES:
+        monkeypatch.setattr(kernels, name, getattr(kernels, name).py_func)
+    plain = trace(scene, *camera.rays_at(m, n))
+    np.testing.assert_array_equal(compiled.object_id, plain.object_id)
+    np.testing.assert_allclose(compiled.depth, plain.depth, rtol=1e-6)
+    np.testing.assert_array_equal(compiled.normal, plain.normal)
+    for kind, count in compiled.count.rays.items():
+        assert abs(count - plain.count.rays[kind]) <= 2 + count // 100
+    off = np.abs(compiled.radiance - plain.radiance).max(axis=1)
+    assert np.quantile(off, 0.99) < 1e-4 and off.max() < 0.5
+    assert compiled.count.rays["reflection"] > 0
+    return compiled
+
+
+def test_start_rays_name_the_first_bad_one():
+    locations, directions = np.zeros((6, 3)), np.ones((6, 3))
+    directions[4] = 0
+    directions[2, 1] = np.nan
+    rows = [np.empty((6, 3), np.float32) for _ in range(3)]
+    out = (*rows, np.empty(6, np.int32), np.empty((6, 2), np.int32))
+    all_of_it, as_they_come = np.empty(0), np.empty(0, np.int32)
+    for function in (kernels.start_rays, kernels.start_rays.py_func):
+        assert function(locations, directions, all_of_it, as_they_come, np.eye(3), np.zeros(3), *out) == (6, 2)
+        two = locations[:2], directions[:2]
+        assert function(*two, all_of_it, as_they_come, np.eye(3), np.ones(3), *out) == (2, -1)
+        np.testing.assert_array_equal(rows[0][:2], 1)
+        np.testing.assert_allclose(rows[1][:2], 3**-0.5, rtol=1e-7)
+        np.testing.assert_array_equal(rows[2][:2], 1)
+
+
+def test_rays_without_light_are_left_out():
+    locations, directions = np.arange(12.0).reshape(4, 3), np.ones((4, 3))
+    directions[1] = 0  # blocked: nobody asks where it goes
+    rows = [np.empty((4, 3), np.float32) for _ in range(3)]
+    pixels, inside = np.empty(4, np.int32), np.empty((4, 0), np.int32)
+    for function in (kernels.start_rays, kernels.start_rays.py_func):
+        shares = np.array([0.25, 0, 0, 1])
+        for order, row, left in (([], [0, 3], [0, 3]), ([3, 1, 0, 2], [0, 2], [3, 0])):
+            order = np.array(order, np.int32)
+            found = function(locations, directions, shares, order, np.eye(3), np.zeros(3), *rows, pixels, inside)
+            assert found == (2, -1)
+            assert pixels[:2].tolist() == row
+            np.testing.assert_array_equal(rows[0][:2], locations[left])
+            np.testing.assert_array_equal(rows[2][:2, 0], shares[left])
+
+
+def test_rays_by_row_and_column_are_those_one_by_one():
+    rng = np.random.default_rng(0)
+    x, y, z = rng.normal(size=(5, 2)), rng.normal(size=(3, 2)), np.array([1.0, 4.0])
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    grid = np.empty((2, 3, 5, 3))
+    for k in range(2):
+        grid[k, ..., 0], grid[k, ..., 1], grid[k, ..., 2] = x[:, k], y[:, k, None], z[k]
+    expected = [np.empty((15, 3), np.float32) for _ in range(3)]
+    pixels, inside = np.empty(15, np.int32), np.empty((15, 0), np.int32)
+    order = rng.permutation(15).astype(np.int32)
+    kernels.start_rays(*grid.reshape(2, 15, 3), np.empty(0), order, turn, np.arange(3.0), *expected, pixels, inside)
+    for function in (kernels.start_separable_rays, kernels.start_separable_rays.py_func):
+        found = [np.empty((15, 3), np.float32) for _ in range(2)]
+        assert function(x, y, z, order // 5, order % 5, turn, np.arange(3.0), *found)
+        np.testing.assert_array_equal(found, expected[:2])
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e200])
+def test_rows_and_columns_of_unusable_rays_are_told(wrong):
+    room = [np.empty((15, 3), np.float32) for _ in range(2)]
+    sizes, order = (10, 6, 2), (np.zeros(15, np.int32),) * 2
+    for where in range(18):
+        flat = np.ones(18)
+        flat[where] = wrong
+        x, y, z = np.split(flat, np.cumsum(sizes)[:-1])
+        rays = x.reshape(5, 2), y.reshape(3, 2), z
+        assert not kernels.start_separable_rays(*rays, *order, np.eye(3), np.zeros(3), *room)
+    nowhere = np.zeros((5, 2)), np.zeros((3, 2)), np.zeros(2)
+    assert not kernels.start_separable_rays(*nowhere, *order, np.eye(3), np.zeros(3), *room), "no direction"
+
+
+def test_shadow_rays_that_arrive_are_packed_to_the_front():
+    rng = np.random.default_rng(0)
+    blocked = rng.choice(np.array([0, -1], np.int32), 50)
+    rows = [rng.normal(size=shape).astype(np.float32) for shape in ((50, 3), (50, 3), (50,), (50, 3))]
+    rows += [rng.integers(0, 99, 50).astype(np.int32), rng.integers(-1, 9, (50, 2)).astype(np.int32)]
+    for function in (kernels.keep_unblocked, kernels.keep_unblocked.py_func):
+        packed = [row.copy() for row in rows]
+        kept = function(blocked, *packed)
+        assert kept == (blocked == -1).sum()
+        for row, array in zip(rows, packed, strict=True):
+            np.testing.assert_array_equal(array[:kept], row[blocked == -1])

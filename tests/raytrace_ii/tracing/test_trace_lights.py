@@ -1,0 +1,128 @@
+"""Spot lights, surfaces that give off light, and equirectangular surroundings, in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+
+from raytrace_ii import Background, Light, Scene, trace
+from raytrace_ii.scene.textures import Image
+from tests.support.trace_scenes import BLACK, UNIFORM, WHITE, body, floor, sphere, spread, wall
+
+
+def spot_on_floor(x, *, cone_deg=(20, 30), colour=WHITE):
+    """What a floor shows at x under a spot light 10 mm up that shines straight down."""
+    light = Light(kind="spot", vector=(0, 10, 0), colour=colour, direction=(0, -3, 0), cone_deg=cone_deg)
+    scene = Scene(bodies=[body(floor(400), colour=WHITE)], lights=[light])
+    starts = np.column_stack([x, np.full_like(x, 5.0), np.full_like(x, 0.1)])
+    return trace(scene, starts, np.broadcast_to([0, -1, 0], starts.shape))
+
+
+def test_a_spot_light_fades_between_its_cones_by_gltfs_formula():
+    x = 10 * np.tan(np.radians(np.linspace(0, 40, 401)))
+    angle = np.arctan2(np.hypot(x, 0.1), 10)
+    inner, outer = np.cos(np.radians([20, 30]))
+    share = np.clip((np.cos(angle) - outer) / (inner - outer), 0, 1) ** 2
+    # a shadow ray starts 8e-4 mm up, of 10: 1e-4 of the cosine, times the cone's steepness of 2·1/(inner − outer)
+    np.testing.assert_allclose(spot_on_floor(x).radiance[:, 0], share * np.cos(angle), atol=2e-3)
+    assert (share == 1).sum() > 150 and (share == 0).sum() > 50
+
+
+def test_a_spot_lights_edges_and_its_saved_rays():
+    x = np.array([10 * math.tan(math.radians(a)) for a in (0.5, 19.9, 29.9, 30.1, 80)])
+    seen = spot_on_floor(x, colour=(1e5,) * 3)  # bright: the edge itself is dark
+    assert (seen.radiance[:3, 0] > 0).all() and (seen.radiance[3:] == 0).all()
+    assert seen.count.rays["shadow"] == 3, "none where its light cannot come"
+    point = Light(kind="point", vector=(0, 10, 0), colour=WHITE)
+    scene = Scene(bodies=[body(floor(400), colour=WHITE)], lights=[point])
+    near = trace(scene, [(1.0, 5, 0.1)], [(0, -1, 0)]).radiance
+    np.testing.assert_array_equal(spot_on_floor(np.array([1.0])).radiance, near), "all of it in the inner cone"
+
+
+def test_a_surface_gives_off_light_on_both_sides_and_lights_nothing_else():
+    glow = (0.5, 3.0, 0.0)
+    lamp = body(wall(20), colour=BLACK, emission=glow)
+    far = body(wall(30, 500), colour=WHITE)
+    for start, direction in (((0, 0, 0), (0, 0, 1)), ((0, 0, 25), (0, 0, -1))):
+        np.testing.assert_allclose(trace(Scene(bodies=[lamp, far]), [start], [direction]).radiance, [glow])
+    np.testing.assert_array_equal(trace(Scene(bodies=[lamp, far]), [(0, 0, 25)], [(0, 0, 1)]).radiance, [BLACK])
+    mirror = body(wall(-10), colour=BLACK, mirror=(0.5,) * 3)
+    seen = trace(Scene(bodies=[lamp, mirror]), [(0, 0, 0)], [(0, 0, -1)]).radiance
+    np.testing.assert_allclose(seen, [0.5 * np.array(glow)], rtol=1e-6)
+
+
+@pytest.mark.parametrize("albedo", [0.0, 0.5, 1.0])
+def test_a_furnace_of_glowing_walls_is_even(albedo):
+    """A wall that gives off what it does not reflect of surroundings of 1 shows 1, also seen in a mirror ball."""
+    room = body(sphere(50, 32), colour=(albedo,) * 3, emission=(1 - albedo,) * 3)
+    ball = body(sphere(5, 48), at=(0, 0, 20), mirror=WHITE)
+    matt = body(sphere(5, 48), at=(20, 0, 0), colour=WHITE)
+    directions = spread(np.random.default_rng(0), 2000)
+    seen = trace(Scene(bodies=[room, ball, matt], ambient=WHITE), np.zeros_like(directions), directions)
+    assert set(np.unique(seen.object_id)) == {0, 1, 2}
+    np.testing.assert_allclose(seen.radiance, 1, rtol=1e-6)
+
+
+# Surroundings
+
+
+def sky(pixels, **options):
+    """What is seen of an image all around, and nothing else."""
+    image = Image(np.asarray(pixels, np.float32))
+    nothing = body(sphere(1), at=(1e3, 2e3, 3.3e3), scale=1e-3)
+    scene = Scene(bodies=[nothing], background=Background(image=image, **options))
+    return lambda *directions: trace(scene, np.zeros((len(directions), 3)), directions).radiance[:, 0]
+
+
+AXES = {"ahead": (0, 0, 1), "right": (1, 0, 0), "behind": (0, 0, -1), "left": (-1, 0, 0)}
+
+
+def compass(width=360, height=180):
+    """Red is longitude in degrees from the centre, to the right; a second image has the elevation."""
+    longitude = (np.arange(width) + 0.5) / width * 360 - 180
+    elevation = 90 - (np.arange(height) + 0.5) / height * 180
+    return (np.repeat(np.broadcast_to(values, (height, width))[..., None], 3, axis=2)
+            for values in (longitude, elevation[:, None]))  # fmt: skip
+
+
+def test_the_images_centre_is_ahead_its_right_half_right_and_its_top_up():
+    longitude, elevation = compass()
+    around = sky(longitude)(AXES["ahead"], AXES["right"], AXES["left"], (1, 0, 1), (-1, 0, 1))
+    np.testing.assert_allclose(around, [0, 90, -90, 45, -45], atol=1e-4)
+    # behind, the image's two edges meet: half way from 179.5° to −179.5°
+    np.testing.assert_allclose(sky(longitude)(AXES["behind"]), 0, atol=1e-4)
+    np.testing.assert_allclose(sky(longitude)((0.05, 0, -1), (-0.05, 0, -1)) / 180, [0.984, -0.984], atol=1e-3)
+    up, down, slanting, level = sky(elevation)((0, 1, 0), (0, -1, 0), (0, 1, 1), AXES["right"])
+    # the poles show the middle of the last row, half a row from the pole
+    np.testing.assert_allclose([up, down, slanting, level], [89.5, -89.5, 45, 0], atol=1e-4)
+
+
+@pytest.mark.parametrize("turn_deg", [0, 90, -30, 450])
+def test_a_turn_takes_the_centre_from_ahead_towards_right(turn_deg):
+    longitude, _ = compass()
+    angle = math.radians(turn_deg)
+    centre = (math.sin(angle), 0, math.cos(angle))
+    right = (math.cos(angle), 0, -math.sin(angle))
+    np.testing.assert_allclose(sky(longitude, turn_deg=turn_deg)(centre, right), [0, 90], atol=1e-4)
+
+
+def test_an_even_image_is_an_even_sky_and_stands_in_the_gradients_place():
+    directions = spread(np.random.default_rng(1), 500)
+    even = sky(np.full((5, 7, 3), 0.25), intensity=3.0, horizon=WHITE)
+    np.testing.assert_allclose(even(*directions), 0.75, rtol=1e-6)
+    ball = body(sphere(5), at=(0, 0, 20), transmission=WHITE)
+    image = Image(np.ones((4, 8, 3), np.float32))
+    around = [trace(Scene(bodies=[ball], background=b), [(0, 0, 0)], [(0.1, 0, 1)]).radiance
+              for b in (UNIFORM, Background(image=image))]  # fmt: skip
+    np.testing.assert_allclose(*around, rtol=1e-6)
+
+
+# Ray length
+
+
+def test_the_length_of_a_ray_is_to_its_hit_from_its_start():
+    directions = np.array([[0, 0, 2.0], [0.3, -0.4, 1], [0, 0, -1]])
+    start = np.array([1.0, 2.0, 3.0])
+    seen = trace(Scene(bodies=[body(wall(23, 90))]), np.broadcast_to(start, (3, 3)), directions)
+    np.testing.assert_allclose(seen.ray_length, [20, 20 * math.sqrt(1.25), math.nan], rtol=1e-6)
+    np.testing.assert_array_equal(np.isnan(seen.depth), [False, False, True])

@@ -1,0 +1,1 @@
+"""Scenes, files and pictures that several tests share."""
