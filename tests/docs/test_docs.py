@@ -153,7 +153,7 @@ def test_scripts_and_targets_exist(page):
     for name in re.findall(r"python\s+-m\s+benchmarks\s+run\s+(\w+)", PAGES[page]):
         assert name in BENCHMARKS or name == "NAME", f"{page}: python -m benchmarks run {name}"
     assert not re.search(r"python\s+-m\s+benchmarks\.", PAGES[page]), f"{page}: type python -m benchmarks run NAME"
-    for path in re.findall(r"\b(?:benchmarks|examples)/[\w/]+\.py", PAGES[page]):
+    for path in re.findall(r"(?<![\w/])(?:benchmarks|examples)/[\w/]+\.py", PAGES[page]):
         assert (ROOT / path).is_file(), f"{page}: {path}"
     targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M)
     for name in re.findall(r"`make ([a-z]+)`|^    make ([a-z]+)", PAGES[page], re.M):
