@@ -224,11 +224,18 @@ def with_commits(lines: Sequence[str], commits: Sequence[Iterable[str]]) -> list
     return [f"{head} commit |", f"{rule}---|", *(f"{a} {b} |" for a, b in zip(body, cells, strict=True))]
 
 
+def _counts(line: str) -> bool:
+    """Whether a committed line must stay: its provenance is known, and its commit is in this history."""
+    git = json.loads(line).get("git")
+    return '"unsure":' not in line and (git is None or exists(git["commit"]))
+
+
 def check(path: Path) -> list[str]:
     """Return what is wrong with a file of records, a line each.
 
     Every record has all fields and a commit that exists, as far as this checkout has a history. No two have the same
-    measured seconds under different commits. No committed line was changed or removed. Records converted from a file
+    measured seconds under different commits. No committed line was changed or removed, unless its
+    commit is unknown. Records converted from a file
     of an earlier form have no code hash and no date; records of unsure provenance have no commit either.
     """
     wrong, seen = [], dict[tuple[float, ...], str]()
@@ -248,7 +255,7 @@ def check(path: Path) -> list[str]:
         if len(seconds) and seen.setdefault(seconds, commit_of(record)) != commit_of(record):
             wrong.append(f"{where}: seconds identical to a row of {seen[seconds]}, stamped {commit_of(record)}")
     lines = set(path.read_text(encoding="utf-8").splitlines())
-    lost = [line for line in committed(path) if line not in lines and '"unsure":' not in line]
+    lost = [line for line in committed(path) if line not in lines and _counts(line)]
     return wrong + [f"{path.name}: a committed row was changed or removed"] * bool(lost)
 
 

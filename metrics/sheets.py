@@ -76,7 +76,7 @@ def plot_error_views(reference: IIPicture, decoded: IIPicture, path: str | os.Pa
     save(error_views_figure({name: error_map(reference, decoded, at) for name, at in views.items()}), path)
 
 
-@checks.checked(quality=checks.instance(DepthQuality), folder=checks.path)
+@checks.checked(quality=checks.instance(DepthQuality, type(None)), folder=checks.path)
 def plot_all(
     reference: IIPicture, decoded: IIPicture, quality: DepthQuality | None, folder: str | os.PathLike[str]
 ) -> list[Path]:

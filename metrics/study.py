@@ -224,8 +224,8 @@ def _git() -> dict[str, Any] | None:
 def is_study(name: str, value: Any) -> None:
     """Rule: a study as `read_study` gives it."""
     checks.mapping(name, value)
-    points, picture = value.get("points"), value.get("picture")
+    points, picture = value.get("points"), value.get("picture", {"name": ""})
     if not isinstance(points, list) or not isinstance(picture, Mapping) or "name" not in picture:
-        raise checks.refuse(name, value, "what read_study gives, with points and picture,")
+        raise checks.refuse(name, value, "what read_study gives, with points and, for charts, a named picture,")
     if not all(isinstance(point, Mapping) for point in points):
         raise checks.refuse(f"{name}['points']", points, "a list of dicts")

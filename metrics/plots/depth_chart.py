@@ -112,7 +112,7 @@ def draw_depth_rate(study: Mapping[str, Any]) -> Any:
     figure.colorbar(map_, ax=panels[0].tolist(), label=r"$Q_\mathrm{depth}$ [dB]")
     lost = [p["depth_outside"] for p in points if "depth_outside" in p]
     told = f": {told_outside(max(lost))}" if lost else ""  # the same for all: depth is the reference's
-    figure.suptitle(study["picture"]["name"] + told, x=0.01, ha="left", fontsize=12)
+    figure.suptitle(study.get("picture", {"name": ""})["name"] + told, x=0.01, ha="left", fontsize=12)
     return figure
 
 

@@ -101,7 +101,7 @@ def draw(study: Mapping[str, Any], measure: str = "q_global") -> Any:
     if not all(point["reached"] for point in points):
         style = {"color": "0.4", "marker": "o", "linestyle": ":"}
         axes.plot([], [], markerfacecolor="white", label="target out of reach: what came instead", **style)
-    axes.set_title(study["picture"]["name"], loc="left")
+    axes.set_title(study.get("picture", {"name": ""})["name"], loc="left")
     # Below the axes, where no curve can hide it and long scheme names have room.
     figure.legend(loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3)
     return figure

@@ -1,10 +1,14 @@
 """The limits that docs/stability.md states, at small size; its figures come from `benchmarks.stability` itself."""
 
+from pathlib import Path
+
 import pytest
 
 from benchmarks.stability import __main__ as book
 from benchmarks.stability import curves, depth, geometry, light, picture
 from raytrace_ii.tracing.packing import LIFT
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_without_a_lift_half_of_all_lit_points_shade_themselves():
@@ -118,7 +122,7 @@ def test_tables_hold_every_row():
 
 
 def test_every_case_has_its_place_on_the_page():
-    page = (book.ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
     for name in [*book.CASES, "convergence"]:
         assert page.count(f"<!-- {name} -->\n") == page.count(f"<!-- /{name} -->") == 1, name
     assert {case for case, *_ in book.PANELS} <= set(book.CASES)

@@ -15,6 +15,7 @@ from codec import encode
 from ii_core import IIPicture, preset
 from ii_core.files import read_image
 from metrics import PointLog
+from metrics.study import FIELDS
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +115,7 @@ def test_a_killed_study_continues_where_it_was(run, picture, tmp_path, monkeypat
 
 def test_points_of_another_picture_or_measure_are_not_taken(tmp_path):
     a = IIPicture(np.zeros((8, 8, 3), np.uint8), (4, 4), (2, 2))
-    point = {"scheme": "x", "target_bpp": 1.0, "q_global": math.inf}
+    point = dict.fromkeys(FIELDS, 1.0) | {"scheme": "x", "options": {}, "reached": True, "q_global": math.inf}
     depth = np.ones((4, 4))
     path = tmp_path / "p.jsonl"
     PointLog(path, a, measures=["q_global"], depth=depth).keep(point)

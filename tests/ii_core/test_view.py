@@ -188,7 +188,7 @@ def test_refusals():
         with pytest.raises(ValueError, match="no camera"):
             look()
     for depth in (1.9, math.inf, math.nan):
-        with pytest.raises(ValueError, match=f"depth {depth} mm is not beyond the lens plane at 2 mm"):
+        with pytest.raises(ValueError, match=f"depth_mm {depth} is not beyond the lens plane at 2 mm"):
             refocus(coded(), depth)
 
 

@@ -15,6 +15,7 @@ from raytrace_ii.tracing import embree
 from raytrace_ii.tracing.embree import CONFIGURATION, Library, Tree, library
 from raytrace_ii.tracing.intersect import Intersector, SingleRays
 from raytrace_ii.tracing.kernels.packets import place_hits
+from raytrace_ii.tracing.packing import packed as packed_scene
 from tests.support.trace_scenes import body, hall, lamp, sphere, sun, wall
 
 SMALL = IICamera(pixels=(128, 64), lenses=(16, 8), pixel_pitch_mm=0.1, gap_mm=2.0)
@@ -134,8 +135,8 @@ def test_a_ray_in_the_plane_of_its_face_keeps_embrees_numbers():
 def in_process(configuration, *lines):
     script = "\n".join(
         [
-            "import sys; sys.path.insert(0, 'tests')",
-            "from test_embree import *",
+            "import sys; sys.path.insert(0, '.')",
+            "from tests.raytrace_ii.tracing.test_embree import *",
             *lines,
         ]
     )
@@ -239,7 +240,7 @@ def test_a_picture_does_not_hang_on_the_packets(monkeypatch):
 def test_a_scene_keeps_its_corners_once():
     """Embree reads those of the packed scene, all trees the same ones, and nothing behind their room."""
     scene = Scene(bodies=[body(wall(20)), body(sphere(2, 24), at=(0, 0, 12), transmission=(1, 1, 1))])
-    packed = scene.packed
+    packed = packed_scene(scene)
     trees = [packed.intersector._all, packed.intersector._opaque, packed.intersector._clear]
     assert packed.corners.base is not None
     for tree in trees:
