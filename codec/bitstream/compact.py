@@ -41,7 +41,7 @@ _WORDS = """
     pixels lenses rectangular hexagonal
     plenoptic plenoptic1 plenoptic2 hdtv hpo multi-focus multi-view moving-lenslets stacked-sensors depth-control
     depth-priority resolution-priority grin-hexagonal-depth-control spherical pinhole2d
-    si-lf stride sources effort
+    si-lf stride sources
 """
 WORDS = tuple(_WORDS.split())
 _NUMBER = {word: number for number, word in enumerate(WORDS)}
