@@ -20,6 +20,9 @@ from .texture_table import TextureTable
 # Spawned rays start this share of the face's largest coordinate off the face: float32 places a hit to about
 # 1e-7 of it, and from 1e-6 on no ray meets its own face again.
 LIFT = 4e-6
+# Embree tells the sides of a face by the product of its normal, as long as twice its area, and the way from the ray's
+# start, in float32: a lift of fewer subnormal steps is rounded away. It is at most this share of the longest edge.
+LIFT_STEPS, MOST_LIFT = 8 * float(np.finfo(np.float32).smallest_subnormal), 1e-3
 
 # Columns of the material table.
 COLOUR, MIRROR, TRANSMISSION, ABSORPTION = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
@@ -236,7 +239,8 @@ def _face_rows(p: NDArray[np.float64]) -> NDArray[np.float64]:
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-    lift = LIFT * np.abs(p).max(axis=(1, 2))
     longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
+    least = np.divide(LIFT_STEPS, length[:, 0], out=np.zeros_like(longest), where=length[:, 0] > 0)
+    lift = np.maximum(LIFT * np.abs(p).max(axis=(1, 2)), np.minimum(least, MOST_LIFT * longest))
     pull = np.minimum(np.divide(lift, longest, out=np.zeros_like(lift), where=longest > 0), 0.25)
     return np.column_stack([unit, lift, pull])
