@@ -16,8 +16,20 @@ from ii_core.files import one_line
 from . import container, file_header
 from .checks import check_type, whole
 from .clock import cpu_seconds
-from .contract import MAX_DECODED_PIXELS, MAX_PIXELS, Goal, Value, check_picture, checked_goal, find, parse_scheme
-from .search import within
+from .contract import (
+    MAX_DECODED_PIXELS,
+    MAX_PIXELS,
+    Coder,
+    Goal,
+    Options,
+    Value,
+    check_picture,
+    checked_goal,
+    find,
+    fractions,
+    parse_scheme,
+)
+from .search import Axis, CodingResult, Run, meet_size, within
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -186,7 +198,9 @@ def encode(
         quality=goal.quality,
         versions=coder.versions,
     )
-    result = coder.encode(picture, settings, _payload_goal(goal, coded))
+    asked = _payload_goal(goal, coded)
+    searched = asked.bpp is not None and not coder.rate_control
+    result = _at_rate(coder, picture, settings, asked) if searched else coder.encode(picture, settings, asked)
     coded = replace(coded, payload=result.run.payload, runs=result.runs)
     return replace(
         coded,
@@ -194,6 +208,27 @@ def encode(
         encode_seconds=cpu_seconds() - started,
         codec_seconds=result.run.codec_seconds,
     )
+
+
+# Doublings of the size over a coder's scale, as a first guess: 51 quantisers of H.264 are 8.5.
+SCALE_OCTAVES = 8
+
+
+def _at_rate(coder: Coder, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
+    """Search the scale of a coder without rate control for the size nearest to a rate."""
+    name, bounds = ("qp", coder.qp_range) if coder.qp_range is not None else ("quality", coder.quality_range)
+    assert bounds is not None and goal.bpp is not None  # `checked_goal` has seen to it
+    low, high = bounds
+    whole_numbers = not fractions(bounds)
+
+    def run(setting: float) -> Run:
+        value = Goal(qp=int(setting)) if name == "qp" else Goal(quality=int(setting) if whole_numbers else setting)
+        return coder.encode(picture, options, value).run
+
+    octave = (high - low) / SCALE_OCTAVES * (-1 if name == "qp" else 1)
+    axis = Axis(low=low, high=high, start=(low + high) / 2, octave=octave, step=1 if whole_numbers else 0)
+    width, height = picture.size
+    return meet_size(run, goal.bpp * width * height / 8, axis)
 
 
 # Target of the payload where the header alone takes more than the target of the file.

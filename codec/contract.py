@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
+from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -103,7 +104,8 @@ class Coder(ABC):
     dtypes : tuple of str
         Pixel types that some options accept; `check` refuses types that the given options do not accept.
     rate_control : bool
-        Whether the coder takes ``bpp``.
+        Whether the coder takes ``bpp`` in `Goal`. For other coders with a scale of quantisers or qualities, `encode`
+        searches the scale for a rate.
     qp_range : (int, int) or None
         Range of quantisers on the coder's own scale; larger is coarser.
     quality_range : (number, number) or None
@@ -125,6 +127,11 @@ class Coder(ABC):
     scale_about: ClassVar[str] = ""
 
     @property
+    def takes_rate(self) -> bool:
+        """Whether `encode` takes a rate for this coder: by its own rate control, or by a search of its scale."""
+        return self.rate_control or self.qp_range is not None or self.quality_range is not None
+
+    @property
     @abstractmethod
     def versions(self) -> dict[str, str]:
         """Name to version."""
@@ -139,7 +146,9 @@ class Coder(ABC):
 
     @abstractmethod
     def encode(self, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
-        """Code a picture. ``goal`` holds one number within its range, or none if `lossless`."""
+        """Code a picture. ``goal`` holds one number within its range, or none if `lossless`; no ``bpp`` without
+        `rate_control`.
+        """
 
     @abstractmethod
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
@@ -159,7 +168,7 @@ def register(coder: Coder) -> None:
     """Add a coder to the known schemes, under its name.
 
     Installed packages register coders by entry points of the group ``raytrace_ii.coders``, each a `Coder`, its
-    class, or a list of them.
+    class, a list of them, or a module that calls `register`.
 
     Raises
     ------
@@ -180,6 +189,8 @@ def _load_plugins() -> None:
     for entry in entry_points(group=ENTRY_POINTS):
         try:
             found = entry.load()
+            if isinstance(found, ModuleType):  # it has registered its coders
+                continue
             for coder in found if isinstance(found, list | tuple) else [found]:
                 register(coder() if isinstance(coder, type) else coder)
         except Exception as error:
@@ -220,7 +231,7 @@ def options(scheme: str) -> dict[str, str]:
         If the scheme is unknown.
     """
     coder = find(scheme)
-    lines = {"bpp": "bits per pixel of the II-picture"} if coder.rate_control else {}
+    lines = {"bpp": "bits per pixel of the II-picture"} if coder.takes_rate else {}
     for name, bounds in (("qp", coder.qp_range), ("quality", coder.quality_range)):
         if bounds is not None:
             lines[name] = f"{coder.scale_about}; {_allowed(bounds)}"
@@ -291,7 +302,7 @@ def checked_options(coder: Coder, given: Mapping[str, Any]) -> dict[str, Value]:
 def checked_goal(coder: Coder, options: Options, bpp: Any, qp: Any, quality: Any) -> Goal:
     """Return the goal; raise ValueError unless one number is given that the coder takes, or none if lossless."""
     given = {name: value for name, value in (("bpp", bpp), ("qp", qp), ("quality", quality)) if value is not None}
-    takes = {"bpp": coder.rate_control, "qp": coder.qp_range is not None, "quality": coder.quality_range is not None}
+    takes = {"bpp": coder.takes_rate, "qp": coder.qp_range is not None, "quality": coder.quality_range is not None}
     if coder.lossless(options):
         takes = {}
     known = [name for name, taken in takes.items() if taken]
@@ -329,18 +340,19 @@ def check_picture(coder: Coder, options: Options, picture: Any) -> None:
     coder.check(picture, options)
 
 
-def _fractions(bounds: tuple[float, float]) -> bool:
+def fractions(bounds: tuple[float, float]) -> bool:
+    """Return whether a range holds numbers that are not whole: one of its bounds is a float."""
     return any(isinstance(bound, float) for bound in bounds)
 
 
 def _allowed(bounds: tuple[float, float]) -> str:
     low, high = bounds
-    return f"a {'' if _fractions(bounds) else 'whole '}number from {low:g} to {high}"
+    return f"a {'' if fractions(bounds) else 'whole '}number from {low:g} to {high}"
 
 
 def _number(text: str, bounds: tuple[float, float]) -> float | None:
     try:
-        return float(text) if _fractions(bounds) else int(text)
+        return float(text) if fractions(bounds) else int(text)
     except ValueError:
         return None
 
@@ -349,7 +361,7 @@ def _within(value: Any, bounds: tuple[float, float]) -> float | None:
     """Return the number within bounds, a float or an int as the bounds are; None if it is outside."""
     if not is_number(value) or not bounds[0] <= value <= bounds[1]:
         return None
-    if _fractions(bounds):
+    if fractions(bounds):
         return float(value)
     try:
         return operator.index(value)

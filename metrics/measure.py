@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import entry_points
+from types import ModuleType
 from typing import Any
 
 from .pair import PicturePair
@@ -94,7 +95,16 @@ class Measure:
     def axis(self) -> str:
         """Label of a chart's axis."""
         label = self.label or self.name
-        return f"{label} [{self.unit}]" if self.unit else label
+        return (f"{label} [{self.unit}]" if self.unit else label) + self._direction
+
+    @property
+    def caption(self) -> str:
+        """What the number is, its unit, and whether lower is better."""
+        return self.text + (f" in {self.unit}" if self.unit else "") + self._direction
+
+    @property
+    def _direction(self) -> str:
+        return "" if self.higher_is_better else ", lower is better"
 
     @property
     def best(self) -> float:
@@ -142,7 +152,8 @@ def register_measure(measure: Measure) -> Measure:
 def known_measures() -> dict[str, Measure]:
     """Return all measures by name, those of installed packages too.
 
-    A package registers a measure by an entry point of the group ``raytrace_ii.measures`` that names a `Measure`.
+    A package registers a measure by an entry point of the group ``raytrace_ii.measures`` that names a `Measure`,
+    or a module that calls `register_measure`.
     """
     _load_plugins()
     return MEASURES
@@ -152,7 +163,9 @@ def known_measures() -> dict[str, Measure]:
 def _load_plugins() -> None:
     for point in entry_points(group=PLUGINS):
         try:
-            register_measure(point.load())
+            found = point.load()
+            if not isinstance(found, ModuleType):  # a module has registered its measures
+                register_measure(found)
         except Exception as error:  # whatever a foreign package raises must not stop the others
             warnings.warn(f"measure {point.name} ({point.value}) is left out: {error}", stacklevel=3)
 

@@ -136,7 +136,8 @@ def _plain_row(measure: Measure) -> Row:
     def describe(quality: Any) -> tuple[str, Any]:
         value = float(measure.value(quality))
         unit = f" {measure.unit}" if measure.unit else ""
-        return f"{measure.shown(value)}{unit}, {measure.text}", value
+        lower = "" if measure.higher_is_better else ", lower is better"
+        return f"{measure.shown(value)}{unit}, {measure.text}{lower}", value
 
     return Row(measure.name, measure.name, measure.name, describe)
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from .common import Force, app, check_outputs, columns, console, image_file, picture_files, spinner
+from .plugins import Plugins, load_plugins
 from .words import one_line, say
 
 
@@ -15,10 +16,12 @@ from .words import one_line, say
 def schemes(
     names: Annotated[list[str] | None, typer.Argument(help="Only these.")] = None,
     help_options: Annotated[bool, typer.Option("--help-options", help="Say what can be asked of each.")] = False,
+    plugin: Plugins = None,
 ) -> None:
     """List the coding schemes."""
     from codec import options, schemes
 
+    load_plugins(plugin)
     known = schemes()
     asked = {name: options(name) for name in names or known}  # a misspelt one is found before anything is printed
     if not help_options:
@@ -37,12 +40,14 @@ def encode(
     bpp: Annotated[float | None, typer.Option(help="Bits per pixel to aim at.")] = None,
     qp: Annotated[int | None, typer.Option(help="Quantiser to keep.")] = None,
     quality: Annotated[float | None, typer.Option(help="Quality to keep, where a scheme has a scale for it.")] = None,
+    plugin: Plugins = None,
     force: Force = False,
 ) -> None:
     """Code an II-picture."""
     from codec import encode
     from ii_core import IIPicture
 
+    load_plugins(plugin)
     check_outputs([output], force)
     original = IIPicture.load(picture)
     with spinner(f"{scheme} codes {picture.name}"):
@@ -64,12 +69,14 @@ def decode(
     max_pixels: Annotated[
         int | None, typer.Option(help="Pixels of the largest picture to decode, 2^27 if not given; bounds memory.")
     ] = None,
+    plugin: Plugins = None,
     force: Force = False,
 ) -> None:
     """Decode an II-picture, or one component image of it."""
     from codec import Encoded, decode, decode_component
     from ii_core.files import check_file, write_image
 
+    load_plugins(plugin)
     check_file(coded)
     stream = Encoded.load(coded)
     files = picture_files if component is None else image_file
@@ -88,12 +95,14 @@ def extract(
     output: Annotated[
         Path, typer.Option("-o", "--output", help="A video or picture file: .mkv, .mp4, .obu, .jp2, … by the scheme.")
     ],
+    plugin: Plugins = None,
     force: Force = False,
 ) -> None:
     """Take the coded stream out as a file that other programs open, without coding it again."""
     from codec import Encoded, extract
     from ii_core.files import check_file
 
+    load_plugins(plugin)
     check_file(coded)
     check_outputs([output], force)
     stream = Encoded.load(coded)

@@ -10,6 +10,7 @@ import typer
 
 from .coding import study_orders
 from .common import Force, Workers, app, check_outputs, columns, console, load_any, progress_bar, spinner
+from .plugins import Plugins, load_plugins
 from .words import one_line, say
 
 if TYPE_CHECKING:
@@ -30,6 +31,15 @@ Method = Annotated[str, typer.Option(help="Of depth from focus: dissertation or 
 
 
 @app.command()
+def measures(plugin: Plugins = None) -> None:
+    """List the measures that studies chart."""
+    from metrics import known_measures
+
+    load_plugins(plugin)
+    columns({name: measure.caption for name, measure in known_measures().items()})
+
+
+@app.command()
 def measure(
     reference: Annotated[Path, typer.Argument(help="The II-picture as it was.")],
     decoded: Annotated[Path, typer.Argument(help="The II-picture to judge, bare of the same size, or a coded file.")],
@@ -41,6 +51,7 @@ def measure(
     layers: Layers = None,
     ssim: Annotated[bool, typer.Option("--ssim", help="Also SSIM and MS-SSIM of every sub-image.")] = False,
     mask: Annotated[Path | None, typer.Option(help="Only pixels that are white in this picture count.")] = None,
+    plugin: Plugins = None,
     force: Force = False,
 ) -> None:
     """Compare two II-pictures of the same structure."""
@@ -48,6 +59,7 @@ def measure(
     from ii_core.files import read_depth, read_image, write_json
     from metrics import report
 
+    load_plugins(plugin)
     files = [json] if json else []
     check_outputs(files, force)
     if plots:
@@ -129,6 +141,7 @@ def study(
         bool, typer.Option("--orders", help="Code nothing: correlation and residuals of every order instead.")
     ] = False,
     workers: Workers = None,
+    plugin: Plugins = None,
     force: Force = False,
 ) -> None:
     """Chart quality against rate for several schemes."""
@@ -136,6 +149,7 @@ def study(
     from ii_core import IIPicture
     from ii_core.files import read_depth
 
+    load_plugins(plugin)
     if orders:
         study_orders(picture, output, force)
         return
@@ -238,9 +252,7 @@ def about(measure: str) -> str:
     """What a table of this measure shows."""
     from metrics.measure import measure_of
 
-    kind = measure_of(measure)
-    unit = f" in {kind.unit}" if kind.unit else ""
-    return f"{kind.text}{unit} at bits per pixel; gain and Bjøntegaard differences against jpeg2000"
+    return f"{measure_of(measure).caption} at bits per pixel; gain and Bjøntegaard differences against jpeg2000"
 
 
 def print_summary(name: str, study: dict[str, Any], measure: str = "q_global") -> None:

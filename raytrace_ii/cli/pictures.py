@@ -19,6 +19,7 @@ from .common import (
     progress_bar,
     spinner,
 )
+from .plugins import Plugins, load_plugins
 from .words import say
 
 
@@ -110,6 +111,7 @@ def export(
     to: Annotated[str, typer.Option(help="views, hci, quilt or mosaic.")] = "views",
     depth: Annotated[Path | None, typer.Option(help="z in mm, an .exr: hci gets its disparity map.")] = None,
     row: Annotated[int | None, typer.Option(help="Row of views for a quilt, from 0; the middle one.")] = None,
+    plugin: Plugins = None,
     force: Force = False,
 ) -> None:
     """Write an II-picture as other light field programs read it."""
@@ -117,6 +119,7 @@ def export(
     from ii_core.files import read_depth, write_image
     from ii_core.formats.quilt import quilt_path
 
+    load_plugins(plugin)
     if to not in ("views", "hci", "quilt", "mosaic"):
         raise ValueError(f"unknown layout {to!r}: known are views, hci, quilt, mosaic")
     if depth is not None and to != "hci":
@@ -148,6 +151,7 @@ def components(
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder for the component images.")],
     type: Annotated[str, typer.Option(help="ei, si or ri.")] = "si",
     sheet: Annotated[Path | None, typer.Option(help="Write all of them side by side, a line between, here.")] = None,
+    plugin: Plugins = None,
     force: Force = False,
 ) -> None:
     """Write the elementary, sub- or ray-space images of an II-picture.
@@ -160,6 +164,7 @@ def components(
     from ii_core.component import KINDS
     from ii_core.files import write_image
 
+    load_plugins(plugin)
     if type not in KINDS:
         raise ValueError(f"unknown component image {type!r}: known are {', '.join(KINDS)}")
     original = load_any(picture)

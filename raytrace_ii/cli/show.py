@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from .common import Force, app, check_outputs, image_file, load_any, pair, progress_bar, spinner
+from .plugins import Plugins, load_plugins
 from .words import say
 
 
@@ -23,6 +24,7 @@ def view(
         bool, typer.Option("--serve", help="Serve the page on this machine instead of writing it.")
     ] = False,
     port: Annotated[int, typer.Option(help="To serve on; 0 for any that is free.")] = 0,
+    plugin: Plugins = None,
     force: Force = False,
 ) -> None:
     """Look at an II-picture in a browser: parallax, focus, comparison, stereo."""
@@ -30,6 +32,7 @@ def view(
     from ii_core.display.viewer import JPEG_QUALITY, write_viewer, write_viewer_folder
     from ii_core.files import read_depth
 
+    load_plugins(plugin)
     if (output is None) == (not serve):
         raise ValueError("one of --output and --serve is needed")
     if output is not None:
