@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .files.load import load_scene, scene_names
+    from .files.take import Take, load_take
     from .rendering.options import RenderOptions
     from .rendering.render import Shot, Stats, render, render_to
     from .scene.scene import Background, Body, Fog, Light, Material, Scene
@@ -23,7 +24,9 @@ __all__ = [
     "Scene",
     "Shot",
     "Stats",
+    "Take",
     "load_scene",
+    "load_take",
     "render",
     "render_to",
     "scene_names",
@@ -33,6 +36,8 @@ __all__ = [
 _HOMES = {
     "load_scene": "files.load",
     "scene_names": "files.load",
+    "Take": "files.take",
+    "load_take": "files.take",
     "trace": "tracing.tracer",
     "RenderOptions": "rendering.options",
 }

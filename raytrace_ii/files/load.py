@@ -7,9 +7,10 @@ import tomllib
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,10 @@ from .toml_schema import (  # fmt: skip
 )
 from .validation_messages import line, words
 
+if TYPE_CHECKING:
+    from .gltf.nodes import GltfScene
+
+Made = TypeVar("Made")
 GLTF_TYPES = (".glb", ".gltf")
 MESH_TYPES = (*GLTF_TYPES, ".obj", ".ply", ".stl")
 MOST_NAMED = 40  # of what a file holds that is left out
@@ -100,11 +105,22 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
         Once for each mesh file that holds something unsupported, naming all of it; and once if glass is not closed
         or looks inwards, naming the objects.
     """
+    path = scene_path(name)
+    files = MeshFiles()
+    if is_mesh(path):
+        scene = mesh_scene(path, files.model(path))
+    else:
+        scene = built(path, SceneLoader(path, files).scene, read_tables(path))
+    warn_of(path, scene, files)
+    return scene
+
+
+def scene_path(name: str | os.PathLike[str]) -> Path:
+    """The file of a scene; errors as `load_scene`."""
     if not isinstance(name, str | os.PathLike) or not isinstance(os.fspath(name), str):
         raise TypeError(f"name is {name!r}: the name of a scene or a path is needed")
     path = Path(name)
-    alone = path.suffix.lower() in MESH_TYPES
-    if path.suffix != ".toml" and not alone:
+    if path.suffix != ".toml" and not is_mesh(path):
         known = scene_names()
         if str(name) not in known:
             raise ValueError(
@@ -112,34 +128,71 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
             )
         path = Path(str(files("assets") / "scenes" / f"{name}.toml"))
     check_file(path)
-    if alone:
-        model = read_model(path)
-        try:
-            scene, models = _alone(path, model), {path: model}
-        except ValueError as error:
-            raise ValueError(f"{path.name}: {one_line(error)}") from None
-    else:
-        loader = _Loader(path)
-        try:
-            scene, models = loader.scene(parse(path.read_text(encoding="utf-8"))), loader.models
-        except ValueError as error:
-            raise ValueError(f"{path}: {one_line(error)}") from None
-        except OSError as error:
-            raise type(error)(f"{path}: {one_line(error)}") from None
-    for file, model in models.items():
-        if model.left_out:
-            named, more = model.left_out[:MOST_NAMED], len(model.left_out) - MOST_NAMED
-            rest = f" and {more} more" if more > 0 else ""
-            warnings.warn(f"{file}: not supported or not there, and left out: {', '.join(named)}{rest}", stacklevel=2)
+    return path
+
+
+def is_mesh(path: Path) -> bool:
+    """Whether a file is a mesh file alone."""
+    return path.suffix.lower() in MESH_TYPES
+
+
+def read_tables(path: Path) -> SceneFile:
+    """The checked tables of a scene file; errors name it."""
+    return built(path, lambda: parse(path.read_text(encoding="utf-8")))
+
+
+def built(path: Path, make: Callable[..., Made], *arguments: Any) -> Made:
+    """What a function makes of a scene file; its errors name the file."""
+    try:
+        return make(*arguments)
+    except ValueError as error:
+        raise ValueError(f"{path}: {one_line(error)}") from None
+    except OSError as error:
+        raise type(error)(f"{path}: {one_line(error)}") from None
+
+
+def warn_of(path: Path, scene: Scene, files: MeshFiles) -> None:
+    """Warn of what mesh files hold that is left out, and of glass without an inside."""
+    for file, names in files.left_out.items():
+        named, more = names[:MOST_NAMED], len(names) - MOST_NAMED
+        rest = f" and {more} more" if more > 0 else ""
+        warnings.warn(f"{file}: not supported or not there, and left out: {', '.join(named)}{rest}", stacklevel=3)
     glass = [body for body in scene.bodies if body.material.fills]
     if hollow := [f"{body.name!r} ({why})" for body in glass if (why := flaw(body.vertices, body.faces))]:
         needed = "closed meshes whose faces look outwards are needed, or ior = 1 without absorption for a sheet"
-        warnings.warn(f"{path}: glass without an inside: {', '.join(hollow)}: {needed}", stacklevel=2)
-    return scene
+        warnings.warn(f"{path}: glass without an inside: {', '.join(hollow)}: {needed}", stacklevel=3)
 
 
-def read_model(path: Path) -> Model:
+class MeshFiles:
+    """Mesh files, each read once; glTF files as they stand at any instant of a clip."""
+
+    def __init__(self) -> None:
+        self.left_out: dict[Path, list[str]] = {}
+        self._scenes: dict[Path, GltfScene] = {}
+        self._models: dict[Path, tuple[Any, Model]] = {}  # the latest of each file, and its instant
+
+    def model(self, path: Path, clip: str | None = None, seconds: float = 0.0) -> Model:
+        """Meshes, materials and lights of a file; errors as `read_model`."""
+        instant = (clip, seconds if clip is not None else 0.0)
+        if path not in self._models or self._models[path][0] != instant:
+            self._models[path] = instant, read_model(path, clip, seconds, self._scenes)
+            self.left_out[path] = self._models[path][1].left_out
+            if not self.left_out[path]:
+                del self.left_out[path]
+        return self._models[path][1]
+
+
+def read_model(
+    path: Path, clip: str | None = None, seconds: float = 0.0, scenes: dict[Path, GltfScene] | None = None
+) -> Model:
     """Meshes, materials and lights of a file, brought to the scene's left-handed frame by z → −z.
+
+    Parameters
+    ----------
+    clip : str, optional
+        Animation of a glTF file, taken at ``seconds``, and repeated without end.
+    scenes : dict, optional
+        Keeps glTF files that have been read.
 
     Raises
     ------
@@ -154,9 +207,14 @@ def read_model(path: Path) -> Model:
     check_file(path)
     try:
         if kind in GLTF_TYPES:
-            from .gltf.nodes import read_gltf
+            from .gltf.nodes import GltfScene
 
-            model = read_gltf(path)
+            scenes = {} if scenes is None else scenes
+            if path not in scenes:
+                scenes[path] = GltfScene(path)
+            model = scenes[path].model(clip, seconds)
+        elif clip is not None:
+            raise ValueError(f"clip {clip!r}: only glTF files have animations")
         else:
             model = {".obj": read_obj, ".ply": read_ply, ".stl": read_stl}[kind](path)
         if not any(len(part.mesh.faces) for part in model.parts):
@@ -192,16 +250,24 @@ MAPS: dict[str, Callable[[NDArray[Any]], Image]] = {
 }
 
 
-class _Loader:
-    """Makes a scene of one file's tables; every mesh file is read once."""
+class SceneLoader:
+    """Makes scenes of one file's tables; what stays the same from scene to scene is made once."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.models: dict[Path, Model] = {}
+    def __init__(self, path: Path, files: MeshFiles) -> None:
+        self.path, self.files = path, files
+        self._made: dict[Any, tuple[Any, Any, Any]] = {}
 
-    def scene(self, file: SceneFile) -> Scene:
-        textures = {name: self._texture(name, value) for name, value in file.texture.items()}
-        materials = {name: self._material(name, value, textures) for name, value in file.material.items()}
+    def scene(self, file: SceneFile, seconds: float = 0.0) -> Scene:
+        """The scene at an instant, which clips of mesh files show."""
+        textures = {
+            name: self._once(("texture", name), value, None, partial(self._texture, name, value))
+            for name, value in file.texture.items()
+        }
+        materials = {}
+        for name, table in file.material.items():
+            texture = textures.get(table.texture or "")
+            make = partial(self._material, name, table, textures)
+            materials[name] = self._once(("material", name), table, texture, make)
         if not file.object:
             raise ValueError("no geometry: at least one [[object]] is needed")
         bodies: list[Body] = []
@@ -209,31 +275,52 @@ class _Loader:
         for i, value in enumerate(file.object):
             where = f"object.{i} ({value.name})" if value.name else f"object.{i}"
             try:
-                model, label, strength = self._model(value, materials)
-                bodies += _bodies(value, model.parts, f"{label} {i}")
-                lights += [_placed(light, value, strength) for light in model.lights if strength > 0]
+                moment = seconds if (value.model_extra or {}).get("clip") else 0.0
+                look = materials.get(value.material or "")
+                made = partial(self._object, i, value, materials, seconds)
+                shown, shining = self._once(("object", i), (value, moment), look, made)
             except ValueError as error:
                 raise ValueError(f"{where}: {error}") from None
             except OSError as error:
                 raise type(error)(f"{where}: {error}") from None
+            bodies += shown
+            lights += shining
+        sky = self._once("background", file.background, None, partial(self._background, file.background))
         return Scene(
             name=self.path.stem,
             bodies=bodies,
             lights=lights,
-            background=self._background(file.background),
+            background=sky,
             fog=Fog(colour=file.fog.colour, density_per_mm=file.fog.density_per_mm) if file.fog else None,
             ambient=file.ambient,
             max_depth=file.max_depth,
         )
 
-    def _model(self, value: ObjectTable, materials: dict[str, Material]) -> tuple[Model, str, float]:
+    def _once(self, key: Any, value: Any, other: Any, make: Callable[[], Any]) -> Any:
+        """What a table makes, made again only if the table or the other thing that it uses has changed."""
+        found = self._made.get(key)
+        if found is None or found[0] != value or found[1] is not other:
+            found = self._made[key] = value, other, make()
+        return found[2]
+
+    def _object(
+        self, i: int, value: ObjectTable, materials: dict[str, Material], seconds: float
+    ) -> tuple[list[Body], list[Light]]:
+        """An object's bodies and lights."""
+        model, label, strength = self._model(i, value, materials, seconds)
+        bodies = list(_bodies(value, model.parts, f"{label} {i}"))
+        return bodies, [_placed(light, value, strength) for light in model.lights if strength > 0]
+
+    def _model(
+        self, i: int, value: ObjectTable, materials: dict[str, Material], seconds: float
+    ) -> tuple[Model, str, float]:
         """What an object shows, with the material it names; what to call it; and how strong its lights are."""
         parameters = value.model_extra or {}
         if value.material is not None and value.material not in materials:
             raise ValueError(f"unknown material {value.material!r}: known are {_known(materials)}")
         material = materials[value.material] if value.material is not None else None
         if "mesh" not in parameters:
-            mesh, label = parse_shape(parameters)
+            mesh, label = self._once(("shape", i), parameters, None, partial(parse_shape, parameters))
             if material is None:
                 raise ValueError("material: is missing")
             return Model([Part("", mesh, material)]), label, 0.0
@@ -241,14 +328,13 @@ class _Loader:
             raise ValueError("both mesh and shape: one of them is needed")
         file = parse_mesh(parameters)
         path = self.path.parent / file.mesh
-        if path not in self.models:
-            self.models[path] = read_model(path)
-        parts = self.models[path].parts
+        model = self.files.model(path, file.clip, file.clip_s + file.clip_speed * seconds)
+        parts = model.parts
         if material is not None:
             parts = [replace(part, material=material) for part in parts]
         if not file.smooth:
             parts = [replace(part, mesh=replace(part.mesh, normals=None)) for part in parts]
-        return Model(parts, self.models[path].lights), path.stem, file.lights
+        return Model(parts, model.lights), path.stem, file.lights
 
     def _image(self, where: str, name: str, make: Any = image_texture) -> Image:
         try:
@@ -395,8 +481,17 @@ def _placed(light: Light, value: ObjectTable, strength: float) -> Light:
     return replace(light, vector=vector(turn @ light.vector + value.position_mm), direction=along, colour=colour)
 
 
-def _alone(path: Path, model: Model) -> Scene:
-    """A mesh file as a scene of its own."""
+def mesh_scene(path: Path, model: Model, place: ObjectTable | None = None) -> Scene:
+    """A mesh file as a scene of its own, placed by `working_place` unless told."""
+    try:
+        value = working_place(path, model) if place is None else place
+        return _alone(path, model, value)
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {one_line(error)}") from None
+
+
+def working_place(path: Path, model: Model) -> ObjectTable:
+    """Where a model fills the working volume."""
     corners = np.concatenate([part.mesh.vertices for part in model.parts])
     low, high = corners.min(axis=0), corners.max(axis=0)
     if not max(np.abs(low).max(), np.abs(high).max()) <= np.finfo(np.float32).max:
@@ -406,7 +501,10 @@ def _alone(path: Path, model: Model) -> Scene:
     shift = (WORKING_VOLUME.sum(axis=0) - (low + high) * scale) / 2
     shift[2] = WORKING_VOLUME[0, 2] - low[2] * scale
     x, y, z = (float(s) for s in shift)
-    value = ObjectTable(name=path.stem, position_mm=(x, y, z), scale=(scale, scale, scale))
+    return ObjectTable(name=path.stem, position_mm=(x, y, z), scale=(scale, scale, scale))
+
+
+def _alone(path: Path, model: Model, value: ObjectTable) -> Scene:
     lights = [_placed(light, value, 1.0) for light in model.lights] or [
         Light(kind="directional", vector=(0.5, -1.0, 0.8), colour=(0.7, 0.7, 0.7)),
         Light(kind="directional", vector=(-0.8, -0.2, 0.6), colour=(0.25, 0.25, 0.25)),

@@ -167,11 +167,16 @@ class MeshFile(_Strict):
         Shade by vertex normals.
     lights : float
         Strength of all the file's lights together at its middle; 0 leaves them out.
+    clip : str, optional
+        Animation of a glTF file, at ``clip_s`` seconds; in a take ``clip_speed`` seconds a second later.
     """
 
     mesh: str
     smooth: bool = True
     lights: NotNegative = 1.0
+    clip: str | None = None
+    clip_s: NotNegative = 0.0
+    clip_speed: NotNegative = 1.0
 
 
 class ObjectTable(BaseModel):
@@ -185,6 +190,30 @@ class ObjectTable(BaseModel):
     scale: OneOrThree = (1.0, 1.0, 1.0)
 
 
+def _listed(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
+def _rows(value: Any) -> Any:
+    return [row if isinstance(row, list) else [row] for row in value] if isinstance(value, list) else value
+
+
+class TrackTable(_Strict):
+    """Keyframes of one key of one or several tables of the file, or of the camera."""
+
+    of: Annotated[list[str], BeforeValidator(_listed)]
+    key: str
+    frames: list[float]
+    values: Annotated[list[list[float]], BeforeValidator(_rows)]
+    how: Literal["linear", "smooth", "step"] = "linear"
+
+
+class AnimationTable(_Strict):
+    frames: Annotated[int, Field(ge=1, le=1_000_000)]
+    fps: Annotated[float, Field(gt=0, le=1000)] = 24.0
+    track: list[TrackTable] = []
+
+
 class SceneFile(_Strict):
     title: str = ""
     about: str = ""
@@ -196,6 +225,7 @@ class SceneFile(_Strict):
     texture: dict[str, Annotated[AnyTexture, Field(discriminator="kind")]] = {}
     material: dict[str, MaterialTable] = {}
     object: list[ObjectTable] = []
+    animation: AnimationTable | None = None
 
 
 class _ShapeHolder(_Strict):
@@ -212,7 +242,8 @@ SHAPES = _by_tag(get_args(get_args(AnyShape)[0]), "shape")
 SHAPE_PARTS = _by_tag(PARTS, "part")
 # By what pydantic calls the part of a file that a model describes.
 _MODELS: dict[str, type[BaseModel]] = {
-    "background": BackgroundTable, "fog": FogTable, **TEXTURES, **LIGHTS, **SHAPES, **SHAPE_PARTS
+    "background": BackgroundTable, "fog": FogTable, "animation": AnimationTable, "track": TrackTable,
+    **TEXTURES, **LIGHTS, **SHAPES, **SHAPE_PARTS,
 }  # fmt: skip
 
 
@@ -225,7 +256,15 @@ def parse(text: str) -> SceneFile:
         With one line on the first thing that is wrong, and where it stands.
     """
     try:
-        return _checked(SceneFile, tomllib.loads(text))
+        return checked_tables(tomllib.loads(text))
+    except RecursionError:
+        raise ValueError("tables or lists are nested too deeply") from None
+
+
+def checked_tables(data: dict[str, Any]) -> SceneFile:
+    """A scene file's tables, checked; errors as `parse`."""
+    try:
+        return _checked(SceneFile, data)
     except ValidationError as error:
         raise ValueError(_first(error)) from None
     except RecursionError:
@@ -277,7 +316,8 @@ def _keys(title: str, place: list[Any]) -> list[str]:
     if title == SceneFile.__name__:
         if len(place) == 1:
             return list(SceneFile.model_fields)
-        return list((MaterialTable if place[0] == "material" else _MODELS[place[-2]]).model_fields)
+        holder = next(part for part in reversed(place[:-1]) if isinstance(part, str))
+        return list((MaterialTable if place[0] == "material" else _MODELS[holder]).model_fields)
     if title == _ShapeHolder.__name__ and len(place) > 4:  # a part of a shape
         return list(_MODELS[place[4]].model_fields)
     model = _MODELS[place[1]] if title == _ShapeHolder.__name__ else MeshFile

@@ -17,12 +17,14 @@ from raytrace_ii.files.toml_schema import (  # fmt: skip
     SHAPE_PARTS,
     SHAPES,
     TEXTURES,
+    AnimationTable,
     BackgroundTable,
     FogTable,
     MaterialTable,
     MeshFile,
     ObjectTable,
     SceneFile,
+    TrackTable,
 )
 from raytrace_ii.shapes.implicit_parts import Part
 
@@ -35,6 +37,8 @@ MODELS = {
     "object": ObjectTable,
     "mesh": MeshFile,
     "parts": Part,
+    "animation": AnimationTable,
+    "track": TrackTable,
     **{
         f"{kind} {name}": model
         for kind, models in (("light", LIGHTS), ("texture", TEXTURES), ("shape", SHAPES), ("part", SHAPE_PARTS))

@@ -18,7 +18,7 @@ from ..beside import beside, read_bytes, read_texture
 from .tables import KNOWN_EXTENSIONS, Accessor, Buffer, BufferView, Gltf, ImageSource
 
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_SHAPES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_SHAPES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 MOST_ROWS = 10_000_000  # of an accessor without a view: no bytes of the file answer for them
 _GLB, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 

@@ -1,10 +1,11 @@
-"""glTF 2.0 scenes: nodes, meshes and lights, with the materials of materials.py."""
+"""glTF 2.0 scenes: nodes, meshes, skins and lights, with the materials of materials.py."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,10 @@ from numpy.typing import NDArray
 from ...scene.scene import Light, unit_rows
 from ...shapes.primitives import Mesh
 from ..mesh_model import Model, Part
+from .clips import Clip, Keys, clip_names
 from .container import GltfFile
 from .materials import Look, Looks
-from .tables import GltfMesh, Node, Primitive, PunctualLight, left_out
+from .tables import GltfMesh, Node, Primitive, PunctualLight, Skin, left_out
 
 Array = NDArray[np.float64]
 FLIP = np.diag([1.0, 1.0, -1.0, 1.0])  # right-handed with −z ahead to left-handed with z ahead
@@ -24,13 +26,11 @@ TRIANGLES, STRIP, FAN = 4, 5, 6
 MOST_FACES = 50_000_000  # of all instances: about 10 GB when they are traced
 # Attributes that are read or have no bearing here: tangents follow from the texture coordinates, of which no
 # texture needs the other sets or is named itself, and those with an underscore are the application's own.
-_READ = re.compile(r"(POSITION|NORMAL|TANGENT|COLOR_0|TEXCOORD_\d+|_.*)$")
+_READ = re.compile(r"(POSITION|NORMAL|TANGENT|COLOR_0|TEXCOORD_\d+|JOINTS_\d+|WEIGHTS_\d+|_.*)$")
 
 
-def read_gltf(path: Path) -> Model:
-    """Parts, one for each primitive of each node, and punctual lights of a .gltf or .glb file.
-
-    Instances of a mesh share their faces, texture coordinates and material.
+class GltfScene:
+    """A .gltf or .glb file, read once, as it stands at any instant of one of its animations.
 
     Raises
     ------
@@ -39,16 +39,45 @@ def read_gltf(path: Path) -> Model:
     OSError
         If a file that it names is missing.
     """
-    file = GltfFile(path)
-    reader = _Reader(file)
-    for index, matrix in _nodes(file):
-        reader.node(index, FLIP @ matrix)
-    scenes = len(file.tables.scenes)
-    notes = [*left_out(file.tables), *([f"scenes but one of {scenes}"] if scenes > 1 else []), *reader.notes]
-    return Model(reader.parts, _exposed(reader.lights, reader.parts), list(dict.fromkeys(notes)))
+
+    def __init__(self, path: Path) -> None:
+        self.file = GltfFile(path)
+        self._reader = _Reader(self.file)
+        self._clips: dict[str, Clip] = {}
+
+    @property
+    def clips(self) -> list[str]:
+        """Names of the animations."""
+        return clip_names(self.file)
+
+    def clip(self, name: str) -> Clip:
+        """An animation by its name; ValueError if there is none."""
+        if name not in self.clips:
+            raise ValueError(f"unknown clip {name!r}: known are {', '.join(self.clips) or 'none'}")
+        if name not in self._clips:
+            self._clips[name] = Clip(self.file, self.clips.index(name))
+        return self._clips[name]
+
+    def model(self, clip: str | None = None, seconds: float = 0.0) -> Model:
+        """Parts, one for each primitive of each node, and punctual lights.
+
+        Instances of a mesh share their faces, texture coordinates and material. Without a clip every node stands as
+        the file has it, and skins follow their joints there.
+        """
+        tables, keys = self.file.tables, self.clip(clip).at(seconds) if clip is not None else {}
+        matrices = dict(_nodes(self.file, keys))
+        reader = self._reader
+        reader.begin(matrices, keys)
+        for index in matrices:
+            reader.node(index)
+        scenes = len(tables.scenes)
+        notes = [*left_out(tables), *([f"scenes but one of {scenes}"] if scenes > 1 else []), *reader.notes]
+        if clip is not None:
+            notes += self.clip(clip).left_out
+        return Model(reader.parts, _exposed(reader.lights, reader.parts), list(dict.fromkeys(notes)))
 
 
-def _nodes(file: GltfFile) -> Iterator[tuple[int, Array]]:
+def _nodes(file: GltfFile, keys: Mapping[tuple[int, str], Array]) -> Iterator[tuple[int, Array]]:
     """Every node of the scene with its matrix to the scene, parents first.
 
     A file without a scene shows every node that is no other's child.
@@ -68,9 +97,15 @@ def _nodes(file: GltfFile) -> Iterator[tuple[int, Array]]:
         if index in seen:
             raise ValueError(f"{who}: nodes.{index} is named twice: each node has one parent")
         seen.add(index)
-        matrix = above @ _matrix(node, f"nodes.{index}")
+        matrix = above @ _matrix(_keyed(node, index, keys), f"nodes.{index}")
         yield index, matrix
         waiting += [(child, matrix, f"nodes.{index}") for child in reversed(node.children)]
+
+
+def _keyed(node: Node, index: int, keys: Mapping[tuple[int, str], Array]) -> Node:
+    """A node with its animated keys."""
+    found = {path: keys[index, path] for path in ("translation", "rotation", "scale") if (index, path) in keys}
+    return node.model_copy(update={path: tuple(value.tolist()) for path, value in found.items()}) if found else node
 
 
 def _matrix(node: Node, where: str) -> Array:
@@ -93,33 +128,68 @@ def _matrix(node: Node, where: str) -> Array:
     return matrix
 
 
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """A primitive in its node's frame, right-handed as it is stored, and how it is deformed.
+
+    ``targets`` are displacements of positions and of normals, each (V, 3) or None; ``joints`` and ``weights`` are
+    (V, n), or None for a primitive without a skin.
+    """
+
+    mesh: Mesh
+    look: Look
+    targets: list[tuple[Array | None, Array | None]] = field(default_factory=list)
+    joints: NDArray[np.int64] | None = None
+    weights: Array | None = None
+
+    def morphed(self, weights: Array) -> Mesh:
+        """The mesh with its targets added by their weights."""
+        if not weights.any():
+            return self.mesh
+        place, normals = self.mesh.vertices.copy(), self.mesh.normals
+        normals = None if normals is None else normals.copy()
+        for weight, (by, tilt) in zip(weights, self.targets, strict=True):
+            if by is not None:
+                place += weight * by
+            if normals is not None and tilt is not None:
+                normals += weight * tilt
+        return replace(self.mesh, vertices=place, normals=None if normals is None else unit_rows(normals))
+
+
 class _Reader:
-    """Gathers parts and lights; meshes are read once for all their instances."""
+    """Gathers parts and lights; meshes are read once for all their instances and instants."""
 
     def __init__(self, file: GltfFile) -> None:
         self.file = file
         self.notes: list[str] = []
+        self._looks = Looks(file, self.notes.append)
+        self._meshes: dict[int, list[_Shown]] = {}
+        self.begin({}, {})
+
+    def begin(self, matrices: Mapping[int, Array], keys: Keys) -> None:
+        """Start another instant: matrices of all nodes to the scene, and animated keys."""
         self.parts: list[Part] = []
         self.lights: list[tuple[PunctualLight, Array]] = []
-        self._looks = Looks(file, self.notes.append)
-        self._meshes: dict[int, list[tuple[Mesh, Look]]] = {}
+        self._matrices, self._keys = matrices, keys
         self._faces_shown = 0
 
-    def node(self, index: int, matrix: Array) -> None:
-        """Add what a node shows, by its matrix to our frame."""
+    def node(self, index: int) -> None:
+        """Add what a node shows."""
         node: Node = self.file.tables.nodes[index]
+        matrix = FLIP @ self._matrices[index]
         if node.mesh is not None:
             mesh: GltfMesh = self.file.at("meshes", node.mesh, f"nodes.{index}")
             if node.mesh not in self._meshes:
                 self._meshes[node.mesh] = list(self._primitives(node.mesh, mesh))
             shown = self._meshes[node.mesh]
-            self._faces_shown += sum(len(primitive.faces) for primitive, _ in shown)
+            self._faces_shown += sum(len(one.mesh.faces) for one in shown)
             if self._faces_shown > MOST_FACES:
                 raise ValueError(f"nodes.{index}: more than {MOST_FACES} triangles, all instances counted")
             name = node.name or mesh.name or f"node {index}"
-            for i, (primitive, look) in enumerate(shown):
+            for i, one in enumerate(shown):
                 own = f"{name} {i}" if len(shown) > 1 else name
-                self.parts.append(Part(own, _moved(primitive, matrix), look.material))
+                moved = self._posed(one, index, node, mesh, matrix)
+                self.parts.append(Part(own, moved, one.look.material))
         light = node.extensions.KHR_lights_punctual
         if light is not None:
             lights = self.file.tables.extensions.KHR_lights_punctual.lights
@@ -127,7 +197,38 @@ class _Reader:
                 raise ValueError(f"nodes.{index}: light {light.light} is named, there are {len(lights)}")
             self.lights.append((lights[light.light], matrix))
 
-    def _primitives(self, index: int, mesh: GltfMesh) -> Iterator[tuple[Mesh, Look]]:
+    def _posed(self, one: _Shown, index: int, node: Node, mesh: GltfMesh, matrix: Array) -> Mesh:
+        """A primitive in our frame: morphed, then moved by its node, or by its joints alone if it has a skin."""
+        rest = np.array(node.weights or mesh.weights or [0.0] * len(one.targets))
+        weights = self._keys.get((index, "weights"), rest)
+        if len(weights) != len(one.targets):
+            raise ValueError(f"nodes.{index}: {len(weights)} morph weights, {len(one.targets)} targets")
+        shape = one.morphed(weights) if one.targets else one.mesh
+        if node.skin is None:
+            return _moved(shape, matrix)
+        if one.joints is None or one.weights is None:
+            self.notes.append("a skin over a mesh without joints")
+            return _moved(shape, matrix)
+        skin: Skin = self.file.at("skins", node.skin, f"nodes.{index}")
+        bones = self._bones(skin, f"skins.{node.skin}")
+        if one.joints.max() >= len(bones):
+            raise ValueError(f"nodes.{index}: joint {one.joints.max()} is named, the skin has {len(bones)}")
+        return _skinned(shape, bones, one.joints, one.weights)
+
+    def _bones(self, skin: Skin, where: str) -> Array:
+        """Matrices (n, 4, 4) from a mesh at rest to our frame, one a joint."""
+        inverse = np.tile(np.eye(4), (len(skin.joints), 1, 1))
+        if skin.inverseBindMatrices is not None:
+            stored = self.file.array(skin.inverseBindMatrices, where)
+            if stored.shape[1] != 16 or len(stored) < len(skin.joints):
+                raise ValueError(f"{where}.inverseBindMatrices: {len(skin.joints)} matrices are needed")
+            inverse = stored[: len(skin.joints)].astype(np.float64).reshape(-1, 4, 4).transpose(0, 2, 1)
+        for joint in skin.joints:
+            if joint not in self._matrices:
+                raise ValueError(f"{where}: joint nodes.{joint} is not in the scene")
+        return FLIP @ np.stack([self._matrices[joint] for joint in skin.joints]) @ inverse
+
+    def _primitives(self, index: int, mesh: GltfMesh) -> Iterator[_Shown]:
         for i, primitive in enumerate(mesh.primitives):
             where = f"meshes.{index}.primitives.{i}"
             if primitive.mode < TRIANGLES:
@@ -135,7 +236,42 @@ class _Reader:
                 continue
             look = self._looks.look(primitive.material, "COLOR_0" in primitive.attributes, where)
             if look is not None:
-                yield self._mesh(primitive, look, where), look
+                targets = [self._target(primitive, k, where) for k in range(len(primitive.targets))]
+                yield _Shown(self._mesh(primitive, look, where), look, targets, *self._joints(primitive, where))
+
+    def _target(self, primitive: Primitive, k: int, where: str) -> tuple[Array | None, Array | None]:
+        """Displacements of positions and normals of a morph target."""
+        where = f"{where}.targets.{k}"
+        attributes = primitive.targets[k]
+        self.notes += [f"morphed {name}" for name in attributes if name not in ("POSITION", "NORMAL", "TANGENT")]
+        count = {name: primitive.attributes[name] for name in ("POSITION",) if name in primitive.attributes}
+        rows = len(self.file.array(count["POSITION"], where)) if count else 0
+        found: list[Array | None] = []
+        for name in ("POSITION", "NORMAL"):
+            values = self.file.array(attributes[name], f"{where}.{name}") if name in attributes else None
+            if values is not None and values.shape != (rows, 3):
+                raise ValueError(f"{where}.{name}: has {values.shape}: {(rows, 3)} are needed")
+            found.append(None if values is None else values.astype(np.float64))
+        return found[0], found[1]
+
+    def _joints(self, primitive: Primitive, where: str) -> tuple[NDArray[np.int64] | None, Array | None]:
+        """Joints and weights (V, 4n) of all sets; weights add up to 1."""
+        joints, weights = [], []
+        for i in range(len(primitive.attributes)):
+            if f"JOINTS_{i}" not in primitive.attributes:
+                break
+            pair = [self._attribute(primitive, f"{name}_{i}", 4, where) for name in ("JOINTS", "WEIGHTS")]
+            if pair[0] is None or pair[1] is None:
+                raise ValueError(f"{where}: has JOINTS_{i} without WEIGHTS_{i}")
+            joints.append(pair[0].astype(np.int64))
+            weights.append(pair[1])
+        if not joints:
+            return None, None
+        share = np.concatenate(weights, axis=1)
+        total = share.sum(axis=1, keepdims=True)
+        if not (total > 0).all() or share.min() < 0:
+            raise ValueError(f"{where}: a vertex has no weight or a negative one: shares of joints are needed")
+        return np.concatenate(joints, axis=1), share / total
 
     def _mesh(self, primitive: Primitive, look: Look, where: str) -> Mesh:
         """A primitive in its node's frame, right-handed as it is stored."""
@@ -204,6 +340,19 @@ def _moved(mesh: Mesh, matrix: Array) -> Mesh:
         cofactors = np.array([np.cross(turn[(i + 1) % 3], turn[(i + 2) % 3]) for i in range(3)])
         normals = unit_rows(mesh.normals @ cofactors.T * (1.0 if np.linalg.det(turn) >= 0 else -1.0))
     return Mesh(mesh.vertices @ turn.T + matrix[:3, 3], faces, normals, mesh.uv, mesh.colours)
+
+
+def _skinned(mesh: Mesh, bones: Array, joints: NDArray[np.int64], weights: Array) -> Mesh:
+    """A mesh whose vertices each follow a weighted mean of their joints' matrices (linear blending)."""
+    matrices = np.einsum("vn,vnij->vij", weights, bones[joints][:, :, :3])
+    turn = matrices[:, :, :3]
+    place = np.einsum("vij,vj->vi", turn, mesh.vertices) + matrices[:, :, 3]
+    mirrored = float(np.median(np.linalg.det(turn))) < 0
+    normals = None
+    if mesh.normals is not None:
+        rows = [np.cross(turn[:, (i + 1) % 3], turn[:, (i + 2) % 3]) for i in range(3)]
+        normals = unit_rows(np.einsum("vij,vj->vi", np.stack(rows, axis=1), mesh.normals) * (-1 if mirrored else 1))
+    return Mesh(place, mesh.faces[:, ::-1] if mirrored else mesh.faces, normals, mesh.uv, mesh.colours)
 
 
 def _exposed(lights: list[tuple[PunctualLight, Array]], parts: list[Part]) -> list[Light]:

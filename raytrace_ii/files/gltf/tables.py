@@ -147,10 +147,14 @@ class Primitive(_Table):
     indices: Index | None = None
     material: Index | None = None
     mode: Annotated[int, Field(ge=0, le=6)] = 4
+    targets: list[dict[str, Index]] = []
 
 
 class GltfMesh(_Table):
+    """Primitives, and the weights of their morph targets unless a node or an animation has others."""
+
     primitives: list[Primitive]
+    weights: list[float] = []
 
 
 class LightReference(_Table):
@@ -164,11 +168,48 @@ class NodeExtensions(_Table):
 class Node(_Table):
     children: list[Index] = []
     mesh: Index | None = None
+    skin: Index | None = None
+    weights: list[float] = []
     matrix: Annotated[list[float], Field(min_length=16, max_length=16)] | None = None
     translation: Vector3 = (0.0, 0.0, 0.0)
     rotation: Vector4 = (0.0, 0.0, 0.0, 1.0)
     scale: Vector3 = (1.0, 1.0, 1.0)
     extensions: NodeExtensions = NodeExtensions()
+
+
+class Skin(_Table):
+    """Joints, which are nodes, and matrices from the mesh's frame at rest to theirs. ``skeleton`` is only a hint."""
+
+    joints: Annotated[list[Index], Field(min_length=1)]
+    inverseBindMatrices: Index | None = None
+    skeleton: Any = None
+
+
+class ChannelTarget(_Table):
+    node: Index | None = None
+    path: str
+
+
+class Channel(_Table):
+    """Which key of which node a sampler sets."""
+
+    sampler: Index
+    target: ChannelTarget
+
+
+class KeyframeSampler(_Table):
+    """Accessors of times in seconds and of values."""
+
+    input: Index
+    output: Index
+    interpolation: Literal["LINEAR", "STEP", "CUBICSPLINE"] = "LINEAR"
+
+
+class Animation(_Table):
+    """A clip."""
+
+    channels: list[Channel] = []
+    samplers: list[KeyframeSampler] = []
 
 
 class NodeList(_Table):
@@ -276,6 +317,8 @@ class Gltf(_Table):
     accessors: list[Accessor] = []
     bufferViews: list[BufferView] = []
     buffers: list[Buffer] = []
+    skins: list[Skin] = []
+    animations: list[Animation] = []
     extensions: FileExtensions = FileExtensions()
 
 

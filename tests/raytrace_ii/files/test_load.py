@@ -291,7 +291,7 @@ WRONG = {
     ),
     "unknown key of a mesh": (
         ball('shape = "sphere"\nradius_mm = 1', 'mesh = "a.obj"\nsegments = 3'),
-        f"object.0: segments: no such key: known are mesh, smooth, lights, {OBJECT_KEYS}",
+        f"object.0: segments: no such key: known are mesh, smooth, lights, clip, clip_s, clip_speed, {OBJECT_KEYS}",
     ),
     "unknown key of a material": (
         ball("colour", "color"),
