@@ -1,6 +1,6 @@
 """Gallery of reference scenes: a page of the viewer for each, and a still.
 
-    python -m benchmarks run gallery [--missing] [--stills] [--scale 4]
+    python -m benchmarks run gallery [--missing] [--stills] [--scale 2]
 
 Pages go to ``docs/gallery``. Git does not keep them; ``make docs`` writes those that are missing. With ``--stills`` a
 browser draws the stills, which git keeps, and ``docs/gallery/README.md`` is written.
@@ -22,12 +22,12 @@ STILL = {"width": 1200, "height": 640}
 # State of the page in each still: what a stranger should see first.
 STILLS = {"apples": "#a=3", "cuboid": "#x=0.5&y=0.3", "objects": "#stereo=anaglyph&eyes=0.15", "mountains": "#f=0"}
 QUALITY = 80
-SAMPLES = 4
-SCALE = 4  # 128×64 lenses: pages of a megabyte
+SAMPLES = 16
+SCALE = 2  # 256×128 lenses: pages of a few megabytes
 INTRODUCTION = f"""# Gallery
 
 The reference scenes as pages of `raytrace-ii view`: stills here, pages that open in any browser, without a network,
-after `make docs` or `python -m benchmarks run gallery`. Each is *setup1* with a quarter of the lenses each way,
+after `make docs` or `python -m benchmarks run gallery`. Each is *setup1* with half of the lenses each way,
 {SAMPLES} samples a pixel, JPEG of quality {QUALITY}. *Mountains* and the ground behind the *Twins* are so far away
 that each lens sees them whole: no display of this kind can resolve them.
 """
@@ -66,7 +66,7 @@ def draw_stills() -> None:
     lines = [INTRODUCTION]
     with tab(STILL) as page:
         for name, about in scene_names().items():
-            page.goto(f"file://{page_of(name)}{STILLS.get(name, '#a=1.5')}")
+            page.goto(f"file://{page_of(name)}{STILLS.get(name, '')}")
             page.evaluate("async () => { await ii.ready }")
             page.wait_for_timeout(1000)
             page.screenshot(path=GALLERY / f"{name}.jpg", type="jpeg", quality=85)

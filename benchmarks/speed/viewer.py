@@ -40,7 +40,7 @@ def tab(size: dict[str, int]) -> Iterator[Any]:
         raise SystemExit(f"no browser is installed: one of {', '.join(BROWSERS)} is needed")
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=path, args=FLAGS)
-        yield browser.new_page(viewport=size)
+        yield browser.new_page(viewport=size, reduced_motion="reduce")
         browser.close()
 
 

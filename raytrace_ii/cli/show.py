@@ -44,10 +44,11 @@ def view(
     options: dict[str, Any] = {"title": picture.stem, "quality": None if lossless else JPEG_QUALITY}
     original = IIPicture.load(picture)
     decoded = load_any(compare) if compare else None
-    if decoded is not None:
+    if compare is not None and decoded is not None:
         from metrics import quality_rows
 
-        options["quality_rows"] = quality_rows(original, decoded)
+        rows = options["quality_rows"] = quality_rows(original, decoded)
+        options["labels"] = ("original", ", ".join([*_coding(compare), rows[0][1]]))
     if depth is not None:
         options["depth"] = read_depth(depth, size=original.size)
     with progress_bar(f"view {picture.name}") as report:
@@ -62,6 +63,18 @@ def view(
         write_viewer_folder(folder.name, original, decoded, **options)
     with folder:
         _serve(folder.name, port)
+
+
+def _coding(path: Path) -> list[str]:
+    """Scheme and rate of a coded file, or the name of a decoded picture."""
+    from ii_core.files import IMAGE_TYPES
+
+    if path.suffix in IMAGE_TYPES:
+        return [path.stem]
+    from codec import Encoded
+
+    coded = Encoded.load(path)
+    return [coded.scheme, f"{coded.bpp:.3g} bpp"]
 
 
 def _serve(folder: str, port: int) -> None:

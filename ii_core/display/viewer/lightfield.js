@@ -230,9 +230,19 @@ class LightField {
     });
   }
 
+  // What `render` draws, cut at a pane's edges.
+  within(pane, render) {
+    const { gl } = this;
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(pane.x, pane.y, pane.width, pane.height);
+    render();
+    gl.disable(gl.SCISSOR_TEST);
+  }
+
   // Draws one pane: {x, y, width, height} in canvas pixels from its lower left corner.
   draw(name, pane, values) {
     const { gl, meta } = this, { program, places } = this.programs[name];
+    if (!(pane.width > 0 && pane.height > 0)) return;
     gl.viewport(pane.x, pane.y, pane.width, pane.height);
     gl.useProgram(program);
     const textures = [["original", gl.TEXTURE_2D_ARRAY, this.pages[0]],

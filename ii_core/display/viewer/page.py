@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,18 +36,39 @@ FARTHEST = 250  # gaps to the farthest focus
 Rows = Sequence[tuple[str, str]]
 
 
+class ViewerOptions(TypedDict, total=False):
+    """Keywords of `write_viewer` and `write_viewer_folder`.
+
+    Attributes
+    ----------
+    depth : ndarray, (N, M), optional
+        z in mm of every pixel, as `raytrace_ii.render` gives it: clicks focus by it instead of by the picture.
+    title : str
+        The name shown.
+    quality : int or None
+        Of JPEG pages (4:4:4), 1 to 100, 95 if not given; None for WebP without loss, four times as large as 95.
+    quality_rows : sequence of (str, str)
+        Names and values of a table beside the picture, such as ``("Q_global", "31.20 dB")``.
+    labels : (str, str)
+        Of the halves of a split view, such as ``("original", "si-h264, 0.10 bpp, 31.20 dB")``.
+    """
+
+    depth: NDArray[Any] | None
+    title: str
+    quality: int | None
+    quality_rows: Rows
+    labels: tuple[str, str]
+
+
 def write_viewer(
     path: str | os.PathLike[str],
     picture: IIPicture,
     decoded: IIPicture | None = None,
     *,
-    depth: NDArray[Any] | None = None,
-    title: str = "",
-    quality: int | None = JPEG_QUALITY,
-    quality_rows: Rows = (),
     progress: Callable[[int, int], None] | None = None,
+    **options: Unpack[ViewerOptions],
 ) -> int:
-    """One self-contained HTML file, which opens from disk in a browser with WebGL2.
+    """Write one self-contained HTML file, which opens from disk in a browser with WebGL2.
 
     Parameters
     ----------
@@ -57,16 +78,10 @@ def write_viewer(
         Of a regular structure. 16 bits and floats are shown as 8-bit sRGB.
     decoded : IIPicture, optional
         Of the same structure, to compare it with.
-    depth : ndarray, (N, M), optional
-        z in mm of every pixel, as `raytrace_ii.render` gives it: clicks focus by it instead of by the picture.
-    title : str
-        The name shown.
-    quality : int or None
-        Of JPEG pages (4:4:4), 1 to 100; None for WebP without loss, four times as large as 95.
-    quality_rows : sequence of (str, str)
-        Names and values of a table beside the picture, such as ``("Q_global", "31.20 dB")``.
     progress : callable, optional
         Called with pages done and pages in all.
+    **options : ViewerOptions
+        Depth map, title, quality, table and labels.
 
     Returns
     -------
@@ -81,7 +96,7 @@ def write_viewer(
     OSError
         If the file cannot be written.
     """
-    page = _Page(picture, decoded, depth, title, quality, quality_rows)
+    page = _Page(picture, decoded, **options)
     used = 0
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         head, tail = page.html("\x00").split("\x00")
@@ -104,14 +119,11 @@ def write_viewer_folder(
     picture: IIPicture,
     decoded: IIPicture | None = None,
     *,
-    depth: NDArray[Any] | None = None,
-    title: str = "",
-    quality: int | None = JPEG_QUALITY,
-    quality_rows: Rows = (),
     progress: Callable[[int, int], None] | None = None,
+    **options: Unpack[ViewerOptions],
 ) -> None:
-    """The page as index.html with its data in files beside it, for a web server; parameters as `write_viewer`."""
-    page = _Page(picture, decoded, depth, title, quality, quality_rows)
+    """Write the page as index.html with its data in files beside it, for a web server; see `write_viewer`."""
+    page = _Page(picture, decoded, **options)
     order: list[list[Any]] = []
     for number, (kind, where, data) in enumerate(page.parts(progress)):
         name = f"{number}.{kind}"
@@ -129,10 +141,11 @@ class _Page:
         self,
         picture: IIPicture,
         decoded: IIPicture | None,
-        depth: NDArray[Any] | None,
-        title: str,
-        quality: int | None,
-        quality_rows: Rows,
+        depth: NDArray[Any] | None = None,
+        title: str = "",
+        quality: int | None = JPEG_QUALITY,
+        quality_rows: Rows = (),
+        labels: tuple[str, str] = ("original", "decoded"),
     ) -> None:
         picture.check_regular()
         if decoded is not None:
@@ -146,6 +159,7 @@ class _Page:
         self.pictures = [picture] if decoded is None else [picture, decoded]
         self.depth = None if depth is None else depth_view(picture, depth)
         self.title, self.jpeg, self.quality_rows = title or "II-picture", quality, quality_rows
+        self.labels = labels
         (k, l), (u, v) = picture.lenses, picture.ei_pixels
         self.side = min(PAGE_SIDE, max(k * u, l * v))
         self.grid = -(-(k * u) // self.side), -(-(l * v) // self.side)
@@ -190,6 +204,7 @@ class _Page:
             "across": self.grid[0],
             "pages": math.prod(self.grid),
             "compared": len(self.pictures) > 1,
+            "labels": list(self.labels),
             "focus": [-far if assumed else -far / 4, far] if u > 1 else [-1, 1],
             "camera": {
                 "gap_mm": camera.gap_mm,
@@ -270,8 +285,8 @@ class _Page:
 
 COMPARE = """<label>Show <select data-state="mode">
         <option>original<option>decoded<option>split<option>difference</select></label>
-      <label>Split at <input type="range" data-state="split"></label>
-      <label>Gain <input type="range" data-state="gain"></label>"""
+      <label>Split at <input type="range" data-state="split"><output></output></label>
+      <label>Gain <input type="range" data-state="gain"><output></output></label>"""
 
 
 def depth_view(picture: IIPicture, depth: NDArray[Any]) -> NDArray[np.float32]:

@@ -1,11 +1,15 @@
 "use strict";
 // What the user sees and does: panes, the viewer's place, pointer, keyboard, and a link that keeps it all.
 
-const DEFAULTS = { x: 0, y: 0, r: 1, f: 0, a: 1, zoom: 1, cx: 0.5, cy: 0.5, mode: "original", split: 0.5, gain: 4,
+const DEFAULTS = { x: 0, y: 0, r: 1, f: 0, a: 1.5, zoom: 1, cx: 0.5, cy: 0.5, mode: "original", split: 0.5, gain: 4,
   stereo: "off", eyes: 0.25 };
 // The opening focus moves a neighbouring pixel's lens by at most this share of the array.
 const OPENING_SHARE = 1 / 16;
 const MODES = ["original", "decoded", "split", "difference"];
+// Until the first touch the viewer sways: amplitude in shares of the zone, and seconds of a turn.
+const SWAY = { x: 0.45, y: 0.2, seconds: 7 };
+const SLOWEST = 250;  // milliseconds a frame: what draws more slowly, a processor say, sways no further
+const MOST_ZOOMED = 3;  // on a tall screen the opening zoom fills the pane's height, up to this
 
 class Viewer {
   constructor(meta) {
@@ -15,8 +19,10 @@ class Viewer {
     this.limits = { x: [-2, 2], y: [-2, 2], r: [0.35, 10], f: meta.focus, a: [1, Math.max(1, Math.max(...meta.ei) / 2)],
       zoom: [1, 40], cx: [0, 1], cy: [0, 1], split: [0, 1], gain: [1, 32], eyes: [0, 1] };
     // What the page opens with and Reset returns to; the focus comes once the picture is there.
-    this.opening = { ...DEFAULTS, ...(meta.compared ? { mode: "split" } : {}) };
+    this.opening = { ...DEFAULTS, a: Math.min(DEFAULTS.a, this.limits.a[1]), zoom: this.openingZoom(),
+      ...(meta.compared ? { mode: "split" } : {}) };
     this.state = { ...this.opening };
+    this.swung = [0, 0];
     this.cursor = [(meta.lenses[0] - 1) / 2, (meta.lenses[1] - 1) / 2];
     this.quick = false;
     this.work = [];
@@ -24,7 +30,8 @@ class Viewer {
     this.bind();
     this.canvas.addEventListener("webglcontextlost", () =>
       ii.failed("The graphics card gave the picture up, perhaps for want of memory. Reload the page to try again."));
-    new ResizeObserver(() => this.redraw()).observe(document.body);
+    new ResizeObserver(() => this.redraw()).observe(document.getElementById("main"));
+    document.querySelector("aside").addEventListener("scroll", () => this.redraw());
     this.redraw();
   }
 
@@ -55,6 +62,35 @@ class Viewer {
     this.opening.f = this.start();
     if (!/[#&]f=/.test(location.hash)) this.state.f = this.opening.f;
     this.redraw();
+    if (!this.touched && !location.hash && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.sway();
+  }
+
+  // The viewer's place swings around its own, which the state keeps, until `set` changes something.
+  sway() {
+    let begun = null, before = null, slow = 0;
+    const step = (now) => {
+      begun ??= now;
+      slow = before !== null && now - before > SLOWEST ? slow + 1 : 0;
+      before = now;
+      if (this.touched || slow > 3) {
+        this.swaying = false;
+        this.swung = [0, 0];
+      } else {
+        const angle = 2 * Math.PI * (now - begun) / 1000 / SWAY.seconds;
+        this.swung = [SWAY.x * Math.sin(angle), SWAY.y * Math.sin(2 * angle)];
+        requestAnimationFrame(step);
+      }
+      this.redraw();
+    };
+    this.swaying = true;
+    requestAnimationFrame(step);
+  }
+
+  // 1 shows the whole array; on a tall screen that would leave most of the pane empty.
+  openingZoom() {
+    const box = document.getElementById("main").getBoundingClientRect(), { lenses, camera: c } = this.meta;
+    const across = box.width / (lenses[0] * c.lens_pitch_mm[0]), down = box.height / (lenses[1] * c.lens_pitch_mm[1]);
+    return box.height > box.width ? Math.min(Math.max(1, down / across), MOST_ZOOMED) : 1;
   }
 
   // Where the focus is unless the link says it: on the nearer things, or on what lies in the middle, as far as
@@ -71,7 +107,7 @@ class Viewer {
   // --- geometry ----------------------------------------------------------------------------------------------
   viewpoint(eye = 0) {
     const { gap_mm: gap, distance_mm, phi, theta } = this.meta.camera, { x, y, r } = this.state;
-    const sx = Math.sin((x + eye) * phi), sy = Math.sin(y * theta);
+    const [across, up] = this.swung, sx = Math.sin((x + across + eye) * phi), sy = Math.sin((y + up) * theta);
     return [r * distance_mm * sx, r * distance_mm * sy, gap - r * distance_mm * Math.sqrt(Math.max(0.01, 1 - sx * sx - sy * sy))];
   }
 
@@ -116,7 +152,7 @@ class Viewer {
   }
 
   pane(id) {
-    const box = document.getElementById(id).getBoundingClientRect(), all = this.canvas.getBoundingClientRect(), d = this.density;
+    const box = document.querySelector(id === "aside" ? id : `#${id}`).getBoundingClientRect(), all = this.canvas.getBoundingClientRect(), d = this.density;
     const round = (v) => Math.round(v * d);
     return { x: round(box.left - all.left), y: this.canvas.height - round(box.bottom - all.top),
       width: round(box.width), height: round(box.height) };
@@ -143,8 +179,8 @@ class Viewer {
     const epi = this.pane("epi"), raw = this.pane("raw"), { origin, pace } = this.map(this.pane("main"));
     this.field.draw("epi", epi, { ...this.optics(), origin: [origin[0], 0], pace: [pace[0], 0], cursor, rows: epi.height, second });
     const ei = this.meta.ei, middle = cursor.map((n, i) => (Math.round(n) + 0.5) * ei[i]);
-    this.field.draw("raw", raw, { ...this.optics(), middle, extent: [raw.width, raw.height],
-      magnify: Math.max(2, raw.width / (5 * Math.max(...ei))), second });
+    this.field.within(this.pane("aside"), () => this.field.draw("raw", raw, { ...this.optics(), middle,
+      extent: [raw.width, raw.height], magnify: Math.max(2, raw.width / (5 * Math.max(...ei))), second }));
     this.showState();
   }
 
@@ -225,6 +261,12 @@ class Viewer {
 
   // --- state -------------------------------------------------------------------------------------------------
   set(change, quick = false) {
+    if (this.swaying) {  // go on from where the sway has led
+      this.state.x += this.swung[0];
+      this.state.y += this.swung[1];
+      this.swung = [0, 0];
+    }
+    this.touched = true;
     for (const [key, value] of Object.entries(change)) {
       const limit = this.limits[key];
       this.state[key] = limit ? Math.min(Math.max(Number(value), limit[0]), limit[1]) : value;
@@ -261,31 +303,54 @@ class Viewer {
     document.getElementById("status").textContent = text;
   }
 
-  showState() {
-    const { state, meta } = this;
-    for (const input of document.querySelectorAll("[data-state]"))
-      if (document.activeElement !== input || input.type === "range") input.value = state[input.dataset.state];
-    const degrees = (angle) => (angle * 180 / Math.PI).toFixed(1);
-    const outside = Math.abs(state.x) > 1 || Math.abs(state.y) > 1;
-    const texts = {
-      place: `${degrees(state.x * meta.camera.phi)}°, ${degrees(state.y * meta.camera.theta)}°${outside ? " – outside the zone" : ""}`,
-      focus: meta.camera.assumed ? `${state.f.toFixed(2)} lenses a pixel` : `z = ${this.depthOf(state.f).toFixed(2)} mm`,
-      aperture: `${(2 * state.a - 1).toFixed(1)} px`,
+  // Values as the page names them.
+  shown() {
+    const { state, meta: { camera: c } } = this, degrees = (angle) => `${(angle * 180 / Math.PI).toFixed(1)}°`;
+    return {
+      x: degrees(state.x * c.phi), y: degrees(state.y * c.theta),
+      r: c.assumed ? `${state.r.toFixed(2)} ×` : `${(state.r * c.distance_mm).toFixed(0)} mm`,
+      f: c.assumed ? `${state.f.toFixed(2)} lens/px` : `z ${this.depthOf(state.f).toFixed(1)} mm`,
+      a: `${(2 * state.a - 1).toFixed(1)} px`, zoom: `${state.zoom.toFixed(2)} ×`, eyes: degrees(2 * state.eyes * c.phi),
+      split: `${(100 * state.split).toFixed(0)} %`, gain: `${state.gain.toFixed(1)} ×`,
     };
-    for (const [id, text] of Object.entries(texts)) document.getElementById(id).textContent = text;
+  }
+
+  // Whether a control changes anything as things stand.
+  matters(key) {
+    const { state, meta: { ei, camera } } = this, limit = this.limits[key];
+    const rules = { eyes: state.stereo !== "off", split: state.mode === "split", gain: state.mode === "difference",
+      f: Math.max(...ei) > 1, y: camera.vertical_parallax };
+    return (rules[key] ?? true) && !(limit && limit[0] === limit[1]);
+  }
+
+  showState() {
+    const { state, meta } = this, texts = this.shown();
+    for (const input of document.querySelectorAll("[data-state]")) {
+      const key = input.dataset.state;
+      if (document.activeElement !== input || input.type === "range") input.value = state[key];
+      input.disabled = !this.matters(key);
+      if (key in texts) input.parentElement.querySelector("output").textContent = texts[key];
+    }
+    document.getElementById("zone").hidden = Math.abs(state.x) <= 1 && Math.abs(state.y) <= 1;
+    const line = document.getElementById("split"), percent = Math.round(100 * state.split);
+    line.hidden = !meta.compared || state.mode !== "split" || state.stereo === "cross-eyed";
+    const main = this.pane("main"), { origin, pace } = this.map(main), height = main.height / this.density;
+    const edge = (lens) => Math.min(Math.max((lens - origin[1]) / pace[1] / this.density, 0), height);
+    Object.assign(line.style, { left: `${100 * state.split}%`, top: `${edge(-0.5)}px`,
+      bottom: `${height - edge(meta.lenses[1] - 0.5)}px` });
+    document.getElementById("grip").setAttribute("aria-valuenow", percent);
   }
 
   // --- input -------------------------------------------------------------------------------------------------
   bind() {
     const main = document.getElementById("main");
     const pointers = new Map();
-    let moved = 0, grip = null;
+    let moved = 0, panning = false;
     main.addEventListener("pointerdown", (event) => {
       main.setPointerCapture(event.pointerId);
       pointers.set(event.pointerId, [event.clientX, event.clientY]);
       moved = 0;
-      const box = main.getBoundingClientRect(), x = (event.clientX - box.left) / box.width;
-      grip = this.state.mode === "split" && Math.abs(x - this.state.split) * box.width < 12 ? "split" : event.shiftKey ? "pan" : "look";
+      panning = event.shiftKey;
     });
     main.addEventListener("pointermove", (event) => {
       this.point(event);
@@ -297,14 +362,13 @@ class Viewer {
         const other = [...pointers].find(([id]) => id !== event.pointerId)[1];
         const length = (p) => Math.hypot(p[0] - other[0], p[1] - other[1]);
         this.set({ zoom: this.state.zoom * length(now) / Math.max(1, length(before)) }, true);
-      } else if (grip === "split") this.set({ split: (now[0] - box.left) / box.width }, true);
-      else if (grip === "pan") this.pan(-delta[0], -delta[1]);
+      } else if (panning) this.pan(-delta[0], -delta[1]);
       else this.look(-delta[0] / box.width, delta[1] / box.height);
       moved += Math.abs(delta[0]) + Math.abs(delta[1]);
       pointers.set(event.pointerId, now);
     });
     const up = (event) => {
-      if (pointers.delete(event.pointerId) && moved < 4 && event.type === "pointerup" && grip === "look") {
+      if (pointers.delete(event.pointerId) && moved < 4 && event.type === "pointerup" && !panning) {
         this.point(event);
         this.set({ f: this.pick(this.cursor) });
       }
@@ -323,10 +387,77 @@ class Viewer {
     }
     document.getElementById("save").addEventListener("click", () => this.save());
     document.getElementById("reset").addEventListener("click", () => this.set({ ...this.opening }));
+    this.bindGrip(main);
+    this.bindWide();
+    this.bindTilt();
     window.addEventListener("hashchange", () => {
       this.state = { ...this.opening };
       this.fromLink();
       this.redraw();
+    });
+  }
+
+  // The split line's own handle: dragged, or moved by arrow keys.
+  bindGrip(main) {
+    const grip = document.getElementById("grip");
+    document.querySelectorAll("#split .half").forEach((half, i) => (half.textContent = this.meta.labels[i]));
+    for (const type of ["pointerdown", "pointerup", "pointermove"]) grip.addEventListener(type, (event) => {
+      event.stopPropagation();
+      if (type === "pointerdown") grip.setPointerCapture(event.pointerId);
+      if (type !== "pointermove" || !grip.hasPointerCapture(event.pointerId)) return;
+      const box = main.getBoundingClientRect();
+      this.set({ split: (event.clientX - box.left) / box.width }, true);
+    });
+    grip.addEventListener("keydown", (event) => {
+      const step = { ArrowLeft: -0.02, ArrowRight: 0.02 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      event.stopPropagation();
+      this.set({ split: this.state.split + step }, true);
+    });
+  }
+
+  // The picture alone, on the full screen where the browser lets a page have it.
+  bindWide() {
+    const show = (wide) => {
+      document.body.classList.toggle("wide", wide);
+      this.redraw();
+    };
+    this.widen = async (wide) => {
+      show(wide);
+      try {
+        if (wide) await document.documentElement.requestFullscreen?.();
+        else if (document.fullscreenElement) await document.exitFullscreen();
+      } catch { /* the browser refuses: the picture fills the window */ }
+    };
+    document.getElementById("wide").addEventListener("click", () => this.widen(true));
+    const narrow = document.getElementById("narrow");
+    narrow.addEventListener("click", () => this.widen(false));
+    narrow.addEventListener("pointerdown", (event) => event.stopPropagation());
+    document.addEventListener("fullscreenchange", () => show(Boolean(document.fullscreenElement)));
+    document.addEventListener("keydown", (event) => event.key === "Escape" && this.widen(false));
+  }
+
+  // Tilting the device turns the view as it would turn a display: by the same angle, from where it was switched on.
+  bindTilt() {
+    const button = document.getElementById("tilt"), radian = Math.PI / 180;
+    if (!window.DeviceOrientationEvent || !navigator.maxTouchPoints) return;
+    button.hidden = false;
+    let first = null;
+    const turn = ({ beta, gamma }) => {
+      if (beta === null || gamma === null) return;
+      first ??= { beta, gamma, x: this.state.x, y: this.state.y };
+      const right = first.gamma - gamma, up = beta - first.beta, angle = (screen.orientation?.angle ?? 0) * radian;
+      const across = right * Math.cos(angle) - up * Math.sin(angle), above = right * Math.sin(angle) + up * Math.cos(angle);
+      const { phi, theta } = this.meta.camera, inside = (value) => Math.min(Math.max(value, -1), 1);
+      this.set({ x: inside(first.x + across * radian / phi), y: inside(first.y + above * radian / theta) }, true);
+    };
+    button.addEventListener("click", async () => {
+      const on = button.getAttribute("aria-pressed") !== "true";
+      if (on && (await DeviceOrientationEvent.requestPermission?.()) === "denied") return;
+      button.setAttribute("aria-pressed", on);
+      first = null;
+      (on ? addEventListener : removeEventListener)("deviceorientation", turn);
     });
   }
 
@@ -365,6 +496,7 @@ class Viewer {
       PageUp: () => ({ r: state.r * 1.1 }), PageDown: () => ({ r: state.r / 1.1 }),
       Enter: () => ({ f: this.pick(this.cursor) }), Home: () => ({ x: 0, y: 0, zoom: 1, cx: 0.5, cy: 0.5 }),
       m: () => (this.meta.compared ? { mode: MODES[(MODES.indexOf(state.mode) + 1) % 4] } : {}),
+      f: () => (this.widen(!document.body.classList.contains("wide")), {}),
       s: () => ({ stereo: { off: "cross-eyed", "cross-eyed": "anaglyph", anaglyph: "off" }[state.stereo] }),
     };
     if (!(event.key in moves) || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -382,16 +514,26 @@ const ii = {
       ii.failed(error.message);
     }
   },
+  // A still picture stands under the message.
   failed(message) {
-    document.getElementById("failure").textContent = message;
+    document.querySelector("#failure p").textContent = message;
     document.getElementById("failure").hidden = false;
   },
-  preview: (text) => ii.viewer?.preview(ii.viewer.bytes(text)),
+  still(source) {
+    const image = document.getElementById("still");
+    image.src = source;
+    image.hidden = false;
+  },
+  preview(text) {
+    ii.still(`data:image/jpeg;base64,${text}`);
+    ii.viewer?.preview(ii.viewer.bytes(text));
+  },
   page: (picture, layer, text) => ii.viewer?.page(picture, layer, ii.viewer.bytes(text)),
   depth: (text) => ii.viewer?.depth(ii.viewer.bytes(text)),
   // The same from files beside the page, for a picture too large to stand in it.
   async fetch(order) {
     const load = async (name) => new Uint8Array(await (await fetch(name)).arrayBuffer());
+    ii.still(order.find(([kind]) => kind === "preview")[1]);
     if (!ii.viewer) return;
     for (const [kind, name, ...where] of order) {
       const data = await load(name);
