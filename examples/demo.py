@@ -23,9 +23,10 @@ from ii_core import (
     view_image,
 )
 from ii_core.files import write_image
+from metrics.rd import RATES
 from raytrace_ii import Scene, Shot, load_scene, render
 from raytrace_ii.cli.common import progress_bar, spinner
-from raytrace_ii.cli.evaluate import RATES, SCHEMES, run_study
+from raytrace_ii.cli.evaluate import SCHEMES, run_study
 
 
 def main() -> None:

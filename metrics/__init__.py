@@ -6,6 +6,7 @@ from .builtin_measures import MEASURES
 from .depth.focus import FocusDepth, depth_from_focus
 from .depth.layers import covering_layers, linear_layers, logarithmic_layers
 from .depth.q_depth import q_depth
+from .differences import differences, mean_differences
 from .global_angle import angle_axes, mean_q_angle, q_angle, q_global
 from .measure import Measure, Needs, known_measures, register_measure
 from .pair import PicturePair
@@ -17,7 +18,7 @@ from .plots.tables import summary_table, write_csv, write_latex
 from .point_log import PointLog
 from .quality import AngleQuality, DepthQuality, ViewQuality
 from .quality_report import Report, quality_rows, report
-from .rd import bd_psnr, bd_rate, rate_distortion
+from .rd import bd_psnr, bd_rate, default_rates, rate_distortion
 from .sheets import PLOTS, plot_all, plot_angle, plot_error_views
 from .study import provenance, read_study, write_study
 from .view import error_map, q_view
@@ -38,13 +39,16 @@ __all__ = [
     "bd_psnr",
     "bd_rate",
     "covering_layers",
+    "default_rates",
     "depth_from_focus",
     "depth_over_rate",
     "depth_rate_chart",
+    "differences",
     "error_map",
     "known_measures",
     "linear_layers",
     "logarithmic_layers",
+    "mean_differences",
     "mean_q_angle",
     "measuring",
     "plot_all",

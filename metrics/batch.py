@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -60,11 +60,21 @@ def measuring(
     if depth is None and any(measure.needs.depth for measure in measures):
         pair = replace(pair, depth=depth_from_focus(reference, layers_mm=layers_mm, method=method))
 
-    def measure_decoded(decoded: IIPicture) -> dict[str, Any]:
-        compared = replace(pair, decoded=decoded)
+    return _Measuring(pair, tuple(names))
+
+
+@dataclass(frozen=True)
+class _Measuring:
+    """Measures of decoded pictures against the reference of a pair; other processes can be sent it."""
+
+    pair: PicturePair
+    names: tuple[str, ...]
+
+    def __call__(self, decoded: IIPicture) -> dict[str, Any]:
+        compared = replace(self.pair, decoded=decoded)
         results: dict[Any, Any] = {}
         kept: dict[str, Any] = {}
-        for measure in measures:
+        for measure in map(measure_of, self.names):
             if measure.compute not in results:
                 results[measure.compute] = measure.compute(compared)
             kept[measure.name] = float(measure.value(results[measure.compute]))
@@ -73,5 +83,3 @@ def measuring(
                 kept |= {"q_depth": result.values.tolist(), "depth_mm": result.depth_mm.tolist()}
                 kept["depth_outside"] = result.outside_share
         return kept
-
-    return measure_decoded

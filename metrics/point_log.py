@@ -14,10 +14,11 @@ from ii_core import IIPicture
 from ii_core.identity import library_versions, source_hash
 from ii_core.json_lines import append_record, read_records
 
-from .study import check_points, picture_json, spelt, unspelt
+from .points import check_points, spelt, unspelt
+from .rd import PACKAGES
+from .study import picture_json
 
 FORMAT, VERSION = "ii-rd-point", 1
-PACKAGES = ("ii_core", "codec", "metrics")  # what a point depends on
 
 
 class PointLog:

@@ -12,8 +12,8 @@ from ii_core import IIPicture
 
 from .measure import Measure, known_measures, measure_of
 from .pair import PicturePair
+from .points import spelt
 from .quality import AngleQuality, DepthQuality, ViewQuality, told_outside
-from .study import spelt
 
 
 @dataclass

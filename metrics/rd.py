@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import closing
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IIPicture, checks
+from ii_core.executors import as_they_come, check_executor, lost
+from ii_core.identity import library_versions, source_hash
 
 from .global_angle import q_global
 
+PACKAGES = ("ii_core", "codec", "metrics")  # what a point depends on
+RATES = (0.02, 0.05, 0.15, 0.4, 1.0)  # bpp, of studies whose schemes reach them all
+# Lowest rate over the highest floor: rate control near a floor misses by up to a tenth. Highest over lowest rate.
+ABOVE, SPAN = 1.1, 4.0
+WORKERS = 2  # points at a time, if not given
 MIN_POINTS = 4
 # Share of the shorter curve's extent that both must cover: below it the mean is about a corner of the curves.
 MIN_OVERLAP = 0.25
@@ -173,7 +183,8 @@ def rate_distortion(
     encode: Callable[..., Any],
     decode: Callable[[Any], Any],
     progress: Callable[[int, int, str], None] | None = None,
-    workers: int = 2,
+    workers: int | None = None,
+    executor: Any = None,
     measure: Callable[[IIPicture], Mapping[str, Any]] | None = None,
     known: Mapping[tuple[str, float], dict[str, Any]] | None = None,
     keep: Callable[[dict[str, Any]], None] | None = None,
@@ -195,8 +206,12 @@ def rate_distortion(
         `codec.timed_decode` does.
     progress : callable, optional
         ``progress(done, total, text)`` after every point, in the calling thread.
-    workers : int
-        Points measured at a time, in threads. Everything but the seconds is the same for any number.
+    workers : int, optional
+        Points measured at a time, in threads; 2 if not given. Everything but the seconds is the same for any number.
+    executor : optional
+        Any `concurrent.futures.Executor` or dask client, instead of ``workers``, as for `raytrace_ii.render`. To
+        other processes the picture is sent once; ``encode``, ``decode`` and ``measure`` must be picklable, as
+        `codec.encode`, `codec.timed_decode` and that of `measuring` are. Workers need the same code and libraries.
     measure : callable, optional
         ``measure(decoded)`` gives what else to keep of each point, as that of `measuring` does. Q_global always is.
     known : mapping, optional
@@ -225,28 +240,96 @@ def rate_distortion(
             raise ValueError(f"{what} are {given}: at least one, each once, is needed")
     if bad := [rate for rate in rates if not 0 < rate < float("inf")]:
         raise ValueError(f"rates hold {bad[0]:g} bpp: positive rates are needed")
-    if workers < 1:
+    check_executor(executor, workers)
+    if workers is not None and workers < 1:
         raise ValueError(f"workers is {workers}: at least 1 is needed")
 
     points = [(scheme, rate) for scheme in schemes for rate in rates]
     records: list[dict[str, Any]] = [dict((known or {}).get(point, {})) for point in points]
-    with ThreadPoolExecutor(workers) as pool:
-        futures = {
-            pool.submit(_measure, picture, scheme, rate, encode, decode, measure): i
-            for i, (scheme, rate) in enumerate(points)
-            if not records[i]
-        }
-        try:
-            for done, future in enumerate(as_completed(futures), 1 + len(points) - len(futures)):
-                record = records[futures[future]] = future.result()
+    missing = [i for i, record in enumerate(records) if not record]
+    work = _Point(picture, encode, decode, measure)
+    threads = (WORKERS if workers is None else workers) if executor is None else None
+    try:
+        came = as_they_come(work, [points[i] for i in missing], identity=identity, workers=threads, executor=executor)
+        with closing(came) as results:
+            for done, (number, record) in enumerate(results, 1 + len(points) - len(missing)):
+                records[missing[number]] = record
                 if keep is not None:
                     keep(record)
                 if progress is not None:
                     progress(done, len(points), _told(record))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    except Exception as error:
+        if (reason := lost(error, executor)) is not None:
+            raise OSError(f"{reason} while it measured: the study is not finished") from error
+        raise
     return records
+
+
+@checks.checked(picture=checks.instance(IIPicture), schemes=checks.list_of(str))
+def default_rates(
+    picture: IIPicture, schemes: Sequence[str], **options: Any
+) -> tuple[list[float], dict[tuple[str, float], dict[str, Any]]]:
+    """Return five rates for a study, none below what a scheme reaches, and the points measured to find them.
+
+    Every scheme is coded at the lowest of `RATES`. If all reach it, the rates are `RATES`. Otherwise they are a
+    geometric series that starts at the greatest of the rates that came instead.
+
+    Parameters
+    ----------
+    picture, schemes
+        As for `rate_distortion`.
+    **options
+        Those of `rate_distortion`.
+
+    Returns
+    -------
+    rates : list of float
+        Bits per pixel.
+    points : dict
+        As ``known`` of `rate_distortion`.
+
+    Raises
+    ------
+    ValueError, OSError
+        As `rate_distortion`.
+    """
+    lowest = RATES[0]
+    tried = rate_distortion(picture, schemes, [lowest], **options)
+    floor = max((r["bpp"] for r in tried if not r["reached"] and r["bpp"] > lowest), default=0.0)
+    return rates_above(floor), {(record["scheme"], lowest): record for record in tried}
+
+
+def rates_above(floor: float) -> list[float]:
+    """Return `RATES`, or as many rates of two digits from above a floor on."""
+    if floor <= RATES[0]:
+        return list(RATES)
+    first = _two_digits(ABOVE * floor, math.ceil)
+    ratio = (max(RATES[-1], SPAN * first) / first) ** (1 / (len(RATES) - 1))
+    return [first, *(_two_digits(first * ratio**i, round) for i in range(1, len(RATES)))]
+
+
+def _two_digits(value: float, rounding: Callable[[float], int]) -> float:
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return float(f"{rounding(value / unit) * unit:.6g}")
+
+
+@lru_cache(maxsize=1)
+def identity() -> dict[str, str]:
+    """Return the hash of the code of this process, and the versions of the libraries that points depend on."""
+    return {"code": source_hash(PACKAGES)[:12], **library_versions()}
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Coding of one picture at one point, and what comes of it; other processes can be sent it."""
+
+    picture: IIPicture
+    encode: Callable[..., Any]
+    decode: Callable[[Any], Any]
+    measure: Callable[[IIPicture], Mapping[str, Any]] | None
+
+    def __call__(self, scheme: str, rate: float) -> dict[str, Any]:
+        return _measure(self.picture, scheme, rate, self.encode, self.decode, self.measure)
 
 
 def _measure(

@@ -7,7 +7,7 @@ import math
 import os
 import platform
 import subprocess
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,27 +17,21 @@ from ii_core import IIPicture, checks
 from ii_core.files import one_line, read_json, write_json
 from ii_core.identity import library_versions
 
-from .measure import known_measures
+from .differences import differences
+from .points import check_points, measures_of, spelt, unspelt
 
 FORMAT, VERSION = "ii-rd-study", 1
 POOLING = "pooled MSE over R, G and B"
-FIELDS = (
-    "scheme",
-    "options",
-    "target_bpp",
-    "bpp",
-    "reached",
-    "q_global",
-    "encode_seconds",
-    "decode_seconds",
-    "nbytes",
-)
 PACKAGES = ("ii_core", "raytrace_ii", "codec", "metrics", "assets", "benchmarks")
 CODE = (*(f":(top){package}" for package in PACKAGES), ":(top)pyproject.toml", ":(top,exclude)benchmarks/results")
 
 
 @checks.checked(
-    path=checks.path, picture_name=checks.text, records=checks.sequence, picture=checks.instance(IIPicture)
+    path=checks.path,
+    picture_name=checks.text,
+    records=checks.sequence,
+    picture=checks.instance(IIPicture),
+    anchor=checks.text,
 )
 def write_study(
     path: str | os.PathLike[str],
@@ -46,6 +40,7 @@ def write_study(
     extra: Mapping[str, Any] | None = None,
     *,
     picture: IIPicture,
+    anchor: str | None = None,
 ) -> None:
     """Write the records of `rate_distortion` and everything needed to judge them, as JSON.
 
@@ -60,6 +55,9 @@ def write_study(
         Anything else worth keeping, plain values.
     picture : IIPicture
         What was coded: its structure and the SHA-256 of its pixels are kept.
+    anchor : str, optional
+        The scheme that others are compared with, the first if not given. For every measure the file has the
+        `differences` to it.
 
     Raises
     ------
@@ -69,6 +67,8 @@ def write_study(
         If the file cannot be written.
     """
     check_points(records)
+    study = {"points": records, "anchor": anchor}
+    measured = measures_of(records) if records else []
     write_json(
         path,
         {
@@ -78,6 +78,8 @@ def write_study(
             "pooling": POOLING,
             **provenance(),
             "extra": dict(extra or {}),
+            "anchor": anchor or (records[0]["scheme"] if records else None),
+            "differences": {name: spelt(differences(study, measure=name)) for name in measured},
             # Infinity is no JSON number: a lossless point says so, other qualities are spelt out.
             "points": [{**spelt(dict(record)), "lossless": record["q_global"] == math.inf} for record in records],
         },
@@ -123,77 +125,6 @@ def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
     return study
 
 
-def unspelt(point: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a point as `rate_distortion` gave it, from what `spelt` and JSON made of it."""
-    point = dict(point)
-    lossless = point.pop("lossless", False)
-    for name in measures_of([point]) + ["q_depth"] * ("q_depth" in point):
-        point[name] = _read(name, point[name])
-    if lossless:
-        point["q_global"] = math.inf
-    return point
-
-
-def measures_of(points: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the names of the measures that every point has, in the order of their registration."""
-    return [name for name in known_measures() if all(name in point for point in points)]
-
-
-def spelt(value: Any) -> Any:
-    """Return plain values for JSON: infinities as text, null for NaN."""
-    if isinstance(value, Mapping):
-        return {key: spelt(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [spelt(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else str(value)
-    return value
-
-
-def _read(name: str, value: Any) -> Any:
-    if isinstance(value, list):
-        return [_read(name, item) for item in value]
-    if value is None:
-        return math.nan
-    try:
-        if not isinstance(value, bool):
-            return float(value)
-    except (TypeError, ValueError, OverflowError):
-        pass
-    raise ValueError(f"{name} is {_short(value)}: a number is needed")
-
-
-def check_points(records: Any) -> None:
-    """Raise ValueError unless every record has all FIELDS, each of its kind."""
-    for i, record in enumerate(records):
-        if not isinstance(record, Mapping):
-            raise ValueError(f"points[{i}] of the records is {_short(record)}: an object is needed")
-        if missing := set(FIELDS) - set(record):
-            raise ValueError(f"points[{i}] has no {', '.join(sorted(missing))}")
-        for name, (kind, right) in KINDS.items():
-            if not right(record[name]):
-                raise ValueError(f"points[{i}]: {name} is {_short(record[name])}: {kind} is needed")
-
-
-def _rate(value: Any) -> bool:
-    """Whether a value is a positive number; its logarithm is charted."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < 1e300
-
-
-KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
-    "scheme": ("a name", lambda value: isinstance(value, str)),
-    "options": ("an object", lambda value: isinstance(value, Mapping)),
-    "target_bpp": ("a positive number", _rate),
-    "bpp": ("a positive number", _rate),
-    "reached": ("true or false", lambda value: isinstance(value, bool)),
-}
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else f"{text[:37]}…"
-
-
 def provenance() -> dict[str, Any]:
     """What a number was measured on: commit, machine and versions of the libraries."""
     return {
@@ -219,13 +150,3 @@ def _git() -> dict[str, Any] | None:
         return {"commit": git("rev-parse", "HEAD"), "dirty": bool(git("status", "--porcelain", "--", *CODE))}
     except (OSError, subprocess.SubprocessError):
         return None
-
-
-def is_study(name: str, value: Any) -> None:
-    """Rule: a study as `read_study` gives it."""
-    checks.mapping(name, value)
-    points, picture = value.get("points"), value.get("picture", {"name": ""})
-    if not isinstance(points, list) or not isinstance(picture, Mapping) or "name" not in picture:
-        raise checks.refuse(name, value, "what read_study gives, with points and, for charts, a named picture,")
-    if not all(isinstance(point, Mapping) for point in points):
-        raise checks.refuse(f"{name}['points']", points, "a list of dicts")

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ii_core import checks
 
 from ..depth.layers import logarithmic
+from ..points import is_study
 from ..quality import told_outside
-from ..study import is_study
 from .rd_chart import COLOURS, LINES, MARKERS, check_suffix, edges, new_figure, save, set_rate_axis
 
 EXTREMES = ("q_depth_min", "q_depth_mean", "q_depth_max")

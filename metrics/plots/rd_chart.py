@@ -16,8 +16,7 @@ from ii_core import checks
 from ii_core.files import atomic_path
 
 from ..measure import measure_of
-from ..study import is_study
-from .tables import check_measured
+from ..points import check_measured, is_study
 
 # Okabe and Ito's colours, told apart by colour-blind readers too; their yellow is too pale on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,11 +10,9 @@ from typing import Any
 from ii_core import checks
 from ii_core.files import atomic_path
 
+from ..differences import anchor_of, differences
 from ..measure import Measure, measure_of
-from ..rd import UndefinedDifference, bd_psnr, bd_rate
-from ..study import FIELDS, check_points, is_study, measures_of
-
-Points = list[tuple[float, float]]
+from ..points import FIELDS, check_measured, check_points, is_study, measures_of
 
 
 @checks.checked(path=checks.path, records=checks.sequence)
@@ -42,7 +39,7 @@ def write_csv(path: str | os.PathLike[str], records: Sequence[Mapping[str, Any]]
 
 @checks.checked(study=is_study, anchor=checks.text, measure=checks.text)
 def summary_table(
-    study: Mapping[str, Any], *, anchor: str = "jpeg2000", measure: str = "q_global"
+    study: Mapping[str, Any], *, anchor: str | None = None, measure: str = "q_global"
 ) -> list[dict[str, str]]:
     """A study as rows of text, one a scheme, all with the same columns.
 
@@ -50,8 +47,8 @@ def summary_table(
     ----------
     study : dict
         From `read_study`.
-    anchor : str
-        The scheme the others are compared with.
+    anchor : str, optional
+        The scheme the others are compared with. That of the study, or else its first scheme, if not given.
     measure : str
         Which quality, of those that the study has.
 
@@ -75,42 +72,33 @@ def summary_table(
     targets = sorted({point["target_bpp"] for point in points})
     by_target = {scheme: {p["target_bpp"]: p for p in points if p["scheme"] == scheme} for scheme in schemes}
     rows = []
+    different = differences(study, anchor=anchor, measure=measure) if points else {}
     for scheme in schemes:
         row = {"scheme": scheme}
         for target in targets:
             row[f"{target:g}"] = _cell(by_target[scheme].get(target), measure)
-        if scheme == anchor:
+        if scheme == anchor_of(study, anchor):
             row |= dict.fromkeys(("gain", "BD-rate", bd_quality), "anchor")
-        elif anchor not in by_target:
-            row |= dict.fromkeys(("gain", "BD-rate", bd_quality), f"– (no {anchor})")
         else:
-            row["gain"] = _gain(by_target[anchor], by_target[scheme], measure)
-            a, b = (operating_points(points, name, measure) for name in (anchor, scheme))
-            row["BD-rate"] = _difference(bd_rate, _growing(a, kind), _growing(b, kind), 1, "%")
-            row[bd_quality] = _difference(bd_psnr, a, b, max(kind.digits - 1, 1), kind.unit)
+            row |= _differences(different[scheme], kind, bd_quality)
         rows.append(row)
     return rows
 
 
-def check_measured(points: Sequence[Mapping[str, Any]], measure: str) -> None:
-    """Raise ValueError unless the measure is registered and all points have it."""
-    measure_of(measure)
-    if measure not in measures_of(points):
-        raise ValueError(f"the study has no {measure}: it has {', '.join(measures_of(points))}")
-
-
-def operating_points(points: Sequence[Mapping[str, Any]], scheme: str, measure: str = "q_global") -> Points:
-    """The different (bpp, quality) of a scheme by rate, without infinite and missing qualities.
-
-    A point beside its target is as true an operating point as any; the same one given for several targets counts
-    once.
-    """
-    return sorted({(p["bpp"], p[measure]) for p in points if p["scheme"] == scheme and math.isfinite(p[measure])})
-
-
-def _growing(points: Points, measure: Measure) -> Points:
-    """Points whose quality grows with rate, as `bd_rate` needs it: negated where lower is better."""
-    return points if measure.higher_is_better else [(rate, -quality) for rate, quality in points]
+def _differences(found: Mapping[str, Any], kind: Measure, bd_quality: str) -> dict[str, str]:
+    """Cells of the differences to the anchor: values, or why they are not defined."""
+    columns = {
+        "gain": ("gain", kind.digits, kind.unit),
+        "BD-rate": ("bd_rate_percent", 1, "%"),
+        bd_quality: ("bd_quality", max(kind.digits - 1, 1), kind.unit),
+    }
+    cells = {}
+    for column, (name, digits, unit) in columns.items():
+        value = found[name]
+        cells[column] = f"– ({found['why'][name]})" if value is None else _signed(value, digits, unit)
+    if found["gain"] is not None:
+        cells["gain"] += f" at {found['rates']} rates"
+    return cells
 
 
 def _cell(point: Mapping[str, Any] | None, measure: str) -> str:
@@ -121,32 +109,8 @@ def _cell(point: Mapping[str, Any] | None, measure: str) -> str:
     return f"– ({'floor' if point['bpp'] > point['target_bpp'] else 'ceiling'} {point['bpp']:.3g})"
 
 
-def _gain(anchor: Mapping[float, Mapping[str, Any]], tested: Mapping[float, Mapping[str, Any]], measure: str) -> str:
-    both = [
-        tested[target][measure] - anchor[target][measure]
-        for target in tested.keys() & anchor.keys()
-        if tested[target]["reached"] and anchor[target]["reached"]
-    ]
-    gains = [gain for gain in both if math.isfinite(gain)]
-    if not gains:
-        return "– (no common rate)"
-    kind = measure_of(measure)
-    return f"{_signed(sum(gains) / len(gains), kind.digits, kind.unit)} at {len(gains)} rates"
-
-
 def _signed(value: float, digits: int, unit: str) -> str:
     return f"{value:+.{digits}f}" + (f" {unit}" if unit else "")
-
-
-def _difference(
-    function: Any, a: list[tuple[float, float]], b: list[tuple[float, float]], digits: int, unit: str
-) -> str:
-    if not (a and b):
-        return "– (no points)"
-    try:
-        return _signed(function(*zip(*a, strict=True), *zip(*b, strict=True)), digits, unit)
-    except UndefinedDifference as error:
-        return f"– ({error.short})"
 
 
 # What means something to LaTeX, and what its default fonts do not have as such.

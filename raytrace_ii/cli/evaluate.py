@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .cluster import Dask, cluster
 from .coding import study_orders
 from .common import Force, Workers, app, check_outputs, columns, console, load_any, progress_bar, spinner
 from .plugins import Plugins, load_plugins
@@ -16,7 +17,7 @@ from .words import one_line, say
 if TYPE_CHECKING:
     from ii_core import IIPicture
 
-RATES = (0.02, 0.05, 0.15, 0.4, 1.0)
+PICTURES = "pictures_rd.json"
 SCHEMES = ("si-h264", "ei-h264", "ri-h264", "jpeg2000")
 STUDY_ENDS = (".tex", ".png", ".pdf")
 OVER_DEPTH = ("q_depth_min", "q_depth_mean", "q_depth_max")
@@ -125,12 +126,18 @@ def _layers(text: str | None, picture: IIPicture) -> Any:
 
 @app.command()
 def study(
-    picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="A folder for chart and numbers.")],
+    pictures: Annotated[list[Path], typer.Argument(help="II-pictures with their sidecars.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A folder for charts and numbers.")],
     schemes: Annotated[str, typer.Option(help="Schemes, parted by commas; options of one by semicolons.")] = ",".join(
         SCHEMES
     ),
-    rates: Annotated[str, typer.Option(help="Bits per pixel, parted by commas.")] = ",".join(map(str, RATES)),
+    anchor: Annotated[
+        str | None, typer.Option(help="The scheme that others are compared with; the first if not given.")
+    ] = None,
+    rates: Annotated[
+        str | None,
+        typer.Option(help="Bits per pixel, parted by commas; five that all schemes reach if not given."),
+    ] = None,
     measures: Annotated[
         str, typer.Option(help="What to chart, parted by commas: q_global, q_view, q_depth …")
     ] = "q_global",
@@ -141,31 +148,64 @@ def study(
         bool, typer.Option("--orders", help="Code nothing: correlation and residuals of every order instead.")
     ] = False,
     workers: Workers = None,
+    dask: Dask = None,
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
-    """Chart quality against rate for several schemes."""
+    """Chart quality against rate for several schemes.
+
+    Every point is written when it is measured. The same command continues a study that was stopped.
+    """
     from codec import parse_scheme
     from ii_core import IIPicture
     from ii_core.files import read_depth
+    from metrics.rd import identity
 
+    if dask and workers is not None:
+        raise ValueError("--workers are threads of this machine: with --dask there are none")
+    if dask and plugin:
+        raise ValueError("--plugin is for this machine alone: with --dask, install it as a package on all workers")
     load_plugins(plugin)
+    stems = [picture.stem for picture in pictures]
+    if len(set(stems)) < len(stems):
+        raise ValueError(f"pictures are named {', '.join(stems)}: every picture needs a name of its own")
     if orders:
-        study_orders(picture, output, force)
+        for picture in pictures:
+            study_orders(picture, output, force)
         return
-    names = [name.replace(";", ",") for name in schemes.split(",")]
+    names = [_scheme(name) for name in schemes.split(",")]
     for name in names:
         parse_scheme(name)  # a misspelt one is found before anything is made
+    if anchor is not None and (anchor := _scheme(anchor)) not in names:
+        raise ValueError(f"anchor is {anchor!r}: one of the schemes {', '.join(names)} is needed")
+    if depth is not None and len(pictures) > 1:
+        raise ValueError(f"--depth is of one picture, {len(pictures)} are given: study them one by one")
+    targets, wanted = _rates(rates), _measures(measures)
+    files = [file for stem in stems for file in study_files(output, stem, wanted)]
+    check_outputs([*files, *([output / PICTURES] if len(stems) > 1 else [])], force, make_folder=True)
+    originals = [IIPicture.load(picture) for picture in pictures]
+    with cluster(dask, identity) as executor:
+        for stem, original in zip(stems, originals, strict=True):
+            z = None if depth is None else read_depth(depth, size=original.size)
+            run_study(
+                original, stem, names, targets, output, workers=workers, executor=executor, measures=wanted,
+                anchor=anchor, depth=z, method=method, layers_mm=_layers(layers, original),
+            )  # fmt: skip
+    if len(stems) > 1:
+        write_means(output, stems, wanted)
+
+
+def _scheme(text: str) -> str:
+    return text.strip().replace(";", ",")
+
+
+def _rates(text: str | None) -> list[float] | None:
+    if text is None:
+        return None
     try:
-        targets = [float(rate) for rate in rates.split(",")]
+        return [float(rate) for rate in text.split(",")]
     except ValueError:
-        raise ValueError(f"rates are {rates!r}: numbers parted by commas are needed") from None
-    wanted = _measures(measures)
-    check_outputs(study_files(output, picture.stem, wanted), force, make_folder=True)
-    original = IIPicture.load(picture)
-    z = None if depth is None else read_depth(depth, size=original.size)
-    over_depth = {"depth": z, "method": method, "layers_mm": _layers(layers, original)}
-    run_study(original, picture.stem, names, targets, output, workers=workers, measures=wanted, **over_depth)
+        raise ValueError(f"rates are {text!r}: numbers parted by commas are needed") from None
 
 
 def _measures(text: str) -> list[str]:
@@ -195,49 +235,47 @@ def _stem(name: str, measure: str) -> str:
 
 
 def run_study(
-    picture: IIPicture, name: str, schemes: Sequence[str], rates: Sequence[float], folder: Path, *,
-    workers: int | None = None, extra: dict[str, Any] | None = None, measures: Sequence[str] = ("q_global",),
-    **over_depth: Any,
+    picture: IIPicture, name: str, schemes: Sequence[str], rates: Sequence[float] | None, folder: Path, *,
+    workers: int | None = None, executor: Any = None, extra: dict[str, Any] | None = None,
+    measures: Sequence[str] = ("q_global",), anchor: str | None = None, **over_depth: Any,
 ) -> None:  # fmt: skip
     """Measure; leave `study_files` in a folder, the charts and tables made from the JSON; print the tables.
 
     Points are kept in ``NAME_rd.points.jsonl`` until all are measured; a study that was killed continues from there.
-    ``over_depth`` are depth, layers_mm and method of `measuring`.
+    Without rates they are `default_rates`. ``over_depth`` are depth, layers_mm and method of `measuring`.
     """
     from codec import encode, timed_decode
-    from metrics import (
-        PointLog,
-        depth_rate_chart,
-        measuring,
-        rate_distortion,
-        rd_chart,
-        read_study,
-        summary_table,
-        write_csv,
-        write_latex,
-        write_study,
-    )
-    from metrics.quality import told_outside
-
-    from ..rendering.render import cores
+    from ii_core.executors import cores
+    from metrics import PointLog, default_rates, measuring, rate_distortion, write_study
 
     more = measuring(picture, measures, **over_depth) if set(measures) - {"q_global"} else None
     log = PointLog(folder / f"{name}_rd.points.jsonl", picture, measures=sorted(measures), **over_depth)
     if log.known:
         print(f"{name}: {len(log.known)} points are there from a run that was stopped")
+    means: dict[str, Any] = {"workers": None if executor else workers or cores(), "executor": executor}
+    means |= {"encode": encode, "decode": timed_decode, "measure": more, "keep": log.keep}
+    if rates is None:
+        with progress_bar(f"find the rates of {name}") as report:
+            rates, found = default_rates(picture, schemes, known=log.known, progress=report, **means)
+        log.known.update(found)
+        say(f"{name}: rates {', '.join(f'{rate:g}' for rate in rates)} bpp")
     with progress_bar(f"code {name}") as report:
-        records = rate_distortion(
-            picture, schemes, rates, encode=encode, decode=timed_decode, progress=report, workers=workers or cores(),
-            measure=more, known=log.known, keep=log.keep,
-        )  # fmt: skip
-    numbers = folder / f"{name}_rd.json"
-    write_study(numbers, name, records, extra, picture=picture)
+        records = rate_distortion(picture, schemes, rates, known=log.known, progress=report, **means)
+    write_study(folder / f"{name}_rd.json", name, records, extra, picture=picture, anchor=anchor)
     log.remove()
-    write_csv(folder / f"{name}_rd.csv", records)
-    drawn = read_study(numbers)
+    draw_study(folder, name, measures)
+
+
+def draw_study(folder: Path, name: str, measures: Sequence[str]) -> None:
+    """Draw the charts and write the tables of a study from its JSON; print the tables."""
+    from metrics import depth_rate_chart, rd_chart, read_study, summary_table, write_csv, write_latex
+    from metrics.quality import told_outside
+
+    drawn = read_study(folder / f"{name}_rd.json")
+    write_csv(folder / f"{name}_rd.csv", drawn["points"])
     for measure in measures:
         table, *charts = (folder / f"{_stem(name, measure)}{end}" for end in STUDY_ENDS)
-        write_latex(table, summary_table(drawn, measure=measure), f"{name}: {about(measure)}")
+        write_latex(table, summary_table(drawn, measure=measure), f"{name}: {about(measure, drawn['anchor'])}")
         for chart in charts:
             rd_chart(drawn, chart, measure=measure)
         print_summary(name, drawn, measure)
@@ -248,11 +286,47 @@ def run_study(
             depth_rate_chart(drawn, folder / f"{name}_q_depth{end}")
 
 
-def about(measure: str) -> str:
+def write_means(folder: Path, names: Sequence[str], measures: Sequence[str]) -> None:
+    """Leave the mean differences over several pictures in a folder; print them."""
+    from ii_core.files import write_json
+    from metrics import mean_differences, provenance, read_study
+    from metrics.points import spelt
+
+    studies = [read_study(folder / f"{name}_rd.json") for name in names]
+    means = {measure: mean_differences(studies, measure=measure) for measure in measures}
+    write_json(
+        folder / PICTURES,
+        {
+            "format": "ii-rd-pictures", "version": 1, **provenance(), "pictures": list(names),
+            "anchor": studies[0]["anchor"], "differences": spelt(means),
+        },
+    )  # fmt: skip
+    for measure, schemes in means.items():
+        say(f"mean of {len(names)} pictures, {about(measure, studies[0]['anchor'])}:")
+        columns({scheme: _means(found, measure) for scheme, found in schemes.items()})
+
+
+def _means(found: dict[str, Any], measure: str) -> str:
+    from metrics.measure import measure_of
+
+    kind = measure_of(measure)
+    unit = f" {kind.unit}" if kind.unit else ""
+    shown = {
+        "gain": ("gain", kind.digits, unit), "bd_rate_percent": ("BD-rate", 1, " %"),
+        "bd_quality": ("at equal rate", kind.digits, unit),
+    }  # fmt: skip
+    parts = []
+    for name, (label, digits, unit) in shown.items():
+        value, count = found[name], found["pictures"][name]
+        parts.append(f"{label} " + (f"{value:+.{digits}f}{unit} ({count})" if count else "–"))
+    return ", ".join(parts)
+
+
+def about(measure: str, anchor: str) -> str:
     """What a table of this measure shows."""
     from metrics.measure import measure_of
 
-    return f"{measure_of(measure).caption} at bits per pixel; gain and Bjøntegaard differences against jpeg2000"
+    return f"{measure_of(measure).caption} at bits per pixel; gain and Bjøntegaard differences against {anchor}"
 
 
 def print_summary(name: str, study: dict[str, Any], measure: str = "q_global") -> None:
@@ -262,7 +336,7 @@ def print_summary(name: str, study: dict[str, Any], measure: str = "q_global") -
     from metrics import summary_table
 
     rows = summary_table(study, measure=measure)
-    table = Table(title=one_line(f"{name}: {about(measure)}"))
+    table = Table(title=one_line(f"{name}: {about(measure, study['anchor'])}"))
     for column in rows[0]:
         table.add_column(column, justify="left" if column == "scheme" else "right", no_wrap=True)
     for row in rows:

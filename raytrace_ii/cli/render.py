@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .cluster import Dask, cluster
 from .common import Force, Workers, app, check_outputs, image_file, picture_files, progress_bar
 from .words import say
 
@@ -48,7 +48,7 @@ def render(
     object_id: Annotated[Exr, typer.Option(help="Write object numbers to this .exr, −1 for none.")] = None,
     projection: Annotated[Path | None, typer.Option(help="Write what a 2D camera sees to this .png.")] = None,
     workers: Workers = None,
-    dask: Annotated[str | None, typer.Option(help="Render on the cluster of this dask scheduler: host:port.")] = None,
+    dask: Dask = None,
     force: Force = False,
 ) -> None:
     """Ray trace a scene, or a set of scenes, through a camera.
@@ -70,9 +70,11 @@ def render(
     arrays = _cameras(camera, scale)
     poses = [_pose(array, at) for array in arrays]
     if set_name:
+        from ..rendering.executors import identity
+
         if extra or support or projection:
             raise ValueError("a set has all its support images and projections: none is asked for by name")
-        with _cluster(dask) as executor:
+        with cluster(dask, identity) as executor:
             _render_set(set_name, output, arrays, poses, options, bits, workers, executor, force)
         return
     if support is not None and support.suffix != ".exr":
@@ -95,9 +97,10 @@ def _render_scene(
 ) -> None:  # fmt: skip
     """One scene through every pixel array, and its projection."""
     from ..files.load import load_scene
+    from ..rendering.executors import identity
 
     loaded = load_scene(scene)
-    with _cluster(dask) as executor:
+    with cluster(dask, identity) as executor:
         means = {"workers": workers, "executor": executor}
         for array, pose, numbered in zip(arrays, poses, names, strict=True):
             files = {name: [numbered(path)] for name, path in extra.items()}
@@ -146,35 +149,6 @@ def _render_set(
     products = [p for entry in manifest["scenes"].values() for p in entry["products"].values()]
     seconds, rays = sum(p["seconds"] for p in products), sum(sum(p["rays"].values()) for p in products)
     say(f"{folder}: {len(manifest['scenes'])} scenes, {rays / 1e6:.1f} M rays, rendered in {seconds:.1f} s in all")
-
-
-@contextmanager
-def _cluster(address: str | None) -> Iterator[Any]:
-    """A client of a dask scheduler, closed at the end; None without an address."""
-    if address is None:
-        yield None
-        return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise ValueError("--dask needs dask, which is not installed: pip install 'raytrace-ii[dask]'") from None
-    import logging
-
-    from ..rendering.executors import check_workers
-
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told by our one line
-    try:
-        client = Client(address, timeout=5, set_as_default=False)
-    except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # tls:// without certificates, too
-        raise OSError(f"no dask scheduler answers at {address}: {error}") from None
-    try:
-        client.wait_for_workers(1, timeout=30)
-    except TimeoutError:
-        client.close()
-        raise OSError(f"the dask scheduler at {address} has no workers") from None
-    with client:
-        check_workers(client)  # before the output is opened
-        yield client
 
 
 def _cameras(name: str, scale: int) -> Sequence[Any]:

@@ -9,7 +9,8 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .executors import check_executor
+from ii_core.executors import check_executor
+
 from .job import CURVES
 
 MOST_WORKERS = 1024

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise
+from ii_core.executors import cores
 from ii_core.files import RowWriter, atomic_paths, check_type, image_rows
 from ii_core.picture import NOISE_ROWS, noisy_rows, picture_rows, sidecar
 
@@ -22,7 +23,7 @@ from ..scene.scene import Scene
 from ..tracing.sampling import sampling
 from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES, UNITS
 from ..tracing.tracer import RayCount, check_scene, rigid
-from .executors import Tile, cores, run
+from .executors import Tile, run
 from .job import Block, Job, check_disparity
 from .options import RenderKeywords, RenderOptions, check_keywords
 

@@ -15,7 +15,7 @@ from codec import encode
 from ii_core import IIPicture, preset
 from ii_core.files import read_image
 from metrics import PointLog
-from metrics.study import FIELDS
+from metrics.points import FIELDS
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +84,38 @@ def test_study_leaves_chart_numbers_and_a_table(run, picture, tmp_path):
     assert [p["target_bpp"] for p in study["points"]] == [0.1, 0.5, 2] * 2
     assert (tmp_path / "s" / "small_rd.csv").read_text().count("\n") == 7
     assert read_image(tmp_path / "s" / "small_rd.png").shape[0] > 300
+
+
+def test_several_pictures_an_anchor_and_rates_that_are_found(run, refused, picture, tmp_path):
+    other = tmp_path / "other.png"
+    IIPicture.load(picture).with_pixels(IIPicture.load(picture).pixels[:, ::-1].copy()).save(other)
+    command = [
+        "study",
+        picture,
+        other,
+        "--schemes",
+        "jpeg2000,si-h264,jpegxl",
+        "--anchor",
+        "si-h264",
+        "-o",
+        tmp_path / "s",
+    ]
+    code, out, error = run(*command)
+    assert code == 0, error
+    assert "mean of 2 pictures" in out and "differences against si-h264" in out
+    for name in ("small", "other"):
+        study = json.loads((tmp_path / "s" / f"{name}_rd.json").read_text())
+        assert study["anchor"] == "si-h264"
+        assert not [p for p in study["points"] if p["bpp"] > 1.02 * p["target_bpp"]]  # no floor among them
+        found = study["differences"]["q_global"]
+        assert set(found) == {"jpeg2000", "jpegxl"} and found["jpeg2000"]["rates"] >= 3
+    means = json.loads((tmp_path / "s" / "pictures_rd.json").read_text())["differences"]["q_global"]
+    gains = [each["gain"] for each in means["jpegxl"]["each"].values()]
+    assert means["jpegxl"]["gain"] == pytest.approx(sum(gains) / 2) and len(gains) == 2
+    refused(run(*command, "--force", "--anchor", "jpeg"), "anchor is 'jpeg': one of the schemes jpeg2000, si-h264")
+    refused(run("study", picture, picture, "-o", tmp_path / "t"), "every picture needs a name of its own")
+    refused(run(*command, "--depth", "z.exr", "--force"), "--depth is of one picture, 2 are given")
+    refused(run("study", picture, "-o", tmp_path / "t", "--dask", "x:1", "--plugin", "my.py"), "--plugin is for this")
 
 
 def test_a_killed_study_continues_where_it_was(run, picture, tmp_path, monkeypatch):

@@ -421,6 +421,11 @@ def test_chart_refusals(tmp_path):
 def test_table():
     rows = {row["scheme"]: row for row in summary_table({"points": made_up()})}
     assert list(rows) == ["si-h264", "ei-h264", "jpeg2000"]
+    si, ei, jpeg = rows.values()
+    assert si["gain"] == si["BD-rate"] == si["BD-PSNR"] == "anchor"  # the first scheme
+    assert ei["gain"] == "-6.00 dB at 2 rates" and jpeg["gain"] == "-12.00 dB at 5 rates"
+    rows = {row["scheme"]: row for row in summary_table({"points": made_up()}, anchor="jpeg2000")}
+    assert rows == {row["scheme"]: row for row in summary_table({"points": made_up(), "anchor": "jpeg2000"})}
     si, ei, anchor = rows.values()
     assert list(si) == list(ei) == ["scheme", "0.02", "0.05", "0.1", "0.35", "1", "gain", "BD-rate", "BD-PSNR"]
     assert si["1"] == "47.00" and ei["0.1"] == "– (floor 0.31)"
@@ -428,7 +433,7 @@ def test_table():
     assert si["BD-PSNR"] == "+12.0 dB" and si["BD-rate"].endswith(" %")
     assert ei["BD-rate"] == "– (3 points)"
     assert anchor["gain"] == anchor["BD-rate"] == "anchor"
-    (row,) = summary_table({"points": made_up()[:5]})
+    (row,) = summary_table({"points": made_up()[:5]}, anchor="jpeg2000")
     assert row["gain"] == "– (no jpeg2000)"
 
 
@@ -436,7 +441,7 @@ def test_table_of_a_ceiling_and_of_missing_points():
     records = made_up()
     records[4] |= {"reached": False, "bpp": 0.8}
     del records[3]
-    row = summary_table({"points": records})[0]
+    row = summary_table({"points": records}, anchor="jpeg2000")[0]
     assert row["1"] == "– (ceiling 0.8)" and row["0.35"] == "" and row["gain"] == "+12.00 dB at 3 rates"
 
 

@@ -270,7 +270,9 @@ def test_an_own_measure_is_measured_reported_and_compared(own_measure, tmp_path)
     b = encode(a, "coarse", bpp=6).picture
     assert next(r for r in records if (r["scheme"], r["target_bpp"]) == ("coarse", 6))["q_mae"] == measure(b)["q_mae"]
     made = report(a, b)
-    assert made.numbers["q_mae"] == measure(b)["q_mae"] and made.rows["q_mae"].endswith(", mean absolute error")
+    assert made.numbers["q_mae"] == measure(b)["q_mae"] and made.rows["q_mae"].endswith(
+        ", mean absolute error, lower is better"
+    )
     write_study(tmp_path / "s.json", "waves", records, picture=a)
     kept = read_study(tmp_path / "s.json")
     fine, coarse = summary_table(kept, anchor="coarse", measure="q_mae")

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture, preset
+from ii_core import executors as calls
 from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.rendering import executors, job
 from raytrace_ii.tracing.packing import packed
@@ -67,12 +68,12 @@ def test_processes_read_the_scene_once_and_a_broken_pool_is_one_line(scene, whol
             for pid in list(pool._processes):
                 os.kill(pid, signal.SIGKILL)
 
-        with pytest.raises(OSError, match="worker processes died while they rendered"):
+        with pytest.raises(OSError, match=r"worker processes died, .* while it rendered: the picture is not"):
             render(scene, preset("setup1", scale=8), executor=pool, progress=kill)
 
 
 def _opened():
-    return len(executors._opened)
+    return len(calls._opened)
 
 
 def test_a_cluster_of_processes_loses_nothing_when_one_is_killed(scene, whole, run, tmp_path):
@@ -163,7 +164,7 @@ def test_a_worker_that_differs_renders_no_block(scene, name, monkeypatch, tmp_pa
     assert set(ours) == {"code", "embreex", "numba", "numpy"} and len(ours["code"]) == 12
     monkeypatch.setattr(executors, "identity", lambda: {**ours, name: "0"})
     with pytest.raises(OSError, match=rf"worker process \d+ is refused: {name} 0 there, {ours[name]} here"):
-        executors._tile_from(str(tmp_path / "no.job"), (slice(0, 1), slice(0, 1)), ours)
+        calls.in_process(str(tmp_path / "no.job"), (slice(0, 1), slice(0, 1)), executors.identity, ours)
 
 
 def test_a_lost_scheduler_is_one_line(cluster, scene):
@@ -208,7 +209,7 @@ def test_few_blocks_are_under_way_at_a_time(scene):
 
     with Counting(2) as pool:
         render(scene, preset("setup1", scale=32), executor=pool)
-    assert pool.most == 2 * executors.AHEAD
+    assert pool.most == 2 * calls.AHEAD
 
 
 def test_an_error_or_an_interrupt_leaves_nothing_running(scene):

@@ -1,0 +1,40 @@
+"""The option ``--dask``: work on a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Annotated, Any
+
+import typer
+
+Dask = Annotated[str | None, typer.Option(help="Work on the cluster of this dask scheduler: host:port.")]
+
+
+@contextmanager
+def cluster(address: str | None, identity: Callable[[], Mapping[str, str]]) -> Iterator[Any]:
+    """A client of a dask scheduler whose workers run this code, closed at the end; None without an address."""
+    if address is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise ValueError("--dask needs dask, which is not installed: pip install 'raytrace-ii[dask]'") from None
+    import logging
+
+    from ii_core.executors import check_workers
+
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told by our one line
+    try:
+        client = Client(address, timeout=5, set_as_default=False)
+    except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # tls:// without certificates, too
+        raise OSError(f"no dask scheduler answers at {address}: {error}") from None
+    try:
+        client.wait_for_workers(1, timeout=30)
+    except TimeoutError:
+        client.close()
+        raise OSError(f"the dask scheduler at {address} has no workers") from None
+    with client:
+        check_workers(client, identity)  # before the output is opened
+        yield client
