@@ -277,7 +277,7 @@ def test_an_own_measure_is_measured_reported_and_compared(own_measure, tmp_path)
     kept = read_study(tmp_path / "s.json")
     fine, coarse = summary_table(kept, anchor="coarse", measure="q_mae")
     assert float(fine["BD-rate"].removesuffix(" %")) < 0 and coarse["gain"] == "anchor"  # less error at equal rate
-    assert draw(kept, "q_mae").axes[0].get_ylabel() == "q_mae"
+    assert draw(kept, "q_mae").axes[0].get_ylabel() == "q_mae, lower is better"
 
 
 def test_records_of_a_measure_that_is_not_registered(study):
