@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .files.take import Take, load_take
     from .rendering.options import RenderOptions
     from .rendering.render import Shot, Stats, render, render_to
+    from .rendering.render_take import render_take
     from .scene.scene import Background, Body, Fog, Light, Material, Scene
     from .tracing.tracer import trace
 
@@ -28,6 +29,7 @@ __all__ = [
     "load_scene",
     "load_take",
     "render",
+    "render_take",
     "render_to",
     "scene_names",
     "trace",
@@ -40,6 +42,7 @@ _HOMES = {
     "load_take": "files.take",
     "trace": "tracing.tracer",
     "RenderOptions": "rendering.options",
+    "render_take": "rendering.render_take",
 }
 _HOMES |= dict.fromkeys(["Shot", "Stats", "render", "render_to"], "rendering.render")
 

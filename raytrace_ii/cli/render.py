@@ -27,6 +27,11 @@ def render(
     set_name: Annotated[str, typer.Option("--set", help="Render a set of scenes instead: reference.")] = "",
     camera: Annotated[str, typer.Option(help="A camera's name, a .json file, or a folder of maps.")] = "setup1",
     scale: Annotated[int, typer.Option(help="Divides the number of lenses, at the same pixels per lens.")] = 1,
+    frames: Annotated[
+        str, typer.Option(help="Of a scene that moves: one frame 5, several 0..47, or all; the output is a folder.")
+    ] = "",
+    clip: Annotated[str, typer.Option(help="Of a glTF file that moves: the name of its animation.")] = "",
+    fps: Annotated[float | None, typer.Option(help="Frames a second, in place of the file's.")] = None,
     at: Annotated[str | None, typer.Option(help="Where the camera stands in the scene, mm: x,y,z.")] = None,
     samples: Annotated[str, typer.Option(help="Rays per pixel; adaptive between two powers of 2: 4..64.")] = "1",
     error: Annotated[
@@ -56,6 +61,9 @@ def render(
     A camera of one lens stands back and gives its picture upright. A camera of several pixel arrays gives as many
     pictures, numbered. Pictures are written as they come and may be larger than memory. An interrupted set goes on
     where it was when the same command is given again.
+
+    With --frames a scene that moves is rendered into a folder, frame_0000.png and on; support images stand beside
+    each, with its name before theirs. Frames that are there and would be the same are kept.
     """
     if bool(scene) == bool(set_name):
         raise ValueError("a scene is needed, or --set and no scene: see raytrace-ii scenes")
@@ -69,6 +77,20 @@ def render(
     extra = {name: path for name, path in wanted.items() if path is not None}
     arrays = _cameras(camera, scale)
     poses = [_pose(array, at) for array in arrays]
+    if frames:
+        from ..rendering.executors import identity
+        from .take import render_frames, support_files
+
+        if set_name or projection or len(arrays) > 1:
+            raise ValueError("--frames renders one scene through one pixel array, without --set and --projection")
+        moving = {"clip": clip or None, "fps": fps}
+        with cluster(dask, identity) as executor:
+            means = {**options, "pose": poses[0], "workers": workers, "executor": executor, "dtype": f"uint{bits}"}
+            images = support_files(_all_support(arrays[0]) if support else [], support, extra)
+            render_frames(scene, moving, frames, output, arrays[0], images, force, means)
+        return
+    if clip or fps is not None:
+        raise ValueError("--clip and --fps are of scenes that move: --frames is needed")
     if set_name:
         from ..rendering.executors import identity
 

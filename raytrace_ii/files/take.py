@@ -135,24 +135,24 @@ class Take:
         self._place = working_place(self._path, self._files.model(self._path, self._clip, 0.0))
 
     def _checked_tracks(self, tracks: list[TrackTable]) -> list[_Motion]:
-        motions, seen = [], set()
+        motions: list[_Motion] = []
+        seen: set[tuple[int, str]] = set()
         for i, table in enumerate(tracks):
             try:
                 motion = _Motion(tuple(table.of), table.key, Track(table.frames, table.values, table.how))
-                for of in motion.of:
-                    if of == "camera":
-                        _check_camera_key(motion)
-                        targets = ["camera"]
-                    else:
-                        targets = [str(id(found)) for found in _tables(self._data, of)]
-                    for target in targets:
-                        if (target, motion.key) in seen:
-                            raise ValueError(f"{motion.key} of {of} is set twice")
-                        seen.add((target, motion.key))
+                if "camera" in motion.of:
+                    _check_camera_key(motion)
+                sets = {(id(table), motion.key) for of in motion.of for table in self._targets(of)}
+                if sets & seen:
+                    raise ValueError(f"{motion.key} of {', '.join(motion.of)} is set by another track, too")
+                seen |= sets
             except ValueError as error:
                 raise ValueError(f"animation.track.{i}: {error}") from None
             motions.append(motion)
         return motions
+
+    def _targets(self, of: str) -> list[Any]:
+        return [CAMERA_KEYS] if of == "camera" else _tables(self._data, of)
 
     def _check_frame(self, frame: float) -> None:
         try:

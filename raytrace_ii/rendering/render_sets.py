@@ -6,9 +6,8 @@ the same scene, camera, options and version, is not made again, so that an inter
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -21,13 +20,14 @@ from ii_core.files import read_json, write_json
 from ii_core.picture import sidecar
 
 from ..files.load import load_scene
-from ..scene.hashing import content_hash, file_hash
+from ..scene.hashing import content_hash
 from ..scene.scene import Scene
 from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES
 from .contact_sheet import contact_sheet
 from .job import check_disparity
 from .options import RenderOptions, SetKeywords, check_keywords
-from .render import Stats, render_to
+from .products import Product, commit, fingerprint, is_done, is_same, record_of
+from .render import render_to
 
 SETS = {"reference": ("apples", "car", "cuboid", "dolphin", "hairdo", "mountains", "objects", "twins")}
 MANIFEST, CONTACT = "manifest.json", "contact.png"
@@ -35,15 +35,6 @@ PICTURE_OPTIONS = ("samples", "error", "seed", "noise", "dtype", "texture_filter
 FLAT_PIXELS, FLAT_SAMPLES = 1024, 4  # across, and a pixel
 
 Progress = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True)
-class _Product:
-    """Files that are made together, and all that they depend on."""
-
-    files: tuple[Path, ...]
-    key: str
-    make: Callable[..., Stats]
 
 
 def render_set(
@@ -112,9 +103,9 @@ def render_set(
         known = old.get("scenes", {}).get(title, {}).get("products", {})
         manifest["scenes"][title] = entry
         for kind, product in _products(folder, title, scene, scene_hash, cameras, poses, of_pictures, means):
-            if not _is_done(product, known.get(kind)):
+            if not is_done(product, known.get(kind)):
                 report = _reporter(progress, product.files[0].name)
-                entry["products"][kind] = _record(product, product.make(progress=report))
+                entry["products"][kind] = record_of(product, product.make(progress=report))
             else:
                 entry["products"][kind] = known[kind]
             _write_manifest(folder, manifest, old)
@@ -126,7 +117,7 @@ def render_set(
 def _products(
     folder: Path, title: str, scene: Scene, scene_hash: str, cameras: Sequence[Any], poses: Sequence[Any],
     options: dict[str, Any], means: dict[str, Any],
-) -> Iterator[tuple[str, _Product]]:  # fmt: skip
+) -> Iterator[tuple[str, Product]]:  # fmt: skip
     """What there is to make of a scene."""
     release = version("raytrace-ii")
     for i, (camera, pose) in enumerate(zip(cameras, poses, strict=True)):
@@ -139,15 +130,15 @@ def _products(
         shoot = partial(render_to, picture, scene, camera, **options, **common)
         # one ray through every pixel's centre, and no light
         survey = partial(render_to, None, replace(scene, lights=()), camera, support=images, **common)
-        yield f"picture{number}", _Product((picture,), content_hash("picture", *seen, options), shoot)
-        yield f"support{number}", _Product((support,), content_hash("support", *seen, list(images)), survey)
+        yield f"picture{number}", Product((picture,), content_hash("picture", *seen, options), shoot)
+        yield f"support{number}", Product((support,), content_hash("support", *seen, list(images)), survey)
     pinhole, pose = projection_camera(cameras[0].model, FLAT_PIXELS)
     flat, behind = folder / f"{title}_flat.png", folder / f"{title}_flat_support.exr"
     images = dict.fromkeys(SUPPORT, behind)
     project = partial(
         render_to, flat, scene, pinhole, pose=pose, upright=True, support=images, samples=FLAT_SAMPLES, **means
     )
-    yield "flat", _Product((flat, behind), content_hash("flat", release, scene_hash, pinhole, pose), project)
+    yield "flat", Product((flat, behind), content_hash("flat", release, scene_hash, pinhole, pose), project)
 
 
 def support_images(camera: Camera) -> list[str]:
@@ -164,56 +155,15 @@ def _reporter(progress: Progress | None, title: str) -> Callable[[int, int], Non
     return lambda done, total: progress(title, done, total) if progress else None
 
 
-def _record(product: _Product, stats: Stats) -> dict[str, Any]:
-    return {
-        "key": product.key,
-        "files": {path.name: _fingerprint(path) for path in product.files},
-        "seconds": round(stats.seconds, 3),
-        "cpu_seconds": round(stats.cpu_seconds, 3),
-        "rays": stats.rays,
-        "skipped": stats.skipped,
-        "samples": {str(n): pixels for n, pixels in stats.samples.items()},
-    }
-
-
-def _fingerprint(path: Path) -> dict[str, Any]:
-    return {"bytes": path.stat().st_size, "sha256": file_hash(path)}
-
-
-def _is_done(product: _Product, record: dict[str, Any] | None) -> bool:
-    """Whether all files are there, the very ones, made of the very same."""
-    if record is None or record.get("key") != product.key:
-        return False
-    return all(_is_same(path, record["files"].get(path.name)) for path in product.files)
-
-
-def _is_same(path: Path, fingerprint: Any) -> bool:
-    if not fingerprint or not path.is_file() or path.stat().st_size != fingerprint["bytes"]:
-        return False
-    return file_hash(path) == fingerprint["sha256"]
-
-
 def _header(name: str, cameras: Sequence[Any], options: dict[str, Any]) -> dict[str, Any]:
     return {
         "format": "ii-picture-set",
         "set": name,
         "raytrace_ii": version("raytrace-ii"),
-        "commit": _commit(),
+        "commit": commit(),
         "camera": [camera.model.to_json() for camera in cameras if camera.model],
         "options": options,
     }
-
-
-def _commit() -> str | None:
-    """The commit of the source that runs; None if it was installed."""
-    root = Path(__file__).parent.parent
-    if not (root / ".git").exists():
-        return None
-    try:
-        found = subprocess.run(["git", "-C", root, "rev-parse", "HEAD"], capture_output=True, text=True)
-    except OSError:
-        return None
-    return found.stdout.strip() or None
 
 
 def _read_manifest(folder: Path, name: str) -> dict[str, Any]:
@@ -276,7 +226,7 @@ def _draw_contact(folder: Path, name: str, manifest: dict[str, Any]) -> None:
     flats = [manifest["scenes"][title]["products"]["flat"] for title in SETS[name]]
     key = content_hash(manifest["raytrace_ii"], [[f["sha256"] for f in flat["files"].values()] for flat in flats])
     record, path = manifest[CONTACT], folder / CONTACT
-    if record and record["key"] == key and _is_same(path, record["files"].get(CONTACT)):
+    if record and record["key"] == key and is_same(path, record["files"].get(CONTACT)):
         return
     contact_sheet(path, [(t, folder / f"{t}_flat.png", folder / f"{t}_flat_support.exr") for t in SETS[name]])
-    manifest[CONTACT] = {"key": key, "files": {CONTACT: _fingerprint(path)}}
+    manifest[CONTACT] = {"key": key, "files": {CONTACT: fingerprint(path)}}

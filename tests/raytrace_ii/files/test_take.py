@@ -135,7 +135,7 @@ values = [[-10, 0, 40], [10, 0, 40]]
         ('key = "scale"', 'key = "sclae"', "sclae"),
         ("values = [1, 3]", "values = [1, -3]", "frame 5: object.1.scale"),
         ("values = [1, 3]", "values = [1]", "a value for each"),
-        ('of = ["object.ball a"]\nkey = "scale"', 'of = ["object.ball a"]\nkey = "position_mm"', "set twice"),
+        ('of = ["object.ball a"]\nkey = "scale"', 'of = ["object.ball a"]\nkey = "position_mm"', "by another track"),
         ("values = [[0, 0, 0], [0, 4, 0]]", "values = [0, 1]", "3 numbers"),
         ("frames = 11", "frames = 0", "frames: 0"),
         ("frames = 11", "frames = 11\nshutter = 1", "shutter: no such key: known are frames, fps, track"),

@@ -1,0 +1,206 @@
+"""Takes rendered into a folder: a picture and its support images a frame, and a manifest.
+
+The manifest says of every file what it was made of, as a hash of that frame's scene, pose, camera and options, and
+what it is, as another. Frames that are there already, made of the same, are not made again: a take that was
+interrupted goes on where it was, and a changed keyframe renders the frames that it changes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ii_core import IICamera, MapCamera
+from ii_core.files import read_json, write_json
+from ii_core.picture import sidecar
+
+from ..files.take import Take
+from ..scene.hashing import content_hash
+from ..scene.scene import Scene
+from .options import RenderOptions, SetKeywords, check_keywords
+from .products import Product, commit, is_done, record_of
+from .render import render_to
+
+FORMAT, VERSION, MANIFEST = "ii-take", 1, "manifest.json"
+PICTURE_OPTIONS = ("samples", "error", "seed", "noise", "dtype", "texture_filter")
+
+Progress = Callable[[int, int, int], None]
+
+
+def render_take(
+    take: Take,
+    folder: str | os.PathLike[str],
+    camera: IICamera | MapCamera,
+    *,
+    frames: Sequence[int] | None = None,
+    pose: ArrayLike | None = None,
+    support: Mapping[str, Sequence[str]] | None = None,
+    suffix: str = ".png",
+    dtype: str = "uint8",
+    force: bool = False,
+    progress: Progress | None = None,
+    **options: Unpack[SetKeywords],
+) -> dict[str, Any]:
+    """Render frames of a take, or what is left of them.
+
+    Of frame τ there are ``frame_TTTT.png`` with its sidecar and ``frame_TTTT_NAME`` for each file of support images.
+    A frame is kept if its manifest entry has the same scene, pose, camera, options and version, and its files are
+    unchanged. Each frame is recorded when it is done: a run that is killed loses at most the frame it was at.
+
+    Parameters
+    ----------
+    folder : path
+        Made if it is not there.
+    camera : IICamera or MapCamera
+        One pixel array.
+    frames : sequence of int, optional
+        Frame numbers, from 0; all if not given.
+    pose : array_like, (4, 4), optional
+        Where the camera stands; its motion in the take comes before.
+    support : mapping, optional
+        Names of files, as ``support.exr``, to the support images in each.
+    suffix : str
+        Type of the pictures: .png, .tif or .exr.
+    force : bool
+        Replace files that are there and of no earlier run of this take.
+    progress : callable, optional
+        Called with frame number, blocks done and blocks in all.
+    **options
+        ``samples``, ``error``, ``seed``, ``noise``, ``texture_filter``, ``workers``, ``executor``: `RenderOptions`.
+
+    Returns
+    -------
+    dict
+        The manifest: ``frames`` by number, each with key, pose, files, seconds and rays; the take's frame rate.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is of the wrong type or out of range, or the folder holds another take.
+    FileExistsError
+        If a file is there that no manifest knows, without ``force``.
+    OSError
+        If a file cannot be written.
+    """
+    check_keywords(options, SetKeywords)
+    numbers = _numbers(take, frames)
+    wanted = RenderOptions(dtype=dtype, pose=pose, **options)
+    of_pictures = {field: getattr(wanted, field) for field in PICTURE_OPTIONS}
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    old = _read_manifest(folder, take.name)
+    manifest = {**_header(take, camera, of_pictures), "frames": dict(old.get("frames", {}))}
+    means = {"workers": wanted.workers, "executor": wanted.executor}
+    base = np.eye(4) if pose is None else np.asarray(pose, np.float64)
+    hashed: list[tuple[Scene, str]] = []
+    manifest["claims"] = _claims(folder, numbers, support or {}, suffix, old, force)
+    write_json(folder / MANIFEST, manifest)
+    for number in numbers:
+        scene, stands = take.scene_at(number / take.fps), take.pose_at(number / take.fps) @ base
+        product = _product(folder, number, scene, stands, camera, support or {}, suffix, of_pictures, means, hashed)
+        if is_done(product, manifest["frames"].get(str(number))):
+            continue
+        report = partial(progress, number) if progress else None
+        made = record_of(product, product.make(progress=report))
+        manifest["frames"][str(number)] = {"pose": stands.tolist(), **made}
+        write_json(folder / MANIFEST, manifest)
+    return manifest
+
+
+def frame_file(folder: Path, number: int, suffix: str) -> Path:
+    """The picture of a frame."""
+    return folder / f"frame_{number:04}{suffix}"
+
+
+def _product(
+    folder: Path, number: int, scene: Scene, pose: Any, camera: Any, support: Mapping[str, Sequence[str]],
+    suffix: str, options: dict[str, Any], means: dict[str, Any], hashed: list[tuple[Scene, str]],
+) -> Product:  # fmt: skip
+    """A frame's files, and what they depend on."""
+    if not hashed or hashed[-1][0] is not scene:  # a scene that does not move is hashed once
+        hashed[:] = [(scene, content_hash(scene))]
+    picture = frame_file(folder, number, suffix)
+    images: dict[str, list[Path]] = {}
+    for name, kinds in support.items():
+        for kind in kinds:
+            images.setdefault(kind, []).append(_beside(picture, name))
+    files = (picture, *dict.fromkeys(path for paths in images.values() for path in paths))
+    key = content_hash(
+        "frame", version("raytrace-ii"), hashed[-1][1], camera, pose, options, suffix,
+        {name: list(kinds) for name, kinds in support.items()},
+    )  # fmt: skip
+    make = partial(
+        render_to, picture, scene, camera, pose=pose, upright=camera.lenses == (1, 1), support=images, **options,
+        **means,
+    )  # fmt: skip
+    return Product(files, key, make)
+
+
+def _beside(picture: Path, name: str) -> Path:
+    return picture.with_name(f"{picture.stem}_{name}")
+
+
+def _numbers(take: Take, frames: Sequence[int] | None) -> list[int]:
+    numbers = list(range(take.frames) if frames is None else frames)
+    if not numbers:
+        raise ValueError("there are no frames to render: at least one number is needed")
+    for number in numbers:
+        if not isinstance(number, int | np.integer) or not 0 <= number < take.frames:
+            raise ValueError(f"frame {number!r}: {take.name} has {take.frames}, from 0 to {take.frames - 1}")
+    return numbers
+
+
+def _claims(
+    folder: Path, numbers: Sequence[int], support: Mapping[str, Any], suffix: str, old: Mapping[str, Any], force: bool
+) -> list[str]:
+    """Names of all files of the take; FileExistsError if one is there that no manifest has claimed."""
+    known = set(old.get("claims", ()))
+    ours = [path.name for number in numbers for path in _files(folder, number, support, suffix)]
+    strange = [name for name in ours if name not in known and (folder / name).exists()]
+    if strange and not force:
+        raise FileExistsError(f"{folder / strange[0]} is there already and not of this take: --force replaces it")
+    return sorted(known | set(ours))
+
+
+def _files(folder: Path, number: int, support: Mapping[str, Any], suffix: str) -> Iterator[Path]:
+    picture = frame_file(folder, number, suffix)
+    yield from (picture, sidecar(picture), *(_beside(picture, name) for name in support))
+
+
+def _header(take: Take, camera: Any, options: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "take": take.name,
+        "length": take.frames,
+        "fps": take.fps,
+        "raytrace_ii": version("raytrace-ii"),
+        "commit": commit(),
+        "camera": camera.model.to_json() if camera.model else None,
+        "options": options,
+    }
+
+
+def _read_manifest(folder: Path, name: str) -> dict[str, Any]:
+    """What the folder's manifest says; nothing if there is none."""
+    path = folder / MANIFEST
+    if not path.exists():
+        return {}
+    manifest = read_json(path)
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT or manifest.get("take") != name:
+        raise ValueError(f"{path} is not the manifest of the take {name!r}: another folder is needed")
+    entries, claims = manifest.get("frames"), manifest.get("claims")
+    if not isinstance(claims, list) or not isinstance(entries, dict) or not all(
+        isinstance(entry, dict) and isinstance(entry.get("key"), str) and isinstance(entry.get("files"), dict)
+        and all(isinstance(file, dict) and {"bytes", "sha256"} <= set(file) for file in entry["files"].values())
+        for entry in entries.values()
+    ):  # fmt: skip
+        raise ValueError(f"{path} is damaged: remove it, and give --force to make its files again")
+    return manifest
