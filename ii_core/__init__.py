@@ -11,12 +11,14 @@ from .maps import MapCamera, read_maps, write_maps
 from .picture import IIPicture, add_sensor_noise
 from .presets import camera_names, preset, preset_cameras
 from .regular import from_smallest_rectangle, resampled, smallest_rectangle
+from .video import IIVideo, open_video, video_of, write_view_folders
 from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stand_back, view_image
 
 __all__ = [
     "Camera",
     "IICamera",
     "IIPicture",
+    "IIVideo",
     "MapCamera",
     "add_sensor_noise",
     "camera_names",
@@ -26,6 +28,7 @@ __all__ = [
     "five_viewpoints",
     "from_smallest_rectangle",
     "load_mosaic",
+    "open_video",
     "orthoscopic",
     "picture_of",
     "picture_pixels",
@@ -39,9 +42,11 @@ __all__ = [
     "smallest_rectangle",
     "stand_back",
     "sub_images",
+    "video_of",
     "view_image",
     "write_hci",
     "write_maps",
     "write_quilt",
+    "write_view_folders",
     "write_views",
 ]

@@ -19,7 +19,7 @@ ANIMATIONS = (".mp4", ".gif", ".webp")
 QUALITY_CRF = 18  # of x264: no loss that eyes find
 
 
-def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], *, fps: int = 25) -> Path:
+def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], *, fps: float = 25) -> Path:
     """Write frames as a film (H.264 in MP4) or as a picture that moves for ever (GIF, WebP).
 
     Parameters
@@ -28,8 +28,8 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.ui
         Ends in .mp4, .gif or .webp; replaced whole.
     frames : iterable of ndarray of uint8, (height, width, 3)
         sRGB, all of one size. Odd sides lose a row or column in MP4, whose colours are 4:2:0.
-    fps : int
-        Frames a second.
+    fps : float
+        Frames a second, 1 to 240; in MP4 as the nearest fraction of at most 1001.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.ui
     if kind not in ANIMATIONS:
         raise ValueError(f"{path} is no known moving picture: known are {', '.join(ANIMATIONS)}")
     if not 1 <= fps <= 240:
-        raise ValueError(f"fps is {fps}: a whole number from 1 to 240 is needed")
+        raise ValueError(f"fps is {fps}: a number from 1 to 240 is needed")
     with atomic_path(path) as temporary:
         count = _film(temporary, frames, fps) if kind == ".mp4" else _picture(temporary, frames, fps, kind)
         if not count:
@@ -55,7 +55,7 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.ui
     return Path(path)
 
 
-def _film(path: Path, frames: Iterable[NDArray[np.uint8]], fps: int) -> int:
+def _film(path: Path, frames: Iterable[NDArray[np.uint8]], fps: float) -> int:
     count, stream = 0, None
     with av.open(str(path), "w", format="mp4") as file:
         for frame in frames:
@@ -70,16 +70,16 @@ def _film(path: Path, frames: Iterable[NDArray[np.uint8]], fps: int) -> int:
     return count
 
 
-def _stream(file: Any, width: int, height: int, fps: int) -> Any:
+def _stream(file: Any, width: int, height: int, fps: float) -> Any:
     if min(width, height) < 2:
         raise ValueError(f"frames have {width}×{height} pixels: MP4 needs at least 2×2")
-    stream: Any = file.add_stream("libx264", rate=Fraction(fps))
+    stream: Any = file.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
     stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
     stream.options = {"crf": str(QUALITY_CRF)}
     return stream
 
 
-def _picture(path: Path, frames: Iterable[NDArray[np.uint8]], fps: int, kind: str) -> int:
+def _picture(path: Path, frames: Iterable[NDArray[np.uint8]], fps: float, kind: str) -> int:
     images = [Image.fromarray(frame) for frame in frames]
     if not images:
         return 0

@@ -96,15 +96,21 @@ def write_quilt(picture: IIPicture, path: str | os.PathLike[str], *, row: int | 
     OSError
         If it cannot be written.
     """
+    pixels = quilt_row(picture, row)
+    target = quilt_path(path, picture)
+    write_image(target, pixels)
+    return target
+
+
+def quilt_row(picture: IIPicture, row: int | None = None) -> NDArray[Any]:
+    """Return one row of views as a quilt; errors as `write_quilt`."""
     picture.check_regular()
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
     chosen = v // 2 if row is None else row
     if not 0 <= chosen < v:
         raise ValueError(f"row is {row}: the picture has {v} rows of views, from 0")
-    target = quilt_path(path, picture)
     views = (view for at, _, view in camera_views(picture) if at == chosen)
-    write_image(target, quilt_pixels(views, _tiles(u, (k, l))))
-    return target
+    return quilt_pixels(views, _tiles(u, (k, l)))
 
 
 def quilt_path(path: str | os.PathLike[str], picture: IIPicture) -> Path:

@@ -12,12 +12,12 @@ from typing import Any
 
 import typer
 
-from . import synthesize, render, pictures, coding, evaluate, show
+from . import synthesize, render, pictures, coding, evaluate, show, video
 from .common import app
 from .ending import ends_soon
 from .words import SPELT, one_line
 
-__all__ = ["app", "coding", "evaluate", "main", "pictures", "render", "show", "synthesize"]
+__all__ = ["app", "coding", "evaluate", "main", "pictures", "render", "show", "synthesize", "video"]
 
 INTERRUPTED = 130  # the exit code of a command that Ctrl-C ended
 
