@@ -1,4 +1,4 @@
-"""Command line of the benchmarks: list them, run some.
+"""Command line of the benchmarks: `list` and `run`.
 
     python -m benchmarks list [NAME ...]
     python -m benchmarks run NAME ... [OPTION ...]
@@ -47,8 +47,8 @@ def description(benchmark: Benchmark) -> str:
     """Return name, summary, needs, cost and files of a benchmark, for people."""
     spent = benchmark.minutes()
     cost = "no times recorded" if spent is None else f"{'at least ' * spent[1]}{spent[0]:.1f} min by its records"
-    files = [f"benchmarks/results/{benchmark.records}"] * bool(benchmark.records)
-    files += benchmark.writes
+    files = [f"benchmarks/results/{benchmark.pattern}"] * bool(benchmark.records)
+    files += benchmark.outputs
     return "\n".join(
         [
             f"{benchmark.name} ({benchmark.room}): {benchmark.summary()}",

@@ -1,4 +1,4 @@
-"""Append-only records of benchmarks: every row carries its own commit, machine, versions and date.
+"""Append-only records of benchmarks: every row has its own commit, machine, versions and date.
 
 A record is a line of JSON in ``benchmarks/results/NAME.jsonl``. The script that measures a row appends it the moment
 its measurement ends; nothing else writes there, and no line is changed afterwards. Readers take the newest record of
@@ -190,10 +190,11 @@ def origin(rows: Iterable[Mapping[str, Any]]) -> str:
     """Return a sentence that says which commits measured these rows."""
     commits = list(dict.fromkeys(row["commit"] for row in rows))
     known = ", ".join(f"`{commit}`" for commit in commits if commit != "unsure")
-    unsure = "of unsure provenance (several commits measured them, the stamp of one was put over all)"
     if "unsure" not in commits:
         return f"Measured by {known}."
-    return f"Measured by {known}; rows without a commit are {unsure}." if known else f"All rows are {unsure}."
+    if not known:
+        return "The commits that measured these rows are unknown."
+    return f"Measured by {known}; the commits that measured the rows without one are unknown."
 
 
 def by_scene(scenes: Mapping[str, Any]) -> str:
@@ -234,9 +235,10 @@ def check(path: Path) -> list[str]:
     """Return what is wrong with a file of records, a line each.
 
     Every record has all fields and a commit that exists, as far as this checkout has a history. No two have the same
-    measured seconds under different commits. No committed line was changed or removed, unless its
-    commit is unknown. Records converted from a file
-    of an earlier form have no code hash and no date; records of unsure provenance have no commit either.
+    measured seconds under different commits. No committed line was changed or removed, unless its commit is unknown.
+    Records converted from a file
+    of an earlier form have no code hash and no date. Records marked ``unsure`` have no commit either: several commits
+    measured them, and the file of that time named one for all.
     """
     wrong, seen = [], dict[tuple[float, ...], str]()
     for number, record in enumerate(read_records(path, FORMAT, VERSION), 1):

@@ -1,4 +1,4 @@
-"""Registry of benchmarks: module, needs, cost by its records, and what each writes."""
+"""Registry of benchmarks: module, needs, cost by records, outputs."""
 
 from __future__ import annotations
 
@@ -7,48 +7,75 @@ import importlib
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any
 
 from benchmarks.records import RESULTS, ROOT, seconds_in
 
 LEAST = 6.0  # seconds: a shorter sum is of single calls, not of the run
+OWN = "NAME.jsonl"  # records in the file of the benchmark's name
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Benchmark:
     """One program that measures, or that fills pages.
 
     Parameters
     ----------
-    module : str
-        Dotted name; its last part is the benchmark's name, that of a package its own.
+    path : str
+        Dotted name of the module or package in ``benchmarks``; its last part is the benchmark's name.
     needs : str
         Programs and files beyond the packages of ``make test``.
     records : str
-        Glob pattern of its files in ``benchmarks/results``.
+        Glob pattern of its files in ``benchmarks/results``; `OWN` is ``NAME.jsonl``.
+    fills : tuple of str
+        Pages whose tables its ``tables()`` returns.
     writes : tuple of str
-        Pages and pictures, as glob patterns from the root.
-    tables : str
-        Module with ``tables()``, if it fills tables of pages.
+        Other pages and pictures, as glob patterns from the root.
+    tables_in : str
+        Module with ``tables()``; that of ``main`` if not given.
     """
 
-    module: str
+    path: str
+    _: KW_ONLY
     needs: str = ""
     records: str = ""
+    fills: tuple[str, ...] = ()
     writes: tuple[str, ...] = ()
-    tables: str = ""
+    tables_in: str = ""
+
+    @property
+    def module(self) -> str:
+        """Dotted name of the module or package."""
+        return f"benchmarks.{self.path}"
 
     @property
     def name(self) -> str:
         """Name on the command line."""
-        return self.module.rpartition(".")[2]
+        return self.path.rpartition(".")[2]
 
     @property
     def room(self) -> str:
         """Folder in ``benchmarks``."""
-        return self.module.split(".")[1]
+        return self.path.split(".")[0]
+
+    @property
+    def pattern(self) -> str:
+        """Glob pattern of its files in ``benchmarks/results``."""
+        return f"{self.name}.jsonl" if self.records == OWN else self.records
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """All pages and pictures that it changes."""
+        return self.fills + self.writes
+
+    @property
+    def tables(self) -> str:
+        """Module with ``tables()``; empty if it fills no page."""
+        if not self.fills:
+            return ""
+        return f"benchmarks.{self.tables_in}" if self.tables_in else entry(self.module)
 
     def summary(self) -> str:
         """Return the first line of the module's documentation; nothing is imported."""
@@ -57,7 +84,7 @@ class Benchmark:
 
     def result_files(self) -> list[Path]:
         """Return its files in ``benchmarks/results``."""
-        return sorted(RESULTS.glob(self.records)) if self.records else []
+        return sorted(RESULTS.glob(self.pattern)) if self.records else []
 
     def minutes(self) -> tuple[float, bool] | None:
         """Return the minutes of its newest records, and whether that is only a lower bound; None without times.
@@ -106,182 +133,90 @@ def source(module: str) -> Path:
 
 HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
 IMAGES = "docs/images"
-# In the order in which the whole study runs them: pages after the measurements that they show.
+# In the order of a whole study: pages after the measurements that they show.
 BENCHMARKS = {
     benchmark.name: benchmark
     for benchmark in (
+        Benchmark("pages.cameras", writes=("docs/cameras.md", f"{IMAGES}/cameras/*", f"{IMAGES}/scenes.*")),
+        Benchmark("pages.concepts", writes=(f"{IMAGES}/concepts/*",)),
+        Benchmark("accuracy.camera_in_scene", records=OWN, writes=(f"{IMAGES}/camera_in_scene.*",)),
+        Benchmark("coding.disparity", records=OWN),
+        Benchmark("coding.orders", records=OWN, fills=("docs/structure.md",)),
+        Benchmark("coding.headers", records=OWN, fills=("docs/structure.md",)),
+        Benchmark("coding.cost", records=OWN, fills=("docs/structure.md",)),
+        Benchmark("coding.coders", records=OWN),
+        Benchmark("coding.bframes", records=OWN),
         Benchmark(
-            module="benchmarks.pages.cameras", writes=("docs/cameras.md", f"{IMAGES}/cameras/*", f"{IMAGES}/scenes.*")
-        ),
-        Benchmark(module="benchmarks.pages.concepts", writes=(f"{IMAGES}/concepts/*",)),
-        Benchmark(
-            module="benchmarks.accuracy.camera_in_scene",
-            records="camera_in_scene.jsonl",
-            writes=(f"{IMAGES}/camera_in_scene.*",),
-        ),
-        Benchmark(module="benchmarks.coding.disparity", records="disparity.jsonl"),
-        Benchmark(
-            module="benchmarks.coding.orders",
-            records="orders.jsonl",
-            writes=("docs/structure.md",),
-            tables="benchmarks.coding.orders",
-        ),
-        Benchmark(
-            module="benchmarks.coding.headers",
-            records="headers.jsonl",
-            writes=("docs/structure.md",),
-            tables="benchmarks.coding.headers",
-        ),
-        Benchmark(
-            module="benchmarks.coding.cost",
-            records="cost.jsonl",
-            writes=("docs/structure.md",),
-            tables="benchmarks.coding.cost",
-        ),
-        Benchmark(module="benchmarks.coding.coders", records="coders.jsonl"),
-        Benchmark(module="benchmarks.coding.bframes", records="bframes.jsonl"),
-        Benchmark(
-            module="benchmarks.pages.coding_docs",
+            "pages.coding_docs",
             needs="records of coders and bframes",
-            writes=(
-                "docs/coding.md",
-                "docs/speed_accuracy.md",
-                f"{IMAGES}/coders*",
-            ),
-            tables="benchmarks.pages.coding_docs",
+            fills=("docs/coding.md", "docs/speed_accuracy.md"),
+            writes=(f"{IMAGES}/coders*",),
         ),
+        Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
+        Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
+        Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
+        Benchmark("pages.make_textures", writes=("assets/textures/*",)),
+        Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
+        Benchmark("pages.focus_patterns", writes=(f"{IMAGES}/focus_patterns.*",)),
+        Benchmark("pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)),
         Benchmark(
-            module="benchmarks.coding.volume",
-            records="volume.jsonl",
-            writes=("docs/volume.md",),
-            tables="benchmarks.coding.volume",
+            "accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",), writes=(f"{IMAGES}/depth_truth.*",)
         ),
+        Benchmark("accuracy.map_precision", records=OWN, writes=(f"{IMAGES}/map_precision.*",)),
+        Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),
         Benchmark(
-            module="benchmarks.coding.light_field",
-            records="light_field.jsonl",
-            writes=("docs/lf.md",),
-            tables="benchmarks.coding.light_field",
-        ),
-        Benchmark(
-            module="benchmarks.coding.fuzz",
-            records="fuzz.jsonl",
-            writes=("docs/formats.md",),
-            tables="benchmarks.coding.fuzz",
-        ),
-        Benchmark(module="benchmarks.pages.make_textures", writes=("assets/textures/*",)),
-        Benchmark(
-            module="benchmarks.stability.fuzz_readers",
-            records="fuzz_readers.jsonl",
-            writes=("docs/stability.md",),
-            tables="benchmarks.stability.fuzz_readers.__main__",
-        ),
-        Benchmark(module="benchmarks.pages.focus_patterns", writes=(f"{IMAGES}/focus_patterns.*",)),
-        Benchmark(
-            module="benchmarks.pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)
-        ),
-        Benchmark(
-            module="benchmarks.accuracy.depth_truth",
-            records="depth_truth.jsonl",
-            writes=(
-                "docs/metrics.md",
-                f"{IMAGES}/depth_truth.*",
-            ),
-            tables="benchmarks.accuracy.depth_truth",
-        ),
-        Benchmark(
-            module="benchmarks.accuracy.map_precision",
-            records="map_precision.jsonl",
-            writes=(f"{IMAGES}/map_precision.*",),
-        ),
-        Benchmark(
-            module="benchmarks.accuracy.convergence",
-            records="convergence.jsonl",
-            writes=(f"{IMAGES}/convergence.*",),
-        ),
-        Benchmark(
-            module="benchmarks.accuracy.povray",
+            "accuracy.povray",
             needs="povray",
-            records="povray.jsonl",
-            writes=(
-                "docs/stability.md",
-                f"{IMAGES}/povray.*",
-            ),
-            tables="benchmarks.accuracy.povray",
+            records=OWN,
+            fills=("docs/stability.md",),
+            writes=(f"{IMAGES}/povray.*",),
         ),
         Benchmark(
-            module="benchmarks.stability",
+            "stability",
             needs="records of convergence, map_precision and depth_truth",
-            records="stability.jsonl",
-            writes=(
-                "docs/stability.md",
-                f"{IMAGES}/stability*",
-            ),
-            tables="benchmarks.stability.__main__",
+            records=OWN,
+            fills=("docs/stability.md",),
+            writes=(f"{IMAGES}/stability*",),
         ),
         Benchmark(
-            module="benchmarks.speed.pareto",
+            "speed.pareto",
             needs="records of map_precision",
-            records="pareto.jsonl",
-            writes=(
-                "docs/speed_accuracy.md",
-                f"{IMAGES}/pareto.*",
-            ),
-            tables="benchmarks.speed.pareto",
+            records=OWN,
+            fills=("docs/speed_accuracy.md",),
+            writes=(f"{IMAGES}/pareto.*",),
+        ),
+        Benchmark("speed.needs", records=OWN, fills=("docs/speed_accuracy.md",), writes=(f"{IMAGES}/needs.*",)),
+        Benchmark(
+            "speed.texture_filter",
+            records=OWN,
+            fills=("docs/speed_accuracy.md",),
+            writes=(f"{IMAGES}/texture_filter.*",),
         ),
         Benchmark(
-            module="benchmarks.speed.needs",
-            records="needs.jsonl",
-            writes=(
-                "docs/speed_accuracy.md",
-                f"{IMAGES}/needs.*",
-            ),
-            tables="benchmarks.speed.needs",
+            "speed.metrics_speed",
+            records=OWN,
+            fills=("docs/metrics.md", "docs/speed_accuracy.md"),
+            writes=(f"{IMAGES}/depth_cost.*", f"{IMAGES}/depth_pareto.*"),
         ),
+        Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
+        Benchmark("speed.before_after", needs="git history", records=OWN),
+        Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
+        Benchmark("pages.gallery", needs=f"{BROWSER} for --stills", writes=("docs/gallery/*",)),
         Benchmark(
-            module="benchmarks.speed.texture_filter",
-            records="texture_filter.jsonl",
-            writes=("docs/speed_accuracy.md", f"{IMAGES}/texture_filter.*"),
-            tables="benchmarks.speed.texture_filter",
-        ),
-        Benchmark(
-            module="benchmarks.speed.metrics_speed",
-            records="metrics_speed.jsonl",
-            writes=(
-                "docs/metrics.md",
-                "docs/speed_accuracy.md",
-                f"{IMAGES}/depth_cost.*",
-                f"{IMAGES}/depth_pareto.*",
-            ),
-            tables="benchmarks.speed.metrics_speed",
-        ),
-        Benchmark(module="benchmarks.speed.ratios", needs=HISTORY, records="speed.jsonl"),
-        Benchmark(module="benchmarks.speed.before_after", needs="git history", records="before_after.jsonl"),
-        Benchmark(module="benchmarks.speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
-        Benchmark(module="benchmarks.pages.gallery", needs=f"{BROWSER} for --stills", writes=("docs/gallery/*",)),
-        Benchmark(
-            module="benchmarks.pages.readme",
+            "pages.readme",
             needs="out/demo and out/full of examples/demo.py; records of disparity and ratios",
             records="*_rd.json",
-            writes=(
-                "README.md",
-                "docs/study.md",
-                f"{IMAGES}/apples_*",
-                f"{IMAGES}/cuboid_*",
-                f"{IMAGES}/demo_*",
-                f"{IMAGES}/full_*",
-            ),
-            tables="benchmarks.pages.readme",
+            fills=("README.md", "docs/study.md"),
+            writes=tuple(f"{IMAGES}/{name}_*" for name in ("apples", "cuboid", "demo", "full")),
         ),
         Benchmark(
-            module="benchmarks.study",
+            "study",
             needs="records of coders",
             records="study/*.jsonl",
-            writes=(
-                "docs/study.md",
-                f"{IMAGES}/study/*",
-            ),
-            tables="benchmarks.study.page",
+            fills=("docs/study.md",),
+            tables_in="study.page",
+            writes=(f"{IMAGES}/study/*",),
         ),
-        Benchmark(module="benchmarks.pages.tables", needs="records of all others"),
+        Benchmark("pages.tables", needs="records of all others"),
     )
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -104,8 +105,8 @@ class Encoded:
         width, height = self.size
         return 8 * self.nbytes / (width * height)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an ``.ii`` file that `decode` reads, whole or not at all.
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write an ``.ii`` file that `decode` reads, whole or not at all, and return its path.
 
         Raises
         ------
@@ -115,7 +116,7 @@ class Encoded:
             If the file cannot be written.
         """
         check_type("path", path, (str, os.PathLike), "a path")
-        container.write(path, file_header.values(self), self.payload)
+        return container.write(path, file_header.values(self), self.payload)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Encoded:

@@ -1,4 +1,4 @@
-"""CPU time of a thread and of the encoders' threads that work for it."""
+"""CPU time of the calling thread and of the threads of its encoder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""RGB pixels of a picture ↔ the planes of frames, in the colours and depths that encoders take.
+"""Colour conversion between RGB pixels of a picture and planes of frames, at any bit depth and subsampling.
 
 Colour is ITU-R BT.709, full range, rounded to nearest, with P the highest value of the depth (255 or 1023)::
 
@@ -6,14 +6,14 @@ Colour is ITU-R BT.709, full range, rounded to nearest, with P the highest value
     Cb = (B − Y') / 1.8556 · P/255 + (P + 1)/2        Y' unrounded, of 8 bit
     Cr = (R − Y') / 1.5748 · P/255 + (P + 1)/2
 
-At 4:4:4 and 8 bit there and back changes no value by more than 1: a PSNR of about 52.9 dB, the most a coder behind it
-can reach. At 10 bit every colour comes back exactly.
+Conversion at 4:4:4 and 8 bit and back changes values by at most 1. Its PSNR of about 52.9 dB is the upper bound of
+coders that use it. At 10 bit it is exact.
 
-At 4:2:0 Cb and Cr are those of the mean colour of 2×2 pixels. On the way back they are interpolated linearly between
-the middles of these squares (weights 9, 3, 3, 1 of 16), and not beyond the outermost.
+At 4:2:0, Cb and Cr are those of the mean colour of 2×2 pixels. The inverse interpolates them linearly between the
+centres of these squares (weights 9, 3, 3, 1 of 16), without extrapolation at the border.
 
-As RGB the values are handed on as they are. A frame larger than its component image is filled by repeating the last
-column and row.
+RGB formats store values unchanged. The last column and row are repeated to fill a frame larger than its component
+image.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from numpy.typing import NDArray
 from ii_core.colour import CB, CR, KB, KG, KR
 from ii_core.jit import kernel
 
-# 20 fractional bits: exact enough to round like the real numbers do.
+# Fractional bits: 20 suffice to round as real numbers do.
 BITS = np.int32(20)
 HALF = np.int32(1 << 19)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Format:
-    """How frames hold colour: FFmpeg's name of it, and how it is laid out.
+    """Pixel format of frames: FFmpeg's name, layout of planes, bit depth.
 
-    ``chroma`` is "444", "420", "gbr" (three planes) or "bgr0" (one plane, four bytes a pixel).
+    ``chroma`` is "444", "420", "gbr" (three planes) or "bgr0" (one plane, four bytes per pixel).
     """
 
     name: str
@@ -48,7 +48,7 @@ class Format:
         return "uint8" if self.depth == 8 else "uint16"
 
     def planes(self, width: int, height: int) -> list[tuple[int, int]]:
-        """Rows and samples a row of each plane."""
+        """Return rows and samples per row of each plane."""
         if self.chroma == "bgr0":
             return [(height, 4 * width)]
         small = (height // 2, width // 2) if self.chroma == "420" else (height, width)
@@ -56,7 +56,7 @@ class Format:
 
 
 def ycbcr(chroma: str, depth: int) -> Format:
-    """Y, Cb and Cr planes."""
+    """Return the format of Y, Cb and Cr planes."""
     return Format(name=f"yuv{chroma}p{'' if depth == 8 else f'{depth}le'}", chroma=chroma, depth=depth)
 
 
@@ -65,10 +65,10 @@ RGB16 = Format(name="gbrp16le", chroma="gbr", depth=16)
 
 
 def gather(pixels, origins, steps, size, form: Format, planes) -> None:
-    """Fill planes[·][b] with the pixels that start at origins[b], ``steps`` apart down and right.
+    """Fill planes[·][b] with the pixels from origins[b] on, ``steps`` apart down and right.
 
-    ``size`` is height, width, and the width up to which the edge is repeated; it is repeated down to the last row.
-    pixels is (n, 3); each plane is (B, rows, ≥ samples a row), C-contiguous.
+    ``size`` is height, width, and the width up to which the last column is repeated; the last row is repeated to the
+    end of the plane. ``pixels`` is (n, 3). Each plane is (B, rows, ≥ samples per row), C-contiguous.
     """
     if form.chroma == "bgr0":
         gather_bgr0(pixels, origins, *steps, *size, planes[0])
@@ -81,7 +81,7 @@ def gather(pixels, origins, steps, size, form: Format, planes) -> None:
 
 
 def scatter(planes, origins, steps, size, form: Format, pixels) -> None:
-    """The inverse of `gather`: write the pixels of these frames; ``size`` is height, width."""
+    """Invert `gather`: write the pixels of these frames; ``size`` is height, width."""
     if form.chroma == "bgr0":
         scatter_bgr0(planes[0], origins, *steps, *size, pixels)
     elif form.chroma == "gbr":
@@ -93,18 +93,18 @@ def scatter(planes, origins, steps, size, form: Format, pixels) -> None:
 
 
 def forward(depth: int) -> NDArray[np.int32]:
-    """Factors of R, G and B in Y, Cb and Cr, the chroma offset and the highest value."""
+    """Return the factors of R, G and B in Y, Cb and Cr, the chroma offset and the highest value."""
     peak = (1 << depth) - 1
     gain = peak / 255
     yr, yb = _fixed(KR * gain), _fixed(KB * gain)
-    luma = [yr, _fixed(gain) - yr - yb, yb]  # greys stay greys
+    luma = [yr, _fixed(gain) - yr - yb, yb]  # the sum is exact, so that grey has neutral chroma
     cb = [_fixed(-KR / CB * gain), _fixed(-KG / CB * gain), _fixed(0.5 * gain)]
     cr = [_fixed(0.5 * gain), _fixed(-KG / CR * gain), _fixed(-KB / CR * gain)]
     return np.array([*luma, *cb, *cr, (peak + 1) // 2, peak], np.int32)
 
 
 def backward(depth: int) -> NDArray[np.int32]:
-    """Factors of Y, of Cr in R, of Cb and Cr in G, of Cb in B; the chroma offset."""
+    """Return the factors of Y, of Cr in R, of Cb and Cr in G, and of Cb in B, and the chroma offset."""
     peak = (1 << depth) - 1
     gain = 255 / peak
     parts = [gain, CR * gain, -KB * CB / KG * gain, -KR * CR / KG * gain, CB * gain]
@@ -115,8 +115,8 @@ def _fixed(value: float) -> int:
     return round(value * (1 << 20))
 
 
-# The kernels handle one row of a few frames before the next row: neighbouring frames are interleaved in the picture,
-# so that a cache line of it serves several of them while it is at hand.
+# Kernels process one row of several frames before the next row: neighbouring frames are interleaved in the picture,
+# so that one cache line holds pixels of several frames.
 TILE = 16
 
 
@@ -133,10 +133,12 @@ def gather_444(pixels, origins, step_y, step_x, height, width, wide, factors, lu
                 line = pixels[origins[b] + min(y, height - 1) * step_y :]
                 to_luma, to_cb, to_cr = luma[b, y], cb[b, y], cr[b, y]
                 for x in range(width):
-                    p = np.uint64(x) * np.uint64(step_x)  # unsigned: no check for indices from the end
+                    p = np.uint64(x) * np.uint64(
+                        step_x
+                    )  # unsigned: numba then omits the handling of negative indices
                     red, green, blue = np.int32(line[p, 0]), np.int32(line[p, 1]), np.int32(line[p, 2])
                     to_luma[x] = (yr * red + yg * green + yb * blue + HALF) >> BITS
-                    # Pure blue and pure red round to one more than there is.
+                    # Pure blue and pure red round to one above the highest value.
                     to_cb[x] = min(((br * red + bg * green + bb * blue + HALF) >> BITS) + mid, top)
                     to_cr[x] = min(((rr * red + rg * green + rb * blue + HALF) >> BITS) + mid, top)
                 for x in range(width, wide):
@@ -163,7 +165,7 @@ def scatter_444(luma, cb, cr, origins, step_y, step_x, height, width, factors, p
 
 @kernel
 def gather_420(pixels, origins, step_y, step_x, height, width, wide, factors, luma, cb, cr):
-    """As `gather_444`, with the chroma of the mean colour of every 2×2 pixels."""
+    """Do as `gather_444`, with the chroma of the mean colour of every 2×2 pixels."""
     yr, yg, yb, br, bg, bb, rr, rg, rb, mid, top = (
         factors[0], factors[1], factors[2], factors[3], factors[4], factors[5],
         factors[6], factors[7], factors[8], factors[9], factors[10],
@@ -194,7 +196,7 @@ def gather_420(pixels, origins, step_y, step_x, height, width, wide, factors, lu
 
 @kernel
 def scatter_420(luma, cb, cr, origins, step_y, step_x, height, width, factors, pixels):
-    """As `scatter_444`, with chroma interpolated between the middles of 2×2 pixels."""
+    """Do as `scatter_444`, with chroma interpolated between the centres of 2×2 pixels."""
     yy, r_cr, g_cb, g_cr, b_cb, mid = factors[0], factors[1], factors[2], factors[3], factors[4], factors[5]
     low, high = np.int32(0), np.int32(255)
     bits, last_x, last_y = BITS + 4, (width - 1) // 2, (height - 1) // 2
@@ -240,7 +242,7 @@ def gather_bgr0(pixels, origins, step_y, step_x, height, width, wide, packed):
 
 @kernel
 def scatter_bgr0(packed, origins, step_y, step_x, height, width, pixels):
-    """The inverse of `gather_bgr0`."""
+    """Invert `gather_bgr0`."""
     for tile in range(0, origins.size, TILE):
         for y in range(height):
             for b in range(tile, min(tile + TILE, origins.size)):
@@ -264,7 +266,7 @@ def gather_channel(pixels, origins, step_y, step_x, height, width, wide, channel
 
 @kernel
 def scatter_channel(plane, origins, step_y, step_x, height, width, channel, pixels):
-    """The inverse of `gather_channel`."""
+    """Invert `gather_channel`."""
     for tile in range(0, origins.size, TILE):
         for y in range(height):
             for b in range(tile, min(tile + TILE, origins.size)):

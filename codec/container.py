@@ -1,4 +1,4 @@
-"""The ``.ii`` file: a coded picture that decodes by itself.
+"""Container format of the ``.ii`` file: magic, lengths, digest, header, payload.
 
 ==============  =======  =============================================================================
 part            bytes    meaning
@@ -8,7 +8,7 @@ version         1        2
 lengths         2 to 10  of header and payload, LEB128
 digest          8        the first bytes of SHA-256 of everything else, in file order
 header                   values of `codec.file_header`, in the form of `codec.bitstream.compact`
-payload                  what the scheme's decoder reads, and nothing else
+payload                  input of the scheme's decoder
 ==============  =======  =============================================================================
 
 Files of the first version have ``0D 0A 1A 0A`` after the magic, then, little endian, the version 1 (2 bytes) and the
@@ -31,14 +31,14 @@ from .bitstream.compact import leb128, read_leb128, read_values, write_values
 
 MAGIC = b"\x89IIC"
 VERSION = 2
-# Names and cameras of a user's own take some hundred bytes; more than this is no header of ours.
+# Upper limit of the header; names and cameras of users take some hundred bytes.
 MAX_HEADER = 1 << 20
 _DIGEST = 8
 
 FIRST_MAGIC = MAGIC + b"\r\n\x1a\n"
 _FIRST = struct.Struct("<8sHIQ")
 _FIRST_DIGEST = 32
-# No fixed part and digest of either version have more bytes: a number in LEB128 has at most 9.
+# Upper limit of fixed part and digest of both versions; a LEB128 number has at most 9 bytes.
 _START = max(len(MAGIC) + 1 + 2 * 9 + _DIGEST, _FIRST.size + _FIRST_DIGEST)
 
 Header = dict[str, Any] | list[Any]
@@ -46,7 +46,7 @@ Header = dict[str, Any] | list[Any]
 
 @dataclass(frozen=True)
 class _Frame:
-    """What stands before the header: its bytes without the digest, the digest, and the lengths it states."""
+    """Part before the header: its bytes without the digest, the digest, and the stated lengths."""
 
     fixed: bytes
     digest: bytes
@@ -60,18 +60,18 @@ class _Frame:
 
 
 def overhead(header: list[Any], payload_length: int) -> int:
-    """Return how many bytes a file has beyond its payload."""
+    """Return the number of bytes of a file beyond its payload."""
     text = write_values(header)
     return len(_fixed(text, payload_length)) + _DIGEST + len(text)
 
 
-def write(path: str | os.PathLike[str], header: list[Any], payload: bytes) -> None:
-    """Write a coded picture, whole or not at all; the same content makes the same bytes.
+def write(path: str | os.PathLike[str], header: list[Any], payload: bytes) -> Path:
+    """Write a coded picture, whole or not at all, and return the file's path; equal content makes equal bytes.
 
     Raises
     ------
     ValueError
-        If the header is not plain JSON values, or too long.
+        If the header does not consist of JSON values, or is too long.
     OSError
         If the file cannot be written.
     """
@@ -82,21 +82,22 @@ def write(path: str | os.PathLike[str], header: list[Any], payload: bytes) -> No
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         for part in (fixed, _digest(fixed, text, payload)[:_DIGEST], text, payload):
             file.write(part)
+    return Path(path)
 
 
 def read(path: str | os.PathLike[str]) -> tuple[Header, bytes]:
-    """Return header and payload of a coded picture; memory stays within the file's own size.
+    """Return header and payload of a coded picture; takes no more memory than the file has bytes.
 
     Returns
     -------
     header : list or dict
-        The values given to `write`; an object from a file of the first version.
+        The values given to `write`; an object for files of the first version.
     payload : bytes
 
     Raises
     ------
     ValueError
-        If the file is something else, cut short, longer than it says, or damaged anywhere.
+        If the file is of another type, truncated, too long or damaged.
     OSError
         If the file cannot be read, or is a folder, pipe or device.
     """
@@ -118,7 +119,7 @@ def _fixed(text: bytes, payload_length: int) -> bytes:
 
 
 def _frame(path: Path, file: BinaryIO) -> _Frame:
-    """Read the part before the header and check its lengths against the file's real size."""
+    """Read the part before the header and compare its lengths with the size of the file."""
     there = os.fstat(file.fileno()).st_size
     start = file.read(_START)
     if start[: len(MAGIC)] != MAGIC[: len(start)] or not start:
@@ -126,13 +127,13 @@ def _frame(path: Path, file: BinaryIO) -> _Frame:
     try:
         frame = _first_frame(path, start) if start[4:5] == FIRST_MAGIC[4:5] else _second_frame(path, start)
     except IndexError:
-        raise ValueError(f"{path} is truncated: {there} bytes are there, its fixed part alone has more") from None
+        raise ValueError(f"{path} is truncated: it has {there} bytes, fewer than its fixed part") from None
     if frame.header > MAX_HEADER:
         raise ValueError(f"{path} is damaged: a header of {frame.header} bytes, at most {MAX_HEADER} are allowed")
     if there < frame.total:
-        raise ValueError(f"{path} is truncated: {there} bytes are there, {frame.total} are needed")
+        raise ValueError(f"{path} is truncated: it has {there} bytes, {frame.total} are needed")
     if there > frame.total:
-        raise ValueError(f"{path} is damaged: {there} bytes are there, {frame.total} are expected")
+        raise ValueError(f"{path} is damaged: it has {there} bytes, {frame.total} are expected")
     file.seek(len(frame.fixed) + len(frame.digest))
     return frame
 

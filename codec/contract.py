@@ -112,6 +112,10 @@ class Coder(ABC):
         Range of qualities on the coder's own scale; whole numbers unless the bounds are floats.
     scale_about : str
         Meaning of ``qp`` or ``quality``.
+    kind : str
+        Kind of component images that the scheme codes: "ei", "si" or "ri"; empty for the whole picture.
+    components_alone : bool
+        Whether `decode_component` decodes one component image without all others.
     versions : mapping of str to str
         Names and versions of the libraries in use.
     """
@@ -125,6 +129,8 @@ class Coder(ABC):
     qp_range: ClassVar[tuple[int, int] | None] = None
     quality_range: ClassVar[tuple[float, float] | None] = None
     scale_about: ClassVar[str] = ""
+    kind: str = ""
+    components_alone: ClassVar[bool] = False
 
     @property
     def takes_rate(self) -> bool:
@@ -157,6 +163,17 @@ class Coder(ABC):
         ``blank`` has the structure and pixel type of the picture; its pixels are zeros that take no memory. A decoder
         takes memory for the pixels only after the stream has shown that it holds such a picture.
         """
+
+    def frame_order(self, rows: int, cols: int, options: Options) -> NDArray[np.int64]:
+        """Return the place of each frame on the grid of component images, counted row by row."""
+        return np.arange(rows * cols)
+
+    def decode_component(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
+        """Return one component image (T, S, 3), equal to that of the whole decoded picture.
+
+        ``index`` counts the grid row by row. A coder that implements this sets ``kind`` and ``components_alone``.
+        """
+        raise NotImplementedError(f"scheme {self.name} decodes no component image alone")
 
 
 ENTRY_POINTS = "raytrace_ii.coders"

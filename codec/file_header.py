@@ -24,11 +24,11 @@ from typing import Any, Protocol
 from .container import Header
 from .contract import Value, checked_options, find, is_number
 
-GOALS = {"bpp": "target_bpp", "qp": "qp", "quality": "quality"}  # in the file, and in `Encoded`
+GOALS = {"bpp": "target_bpp", "qp": "qp", "quality": "quality"}  # name in the file: field of `Encoded`
 
 
 class Described(Protocol):
-    """A coded picture, as far as its header says it."""
+    """Fields of a coded picture that its header holds."""
 
     @property
     def structure(self) -> Mapping[str, Any]: ...
@@ -60,7 +60,7 @@ def fields(header: Header) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If the header is not of this form, or its scheme, options or pixel type are unknown. The structure is not
+        If the header has another form, or its scheme, options or pixel type are unknown. The structure is not
         checked.
     """
     found = _first(header) if isinstance(header, dict) else _second(header)
@@ -76,7 +76,7 @@ def fields(header: Header) -> dict[str, Any]:
 
 
 def _implied(k: int, l: int, u: int, v: int) -> dict[str, Any]:
-    """What the structure says about its camera."""
+    """Return the values of a camera that follow from the structure."""
     return {"kind": "lenslet-array", "lenses": [k, l], "pixels": [k * u, l * v]}
 
 
@@ -100,7 +100,7 @@ def _second(header: list[Any]) -> dict[str, Any]:
     }
 
 
-# Fields of the first version, in JSON, and those that its first files lack.
+# Fields of the first version, in JSON, and later fields with their defaults.
 _NEEDED = {"scheme", "options", "structure", "target_bpp", "qp", "reached", "runs", "versions"}
 _LATER = {"dtype": "uint8", "quality": None}
 

@@ -1,4 +1,4 @@
-"""Frames of pseudo video sequences: II-picture ↔ planes of component images, in batches.
+"""Frames of pseudo video sequences: II-picture to planes of component images and back, in batches.
 
 A batch is gathered directly from the interleaved RGB picture into the planes of an encoder, and scattered directly
 from the planes of a decoder. The picture is never rearranged as a whole. `codec.colour` converts colours.
@@ -47,18 +47,18 @@ class Layout:
         return self.rows * self.cols
 
     def origins(self, order: str, by: str = "rows") -> NDArray[np.int64]:
-        """The first pixel of each component image, by frame number."""
+        """Return the first pixel of each component image, by frame number."""
         row, col = np.divmod(selection_order(order, self.rows, self.cols, by), self.cols)
         return row * self.step_row + col * self.step_col
 
     def transposed(self) -> Layout:
-        """The same images in the same grid, each with rows for columns."""
+        """Return the layout with each image transposed, on the same grid."""
         sides = {"height": self.width, "width": self.height, "step_y": self.step_x, "step_x": self.step_y}
         return replace(self, **sides, turned=not self.turned)
 
 
 def layout(lenses: Pair, ei_pixels: Pair, kind: str) -> Layout:
-    """Grid, frame size and steps of one kind of component image.
+    """Return grid, frame size and steps of one kind of component image.
 
     =====  ============  =================  ==============
     kind   frame (T×S)   grid (rows×cols)   (2.12)–(2.14)
@@ -68,8 +68,8 @@ def layout(lenses: Pair, ei_pixels: Pair, kind: str) -> Layout:
     ri     K × U         L × V              one picture row
     =====  ============  =================  ==============
 
-    By (2.11) the first index of a component image runs across the grid and the second down, so that ray-space images
-    in row order are the picture's rows from top to bottom (2.14).
+    By (2.11) the first index of a component image counts across the grid and the second down. Ray-space images in row
+    order are therefore the picture's rows from top to bottom (2.14).
 
     Raises
     ------
@@ -97,10 +97,10 @@ def layout(lenses: Pair, ei_pixels: Pair, kind: str) -> Layout:
 
 @dataclass(frozen=True, kw_only=True)
 class Film:
-    """The frames of a pseudo video sequence: which component images, in what order and colours, how large.
+    """Frames of a pseudo video sequence: layout, order, pixel format and size.
 
-    ``width`` and ``height`` are those of the frames that are coded, at least those of a component image. ``start``
-    and ``stop`` bound the frames of a part of the sequence.
+    ``width`` and ``height`` of coded frames are at least those of a component image. ``start`` and ``stop`` select a
+    part of the sequence.
     """
 
     layout: Layout
@@ -118,11 +118,11 @@ class Film:
         return (self.layout.frames if self.stop is None else self.stop) - self.start
 
     def origins(self) -> NDArray[np.int64]:
-        """The first pixel of each frame in the picture."""
+        """Return the first pixel of each frame in the picture."""
         return self.layout.origins(self.order, self.by)[self.start : self.stop]
 
     def batch(self, strides: list[int] | None = None) -> Planes:
-        """Room for one batch of frames, an array (B, rows, ``stride``) of samples for each plane."""
+        """Return arrays for one batch of frames, (B, rows, ``stride``) of samples per plane."""
         shapes = self.format.planes(self.width, self.height)
         sizes = [(rows, stride) for (rows, _), stride in zip(shapes, strides or [n for _, n in shapes], strict=True)]
         nbytes = sum(rows * stride for rows, stride in sizes) * np.dtype(self.format.dtype).itemsize
@@ -137,12 +137,12 @@ class Film:
         pixels : ndarray, (N, M, 3)
             The picture, C-contiguous.
         planes : list of ndarray
-            As from `batch`, overwritten every time: use them up before asking for the next.
+            From `batch`. Every step overwrites them.
 
         Yields
         ------
         int
-            How many frames of ``planes`` are filled.
+            Number of filled frames in ``planes``.
         """
         flat, origins, size = pixels.reshape(-1, 3), self.origins(), len(planes[0])
         for first in range(0, self.frames, size):
@@ -151,15 +151,15 @@ class Film:
             yield len(some)
 
     def scatter(self, planes: Planes, origins: NDArray[np.int64], pixels: NDArray[Any]) -> None:
-        """Put a batch of frames back into the picture: the inverse of one step of `gathered`.
+        """Write a batch of frames into the picture, the inverse of one step of `gathered`.
 
         Parameters
         ----------
         planes : list of ndarray
         origins : ndarray of int64, at most (B,)
-            The part of `origins` these frames have.
+            Part of `origins` for these frames.
         pixels : ndarray, (N, M, 3)
-            C-contiguous; the pixels of these frames are written.
+            The picture, C-contiguous; the pixels of these frames are written.
         """
         colour.scatter(planes, origins, self._steps, self._size, self.format, pixels.reshape(-1, 3))
 

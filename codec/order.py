@@ -1,7 +1,7 @@
-"""Γ: the order in which the component images of a picture become frames (5.2).
+"""Order Γ of component images as frames (5.2).
 
-A component image has a place in a grid of ``rows`` × ``cols`` (see `codec.frames.layout` for which grid), and is
-named by its flat index ``row * cols + col``. An order is the permutation that lists these indices frame by frame.
+Component images lie on a grid of ``rows`` × ``cols`` (see `codec.frames.layout`) and have the flat index
+``row * cols + col``. An order is the permutation that lists these indices frame by frame.
 """
 
 from __future__ import annotations
@@ -17,45 +17,45 @@ BY = ("rows", "columns")
 
 
 def selection_order(order: str, rows: int, cols: int, by: str = "rows") -> Indices:
-    """Γ(j) for j = 0 … J−1: which component image is frame j.
+    """Return Γ(j) for j = 0 … J−1: the component image of frame j.
 
     Parameters
     ----------
     order : {"row", "column", "parallel", "zigzag", "spiral"}
-        Row by row; column by column; rows alternately rightward and leftward; along the anti-diagonals, alternately
-        down and up, as JPEG scans a block; or in rings around the centre, outward.
+        Row by row; column by column; rows alternately rightward and leftward; anti-diagonals alternately down and up,
+        as in JPEG blocks; or rings around the centre, outward.
     rows, cols : int
         The grid, at least 1 × 1.
     by : {"rows", "columns"}
-        ``columns`` walks the transposed grid: parallel goes down and up, a row order is a column order.
+        ``columns`` applies the order to the transposed grid.
 
     Returns
     -------
     ndarray of int64, (rows * cols,)
-        Flat indices. Neighbours in ``parallel`` and ``spiral`` are neighbours in the grid, whatever its shape.
+        Flat indices. Consecutive frames of ``parallel`` and ``spiral`` are neighbours on every grid.
 
     Raises
     ------
     ValueError
-        If the order or what it goes by is unknown, or the grid is empty.
+        If ``order`` or ``by`` is unknown, or the grid is empty.
 
     References
     ----------
-    Olsson 2008, §5.5.2 and Figure 5.4. The figure's spiral is lost: ours starts at the centre, where the view differs
-    least from all others and makes the best only I picture, and ends in the upper left corner.
+    Olsson 2008, §5.5.2 and Figure 5.4. The figure's spiral is not legible. Ours starts at the centre, since the
+    central view differs least from all others and makes the best single I picture; it ends in the upper left corner.
     """
     if order not in ORDERS:
         raise ValueError(f"unknown order {order!r}: known are {', '.join(ORDERS)}")
     if rows < 1 or cols < 1:
         raise ValueError(f"a grid of {rows}×{cols} component images has no order: at least 1×1 is needed")
     if by not in BY:
-        raise ValueError(f"unknown way to go {by!r}: known are {', '.join(BY)}")
+        raise ValueError(f"unknown by {by!r}: known are {', '.join(BY)}")
     grid = np.arange(rows * cols, dtype=np.int64).reshape(rows, cols)
     return np.ascontiguousarray(ORDERS[order](grid if by == "rows" else grid.T.copy()))
 
 
 def inverse(permutation: NDArray[Any]) -> Indices:
-    """Where each component image went: ``inverse(p)[p[j]] == j``."""
+    """Return the frame of each component image: ``inverse(p)[p[j]] == j``."""
     back = np.empty(len(permutation), np.int64)
     back[permutation] = np.arange(len(permutation))
     return back
@@ -74,7 +74,7 @@ def _zigzag(grid: Indices) -> Indices:
 
 
 def _spiral(grid: Indices) -> Indices:
-    """Peel the grid clockwise from the upper left corner inward, then walk that path backwards."""
+    """Return the reverse of the clockwise path from the upper left corner inward."""
     peeled = []
     while grid.size:
         peeled.append(grid[0])

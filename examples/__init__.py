@@ -1,1 +1,1 @@
-"""Programs to copy from."""
+"""Example programs."""

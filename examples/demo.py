@@ -1,4 +1,4 @@
-"""The main job, end to end: render two scenes, look at them, code them, chart them. ``make demo``.
+"""Demo: renders two scenes, writes views, codes them and draws rate–distortion charts. ``make demo``.
 
 python examples/demo.py [--scale 2] [--scenes apples,cuboid] [-o out/demo]
 """

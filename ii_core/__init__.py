@@ -1,4 +1,4 @@
-"""Integral imaging's nouns: cameras, pictures, component images, view images."""
+"""Cameras, pictures, component images and view images of integral imaging."""
 
 from .camera import Camera, IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images

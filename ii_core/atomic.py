@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all; temporary files of dead runs are removed by the next run."""
+"""Atomic writes: files appear whole or not at all; temporary files of dead processes are removed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The II-camera: nothing but where each pixel's ray starts (L) and where it goes (D).
+"""II-camera: location map L and direction map D, the start and direction of each pixel's ray.
 
 Coordinates: left-handed, x right, y up, z into the scene, millimetres. The pixel array lies in z = 0,
 centred on the origin; the lens plane is z = gap. A pixel (m, n) is column m from the left, row n from the top.
@@ -25,9 +25,9 @@ Floats = NDArray[np.float64]
 
 
 class Camera(Protocol):
-    """What `IICamera` and `MapCamera` have in common: one pixel array, its lenses and its rays.
+    """Protocol of `IICamera` and `MapCamera`: one pixel array, its lenses and its rays.
 
-    ``erect`` tells that elementary images stand upright; ``model`` is the camera as parameters, None of maps alone.
+    ``erect`` is true for upright elementary images. ``model`` is the camera with parameters; None if only maps exist.
     """
 
     @property
@@ -43,15 +43,14 @@ class Camera(Protocol):
     @property
     def model(self) -> IICamera | None: ...
     def rays(self, rows: slice = ..., cols: slice = ...) -> tuple[Floats, Floats]:
-        """L and D, (h, w, 3), of the first sample of a block of pixels."""
+        """Return L and D, (h, w, 3), of the first sample of a block of pixels."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class IICamera:
-    """An array of lenslets before an array of pixels.
+    """Array of lenslets in front of an array of pixels.
 
-    With one lens it is a 2D camera. With the defaults it is a rectangular array in the pinhole approximation, in
-    which every lens covers a whole number of pixels.
+    The default is a rectangular array of pinholes, each over a whole number of pixels. One lens makes a 2-D camera.
 
     Parameters
     ----------
@@ -64,17 +63,17 @@ class IICamera:
     gap_mm : float
         Λ, the distance from the pixel array to the lens plane.
     lens_pitch_mm : float or (float, float), optional
-        δL across and down; the pixel array shared out evenly if not given.
+        δL across and down; the size of the pixel array over the number of lenses if not given.
     lattice : {"rectangular", "hexagonal"}
-        In a hexagonal array odd rows of lenses stand half a pitch to the right.
+        Odd rows of a hexagonal array are shifted half a pitch to the right.
     optics : sequence of `Element` or their plain values
-        The lens model, a pinhole if none is named, and what stands before the array; see `optics`.
+        The lens model, by default a pinhole, and the elements in front of the array; see `optics`.
     lens_offset_mm : (x, y)
-        Shift of the lens array against the pixel array: moving lenslets.
+        Shift of the lens array against the pixel array, for moving lenslets.
     origin_mm : (x, y, z)
-        Centre of the pixel array: one of several, as in a stack of sensors or an array of cameras.
+        Centre of the pixel array, for stacks of sensors and arrays of cameras.
     name : str
-        What to call it in files and messages.
+        Name in files and messages.
 
     Raises
     ------
@@ -128,7 +127,7 @@ class IICamera:
         model, front = chain(self.optics)
         put("optics", (model, *front))
         if hasattr(model, "thickness"):
-            model.thickness(self.lens_pitch_mm)  # a sphere too small for its cell is refused here
+            model.thickness(self.lens_pitch_mm)  # raises ValueError if the sphere is too small for its cell
         behind = self.gap_mm
         for element in front:
             if element.z_mm < behind:  # no ray would ever reach it, and the picture be black
@@ -140,12 +139,12 @@ class IICamera:
 
     @property
     def lens_model(self) -> LensModel:
-        """What stands over every lenslet."""
+        """Model of the lenslets."""
         return self.optics[0]  # type: ignore[return-value]
 
     @property
     def front(self) -> tuple[FrontElement, ...]:
-        """What stands before the array."""
+        """Elements in front of the lens array."""
         return self.optics[1:]  # type: ignore[return-value]
 
     @cached_property
@@ -154,7 +153,7 @@ class IICamera:
         pitch = []
         for pixels, lenses, lens_pitch in zip(self.pixels, self.lenses, self.lens_pitch_mm, strict=True):
             even, given = pixels / lenses, lens_pitch / self.pixel_pitch_mm
-            # A pitch in millimetres is not a whole number of pixels to the last bit; to a billionth it is.
+            # Quotients of millimetres are whole pixels only within rounding: 1e-9 is the tolerance.
             pitch.append(even if abs(given - even) < 1e-9 * even else round(given, 9))
         shift = [round(offset / self.pixel_pitch_mm, 9) for offset in self.lens_offset_mm]
         shift[1] *= -1  # rows run down
@@ -172,7 +171,7 @@ class IICamera:
 
     @property
     def ei_pixels(self) -> tuple[Any, Any]:
-        """(U, V), pixels across and down in one elementary image: whole numbers if the structure is regular."""
+        """(U, V), pixels across and down in one elementary image; whole numbers if the structure is regular."""
         u, v = self.lens_lattice.pitch
         return (int(u), int(v)) if self.regular else (u, v)
 
@@ -188,7 +187,7 @@ class IICamera:
 
     @property
     def model(self) -> IICamera | None:
-        """The camera whose parameters describe the picture: itself."""
+        """The camera itself; see `Camera`."""
         return self
 
     @property
@@ -198,7 +197,7 @@ class IICamera:
 
     @property
     def view_angle_deg(self) -> float:
-        """α, the full horizontal angle that one lens sees (2.1)."""
+        """α, the full horizontal angle of view of one lens (2.1)."""
         return math.degrees(2 * math.atan(self.lens_pitch_mm[0] / (2 * self.gap_mm)))
 
     def rays(
@@ -208,23 +207,23 @@ class IICamera:
         sample: ArrayLike = (0.5, 0.5),
         place: ArrayLike = (0.5, 0.5),
     ) -> tuple[Floats, Floats]:
-        """Location points and direction vectors of a block of pixels.
+        """Return location points and direction vectors of a block of pixels.
 
         Parameters
         ----------
         rows, cols : slice
-            The block, numpy rules. Only this block is computed.
+            The block, as numpy slices. Only this block is computed.
         sample : array_like, (2,) or (h, w, 2)
-            Where in each pixel the ray starts, right and down from its top left corner, in [0, 1].
-            The lens is the one over the pixel's centre, so a sample never strays under a neighbour.
+            Start of the ray in its pixel, right and down from the top left corner, in [0, 1]. The ray passes the lens
+            over the pixel's centre.
         place : array_like, (2,) or (h, w, 2)
-            Where on the lens's aperture, in [0, 1] each way; (½, ½) is its centre.
+            Position on the lens's aperture, in [0, 1] along both axes; (½, ½) is its centre.
 
         Returns
         -------
         L, D : ndarray of float64, (h, w, 3)
-            Where rays leave the camera, mm, and where to, not normalised; for a pinhole the lens centre, and lens
-            centre minus pixel. A ray that the optics block has the direction 0.
+            Start of each ray, mm, and its direction, not normalised. For a pinhole these are the lens centre, and the
+            lens centre minus the pixel. Blocked rays have direction 0.
 
         References
         ----------
@@ -235,12 +234,12 @@ class IICamera:
     def rays_at(
         self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), place: ArrayLike = (0.5, 0.5)
     ) -> tuple[Floats, Floats]:
-        """Rays of any pixels: m and n broadcast against each other; see `rays`.
+        """Return rays of any pixels; m and n broadcast against each other. See `rays`.
 
         Raises
         ------
         ValueError
-            If ``sample`` leaves the pixel or ``place`` the aperture.
+            If ``sample`` or ``place`` is outside [0, 1].
         """
         L, D, weight = self.weighted_rays_at(m, n, sample, place)
         if weight is not None:
@@ -254,13 +253,13 @@ class IICamera:
         sample: ArrayLike = (0.5, 0.5),
         place: ArrayLike = (0.5, 0.5),
     ) -> tuple[Floats, Floats, Floats | None]:
-        """L and D as `rays` gives them, and the share of light (h, w) that the optics let through, None for all."""
+        """Return L and D as `rays` does, and the transmitted share of light (h, w); None if all is transmitted."""
         return self.weighted_rays_at(*self._block(rows, cols), sample, place)
 
     def weighted_rays_at(
         self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), place: ArrayLike = (0.5, 0.5)
     ) -> tuple[Floats, Floats, Floats | None]:
-        """As `weighted_rays`, for any pixels."""
+        """Return rays of any pixels, as `weighted_rays` does."""
         sample, place = _inside("sample", sample), _inside("place", place)
         m, n = np.asarray(m), np.asarray(n)
         shape = np.broadcast_shapes(m.shape, n.shape, sample.shape[:-1], place.shape[:-1])
@@ -272,12 +271,12 @@ class IICamera:
         return L, D, None if rays.weight is None else np.broadcast_to(rays.weight, shape).copy()
 
     def separable_rays(self, rows: slice = slice(None), cols: slice = slice(None)) -> tuple[Floats, ...] | None:
-        """Rays of pixel centres if x hangs on the column alone, y on the row alone and z on neither, else None.
+        """Return rays of pixel centres as coordinates; None unless x depends on the column and y on the row alone.
 
         Returns
         -------
         x, y, z : ndarray, (w, 2), (h, 2), (2,)
-            Coordinates of L and of D, the same to the bit as those of `rays`.
+            Coordinates of L and of D, bitwise equal to those of `rays`.
         """
         centre = np.full(2, 0.5)
         m, n = self._block(rows, cols)
@@ -313,7 +312,7 @@ class IICamera:
         return rays
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values that `from_json` takes back; what is as usual is left out."""
+        """Return plain values for `from_json`; values equal to their default are left out."""
         data: dict[str, Any] = {
             "kind": "lenslet-array",
             "name": self.name,
@@ -335,7 +334,7 @@ class IICamera:
 
     @classmethod
     def from_json(cls, data: Any) -> IICamera:
-        """A camera from `to_json`'s values.
+        """Return the camera of the values of `to_json`.
 
         Raises
         ------

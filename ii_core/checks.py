@@ -1,4 +1,4 @@
-"""Checks of arguments: rules by kind of value, and a decorator that applies them; errors name the argument."""
+"""Checks of arguments: rules by kind of value, and a decorator that applies them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def checked(**rules: Rule) -> Callable[[Function], Function]:
     """Decorate a public function: check each named argument by its rule before the call.
 
-    An argument equal to its default, None say, is not checked. Parameters of wrong values, as opposed to wrong types,
-    remain the function's own to refuse.
+    An argument that is its default, such as None, is not checked. The function itself refuses wrong values of the
+    right type.
     """
 
     def decorate(function: Function) -> Function:
@@ -48,7 +48,7 @@ def _short(value: Any) -> str:
 
 
 def refuse(name: str, value: Any, needed: str) -> TypeError:
-    """Return the TypeError that says what an argument is and what is needed."""
+    """Return a TypeError with the name, value and type of an argument and the needed kind."""
     return TypeError(f"{name} is {_short(value)}, a {type(value).__name__}: {needed} is needed")
 
 
@@ -86,7 +86,7 @@ def one_of(*known: str) -> Rule:
 
 
 def number(name: str, value: Any) -> float:
-    """Rule: a real number that a float can hold; return it."""
+    """Rule: a real number within the range of floats; return it."""
     if not isinstance(value, int | float | np.integer | np.floating) and not (
         isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu"
     ):
@@ -109,7 +109,7 @@ def whole(name: str, value: Any) -> int:
 
 
 def numbers(name: str, value: Any) -> None:
-    """Rule: an array of real numbers, or what numpy makes one of."""
+    """Rule: an array of real numbers, or values that numpy converts to one."""
     try:
         array = np.asarray(value)
     except (TypeError, ValueError, OverflowError) as error:
@@ -119,7 +119,7 @@ def numbers(name: str, value: Any) -> None:
 
 
 def numbers_in_a_row(name: str, value: Any) -> None:
-    """Rule: numbers, one after another."""
+    """Rule: a list of numbers."""
     numbers(name, value)
     if np.ndim(value) != 1:
         raise refuse(name, value, "a list of numbers")
@@ -132,7 +132,7 @@ def array(name: str, value: Any) -> None:
 
 
 def sequence(name: str, value: Any) -> None:
-    """Rule: a list, but no text."""
+    """Rule: a list; text is none."""
     if isinstance(value, str | bytes) or not isinstance(value, Sequence):
         raise refuse(name, value, "a list")
 
@@ -162,7 +162,13 @@ def callable_(name: str, value: Any) -> None:
 
 
 def positive(name: str, value: Any) -> float:
-    """Return a positive, finite length in mm; TypeError or ValueError that names it otherwise."""
+    """Return a positive, finite length in mm.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the value is none; the message names the argument.
+    """
     given = number(name, value)
     if not 0 < given < math.inf:
         raise ValueError(f"{name} is {given:g}: a positive length in mm is needed")
@@ -170,7 +176,13 @@ def positive(name: str, value: Any) -> float:
 
 
 def finite(name: str, value: Any, count: int) -> tuple[Any, ...]:
-    """Return so many finite numbers; TypeError or ValueError that names them otherwise."""
+    """Return a tuple of ``count`` finite numbers.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the value is none; the message names the argument.
+    """
     if isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray):
         raise refuse(name, value, f"{count} finite numbers")
     found = tuple(number(name, x) for x in value)
@@ -180,7 +192,13 @@ def finite(name: str, value: Any, count: int) -> tuple[Any, ...]:
 
 
 def whole_pair(name: str, value: Any) -> Pair:
-    """Return a pair of counts ≥ 1, across and down; ValueError that names it otherwise."""
+    """Return a pair of whole numbers of at least 1, across and down.
+
+    Raises
+    ------
+    ValueError
+        If the value is none; the message names the argument.
+    """
     try:
         a, b = value
         across, down = int(a), int(b)

@@ -2,18 +2,17 @@
 
 With the picture as a light field ``ii.reshape(L, V, K, U, 3)[l, v, k, u]``:
 
-- an elementary image EI_{k,l} holds what one lens sees (2.12),
-- a sub-image SI_{u,v} holds one pixel from under every lens: one direction (2.13),
-- a ray-space image RI_{v,l} is picture row l·V + v folded to K rows of U pixels (2.14). (The dissertation's
-  §5.5.4 gives it L rows; by (2.14) it is K.)
+- an elementary image EI_{k,l} is the pixels under one lens (2.12),
+- a sub-image SI_{u,v} is one pixel from under every lens: one direction (2.13),
+- a ray-space image RI_{v,l} is picture row l·V + v folded to K rows of U pixels (2.14). (§5.5.4 of the dissertation
+  gives L rows; (2.14) gives K.)
 
-All are stacks indexed by the component image first.
+The first two axes of a stack number the component image.
 """
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,35 +21,36 @@ from numpy.typing import NDArray
 from . import checks
 from .camera import Pair
 from .jit import kernel
+from .parallel import over_rows
 from .picture import IIPicture
 
 KINDS = ("ei", "si", "ri")
 _AXES = {"ei": (0, 2, 1, 3, 4), "si": (1, 3, 0, 2, 4), "ri": (1, 0, 2, 3, 4)}  # of the light field
 KIND = checks.instance(str)
-SMALL = 1 << 20  # bytes below which starting threads costs more than it saves
+SMALL = 1 << 20  # bytes; below, threads cost more time than they save
 
 
 @checks.checked(picture=checks.instance(IIPicture))
 def elementary_images(picture: IIPicture) -> NDArray[Any]:
-    """All elementary images, (L, K, V, U, 3), a copy: ``[l, k]`` is EI_{k,l} (2.12)."""
+    """Return all elementary images as a copy, (L, K, V, U, 3): ``[l, k]`` is EI_{k,l} (2.12)."""
     return component_images(picture, "ei")
 
 
 @checks.checked(picture=checks.instance(IIPicture))
 def sub_images(picture: IIPicture) -> NDArray[Any]:
-    """All sub-images, (V, U, L, K, 3), a copy: ``[v, u]`` is SI_{u,v} (2.13)."""
+    """Return all sub-images as a copy, (V, U, L, K, 3): ``[v, u]`` is SI_{u,v} (2.13)."""
     return component_images(picture, "si")
 
 
 @checks.checked(picture=checks.instance(IIPicture))
 def ray_space_images(picture: IIPicture) -> NDArray[Any]:
-    """All ray-space images, (V, L, K, U, 3), a copy: ``[v, l]`` is RI_{v,l} (2.14)."""
+    """Return all ray-space images as a copy, (V, L, K, U, 3): ``[v, l]`` is RI_{v,l} (2.14)."""
     return component_images(picture, "ri")
 
 
 @checks.checked(picture=checks.instance(IIPicture), kind=KIND)
 def component_images(picture: IIPicture, kind: str) -> NDArray[Any]:
-    """The stack of one kind, ``"ei"``, ``"si"`` or ``"ri"``; see the function named after it.
+    """Return the stack of one kind: ``"ei"``, ``"si"`` or ``"ri"``; see the function of that name.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def component_images(picture: IIPicture, kind: str) -> NDArray[Any]:
 
 @checks.checked(stack=checks.array, kind=KIND)
 def picture_pixels(stack: NDArray[Any], kind: str) -> NDArray[Any]:
-    """Picture pixels, (N, M, 3), from a stack of component images: the inverse of `component_images`.
+    """Return the picture pixels (N, M, 3) of a stack of component images: the inverse of `component_images`.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def picture_pixels(stack: NDArray[Any], kind: str) -> NDArray[Any]:
 
 
 def light_field(pixels: NDArray[Any], lenses: Pair, ei_pixels: Pair) -> NDArray[Any]:
-    """The picture seen as ``[l, v, k, u]``, without copying where memory order allows."""
+    """Return pixels as ``[l, v, k, u]``, (L, V, K, U, 3): a view, or a copy if they are not contiguous."""
     (k, l), (u, v) = lenses, ei_pixels
     return np.ascontiguousarray(pixels).reshape(l, v, k, u, 3)
 
@@ -91,10 +91,7 @@ def _check_kind(kind: str) -> None:
 
 
 def _permute(source: NDArray[Any], kind: str, *, split: bool) -> NDArray[Any]:
-    """A light field [l, v, k, u] as a stack of one kind, or back, on all cores.
-
-    Plain threads, not numba's own: those of some platforms abort when two callers meet.
-    """
+    """Return a light field [l, v, k, u] as a stack of one kind, or the inverse, computed on all cores."""
     source = np.ascontiguousarray(source)
     order = _AXES[kind] if split else np.argsort(_AXES[kind])
     target = np.empty([source.shape[axis] for axis in order], source.dtype)
@@ -106,19 +103,13 @@ def _permute(source: NDArray[Any], kind: str, *, split: bool) -> NDArray[Any]:
     else:
         move = split_si if split else join_si
     rows = a.shape[0] if move is split_si else target.shape[0] if move is join_si else a.shape[1]
-    cores = min(os.cpu_count() or 1, rows) if source.nbytes > SMALL else 1
-    bounds = np.linspace(0, rows, cores + 1).astype(int)
-    if cores == 1:
-        move(a, b, 0, rows)
-    else:
-        with ThreadPoolExecutor(cores) as pool:
-            list(pool.map(move, [a] * cores, [b] * cores, bounds[:-1], bounds[1:]))
+    over_rows(partial(move, a, b), rows, workers=None if source.nbytes > SMALL else 1)
     return target
 
 
 @kernel
 def swap_runs(source, target, first, last):
-    """target[a, c, b, i] = source[a, b, c, i] for b from first to last: its own inverse."""
+    """target[a, c, b, i] = source[a, b, c, i] for b from first to last; it is its own inverse."""
     for a in range(source.shape[0]):
         for b in range(first, last):
             for c in range(source.shape[2]):

@@ -1,4 +1,4 @@
-"""Design aid for cameras: solve for lengths and angle, report what a camera can do and what limits it.
+"""Design of cameras: solver for lengths and angles, report of properties and limits.
 
 Symbols as in `ii_core.properties`.
 """
@@ -25,9 +25,9 @@ def solve(
     ei_pixels: float | None = None,
     view_angle_deg: float | None = None,
 ) -> dict[str, float]:
-    """All of lens pitch, gap, pixel pitch, pixels under a lens and viewing angle from three of them.
+    """Solve for lens pitch, gap, pixel pitch, pixels under a lens and viewing angle, given three of them.
 
-    Two equations bind them, δL = U·δP and tan(α/2) = δL / 2Λ (2.1).
+    They satisfy two equations, δL = U·δP and tan(α/2) = δL / 2Λ (2.1).
 
     Returns
     -------
@@ -37,7 +37,7 @@ def solve(
     Raises
     ------
     ValueError
-        If a value is out of range, or the values leave some other open, give one twice, or contradict one another.
+        If a value is out of range, or the values are too few, too many or contradictory.
     """
     values = dict(
         lens_pitch_mm=lens_pitch_mm, gap_mm=gap_mm, pixel_pitch_mm=pixel_pitch_mm, ei_pixels=ei_pixels,
@@ -50,15 +50,13 @@ def solve(
     _check_determined(known)
     while len(known) < len(values):
         known |= _consequences(known)
-    check_lengths(
-        **{name: value for name, value in known.items() if name != "view_angle_deg"}
-    )  # nothing ran out of floats
+    check_lengths(**{name: value for name, value in known.items() if name != "view_angle_deg"})  # no overflow
     check_angle(known["view_angle_deg"])
     return {name: known[name] for name in values}
 
 
 def _consequences(known: dict[str, float]) -> dict[str, float]:
-    """What either equation gives of what is not known yet, once it lacks but one."""
+    """Return the unknowns that follow from an equation with one unknown."""
     pitch, gap, pixel, count, angle = (known.get(name) for name in ALL)
     tangent = None if angle is None else 2 * math.tan(math.radians(angle) / 2)
     found: dict[str, float | None] = {}
@@ -84,7 +82,7 @@ def _ratio(a: float | None, b: float | None) -> float | None:
 
 
 def _check_determined(known: dict[str, float]) -> None:
-    """Raise ValueError unless three values are given, and no equation has all of its own."""
+    """Raise ValueError unless three values are given that do not determine one equation completely."""
     complaints = []
     for names, law, others in ((SAMPLING, "δL = U·δP", SEEING[1:]), (SEEING, "tan(α/2) = δL / 2Λ", SAMPLING[1:])):
         if all(name in known for name in names):
@@ -108,13 +106,13 @@ def _check_determined(known: dict[str, float]) -> None:
 
 
 def _complaint(name: str, given: float, told: float, why: str) -> str:
-    if abs(given - told) > 1e-6 * told:  # the rounding of a value copied with six digits is no contradiction
+    if abs(given - told) > 1e-6 * told:  # tolerance for values rounded to six digits
         return f"contradictory: {name} is {given:.6g}, the others make it {told:.6g}. {why}"
     return f"over-determined: the others make {name} {told:.6g} already. {why}"
 
 
 def report(camera: IICamera) -> str:
-    """A design report: the camera's properties and, in words, what limits what."""
+    """Return a design report: the properties of a camera, and sentences on their limits."""
     p = properties(camera)
     lines = _structure_lines(p) + _plane_lines(camera, p)
     if camera.lenses != (1, 1):
@@ -181,14 +179,14 @@ def _cell_lines(camera: IICamera, p: dict[str, Any]) -> list[str]:
     if cell["aperture_share"] is not None:
         lines.append(f"  aperture         {cell['aperture_share']:.1%} of a lens's cell is clear")
     if (rim := cell["rim_image_mm"]) is not None:
-        # A hundredth is less than a pixel of any elementary image in use.
+        # 1 % is less than a pixel of all elementary images in use.
         verdict = "would overlap" if rim > pitch * 1.01 else "dark around" if rim < pitch * 0.99 else "just touch"
         lines.append(f"  rim in front     imaged {rim:.4g} mm wide in cells of {pitch:.4g} mm: {verdict}")
     return lines
 
 
 def _limit_lines(camera: IICamera, p: dict[str, Any]) -> list[str]:
-    """What limits what, a sentence each."""
+    """Return one sentence per limit."""
     lines = _array_limits(p) if camera.lenses != (1, 1) else ["One view: pixels alone limit its resolution."]
     if (diffraction := p["diffraction"]) is not None:
         wave, spot, pixel = diffraction["wavelength_mm"] * 1e6, diffraction["spot_mm"], p["pixel_pitch_mm"]

@@ -24,17 +24,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from .parallel import cores
+
 Work = Callable[..., Any]
 Identity = Callable[[], Mapping[str, str]]  # code and libraries of a process; a function of a module
 AHEAD = 3  # calls under way for every worker: none waits, and few are kept until those before them are done
 
 _opened: dict[str, Work] = {}
 _opening = threading.Lock()
-
-
-def cores() -> int:
-    """Cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def check_executor(executor: Any, workers: int | None) -> None:

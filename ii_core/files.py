@@ -1,4 +1,4 @@
-"""JSON and images, in and out (through OpenImageIO); files appear whole or not at all and are checked first."""
+"""JSON and image files (through OpenImageIO): checked reads, atomic writes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ __all__ = [
     "write_json",
 ]
 
-# What each file type can hold without loss.
+# Pixel types that each file type stores without loss.
 IMAGE_TYPES: dict[str, tuple[str, ...]] = {
     ".png": ("uint8", "uint16"),
     ".tif": ("uint8", "uint16", "float32"),
@@ -50,17 +50,17 @@ IMAGE_TYPES: dict[str, tuple[str, ...]] = {
     ".exr": ("float32",),
     ".hdr": ("float32",),
 }
-LOSSY = (".hdr",)  # a common exponent for three numbers
+LOSSY = (".hdr",)  # one exponent for three numbers
 PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
-BAND = 64  # rows in memory at a time when a file is checked
+BAND = 64  # rows read at once to check a file
 MAX_TEXT = 16 << 20  # bytes of a JSON or configuration file; a sidecar has under ten thousand
-MAX_DIGITS = 20  # of whole numbers in JSON: all of 64 bits
-MAX_MESSAGE = 600  # characters of an error that quotes what a file holds
+MAX_DIGITS = 20  # of whole numbers in JSON; 64 bits need 20
+MAX_MESSAGE = 600  # characters of an error that quotes a file
 NOT_WHOLE = "the file does not hold what was written to it, as if the disk were full"
 
 
 def check_file(path: str | os.PathLike[str]) -> None:
-    """Raise OSError unless a regular file is there: reading a pipe or a device may never end."""
+    """Raise OSError unless the path is a regular file: reading a pipe or a device may never end."""
     try:
         mode = os.stat(path).st_mode
     except FileNotFoundError:
@@ -74,7 +74,7 @@ def check_file(path: str | os.PathLike[str]) -> None:
 
 
 def check_name(path: str | os.PathLike[str]) -> None:
-    """Raise ValueError unless the name is UTF-8, which image libraries need."""
+    """Raise ValueError unless the name is UTF-8, as image libraries need."""
     try:
         os.fspath(path).encode("utf-8")
     except UnicodeEncodeError:
@@ -82,18 +82,18 @@ def check_name(path: str | os.PathLike[str]) -> None:
 
 
 def one_line(text: object) -> str:
-    """A message as one line of at most about `MAX_MESSAGE` characters, the middle of a longer one left out."""
+    """Return a text as one line; the middle of a text longer than `MAX_MESSAGE` characters is left out."""
     line, half = " ".join(str(text).split()), MAX_MESSAGE // 2
     return line if len(line) <= MAX_MESSAGE else f"{line[:half]} … {line[-half:]}"
 
 
 def read_text(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> str:
-    """A small UTF-8 file.
+    """Return the text of a small UTF-8 file.
 
     Raises
     ------
     ValueError
-        If it is longer than ``limit`` bytes or no UTF-8.
+        If it is longer than ``limit`` bytes or not UTF-8.
     OSError
         If it is missing or not regular.
     """
@@ -101,7 +101,7 @@ def read_text(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> str:
     with open(path, "rb") as file:
         data = file.read(limit + 1)
     if len(data) > limit:
-        raise ValueError(f"{os.fspath(path)}: longer than {limit >> 20} MiB, the most that is read of such a file")
+        raise ValueError(f"{os.fspath(path)}: longer than {limit >> 20} MiB, the limit for such files")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -109,12 +109,12 @@ def read_text(path: str | os.PathLike[str], limit: int = MAX_TEXT) -> str:
 
 
 def read_json(path: str | os.PathLike[str]) -> Any:
-    """The value in a JSON file.
+    """Return the value of a JSON file.
 
     Raises
     ------
     ValueError
-        If the file is no JSON, is longer than `MAX_TEXT`, nests too deeply, or holds a number of more than
+        If the file is not JSON, is longer than `MAX_TEXT`, nests too deeply, or holds a number of more than
         `MAX_DIGITS` digits.
     OSError
         If it is missing or not regular.
@@ -135,14 +135,15 @@ def _whole(digits: str) -> int:
 
 
 def json_text(data: Any) -> str:
-    """JSON as files hold it; NaN and infinity become null, which strict readers accept."""
+    """Return the JSON text of a value; NaN and infinity become null, which strict readers accept."""
     return json.dumps(_finite(data), indent=2, ensure_ascii=False) + "\n"
 
 
-def write_json(path: str | os.PathLike[str], data: Any) -> None:
-    """Write `json_text` whole or not at all."""
+def write_json(path: str | os.PathLike[str], data: Any) -> Path:
+    """Write `json_text` whole or not at all, and return the file's path."""
     with atomic_path(path) as temporary:
         temporary.write_text(json_text(data), encoding="utf-8")
+    return Path(path)
 
 
 def _finite(value: Any) -> Any:
@@ -155,8 +156,8 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def write_image(path: str | os.PathLike[str], pixels: NDArray[Any]) -> None:
-    """Write an (N, M) or (N, M, channels) array of uint8, uint16 or float32 without loss.
+def write_image(path: str | os.PathLike[str], pixels: NDArray[Any]) -> Path:
+    """Write an (N, M) or (N, M, channels) array of uint8, uint16 or float32 without loss; return the file's path.
 
     Raises
     ------
@@ -170,6 +171,7 @@ def write_image(path: str | os.PathLike[str], pixels: NDArray[Any]) -> None:
     height, width, channels = pixels.shape
     with image_writer(path, (width, height), channels, pixels.dtype.name) as write:
         write(pixels)
+    return Path(path)
 
 
 @contextlib.contextmanager
@@ -182,7 +184,7 @@ def image_writer(
     names: Sequence[str] = (),
     about: Mapping[str, str] | None = None,
 ) -> Iterator[RowWriter]:
-    """Write an image band by band from the top; the file appears when the block ends, whole, or not at all.
+    """Write an image band by band from the top; the file appears whole when the block ends, or not at all.
 
     Parameters
     ----------
@@ -191,21 +193,21 @@ def image_writer(
     dtype : str
         uint8, uint16 or float32.
     names : sequence of str
-        Of the channels, which EXR keeps.
+        Names of the channels, which EXR stores.
     about : mapping of str, optional
-        Texts for the file's header.
+        Texts of the file's header, by key.
 
     Yields
     ------
     RowWriter
-        Takes the next rows, (h, M, channels), when called.
+        Call it with the next rows, (h, M, channels).
 
     Raises
     ------
     ValueError
         If the file type is unknown or cannot hold the type.
     OSError
-        If the file cannot be written, or does not hold afterwards what was written to it.
+        If the file cannot be written, or its pixels differ from the written ones afterwards.
     """
     check_type(path, dtype)
     with (
@@ -226,17 +228,17 @@ def image_rows(
     about: Mapping[str, str] | None = None,
     named: str | os.PathLike[str],
 ) -> Iterator[RowWriter]:
-    """As `image_writer`, into a temporary file of `atomic_path`; errors speak of the file as ``named``."""
-    # OpenImageIO knows no "float32": it would take the file type's own default, half or even uint8, without a word.
+    """Write an image as `image_writer` does, into a temporary file of `atomic_path`; errors name ``named``."""
+    # OpenImageIO has no type "float32": it silently uses the default of the file type, half or uint8.
     spec = oiio.ImageSpec(*size, channels, "float" if dtype == "float32" else dtype)
     if names:
         spec.channelnames = tuple(names)
     for key, text in (about or {}).items():
         spec[key] = text
-    spec["DateTime"] = ""  # else EXR and TIFF get the time of day, and equal pictures different files
-    spec["oiio:UnassociatedAlpha"] = 1  # else PNG divides by alpha
+    spec["DateTime"] = ""  # otherwise EXR and TIFF store the time, and equal pictures differ as files
+    spec["oiio:UnassociatedAlpha"] = 1  # otherwise PNG divides by alpha
     if file.suffix == ".png":
-        spec["png:compressionLevel"] = 4  # a quarter of level 6's time for 2 % more bytes on noisy pictures
+        spec["png:compressionLevel"] = 4  # a quarter of the time of level 6, 2 % more bytes on noisy pictures
     if file.suffix == ".exr":
         spec["compression"] = "zip"
     check_name(named)
@@ -247,11 +249,11 @@ def image_rows(
     try:
         yield writer
     except BaseException:
-        output.close()  # of half a picture: what it says of that is of no use
+        output.close()  # its message on an incomplete picture does not help
         raise
     if not output.close():
         raise _failed(output, file, named)
-    # libpng and libtiff do not report a full disk: the file itself is read.
+    # libpng and libtiff do not report a full disk: compare the file's pixels.
     try:
         writer.digest = _stored_digest(file, names)
     except (OSError, ValueError):
@@ -265,12 +267,12 @@ def _failed(output: Any, file: Path, named: str | os.PathLike[str]) -> OSError:
 
 
 def _reason(said: str, file: Path) -> str:
-    """OpenImageIO's complaint in one line, without the temporary name; some disks' errors come without any."""
+    """Return OpenImageIO's message in one line, without the temporary name; it may be empty for disk errors."""
     return " ".join(said.replace(f' "{file}"', "").split()) or NOT_WHOLE
 
 
 class RowWriter:
-    """Takes an image band by band, (h, M, channels) each; ``digest`` names the stored pixels when all are written."""
+    """Writer of an image, band by band; ``digest`` is that of the stored pixels after the last band."""
 
     def __init__(self, output: Any, shape: tuple[int, ...], dtype: str, failed: Callable[[], OSError]) -> None:
         self._output, self._shape, self._failed, self._top = output, shape, failed, 0
@@ -278,7 +280,7 @@ class RowWriter:
         self.digest = ""
 
     def __call__(self, rows: NDArray[Any]) -> None:
-        """Write the next rows."""
+        """Write the next rows, (h, M, channels)."""
         rows = np.ascontiguousarray(rows).reshape(-1, *self._shape[1:])
         if not self._output.write_scanlines(self._top, self._top + len(rows), 0, rows):
             raise self._failed()
@@ -287,21 +289,21 @@ class RowWriter:
 
 
 def _digest(shape: tuple[int, ...], dtype: str) -> Any:
-    """BLAKE2b, which is twice as fast as SHA-256 without special instructions, of an image whose rows follow."""
+    """Return a BLAKE2b hash to update with the rows of an image; twice as fast as SHA-256 in plain code."""
     return hashlib.blake2b(f"{dtype}:{shape}:".encode(), digest_size=16)
 
 
 def pixel_digest(pixels: NDArray[Any]) -> str:
-    """BLAKE2b (128 bits) of an image's type, shape (N, M, channels) and values."""
+    """Return the BLAKE2b hash (128 bits) of an image's type, shape (N, M, channels) and values."""
     digest = _digest(pixels.shape, pixels.dtype.name)
     digest.update(np.ascontiguousarray(pixels))
     return str(digest.hexdigest())
 
 
 def _stored_digest(path: Path, names: Sequence[str]) -> str:
-    """`pixel_digest` of a file, which is read band by band."""
+    """Return the `pixel_digest` of a file, read band by band."""
     if path.suffix.lower() == ".png" and not _ends_with(path, PNG_END):
-        raise OSError("cut short")  # libpng would print its own complaint
+        raise OSError("cut short")  # libpng would print a message of its own
     with _opened(path) as source:
         spec = source.spec()
         order = [spec.channelnames.index(name) for name in names]  # EXR sorts channels by name
@@ -322,14 +324,20 @@ def _ends_with(path: Path, end: bytes) -> bool:
 
 
 def check_type(path: str | os.PathLike[str], dtype: str) -> None:
-    """Raise ValueError unless a file of this name can hold pixels of this type."""
+    """Raise ValueError unless a file of this name can store pixels of this type."""
     if dtype not in (allowed := image_types(path)):
         path = Path(path)
         raise ValueError(f"{path} cannot hold {dtype} pixels: {path.suffix} takes {', '.join(allowed)}")
 
 
 def image_types(path: str | os.PathLike[str]) -> tuple[str, ...]:
-    """Pixel types a file of this name can hold; ValueError if the type of file is unknown."""
+    """Return the pixel types that a file of this name can store.
+
+    Raises
+    ------
+    ValueError
+        If the file type is unknown.
+    """
     try:
         return IMAGE_TYPES[Path(path).suffix.lower()]
     except KeyError:
@@ -337,12 +345,12 @@ def image_types(path: str | os.PathLike[str]) -> tuple[str, ...]:
 
 
 def image_header(path: str | os.PathLike[str]) -> tuple[tuple[int, int, int], str]:
-    """Shape (N, M, channels) and type of an image as `read_image` gives it, from the file's header alone.
+    """Return the shape (N, M, channels) and pixel type of an image from the file's header.
 
     Raises
     ------
     OSError
-        If the file is missing, not regular, or no image.
+        If the file is missing, not regular, or not an image.
     """
     with _opened(Path(path)) as source:
         spec = source.spec()
@@ -350,12 +358,12 @@ def image_header(path: str | os.PathLike[str]) -> tuple[tuple[int, int, int], st
 
 
 def read_image(path: str | os.PathLike[str], *, size: tuple[int, int] | None = None) -> NDArray[Any]:
-    """Read an (N, M, channels) array of uint8, uint16 or float32, as stored; alpha, if any, is not multiplied in.
+    """Read an (N, M, channels) array of uint8, uint16 or float32 as stored; colours are not multiplied by alpha.
 
     Parameters
     ----------
     size : (M, N), optional
-        Pixels across and down that are needed. The header is held against it, so that no memory is taken for others.
+        Required pixels across and down; compared with the header before memory is allocated.
 
     Raises
     ------
@@ -382,7 +390,7 @@ def read_image(path: str | os.PathLike[str], *, size: tuple[int, int] | None = N
 
 
 def memory_bytes() -> int:
-    """Memory of the machine; 2⁶³ where the system does not say."""
+    """Return the bytes of memory of the machine; 2⁶³ if the system does not report them."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
@@ -390,7 +398,7 @@ def memory_bytes() -> int:
 
 
 def read_channels(path: str | os.PathLike[str], *, size: tuple[int, int] | None = None) -> dict[str, NDArray[Any]]:
-    """The channels of an image by their names, (N, M) each; parameters and errors are those of `read_image`."""
+    """Return the channels of an image, (N, M) each, by name; parameters and errors as `read_image`."""
     pixels = read_image(path, size=size)
     with _opened(Path(path)) as source:
         names = source.spec().channelnames
@@ -398,13 +406,13 @@ def read_channels(path: str | os.PathLike[str], *, size: tuple[int, int] | None 
 
 
 def read_depth(path: str | os.PathLike[str], *, size: tuple[int, int] | None = None) -> NDArray[Any]:
-    """The channel depth.Z of an image, or its first if there is none; as `read_image`."""
+    """Return the channel depth.Z of an image, or the first channel; parameters and errors as `read_image`."""
     channels = read_channels(path, size=size)
     return channels.get("depth.Z", next(iter(channels.values())))
 
 
 def read_about(path: str | os.PathLike[str], key: str) -> str | None:
-    """A text of an image's header, as `image_writer` puts it there; None if there is none."""
+    """Return a text that `image_writer` stored in an image's header; None if there is none."""
     with _opened(Path(path)) as source:
         text = source.spec().get(key)
     return None if text is None else str(text)
@@ -412,11 +420,11 @@ def read_about(path: str | os.PathLike[str], key: str) -> str | None:
 
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    """An image file, opened for reading as stored."""
+    """Open an image file; pixels are read as stored."""
     check_file(path)
     check_name(path)
     plain = oiio.ImageSpec()
-    plain.attribute("oiio:UnassociatedAlpha", 1)  # left alone it multiplies what PNG stores by alpha
+    plain.attribute("oiio:UnassociatedAlpha", 1)  # by default OpenImageIO multiplies PNG colours by alpha
     source = oiio.ImageInput.open(str(path), plain)
     if not source:
         raise OSError(f"cannot read {path}: {one_line(oiio.geterror())}")
@@ -427,10 +435,10 @@ def _opened(path: Path) -> Iterator[Any]:
 
 
 def _stored_type(spec: Any) -> str:
-    """Type of the pixels as they are read."""
+    """Return the numpy type of the pixels that are read."""
     return stored if (stored := str(spec.format)) in ("uint8", "uint16") else "float32"
 
 
 def _oiio_type(spec: Any) -> str:
-    """The same in OpenImageIO's words."""
+    """Return the same type by OpenImageIO's name."""
     return "float" if (kind := _stored_type(spec)) == "float32" else kind

@@ -1,4 +1,4 @@
-"""Identity of the code that makes a number or a picture: hash of its sources, versions of its libraries."""
+"""Identity of code: hash of sources, versions of libraries."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 
-# All that results depend on; command line, charts and validation messages are left out.
+# Libraries that results depend on, without those of command line, charts and validation messages.
 LIBRARIES = (
     "numpy", "numba", "embreex", "trimesh", "OpenImageIO", "scikit-image", "scipy", "av", "pillow", "imagecodecs",
     "bjontegaard",
@@ -18,14 +18,14 @@ LIBRARIES = (
 
 
 def source_hash(packages: Sequence[str], endings: Sequence[str] = (".py",)) -> str:
-    """Return the SHA-256 of the files of packages as they are on disk now.
+    """Return the SHA-256 of the files of packages on disk.
 
     Parameters
     ----------
     packages : sequence of str
-        Names; they are found, not imported.
+        Names of packages, which are not imported.
     endings : sequence of str
-        Kinds of files that count.
+        Suffixes of the hashed files.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def _file_hash(path: Path, _changed: int) -> bytes:
 
 
 def library_versions(libraries: Sequence[str] = LIBRARIES) -> dict[str, str]:
-    """Return the versions of Python, of this distribution and of libraries, as far as they are installed."""
+    """Return the versions of Python, of this distribution and of the installed ones among libraries."""
     found = {"python": platform.python_version()}
     for library in ("raytrace-ii", *libraries):
         try:

@@ -1,6 +1,6 @@
-"""How kernels are compiled: once, lazily, kept on disk, without the GIL.
+"""Compilation of kernels: lazy, cached on disk, without the interpreter lock.
 
-numba's cache watches only a kernel's own file: a kernel that called one of another file would miss an edit there.
+numba's cache notices changes in a kernel's own file only. A kernel must therefore not call kernels of other files.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from numba.core.caching import FunctionCache
 
 
 class Cache(FunctionCache):
-    """numba's disk cache, with kernels compiled again where it cannot be read and left uncached where not written.
+    """Disk cache of numba: kernels are compiled again if it cannot be read, and not cached if it cannot be written.
 
-    A file may be cut short, name modules that have been renamed since (its time stamp is the source file's, which a
-    renamed folder leaves as it was), or lie on a full disk. Unpickling fails in as many ways as there are bytes.
+    A file may be truncated, may lie on a full disk, or may name modules that have been renamed since: its time stamp
+    is that of the source file, which renaming a folder does not change. Unpickling then raises errors of any type.
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled kernel of a signature, None if there is none that can be read."""
+        """Return the compiled kernel of a signature; None if none can be read."""
         try:
             return super().load_overload(sig, target_context)
         except Exception:
@@ -30,42 +30,42 @@ class Cache(FunctionCache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled kernel if the disk takes it."""
+        """Store a compiled kernel, if the disk can be written."""
         with contextlib.suppress(OSError):
             super().save_overload(sig, data)
 
 
 def kernel(function: Callable[..., Any], **options: Any) -> Any:
-    """Compile on first call and keep the result, or just compile where nothing can be kept."""
+    """Compile on the first call and cache the result; without a writable folder, only compile."""
     compiled = numba.njit(nogil=True, **options)(function)
-    with contextlib.suppress(RuntimeError):  # no folder to keep it in can be written
+    with contextlib.suppress(RuntimeError):  # no cache folder can be written
         compiled._cache = Cache(function)  # as numba's own enable_caching does
     return compiled
 
 
 def lean_kernel(function: Callable[..., Any], **options: Any) -> Any:
-    """A kernel that makes no arrays, and so need not count references to those it is given.
+    """Compile a kernel that creates no arrays, without reference counting.
 
-    Where a function with several ways out is called, that counting is a locked instruction an array: 36 ns for a
-    branch of 4. Nor is a division by zero caught: it gives infinity or NaN, as in numpy. A product and the sum that
-    takes it may be one instruction, rounded once: a tenth of the time of shading.
+    Counting takes one locked instruction per array at every call of a function with several returns: 36 ns for four
+    arrays. Division by zero gives infinity or NaN, as in numpy. A product and a following sum may be one fused
+    instruction with one rounding, which saves a tenth of the time of shading.
     """
     return kernel(function, _nrt=False, error_model="numpy", fastmath={"contract"}, **options)
 
 
 def exact_kernel(function: Callable[..., Any]) -> Any:
-    """A lean kernel that rounds after every operation: the same to the bit on every CPU."""
+    """Compile a lean kernel that rounds after every operation: bitwise equal results on every CPU."""
     return kernel(function, _nrt=False, error_model="numpy")
 
 
 def inline_kernel(function: Callable[..., Any]) -> Any:
-    """A kernel's own helper, copied into its caller."""
+    """Compile a helper of a kernel, inlined as source into its callers."""
     return numba.njit(nogil=True, inline="always")(function)
 
 
 def inner_kernel(function: Callable[..., Any]) -> Any:
-    """A lean kernel whose machine code is copied into its callers': no call in the inmost loop.
+    """Compile a lean kernel whose machine code is inlined into its callers.
 
-    Unlike `inline_kernel`, which numba copies as source before it knows types, it may have several ways out.
+    It may have several returns. `inline_kernel` may not: numba inlines its source before types are inferred.
     """
     return lean_kernel(function, forceinline=True)

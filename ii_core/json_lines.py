@@ -1,4 +1,4 @@
-"""Files of JSON lines that grow by one whole record at a time and outlive a kill."""
+"""JSON-lines files: appended record by record; a killed writer loses no whole record."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from .files import check_file
 
 try:
     import fcntl
-except ImportError:  # not on Windows, where two processes must not write one file
+except ImportError:  # Windows has no fcntl: there, only one process may write a file
     fcntl = None  # type: ignore[assignment]
 
 
 def append_record(path: Path, record: Mapping[str, Any]) -> None:
-    """Add a line to a file, on disk when this returns; a last line that a kill cut off is removed first."""
+    """Append a record and flush it to disk; an incomplete last line of a killed writer is removed first."""
     path.parent.mkdir(parents=True, exist_ok=True)
     line = json.dumps(record, ensure_ascii=False) + "\n"
     with path.open("a+b") as file:
         if fcntl is not None:
-            fcntl.flock(file, fcntl.LOCK_EX)  # another process may add records of its own
+            fcntl.flock(file, fcntl.LOCK_EX)  # other processes may append, too
         file.seek(0)
         file.truncate(file.read().rfind(b"\n") + 1)
         file.write(line.encode())
@@ -31,14 +31,14 @@ def append_record(path: Path, record: Mapping[str, Any]) -> None:
 
 
 def read_records(path: Path, format: str, version: int) -> list[dict[str, Any]]:
-    """Return all records of a file, oldest first; a last line that a kill cut off is left out.
+    """Return all records of a file, oldest first, without an incomplete last line.
 
     Raises
     ------
     ValueError
-        If another line is no record of this format and version.
+        If a line is not a record of this format and version.
     OSError
-        If the file is a folder, pipe or device.
+        If the path is a folder, pipe or device.
     """
     if not path.exists():
         return []

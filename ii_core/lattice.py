@@ -1,8 +1,8 @@
-"""Where lens centres lie on the pixel array, and which lens a pixel is under. All in units of pixels.
+"""Lattice of lens centres on the pixel array, and the lens of each pixel; in units of pixels.
 
-Positions are measured from the array's top left corner, to the right and down; pixel (m, n) has its centre at
-(m + ½, n + ½). Only +, −, × and ÷ are used, and what differs by less than a millionth of a pixel is a tie, so that a
-pixel on the border of two lenses goes to the same one on every platform, however the border was computed.
+Positions are measured from the top left corner of the pixel array, right and down; pixel (m, n) has its centre at (m
++ ½, n + ½). Distances that differ by less than 1e-6 pixels are ties, and only +, −, × and ÷ are used. A pixel on the
+border of two lenses therefore has the same owner on every platform.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ TIE = 1e-6  # pixels
 
 
 class Lattice(NamedTuple):
-    """K×L lens centres at ((k + ½)·pitch + origin); in a hexagonal array odd rows stand half a pitch to the right."""
+    """K×L lens centres at (k + ½)·pitch + origin; odd rows of a hexagonal array are shifted half a pitch right."""
 
     lenses: tuple[int, int]
     pitch: tuple[float, float]
@@ -28,16 +28,16 @@ class Lattice(NamedTuple):
     hexagonal: bool
 
     def centres(self, k: NDArray[Any], l: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """x and y of the centres of lenses (k, l) (3.16)."""
+        """Return x and y of the centres of lenses (k, l) (3.16)."""
         x = (k + 0.5) * self.pitch[0] + self.origin[0]
         if self.hexagonal:
             x = x + 0.5 * self.pitch[0] * (l % 2)
         return x, (l + 0.5) * self.pitch[1] + self.origin[1]
 
     def nearest(self, m: NDArray[Any], n: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Lens (k, l) nearest to the centres of pixels (3.19); (m, n) broadcast, and so may k and l.
+        """Return the lens (k, l) nearest to the centres of pixels (3.19); m and n broadcast, and so do k and l.
 
-        A pixel halfway between two lenses belongs to the one further right or, in another row, further up.
+        A pixel halfway between two lenses belongs to the right one, or to the upper one if rows differ.
         """
         if not self.hexagonal:
             right = np.floor((m + 0.5 - self.origin[0] + TIE) / self.pitch[0])
@@ -52,10 +52,10 @@ class Lattice(NamedTuple):
 
 @kernel
 def nearest_hexagonal(m, n, lenses, pitch, origin, out_k, out_l):
-    """Nearest lens of an array whose odd rows stand half a pitch to the right, by distance.
+    """Find the nearest lens of each pixel in a hexagonal array.
 
-    All odd rows have their lenses at the same x, and so have all even ones: the nearest lens is in the nearest row of
-    its kind, which is the pixel's own row or a neighbour of it.
+    Lenses of all odd rows have the same x, and so have lenses of all even rows. The nearest lens is therefore in the
+    nearest odd or the nearest even row: the pixel's own row or a neighbour.
     """
     for i in range(m.shape[0]):
         x, y = m[i] + 0.5 - origin[0], n[i] + 0.5 - origin[1]

@@ -1,13 +1,14 @@
-"""Cameras as pictures: L and D stored as images that anyone can open, and a camera made of nothing but them.
+"""Cameras stored as images: location and direction maps in PNG, EXR or HDR, and the camera read from them.
 
-A folder holds, for every pixel array and sample, two images whose red, green and blue are x, y and z, and a third
-with the share of light of every ray if not all carry all; beside them ``camera.json``. A stored number x stands for
+A folder holds ``camera.json`` and, for every pixel array and sample, the images L and D. Their red, green and blue
+are x, y and z. A third image, W, holds the transmitted share of light if rays are blocked or dimmed. A stored number
+x means
 
     X = x / C · (max − min) + min
 
-by channel (3.12). Integers of b bits have C = 2^b; ``max`` is put so that both true extremes are codes, which
-(3.11) with the true maximum would miss. Floats have C = 1: EXR holds millimetres as they are, box (0, 1); ``.hdr``
-knows no negative numbers and gets the true box.
+in each channel (3.12). Integers of b bits have C = 2^b. ``max`` is chosen so that both extremes are codes; with the
+true maximum, (3.11) would not store it. Floats have C = 1. EXR stores millimetres, with min = 0 and max = 1. ``.hdr``
+stores no negative numbers and uses the true extremes.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ FORMATS = {
     "hdr": (".hdr", "float32"),
 }
 SHEET = "camera.json"
-BLOCK_ROWS = 64  # rows of rays in memory at a time
+BLOCK_ROWS = 64  # rows of rays computed at once
 
 Box = list[list[float]]
 Rays = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]
@@ -47,20 +48,25 @@ def write_maps(
     format: str = "png16",
     samples: Sequence[tuple[ArrayLike, ArrayLike]] = (((0.5, 0.5), (0.5, 0.5)),),
     progress: Callable[[int, int], None] | None = None,
-) -> None:
-    """Store cameras, one pixel array each, as maps.
+) -> Path:
+    """Store cameras of one pixel array each as maps.
 
     Parameters
     ----------
     cameras : sequence of IICamera
         All of the same structure.
     folder : path
-        Made if need be; files of the same names are replaced.
+        Created if it does not exist; files of the same names are replaced.
     format : {"png16", "png8", "exr", "hdr"}
     samples : sequence of (sample, place)
-        Where in the pixel and on the aperture rays start; one pair of maps each. Centres by default.
+        Positions in the pixel and on the aperture, one pair of maps each; their centres by default.
     progress : callable, optional
-        Called with maps written and maps in all.
+        Called with the number of maps written and of all maps.
+
+    Returns
+    -------
+    Path
+        The folder.
 
     Raises
     ------
@@ -92,10 +98,11 @@ def write_maps(
                 progress(len(samples) * i + j + 1, total)
         arrays.append({"camera": camera.to_json(), "samples": stored})
     write_json(folder / SHEET, {**_structure(first), "arrays": arrays})
+    return folder
 
 
 def map_files(cameras: Sequence[IICamera], format: str = "png16", *, samples: int = 1) -> list[str]:
-    """Names of all files that `write_maps` may leave in its folder; W is left out if all rays carry all light."""
+    """Return the names of all files that `write_maps` may write; W is written only if rays lose light."""
     check_format(format)
     total = len(cameras) * samples
     endings = [f"_{i}_{j}" for i in range(len(cameras)) for j in range(samples)] if total > 1 else [""]
@@ -103,7 +110,7 @@ def map_files(cameras: Sequence[IICamera], format: str = "png16", *, samples: in
 
 
 def check_format(format: str) -> None:
-    """Raise ValueError, with the known ones, unless it is a format of maps."""
+    """Raise ValueError with the known formats unless this is one."""
     if format not in FORMATS:
         raise ValueError(f"unknown format {format!r}: known are {', '.join(FORMATS)}")
 
@@ -130,7 +137,7 @@ def _structure(camera: IICamera) -> dict[str, Any]:
 def _write_pair(
     camera: IICamera, where: tuple[ArrayLike, ArrayLike], folder: Path, ending: str, format: str
 ) -> dict[str, Any]:
-    """Two or three images, and what the sheet says of them."""
+    """Write the images of one sample and return their entry in the sheet."""
     suffix, dtype = FORMATS[format]
     boxes, weighted = _extremes(camera, where)
     if format == "exr":
@@ -156,17 +163,17 @@ def _write_pair(
 
 
 def _blocks(camera: IICamera, where: tuple[ArrayLike, ArrayLike]) -> Iterator[tuple[slice, Any, Any, Any]]:
-    """Rays by strips of rows, with unit directions."""
+    """Yield rays in bands of rows, with unit directions."""
     for top in range(0, camera.pixels[1], BLOCK_ROWS):
         rows = slice(top, min(top + BLOCK_ROWS, camera.pixels[1]))
         L, D, weight = camera.weighted_rays(rows, slice(None), *where)
         if weight is not None:
-            D[weight == 0] = (0, 0, 1)  # wherever: it is not stored for its direction
+            D[weight == 0] = (0, 0, 1)  # any direction: W marks the ray as blocked
         yield rows, L, D / np.linalg.norm(D, axis=-1, keepdims=True), weight
 
 
 def _extremes(camera: IICamera, where: tuple[ArrayLike, ArrayLike]) -> tuple[dict[str, Box], bool]:
-    """True box of what the rays that carry light need, and whether any is dimmed."""
+    """Return the extremes of the rays that are not blocked, and whether any ray loses light."""
     low, high, weighted = np.full((2, 3), np.inf), np.full((2, 3), -np.inf), False
     for _, L, D, weight in _blocks(camera, where):
         for i, value in enumerate((L, D)):
@@ -175,19 +182,19 @@ def _extremes(camera: IICamera, where: tuple[ArrayLike, ArrayLike]) -> tuple[dic
             high[i] = np.maximum(high[i], needed.max(axis=0, initial=-np.inf))
         weighted = weighted or (weight is not None and bool((weight != 1).any()))
     if not np.isfinite(low).all():
-        raise ValueError(f"camera {camera.name!r} lets no ray out: its optics block them all")
+        raise ValueError(f"camera {camera.name!r} blocks every ray: optics that let rays pass are needed")
     boxes = {name: np.stack([low[i], high[i]], axis=1).tolist() for i, name in enumerate("LD")}
     return boxes, weighted
 
 
 def _widened(box: Sequence[float], steps: int) -> list[float]:
-    """The box whose last code is the true maximum."""
+    """Return the extremes for which the last code is the true maximum."""
     low, high = box
     return [low, low + (high - low) * steps / (steps - 1)] if steps > 1 else [low, high]
 
 
 def encode(values: NDArray[np.float64], box: Box, steps: int, dtype: str) -> NDArray[Any]:
-    """Numbers to stored ones (3.11); an extent of zero stores 0."""
+    """Return the codes of numbers (3.11); 0 where the extremes are equal."""
     low, high = np.array(box).T
     extent = high - low
     share = (values - low) / np.where(extent == 0, 1, extent)
@@ -195,7 +202,7 @@ def encode(values: NDArray[np.float64], box: Box, steps: int, dtype: str) -> NDA
 
 
 def decode(stored: NDArray[Any], box: Box, steps: float) -> NDArray[np.float64]:
-    """Stored numbers to what they stand for (3.12)."""
+    """Return the numbers of codes (3.12)."""
     low, high = np.array(box).T
     return stored / steps * (high - low) + low
 
@@ -212,9 +219,9 @@ class _Map:
 
 @dataclass(frozen=True, eq=False)
 class MapCamera:
-    """A camera of which nothing is known but its rays: one pixel array, ``stored_samples`` rays a pixel.
+    """Camera of stored rays: one pixel array, ``stored_samples`` rays per pixel.
 
-    Made by `read_maps`. `render` takes it where it takes an `IICamera`.
+    `read_maps` returns it. `render` accepts it in place of an `IICamera`.
     """
 
     pixels: tuple[int, int]
@@ -231,33 +238,33 @@ class MapCamera:
         return len(self.maps)
 
     def rays(self, rows: slice = slice(None), cols: slice = slice(None)) -> tuple[Floats, Floats]:
-        """L and D, (h, w, 3), of the first sample of a block of pixels."""
+        """Return L and D, (h, w, 3), of the first sample of a block of pixels."""
         L, D, _ = self.stored_rays(0, rows, cols)
         return L, D
 
     def stored_rays(self, sample: int, rows: slice = slice(None), cols: slice = slice(None)) -> Rays:
-        """L, D and the share of light, or None for all, of one sample of a block of pixels."""
+        """Return L, D and the transmitted share of light (None for all) of one sample of a block of pixels."""
         maps = self.maps[sample]
         L, D = maps["L"].block(rows, cols), maps["D"].block(rows, cols)
         if "W" in maps:
             return L, D, maps["W"].block(rows, cols)[..., 0]
-        dark = (D == 0).all(axis=-1)  # made by hand: a ray without a direction is none
+        dark = (D == 0).all(axis=-1)  # maps made by hand: direction 0 is a blocked ray
         return L, D, (~dark).astype(np.float64) if dark.any() else None
 
 
 @checks.checked(folder=checks.path)
 def read_maps(folder: str | os.PathLike[str]) -> tuple[MapCamera, ...]:
-    """Cameras from a folder of maps, one a pixel array.
+    """Read cameras from a folder of maps, one per pixel array.
 
-    Of the sheet only ``arrays`` is needed, and in it of each image ``file`` and, for other than metric floats, ``C``
-    and ``box``. Without ``lenses`` the picture is of one lens.
+    ``camera.json`` needs ``arrays`` with the ``file`` of each image, and its ``C`` and ``box`` unless it stores
+    millimetres as floats. Without ``lenses`` the camera has one lens.
 
     Raises
     ------
     ValueError
-        If the sheet or an image is not as described.
+        If ``camera.json`` or an image has another form.
     OSError
-        If one is missing.
+        If a file is missing.
     """
     path = Path(folder) / SHEET
     sheet = read_json(path)
@@ -298,14 +305,14 @@ def _is_finite(value: Any) -> bool:
 
 
 def _inside(folder: Path, name: str) -> Path:
-    """A file of the folder; ValueError if the name leads out of it."""
+    """Return the path of a file in the folder; raise ValueError if the name points outside."""
     if not isinstance(name, str) or not (folder / name).resolve().is_relative_to(folder.resolve()):
         raise ValueError(f"file is {name!r}: a name inside {folder} is needed")
     return folder / name
 
 
 def _map(pair: Mapping[str, Any], name: str, folder: Path, size: tuple[int, int]) -> _Map:
-    """One map, whose header is held against the size of the first L before it is decoded."""
+    """Read one map; its header is compared with the size of the first L before pixels are decoded."""
     entry = pair[name]
     stored = read_image(_inside(folder, entry["file"]), size=size)
     if stored.shape[2] < 3:

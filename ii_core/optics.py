@@ -1,10 +1,10 @@
-"""What a camera's interior does to a ray, as a chain of elements.
+"""Optics of a camera as a chain of elements: pinholes, lenslets, GRIN lenses, main lenses, apertures.
 
-The first element, the lens model, stands over every pixel's own lenslet and turns a point of the pixel and a place on
-the aperture into a ray that leaves the lens plane. Each further element stands somewhere in front of the array and
-turns one ray into another. Rays run from the pixel out into the scene; light comes the other way along them.
+The first element is the lens model of every lenslet. It maps a point of a pixel and a position on the aperture to a
+ray that leaves the lens plane. Further elements stand between the array and the scene and map rays to rays. Rays run
+from the pixel into the scene, against the light.
 
-Lengths are millimetres, frame as in `camera`. The arrays of a bundle broadcast against each other.
+Lengths are in millimetres, in the frame of `camera`. The arrays of a bundle broadcast against each other.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Focal = float | tuple[tuple[float, ...], ...]
 
 
 class Bundle(NamedTuple):
-    """Rays: location, direction of any length, and weight: the share of light that gets through, 0 if blocked."""
+    """Rays: location, direction of any length, and weight, the transmitted share of light (0 if blocked)."""
 
     lx: Array
     ly: Array
@@ -34,10 +34,10 @@ class Bundle(NamedTuple):
 
 
 class Under(NamedTuple):
-    """What a lens model is given: pixel points, the centres and numbers of their lenses, places on the aperture.
+    """Input of a lens model: points of pixels, centres and numbers of their lenses, positions on the aperture.
 
-    ``ax`` and ``ay`` lie on the unit disk; 0 is the centre. ``cell`` is the lens pitch across and down; in a
-    hexagonal array the lens's own cell is what is nearer to its centre than to any other.
+    ``ax`` and ``ay`` lie on the unit disk; 0 is the centre. ``cell`` is the lens pitch across and down. The cell of a
+    lens in a hexagonal array is the set of points nearer to its centre than to any other centre.
     """
 
     px: Array
@@ -53,28 +53,28 @@ class Under(NamedTuple):
     hexagonal: bool = False
 
     def owns(self, x: NDArray[Any], y: NDArray[Any]) -> NDArray[np.bool_]:
-        """Whether a place, from the lens's centre, lies in the lens's own cell, border and all."""
+        """Return whether a position relative to the lens centre lies in the lens's cell, border included."""
         across, down = self.cell
         if not self.hexagonal:
             return (abs(x) <= across / 2) & (abs(y) <= down / 2)
-        # nearer than to the lens beside, the one two rows off, and the one beside in the next row
+        # bisectors to the lens beside, to the lens two rows away, and to the nearest lens of the next row
         slanting = abs(x) * across / 2 + abs(y) * down <= (across * across / 4 + down * down) / 2
         return (abs(x) <= across / 2) & (abs(y) <= down) & slanting
 
 
 class Scaling(NamedTuple):
-    """Change of a lens array by `presets.scaled`, as its elements need it.
+    """Change of a lens array by `presets.scaled`.
 
     Attributes
     ----------
     factor : float
         Growth of gap and lens pitch.
     gap_mm, cell_mm : float, (float, float)
-        Gap and lens pitch before.
+        Gap and lens pitch before the change.
     forward_mm : float
-        d, how far the lens plane moves towards the scene.
+        d, the shift of the lens plane towards the scene.
     front_mm : float, optional
-        a, distance from the lens plane to the first lens in front of the array, before; None if there is none.
+        a, distance from the lens plane to the first lens in front of the array before the change; None without one.
     """
 
     factor: float
@@ -84,12 +84,12 @@ class Scaling(NamedTuple):
     front_mm: float | None
 
     def refocused(self, vergence: Array) -> NDArray[np.float64]:
-        """Vergence 1/b, per mm, that keeps the scene plane which lenslets of vergence 1/b image; 0 is infinity.
+        """Return the vergence 1/b, per mm, that keeps the imaged scene plane of a vergence; 0 is infinity.
 
         Raises
         ------
         ValueError
-            If the lens plane moves up to the plane, or past it.
+            If the lens plane reaches the scene plane.
         """
         w, d = np.asarray(vergence, np.float64), self.forward_mm
         if self.front_mm is not None:
@@ -105,7 +105,7 @@ class Scaling(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Element:
-    """An optical element: its parameters as plain values."""
+    """Optical element; its parameters are plain values."""
 
     kind: ClassVar[str]
 
@@ -124,34 +124,34 @@ class Element:
 
 
 class LensModel(Element):
-    """The element over every lenslet."""
+    """Model of the lenslets."""
 
     erect: ClassVar[bool] = False
     samples_aperture: ClassVar[bool] = False
     vertical_parallax: ClassVar[bool] = True
 
     def leave(self, under: Under) -> Bundle:
-        """Rays that leave the lens plane."""
+        """Return the rays that leave the lens plane."""
         raise NotImplementedError
 
     def scaled(self, scaling: Scaling) -> LensModel:
-        """The model over larger lenslets that image the same scene planes; see `presets.scaled`."""
+        """Return the model of larger lenslets that image the same scene planes; see `presets.scaled`."""
         return self
 
 
 class FrontElement(Element):
-    """An element between the array and the scene, at ``z_mm``."""
+    """Element between the lens array and the scene, at ``z_mm``."""
 
     z_mm: float
 
     def pass_on(self, rays: Bundle) -> Bundle:
-        """Rays behind it turned to rays before it."""
+        """Return the rays on the scene side of rays on the pixel side."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pinhole(LensModel):
-    """The ray from the pixel through the lens centre (3.15), (3.20)."""
+    """Pinhole: the ray from the pixel through the lens centre (3.15), (3.20)."""
 
     kind: ClassVar[str] = "pinhole"
 
@@ -161,7 +161,7 @@ class Pinhole(LensModel):
 
 @dataclass(frozen=True, kw_only=True)
 class Grin(LensModel):
-    """A gradient-index rod: the elementary image is erect, so that the ray is mirrored about the lens's axis."""
+    """Gradient-index rod: its elementary image is erect, so the ray is mirrored about the lens axis."""
 
     kind: ClassVar[str] = "grin"
     erect: ClassVar[bool] = True
@@ -172,7 +172,7 @@ class Grin(LensModel):
 
 @dataclass(frozen=True, kw_only=True)
 class Lenticular(LensModel):
-    """A vertical cylinder lens over a column of pixels: horizontal parallax only; each row looks straight ahead."""
+    """Vertical cylinder lens over a column of pixels: horizontal parallax only; rays of a row are horizontal."""
 
     kind: ClassVar[str] = "lenticular"
     vertical_parallax: ClassVar[bool] = False
@@ -183,17 +183,17 @@ class Lenticular(LensModel):
 
 @dataclass(frozen=True, kw_only=True)
 class Lenslet(LensModel):
-    """An ideal thin lens with an aperture. Its rays meet where the pixel is imaged, at z − Λ = fΛ/(Λ − f) (2.3).
+    """Ideal thin lens with an aperture. The rays of a pixel meet at its image, z − Λ = fΛ/(Λ − f) (2.3).
 
-    Λ = f is depth priority, the rays of a pixel are parallel; Λ ≠ f resolution priority. Written by slopes,
-    x' = (a − p)/Λ − (a − c)/f, nothing happens as Λ passes f.
+    Λ = f is depth priority: the rays of a pixel are parallel. Λ ≠ f is resolution priority. The slope form
+    x' = (a − p)/Λ − (a − c)/f has no singularity at Λ = f.
 
     Parameters
     ----------
     focal_mm : float or rows of floats
-        f; rows and columns of several focal lengths repeat over the array.
+        f. A matrix of focal lengths repeats over the array.
     aperture_mm : float, optional
-        Diameter of the round aperture; none is the centre alone.
+        Diameter of the round aperture; without it, rays pass the lens centre.
     """
 
     kind: ClassVar[str] = "lenslet"
@@ -233,19 +233,19 @@ class Lenslet(LensModel):
 
 @dataclass(frozen=True, kw_only=True)
 class SphericalLenslet(LensModel):
-    """A plano-convex lens, flat towards the pixels at z = Λ, refracting exactly by Snell's law at both faces.
+    """Plano-convex lens with its flat face towards the pixels at z = Λ; Snell's law holds at both faces.
 
-    Rays leave from the sphere. Blocked are rays that enter beside their own lens's cell or leave it inside the
-    glass, and rays that are totally reflected. f = R/(n − 1) for a thin one.
+    Rays start on the sphere. Rays are blocked if they enter outside the lens's cell, leave the cell inside the glass,
+    or are totally reflected. A thin lens has f = R/(n − 1).
 
     Parameters
     ----------
     radius_mm : float
-        R, of the sphere; at least half the diagonal of the lens's cell.
+        R, radius of the sphere; at least half the diagonal of the lens's cell.
     ior : float
         n, at least 1.
     aperture_mm : float, optional
-        Diameter, on the flat face, over which rays are spread; none is the centre alone.
+        Diameter of the aperture on the flat face; without it, rays pass its centre.
     """
 
     kind: ClassVar[str] = "spherical-lenslet"
@@ -260,7 +260,7 @@ class SphericalLenslet(LensModel):
             raise ValueError(f"spherical-lenslet: ior is {self.ior}: at least 1 is needed")
 
     def thickness(self, cell: tuple[float, float]) -> float:
-        """Glass on the axis, mm, if the sphere meets the flat face at the cell's corners."""
+        """Return the thickness of the glass on the axis, mm; the sphere meets the flat face at the cell's corners."""
         half = math.hypot(*cell) / 2
         if half > self.radius_mm:
             raise ValueError(
@@ -277,7 +277,7 @@ class SphericalLenslet(LensModel):
         length = np.sqrt(tx * tx + ty * ty + tz * tz)
         tx, ty = tx / length / n, ty / length / n  # Snell at the flat face
         tz = np.sqrt(1 - tx * tx - ty * ty)
-        # The sphere's centre lies on the axis at this height over the flat face; the ray leaves at the far root.
+        # Height of the sphere's centre above the flat face. The ray leaves at the far intersection.
         centre = self.thickness(u.cell) - radius
         along = ax * tx + ay * ty - centre * tz
         beside = ax * ax + ay * ay + centre * centre - radius * radius  # positive if it enters beside the sphere
@@ -292,9 +292,9 @@ class SphericalLenslet(LensModel):
         return Bundle(u.cx + ex, u.cy + ey, u.gap + ez, dx, dy, dz, through.astype(np.float64))
 
     def vergence(self, gap_mm: float, cell: tuple[float, float]) -> float:
-        """Paraxial 1/b, b from the lens plane to the plane it images, mm; infinite if that is the lens plane.
+        """Return the paraxial vergence 1/b, per mm; b is the distance from the lens plane to the imaged plane.
 
-        Glass of thickness t adds t/n to the gap; the sphere of power (n − 1)/R stands t before the lens plane.
+        Glass of thickness t adds t/n to the gap. The sphere, of power (n − 1)/R, stands t in front of the lens plane.
         """
         t = self.thickness(cell)
         at_sphere = (self.ior - 1) / self.radius_mm - 1 / (gap_mm + t / self.ior)
@@ -315,19 +315,19 @@ class SphericalLenslet(LensModel):
 
 @dataclass(frozen=True, kw_only=True)
 class Lens(FrontElement):
-    """An ideal thin lens about the z axis: a depth-control lens, or the main lens of a plenoptic camera.
+    """Ideal thin lens about the z axis: a depth-control lens, or the main lens of a plenoptic camera.
 
-    A ray that meets it at h leaves with its slope changed by −h/f. What passes outside of its rim, or never reaches
-    it, is blocked.
+    It changes the slope of a ray at height h by −h/f. Rays outside the rim, and rays that do not reach the lens, are
+    blocked.
 
     Parameters
     ----------
     z_mm : float
-        Where it stands.
+        Position of the lens.
     focal_mm : float
         Negative for a diverging lens.
     diameter_mm : float, optional
-        Of the rim; none is endless.
+        Diameter of the rim; without it the lens is unbounded.
     """
 
     kind: ClassVar[str] = "lens"
@@ -363,7 +363,7 @@ KINDS: dict[str, type[Element]] = {
 
 
 def element(data: Any) -> Element:
-    """An element from its name or from `Element.to_json`'s values.
+    """Return an element from its name or from the values of `Element.to_json`.
 
     Raises
     ------
@@ -388,7 +388,7 @@ def element(data: Any) -> Element:
 
 
 def chain(elements: Sequence[Any]) -> tuple[LensModel, tuple[FrontElement, ...]]:
-    """A lens model, a pinhole if none is named, and what stands before it.
+    """Return the lens model, by default a pinhole, and the elements in front of the array.
 
     Raises
     ------
@@ -407,12 +407,12 @@ def chain(elements: Sequence[Any]) -> tuple[LensModel, tuple[FrontElement, ...]]
 
 
 def scaled_chain(elements: Sequence[Element], scaling: Scaling, *, nearer_mm: float = 0.0) -> tuple[Element, ...]:
-    """Elements of a scaled camera, see `presets.scaled`; ``nearer_mm``: how far the pixel array moves forward.
+    """Return the elements of a scaled camera; see `presets.scaled`. The pixel array moves forward by ``nearer_mm``.
 
     Raises
     ------
     ValueError
-        If the lens plane moves up to a lens in front, or no positive focal length keeps a plane.
+        If the lens plane reaches a lens in front, or no positive focal length keeps an imaged plane.
     """
     model, *front = elements
     placed: list[Any] = [replace(e, z_mm=e.z_mm - nearer_mm) for e in front]  # type: ignore[call-arg,attr-defined]
@@ -433,7 +433,7 @@ def scaled_chain(elements: Sequence[Element], scaling: Scaling, *, nearer_mm: fl
 
 
 def _radius(lens: SphericalLenslet, gap: float, cell: tuple[float, ...], vergence: float) -> float:
-    """The radius with which a spherical lenslet has the vergence wanted."""
+    """Return the radius of a spherical lenslet of a given vergence."""
     from scipy.optimize import brentq
 
     least = math.hypot(*cell) / 2
@@ -441,7 +441,7 @@ def _radius(lens: SphericalLenslet, gap: float, cell: tuple[float, ...], vergenc
     def excess(radius: float) -> float:
         return replace(lens, radius_mm=radius).vergence(gap, cell) - vergence  # type: ignore[arg-type]
 
-    # A sphere of twice the power that thin glass needs is too strong, one of half of it too weak.
+    # Bracket: twice the power of a thin lens is too strong, half of it too weak.
     thin = (lens.ior - 1) / (1 / gap + vergence)
     low, high = max(least, thin / 2), max(2 * thin, 2 * least)
     if not excess(low) >= 0 >= excess(high):
@@ -457,7 +457,7 @@ def _times(length: float | None, factor: float) -> float | None:
 
 
 def unit_disk(place: NDArray[np.float64]) -> tuple[Array, Array]:
-    """The unit square (…, 2) spread evenly over the unit disk, (½, ½) at its centre (Shirley and Chiu 1997)."""
+    """Map the unit square (…, 2) to the unit disk, equal areas, (½, ½) to its centre (Shirley and Chiu 1997)."""
     a, b = 2 * place[..., 0] - 1, 2 * place[..., 1] - 1
     wide = abs(a) > abs(b)
     radius = np.where(wide, a, b)

@@ -1,10 +1,9 @@
-"""An II-picture: pixels, the structure that says which lens each lies under, and the camera where it is known."""
+"""II-picture: pixels, structure of lenses, and camera."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,29 +29,30 @@ from .files import (
     read_json,
 )
 from .jit import kernel
+from .parallel import over_rows
 
 DTYPES = ("uint8", "uint16", "float32")
-BINDING = "pixels_blake2b"  # the sidecar's entry that names the pixels it belongs to
-SAME_PITCH = 1e-7  # of the pitch: over ten thousand lenses a thousandth of one
+BINDING = "pixels_blake2b"  # key of the sidecar: hash of its picture's pixels
+SAME_PITCH = 1e-7  # relative tolerance of the pitch: 0.001 pitches over 10 000 lenses
 
 
 @dataclass(frozen=True, eq=False)
 class IIPicture:
-    """An integral-imaging picture.
+    """Integral-imaging picture.
 
     Parameters
     ----------
     pixels : ndarray, (N, M, 3), of uint8, uint16 (sRGB) or float32 (linear light)
-        Row 0 is the top. Kept, not copied.
+        Row 0 is the top. Not copied.
     lenses : (K, L)
         Lenslets across and down.
     ei_pixels : (U, V)
-        Pixels across and down under each lenslet; M = K·U and N = L·V. Not whole numbers if a camera with a
-        hexagonal array or with pixels shared between lenses says so.
+        Pixels across and down under each lenslet; M = K·U and N = L·V. Fractional for cameras with a hexagonal array
+        or a non-integer lens pitch.
     camera : IICamera, optional
-        What took it; needed to make view images.
+        Camera of the picture; view images need it.
     erect : bool
-        True if every elementary image is upright (each rotated by 180° against what a plain lens casts).
+        True if every elementary image is upright, rotated by 180° against the image of a plain lens.
 
     Raises
     ------
@@ -132,7 +132,7 @@ class IIPicture:
 
     @property
     def light_field(self) -> NDArray[Any]:
-        """Pixels by lens and place under it, (L, K, V, U, 3): a view, or a copy of pixels that are not contiguous.
+        """Pixels by lens and position under it, (L, K, V, U, 3): a view, or a copy if pixels are not contiguous.
 
         Raises
         ------
@@ -144,7 +144,7 @@ class IIPicture:
         return np.ascontiguousarray(self.pixels).reshape(l, v, k, u, 3).transpose(0, 2, 1, 3, 4)
 
     def with_pixels(self, pixels: NDArray[Any]) -> IIPicture:
-        """The same structure and camera over other pixels."""
+        """Return a picture of other pixels with the same structure and camera."""
         return replace(self, pixels=pixels)
 
     def check_same_structure(self, other: IIPicture) -> None:
@@ -156,11 +156,16 @@ class IIPicture:
         if self.pixels.dtype != other.pixels.dtype:
             raise ValueError(f"pictures of different type: {self.pixels.dtype} against {other.pixels.dtype}")
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the picture and, beside it, ``<path>.json`` with its structure and camera.
 
         PNG holds 8 and 16 bit, EXR float, TIFF all three. Files of these names are replaced, whole and together: the
         sidecar holds a hash of the pixels, and `load` refuses a sidecar of other pixels.
+
+        Returns
+        -------
+        Path
+            The picture's file.
 
         Raises
         ------
@@ -175,9 +180,10 @@ class IIPicture:
             picture_rows(self, file, beside, named=path) as write,
         ):
             write(self.pixels)
+        return Path(path)
 
     def structure_json(self) -> dict[str, Any]:
-        """Everything but the pixels, as plain values."""
+        """Return everything but the pixels as plain values."""
         return {
             "format": "ii-picture",
             "version": 1,
@@ -189,7 +195,7 @@ class IIPicture:
 
     @classmethod
     def from_structure_json(cls, pixels: NDArray[Any], data: Any) -> IIPicture:
-        """Pixels and the plain values of `structure_json` put together again.
+        """Return the picture of pixels and the plain values of `structure_json`.
 
         Raises
         ------
@@ -223,10 +229,10 @@ class IIPicture:
             If the picture cannot be read.
         """
         if (lenses is None) != (ei_pixels is None):
-            raise ValueError("the structure of a picture needs both lenses and ei_pixels, only one is given")
+            raise ValueError("the structure of a picture needs both lenses and ei_pixels: only one is given")
         image_types(path)
         shape, dtype = image_header(path)
-        nothing = np.broadcast_to(np.zeros(1, dtype), shape)  # the structure is held against the header first
+        nothing = np.broadcast_to(np.zeros(1, dtype), shape)  # check the structure before pixels are read
         if lenses is not None and ei_pixels is not None:
             return cls(nothing, lenses, ei_pixels).with_pixels(read_image(path))
         try:
@@ -260,9 +266,9 @@ def picture_rows(
     Parameters
     ----------
     structure : IIPicture
-        Of the picture's size and type; its pixels are not looked at.
+        Picture of the same size and type; its pixels are ignored.
     named : path
-        The picture's final name, for errors.
+        Final name of the picture, for errors.
     """
     with image_rows(file, structure.size, 3, structure.pixels.dtype.name, named=named) as write:
         yield write
@@ -270,12 +276,17 @@ def picture_rows(
 
 
 def sidecar(path: str | os.PathLike[str]) -> Path:
-    """Where the structure of a picture file is kept: its own name with ``.json`` behind."""
+    """Return the path of a picture file's structure: the file's name with ``.json`` appended."""
     return Path(f"{os.fspath(path)}.json")
 
 
+def peak(dtype: np.dtype[Any]) -> float:
+    """Return the largest code value of a pixel type; 1 for linear light."""
+    return 1.0 if dtype.kind == "f" else float(np.iinfo(dtype).max)
+
+
 def codes8(pixels: NDArray[Any]) -> NDArray[np.uint8]:
-    """Pixels as a screen shows them: 8-bit sRGB, of 16 bits rounded, of linear floats clipped; NaN is black."""
+    """Return 8-bit sRGB of pixels: 16 bits are rounded, linear floats clipped; NaN is black."""
     if pixels.dtype == np.uint8:
         return pixels
     if pixels.dtype == np.uint16:
@@ -286,14 +297,14 @@ def codes8(pixels: NDArray[Any]) -> NDArray[np.uint8]:
 
 @checks.checked(picture=checks.instance(IIPicture), sigma=checks.number, seed=checks.whole)
 def add_sensor_noise(picture: IIPicture, sigma: float = 1.0, seed: int = 0) -> IIPicture:
-    """The picture with monochromatic sensor noise: one N(0, σ) sample per pixel added to R, G and B alike.
+    """Return the picture with monochromatic sensor noise: one N(0, σ) sample per pixel, added to R, G and B.
 
     Parameters
     ----------
     sigma : float
-        Standard deviation in 8-bit code values, whatever the picture's type.
+        Standard deviation in 8-bit code values, for every pixel type.
     seed : int
-        Same seed, same noise.
+        Equal seeds give equal noise.
 
     References
     ----------
@@ -308,36 +319,34 @@ def add_sensor_noise(picture: IIPicture, sigma: float = 1.0, seed: int = 0) -> I
         return picture
     noisy = np.empty_like(source)
 
-    def block(top: int) -> None:
-        rows = slice(top, top + NOISE_ROWS)
-        noisy[rows] = noisy_rows(source[rows], top, sigma, seed)
+    def fill(first: int, last: int) -> None:
+        noisy[first:last] = noisy_rows(source[first:last], first, sigma, seed)
 
-    with ThreadPoolExecutor() as pool:
-        list(pool.map(block, range(0, source.shape[0], NOISE_ROWS)))
+    over_rows(fill, source.shape[0], step=NOISE_ROWS)
     return picture.with_pixels(noisy)
 
 
 def noisy_rows(rows: NDArray[Any], top: int, sigma: float, seed: int) -> NDArray[Any]:
-    """Rows ``top``, a multiple of `NOISE_ROWS`, and on, of which there may be many, with their sensor noise."""
+    """Return rows from ``top``, a multiple of `NOISE_ROWS`, with their sensor noise."""
     noisy = np.empty_like(rows)
-    peak = 1.0 if rows.dtype.kind == "f" else float(np.iinfo(rows.dtype).max)
+    top_code = peak(rows.dtype)
     for i in range(0, len(rows), NOISE_ROWS):
         block = rows[i : i + NOISE_ROWS]
         sample = np.random.default_rng((seed, top + i)).standard_normal(block.shape[:2], dtype=np.float32)
-        sample *= np.float32(sigma * peak / 255)
+        sample *= np.float32(sigma * top_code / 255)
         if rows.dtype.kind == "f":
             np.add(block, sample[..., None], out=noisy[i : i + NOISE_ROWS])
         else:
-            add_code_noise(block, sample, peak, noisy[i : i + NOISE_ROWS])
+            add_code_noise(block, sample, top_code, noisy[i : i + NOISE_ROWS])
     return noisy
 
 
-NOISE_ROWS = 64  # rows that share a generator: the noise is the same on any number of cores
+NOISE_ROWS = 64  # rows of one generator: the noise does not depend on the number of threads
 
 
 @kernel
 def add_code_noise(source, noise, peak, out):
-    """Add noise in whole codes, the very same to R, G and B, kept between 0 and peak."""
+    """Add rounded noise to R, G and B alike, clipped to [0, peak]."""
     for i in range(source.shape[0]):
         for j in range(source.shape[1]):
             step = np.rint(noise[i, j])

@@ -1,4 +1,4 @@
-"""Cameras by name, from the JSON files of ``assets/cameras``, and from files of the user's own."""
+"""Cameras by name, from the JSON files of ``assets/cameras`` or of the user."""
 
 from __future__ import annotations
 
@@ -20,23 +20,22 @@ ALIASES = {"setup2": "setup2-16"}
 
 
 def camera_names() -> dict[str, str]:
-    """Names of the cameras that come with the package, each with a line on what it is."""
+    """Return the names of the cameras of the package with a description in one line."""
     return {path.stem: str(_read(path).get("about", "")) for path in _folder().glob("*.json")}
 
 
 @checks.checked(name=checks.path, scale=checks.number)
 def preset(name: str | os.PathLike[str], *, scale: int = 1) -> IICamera:
-    """A camera by name, or from a JSON file.
+    """Return a camera by name or from a JSON file.
 
     Parameters
     ----------
     name : str or path
         One of `camera_names`; ``setup2`` is ``setup2-16``. Or a file that ends in ``.json``.
     scale : int
-        Divides the number of lenses (of pixels, for a camera of one lens) along both axes. Sensor size,
-        pixels per elementary image, viewing angle and the scene planes in focus stay, so pixel pitch, lens pitch,
-        gap and apertures grow by ``scale``, focal lengths follow from them (see `scaled`), and a scene looks the
-        same, coarser, at every scale.
+        Divides the number of lenses (of pixels for a camera of one lens) along both axes. Sensor size, pixels per
+        elementary image, viewing angle and scene planes in focus do not change. Pixel pitch, lens pitch, gap and
+        apertures grow by ``scale``; focal lengths follow (see `scaled`). Scenes look the same, at lower resolution.
 
     Raises
     ------
@@ -54,7 +53,7 @@ def preset(name: str | os.PathLike[str], *, scale: int = 1) -> IICamera:
 
 @checks.checked(name=checks.path, scale=checks.number)
 def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IICamera, ...]:
-    """All cameras of a name: one, or those of a camera array, of moving lenslets or of stacked sensors.
+    """Return all cameras of a name: several for a camera array, moving lenslets or stacked sensors.
 
     Parameters and errors are those of `preset`.
     """
@@ -74,36 +73,35 @@ def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IIC
 
 
 def scaled(camera: IICamera, scale: int) -> IICamera:
-    """The camera with ``scale`` times as large, fewer lenslets, or pixels if it has one lens.
+    """Return a camera of fewer lenslets, ``scale`` times as large; with one lens, of fewer pixels.
 
-    Pixel pitch, lens pitch, lens offset, gap and apertures grow by s = ``scale``. The scene stands still, so every
-    plane in it that the optics single out must stand still too, while the lens plane moves from Λ to sΛ, by
-    d = (s − 1)Λ. What this asks of each element:
+    Pixel pitch, lens pitch, lens offset, gap and apertures grow by s = ``scale``. The scene and its planes in focus
+    do not move, while the lens plane moves from Λ to sΛ, by d = (s − 1)Λ. The elements change accordingly:
 
     Pinholes, GRIN rods, lenticular lenses
-        Nothing. They image no plane.
-    Lenslets, of one or several focal lengths
-        Image the plane b before the lens plane, 1/b = 1/f − 1/Λ (2.3). The same plane then lies b − d before it:
-        1/f' = 1/(sΛ) + 1/(b − d). Λ = f, depth priority, stays sΛ = f'.
+        No change. They image no plane.
+    Lenslets of one or several focal lengths
+        They image the plane at the distance b in front of the lens plane, 1/b = 1/f − 1/Λ (2.3). Its distance becomes
+        b − d, so 1/f' = 1/(sΛ) + 1/(b − d). Depth priority, Λ = f, remains: sΛ = f'.
     Spherical lenslets
-        The same with the paraxial plane: the radius solves for it.
-    First lens in front: depth-control lens, main lens
-        Keeps place and rim, which make the viewpoint and the parallax of what the scene shows, and the scene plane
-        that it images onto the lens array. That plane is in focus in a plenoptic 1.0 camera and lies on the display
-        behind a depth-control lens. With a from the lens plane to the lens, 1/f' = 1/f + 1/(a − d) − 1/a.
+        As lenslets, with the paraxial plane; the radius is solved for it.
+    First lens in front (depth-control lens, main lens)
+        Its position and rim, which set viewpoint and parallax, do not change. It still images the same scene plane
+        onto the lens array: the plane in focus of a plenoptic 1.0 camera, or the display plane of a depth-control
+        lens. With a the distance from the lens plane to the lens, 1/f' = 1/f + 1/(a − d) − 1/a.
     Lenslets behind a lens in front
-        Keep the scene plane that they image through it. At the lens the vergence 1/(a − b) of their plane changes
-        as the lens's own power does; solved for b, 1/b' = (a²/b − d)/(a − d)².
+        They still image the same scene plane through it. The vergence 1/(a − b) of their plane at the lens changes by
+        as much as the power of the lens. Solved for b: 1/b' = (a²/b − d)/(a − d)².
     Further lenses in front
-        Keep place and focal length.
+        Position and focal length do not change.
 
-    Apertures grow with the lens pitch, so the blur off the focus is as many lens pitches wide: views of the picture
-    are blurred alike, in their own pixels. The field of view behind a main lens widens by a/(a − d).
+    Apertures grow with the lens pitch, so the blur of planes out of focus, in pixels of a view, does not change. The
+    field of view of a main lens grows by a/(a − d).
 
     Raises
     ------
     ValueError
-        If the scale does not divide the lenses and pixels, or the lens plane would pass a plane in focus or a lens
+        If the scale does not divide the lenses and pixels, or the lens plane would reach a plane in focus or a lens
         in front.
     """
     single = camera.lenses == (1, 1)
@@ -119,7 +117,7 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
     pitch = camera.pixel_pitch_mm * scale
     if single:
         return replace(camera, pixels=pixels, pixel_pitch_mm=pitch)
-    # The depth of a sensor in its stack grows with the gap; where a camera stands among others does not.
+    # The depth of a sensor in a stack grows with the gap; the position of a camera in an array does not.
     forward = camera.origin_mm[2] * (scale - 1)
     scaling = Scaling(
         factor=scale,

@@ -1,4 +1,4 @@
-"""What an II-camera can do: viewing angle, image plane, resolution, depth range, what limits them.
+"""Properties of an II-camera: viewing angle, image plane, resolution, depth range and their limits.
 
 Symbols: δL lens pitch, Λ gap, δP pixel pitch, U = δL/δP pixels under a lens, f focal length, α viewing angle.
 Distances z are from the lens plane into the scene unless a name says otherwise.
@@ -15,13 +15,13 @@ from .camera import IICamera
 from .optics import Lens, Lenslet, SphericalLenslet
 from .regular import owners
 
-WAVELENGTH_MM = 0.00055  # green, where eyes and sensors see best
-MAP_BYTES = {"exr": 24, "png16": 12, "png8": 6, "hdr": 8}  # of L and D, a pixel, before the file type packs them
-PATCH = 512  # pixels each way over which borders of cells are looked at
+WAVELENGTH_MM = 0.00055  # green, the maximum of sensitivity of eyes and sensors
+MAP_BYTES = {"exr": 24, "png16": 12, "png8": 6, "hdr": 8}  # of L and D per pixel, uncompressed
+PATCH = 512  # side of the area in which borders of cells are counted, pixels
 
 
 def view_angle_deg(*, lens_pitch_mm: float, gap_mm: float) -> float:
-    """α = 2·arctan(δL / 2Λ) (2.1), the full angle, in degrees, that one lens sees: 180 as Λ → 0.
+    """Return α = 2·arctan(δL / 2Λ) (2.1), the full angle of view of one lens in degrees; 180 as Λ → 0.
 
     Raises
     ------
@@ -33,10 +33,10 @@ def view_angle_deg(*, lens_pitch_mm: float, gap_mm: float) -> float:
 
 
 def image_plane_mm(*, focal_mm: float, gap_mm: float) -> float:
-    """z = f·Λ / (Λ − f) (2.3), mm: where a lens images the pixels.
+    """Return z = f·Λ / (Λ − f) (2.3), the distance of the image plane in mm.
 
-    Infinite for Λ = f, depth priority. Negative for Λ < f: rays diverge as from a plane behind the lenses. −Λ for an
-    infinite f, which bends nothing.
+    It is infinite for Λ = f, depth priority. It is negative for Λ < f, for which rays diverge from a plane behind the
+    lenses. It is −Λ for infinite f, which does not refract.
     """
     check_lengths(gap_mm=gap_mm)
     if not focal_mm > 0:
@@ -47,9 +47,9 @@ def image_plane_mm(*, focal_mm: float, gap_mm: float) -> float:
 
 
 def image_pixel_mm(*, z_mm: float, gap_mm: float, pixel_pitch_mm: float, lens_pitch_mm: float) -> float:
-    """δPI = min(|z|·δP / Λ, δL) (2.2), mm: the size of a pixel's image in a plane z.
+    """Return δPI = min(|z|·δP / Λ, δL) (2.2), the size of a pixel's image in a plane z, in mm.
 
-    Never above the lens pitch: from |z| = U·Λ on, to infinity, the lenses sample coarser than the pixels do.
+    The lens pitch is its upper bound: beyond |z| = U·Λ the lenses sample more coarsely than the pixels.
     """
     check_lengths(gap_mm=gap_mm, pixel_pitch_mm=pixel_pitch_mm, lens_pitch_mm=lens_pitch_mm)
     _distance(z_mm)
@@ -57,27 +57,27 @@ def image_pixel_mm(*, z_mm: float, gap_mm: float, pixel_pitch_mm: float, lens_pi
 
 
 def resolution_per_mm(*, image_pixel_mm: float) -> float:
-    """R_I = 1 / δPI, image pixels a millimetre; 1/δL at the least, where Λ = f."""
+    """Return R_I = 1 / δPI, image pixels per mm; its minimum is 1/δL, for Λ = f."""
     check_lengths(image_pixel_mm=image_pixel_mm)
     return 1 / image_pixel_mm
 
 
 def depth_range_mm(*, z_mm: float, gap_mm: float, pixel_pitch_mm: float, lens_pitch_mm: float) -> float:
-    """Δz = 2·|z|·δPI / δL (2.4), and 2·Λ·δL / δP (2.5) for Λ = f: the marginal image depth, mm.
+    """Return the marginal image depth Δz = 2·|z|·δPI / δL (2.4), in mm; 2·Λ·δL / δP (2.5) for Λ = f.
 
-    Nearer to and further from the image plane than Δz/2, the cone of rays that a lens sends to a point is wider than
-    an image pixel. (2.4) meets (2.5) at |z| = U·Λ. Beyond, where (2.2) holds δPI at δL, (2.4) would run on to
-    infinity while depth priority has (2.5), the range about the lens plane in which a pixel's beam spreads by less
-    than a lens. That is taken for all of these planes, so that nothing jumps as Λ → f and (2.6) holds everywhere.
+    At more than Δz/2 from the image plane, the cone of rays from a lens to a point is wider than an image pixel.
+    (2.4) equals (2.5) at |z| = U·Λ. Beyond, δPI is bounded by δL (2.2), and (2.4) grows without limit. (2.5) is the
+    range about the lens plane in which the beam of a pixel widens by less than a lens. It is returned for all these
+    planes, so that Δz is continuous as Λ → f and (2.6) always holds.
     """
     pixel = image_pixel_mm(z_mm=z_mm, gap_mm=gap_mm, pixel_pitch_mm=pixel_pitch_mm, lens_pitch_mm=lens_pitch_mm)
     return 2 * min(abs(z_mm), gap_mm * lens_pitch_mm / pixel_pitch_mm) * pixel / lens_pitch_mm
 
 
 def characteristic_per_mm(*, resolution_per_mm: float, depth_range_mm: float, view_angle_deg: float) -> float:
-    """R_I²·Δz·tan(α/2), per mm: by the characteristic equation (2.6) R = 1/δP, the pixels a millimetre.
+    """Return R_I²·Δz·tan(α/2), per mm; by the characteristic equation (2.6) it is R = 1/δP, pixels per mm.
 
-    Resolution, depth range and viewing angle can only be traded for one another; finer pixels alone improve all.
+    Resolution, depth range and viewing angle trade off against each other. Only finer pixels improve all three.
     """
     check_lengths(resolution_per_mm=resolution_per_mm, depth_range_mm=depth_range_mm)
     check_angle(view_angle_deg)
@@ -85,37 +85,37 @@ def characteristic_per_mm(*, resolution_per_mm: float, depth_range_mm: float, vi
 
 
 def diffraction_limited_per_mm(*, wavelength_mm: float = WAVELENGTH_MM) -> float:
-    """Δz·R_I² = 1 / λ (2.7), per mm: where diffraction alone limits both (Λ = f)."""
+    """Return Δz·R_I² = 1 / λ (2.7), per mm: the limit by diffraction alone (Λ = f)."""
     check_lengths(wavelength_mm=wavelength_mm)
     return 1 / wavelength_mm
 
 
 def pixel_limited_per_mm(*, pixel_pitch_mm: float, wavelength_mm: float = WAVELENGTH_MM) -> float:
-    """Δz·R_I²·α² = λ / δP² (2.8), per mm, α in radians: where pixels limit R_I = Λ/(z·δP) and diffraction Δz.
+    """Return Δz·R_I²·α² = λ / δP² (2.8), per mm, α in radians.
 
-    The depth of focus is then λ·(z/δL)², and α ≈ δL/Λ.
+    Pixels limit R_I = Λ/(z·δP), and diffraction limits Δz. The depth of focus is λ·(z/δL)², and α ≈ δL/Λ.
     """
     check_lengths(pixel_pitch_mm=pixel_pitch_mm, wavelength_mm=wavelength_mm)
     return wavelength_mm / pixel_pitch_mm**2
 
 
 def diffraction_spot_mm(*, lens_pitch_mm: float, gap_mm: float, wavelength_mm: float = WAVELENGTH_MM) -> float:
-    """λ·Λ / δL, mm: the width, on the pixels, of the spot to which a lens can focus at best."""
+    """Return λ·Λ / δL, the width in mm of the diffraction-limited spot of a lens on the pixels."""
     check_lengths(lens_pitch_mm=lens_pitch_mm, gap_mm=gap_mm, wavelength_mm=wavelength_mm)
     return wavelength_mm * gap_mm / lens_pitch_mm
 
 
 def properties(camera: IICamera, *, wavelength_mm: float = WAVELENGTH_MM) -> dict[str, Any]:
-    """All of a camera's properties, as plain values; pairs are across and down.
+    """Return all properties of a camera as plain values; pairs are across and down.
 
     Returns
     -------
     dict
-        ``view_angle_deg``; ``view_step_deg``, between neighbouring pixels on the axis; ``views``; ``image_planes``,
-        one for each focal length, see `image_planes`; ``characteristic_per_mm`` (2.6) of the first and
-        ``pixels_per_mm``, its other side; ``disparity_si_per_mm``, how far a point moves from view to view, in lens
-        pitches, a millimetre of depth; ``diffraction``, None for one lens without an aperture; ``viewing_zone``,
-        ``cells`` and ``map_bytes``, see the functions.
+        ``view_angle_deg``; ``view_step_deg`` between neighbouring pixels on the axis; ``views``; ``image_planes``,
+        one per focal length, see `image_planes`; ``characteristic_per_mm``, the left side of (2.6) for the first
+        plane, and ``pixels_per_mm``, its right side; ``disparity_si_per_mm``, the disparity between neighbouring
+        views in lens pitches per mm of depth; ``diffraction``, None for one lens without an aperture;
+        ``viewing_zone``, ``cells`` and ``map_bytes``, see the functions of these names.
     """
     (pitch_x, pitch_y), gap, pixel = camera.lens_pitch_mm, camera.gap_mm, camera.pixel_pitch_mm
     vertical = camera.lens_model.vertical_parallax
@@ -154,17 +154,18 @@ def properties(camera: IICamera, *, wavelength_mm: float = WAVELENGTH_MM) -> dic
 
 
 def image_planes(camera: IICamera) -> list[dict[str, float]]:
-    """Where each focal length images the pixels, and what is resolved there; none for a lone pinhole.
+    """Return the image plane of each focal length with its resolution; none for a single pinhole.
 
-    Pinholes, graded-index rods and lenticular lenses stand for lenses with Λ = f (3.15). A spherical lenslet's plane
-    is the paraxial one: glass of thickness t adds t/n to the gap, and distances are from the top of the sphere.
+    Pinholes, GRIN rods and lenticular lenses are treated as lenses with Λ = f (3.15). The plane of a spherical
+    lenslet is the paraxial one: glass of thickness t adds t/n to the gap, and distances are from the top of the
+    sphere.
 
     Returns
     -------
     list of dict
         ``focal_mm``, ``z_mm`` (2.3), ``image_pixel_mm`` (2.2), ``resolution_per_mm``, ``depth_range_mm`` (2.4, 2.5)
-        and the ``view_angle_deg`` that goes with them; ``scene_z_mm``: the plane, seen through what stands in front
-        of the array, from the pixel array.
+        and their ``view_angle_deg``; ``scene_z_mm``: the image of the plane by the elements in front of the array,
+        measured from the pixel array.
     """
     if camera.lenses == (1, 1) and not camera.samples_aperture:
         return []
@@ -196,7 +197,7 @@ def image_planes(camera: IICamera) -> list[dict[str, float]]:
 
 
 def through_front_mm(camera: IICamera, z_mm: float) -> float:
-    """Where what stands in front images a plane z, both in mm from the pixel array: 1/b = 1/f + 1/a at each lens."""
+    """Return the image of a plane z by the lenses in front, mm from the pixel array; 1/b = 1/f + 1/a at each lens."""
     for element in camera.front:
         if isinstance(element, Lens):
             a = z_mm - element.z_mm
@@ -206,14 +207,14 @@ def through_front_mm(camera: IICamera, z_mm: float) -> float:
 
 
 def viewing_zone(camera: IICamera) -> dict[str, Any]:
-    """Where a viewer of the display sees every lens show its own elementary image; what stands in front left aside.
+    """Return the viewing zone: from there every lens shows its own elementary image. Lenses in front are ignored.
 
     Returns
     -------
     dict
-        ``nearest_mm``, the distance from the lens plane from which on a viewer in the middle does, lens borders and
-        all; ``width_mm``, across and down, there and, ``usual_width_mm``, at three times that distance, where
-        `five_viewpoints` stands. Infinite down if lenses have no parallax down.
+        ``nearest_mm``, the least distance of a central viewer from the lens plane, for whole lenses; ``width_mm``,
+        the width across and down at that distance; ``usual_width_mm``, the width at three times that distance, which
+        `five_viewpoints` uses. Widths down are infinite without vertical parallax.
     """
     vertical, tangents, spans = camera.lens_model.vertical_parallax, [], []
     for axis in range(2):
@@ -233,16 +234,16 @@ def viewing_zone(camera: IICamera) -> dict[str, Any]:
 
 
 def cells(camera: IICamera) -> dict[str, Any]:
-    """How elementary images share the pixels.
+    """Return how elementary images divide the pixels.
 
     Returns
     -------
     dict
-        ``unowned``: share of pixels that no lens owns, see `regular`. ``shared``: share of pixels, in the middle of
-        the sensor, that reach over a border into a neighbour's cell and mix two directions. ``pixels_per_lens``:
-        least and most. ``aperture_share``: of a cell's area that an aperture leaves clear, None if it has none.
-        ``rim_image_mm``: width, under a lens, of the image of the first rim in front, None if there is none; wider
-        than a cell, elementary images would overlap, narrower, they are dark around.
+        ``unowned``: share of pixels without an owner, see `regular`. ``shared``: share of pixels in the middle of the
+        sensor that lie in two cells and mix two directions. ``pixels_per_lens``: least and most. ``aperture_share``:
+        area of the aperture over that of the cell, None without an aperture. ``rim_image_mm``: width under a lens of
+        the image of the first rim in front, None without one. Elementary images overlap if it is wider than a cell
+        and have a dark border if it is narrower.
     """
     u, v = camera.ei_pixels
     model, pitch = camera.lens_model, camera.lens_pitch_mm
@@ -265,10 +266,10 @@ def cells(camera: IICamera) -> dict[str, Any]:
 
 
 def _shared(camera: IICamera) -> float:
-    """Share of pixels whose corners have different owners, in the middle of the sensor."""
+    """Return the share of pixels in the middle of the sensor whose corners have different owners."""
     lattice, size = camera.lens_lattice, tuple(min(PATCH, n) for n in camera.pixels)
     x, y = (o - (n - s) // 2 for o, n, s in zip(lattice.origin, camera.pixels, size, strict=True))
-    inset = 0.499  # of a pixel to each side: a corner right on a border is on neither side of it
+    inset = 0.499  # of a pixel: a corner exactly on a border is on neither side
     corners = [
         owners(lattice._replace(origin=(x + dx, y + dy)), (size[0], size[1]))
         for dx in (-inset, inset)
@@ -278,13 +279,13 @@ def _shared(camera: IICamera) -> float:
 
 
 def map_bytes(camera: IICamera) -> dict[str, int]:
-    """Bytes of the L and D maps of one sample by format, before packing: 2 images of 3 numbers; ``hdr`` is RGBE."""
+    """Return the bytes of the L and D maps of one sample by format, uncompressed; ``hdr`` is RGBE."""
     count = camera.pixels[0] * camera.pixels[1]
     return {name: size * count for name, size in MAP_BYTES.items()}
 
 
 def _diffraction(camera: IICamera, wavelength_mm: float) -> dict[str, Any] | None:
-    """The spot through the whole lens, or its aperture, against the pixel; a lone pinhole's width is not known."""
+    """Return the diffraction spot of the lens or its aperture against the pixel; None for a single pinhole."""
     aperture = getattr(camera.lens_model, "aperture_mm", None)
     if camera.lenses == (1, 1) and not aperture:
         return None

@@ -1,19 +1,16 @@
-"""Pictures of hexagonal, non-integer or shifted structures brought to a regular one, where M = K·U and N = L·V.
+"""Conversion of hexagonal, non-integer or shifted structures to regular ones, where M = K·U and N = L·V.
 
-A lens owns the pixels whose centres lie in its cell: all points nearer to it than to any other lens of an endless
-array of the same kind. In a rectangular array that is half a pitch to each side; in a hexagonal one a hexagon, half a
-pitch to the left and right. `Lattice.nearest` decides, ties included, as it does for the camera's rays. Pixels that
-only a lens beyond the array's edge would own, such as those left of the first lens of a hexagonal array's odd rows,
-belong to none.
+A lens owns the pixels whose centres lie in its cell. The cell is the set of points nearer to this lens than to any
+other lens of the infinite lattice: a rectangle, or a hexagon that reaches half a pitch to the left and right.
+`Lattice.nearest` resolves ties, as for the camera's rays. A pixel in the cell of a lens beyond the array has no
+owner.
 
-Both ways here take a map of owners, 4 bytes a pixel, beside the picture and the result.
+`smallest_rectangle` copies pixels unchanged; `resampled` interpolates. Both take 4 bytes per pixel for a map of
+owners.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -26,39 +23,40 @@ from .component import light_field
 from .jit import kernel
 from .lattice import Lattice
 from .optics import FrontElement, Lens, Lenslet, LensModel, Pinhole, SphericalLenslet
+from .parallel import over_rows
 from .picture import IIPicture
 
 Ints = NDArray[np.int32]
 Mask = NDArray[np.bool_]
-BLOCK = 64  # rows of pixels whose owners are sought at a time
+BLOCK = 64  # rows of pixels in one call of numpy: bounds its temporary arrays
 
 
 @checks.checked(picture=checks.instance(IIPicture))
 def smallest_rectangle(picture: IIPicture) -> tuple[IIPicture, Mask]:
-    """Around each lens the smallest rectangle of whole pixels, of one size for all, that holds all pixels it owns.
+    """Return a regular picture of the smallest rectangle of pixels around each lens that holds all pixels it owns.
 
-    No pixel changes its value, and `from_smallest_rectangle` puts each back where it was. A regular picture is
-    returned as it is.
+    All rectangles have one size. No pixel changes its value, and `from_smallest_rectangle` inverts the conversion. A
+    regular picture is returned unchanged.
 
     Parameters
     ----------
     picture : IIPicture
-        With its camera, unless it is regular.
+        With its camera; a regular picture needs none.
 
     Returns
     -------
     picture : IIPicture
-        Lenses (K, L) of (U, V) pixels. Its camera has pixel pitch δP·p/U and gap Λ·p/U, p the lens pitch in pixels
-        across, which gives every ray its own direction and every lens its place, but for three things. The lens
-        centre is taken to be the rectangle's, from which it is off by less than a pixel each way (more where the
-        sensor cuts the cell). Pixels being square, lens places down are stretched by V·p_x/(U·p_y) about the middle.
-        Odd rows of a hexagonal array are drawn half a pitch too far left. Spherical lenslets become thin ones.
+        Lenses (K, L) of (U, V) pixels. Its camera has pixel pitch δP·p/U and gap Λ·p/U, where p is the lens pitch
+        across in pixels. These keep the directions of rays and the positions of lenses, with four exceptions. Lens
+        centres move to the centres of their rectangles, by less than a pixel along each axis (more at the edge of the
+        sensor). Vertical positions of lenses are stretched by V·p_x/(U·p_y) about the middle, since pixels are
+        square. Odd rows of a hexagonal array lie half a pitch too far left. Spherical lenslets become thin lenses.
     owned : ndarray of bool, (L·V, K·U)
-        False for pixels of neighbours and, black, those beyond the sensor.
+        False for pixels of neighbouring lenses, and for pixels beyond the sensor, which are black.
 
     References
     ----------
-    Sgouros et al. as told in Olsson 2008, §2.3.3: the least rectangle round a hexagonal elementary image.
+    Sgouros et al., cited in Olsson 2008, §2.3.3: the smallest rectangle around a hexagonal elementary image.
     """
     if picture.regular:
         return picture, np.ones(picture.pixels.shape[:2], np.bool_)
@@ -67,7 +65,7 @@ def smallest_rectangle(picture: IIPicture) -> tuple[IIPicture, Mask]:
     left, top, (u, v) = _rectangles(camera.lens_lattice, owner)
     (k, l), source = camera.lenses, np.ascontiguousarray(picture.pixels)
     pixels, owned = np.zeros((l, v, k, u, 3), source.dtype), np.zeros((l, v, k, u), np.bool_)
-    _over_rows(l, lambda first, last: cut_rectangles(source, owner, left, top, first, last, pixels, owned))
+    over_rows(lambda first, last: cut_rectangles(source, owner, left, top, first, last, pixels, owned), l)
     regular = IIPicture(
         pixels.reshape(l * v, k * u, 3), (k, l), (u, v), _regular_camera(camera, (u, v), shrink=True), picture.erect
     )
@@ -76,26 +74,26 @@ def smallest_rectangle(picture: IIPicture) -> tuple[IIPicture, Mask]:
 
 @checks.checked(picture=checks.instance(IIPicture), camera=checks.instance(IICamera))
 def from_smallest_rectangle(picture: IIPicture, camera: IICamera) -> tuple[IIPicture, Mask]:
-    """The inverse of `smallest_rectangle`.
+    """Invert `smallest_rectangle`.
 
     Parameters
     ----------
     picture : IIPicture
-        Regular, as `smallest_rectangle` made it; perhaps coded in between.
+        Regular, from `smallest_rectangle`; it may have been coded.
     camera : IICamera
-        Of the picture that it was made from.
+        Camera of the original picture.
 
     Returns
     -------
     picture : IIPicture
-        In the camera's structure. Every pixel that a lens owns is what it was; the others are 0.
+        In the camera's structure. Pixels without an owner are 0; all others have their original position.
     owned : ndarray of bool, (N, M)
-        False for pixels that no lens owns.
+        False for pixels without an owner.
 
     Raises
     ------
     ValueError
-        If the camera's smallest rectangles are not the picture's elementary images.
+        If the camera's smallest rectangles differ from the picture's elementary images.
     """
     if camera.regular:
         back = IIPicture(picture.pixels, picture.lenses, picture.ei_pixels, camera, picture.erect)
@@ -111,39 +109,39 @@ def from_smallest_rectangle(picture: IIPicture, camera: IICamera) -> tuple[IIPic
         )
     source = light_field(picture.pixels, picture.lenses, picture.ei_pixels)
     pixels = np.zeros((height, width, 3), source.dtype)
-    _over_rows(height, lambda first, last: put_back(source, owner, left, top, first, last, pixels))
+    over_rows(lambda first, last: put_back(source, owner, left, top, first, last, pixels), height)
     return IIPicture(pixels, (k, l), camera.ei_pixels, camera, picture.erect), owner >= 0
 
 
 @checks.checked(picture=checks.instance(IIPicture), ei_pixels=checks.whole_pair)
 def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: bool = False) -> tuple[IIPicture, Mask]:
-    """Every lens's own cell sampled anew on a grid of U×V points that is centred on the lens.
+    """Return a regular picture with every lens's cell resampled on a grid of U×V points centred on the lens.
 
-    The grid fills one pitch across and down. A value is the mean, with bilinear weights, of those of the four pixels
-    around a point that the lens owns: its error is of second order where it owns all four, of first order, the
-    slope over at most a pixel, along the cell's border; neighbours, where directions jump, never leak in.
+    The grid spans one pitch across and down. Interpolation is bilinear over those of the four surrounding pixels that
+    the lens owns. Its error is of second order if the lens owns all four, and of first order along the border of the
+    cell. Pixels of neighbouring lenses have no influence.
 
     Parameters
     ----------
     picture : IIPicture
-        With its camera, unless it is regular.
+        With its camera; a regular picture needs none.
     ei_pixels : (U, V), optional
-        The whole numbers nearest to the lens pitch in pixels if not given. A regular picture that has these is
-        returned as it is.
+        The lens pitch in pixels, rounded, if not given. A regular picture of this size is returned unchanged.
     deshift : bool
-        Odd rows of a hexagonal array stand half a pitch to the right of even ones, which gives a view image a zigzag
-        of half a lens. If true, each lens of an odd row is replaced by the mean of the two at whose middle it should
-        stand, direction by direction. The zigzag goes, and so does detail as fine as a lens in these rows.
+        Remove the zigzag of half a lens that the shifted odd rows of a hexagonal array give view images. Each lens of
+        an odd row becomes the mean of itself and its left neighbour, direction by direction. These rows lose detail
+        of the size of a lens.
 
     Returns
     -------
     picture : IIPicture
-        Its camera keeps lens pitch and gap; the pixel pitch becomes δP·p/U, p the lens pitch in pixels across. Where
-        p_x/U and p_y/V differ, the scene is stretched downwards by V·p_x/(U·p_y), depth unchanged: pixels are square.
+        Its camera keeps lens pitch and gap. The pixel pitch becomes δP·p/U, where p is the lens pitch across in
+        pixels. If p_x/U and p_y/V differ, the scene is stretched vertically by V·p_x/(U·p_y), since pixels are
+        square; depth does not change.
     valid : ndarray of bool, (L·V, K·U)
-        False for points beyond the sensor, out of the lens's cell (a hexagonal cell has no corners where the
-        grid has), under a lens that owns no pixel near, and those for which ``deshift`` lacks one of two lenses. They
-        hold the nearest that is there, or 0.
+        False for points beyond the sensor, outside the lens's cell (the corners of the grid lie outside a hexagonal
+        cell), without an owned pixel around them, or for which ``deshift`` lacks one of the two lenses. Such points
+        have the value of the nearest pixel, or 0.
 
     Raises
     ------
@@ -163,7 +161,7 @@ def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: boo
     owner = owners(lattice, picture.size)
     pixels, valid = np.zeros((l, v, k, u, 3), source.dtype), np.zeros((l, v, k, u), np.bool_)
     whole = source.dtype.kind != "f"
-    _over_rows(l, lambda a, b: resample_cells(source, owner, x, y, dx, dy, inside, whole, a, b, pixels, valid))
+    over_rows(lambda a, b: resample_cells(source, owner, x, y, dx, dy, inside, whole, a, b, pixels, valid), l)
     if deshift and lattice.hexagonal:
         average_odd_rows(pixels, valid, whole)
     camera = _regular_camera(picture.camera, (u, v), shrink=False) if picture.camera is not None else None
@@ -172,34 +170,23 @@ def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: boo
 
 
 def owners(lattice: Lattice, pixels: Pair) -> Ints:
-    """Which lens owns each pixel, (N, M): l·K + k, or −1 if none."""
+    """Return the lens that owns each pixel, (N, M): l·K + k, or −1 without an owner."""
     (width, height), (across, down) = pixels, lattice.lenses
-    # Pixels outside of all cells are those nearest to a lens of a frame round the array; two rows keep odd rows odd.
+    # Lenses of a frame around the array own the pixels outside all cells. Two rows above keep the parity of rows.
     (right, below), (x, y) = lattice.pitch, lattice.origin
     framed = lattice._replace(lenses=(across + 2, down + 4), origin=(x - right, y - 2 * below))
     out = np.empty((height, width), np.int32)
     columns = np.arange(width)[None, :]
 
-    def block(rows: slice) -> None:
-        k, l = framed.nearest(columns, np.arange(rows.start, rows.stop)[:, None])
-        k, l = k - 1, l - 2
-        out[rows] = np.where((k >= 0) & (k < across) & (l >= 0) & (l < down), l * across + k, -1)
+    def find(first: int, last: int) -> None:
+        for top in range(first, last, BLOCK):
+            rows = slice(top, min(top + BLOCK, last))
+            k, l = framed.nearest(columns, np.arange(rows.start, rows.stop)[:, None])
+            k, l = k - 1, l - 2
+            out[rows] = np.where((k >= 0) & (k < across) & (l >= 0) & (l < down), l * across + k, -1)
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(block, _blocks(height)))
+    over_rows(find, height)
     return out
-
-
-def _blocks(height: int) -> list[slice]:
-    return [slice(top, min(top + BLOCK, height)) for top in range(0, height, BLOCK)]
-
-
-def _over_rows(count: int, work: Callable[[int, int], Any]) -> None:
-    """Do the work for rows from, to, a share for each core."""
-    cores = min(os.cpu_count() or 1, count)
-    bounds = [count * i // cores for i in range(cores + 1)]
-    with ThreadPoolExecutor(cores) as pool:
-        list(pool.map(work, bounds[:-1], bounds[1:]))
 
 
 def _camera(picture: IIPicture) -> IICamera:
@@ -219,7 +206,7 @@ def _nearest_whole(pitch: tuple[float, float]) -> Pair:
 
 
 def _rectangles(lattice: Lattice, owner: Ints) -> tuple[Ints, Ints, Pair]:
-    """First column and row of each lens's rectangle, (L, K), and the size of all, in pixels."""
+    """Return the first column and row of each lens's rectangle, (L, K), and their common size in pixels."""
     (across, down), (height, width) = lattice.lenses, owner.shape
     low = np.full((2, down, across), np.iinfo(np.int32).max, np.int32)
     high = np.full((2, down, across), -1, np.int32)
@@ -230,7 +217,7 @@ def _rectangles(lattice: Lattice, owner: Ints) -> tuple[Ints, Ints, Pair]:
         used = high[axis] >= 0
         extent = int((high[axis] - low[axis])[used].max()) + 1 if used.any() else 1
         middle = np.broadcast_to(np.floor(centre - extent / 2 + 0.5), (down, across))
-        # As near to the lens's centre as the pixels it owns allow; a lens that owns none may stand far outside.
+        # Centred on the lens as far as its pixels allow. A lens without pixels may lie far outside.
         fitted = np.clip(middle, high[axis].astype(np.int64) + 1 - extent, low[axis])
         limit = (width, height)[axis]
         corners.append(np.where(used, fitted, np.clip(middle, -extent, limit)).astype(np.int32))
@@ -239,20 +226,20 @@ def _rectangles(lattice: Lattice, owner: Ints) -> tuple[Ints, Ints, Pair]:
 
 
 def _in_cell(lattice: Lattice, dx: NDArray[Any], dy: NDArray[Any]) -> Mask:
-    """Which offsets of at most half a pitch from a lens centre lie in its cell, (V, U)."""
+    """Return whether offsets of at most half a pitch from a lens centre lie in its cell, (V, U)."""
     (p, q), grid = lattice.pitch, (dy.size, dx.size)
     if not lattice.hexagonal:
         return np.ones(grid, np.bool_)
-    # Nearer than the lenses half a pitch aside in the next rows; others are too far off to matter here.
+    # Bisector to the nearest lenses of the next rows; all others are farther away.
     return abs(dx)[None, :] * p + 2 * abs(dy)[:, None] * q <= p * p / 4 + q * q
 
 
 def _regular_camera(camera: IICamera, ei_pixels: Pair, *, shrink: bool) -> IICamera:
-    """The camera of the regular picture: lenses in their places; directions kept by a shorter gap if pixels were."""
+    """Return the camera of the regular picture; ``shrink`` scales the gap with the pixels to keep directions."""
     (u, v), (k, l) = ei_pixels, camera.lenses
     ratio = camera.lens_lattice.pitch[0] / u
     gap = camera.gap_mm * ratio if shrink else camera.gap_mm
-    forward = camera.gap_mm - gap  # so that the lens plane stays
+    forward = camera.gap_mm - gap  # keeps the lens plane in place
     shift = (*camera.lens_offset_mm, forward)
     origin = tuple(a + b for a, b in zip(camera.origin_mm, shift, strict=True))
     return IICamera(
@@ -267,16 +254,16 @@ def _regular_camera(camera: IICamera, ei_pixels: Pair, *, shrink: bool) -> IICam
 
 
 def _same_focus(camera: IICamera, gap: float) -> LensModel:
-    """The lens model that focuses behind another gap where the camera's does."""
+    """Return a lens model that images the same plane with another gap."""
     model = camera.lens_model
-    if isinstance(model, SphericalLenslet) and model.ior == 1:  # bends nothing
+    if isinstance(model, SphericalLenslet) and model.ior == 1:  # no refraction
         return Pinhole()
-    if isinstance(model, SphericalLenslet):  # the stretched cell may be too large for the sphere
+    if isinstance(model, SphericalLenslet):  # the sphere may be too small for the stretched cell
         model = Lenslet(focal_mm=model.radius_mm / (model.ior - 1), aperture_mm=model.aperture_mm)
     if not isinstance(model, Lenslet) or gap == camera.gap_mm:
         return model
     power = 1 / np.atleast_2d(np.asarray(model.focal_mm, np.float64)) + (1 / gap - 1 / camera.gap_mm)
-    if not (power > 0).all():  # would have to diverge
+    if not (power > 0).all():  # a diverging lens
         return Pinhole()
     rows = tuple(tuple(float(f) for f in row) for row in 1 / power)
     return replace(model, focal_mm=rows if isinstance(model.focal_mm, tuple) else rows[0][0])
@@ -299,7 +286,7 @@ def find_bounds(owner, low, high):
 
 @kernel
 def cut_rectangles(source, owner, left, top, first, last, out, owned):
-    """out[l, v, k, u] = the pixel of lens (k, l)'s rectangle, for l from first to last."""
+    """out[l, v, k, u] = pixel (u, v) of the rectangle of lens (k, l), for l from first to last."""
     height, width = owner.shape
     across = left.shape[1]
     for l in range(first, last):
@@ -317,7 +304,7 @@ def cut_rectangles(source, owner, left, top, first, last, out, owned):
 
 @kernel
 def put_back(source, owner, left, top, first, last, out):
-    """out[n, m] = its own lens's pixel, for n from first to last."""
+    """out[n, m] = the pixel of its owner's rectangle, for n from first to last."""
     across = left.shape[1]
     for n in range(first, last):
         for m in range(owner.shape[1]):
@@ -356,7 +343,7 @@ def resample_cells(source, owner, x, y, dx, dy, inside, whole, first, last, out,
                                 red += weight * source[n, m, 0]
                                 green += weight * source[n, m, 1]
                                 blue += weight * source[n, m, 2]
-                    if total > 1e-9:  # else the lens's own pixels lie a pixel away or more, but for rounding
+                    if total > 1e-9:  # otherwise the owned pixels are at least a pixel away, within rounding
                         valid[l, v, k, u] = inside[v, u]
                         red, green, blue = red / total, green / total, blue / total
                     else:
@@ -369,7 +356,7 @@ def resample_cells(source, owner, x, y, dx, dy, inside, whole, first, last, out,
 
 @kernel
 def average_odd_rows(pixels, valid, whole):
-    """Each lens of odd rows becomes the mean of itself and the one to its left, or the valid one of the two."""
+    """Replace each lens of odd rows by the mean of itself and its left neighbour, or by the valid one of the two."""
     for l in range(1, pixels.shape[0], 2):
         for v in range(pixels.shape[1]):
             for k in range(pixels.shape[2] - 1, -1, -1):

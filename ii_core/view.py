@@ -1,4 +1,4 @@
-"""What a viewer of the display sees: view images, refocused images, upright elementary images."""
+"""View images, refocused images, and conversion to upright elementary images."""
 
 from __future__ import annotations
 
@@ -18,33 +18,33 @@ from .picture import IIPicture
 def view_image(
     picture: IIPicture, viewpoint_mm: ArrayLike, *, interpolation: str = "linear"
 ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """What a viewer at one point sees: one pixel through each lens.
+    """Return the view image from a viewpoint: one pixel through each lens.
 
     Parameters
     ----------
     picture : IIPicture
         With its camera.
     viewpoint_mm : array_like, (3,)
-        Camera coordinates; a display's viewer stands at z < 0.
+        Camera coordinates; viewers of a display are at z < 0.
     interpolation : {"linear", "nearest"}
-        Between the pixels of one elementary image; never across its border, where directions jump.
+        Interpolation between pixels of one elementary image, never across its border.
 
     Returns
     -------
     pixels : ndarray, (L, K, 3)
-        Of the picture's type; 0 where not valid.
+        Of the picture's pixel type; 0 if not valid.
     valid : ndarray of bool, (L, K)
-        False where the line leaves the pixel array.
+        False if the line misses the pixel array.
 
     Raises
     ------
     ValueError
-        If the picture has no camera, the viewpoint is not three finite numbers before the lens plane, or
+        If the picture has no camera, the viewpoint is not three finite numbers in front of the lens plane, or
         the interpolation is unknown.
 
     References
     ----------
-    Olsson 2008, (4.1), (4.2) with the offset in pixels and the sign that D = lens − pixel asks for.
+    Olsson 2008, (4.1), (4.2), with the offset in pixels and the sign that follows from D = lens − pixel.
     """
     if interpolation not in ("linear", "nearest"):
         raise ValueError(f"unknown interpolation {interpolation!r}: known are linear, nearest")
@@ -72,13 +72,13 @@ def view_image(
 def view_positions(
     camera: IICamera, viewpoint_mm: ArrayLike, *, erect: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where on the pixel array the lines from a viewpoint through the lens centres end, in pixels.
+    """Return the ends on the pixel array of the lines from a viewpoint through the lens centres, in pixels.
 
     Returns
     -------
     x, y : ndarray, (K,) and (L,)
-        Column of each lens column and row of each lens row; whole numbers are pixel centres.
-        Past an elementary image's border they run on into the neighbour: the side viewing zone.
+        Pixel column for each lens column, pixel row for each lens row; whole numbers are pixel centres. Beyond the
+        border of an elementary image they continue into its neighbour: the side viewing zone.
     """
     e = np.asarray(viewpoint_mm, dtype=np.float64)
     if e.shape != (3,) or not np.isfinite(e).all():
@@ -101,10 +101,10 @@ def view_positions(
 
 @checks.checked(camera=checks.instance(IICamera))
 def five_viewpoints(camera: IICamera) -> dict[str, NDArray[np.float64]]:
-    """Front, up, down, left and right: viewpoints from which every lens shows its own elementary image.
+    """Return the viewpoints front, up, down, left and right, from which every lens shows its own elementary image.
 
-    The distance is three times the nearest one at which that holds from the front; the rotations about the
-    display centre are the largest at which it still holds there, less half a pixel.
+    Their distance is three times the nearest distance of the viewing zone. The rotations about the centre of the
+    display are the largest within the viewing zone, less half a pixel.
 
     References
     ----------
@@ -135,21 +135,21 @@ def five_viewpoints(camera: IICamera) -> dict[str, NDArray[np.float64]]:
 
 @checks.checked(camera=checks.instance(IICamera), across=checks.whole)
 def projection_camera(camera: IICamera, across: int) -> tuple[IICamera, NDArray[np.float64]]:
-    """A 2D pinhole camera that sees the scene through the whole of a display, and where it stands.
+    """Return a 2-D pinhole camera that sees the scene through the whole display, and its pose.
 
-    Its pinhole is the nearest point from which every lens shows its own elementary image, and its picture is just
-    the display: what (4.5)'s virtual camera sees, at any resolution.
+    Its pinhole is the nearest point from which every lens shows its own elementary image. Its picture is that of the
+    virtual camera of (4.5), at any resolution.
 
     Parameters
     ----------
     camera : IICamera
     across : int
-        Pixels across; rows follow from the display's shape.
+        Pixels across; rows follow from the aspect of the display.
 
     Returns
     -------
     pinhole : IICamera
-        Of one lens. Its picture stands on its head, as behind any pinhole; `orthoscopic` turns it.
+        Of one lens. Its picture is upside down; `orthoscopic` turns it.
     pose : ndarray, (4, 4)
         From the pinhole camera's frame to the II-camera's.
     """
@@ -170,7 +170,7 @@ def projection_camera(camera: IICamera, across: int) -> tuple[IICamera, NDArray[
 
 @checks.checked(camera=checks.instance(IICamera), plane_mm=checks.number)
 def stand_back(camera: IICamera, plane_mm: float = 0.0) -> NDArray[np.float64]:
-    """The pose in which a camera of one lens has the plane z = ``plane_mm`` fill its picture, edge to edge."""
+    """Return the pose in which the plane z = ``plane_mm`` exactly fills the picture of a camera of one lens."""
     if not math.isfinite(plane_mm):
         raise ValueError(f"plane_mm is {plane_mm}: a finite number is needed")
     pose = np.eye(4)
@@ -179,13 +179,13 @@ def stand_back(camera: IICamera, plane_mm: float = 0.0) -> NDArray[np.float64]:
 
 
 def _rotation(tangent: float, half_over_r: float) -> float:
-    """The angle φ at which tangent·cos φ − sin φ = half_over_r."""
+    """Return the angle φ with tangent·cos φ − sin φ = half_over_r."""
     return math.acos(min(1.0, half_over_r / math.hypot(1, tangent))) - math.atan2(1, tangent)
 
 
 @checks.checked(picture=checks.instance(IIPicture), depth_mm=checks.number)
 def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
-    """The scene focused on one plane by shifting and adding sub-images.
+    """Return the scene focused on one plane, by shifting and adding sub-images.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
     Returns
     -------
     ndarray of float32, (L, K, 3)
-        In the picture's code values. A pixel is the mean of the sub-images that see it.
+        In code values. A pixel is the mean over the sub-images that cover it.
     """
     camera = camera_of(picture)
     if not camera.gap_mm <= depth_mm < math.inf:
@@ -219,7 +219,7 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
 
 @checks.checked(picture=checks.instance(IIPicture))
 def orthoscopic(picture: IIPicture) -> IIPicture:
-    """Every elementary image rotated by 180°: pseudoscopic to orthoscopic and back."""
+    """Rotate every elementary image by 180°: pseudoscopic to orthoscopic and back."""
     picture.check_regular()
     return IIPicture(turned_pixels(picture), picture.lenses, picture.ei_pixels, picture.camera, not picture.erect)
 
@@ -230,14 +230,20 @@ def turned_pixels(picture: IIPicture) -> NDArray[Any]:
 
 
 def camera_of(picture: IIPicture) -> IICamera:
-    """The picture's camera, or a ValueError that says it is missing."""
+    """Return the picture's camera.
+
+    Raises
+    ------
+    ValueError
+        If it has none.
+    """
     if picture.camera is None:
         raise ValueError("the picture has no camera: gap and pixel pitch are needed to look through its lenses")
     return picture.camera
 
 
 def _between(position, nearest, size):
-    """The two pixels around a position and the weight of the second, kept inside the elementary image."""
+    """Return the two pixels around a position, inside its elementary image, and the weight of the second."""
     first = nearest // size * size
     inside = np.clip(position - first, 0, size - 1)
     low = np.minimum(np.floor(inside).astype(np.int64), max(size - 2, 0))
@@ -246,7 +252,7 @@ def _between(position, nearest, size):
 
 
 def _shifted(count, shift):
-    """Indices and weights that read a row of ``count`` pixels at index + shift, and where that is inside."""
+    """Return indices and weights that sample a row of ``count`` pixels at index + shift, and which are inside."""
     position = np.arange(count) + shift
     inside = (position >= 0) & (position <= count - 1)
     low = np.clip(np.floor(position).astype(np.int64), 0, count - 1)

@@ -1,5 +1,7 @@
 """Quality of decoded II-pictures, rate–distortion studies, and their charts."""
 
+from ii_core.display.view_sheets import plot_pair, plot_views
+
 from .angle import q_angle_ssim, q_angle_ycbcr
 from .batch import measuring
 from .builtin_measures import MEASURES
@@ -10,9 +12,9 @@ from .differences import differences, mean_differences
 from .global_angle import angle_axes, mean_q_angle, q_angle, q_global
 from .measure import Measure, Needs, known_measures, register_measure
 from .pair import PicturePair
+from .plots.angle_depth import plot_depth
 from .plots.depth_chart import depth_over_rate, depth_rate_chart
 from .plots.error_maps import plot_error_layers
-from .plots.overview import plot_depth, plot_pair, plot_views
 from .plots.rd_chart import rd_chart
 from .plots.tables import summary_table, write_csv, write_latex
 from .point_log import PointLog

@@ -1,4 +1,4 @@
-"""What users of light fields expect beside PSNR over R, G and B: YCbCr PSNR, SSIM and MS-SSIM of each sub-image."""
+"""YCbCr PSNR, SSIM and MS-SSIM of each sub-image, as usual for light fields."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ YCBCR = np.array([
     [-KR / CB, -KG / CB, 0.5],
     [0.5, -KG / CR, -KB / CR],
 ])  # fmt: skip
-# Wang, Simoncelli and Bovik 2003: how much each scale counts, the finest first.
+# Exponents of the scales, finest first (Wang, Simoncelli and Bovik 2003).
 SCALES = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 
 
 def q_angle_ycbcr(reference: IIPicture, decoded: IIPicture) -> AngleQuality:
-    """(6·PSNR_Y + PSNR_Cb + PSNR_Cr)/8 of each sub-image, dB.
+    """Return (6·PSNR_Y + PSNR_Cb + PSNR_Cr)/8 of each sub-image, in dB.
 
-    Luma and chroma are those of BT.709 in full range, not rounded.
+    Luma and chroma are those of BT.709 in full range, unrounded.
 
     Parameters
     ----------
@@ -39,8 +39,8 @@ def q_angle_ycbcr(reference: IIPicture, decoded: IIPicture) -> AngleQuality:
     Returns
     -------
     AngleQuality
-        +inf where a sub-image is identical. A channel whose errors are smaller than rounding (1e-6 of the peak)
-        counts as if they were that, 120 dB: a distortion of luma alone stays one of finite quality.
+        +inf for identical sub-images. The PSNR of a channel is at most 120 dB, an error of 1e-6 of the peak, which is
+        below rounding: distortion of luma alone has a finite value.
 
     Raises
     ------
@@ -51,12 +51,11 @@ def q_angle_ycbcr(reference: IIPicture, decoded: IIPicture) -> AngleQuality:
     ----------
     JPEG Pleno Light Field Coding common test conditions (the weights 6:1:1, from video coding).
     """
-
     return angle_ycbcr(PicturePair(reference, decoded))
 
 
 def angle_ycbcr(pair: PicturePair) -> AngleQuality:
-    """`q_angle_ycbcr` of a pair."""
+    """Return `q_angle_ycbcr` of a pair."""
 
     def measure(a: Floats, b: Floats) -> float:
         mse = np.square((b - a) @ YCBCR.T).mean(axis=(0, 1))
@@ -69,11 +68,11 @@ def angle_ycbcr(pair: PicturePair) -> AngleQuality:
 
 @checks.checked(scales=checks.whole)
 def q_angle_ssim(reference: IIPicture, decoded: IIPicture, *, scales: int = 1) -> AngleQuality:
-    """SSIM of each sub-image, or with 5 ``scales`` its MS-SSIM.
+    """Return the SSIM of each sub-image; with five ``scales``, its MS-SSIM.
 
-    Luma and window as of `q_view`. Each further scale halves the sub-image by means over 2×2 pixels; contrast and
-    structure of all scales and the luminance of the coarsest are multiplied, with exponents that are those of five
-    scales, brought to a sum of 1 if there are fewer. A negative mean is taken for 0 before it gets an exponent.
+    Luma and window are those of `q_view`. Each further scale averages over 2×2 pixels. The result is the product of
+    contrast and structure of all scales and of the luminance of the coarsest, each with the exponent of its scale.
+    With fewer than five scales the exponents are normalised to a sum of 1. Negative means count as 0.
 
     Parameters
     ----------
@@ -85,7 +84,7 @@ def q_angle_ssim(reference: IIPicture, decoded: IIPicture, *, scales: int = 1) -
     Returns
     -------
     AngleQuality
-        1 where a sub-image is identical.
+        1 for identical sub-images.
 
     Raises
     ------
@@ -103,7 +102,7 @@ def q_angle_ssim(reference: IIPicture, decoded: IIPicture, *, scales: int = 1) -
 
 
 def angle_ssim(pair: PicturePair, *, scales: int = 1) -> AngleQuality:
-    """`q_angle_ssim` of a pair."""
+    """Return `q_angle_ssim` of a pair."""
     k, l = pair.reference.lenses
     needed = WINDOW * 2 ** (scales - 1)
     if min(k, l) < needed:
@@ -128,7 +127,7 @@ def angle_ssim(pair: PicturePair, *, scales: int = 1) -> AngleQuality:
 
 
 def _each(pair: PicturePair, measure: Callable[[Floats, Floats], float]) -> AngleQuality:
-    """Return a measure of each pair of sub-images, in shares of the peak."""
+    """Return a measure of each pair of sub-images; pixels are divided by the peak."""
     pair.reference.check_regular()
     if pair.dtype.kind == "f":
         pair.check_finite()
@@ -142,7 +141,7 @@ def _each(pair: PicturePair, measure: Callable[[Floats, Floats], float]) -> Angl
 
 
 def _ssim(a: Floats, b: Floats) -> tuple[float, float]:
-    """Mean SSIM, and mean of its contrast and structure, over the region the window fits into."""
+    """Return mean SSIM, and mean of its contrast–structure term, where the whole window fits."""
     from skimage.filters import gaussian
 
     def mean(x: Floats) -> Floats:
@@ -158,6 +157,6 @@ def _ssim(a: Floats, b: Floats) -> tuple[float, float]:
 
 
 def _halved(x: Floats) -> Floats:
-    """Means over 2×2 pixels; an odd row or column at the end is left out."""
+    """Return means over 2×2 pixels without an odd last row or column."""
     rows, cols = x.shape[0] // 2 * 2, x.shape[1] // 2 * 2
     return x[:rows, :cols].reshape(rows // 2, 2, cols // 2, 2).mean(axis=(1, 3))

@@ -25,7 +25,7 @@ def measuring(
     layers_mm: ArrayLike | None = None,
     method: str = "dissertation",
 ) -> Callable[[IIPicture], dict[str, Any]]:
-    """Return a function that measures decoded pictures; work that needs the reference alone is done once, here.
+    """Return a function that measures decoded pictures. Work that depends on the reference alone is done once.
 
     Parameters
     ----------
@@ -33,22 +33,20 @@ def measuring(
     names : sequence of str
         Registered measures, see `MEASURES`.
     depth, layers_mm, method
-        As for `q_depth`, if a measure needs depth. Depth to be estimated is estimated here.
+        As for `q_depth`, if a measure needs depth. Depth is estimated in this call if it is not given.
 
     Returns
     -------
     callable
-        ``measure(decoded)`` gives a dict with every name's value. With a measure over depth it also holds
-        ``q_depth``, the value of every layer, ``depth_mm``, the layers, and ``depth_outside``, the share of view
-        pixels in no layer.
+        ``measure(decoded)`` returns a dict of values by name. Measures over depth add ``q_depth``, the value of every
+        layer, ``depth_mm``, the layers, and ``depth_outside``, the share of view pixels outside all layers.
 
     Raises
     ------
     TypeError
-        If reference is no `IIPicture`, or names are no sequence of text.
+        If ``reference`` is not an `IIPicture`, or ``names`` is not a sequence of text.
     ValueError
-        If a name is unknown, or the reference does not meet a measure's needs: no camera, not regular, too few
-        lenses.
+        If a name is unknown, or the reference lacks a need of a measure: camera, regular structure, number of lenses.
     """
     if bad := [name for name in names if not isinstance(name, str)]:
         raise TypeError(f"names hold {bad[0]!r}: text is needed")

@@ -1,4 +1,4 @@
-"""PSNR of a whole II-picture and of each viewing angle: one pass, sums per sub-image."""
+"""Q_global and Q_angle: PSNR of the whole II-picture and of each sub-image, in one pass."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IICamera, IIPicture, checks
 from ii_core.component import light_field
 from ii_core.jit import kernel
+from ii_core.picture import peak
 
-from .pair import PicturePair, peak
+from .pair import PicturePair
 from .quality import AngleQuality
 
 
 def q_global(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None = None) -> float:
-    """PSNR of the whole picture, from the mean squared error pooled over all 3·M·N values.
+    """Return the PSNR of the whole picture, from the mean squared error pooled over all 3·M·N values.
 
     Parameters
     ----------
     reference, decoded : IIPicture
         Of the same structure and type. The peak is 255 for uint8, 65535 for uint16 and 1.0 for float32.
     mask : array_like of bool, (N, M), optional
-        Which pixels count: those that a lens owns, where a structure was made regular. All, if not given.
+        Pixels that count, such as those with an owner after conversion to a regular structure; all if not given.
 
     Returns
     -------
@@ -34,8 +35,8 @@ def q_global(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None
     Raises
     ------
     ValueError
-        If the pictures differ in structure or type, or hold a pixel that counts and is not finite, or if the mask is
-        of another shape or type.
+        If the pictures differ in structure or type, or hold a pixel that counts and is not finite, or if the mask has
+        another shape or type.
 
     References
     ----------
@@ -45,13 +46,13 @@ def q_global(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None
 
 
 def global_psnr(pair: PicturePair) -> float:
-    """`q_global` of a pair."""
+    """Return `q_global` of a pair."""
     total, count = _squared_errors(pair)
     return float(psnr(total.sum(), 3 * count.sum(), pair.dtype))
 
 
 def q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None = None) -> AngleQuality:
-    """PSNR of each sub-image: quality over the viewing angle.
+    """Return the PSNR of each sub-image: quality over the viewing angle.
 
     Parameters
     ----------
@@ -61,8 +62,8 @@ def q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None 
     Returns
     -------
     AngleQuality
-        ``values`` in dB, (V, U), pooled over the 3·K·L values of SI_{u,v}, or those of them that count; +inf where it
-        is identical, NaN where none counts. ``u_deg`` and ``v_deg`` of a picture with a camera.
+        ``values`` in dB, (V, U), pooled over the values of SI_{u,v} that count; +inf for an identical sub-image, NaN
+        if no value counts. ``u_deg`` and ``v_deg`` if the picture has a camera.
 
     Raises
     ------
@@ -77,39 +78,40 @@ def q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None 
 
 
 def angle_psnr(pair: PicturePair) -> AngleQuality:
-    """`q_angle` of a pair."""
+    """Return `q_angle` of a pair."""
     total, count = _squared_errors(pair)
     pair.reference.check_regular()
     return angle_quality(psnr(total, 3 * count, pair.dtype), pair.reference)
 
 
 def mean_q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None = None) -> float:
-    """Mean of the sub-images' PSNRs, dB: at least `q_global`, by whole dB where distortion varies with the angle.
+    """Return the mean of the PSNRs of sub-images, in dB.
 
-    `q_global` is the PSNR of the errors pooled over all sub-images; +inf here if one sub-image is identical. Without
-    those of which no pixel counts.
+    It is at least `q_global`, which pools errors over all sub-images, and exceeds it by several dB if distortion
+    varies with the angle. It is +inf if one sub-image is identical. Sub-images without a pixel that counts are left
+    out.
     """
     return q_angle(reference, decoded, mask=mask).mean
 
 
 def angle_quality(values: NDArray[np.float64], picture: IIPicture) -> AngleQuality:
-    """Values of each sub-image, with the angles of the picture's camera if it has one."""
+    """Return values of each sub-image with the angles of the picture's camera, if it has one."""
     axes = () if picture.camera is None else angle_axes(picture.camera, erect=picture.erect)
     return AngleQuality(values, *axes)
 
 
 @checks.checked(camera=checks.instance(IICamera))
 def angle_axes(camera: IICamera, *, erect: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """In which direction the rays of each column u and row v of an elementary image go.
+    """Return the directions of the rays of each column u and row v of an elementary image.
 
-    A ray runs along D = lens − pixel: a pixel to the right of its lens's centre looks left, one below it looks
-    up. Angles therefore fall from left to right and rise from top to bottom; with erect images the reverse.
+    A ray has the direction D = lens − pixel: to the left for a pixel to the right of the lens centre, up for a pixel
+    below it. Angles decrease from left to right and increase from top to bottom; with erect images the reverse.
 
     Parameters
     ----------
     camera : IICamera
     erect : bool
-        For a picture of upright elementary images.
+        True for upright elementary images.
 
     Returns
     -------
@@ -128,13 +130,13 @@ def angle_axes(camera: IICamera, *, erect: bool = False) -> tuple[NDArray[np.flo
 
 
 def psnr(squared_error: Any, count: Any, dtype: np.dtype[Any]) -> NDArray[np.float64]:
-    """20·log10(peak/√MSE) of summed squared errors over ``count`` values; NaN where nothing was counted."""
+    """Return 20·log10(peak/√MSE) of a sum of squared errors over ``count`` values; NaN for none."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return 10 * np.log10(peak(dtype) ** 2 * count / np.asarray(squared_error, dtype=np.float64))
 
 
 def _squared_errors(pair: PicturePair) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Sum of squared errors of each sub-image and the pixels it is over, (V, U) both."""
+    """Return the sum of squared errors of each sub-image and its number of pixels, (V, U) each."""
     reference, decoded = pair.pictures
     structure: Any = reference.lenses, reference.ei_pixels
     if not reference.regular:
@@ -153,8 +155,8 @@ def _squared_errors(pair: PicturePair) -> tuple[NDArray[np.float64], NDArray[np.
     return total, count
 
 
-# Not parallel: studies measure from several threads at once, which not every numba threading layer survives, and
-# one thread already runs at memory speed. Sums of whole numbers below 2^53 are exact in float64.
+# Not parallel: studies call it from several threads, which some numba threading layers do not support, and one
+# thread already runs at the speed of memory. Sums of whole numbers below 2^53 are exact in float64.
 @kernel
 def sum_squared_errors(a, b, run, out):
     """out[v, u] = Σ (a − b)² over l, k and colour; the fields are [l, v, k, i], i over the U·3 values of a run."""
@@ -171,7 +173,7 @@ def sum_squared_errors(a, b, run, out):
 
 @kernel
 def sum_masked_errors(a, b, mask, total, count):
-    """As `sum_squared_errors` where the mask [l, v, k, u] says so, and over how many pixels that is."""
+    """Add up `sum_squared_errors` and numbers of pixels where the mask [l, v, k, u] is true."""
     for l in range(a.shape[0]):
         for v in range(a.shape[1]):
             for k in range(a.shape[2]):

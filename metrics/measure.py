@@ -18,20 +18,20 @@ PLUGINS = "raytrace_ii.measures"  # entry points of installed packages
 
 @dataclass(frozen=True, kw_only=True)
 class Needs:
-    """What a measure needs of the pictures.
+    """Needs of a measure.
 
     Parameters
     ----------
     regular : bool
-        Elementary images of whole pixels, so that there are sub-images.
+        Regular structure, so that there are sub-images.
     camera : bool
-        Gap and pixel pitch, to look through the lenses.
+        Camera, for view images.
     lenses : int
-        The least number of lenses across and down.
+        Least number of lenses across and down.
     all_pixels : bool
         No mask.
     depth : bool
-        A depth map, or straight lines of sight to estimate depth from focus.
+        Depth map, or a camera without lenses in front, for depth from focus.
     """
 
     regular: bool = False
@@ -41,7 +41,7 @@ class Needs:
     depth: bool = False
 
     def unmet(self, pair: PicturePair) -> str | None:
-        """Return the first need that the pair does not meet, as a reason to print; None if it meets all."""
+        """Return the first need that the pair does not meet as a sentence; None if it meets all."""
         picture, camera = pair.reference, pair.reference.camera
         if self.regular and not picture.regular:
             return "the structure is not regular: run `raytrace-ii regular`"
@@ -59,7 +59,7 @@ class Needs:
 
 @dataclass(frozen=True, kw_only=True)
 class Measure:
-    """A number that says how good a decoded picture is.
+    """Measure of the quality of a decoded picture.
 
     Parameters
     ----------
@@ -68,13 +68,13 @@ class Measure:
     compute : callable
         ``compute(pair)`` of a `PicturePair`. Measures that share a ``compute`` share its one result.
     value : callable
-        The number, from what ``compute`` returns.
+        ``value(result)`` returns the number for a result of ``compute``.
     text : str
-        What the number is, for captions.
+        Description of the number, for captions.
     label : str
-        Name on the axis of a chart; may hold mathtext. ``name`` if not given.
+        Label of a chart's axis, which may contain mathtext; ``name`` if not given.
     unit : str
-        Empty for shares.
+        Empty for dimensionless numbers.
     digits : int
         Decimals to print.
     higher_is_better : bool
@@ -108,11 +108,11 @@ class Measure:
 
     @property
     def best(self) -> float:
-        """The infinite value of a picture without error, where the measure has one."""
+        """Value of a picture without error, for measures where it is infinite."""
         return math.inf if self.higher_is_better else -math.inf
 
     def shown(self, value: float) -> str:
-        """Return the number as a table prints it."""
+        """Return the text of a number in tables."""
         return f"{value:.{self.digits}f}"
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IIPicture
+from ii_core.picture import peak as peak_of
 
 if TYPE_CHECKING:
     from .depth.focus import FocusDepth
@@ -16,23 +17,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PicturePair:
-    """Reference and decoded picture, checked once, and the conditions of their comparison.
+    """Reference and decoded picture, validated, with the conditions of their comparison.
 
     Parameters
     ----------
     reference, decoded : IIPicture
         Of the same structure and type. The decoded picture gets the reference's camera.
     mask : array_like of bool, (N, M), optional
-        Which pixels count. All, if not given.
+        Pixels that count; all if not given.
     depth, layers_mm, method
         As for `q_depth`, which checks them.
 
     Raises
     ------
     TypeError
-        If reference or decoded is no `IIPicture`.
+        If ``reference`` or ``decoded`` is not an `IIPicture`.
     ValueError
-        If the pictures differ in structure or type, or the mask is of another shape or type.
+        If the pictures differ in structure or type, or the mask has another shape or type.
     """
 
     reference: IIPicture
@@ -60,27 +61,22 @@ class PicturePair:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Type of the pixels of both."""
+        """Pixel type of both pictures."""
         return self.reference.pixels.dtype
 
     @property
     def peak(self) -> float:
         """The largest code value."""
-        return peak(self.dtype)
+        return peak_of(self.dtype)
 
     def check_finite(self) -> None:
-        """Raise ValueError naming the first pixel, in reading order, that counts and is not finite."""
+        """Raise ValueError with the first pixel in reading order that counts and is not finite."""
         for name, picture in zip(("reference", "decoded"), self.pictures, strict=True):
-            for n, row in enumerate(picture.pixels):  # row by row: no mask of the picture's size
+            for n, row in enumerate(picture.pixels):  # row by row, to save memory
                 counts = True if self.mask is None else self.mask[n]
                 bad = np.flatnonzero(~np.isfinite(row).all(axis=1) & counts)
                 if bad.size:
                     raise ValueError(f"{name} pixel ({bad[0]}, {n}) is {row[bad[0]]}: finite values are needed")
-
-
-def peak(dtype: np.dtype[Any]) -> float:
-    """Return the largest code value of a picture of this type."""
-    return 1.0 if dtype.kind == "f" else float(np.iinfo(dtype).max)
 
 
 def _checked_mask(mask: Any, picture: IIPicture) -> NDArray[np.bool_]:

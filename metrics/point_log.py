@@ -1,4 +1,4 @@
-"""Points of a rate–distortion study, on disk as soon as they are measured: a killed study continues from them."""
+"""Log of the points of a rate–distortion study, from which a killed study continues."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ FORMAT, VERSION = "ii-rd-point", 1
 
 
 class PointLog:
-    """A file of points; those of the same picture, conditions, code and libraries are known.
+    """File of points; ``known`` holds those of the same picture, conditions, code and libraries.
 
     Parameters
     ----------
     path : path
     picture : IIPicture
-        What is coded.
+        The coded picture.
     **conditions
-        What else values depend on: names of measures, depth map, layers.
+        Other inputs of the values: names of measures, depth map, layers.
 
     Raises
     ------
     ValueError
-        If the file is there and holds something else.
+        If the file exists and is not a log of points.
     """
 
     def __init__(self, path: str | os.PathLike[str], picture: IIPicture, **conditions: Any) -> None:
@@ -63,12 +63,12 @@ class PointLog:
 
 
 def read_points(path: Path) -> list[tuple[str, dict[str, Any]]]:
-    """Return the points of a file, each with the hash of what it depends on.
+    """Return the points of a file, each with the hash of its inputs.
 
     Raises
     ------
     ValueError
-        If a line is no point.
+        If a line is not a point.
     """
     found = []
     for number, line in enumerate(read_records(path, FORMAT, VERSION), 1):

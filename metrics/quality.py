@@ -1,4 +1,4 @@
-"""Qualities that the measures return: per viewing angle, per view, per depth layer."""
+"""Results of measures: quality per viewing angle, per view, per depth layer."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class AngleQuality:
     Attributes
     ----------
     values : ndarray of float64, (V, U)
-        NaN where no pixel of the sub-image counts. ``np.asarray`` of the quality gives them too.
+        NaN for sub-images without a pixel that counts. ``np.asarray(quality)`` returns the values, too.
     u_deg, v_deg : ndarray of float64, (U,) and (V,), or None
-        Directions of the columns and rows, see `angle_axes`; None of a picture without a camera.
+        Directions of the columns and rows, see `angle_axes`; None for pictures without a camera.
     """
 
     values: NDArray[np.float64]
@@ -31,22 +31,22 @@ class AngleQuality:
 
     @property
     def mean(self) -> float:
-        """Arithmetic mean over the sub-images that have a value; NaN if none has."""
+        """Arithmetic mean over sub-images with a value; NaN if there are none."""
         return float(self._known.mean()) if self._known.size else math.nan
 
     @property
     def worst(self) -> float:
-        """Of the worst sub-image: what a viewer who moves will meet."""
+        """Quality of the worst sub-image; NaN if none has a value."""
         return float(self._known.min()) if self._known.size else math.nan
 
     @property
     def best(self) -> float:
-        """Of the best sub-image."""
+        """Quality of the best sub-image; NaN if none has a value."""
         return float(self._known.max()) if self._known.size else math.nan
 
     @property
     def worst_view(self) -> tuple[int, int] | None:
-        """(u, v) of the worst sub-image, the first in reading order; None if none has a value."""
+        """(u, v) of the worst sub-image, the first of equals in reading order; None if none has a value."""
         if not self._known.size:
             return None
         v, u = np.unravel_index(np.nanargmin(self.values), self.values.shape)
@@ -64,11 +64,11 @@ class ViewQuality:
     Attributes
     ----------
     values : dict of str to float
-        MSSIM by view name; NaN where no window is valid throughout.
+        MSSIM by view name; NaN if no window is entirely valid.
     psnr : dict of str to float
-        dB over the valid pixels' R, G and B; +inf where they are identical, NaN where there are none.
+        dB over R, G and B of the valid pixels; +inf if they are identical, NaN if there are none.
     pooled_psnr : float
-        Of the errors of all views together, dB.
+        PSNR of the errors pooled over all views, dB.
     """
 
     values: dict[str, float]
@@ -77,12 +77,12 @@ class ViewQuality:
 
     @property
     def mean(self) -> float:
-        """Arithmetic mean of MSSIM over the views that have one."""
+        """Arithmetic mean of MSSIM over views with a value."""
         return _mean(self.values)
 
     @property
     def mean_psnr(self) -> float:
-        """Arithmetic mean of PSNR over the views that have one, dB; at least ``pooled_psnr``."""
+        """Arithmetic mean of PSNR over views with a value, dB; at least ``pooled_psnr``."""
         return _mean(self.psnr)
 
     @property
@@ -92,7 +92,7 @@ class ViewQuality:
 
     @property
     def worst_view(self) -> str | None:
-        """Name of the worst view by MSSIM, the first of equals; None if none has one."""
+        """Name of the worst view by MSSIM, the first of equals; None if none has a value."""
         known = _known(self.values)
         return min(known, key=known.__getitem__) if known else None
 
@@ -115,22 +115,21 @@ class DepthQuality:
     depth_mm : ndarray of float64, (layers,)
         z of each layer in camera coordinates.
     values : ndarray of float64, (layers,)
-        dB over the layer's own pixels; NaN where it has none, +inf where they are identical.
+        dB over the pixels of the layer; NaN without pixels, +inf if they are identical.
     counts : ndarray of int64, (layers,)
-        View pixels in each layer.
+        Number of view pixels in each layer.
     outside : int
-        View pixels that hit something nearer or farther than all layers; they count nowhere. 0 if the depth is
-        estimated: it is always that of a layer, or none. 0 with the default layers too, but for depths at the pixel
-        array or behind it.
+        Number of view pixels nearer or farther than all layers; they are left out. It is 0 for estimated depth, which
+        is that of a layer or missing. With the default layers only depths at or behind the pixel array are outside.
     source : str
-        Where depth came from: ``given``, or ``focus`` with the method, as in ``focus (dissertation)``.
+        Source of depth: ``given``, or ``focus`` with the method, as in ``focus (dissertation)``.
     layer : ndarray of int64, (L', K)
-        Layer of each pixel that the virtual camera sees, −1 where it has none; L' is L, less the rows of lenses
-        that the camera does not see.
+        Layer of each pixel of the virtual camera's view, −1 without a layer. L' is L without the rows of lenses that
+        the camera does not see.
     error : ndarray of float64, (L', K)
-        Root of the mean over R, G and B of the squared error at each of these pixels, in shares of the peak.
+        RMS error over R, G and B of each of these pixels, relative to the peak.
     missing : int
-        View pixels without a depth: nothing is hit, or nothing tells the layers apart.
+        Number of view pixels without a depth: no hit, or equal costs in all layers.
     """
 
     depth_mm: NDArray[np.float64]
@@ -143,30 +142,30 @@ class DepthQuality:
     missing: int = 0
 
     def error_map(self, layer: int) -> NDArray[np.float64]:
-        """The error at the pixels of one layer, NaN at all others, (L', K)."""
+        """Return the error at the pixels of one layer, NaN at all others, (L', K)."""
         if not 0 <= layer < self.values.size:
             raise ValueError(f"layer is {layer}: 0 to {self.values.size - 1} are needed")
         return np.where(self.layer == layer, self.error, np.nan)
 
     @property
     def outside_share(self) -> float:
-        """Share of ``outside`` in the view pixels that have a depth; NaN if none has."""
+        """``outside`` over the number of view pixels with a depth; NaN without any."""
         hit = self.outside + int(self.counts.sum())
         return self.outside / hit if hit else float("nan")
 
     @property
     def min(self) -> float:
-        """Of the layers that have pixels; NaN if none has."""
+        """PSNR of the worst layer with pixels; NaN without any."""
         return float(np.min(self._held)) if self._held.size else float("nan")
 
     @property
     def mean(self) -> float:
-        """Of the layers that have pixels, each weighing the same; +inf if one of them is identical."""
+        """Arithmetic mean over layers with pixels; +inf if one of them is identical, NaN without any."""
         return float(np.mean(self._held)) if self._held.size else float("nan")
 
     @property
     def max(self) -> float:
-        """Of the layers that have pixels; NaN if none has."""
+        """PSNR of the best layer with pixels; NaN without any."""
         return float(np.max(self._held)) if self._held.size else float("nan")
 
     @property
@@ -175,5 +174,5 @@ class DepthQuality:
 
 
 def told_outside(share: float) -> str:
-    """The share of view pixels in no layer, in words."""
+    """Return a sentence with the share of view pixels outside all layers."""
     return "no view pixel has a depth" if np.isnan(share) else f"{share:.1%} of view pixels outside all layers"

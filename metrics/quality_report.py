@@ -1,4 +1,4 @@
-"""Report of all measures that a pair of pictures allows, with the reasons why others are missing."""
+"""Report of all measures that a pair of pictures allows, and reasons for the missing ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rate–distortion: measuring operating points, and Bjøntegaard's differences between curves."""
+"""Rate–distortion points of schemes, and Bjøntegaard differences between curves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sheets of charts of a pair of pictures: compute the qualities, hand them to `metrics.plots`."""
+"""Charts of a pair of pictures: computes their qualities and draws them with `metrics.plots`."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import cast
 
 from ii_core import IIPicture, checks, five_viewpoints
+from ii_core.display.figure import save
+from ii_core.display.view_sheets import plot_pair, plot_views
 from ii_core.view import camera_of
 
 from .global_angle import q_angle
 from .pair import PicturePair
+from .plots.angle_depth import angle_figure, plot_depth
 from .plots.error_maps import error_views_figure, plot_error_layers
-from .plots.overview import angle_figure, plot_depth, plot_pair, plot_views
-from .plots.rd_chart import save
 from .quality import DepthQuality
 from .view import error_map
 
@@ -31,56 +32,66 @@ PLOTS = (
 
 
 @checks.checked(path=checks.path)
-def plot_angle(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike[str]) -> None:
-    """Draw Q_angle as a heat map over the directions in which rays go.
+def plot_angle(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike[str]) -> Path:
+    """Draw Q_angle as a heat map over the viewing angle.
 
-    Identical sub-images, of infinite quality, are hatched.
+    Identical sub-images, whose quality is infinite, are hatched.
 
     Parameters
     ----------
     reference, decoded : IIPicture
         As for `q_angle`; with a camera the axes are degrees, else pixels of the elementary image.
     path : path
-        .png, .pdf or .svg. Replaced, whole.
+        .png, .pdf or .svg; replaced whole.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
     ValueError
-        As `q_angle`, or if the suffix is another.
+        As `q_angle`, or if the suffix is unknown.
 
     References
     ----------
     Olsson 2008, (2.18), Figure 4.6.
     """
-    save(angle_figure(q_angle(reference, decoded)), path)
+    return save(angle_figure(q_angle(reference, decoded)), path)
 
 
 @checks.checked(path=checks.path)
-def plot_error_views(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike[str]) -> None:
-    """Draw the error map of each of the five views, all in one scale, up to the 99th percentile.
+def plot_error_views(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike[str]) -> Path:
+    """Draw the error map of each of the five views, on one scale up to the 99th percentile.
 
     Parameters
     ----------
     reference, decoded : IIPicture
         Of the same structure and type; the reference has a camera.
     path : path
-        .png, .pdf or .svg. Replaced, whole.
+        .png, .pdf or .svg; replaced whole.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
     ValueError
-        As `error_map`, or if the suffix is another.
+        As `error_map`, or if the suffix is unknown.
     """
     PicturePair(reference, decoded)
     views = five_viewpoints(camera_of(reference))
-    save(error_views_figure({name: error_map(reference, decoded, at) for name, at in views.items()}), path)
+    return save(error_views_figure({name: error_map(reference, decoded, at) for name, at in views.items()}), path)
 
 
 @checks.checked(quality=checks.instance(DepthQuality, type(None)), folder=checks.path)
 def plot_all(
     reference: IIPicture, decoded: IIPicture, quality: DepthQuality | None, folder: str | os.PathLike[str]
 ) -> list[Path]:
-    """Draw all of PLOTS that the pictures allow into a folder.
+    """Draw all charts of `PLOTS` that the pictures allow into a folder.
 
     Returns
     -------
@@ -98,7 +109,7 @@ def plot_all(
     """
     reference, other = PicturePair(reference, decoded).pictures
     seen = reference.regular and reference.camera is not None
-    works: list[tuple[bool, Callable[[Path], None]]] = [
+    works: list[tuple[bool, Callable[[Path], Path]]] = [
         (reference.regular, lambda path: plot_angle(reference, decoded, path)),
         (seen, lambda path: plot_views(reference, decoded, path)),
         (seen, lambda path: plot_error_views(reference, decoded, path)),
@@ -107,9 +118,4 @@ def plot_all(
         (quality is not None, lambda path: plot_depth(cast(DepthQuality, quality), path)),
         (quality is not None, lambda path: plot_error_layers(reference, cast(DepthQuality, quality), path)),
     ]
-    paths = []
-    for name, (possible, draw) in zip(PLOTS, works, strict=True):
-        if possible:
-            paths.append(Path(folder, name))
-            draw(paths[-1])
-    return paths
+    return [draw(Path(folder, name)) for name, (possible, draw) in zip(PLOTS, works, strict=True) if possible]

@@ -1,4 +1,4 @@
-"""Rate–distortion studies on disk: what was measured, on what, with what."""
+"""Files of rate–distortion studies: points, picture and provenance."""
 
 from __future__ import annotations
 
@@ -41,23 +41,27 @@ def write_study(
     *,
     picture: IIPicture,
     anchor: str | None = None,
-) -> None:
-    """Write the records of `rate_distortion` and everything needed to judge them, as JSON.
+) -> Path:
+    """Write the records of `rate_distortion` and their provenance as JSON.
 
     Parameters
     ----------
     path : path
-        Replaced, whole.
+        Replaced whole.
     picture_name : str
-        What charts call it.
+        Title of charts.
     records : sequence of dict
     extra : dict, optional
-        Anything else worth keeping, plain values.
+        Further plain values to store.
     picture : IIPicture
-        What was coded: its structure and the SHA-256 of its pixels are kept.
+        The coded picture; the file stores its structure and the SHA-256 of its pixels.
     anchor : str, optional
-        The scheme that others are compared with, the first if not given. For every measure the file has the
-        `differences` to it.
+        Scheme of comparison; the first if not given. The file holds the `differences` to it in every measure.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
@@ -69,7 +73,7 @@ def write_study(
     check_points(records)
     study = {"points": records, "anchor": anchor}
     measured = measures_of(records) if records else []
-    write_json(
+    return write_json(
         path,
         {
             "format": FORMAT,
@@ -80,14 +84,14 @@ def write_study(
             "extra": dict(extra or {}),
             "anchor": anchor or (records[0]["scheme"] if records else None),
             "differences": {name: spelt(differences(study, measure=name)) for name in measured},
-            # Infinity is no JSON number: a lossless point says so, other qualities are spelt out.
+            # JSON has no infinity: lossless points are marked, other infinite qualities are text.
             "points": [{**spelt(dict(record)), "lossless": record["q_global"] == math.inf} for record in records],
         },
     )
 
 
 def picture_json(name: str, picture: IIPicture) -> dict[str, Any]:
-    """Return what identifies a picture: the SHA-256 of its pixels, their type, and its structure."""
+    """Return the identity of a picture: the SHA-256 of its pixels, their type, and its structure."""
     return {
         "name": name,
         "sha256": hashlib.sha256(np.ascontiguousarray(picture.pixels).data).hexdigest(),
@@ -99,7 +103,7 @@ def picture_json(name: str, picture: IIPicture) -> dict[str, Any]:
 
 @checks.checked(path=checks.path)
 def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read what `write_study` wrote; ``["points"]`` equal its records, infinite qualities too.
+    """Read a study of `write_study`; its ``["points"]`` equal the records, infinite qualities included.
 
     Raises
     ------
@@ -126,7 +130,7 @@ def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def provenance() -> dict[str, Any]:
-    """What a number was measured on: commit, machine and versions of the libraries."""
+    """Return the provenance of a measurement: commit, machine and versions of libraries."""
     return {
         "git": _git(),
         "machine": {"platform": platform.platform(), "cpus": os.cpu_count()},
@@ -135,9 +139,9 @@ def provenance() -> dict[str, Any]:
 
 
 def _git() -> dict[str, Any] | None:
-    """Commit of the checkout this code runs from, and whether its code was changed; None outside of one.
+    """Return the commit of this checkout and whether its code was changed; None outside a checkout.
 
-    Numbers and pages that a study has just written are not code: what is measured next still is of the commit.
+    Records and pages are not code: writing them does not change the commit of the next measurement.
     """
     folder = Path(__file__).parent
 
@@ -146,7 +150,7 @@ def _git() -> dict[str, Any] | None:
         return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
 
     try:
-        git("ls-files", "--error-unmatch", __file__)  # installed into somebody else's checkout is not ours
+        git("ls-files", "--error-unmatch", __file__)  # fails for an installation inside another checkout
         return {"commit": git("rev-parse", "HEAD"), "dirty": bool(git("status", "--porcelain", "--", *CODE))}
     except (OSError, subprocess.SubprocessError):
         return None

@@ -1,4 +1,4 @@
-"""Structural similarity of what a viewer of the display sees."""
+"""Q_view: structural similarity of the five view images; error maps."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IIPicture, checks, five_viewpoints, view_image
+from ii_core.picture import peak
 from ii_core.view import camera_of
 
 from .global_angle import psnr
-from .pair import PicturePair, peak
+from .pair import PicturePair
 from .quality import ViewQuality
 
 WINDOW = 11  # pixels across the Gaussian of Wang 2004
-# BT.601, as MATLAB's rgb2gray, with which Wang's ssim.m is used.
+# BT.601, as in MATLAB's rgb2gray, which is usual with Wang's ssim.m.
 LUMA = np.array([0.2989, 0.5870, 0.1140])
 
 
@@ -29,32 +30,32 @@ def q_view(
     viewpoints: Mapping[str, ArrayLike] | None = None,
     mask: ArrayLike | None = None,
 ) -> ViewQuality:
-    """Mean structural similarity, and PSNR, of five view images: front, up, down, left and right.
+    """Return mean structural similarity and PSNR of five view images: front, up, down, left and right.
 
-    The SSIM is that of Wang et al. 2004: luma on a range of 255, an 11×11 Gaussian window of σ = 1.5,
-    K1 = 0.01, K2 = 0.03, averaged over the region the window fits into. Luma is BT.601, not rounded; code
-    values of other types are scaled to 255 and taken as they are, without a change of gamma.
+    SSIM follows Wang et al. 2004: luma on a range of 255, an 11×11 Gaussian window of σ = 1.5, K1 = 0.01, K2 = 0.03,
+    averaged where the whole window fits. Luma is BT.601, unrounded. Code values of other types are scaled to 255
+    without a change of gamma.
 
     Parameters
     ----------
     reference, decoded : IIPicture
         Of the same structure and type; the reference has a camera.
     viewpoints : mapping of str to array_like (3,), optional
-        Where from, mm in camera coordinates; `five_viewpoints` of the camera if not given.
+        Viewpoints by name, mm in camera coordinates; `five_viewpoints` if not given.
     mask : array_like of bool, (N, M), optional
-        Which pixels count; see `q_global`. A view pixel counts if all do that it is interpolated from.
+        Pixels that count; see `q_global`. A view pixel counts if all pixels of its interpolation count.
 
     Returns
     -------
     ViewQuality
-        ``values`` by view name, and ``mean``; 1 for identical pictures. View pixels whose line leaves the pixel
-        array are not valid: PSNR leaves them out, MSSIM every window that holds one.
+        ``values`` by view name, and ``mean``; 1 for identical pictures. View pixels whose line misses the pixel array
+        are not valid: PSNR omits them, and MSSIM omits every window that contains one.
 
     Raises
     ------
     ValueError
-        If the pictures differ in structure or type, have no camera, have fewer than 11 lenses across or down,
-        or hold a pixel in view that is not finite; if there is no viewpoint, or one is not before the lens plane.
+        If the pictures differ in structure or type, have no camera, have fewer than 11 lenses across or down, or hold
+        a pixel in view that is not finite; if there is no viewpoint, or one is not in front of the lens plane.
 
     References
     ----------
@@ -64,7 +65,7 @@ def q_view(
 
 
 def view_quality(pair: PicturePair, viewpoints: Mapping[str, ArrayLike] | None = None) -> ViewQuality:
-    """`q_view` of a pair."""
+    """Return `q_view` of a pair."""
     camera = camera_of(pair.reference)
     k, l = pair.reference.lenses
     if min(k, l) < WINDOW:
@@ -85,7 +86,7 @@ def view_quality(pair: PicturePair, viewpoints: Mapping[str, ArrayLike] | None =
 
 
 def view_pair(pair: PicturePair, viewpoint_mm: ArrayLike) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_]]:
-    """Return the same view image of both pictures, (L, K, 3) each, and where it is valid, (L, K)."""
+    """Return the view images of both pictures, (L, K, 3) each, and their valid pixels, (L, K)."""
     (a, valid), (b, _) = (view_image(picture, viewpoint_mm) for picture in pair.pictures)
     if pair.mask is not None:
         counted = np.repeat(pair.mask[..., None].astype(np.float32), 3, axis=2)
@@ -102,17 +103,17 @@ def error_map(reference: IIPicture, decoded: IIPicture, viewpoint_mm: Any) -> ND
     reference, decoded : IIPicture
         Of the same structure and type; the reference has a camera.
     viewpoint_mm : array_like, (3,)
-        Camera coordinates, before the lens plane.
+        Camera coordinates, in front of the lens plane.
 
     Returns
     -------
     ndarray of float64, (L, K)
-        In shares of the peak; NaN where the line of sight leaves the pixel array.
+        Error over the peak; NaN if the line of sight misses the pixel array.
 
     Raises
     ------
     TypeError, ValueError
-        If the pictures differ in structure or type, the reference has no camera, or the viewpoint is none.
+        If the pictures differ in structure or type, the reference has no camera, or the viewpoint is invalid.
     """
     a, b, valid = view_pair(PicturePair(reference, decoded), viewpoint_mm)
     error = np.sqrt(np.square(a.astype(np.float64) - b).mean(axis=-1)) / peak(a.dtype)

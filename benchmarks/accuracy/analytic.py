@@ -1,4 +1,4 @@
-"""A second ray tracer to hold the first against: balls and a floor in closed form, float64, no triangles.
+"""Reference ray tracer: spheres and a floor in closed form, float64, no triangles.
 
 It shares nothing with `raytrace_ii` but the plain values of its materials and lights; intersections, Snell, Fresnel,
 shadows and sky are written again. `World.scene` is the same world as triangle meshes.

@@ -1,4 +1,4 @@
-"""The camera modelled inside the scene against the camera as L/D maps: the same picture, and in what time.
+"""Camera modelled as lens meshes in the scene against L/D maps: equal pictures, CPU time.
 
     python -m benchmarks run camera_in_scene [--scale 16]
 

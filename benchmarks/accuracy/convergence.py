@@ -1,4 +1,4 @@
-"""How fast meshes become the shapes they stand for: errors against closed forms, over the size of the triangles.
+"""Convergence of meshes to the shapes they approximate: error against closed forms over triangle size.
 
     python -m benchmarks run convergence [--finest 768]
 
@@ -25,8 +25,8 @@ from benchmarks.accuracy.camera_in_scene import lens_bodies
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.records import Records, add_again
 from ii_core import IICamera, preset
+from ii_core.display.figure import COLOURS
 from ii_core.optics import SphericalLenslet
-from metrics.plots.rd_chart import COLOURS
 from raytrace_ii import Body, Light, Material, Scene, trace
 from raytrace_ii.scene.textures import Image
 

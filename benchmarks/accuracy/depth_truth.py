@@ -1,4 +1,4 @@
-"""How well depth from focus finds the depth that the renderer knows, and what its errors do to Q_depth.
+"""Depth from focus against the depth of the renderer, and the effect of its errors on Q_depth.
 
     python -m benchmarks run depth_truth [--scale 2] [--scenes apples,cuboid]
 
@@ -25,11 +25,11 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, add_again, origin, with_commits
 from codec import decode, encode
 from ii_core import IIPicture, add_sensor_noise, preset
+from ii_core.display.figure import COLOURS, new_figure, save
 from ii_core.view import camera_of
 from metrics import DepthQuality, FocusDepth, depth_from_focus, linear_layers, q_depth
 from metrics.depth.focus import METHODS
 from metrics.depth.virtual_camera import virtual_camera_pixels
-from metrics.plots.rd_chart import COLOURS, new_figure, save
 from raytrace_ii import Scene, Shot, load_scene, render
 
 RECORDS, CHART = Records("depth_truth", ("benchmarks.accuracy.depth_truth",)), ROOT / "docs/images/depth_truth.png"

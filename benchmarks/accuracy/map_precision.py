@@ -1,4 +1,4 @@
-"""The price of storing a camera as pictures: errors of L and D and of the rendered picture, against bytes.
+"""Cameras stored as pictures: errors of L, D and the rendered picture against bytes.
 
     python -m benchmarks run map_precision [--scale 4]
 

@@ -1,4 +1,4 @@
-"""A third opinion: the still life by POV-Ray 3.7, with the same primitives, lights and rays.
+"""Still life rendered by POV-Ray 3.7 with the same primitives, lights and rays.
 
     python -m benchmarks run povray [--scale 16]
 

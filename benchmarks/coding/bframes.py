@@ -1,4 +1,4 @@
-"""Why B pictures hurt in the dissertation's Table 5.5 and help elsewhere: one thing changed at a time.
+"""B pictures: loss in Table 5.5 of the dissertation, gain elsewhere; one condition changed at a time.
 
 ``python -m benchmarks run bframes --scale 4`` codes sub-images of four scenes with 0 to 3 and 7 B pictures between P
 pictures under several conditions. What is kept is the Bjøntegaard difference in PSNR to the same condition without

@@ -1,4 +1,4 @@
-"""Every scheme and named setting against the dissertation's: rate at equal quality, and what it costs.
+"""Bjøntegaard rate and CPU time of every scheme and preset against the dissertation's coder.
 
     python -m benchmarks run coders [--scale 4] [--scenes apples,car] [--schemes 'si-h264,si-av1*'] [--workers 2]
 
@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import statistics
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from fnmatch import fnmatch
 from itertools import count
 from pathlib import Path
@@ -27,6 +26,7 @@ from benchmarks.records import Records, add_again, origin, with_commits
 from codec import parse_scheme, schemes
 from codec.contract import find
 from ii_core import IIPicture, preset
+from ii_core.parallel import for_each
 from metrics import bd_rate
 from metrics.rd import UndefinedDifference
 from raytrace_ii import load_scene, render
@@ -110,12 +110,7 @@ def measure(picture: IIPicture, keys: Sequence[Mapping[str, Any]], workers: int)
         record = RECORDS.measure(key, lambda: {"points": curve(picture, key["scheme"])})
         print(f"{next(done)} of {len(keys)}: {key['scene']} {key['scheme']}, {record['seconds']:.1f} s", flush=True)
 
-    pool = ThreadPoolExecutor(workers)
-    try:
-        for future in [pool.submit(row, key) for key in keys]:
-            future.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
+    for_each(row, keys, workers=workers)
 
 
 def studied(scale: int) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""What coding costs: CPU time inside the coder, rearrangement apart, and peak memory, for every scheme.
+"""Cost of coding: CPU time inside the coder, rearrangement and peak memory of every scheme.
 
     python -m benchmarks run cost [--scale 2] [--scene apples] [--schemes si-h264,...] [--runs 3]
 

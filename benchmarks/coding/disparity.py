@@ -1,4 +1,4 @@
-"""Why a scene codes well or not: how far its points move between neighbouring sub-images, and how many vanish.
+"""Disparity and occlusion between neighbouring sub-images, scene by scene.
 
     python -m benchmarks run disparity [--scale 2] [--scenes apples,cuboid]
 

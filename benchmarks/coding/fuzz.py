@@ -1,4 +1,4 @@
-"""Damage coded pictures at random and see that decoding never does worse than say so.
+"""Fuzzing of decoders: random damage to coded pictures, counted by the kind of ending.
 
     python -m benchmarks run fuzz [--mutations 4000] [--workers 2] [--schemes si-h264,...] [--seed 0]
 
@@ -33,6 +33,7 @@ from benchmarks.records import Records, add_again, origin
 from codec import Encoded, decode, encode, schemes
 from codec.contract import find
 from ii_core import IIPicture
+from ii_core.parallel import for_each
 
 RECORDS = Records("fuzz", ("benchmarks.coding.fuzz",))
 LENSES, EI = (16, 8), (4, 4)
@@ -67,12 +68,7 @@ def main() -> None:
         record = RECORDS.measure(key, lambda: watched(key["scheme"], seed, count))
         print(f"{key['scheme']}: {record['result']}", flush=True)
 
-    pool = ThreadPoolExecutor(arguments.workers)
-    try:
-        for future in [pool.submit(row, key) for key in RECORDS.todo(keys, arguments.again)]:
-            future.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
+    for_each(row, RECORDS.todo(keys, arguments.again), workers=arguments.workers)
     publish(tables())
 
 

@@ -1,4 +1,4 @@
-"""What structure alone costs: header portions measured, taken apart and predicted, and who codes better for it.
+"""Header portions: measured, by purpose, predicted; and the kind of component image that codes best.
 
     python -m benchmarks run headers [--scale 4] [--scene apples] [--schemes si-hevc,...] [--sides 16,64]
 

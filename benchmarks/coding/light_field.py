@@ -1,4 +1,4 @@
-"""`si-lf` against the best of the other schemes: rate at equal PSNR, its tools one by one, and CPU time.
+"""`si-lf` against the other schemes: rate at equal PSNR, gain of each tool, CPU time.
 
     python -m benchmarks run light_field [--pictures car,car-9x9] [--again missing]
 

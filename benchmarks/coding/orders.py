@@ -1,4 +1,4 @@
-"""What every order of every kind of component image promises, on the coding scenes, before anything is coded.
+"""Correlation and residual energy of every order of component images, before coding.
 
     python -m benchmarks run orders [--scale 2] [--scenes apples,twins,car,cuboid]
 

@@ -1,4 +1,4 @@
-"""What the volume gains: SI-PVI against sub-images coded apart, JPEG 2000 on the plain picture and SI-PVS.
+"""SI-PVI against sub-images coded alone, JPEG 2000 on the II-picture, and SI-PVS.
 
     python -m benchmarks run volume [--scale 4] [--scenes apples cuboid]
 

@@ -1,1 +1,1 @@
-"""Pictures and tables of README and docs, made from records and from code."""
+"""Generated pictures and tables of README and docs."""

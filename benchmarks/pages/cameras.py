@@ -1,4 +1,4 @@
-"""Draw ``docs/cameras.md``, every camera with its maps, a detail of its picture and a view.
+"""Page docs/cameras.md: every camera with its maps, a detail of its picture and a view.
 
     python -m benchmarks run cameras
 

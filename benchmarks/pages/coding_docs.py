@@ -1,4 +1,4 @@
-"""Tables and charts of coders, in docs/coding.md and docs/speed_accuracy.md."""
+"""Tables and charts of coders for docs/coding.md and docs/speed_accuracy.md."""
 
 from __future__ import annotations
 

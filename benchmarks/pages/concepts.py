@@ -1,4 +1,4 @@
-"""Draw the pictures of ``docs/concepts.md``: what the parts of an II-picture are, from one small render.
+"""Pictures of docs/concepts.md: the parts of an II-picture, from one small render.
 
     python -m benchmarks run concepts
 

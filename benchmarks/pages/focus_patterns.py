@@ -1,4 +1,4 @@
-"""Draw what depth from focus goes by: the lenses of B and R, the filter h, and the lenses of the robust method.
+"""Diagram of depth from focus: the lenses of B and R, the filter h, the lenses of the robust method.
 
     python -m benchmarks run focus_patterns
 
@@ -14,9 +14,9 @@ import numpy as np
 from benchmarks.pages.pictures import write_picture
 from benchmarks.records import ROOT
 from ii_core import preset
+from ii_core.display.figure import COLOURS, new_figure, save
 from metrics import linear_layers
 from metrics.depth.focus import BASE, FILTER, NOWHERE, REFERENCE, pixels_per_lens, whole_pixel_steps
-from metrics.plots.rd_chart import COLOURS, new_figure, save
 
 CHART = ROOT / "docs/images/focus_patterns.png"
 

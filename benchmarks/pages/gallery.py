@@ -1,4 +1,4 @@
-"""Gallery of reference scenes: a page of the viewer for each, and a still.
+"""Gallery of reference scenes: a viewer page and a still of each.
 
     python -m benchmarks run gallery [--missing] [--stills] [--scale 2]
 

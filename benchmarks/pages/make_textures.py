@@ -1,4 +1,4 @@
-"""Draw the textures of the reference scenes: ``python -m benchmarks.pages.make_textures``.
+"""Textures of the reference scenes, drawn: ``python -m benchmarks.pages.make_textures``.
 
 The same numbers give the same bytes.
 """

@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/metrics.md that show what `measure` and `study` leave.
+"""Pictures of docs/metrics.md: the charts that `measure` and `study` write.
 
     python -m benchmarks run metrics_gallery
 

@@ -1,4 +1,4 @@
-"""Pictures of README and docs: no wider than a page shows; charts with a palette, photographs as PNG or JPEG."""
+"""Pictures of README and docs: width of a page, palette for charts, PNG or JPEG for photographs."""
 
 from __future__ import annotations
 

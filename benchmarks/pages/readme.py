@@ -1,4 +1,4 @@
-"""Put measured pictures and figures where the README shows them: ``python -m benchmarks run readme``.
+"""Measured pictures and figures of the README: ``python -m benchmarks run readme``.
 
 Takes the studies of ``make demo`` (out/demo) and of ``python examples/demo.py --scale 1 -o out/full``, keeps their
 numbers in ``benchmarks/results`` and fills the tables between the marks of README and docs/study.md from what is

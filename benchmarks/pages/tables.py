@@ -1,4 +1,4 @@
-"""Generated tables of README and docs: which benchmark fills which marks, and whether pages hold what records give.
+"""Generated tables of README and docs: their owners, publication, and check against the records.
 
     python -m benchmarks run tables [--check]
 

@@ -1,1 +1,1 @@
-"""Benchmarks of time: rendering, metrics and the viewer, alone and against accuracy."""
+"""Benchmarks of CPU time: rendering, metrics and the viewer, alone and against accuracy."""

@@ -1,4 +1,4 @@
-"""What the encoder library alone needs: the same parameters, on frames that lie ready."""
+"""CPU time of the encoder library alone: same parameters, frames prepared beforehand."""
 
 from __future__ import annotations
 

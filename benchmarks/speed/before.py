@@ -1,4 +1,4 @@
-"""CPU time of this code and of an earlier commit's on the same pictures, in turns within one run.
+"""CPU time of this code and of an earlier commit on the same pictures, interleaved within one run.
 
 A process for each code, both started at once, render the same bands of full ``setup1`` with one thread, one after the
 other, never together. The earlier code comes from a git worktree in a temporary folder. Its process also makes again

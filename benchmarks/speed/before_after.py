@@ -1,4 +1,4 @@
-"""What a change of the code does to pictures of scenes, and to the coder that the tables are anchored to.
+"""Effect of a change of the code on rendered pictures and on the anchor coder.
 
 ``python -m benchmarks run before_after -- b1dc540 --scenes twins,hairdo --scale 4`` renders each scene by the code of
 that commit, in a work tree of its own, and by the code at hand. It reports the PSNR of the two pictures, the share of

@@ -1,4 +1,4 @@
-"""What the metrics cost at the full size of setup1, 33.5 Mpixel, and what Q_depth's accuracy costs.
+"""CPU time of the metrics at the full size of setup1 (33.5 Mpixel), and Q_depth accuracy against time.
 
     python -m benchmarks run metrics_speed
 
@@ -28,9 +28,9 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, add_again, origin, with_commits
 from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, preset
+from ii_core.display.figure import COLOURS, MARKERS, new_figure, save
 from metrics import depth_from_focus, linear_layers, q_angle, q_depth, q_global, q_view
 from metrics.depth.virtual_camera import virtual_camera_pixels
-from metrics.plots.rd_chart import COLOURS, MARKERS, new_figure, save
 from metrics.view import LUMA, view_pair
 from raytrace_ii import Shot, load_scene, render
 

@@ -1,4 +1,4 @@
-"""What a scene needs: what leaving each thing out costs in quality and saves in time, and the least that will do.
+"""Scene requirements: loss in quality and gain in time of leaving out each feature; cheapest adequate settings.
 
     python -m benchmarks run needs [--scale 16] [--scenes apples,car] [--rounds 5]
 
@@ -30,8 +30,8 @@ from benchmarks.records import ROOT, Records, add_again, by_scene
 from benchmarks.speed.pareto import BASE, SCENES, at_depth, cut_scene, scene_text, sizes
 from ii_core import IICamera, IIPicture, add_sensor_noise, preset
 from ii_core.component import light_field
+from ii_core.display.figure import COLOURS, new_figure, save
 from metrics import q_global, q_view
-from metrics.plots.rd_chart import COLOURS, new_figure, save
 from raytrace_ii import Body, Scene, Shot, render
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, VertexColours
 from raytrace_ii.tracing.intersect import Hits

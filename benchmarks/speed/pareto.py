@@ -1,4 +1,4 @@
-"""Speed against accuracy: CPU time and error of every setting, scene by scene, and the setting to take.
+"""Speed against accuracy: CPU time and error of every setting, scene by scene, and its Pareto front.
 
     python -m benchmarks run pareto [--scale 32] [--scenes apples,car]
 
@@ -28,8 +28,8 @@ from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, add_again, by_scene, origin
 from ii_core import IICamera, IIPicture, preset
+from ii_core.display.figure import COLOURS
 from metrics import q_global
-from metrics.plots.rd_chart import COLOURS
 from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.tracing.packing import packed, share
 

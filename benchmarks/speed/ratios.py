@@ -1,4 +1,4 @@
-"""How fast, as ratios taken within one run: ours against the library's bare call or a copy. ``make bench``.
+"""Speed ratios within one run: our functions against the library's bare call or a copy. ``make bench``.
 
 Everything is interleaved and the median taken, because machines drift. Numbers go to
 ``benchmarks/results/speed.jsonl`` with the commit they were taken on.

@@ -1,4 +1,4 @@
-"""Texture filter: CPU time and PSNR by samples a pixel, with textures filtered and read at points.
+"""Texture filter: CPU time and PSNR over samples per pixel, filtered and point-sampled.
 
     python -m benchmarks run texture_filter [--scale 32] [--scenes cuboid,twins]
 
@@ -18,8 +18,8 @@ from typing import Any
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, add_again, by_scene
 from ii_core import preset
+from ii_core.display.figure import COLOURS, new_figure, save
 from metrics import q_global
-from metrics.plots.rd_chart import COLOURS, new_figure, save
 from raytrace_ii import load_scene, render
 
 RECORDS, CHART = Records("texture_filter", ("benchmarks.speed.texture_filter",)), "docs/images/texture_filter.png"

@@ -1,1 +1,1 @@
-"""Where methods fail, hunted: one function a case, each giving rows of measured numbers."""
+"""Limits of the methods: one function per case, each returning rows of measured numbers."""

@@ -1,4 +1,4 @@
-"""Hunt for where methods fail: ``python -m benchmarks run stability [-- case ...]``.
+"""Limits of the methods, measured: ``python -m benchmarks run stability [-- case ...]``.
 
 Every case sweeps one thing until it breaks; cases can be run one by one. Numbers go to
 ``benchmarks/results/stability.jsonl``, pictures to ``docs/images``, tables to ``docs/stability.md``,
@@ -18,8 +18,8 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, add_again, origin
 from benchmarks.stability import curves, depth, geometry, light, picture, pictures
 from benchmarks.stability.geometry import Row
+from ii_core.display.figure import COLOURS
 from metrics.depth.focus import METHODS
-from metrics.plots.rd_chart import COLOURS
 
 ACCURACY = tuple(f"benchmarks.accuracy.{name}" for name in ("analytic", "map_precision", "depth_truth"))
 RECORDS = Records("stability", ("benchmarks.stability", *ACCURACY))

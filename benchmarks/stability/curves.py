@@ -1,4 +1,4 @@
-"""Where Bjøntegaard's figure fails: curves that hardly overlap, that dip, or that have few points.
+"""Limits of Bjøntegaard differences: little overlap, non-monotonic curves, few points.
 
 The truth is known, for the curves are cut out of measured ones, joined by monotone cubics (Fritsch and Carlson 1980)
 and taken as exact: those in ``rd_curves.json`` beside this file, by ``benchmarks.coding.coders`` on two scenes. They

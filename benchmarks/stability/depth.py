@@ -1,4 +1,4 @@
-"""Where depth from focus fails: less to see than noise, two things in one line, highlights that wander."""
+"""Limits of depth from focus: low contrast against noise, two depths along one line, moving highlights."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where triangles and floating point fail: own hits, distance, coplanar, turned, doubled and missing faces, sizes."""
+"""Limits of triangles and floating point: self-hits, distance, coplanar, reversed, double and missing faces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where light fails: the terminator of coarse smooth meshes, grazing angles, cameras and lamps in bodies, bounces."""
+"""Limits of shading: terminator of coarse meshes, grazing angles, cameras and lamps inside bodies, recursion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where pictures fail: non-integer pitch, the border of the viewing zone, the ends of rate control, tiny frames."""
+"""Limits of pictures: non-integer lens pitch, border of the viewing zone, extreme rates, tiny frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What failures look like: two strips of small pictures for the page, which says what they are."""
+"""Pictures of failures for docs/stability.md: two strips of details."""
 
 from __future__ import annotations
 

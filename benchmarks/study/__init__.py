@@ -1,4 +1,4 @@
-"""Every figure and table of Olsson 2008 again, from one command; and what lies beyond them.
+"""Study: every figure and table of Olsson 2008 from one command, and further experiments.
 
     python -m benchmarks run study [--scale N] [--only NAME,...] [--out DIR] [--force] [--list] [--publish]
 

@@ -1,4 +1,4 @@
-"""The command: see the package."""
+"""Command line of the study; see the package."""
 
 from __future__ import annotations
 

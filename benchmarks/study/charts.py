@@ -1,4 +1,4 @@
-"""Charts of the study, drawn from its records and from nothing else."""
+"""Charts of the study, drawn from its records."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.records import number
+from ii_core.display.figure import COLOURS, LINES, MARKERS, new_figure, save
 from metrics.plots.depth_chart import depth_rate_chart
-from metrics.plots.rd_chart import COLOURS, LINES, MARKERS, edges, new_figure, save, set_rate_axis
+from metrics.plots.rd_chart import edges, set_rate_axis
 
 from .claims import NAMES, Results, of_scenes
 from .rates import MODERN, REFERENCE, SI, VOLUME

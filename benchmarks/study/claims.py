@@ -1,4 +1,4 @@
-"""Ours beside theirs: numbers out of the records, and whether they agree."""
+"""Comparison of our numbers with those of Olsson 2008."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of the setups, and curves of what coders make of them."""
+"""Pictures of the setups, and rate–distortion curves of schemes on them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 from benchmarks.coding.coders import qualities
 from benchmarks.coding.rd import rd_point
 from ii_core import IIPicture, preset
+from ii_core.parallel import cores
 from raytrace_ii import Shot, load_scene, render
-from raytrace_ii.rendering.render import cores
 
 SCENES = ("apples", "twins", "car", "cuboid")
 RATES = (0.015, 0.03, 0.06, 0.15, 0.3, 0.63, 1.0, 1.5)  # bit per pixel, the range of Olsson 2008, §5.7.3

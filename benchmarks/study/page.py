@@ -1,4 +1,4 @@
-"""Fill docs/study.md: what was found, beside what the dissertation found."""
+"""Page docs/study.md: tables and charts of our results beside those of Olsson 2008."""
 
 from __future__ import annotations
 

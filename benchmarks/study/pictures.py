@@ -1,4 +1,4 @@
-"""Pictures that show no measurement: component images, II-pictures through other cameras, five views."""
+"""Pictures without measurements: component images, other cameras, the five views."""
 
 from __future__ import annotations
 

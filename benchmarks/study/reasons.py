@@ -1,4 +1,4 @@
-"""Tests of why numbers are not the dissertation's: framing, search for motion, x264 set as in 2008, many frames."""
+"""Tests of causes of differences from Olsson 2008: framing, motion search, x264 as of 2008, number of frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Steps, and their records: what is there is not done again, and nothing that was found is overwritten."""
+"""Steps of the study and their records; a step with a record is not repeated."""
 
 from __future__ import annotations
 

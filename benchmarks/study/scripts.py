@@ -1,4 +1,4 @@
-"""Experiments that have a script and a page of their own, run as they stand there."""
+"""Benchmarks with pages of their own, run as steps of the study."""
 
 from __future__ import annotations
 

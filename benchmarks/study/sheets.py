@@ -1,4 +1,4 @@
-"""Pictures side by side."""
+"""Contact sheets of images of one size."""
 
 from __future__ import annotations
 

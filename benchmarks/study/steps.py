@@ -1,4 +1,4 @@
-"""All steps in the order in which they are done: what is quick and what others rest on first."""
+"""All steps of the study in their order: quick steps, and steps that others need, first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Setup 2 and beyond: which component image wins, over elementary images and pictures of all sizes (§5.8.3)."""
+"""Setup 2: best kind of component image over sizes of elementary images and pictures (§5.8.3)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 from benchmarks.coding.headers import SIDES, duel
 from ii_core import preset
+from ii_core.parallel import cores
 from raytrace_ii import load_scene, render
-from raytrace_ii.rendering.render import cores
 
 from .runner import Step
 

@@ -1,4 +1,4 @@
-"""What Olsson 2008 found, as far as its text and tables say it in numbers, and what agreement means."""
+"""Results of Olsson 2008 in numbers, as its text and tables give them, and criteria of agreement."""
 
 from __future__ import annotations
 

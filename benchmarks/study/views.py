@@ -1,4 +1,4 @@
-"""Setup 3: what coding does to views and depths (§4.3, §5.8.5), over rate and at equal quality."""
+"""Setup 3: effect of coding on views and depth layers (§4.3, §5.8.5), over rate and at equal quality."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, view_image
 from ii_core.files import write_image
+from ii_core.parallel import cores
 from ii_core.view import camera_of
 from metrics import (
     FocusDepth,
@@ -27,7 +28,6 @@ from metrics import (
 )
 from metrics.depth.layers import virtual_viewpoint
 from raytrace_ii import Shot
-from raytrace_ii.rendering.render import cores
 
 from .coding import CODED, SCENES, curves, setup3_scale, shot
 from .rates import REFERENCE, VOLUME

@@ -1,4 +1,4 @@
-"""The volume coded by JPEG 2000 Part 10's own verification model, where that is installed (Olsson 2008, §5.7.3.2).
+"""Volume coded by the verification model of JPEG 2000 Part 10, if installed (Olsson 2008, §5.7.3.2).
 
 It is part of OpenJPEG up to 2.4: ``cmake -DBUILD_JP3D=ON`` makes ``opj_jp3d_compress`` and
 ``opj_jp3d_decompress``, which the steps look for on the path. It takes grey volumes and nothing else, so each colour

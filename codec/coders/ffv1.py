@@ -1,4 +1,4 @@
-"""FFV1 by FFmpeg: lossless coding of RGB with 8 and 16 bit."""
+"""FFV1 coder, by FFmpeg: lossless RGB with 8 and 16 bit."""
 
 from __future__ import annotations
 

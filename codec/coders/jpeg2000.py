@@ -1,4 +1,4 @@
-"""JPEG 2000 Part 1 on the whole II-picture: the anchor of comparisons."""
+"""JPEG 2000 Part 1 coder of the whole II-picture: the anchor of comparisons."""
 
 from __future__ import annotations
 

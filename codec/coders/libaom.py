@@ -1,4 +1,4 @@
-"""AV1 at 4:4:4 by libaom, through imagecodecs: an AVIF image sequence without its boxes.
+"""AV1 coder at 4:4:4, by libaom through imagecodecs: an AVIF image sequence without its boxes.
 
 imagecodecs takes RGB and converts it to YCbCr. With an identity matrix it does not convert: our Y, Cb and Cr stand in
 the places of G, B and R. The payload is the AV1 stream alone.

@@ -1,11 +1,11 @@
 """Dyadic wavelets along the slice axis of a volume, by lifting in place.
 
-Rows are slices. After a transform row 0 and every 2^levels-th after it hold the lowest band, and a row j whose number
-has t trailing zero bits holds a sample of the high band of level t + 1: no row moves. Ends are extended by
-whole-sample symmetry, as in JPEG 2000, so that any number of rows will do.
+Rows are slices, and rows do not move. After a transform, every 2^levels-th row from row 0 on holds the lowest band. A
+row whose number has t trailing zero bits holds a sample of the high band of level t + 1. Ends are extended by
+whole-sample symmetry, as in JPEG 2000, for any number of rows.
 
-The filters are the lifting steps of Part 1 without its scaling steps. Instead `synthesis_gains` tells for each row by
-how much an error in it grows: scaled by these, all rows count alike in a squared error.
+The filters are the lifting steps of Part 1 without its scaling steps. `synthesis_gains` returns the growth of an
+error in each row; rows scaled by it contribute equally to a squared error.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ STEPS = {
 
 
 def steps(wavelet: str) -> NDArray[np.float32]:
-    """The lifting factors of a wavelet for `forward` and `backward`."""
+    """Return the lifting factors of a wavelet for `forward` and `backward`."""
     return np.array(STEPS[wavelet], np.float32)
 
 
@@ -39,7 +39,7 @@ def forward(rows, factors, levels):
 
 @kernel
 def backward(rows, factors, levels):
-    """The inverse of `forward`, but for rounding."""
+    """Invert `forward`, within rounding."""
     for level in range(levels - 1, -1, -1):
         for i in range(factors.size - 1, -1, -1):
             _lift(rows, 1 << level, (i + 1) % 2, -factors[i])
@@ -55,7 +55,7 @@ def forward_reversible(rows, levels):
 
 @kernel
 def backward_reversible(rows, levels):
-    """The inverse of `forward_reversible`, exactly."""
+    """Invert `forward_reversible` exactly."""
     for level in range(levels - 1, -1, -1):
         _lift_whole(rows, 1 << level, 0, -1)
         _lift_whole(rows, 1 << level, 1, -1)
@@ -63,7 +63,7 @@ def backward_reversible(rows, levels):
 
 @inline_kernel
 def _neighbours(count, step, row):
-    """The rows before and after one at a distance, each the other's mirror image beyond the ends."""
+    """Return the rows at a distance before and after a row; beyond an end, the row on the other side."""
     before, after = row - step, row + step
     if before < 0:
         before = after
@@ -74,7 +74,7 @@ def _neighbours(count, step, row):
 
 @inline_kernel
 def _lift(rows, step, odd, factor):
-    """Add to every even or odd one of the rows at a distance ``step`` its neighbours' sum times a factor."""
+    """Add to every even or odd row of the grid of ``step`` the sum of its neighbours times a factor."""
     if rows.shape[0] > step:  # a single row has no neighbours and is its own low band
         for row in range(odd * step, rows.shape[0], 2 * step):
             before, after = _neighbours(rows.shape[0], step, row)
@@ -84,7 +84,7 @@ def _lift(rows, step, odd, factor):
 
 @inline_kernel
 def _lift_whole(rows, step, odd, sign):
-    """`_lift` with the rounding of the reversible 5/3: odd rows −⌊(a + b)/2⌋, even rows +⌊(a + b + 2)/4⌋."""
+    """Lift with the rounding of the reversible 5/3: odd rows −⌊(a + b)/2⌋, even rows +⌊(a + b + 2)/4⌋."""
     if rows.shape[0] > step:
         for row in range(odd * step, rows.shape[0], 2 * step):
             before, after = _neighbours(rows.shape[0], step, row)
@@ -97,13 +97,13 @@ def _lift_whole(rows, step, odd, sign):
 
 
 def synthesis_gains(wavelet: str, levels: int, count: int) -> NDArray[np.float32]:
-    """How much an error in each row grows: the L2 norm of the row's synthesis waveform, away from the ends.
+    """Return the growth of an error in each row: the L2 norm of its synthesis waveform, away from the ends.
 
     Parameters
     ----------
     wavelet : {"5/3", "9/7"}
     levels, count : int
-        Of the transform, and how many rows there are.
+        Levels of the transform, number of rows.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def synthesis_gains(wavelet: str, levels: int, count: int) -> NDArray[np.float32
 
 @lru_cache
 def _band_gains(wavelet: str, levels: int) -> tuple[float, ...]:
-    """Gains of the high bands from level 1 up, and of the low band last."""
+    """Return the gains of the high bands from level 1 up, then that of the low band."""
     # The longest waveform spans less than 16 samples of the lowest band.
     middle = 16 << levels
     impulses = np.zeros((2 * middle, levels + 1), np.float32)

@@ -1,4 +1,4 @@
-"""MPEG-2 by FFmpeg, as in the first coders of integral images (Yeom et al. 2004)."""
+"""MPEG-2 coder, by FFmpeg, as in the first coders of integral images (Yeom et al. 2004)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many planes as the components of one JPEG 2000 codestream, by OpenJPEG through imagecodecs.
+"""Planes as components of one JPEG 2000 codestream, by OpenJPEG through imagecodecs.
 
 One codestream has one rate control: OpenJPEG cuts all code blocks of all components at one rate–distortion slope,
 such that the squared error of all planes together is the one allowed.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from ii_core import IIPicture
 
 from ..bitstream import framing
-from ..bitstream.obu import temporal_units
 from ..clock import cpu_seconds
 from ..colour import Format, ycbcr
 from ..contract import Coder, Goal, Option, Options, Pixels
 from ..frames import Film, layout
-from ..order import BY, ORDERS
+from ..order import BY, ORDERS, selection_order
 from ..search import Axis, CodingResult, Run, Trial, bracket, met, nearest, size_miss, trials
+from . import groups
+from .decoding import copy_plane, decoded_frames
 
 NAMES = {"ei": "Elementary images", "si": "Sub-images", "ri": "Ray-space images"}
 
@@ -32,7 +33,6 @@ ORDER: dict[str, Option] = {
 DEPTH = Option(about="bits of a sample inside the coder", default="10", choices=("8", "10"))
 
 MAX_TARGET = 1e18  # bytes; upper cap on the target size
-CHUNK = 1 << 16  # bytes of a stream parsed at once
 # Budgets of encoder runs: for the quantiser, and for the share of frames coded finer.
 QUANTISER_RUNS, SHARE_RUNS = 5, 4
 START = 0.6  # of the range of quantisers, from the finest: the first trial
@@ -124,6 +124,7 @@ class PseudoVideo(Coder, Generic[Settings]):
     quantiser_step: ClassVar[float] = 1.0
     relabel: ClassVar[str] = ""
     presets: ClassVar[Mapping[str, Options]] = {}
+    components_alone: ClassVar[bool] = True
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
@@ -246,6 +247,17 @@ class PseudoVideo(Coder, Generic[Settings]):
         except av.FFmpegError as error:
             raise ValueError(f"its {self.standard} stream does not decode ({error.strerror})") from None
 
+    def frame_order(self, rows: int, cols: int, options: Options) -> NDArray[np.int64]:
+        """Return the order that the options name."""
+        return selection_order(str(options["order"]), rows, cols, str(options["by"]))
+
+    def decode_component(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
+        """Decode the frame of a component image from the packets of its group of pictures."""
+        film = self.film(blank, options)
+        stream = groups.sequence(self, payload, film, options)
+        (number,) = np.flatnonzero(self.frame_order(film.layout.rows, film.layout.cols, options) == index)
+        return groups.decode_frame(stream, int(number), blank.pixels.dtype)
+
 
 def _decode(coder: PseudoVideo[Any], payload: bytes, film: Film, blank: NDArray[Any]) -> tuple[Pixels, float]:
     if len(payload) < coder.min_coded_frame * film.frames:  # before memory is taken for the sequence
@@ -277,57 +289,3 @@ def _decode(coder: PseudoVideo[Any], payload: bytes, film: Film, blank: NDArray[
     if done < film.frames:
         raise ValueError(f"its {coder.standard} stream has {done} frames, {film.frames} are needed")
     return pixels, seconds
-
-
-def open_decoder(coder: PseudoVideo[Any], film: Film) -> Any:
-    """Return the decoder, ready for packets."""
-    context: Any = av.CodecContext.create(coder.decoder, "r")
-    context.thread_count = 1
-    # Refuse larger frames before they take memory. The decoder counts what it allocates: whole blocks, and rows
-    # padded for vector instructions.
-    coded = (-(-film.width // 128) * 128) * (-(-film.height // 128) * 128)
-    context.options = {"max_pixels": str(coded), "err_detect": "explode"}
-    if coder.framed:  # the packets do not carry the size
-        context.width, context.height = film.width, film.height
-    return context
-
-
-def decoded_frames(coder: PseudoVideo[Any], payload: bytes, film: Film) -> Iterator[Any]:
-    """Yield the frames of a stream in display order, each checked for its size."""
-    context = open_decoder(coder, film)
-    for packet in stream_packets(coder, context, payload, film):
-        yield from _checked(coder, context.decode(packet), film)
-    yield from _checked(coder, context.decode(None), film)
-
-
-def stream_packets(coder: PseudoVideo[Any], context: Any, payload: bytes, film: Film) -> Iterator[Any]:
-    """Yield the packets of a payload for a decoder."""
-    if coder.decoder == "libdav1d":
-        for unit in temporal_units(payload):
-            yield av.Packet(bytes(unit))
-        return
-    if coder.framed:
-        first, packets = framing.unpack(payload, film.frames)
-        if first:
-            context.extradata = first
-        for packet in packets:
-            yield av.Packet(bytes(packet))
-        return
-    view = memoryview(payload)
-    for start in range(0, len(view), CHUNK):
-        yield from context.parse(view[start : start + CHUNK])
-    yield from context.parse(None)
-
-
-def _checked(coder: PseudoVideo[Any], frames: list[Any], film: Film) -> list[Any]:
-    needed = film.width, film.height, film.format.name
-    for frame in frames:
-        found = frame.width, frame.height, frame.format.name.replace("yuvj", "yuv")
-        if found != needed:
-            raise ValueError(f"its {coder.standard} stream has frames of {found}, {needed} needed")
-    return frames
-
-
-def copy_plane(plane: Any, target: NDArray[Any]) -> None:
-    """Copy the samples of a decoded plane without the padding of its lines."""
-    target[:] = np.ndarray(target.shape, target.dtype, plane, strides=(plane.line_size, target.itemsize))

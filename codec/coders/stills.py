@@ -1,6 +1,6 @@
-"""Coders of single pictures on the II-picture as it lies: JPEG, JPEG XL, High-Throughput JPEG 2000.
+"""Coders of the II-picture as a single picture: JPEG, JPEG XL, High-Throughput JPEG 2000.
 
-None has rate control worth the name, so that a rate is met by trying qualities.
+None has usable rate control: a target rate is met by a search of the quality.
 """
 
 from __future__ import annotations
@@ -30,25 +30,25 @@ from ..clock import cpu_seconds
 from ..contract import Coder, Goal, Option, Options, Pixels
 from ..search import Axis, CodingResult, Run, meet_size
 
-LOSSLESS = Option(about="1 to code to the bit", default=0, low=0, high=1)
+LOSSLESS = Option(about="1 for lossless coding", default=0, low=0, high=1)
 
 
 class Still(Coder):
-    """A coder of one picture with a setting that says how well.
+    """Coder of one picture with one setting of quality.
 
     Attributes
     ----------
     axis : Axis
-        Settings that meet a rate.
+        Settings of the search for a rate.
     """
 
     axis: ClassVar[Axis]
 
     def check(self, picture: IIPicture, options: Options) -> None:
-        """Any size will do."""
+        """Accept any size."""
 
     def encode(self, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
-        """Meet a goal; a rate above that of lossless coding, if there is one, gives the lossless picture."""
+        """Meet a goal; a rate above that of lossless coding gives the lossless picture, if the coder has one."""
         pixels = np.ascontiguousarray(picture.pixels)
         at_setting = partial(self._timed_run, pixels, options)
         if self.lossless(options):
@@ -63,7 +63,7 @@ class Still(Coder):
         )
 
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
-        """Refuses a stream of another size before it takes memory."""
+        """Decode; a stream of another size is refused before memory is allocated."""
         started = cpu_seconds()
         pixels = self._run_decoder(payload, blank, options)
         if pixels.shape != blank.pixels.shape or pixels.dtype != blank.pixels.dtype:
@@ -79,14 +79,14 @@ class Still(Coder):
 
     @abstractmethod
     def _run_encoder(self, pixels: NDArray[Any], options: Options, setting: float | None) -> bytes:
-        """One run of the encoder; None is lossless."""
+        """Run the encoder at a setting; None means lossless."""
 
     @abstractmethod
     def _run_decoder(self, payload: bytes, blank: IIPicture, options: Options) -> Pixels:
-        """One run of the decoder."""
+        """Run the decoder."""
 
 
-# Tables K.1 and K.2 of ISO/IEC 10918-1, row by row, as every JPEG encoder scales them.
+# Tables K.1 and K.2 of ISO/IEC 10918-1, row by row; encoders scale them by quality.
 # fmt: off
 LUMINANCE = np.array([
     16, 11, 10, 16, 24, 40, 51, 61,  12, 12, 14, 19, 26, 58, 60, 55,  14, 13, 16, 24, 40, 57, 69, 56,
@@ -101,15 +101,15 @@ CHROMINANCE = np.array([
 
 
 class Jpeg(Still):
-    """Progressive baseline JPEG with Huffman tables of its own, by libjpeg-turbo through Pillow.
+    """Progressive JPEG with optimised Huffman tables, by libjpeg-turbo through Pillow.
 
-    Qualities are those of libjpeg, and those between whole ones give tables in between, so that rates can be met.
+    Qualities are those of libjpeg. Fractional qualities interpolate the quantiser tables, so that rates can be met.
     """
 
     name = "jpeg"
     about = "The II-picture itself, progressive JPEG by libjpeg-turbo"
     options: ClassVar[Mapping[str, Option]] = {
-        "chroma": Option(about="444 keeps all of the colour, 420 a quarter", default="444", choices=("444", "420")),
+        "chroma": Option(about="444 for full chroma, 420 for a quarter", default="444", choices=("444", "420")),
     }
     quality_range: ClassVar[tuple[float, float] | None] = (1.0, 100.0)
     scale_about = "libjpeg's quality"
@@ -124,7 +124,7 @@ class Jpeg(Still):
         return {"pillow": PIL.__version__, "libjpeg-turbo": str(features.version("libjpeg_turbo"))}
 
     def check(self, picture: IIPicture, options: Options) -> None:
-        """JPEG counts in 16 bits."""
+        """Refuse pictures larger than the 16-bit sizes of JPEG."""
         if max(picture.size) > self.max_side:
             width, height = picture.size
             raise ValueError(f"the picture has {width}×{height} pixels: JPEG takes {self.max_side} a side at most")
@@ -155,13 +155,13 @@ class Jpeg(Still):
 
 
 def jpeg_tables(quality: float) -> list[list[int]]:
-    """libjpeg's quantiser tables of a quality from 1 to 100, row by row; libjpeg itself rounds the scale."""
+    """Return libjpeg's quantiser tables of a quality from 1 to 100, row by row, with an unrounded scale."""
     scale = 50 / quality if quality < 50 else 2 - quality / 50
     return [np.clip(np.floor(table * scale + 0.5), 1, 255).astype(int).tolist() for table in (LUMINANCE, CHROMINANCE)]
 
 
 class JpegXl(Still):
-    """JPEG XL, by libjxl through imagecodecs: lossy in its perceptual colour space, or lossless; bare codestream."""
+    """JPEG XL as a bare codestream, by libjxl through imagecodecs: lossy in XYB colour space, or lossless."""
 
     name = "jpegxl"
     about = "The II-picture itself, JPEG XL by libjxl"
@@ -198,14 +198,14 @@ class JpegXl(Still):
 
 
 def jpegxl_distance(quality: float) -> float:
-    """libjxl's distance for a quality from 0 up to 100."""
+    """Return libjxl's distance for a quality from 0 to 100."""
     if quality >= 30:
         return 0.1 + (100 - quality) * 0.09
     return 53 / 3000 * quality**2 - 23 / 20 * quality + 25
 
 
 def jpegxl_codestream(stream: bytes) -> bytes:
-    """The codestream without the container that libjxl puts around 16-bit pictures."""
+    """Return the codestream without the container that libjxl writes for 16-bit pictures."""
     if stream.startswith(b"\xff\x0a"):
         return stream
     parts, at = [], 0
@@ -218,7 +218,7 @@ def jpegxl_codestream(stream: bytes) -> bytes:
 
 
 def jpegxl_size(stream: bytes) -> tuple[int, int] | None:
-    """(M, N) of a JPEG XL codestream, from its size header (ISO/IEC 18181-1, SizeHeader); None if it is none."""
+    """Return (M, N) of a JPEG XL codestream from its SizeHeader (ISO/IEC 18181-1); None for other data."""
     if stream[:2] != b"\xff\x0a":
         return None
     bits, at = int.from_bytes(stream[2:14], "little"), 0
@@ -244,7 +244,7 @@ def jpegxl_size(stream: bytes) -> tuple[int, int] | None:
 class Htj2k(Still):
     """High-Throughput JPEG 2000 (Part 15), by OpenJPH through imagecodecs: 9/7 and one quantiser, or 5/3 lossless.
 
-    Its block coder is an order of magnitude faster than that of Part 1 and cannot be cut at a rate afterwards.
+    Its block coder is an order of magnitude faster than that of Part 1. Its streams cannot be truncated to a rate.
     """
 
     name = "htj2k"
@@ -270,31 +270,31 @@ class Htj2k(Still):
 
     def _run_decoder(self, payload: bytes, blank: IIPicture, options: Options) -> Pixels:
         if not _htj2k_head(blank).match(payload) or not payload.endswith(b"\xff\xd9"):
-            raise ValueError(f"its HTJ2K stream is no whole one of ours for {blank.size} {blank.pixels.dtype}")
+            raise ValueError(f"its HTJ2K stream is not a whole one for {blank.size} {blank.pixels.dtype}")
         try:
-            with _heard():
+            with _raised():
                 return imagecodecs.htj2k_decode(payload, planar=False)
         except (RuntimeError, ValueError) as error:
             raise ValueError(f"its HTJ2K stream does not decode ({error})") from None
 
 
-_hearing = threading.Lock()
+_hooks = threading.Lock()
 
 
 @contextmanager
-def _heard() -> Iterator[None]:
-    """Raise what OpenJPH throws while pixels are copied out, which its binding only prints, by two hooks."""
+def _raised() -> Iterator[None]:
+    """Raise exceptions of OpenJPH that its binding only prints, by two hooks of the process."""
     thrown: list[BaseException | None] = []
 
-    def hear(args: Any) -> None:
+    def keep(args: Any) -> None:
         if "_htj2k" in str(args.object):
             thrown.append(args.exc_value)
         else:
             unraisable(args)
 
-    with _hearing:  # hooks are the whole process's
+    with _hooks:  # one set of hooks per process
         printing, unraisable = sys.excepthook, sys.unraisablehook
-        sys.excepthook, sys.unraisablehook = lambda *_: None, hear
+        sys.excepthook, sys.unraisablehook = lambda *_: None, keep
         try:
             yield
         finally:
@@ -304,7 +304,7 @@ def _heard() -> Iterator[None]:
 
 
 def _htj2k_head(blank: IIPicture) -> re.Pattern[bytes]:
-    """The main header that `Htj2k` writes, whose decoder may crash on others: only quantiser steps are free."""
+    """Return the pattern of main headers of `Htj2k`, with free quantiser steps; its decoder may crash on others."""
     (width, height), bits = blank.size, 8 * blank.pixels.dtype.itemsize
     size = struct.pack(">HH8IH", 47, 0x4000, width, height, 0, 0, width, height, 0, 0, 3)
     size += bytes((bits - 1, 1, 1)) * 3

@@ -1,4 +1,4 @@
-"""AV1 by SVT-AV1, 4:2:0 only."""
+"""AV1 coder, by SVT-AV1; 4:2:0 only."""
 
 from __future__ import annotations
 

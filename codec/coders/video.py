@@ -1,10 +1,12 @@
-"""Pseudo video sequences by FFmpeg's encoders through PyAV."""
+"""Pseudo video sequences coded by FFmpeg's encoders through PyAV."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import av
@@ -27,7 +29,7 @@ THREADS = Option(about="threads of the encoder; the bytes depend on it", default
 
 def chroma(default: str) -> Option:
     """Return the option for chroma subsampling."""
-    return Option(about="444 keeps all of the colour, 420 a quarter", default=default, choices=("444", "420"))
+    return Option(about="444 for full chroma, 420 for a quarter", default=default, choices=("444", "420"))
 
 
 # The frame rate f in R = S·T·r·f (5.10) is free, since a pseudo video has no time. `fine_rate` sets f such that R is
@@ -115,7 +117,26 @@ def new_frame(film: Film, context: Any) -> Any:
     return frame
 
 
-def two_passes(source: Source[Settings], first: Settings, second: Settings) -> Run:
-    """Code twice; the second pass reads the statistics of the first, and its stream counts."""
-    passes = [source.run(settings) for settings in (first, second)]
+def two_passes(source: Source[Settings], kilobits: int, settings: Callable[[str], Settings]) -> Run:
+    """Code in two passes of x264 or x265 at a bit rate; the result is the second stream and the time of both.
+
+    ``settings`` returns the settings for a text of rate parameters.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        rate = f"bitrate={kilobits}:stats={Path(folder) / 'statistics'}"
+        passes = [source.run(settings(f"{rate}:pass={number}")) for number in (1, 2)]
     return Run(passes[1].payload, sum(run.codec_seconds for run in passes))
+
+
+def with_zone(settings: Settings, key: str, frames: int, finer: str) -> Settings:
+    """Return settings of x264 or x265 whose first frames form a zone, finer as the text ``finer`` says.
+
+    ``key`` names the parameters of the library.
+    """
+    parameters = settings.parameters[key] + f":zones=0,{max(0, frames - 1)},{finer}"
+    return replace(settings, parameters={**settings.parameters, key: parameters})
+
+
+def finer_rate(fine: float, coarse: float) -> str:
+    """Return the zone parameter for a rate factor finer by coarse − fine: 6 steps double the rate."""
+    return f"b={2 ** ((coarse - fine) / 6):.4f}"

@@ -1,4 +1,4 @@
-"""Volumes: component images as slices, a wavelet along the slice axis, JPEG 2000 within slices.
+"""Coder of volumes: component images as slices, a wavelet along the slice axis, JPEG 2000 within slices.
 
 The scheme approximates JPEG 2000 Part 10 (JP3D), of which no packaged implementation exists. It applies a dyadic CDF
 9/7 or 5/3 along the slices (`codec.coders.lifting`), and codes all slices of all bands and colours as components of
@@ -77,7 +77,7 @@ class Volume(Coder):
         "by": Option(about="whether the order goes by rows or by columns", default="rows", choices=BY),
         "wavelet": Option(about="CDF 9/7 or 5/3, in all directions", default="97", choices=("97", "53")),
         "levels": Option(about="of the wavelet along the slices", default=5, low=0, high=8),
-        "lossless": Option(about="1 to code to the bit, with the reversible 5/3", default=0, low=0, high=1),
+        "lossless": Option(about="1 for lossless coding, with the reversible 5/3", default=0, low=0, high=1),
     }
 
     def __init__(self, kind: str) -> None:
@@ -156,13 +156,14 @@ class Separate(Volume):
     """Component images of one kind, each a JPEG 2000 picture that refers to no other, at one slope for all."""
 
     options: ClassVar[Mapping[str, Option]] = {key: Volume.options[key] for key in ("wavelet", "lossless")}
+    components_alone: ClassVar[bool] = True
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
         self.name = f"{kind}-jpeg2000"
         self.about = f"All {NAMES[kind]}, each alone, JPEG 2000 at one slope for all, by OpenJPEG"
 
-    def decode_slice(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
+    def decode_component(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
         """Decode one component image by its own packets; ``index`` counts the grid row by row."""
         cut = self._cut(blank, options)
         mode, step, colours, streams = _parts(payload, len(cut.groups))

@@ -1,4 +1,4 @@
-"""VP9 by libvpx in one pass: PyAV does not expose first-pass statistics."""
+"""VP9 coder, by libvpx in one pass; PyAV does not expose first-pass statistics."""
 
 from __future__ import annotations
 

@@ -1,18 +1,14 @@
-"""H.264 by x264.
+"""H.264 coder, by x264.
 
-The default is the dissertation's structure: one I picture, then P pictures, no B pictures, motion range 16, constant
-bit rate. Frames are 4:4:4 in full range. One thread is the default, since x264's bytes depend on the number of
-threads.
+The default follows the dissertation: one I picture, then P pictures, no B pictures, motion range 16, constant bit
+rate. Frames are 4:4:4 in full range. The default is one thread, since x264's bytes depend on the number of threads.
 """
 
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import ClassVar
 
 import av
@@ -21,7 +17,7 @@ from ..contract import Option, Options
 from ..frames import Film
 from ..search import TOLERANCE, CodingResult, Run, meet_rate
 from .pseudo_video import Source
-from .video import COMMON, MAX_KBIT, THREADS, Settings, Video, chroma, fine_rate, two_passes
+from .video import COMMON, MAX_KBIT, THREADS, Settings, Video, chroma, fine_rate, finer_rate, two_passes, with_zone
 
 COARSEST, LOSSLESS = 51, 0  # quantisers; 0 is lossless coding of YCbCr at 4:4:4 and 8 bit
 
@@ -93,9 +89,8 @@ class H264(Video):
     ) -> list[tuple[Film, Settings]]:
         """Return one sequence whose first frames are a zone with a quantiser of its own."""
         settings = self.constant(coarse, film, options)
-        finer = f"q={_qp(fine, options)}" if options["rate"] == "cq" else f"b={2 ** ((coarse - fine) / 6):.4f}"
-        parameters = settings.parameters["x264-params"] + f":zones=0,{max(0, frames - 1)},{finer}"
-        return [(film, replace(settings, parameters={**settings.parameters, "x264-params": parameters}))]
+        finer = f"q={_qp(fine, options)}" if options["rate"] == "cq" else finer_rate(fine, coarse)
+        return [(film, with_zone(settings, "x264-params", frames, finer))]
 
     def meet(self, target: float, source: Source[Settings]) -> CodingResult:
         """Meet a target by the rate control of the options."""
@@ -162,12 +157,7 @@ def _constant_rate(size: float, film: Film) -> tuple[str, int]:
 
 def _two_passes(size: float, source: Source[Settings]) -> Run:
     kilobits, frame_rate = fine_rate(size, source.film)
-    with tempfile.TemporaryDirectory() as folder:
-        rate = f"bitrate={kilobits}:stats={Path(folder) / 'statistics'}"
-        first, second = (
-            _settings(source.options, source.film, f"{rate}:pass={number}", frame_rate) for number in (1, 2)
-        )
-        return two_passes(source, first, second)
+    return two_passes(source, kilobits, lambda rate: _settings(source.options, source.film, rate, frame_rate))
 
 
 def without_sei(packet: bytes) -> bytes:

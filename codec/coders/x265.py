@@ -1,18 +1,15 @@
-"""HEVC by x265."""
+"""HEVC coder, by x265."""
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
-from dataclasses import replace
-from pathlib import Path
 from typing import ClassVar
 
 from ..contract import Option, Options
 from ..frames import Film
 from ..search import CodingResult, Run, meet_rate
 from .pseudo_video import DEPTH, Source
-from .video import COMMON, MAX_KBIT, THREADS, Settings, Video, chroma, two_passes
+from .video import COMMON, MAX_KBIT, THREADS, Settings, Video, chroma, finer_rate, two_passes, with_zone
 from .x264 import SPEEDS
 
 FINEST, COARSEST = 0, 51
@@ -67,9 +64,8 @@ class Hevc(Video):
     ) -> list[tuple[Film, Settings]]:
         """Return one sequence whose first frames are a zone with a quantiser of its own."""
         settings = self.constant(coarse, film, options)
-        finer = f"q={round(fine)}" if options["rate"] == "cq" else f"b={2 ** ((coarse - fine) / 6):.4f}"
-        parameters = settings.parameters["x265-params"] + f":zones=0,{max(0, frames - 1)},{finer}"
-        return [(film, replace(settings, parameters={**settings.parameters, "x265-params": parameters}))]
+        finer = f"q={round(fine)}" if options["rate"] == "cq" else finer_rate(fine, coarse)
+        return [(film, with_zone(settings, "x265-params", frames, finer))]
 
     def meet(self, target: float, source: Source[Settings]) -> CodingResult:
         """Meet a target by the rate control of the options."""
@@ -78,12 +74,7 @@ class Hevc(Video):
 
         def at_rate(size: float) -> Run:
             kilobits = max(1, round(min(8 * size / source.film.frames * FRAME_RATE / 1000, MAX_KBIT)))
-            with tempfile.TemporaryDirectory() as folder:
-                rate = f"bitrate={kilobits}:stats={Path(folder) / 'statistics'}"
-                first, second = (
-                    _settings(source.options, source.film, f"{rate}:pass={number}", FRAME_RATE) for number in (1, 2)
-                )
-                return two_passes(source, first, second)
+            return two_passes(source, kilobits, lambda rate: _settings(source.options, source.film, rate, FRAME_RATE))
 
         return meet_rate(
             at_rate, target, coarsest=lambda: source.run_at(COARSEST), finest=lambda: source.run_at(FINEST)

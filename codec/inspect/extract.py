@@ -1,4 +1,4 @@
-"""Extraction of the coded stream of an ``.ii`` file into a container that other programs open, without coding again.
+"""Extraction of the coded stream of an ``.ii`` file into a standard container, without coding again.
 
 =================  ===========================================================================================
 schemes            files
@@ -37,11 +37,13 @@ from ii_core.files import atomic_path
 
 from ..api import Encoded
 from ..checks import check_type
+from ..coders.decoding import open_decoder
 from ..coders.ffv1 import Ffv1
-from ..coders.pseudo_video import PseudoVideo, open_decoder
+from ..coders.groups import DEMUXERS, Sequence
+from ..coders.pseudo_video import PseudoVideo
 from ..coders.video import open_encoder
 from ..contract import find
-from .random_access import DEMUXERS, Sequence, sequence
+from .random_access import sequence
 
 RATE = 25
 CONTAINERS = {
@@ -53,9 +55,9 @@ CONTAINERS = {
     "MPEG-2": (".mkv", ".mp4"),
 }
 BARE = {"H.264": (".h264", ".264"), "HEVC": (".hevc", ".265"), "AV1": (".obu",), "MPEG-2": (".m2v",)}
-HEVC_BLOCK = 8  # x265 codes whole smallest blocks, and crops what is beyond the frame
+HEVC_BLOCK = 8  # smallest block of x265: frames are padded to it and cropped
 FOURCC = {"AV1": b"AV01", "VP9": b"VP90"}
-# How the payload of a whole picture starts, and what such a file is called.
+# First bytes of payloads of whole pictures, and the suffixes of such files.
 STILLS: tuple[tuple[bytes, tuple[str, ...]], ...] = (
     (b"\xff\x4f\xff\x51", (".j2k", ".j2c", ".jp2")),
     (b"\xff\xd8\xff", (".jpg", ".jpeg")),
@@ -68,7 +70,7 @@ HIGH_THROUGHPUT = b"\xff\x50"  # the extended capabilities of Part 15 stand amon
 
 @dataclass(frozen=True, kw_only=True)
 class Extracted:
-    """What a file of an extracted stream shows.
+    """Frames in the file of an extracted stream.
 
     Parameters
     ----------
@@ -77,7 +79,7 @@ class Extracted:
     size : (int, int)
         Width and height of a frame as players show it.
     image : (int, int)
-        Width and height of the component image, or the picture, in it.
+        Width and height of the component image, or of the whole picture, within a frame.
     turned : bool
         Whether rows of a frame are columns of the component image.
     """
@@ -99,25 +101,25 @@ class Extracted:
 
 
 def extract(coded: Encoded, path: str | os.PathLike[str]) -> Extracted:
-    """Write the stream of a coded picture as a file of its own kind, whole or not at all.
+    """Write the stream of a coded picture as a file of a standard type, whole or not at all.
 
     Parameters
     ----------
     coded : Encoded
     path : path
-        Its ending says what it becomes; see `suffixes`.
+        Its suffix selects the container; see `suffixes`.
 
     Returns
     -------
     Extracted
-        Number and size of frames, and where the component images lie in them.
+        Number and size of frames, and position of component images in them.
 
     Raises
     ------
     TypeError
         If an argument is of the wrong type.
     ValueError
-        If the scheme's stream does not go into such a file, or is damaged.
+        If the container does not take the scheme's stream, or the stream is damaged.
     OSError
         If it cannot be written.
     """
@@ -126,7 +128,7 @@ def extract(coded: Encoded, path: str | os.PathLike[str]) -> Extracted:
     path = Path(path)
     suffix, allowed = path.suffix.lower(), suffixes(coded)
     if suffix not in allowed:
-        known = ", ".join(allowed) or "none that others read"
+        known = ", ".join(allowed) or "none"
         raise ValueError(f"the stream of scheme {coded.scheme} does not go into {path.name}: possible are {known}")
     coder = find(coded.scheme)
     with atomic_path(path) as temporary:
@@ -147,7 +149,7 @@ def extract(coded: Encoded, path: str | os.PathLike[str]) -> Extracted:
 
 
 def _for_others(stream: Sequence) -> tuple[Sequence, tuple[int, int]]:
-    """The sequence with its colours and, for HEVC, its size named as other programs need it; and that size."""
+    """Return the sequence with metadata for other programs (colours, HEVC size), and its size."""
     film, coder = stream.film, stream.coder
     filters, size = [coder.relabel] if coder.relabel else [], (film.width, film.height)
     if coder.standard == "HEVC":
@@ -178,7 +180,7 @@ def _demuxer(stream: Sequence) -> Any:
 
 
 def suffixes(coded: Encoded) -> tuple[str, ...]:
-    """Endings of the files that `extract` can make of a coded picture, the usual one first."""
+    """Return the suffixes that `extract` accepts for a coded picture, the usual one first."""
     coder = find(coded.scheme)
     if isinstance(coder, PseudoVideo):
         found = CONTAINERS[coder.standard] + BARE.get(coder.standard, ())
@@ -193,11 +195,11 @@ def suffixes(coded: Encoded) -> tuple[str, ...]:
 
 
 def _mux(stream: Sequence, path: Path) -> None:
-    """Packets into a container, each with the time at which its frame is shown."""
+    """Write packets into a container, each with the display time of its frame."""
     shown = _display_order(stream)
-    # A packet is read before it is shown by as much as any runs ahead.
+    # Largest lead of decoding over display.
     ahead = max(i - shown[i] for i in range(len(shown)))
-    # bitexact: Matroska's own numbers and dates are left out, so that equal streams make equal files
+    # bitexact omits identifiers and dates of Matroska: equal streams make equal files
     with av.open(str(path), "w", options={"fflags": "+bitexact"}) as out:
         target, keep = _stream(stream, out)
         target.time_base = Fraction(1, RATE)
@@ -211,10 +213,10 @@ def _mux(stream: Sequence, path: Path) -> None:
 
 
 def _stream(stream: Sequence, out: Any) -> tuple[Any, Any]:
-    """An output stream that describes the packets, and what must outlive it."""
+    """Return an output stream that describes the packets, and an object that must outlive it."""
     coder = stream.coder
     if isinstance(coder, Ffv1):
-        # No file to copy the description from: the encoder that made the packets makes it again.
+        # FFV1 has no bare file to copy the description from: open the encoder again.
         target: Any = out.add_stream(coder.encoder, rate=RATE)
         settings = coder.constant(0, stream.film, stream.options)
         open_encoder(coder, stream.film, settings, target.codec_context)
@@ -223,10 +225,10 @@ def _stream(stream: Sequence, out: Any) -> tuple[Any, Any]:
             raise ValueError("the coded picture was made by another version of FFV1 than this program writes")
         return target, None
     source = _demuxer(stream)
-    # Described by what it is and not by who decodes it: dav1d writes nothing.
+    # From the demuxer, not from the decoder: dav1d has no description.
     target = out.add_stream_from_template(source.streams.video[0], opaque=True)
     context = target.codec_context
-    # MPEG-2 has no word for full range, and old streams none for the matrix: the container says it.
+    # MPEG-2 cannot state full range, and old streams lack the matrix: state both in the container.
     context.color_range = av.video.reformatter.ColorRange.JPEG
     context.colorspace = av.video.reformatter.Colorspace.ITU709
     return target, source
@@ -252,7 +254,7 @@ def _display_order(stream: Sequence) -> Many[int]:
 
 
 def _ivf(stream: Sequence) -> bytes:
-    """The container of the VP8 and AV1 reference coders: a header, then a size and a time before every packet."""
+    """Return an IVF file: a header, then size, time and bytes of every packet."""
     film = stream.film
     fourcc = FOURCC[stream.coder.standard]
     size = film.width, film.height
@@ -263,7 +265,7 @@ def _ivf(stream: Sequence) -> bytes:
 
 
 def _jp2(coded: Encoded) -> bytes:
-    """A codestream in the boxes of a JP2 file: three components of 8 or 16 bit, sRGB (ISO/IEC 15444-1, Annex I)."""
+    """Return a codestream in the boxes of a JP2 file: sRGB of 8 or 16 bit (ISO/IEC 15444-1, Annex I)."""
     width, height = coded.size
     bits = 15 if coded.dtype == "uint16" else 7
     high = HIGH_THROUGHPUT in coded.payload[:128]

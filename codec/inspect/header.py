@@ -1,6 +1,6 @@
-"""Header portion H of a stream (5.11)–(5.15).
+"""Header portion H of a stream (5.11)–(5.15), and bits of a stream by purpose.
 
-The stream is the payload of the ``.ii`` file. The file's own header, some 50 bytes, is no part of H.
+The stream is the payload of the ``.ii`` file. The file's header of about 50 bytes is not part of H.
 
 `floor` measures H by a black picture at the coarsest quantiser. `parts` counts the bits of parameter sets and, for
 H.264, of slice headers. `si_below_ei` and `si_below_ri` compare kinds of component images by their number of frames.
@@ -18,6 +18,7 @@ from ii_core import IIPicture
 from ii_core.camera import whole_pair
 
 from ..api import Encoded, encode
+from ..bitstream.obu import units
 from ..checks import check_type
 from ..contract import find
 
@@ -63,16 +64,16 @@ def parts(coded: Encoded) -> Parts:
     Raises
     ------
     ValueError
-        If the scheme's stream is of a kind that is not taken apart, or it is damaged.
+        If streams of the scheme are not parsed, or the stream is damaged.
     """
     check_type("coded", coded, Encoded, "a coded picture")
     kind = coded.scheme.rpartition("-")[2]
     if kind not in _TAKE_APART:
         known = ", ".join(_TAKE_APART)
-        raise ValueError(f"streams of scheme {coded.scheme} are not taken apart: known are those of {known}")
+        raise ValueError(f"streams of scheme {coded.scheme} are not parsed: known are those of {known}")
     try:
         return _TAKE_APART[kind](coded.payload)
-    except (IndexError, KeyError) as error:
+    except (IndexError, KeyError, ValueError) as error:
         raise ValueError(f"the stream of scheme {coded.scheme} is damaged: {error!r}") from None
 
 
@@ -95,17 +96,17 @@ class Floor:
 
     @property
     def bits(self) -> int:
-        """Of all J frames, b̄_h·J: the stream alone, not the header of the ``.ii`` file around it."""
+        """b̄_h·J, bits of the stream for all J frames, without the header of the ``.ii`` file."""
         return 8 * len(self.coded.payload)
 
     @property
     def bpp(self) -> float:
-        """The rate of the stream below which nothing can be coded: where H = 1."""
+        """Least rate of the stream, for which H = 1."""
         width, height = self.coded.size
         return self.bits / (width * height)
 
     def portion(self, bpp: float) -> float:
-        """H at a rate (5.13): the share that headers take of it. Above 1 the rate cannot be reached."""
+        """Return H at a rate (5.13), the share of headers; above 1 the rate cannot be reached."""
         return self.bpp / bpp
 
 
@@ -140,7 +141,7 @@ def coarsest(picture: IIPicture, scheme: str) -> Encoded:
 
 
 def frames(kind: str, lenses: Pair, ei_pixels: Pair) -> int:
-    """J, frames of a pseudo video sequence: K·L of elementary, U·V of sub-, V·L of ray-space images."""
+    """Return J, the number of frames: K·L of elementary images, U·V of sub-images, V·L of ray-space images."""
     (k, l), (u, v) = lenses, ei_pixels
     return {"ei": k * l, "si": u * v, "ri": v * l}[kind]
 
@@ -154,15 +155,15 @@ def si_below_ei(lenses: Pair, ei_pixels: Pair) -> bool:
 def si_below_ri(lenses: Pair, ei_pixels: Pair) -> bool:
     """Return whether sub-images have the smaller header portion than ray-space images: U < L (5.15).
 
-    An RI has K rows, by (2.14), so that its frames have U·K pixels against K·L of a sub-image. For square elementary
-    images that is U < √N; the dissertation, which gives an RI L rows, has U < √M.
+    By (2.14) a ray-space image has K rows, hence U·K pixels against K·L of a sub-image. For square elementary images
+    the condition is U < √N. The dissertation gives ray-space images L rows and has U < √M.
     """
     (_, l), (u, _) = lenses, ei_pixels
     return u < l
 
 
 def _nal_units(stream: bytes) -> Iterator[tuple[int, bytes]]:
-    """(bits of start code and zero bytes around, unit) of an Annex B stream."""
+    """Yield (bits of start code and zero bytes, unit) of an Annex B stream."""
     at = stream.find(b"\0\0\1")
     if at < 0:
         raise IndexError("no start code")
@@ -206,7 +207,7 @@ class _Bits:
 
 
 def _h264(stream: bytes) -> Parts:
-    """ITU-T H.264, 7.3: units by type, slice headers field by field."""
+    """Count the bits of an H.264 stream: units by type, slice headers field by field (ITU-T H.264, 7.3)."""
     count = dict.fromkeys(("framing", "parameters", "messages", "headers", "data", "units"), 0)
     sequence: dict[str, int] = {}
     picture: dict[str, int] = {}
@@ -351,7 +352,7 @@ def _h264_slice_header(r: _Bits, kind: int, reference: int, sps: dict[str, int],
 
 
 def _skip_weights(r: _Bits, refs: list[int]) -> None:
-    """A table of prediction weights, with chroma (7.3.3.2)."""
+    """Skip a table of prediction weights with chroma (7.3.3.2)."""
     r.ue()
     r.ue()
     for count in refs:
@@ -363,7 +364,7 @@ def _skip_weights(r: _Bits, refs: list[int]) -> None:
 
 
 def _hevc(stream: bytes) -> Parts:
-    """ITU-T H.265, 7.3.1: units by type."""
+    """Count the bits of an HEVC stream: units by type (ITU-T H.265, 7.3.1)."""
     count = dict.fromkeys(("framing", "parameters", "messages", "data", "units"), 0)
     for gap, unit in _nal_units(stream):
         count["framing"] += gap + 16
@@ -375,28 +376,13 @@ def _hevc(stream: bytes) -> Parts:
 
 
 def _av1(stream: bytes) -> Parts:
-    """AV1 bitstream specification, 5.3: units by type, of a stream whose units carry their size."""
+    """Count the bits of an AV1 stream: units by type (AV1 bitstream specification, 5.3)."""
     count = dict.fromkeys(("framing", "parameters", "messages", "data", "units"), 0)
-    at = 0
-    while at < len(stream):
-        kind, extended, sized = stream[at] >> 3 & 15, stream[at] >> 2 & 1, stream[at] >> 1 & 1
-        if not sized:
-            raise KeyError("a unit without its size")
-        body, size, shift = at + 1 + extended, 0, 0
-        while True:
-            byte = stream[body]
-            body += 1
-            size |= (byte & 127) << shift
-            shift += 7
-            if byte < 128:
-                break
-        count["framing"] += 8 * (body - at)
+    for kind, start, body, end in units(stream):
+        count["framing"] += 8 * (body - start)
         part = {1: "parameters", 2: "framing", 5: "messages", 15: "framing"}.get(kind, "data")
-        count[part] += 8 * size
+        count[part] += 8 * (end - body)
         count["units"] += kind in (3, 6)
-        at = body + size
-    if at != len(stream):
-        raise IndexError("its last unit is cut short")
     return Parts(**count)
 
 

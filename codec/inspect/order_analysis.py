@@ -1,7 +1,7 @@
 """Correlation and residual energy of consecutive frames, for orders of component images.
 
-A frame PVS_j is the vector of all its R, G and B values. Sums run over the picture line by line, without a copy. A
-pair of component images that is consecutive in several orders is summed once.
+A frame PVS_j is the vector of all its R, G and B values. Sums run over the picture line by line, without a copy. The
+sum of a pair of component images is computed once for all orders in which the two are consecutive.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class OrderAnalysis:
     samples : int
         R, G and B values in a frame, 3·S·T.
     correlation : ndarray, (J − 1,)
-        c_j (5.3), NaN where a frame is constant: it has no correlation with anything.
+        c_j (5.3); NaN if one of the frames is constant.
     residual : ndarray, (J − 1,)
         e_j, the Frobenius norm of the difference to the frame before (5.7), in the picture's code values.
     """
@@ -47,28 +47,28 @@ class OrderAnalysis:
 
     @property
     def undefined(self) -> int:
-        """How many c_j are NaN."""
+        """Number of c_j that are NaN."""
         return int(np.isnan(self.correlation).sum())
 
     @property
     def mean(self) -> float:
-        """Mean of c_j where there is one (5.4); NaN if there is none."""
+        """Mean of the c_j that are not NaN (5.4); NaN without any."""
         defined = self.correlation[~np.isnan(self.correlation)]
         return float(defined.mean()) if defined.size else np.nan
 
     @property
     def sigma(self) -> float:
-        """Standard deviation of c_j (5.5), by one less than their number; NaN for fewer than two."""
+        """Sample standard deviation of c_j (5.5); NaN for fewer than two."""
         defined = self.correlation[~np.isnan(self.correlation)]
         return float(defined.std(ddof=1)) if defined.size > 1 else np.nan
 
     @property
     def energy(self) -> float:
-        """e, the mean of e_j² (5.6); NaN of a single frame."""
+        """e, the mean of e_j² (5.6); NaN for a single frame."""
         return float((self.residual**2).mean()) if self.residual.size else np.nan
 
     def to_json(self) -> dict[str, Any]:
-        """The numbers as plain values; ``energy_per_sample`` is e/(3·S·T), which frames of any size share."""
+        """Return the numbers as plain values; ``energy_per_sample`` is e/(3·S·T), comparable over sizes of frames."""
         return {
             "kind": self.kind,
             "order": self.order,
@@ -85,7 +85,7 @@ class OrderAnalysis:
 def analyse_orders(
     picture: IIPicture, *, kinds: Sequence[str] = KINDS, orders: Sequence[str] = tuple(ORDERS)
 ) -> list[OrderAnalysis]:
-    """Correlation and residual energy of consecutive frames, for kinds of component images in several orders.
+    """Compute correlation and residual energy of consecutive frames, for kinds of component images and orders.
 
     Parameters
     ----------
@@ -117,8 +117,8 @@ def analyse_orders(
         permutations = {order: selection_order(order, shape.rows, shape.cols) for order in orders}
         row, col = np.divmod(np.arange(shape.frames), shape.cols)
         origins = row * shape.step_row + col * shape.step_col
-        # Sums of a, a², and least and greatest, of every frame; sums of a·b of every pair. All less `middle`, so that
-        # nothing is lost where bright frames differ little.
+        # Sums of a and a², minimum and maximum of every frame; sums of a·b of every pair. `middle` is subtracted
+        # first: this avoids cancellation for bright frames that differ little.
         frames = np.zeros((shape.frames, 4))
         frames[:, 2], frames[:, 3] = np.inf, -np.inf
         steps = shape.step_y, shape.step_x, shape.height, shape.width
@@ -136,13 +136,13 @@ def analyse_orders(
 
 
 def _pair_keys(permutation: NDArray[np.int64]) -> NDArray[np.int64]:
-    """One number for each pair of consecutive frames, the same whichever comes first."""
+    """Return one number per pair of consecutive frames, independent of their order."""
     a, b = permutation[:-1], permutation[1:]
     return np.minimum(a, b) * len(permutation) + np.maximum(a, b)
 
 
 def _statistics(frames: Floats, key: NDArray[np.int64], product: Floats, samples: int) -> tuple[Floats, Floats]:
-    """c_j and e_j from the sums."""
+    """Return c_j and e_j from the sums."""
     a, b = np.divmod(key, len(frames))
     spread = frames[:, 1] - frames[:, 0] ** 2 / samples  # Σ(a − mean)²
     spread[frames[:, 2] == frames[:, 3]] = np.nan
@@ -152,7 +152,8 @@ def _statistics(frames: Floats, key: NDArray[np.int64], product: Floats, samples
     return c, np.sqrt(np.maximum(frames[a, 1] + frames[b, 1] - 2 * product, 0))
 
 
-# A line of every frame before the next line: frames are interleaved in the picture, and a line of it stays in cache.
+# Kernels process a line of all frames before the next line: frames are interleaved, and a picture line stays in
+# cache.
 @kernel
 def frame_sums(pixels, origins, step_y, step_x, height, width, middle, out):
     """out[j] = Σa, Σa², min, max of frame j over all three colours."""

@@ -1,4 +1,4 @@
-"""Moving pictures for people without a 3-D display: MP4, GIF and WebP."""
+"""Films of views: MP4, GIF and WebP."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from PIL import Image
 from ii_core.files import atomic_path
 
 ANIMATIONS = (".mp4", ".gif", ".webp")
-QUALITY_CRF = 18  # of x264: no loss that eyes find
+QUALITY_CRF = 18  # of x264: no visible loss
 
 
 def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], *, fps: float = 25) -> Path:
-    """Write frames as a film (H.264 in MP4) or as a picture that moves for ever (GIF, WebP).
+    """Write frames as a film (H.264 in MP4) or as an endless animation (GIF, WebP).
 
     Parameters
     ----------
     path : path
-        Ends in .mp4, .gif or .webp; replaced whole.
+        With the suffix .mp4, .gif or .webp; replaced whole.
     frames : iterable of ndarray of uint8, (height, width, 3)
-        sRGB, all of one size. Odd sides lose a row or column in MP4, whose colours are 4:2:0.
+        sRGB, all of one size. MP4 drops the last row or column of odd sides, since its colours are 4:2:0.
     fps : float
-        Frames a second, 1 to 240; in MP4 as the nearest fraction of at most 1001.
+        Frames per second, 1 to 240; in MP4, the nearest fraction of at most 1001.
 
     Returns
     -------
@@ -39,13 +39,13 @@ def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.ui
     Raises
     ------
     ValueError
-        If the type is unknown, ``fps`` is not positive, or there is no frame.
+        If the suffix is unknown, ``fps`` is not from 1 to 240, or there is no frame.
     OSError
         If the file cannot be written.
     """
     kind = Path(path).suffix.lower()
     if kind not in ANIMATIONS:
-        raise ValueError(f"{path} is no known moving picture: known are {', '.join(ANIMATIONS)}")
+        raise ValueError(f"{path} is no known film type: known are {', '.join(ANIMATIONS)}")
     if not 1 <= fps <= 240:
         raise ValueError(f"fps is {fps}: a number from 1 to 240 is needed")
     with atomic_path(path) as temporary:

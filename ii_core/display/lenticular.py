@@ -23,25 +23,25 @@ def lenticular(
     depth_mm: float | None = None,
     cone: float = 1.0,
 ) -> NDArray[np.uint8]:
-    """Views interlaced for a panel under slanted cylindrical lenses: every subpixel has a view of its own.
+    """Return views interlaced for a panel under slanted cylindrical lenses, subpixel by subpixel.
 
-    A subpixel at column x and row y, red a third of a pixel left of green and blue a third right, lies at the share
-    t of its lens; behind a lens the rightmost view lies on the left::
+    Red lies a third of a pixel left of green, and blue a third right. A subpixel at column x and row y has the
+    position t under its lens. The rightmost view lies at the left end of a lens::
 
         t = (x + slope · y − centre_px) / pitch_px  mod 1,   view = views − 1 − ⌊t · views⌋
 
     Parameters
     ----------
     size : (width, height)
-        Of the panel, in pixels.
+        Pixels of the panel.
     pitch_px : float
-        From lens to lens along a row, in pixels.
+        Lens pitch along a row, in pixels.
     slope : float
-        Pixels by which the lenses lean to the left from one row to the one below.
+        Shift of the lenses to the left from one row to the next one below, in pixels.
     centre_px : float
-        Column, in the top row, of a border between two lenses; pixel centres are at whole numbers.
+        Column of a border between two lenses in the top row; pixel centres are whole numbers.
     views : int
-        How many are made; more than 3 · pitch_px are not told apart.
+        Number of views; more than 3 · pitch_px have no effect.
 
     Returns
     -------
@@ -58,7 +58,9 @@ def lenticular(
         raise ValueError(f"slope {slope}, centre {centre_px}: finite numbers are needed")
     y, x, channel = np.ogrid[:height, :width, :3]
     t = ((x + (channel - 1) / 3 + slope * y - centre_px) / pitch_px) % 1.0
-    number = views - 1 - np.minimum((t * views + 1e-6).astype(np.int32), views - 1)  # ties go one way everywhere
+    number = (
+        views - 1 - np.minimum((t * views + 1e-6).astype(np.int32), views - 1)
+    )  # rounds ties alike on all platforms
     out = np.empty((height, width, 3), np.uint8)
     made = display_views(picture, views, size=(width, height), depth_mm=depth_mm, cone=cone)
     for i, view in enumerate(made):

@@ -1,4 +1,4 @@
-"""Looks at a display: a view from any place, of any size, in focus at any depth; paths of viewpoints."""
+"""Focused views of a display: any viewpoint, size and focus depth; paths of viewpoints."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from ..picture import IIPicture, codes8
 from ..view import camera_of, five_viewpoints, view_positions
 
 ASSUMED_ANGLE_DEG = 20.0
-MOST_FRAMES = 3000  # of a film: two minutes at 25 a second
+MOST_FRAMES = 3000  # of a film: two minutes at 25 frames per second
 
 
 def with_assumed_camera(picture: IIPicture) -> IIPicture:
-    """The picture, with a camera of 1 mm pixels that sees 20° if it has none: enough to look at it from aside."""
+    """Return the picture with its camera, or with an assumed one of 1 mm pixels and a viewing angle of 20°."""
     if picture.camera is not None:
         return picture
     gap = picture.ei_pixels[0] / 2 / math.tan(math.radians(ASSUMED_ANGLE_DEG / 2))
@@ -35,25 +35,24 @@ def focused_view(
     depth_mm: float | None = None,
     aperture_px: float = 1.0,
 ) -> NDArray[np.uint8]:
-    """What a viewer sees of the whole lens array, at any size, focused on one plane.
+    """Return the view of the whole lens array from a viewpoint, at any size, focused on one plane.
 
     Parameters
     ----------
     viewpoint_mm : array_like, (3,)
-        Camera coordinates, before the lens plane.
+        Camera coordinates, in front of the lens plane.
     size : (width, height), optional
-        Pixels, stretched over the array; one a lens if not given.
+        Pixels of the view; one per lens if not given.
     depth_mm : float, optional
-        z of the plane on which neighbouring views are laid over each other; the lens plane if not given, and then
-        with ``aperture_px`` 1 this is `view_image`.
+        z of the plane in focus; the lens plane if not given, for which ``aperture_px`` 1 gives `view_image`.
     aperture_px : float
-        Radius of the aperture in pixels under a lens, at least 1: that interpolates linearly between neighbouring
-        views; more blurs what is off the plane.
+        Radius of the aperture in pixels under a lens. 1, the minimum, interpolates linearly between neighbouring
+        views; larger apertures blur other planes.
 
     Returns
     -------
     ndarray of uint8, (height, width, 3)
-        sRGB; black where the line leaves the pixel array.
+        sRGB; black if the line misses the pixel array.
 
     Raises
     ------
@@ -67,7 +66,7 @@ def focused_view(
     if not aperture_px >= 1:
         raise ValueError(f"aperture is {aperture_px} px: at least 1 is needed")
     x, y = view_positions(camera, viewpoint_mm, erect=picture.erect)
-    # Positions are straight lines over the lenses: at those between two lenses, between their positions.
+    # Positions are linear over lenses, also between two lenses.
     across, down = (np.arange(n) + 0.5 for n in (width, height))
     lens_x, lens_y = across * k / width - 0.5, down * l / height - 0.5
     pixel_x, pixel_y = _line(x, u, lens_x), _line(y, v, lens_y)
@@ -80,14 +79,14 @@ def focused_view(
 
 
 def _line(positions: NDArray[np.float64], ei: int, lens: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Pixel under the lens at any lens coordinate, from `view_positions` of whole lenses."""
+    """Return the pixel under any lens coordinate, from the `view_positions` of whole lenses."""
     under = positions - np.arange(len(positions)) * ei
     slope = under[1] - under[0] if len(under) > 1 else 0.0
     return under[0] + slope * lens
 
 
 def _shifts(camera: IICamera, erect: bool, depth_mm: float | None) -> NDArray[np.float64]:
-    """Lenses from a point's place in one view to its place in the next, across and down."""
+    """Return the shift of a point from one view to the next, in lenses, across and down."""
     if depth_mm is None:
         return np.zeros(2)
     if not math.isfinite(depth_mm):
@@ -99,16 +98,16 @@ def _shifts(camera: IICamera, erect: bool, depth_mm: float | None) -> NDArray[np
 
 @kernel
 def held(shift, lens, lenses):
-    """Focus, in lenses a pixel, of a place on the array: no more than there are lenses to the border."""
+    """Return the focus at a position on the array, lenses per pixel, bounded by the distance to the border."""
     room = max(0.0, min(lens + 0.5, lenses - 0.5 - lens))
     return min(max(shift, -room), room)
 
 
 @kernel
 def look(field, lens_x, lens_y, pixel_x, pixel_y, shift, radius, out):
-    """All pixels within the aperture, each under the lens that sees the same point of the plane in focus.
+    """Average the pixels within the aperture, each under the lens that sees the same point of the plane in focus.
 
-    Towards the array's border the focus goes back to 0, so that the lens of the next pixel is never beyond it.
+    The focus falls to 0 towards the border of the array, so that no lens beyond it is needed.
     """
     rows, columns, ei_v, ei_u, _ = field.shape
     for row in range(out.shape[0]):
@@ -148,19 +147,19 @@ def look(field, lens_x, lens_y, pixel_x, pixel_y, shift, radius, out):
 
 
 def viewpoints_across(picture: IIPicture, count: int, *, cone: float = 1.0) -> NDArray[np.float64]:
-    """Viewpoints from left to right through the viewing zone, or the share ``cone`` of it, (count, 3)."""
+    """Return viewpoints from left to right across the share ``cone`` of the viewing zone, (count, 3)."""
     if count < 1 or not 0 < cone <= 1:
         raise ValueError(f"{count} viewpoints in {cone} of the zone: at least 1 in a share from 0 to 1 are needed")
     return np.array([_turned(picture, t * cone, 0.0) for t in np.linspace(-1, 1, count) * (count > 1)])
 
 
 def viewpoints_around(picture: IIPicture, count: int, *, cone: float = 0.9) -> NDArray[np.float64]:
-    """Viewpoints along an ellipse in the viewing zone, for a loop without an end, (count, 3).
+    """Return viewpoints along an ellipse in the viewing zone, for a closed loop, (count, 3).
 
     Raises
     ------
     ValueError
-        If there are none, or more than `MOST_FRAMES`, or the cone is no share.
+        If ``count`` is less than 1 or more than `MOST_FRAMES`, or ``cone`` is not in (0, 1].
     """
     if count > MOST_FRAMES:
         raise ValueError(f"{count} frames: at most {MOST_FRAMES} are made")
@@ -171,7 +170,7 @@ def viewpoints_around(picture: IIPicture, count: int, *, cone: float = 0.9) -> N
 
 
 def _turned(picture: IIPicture, x: float, y: float) -> NDArray[np.float64]:
-    """The place at shares x and y of the viewing zone's half angles, at the distance of `five_viewpoints`."""
+    """Return the viewpoint at shares x and y of the zone's half angles, at the distance of `five_viewpoints`."""
     camera = camera_of(picture)
     views, plane = five_viewpoints(camera), camera.origin_mm[2] + camera.gap_mm
     distance = plane - views["front"][2]
@@ -188,6 +187,6 @@ def _turned(picture: IIPicture, x: float, y: float) -> NDArray[np.float64]:
 def display_views(
     picture: IIPicture, count: int, *, size: Pair, depth_mm: float | None = None, cone: float = 1.0
 ) -> Iterator[NDArray[np.uint8]]:
-    """Views from left to right for a multi-view display; parameters as `focused_view`, which see."""
+    """Yield views from left to right for a multi-view display; parameters as for `focused_view`."""
     for place in viewpoints_across(picture, count, cone=cone):
         yield focused_view(picture, place, size=size, depth_mm=depth_mm)

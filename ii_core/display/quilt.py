@@ -1,4 +1,4 @@
-"""Quilt of a display: views through the viewing zone as tiles of one picture, for Looking Glass displays."""
+"""Quilt of views across the viewing zone, for Looking Glass displays."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from .look import display_views
 def quilt(
     picture: IIPicture, tiles: Pair, *, size: Pair, depth_mm: float | None = None, cone: float = 1.0
 ) -> NDArray[np.uint8]:
-    """Views as tiles of one picture, as Looking Glass displays take them: the leftmost at the bottom left.
+    """Return views as tiles of one picture for Looking Glass displays, the leftmost at the bottom left.
 
     Parameters
     ----------
     tiles : (columns, rows)
     size : (width, height)
-        Of a tile, in pixels.
+        Pixels of a tile.
     depth_mm : float, optional
-        The plane that appears in the display's own plane.
+        z of the scene plane that appears in the plane of the display.
     cone : float
-        Share of the viewing zone that the views span.
+        Share of the viewing zone that the views cover.
 
     Returns
     -------

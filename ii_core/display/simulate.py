@@ -1,4 +1,4 @@
-"""Simulation of an integral-imaging display as an eye sees it, lens by lens."""
+"""Simulation of an integral-imaging display, lens by lens."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from ..view import camera_of, view_positions
 def display_simulation(
     picture: IIPicture, viewpoint_mm: ArrayLike, *, size: Pair, fill: float = 1.0
 ) -> NDArray[np.uint8]:
-    """How the display looks to an eye: every lens a patch of one colour, seen in perspective.
+    """Return the display as an eye sees it: every lens is a patch of one colour, in perspective.
 
-    The eye looks at the middle of the lens array, which just fits its picture. A lens shows the pixel on the line
-    from the eye through the lens's centre (4.1); from far aside those are its neighbour's: the side viewing zones.
+    The eye looks at the middle of the lens array, which fills its picture. A lens shows the pixel on the line from
+    the eye through the lens centre (4.1). In side viewing zones this is a pixel of a neighbouring lens.
 
     Parameters
     ----------
     viewpoint_mm : array_like, (3,)
-        Camera coordinates, before the lens plane.
+        Camera coordinates, in front of the lens plane.
     size : (width, height)
-        Of the eye's picture, in pixels.
+        Pixels of the eye's picture.
     fill : float
-        Diameter of a lens as a share of the pitch: 1 is square lenses side by side, less are discs in a black mask.
+        Diameter of a lens over the pitch: 1 means adjacent square lenses, less means discs in a black mask.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def display_simulation(
 
 
 def _spots(camera: IICamera, eye: NDArray[np.float64], size: Pair) -> NDArray[np.float64]:
-    """Where on the lens plane the lines of sight of an eye's pixels end, (height, width, 2), NaN if they do not."""
+    """Return the ends of lines of sight on the lens plane, (height, width, 2); NaN if they miss it."""
     middle = np.array([0.0, 0.0, camera.gap_mm])
     ahead = (middle - eye) / np.linalg.norm(middle - eye)
     right = np.cross([0.0, 1.0, 0.0], ahead)

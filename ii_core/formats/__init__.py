@@ -1,4 +1,4 @@
-"""Light-field formats: folders of views, the HCI layout, quilts, lenslet mosaics. Readers stand beside writers.
+"""Light-field formats: folders of views, the HCI layout, quilts, lenslet mosaics; readers and writers.
 
 A view of a light field is a sub-image here. In camera order, row by row from the top left camera, view (row, column)
 is SI_{u,v} with u = column and v = row: seen from before the display, the pixel further to the right under a lens

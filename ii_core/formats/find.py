@@ -1,4 +1,4 @@
-"""Import of a light field: find its views, find their order, make the II-picture."""
+"""Import of a light field: its views, their order, the II-picture."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ def find_views(source: str | os.PathLike[str], *, grid: Pair | None = None) -> V
     Parameters
     ----------
     source : path
-        A folder, or a picture file whose name says ``_qsCxRaA``.
+        A folder, or a picture file with ``_qsCxRaA`` in its name.
     grid : (columns, rows), optional
-        Of views with only one number in their names; of a quilt's tiles, if its name does not say.
+        Grid of views with only one number in their names, or of the tiles of a quilt without it in its name.
 
     Raises
     ------
     ValueError
         If there are no views, only one, some are missing, numbers have gaps, or file types are mixed.
     OSError
-        If it cannot be read.
+        If the source cannot be read.
     """
     path = Path(source)
     if path.is_dir():
@@ -46,20 +46,20 @@ def find_views(source: str | os.PathLike[str], *, grid: Pair | None = None) -> V
 def picture_of(
     views: Views, *, transposed: bool | None = None, flip_down: bool | None = None, flip_across: bool | None = None
 ) -> tuple[IIPicture, Arrangement]:
-    """Return the II-picture whose sub-images are the views, and the order that they were found to have.
+    """Return the II-picture whose sub-images are the views, and the arrangement of the views.
 
     Parameters
     ----------
     views : Views
     transposed, flip_down, flip_across : bool, optional
-        See `Arrangement`; what is given is not looked for.
+        See `Arrangement`; given values are not estimated.
 
     Raises
     ------
     ValueError
         If views differ in size or type.
     OSError
-        If one cannot be read.
+        If a view cannot be read.
     """
     given = {"transposed": transposed, "flip_down": flip_down, "flip_across": flip_across}
     chosen: Any = {name: value for name, value in given.items() if value is not None}

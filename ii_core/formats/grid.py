@@ -1,4 +1,4 @@
-"""Grid of views: what every reader finds, and the views of an II-picture in camera order."""
+"""Grid of views: the result of every reader; views of an II-picture in camera order."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ WHOLE_ORDER = frozenset(("transposed", "flip_down", "flip_across"))
 
 @dataclass(frozen=True, kw_only=True)
 class Views:
-    """A grid of views as it was found.
+    """Grid of views in the arrangement of their files.
 
     Parameters
     ----------
     shape : (int, int)
-        Views along the first and the second number.
+        Number of views along the first and the second number.
     read : callable
-        Gives view (a, b) as (T, S, 3), checked against the others.
+        Returns view (a, b) as (T, S, 3); size and type are checked against the other views.
     known : frozenset of str
-        Which parts of an `Arrangement` the layout settles, at their defaults.
+        Parts of an `Arrangement` that the layout fixes at their defaults.
     structure : dict, optional
-        What `write_views` left of the picture that the views came from.
+        Structure of the original picture, if `write_views` stored it.
     """
 
     shape: tuple[int, int]
@@ -52,7 +52,7 @@ def listed(files: list[Path], grid: Pair, known: frozenset[str]) -> Views:
 
 
 def checked_reader(path_of: Callable[[int, int], Path], read: Callable[[Path], NDArray[Any]]) -> Read:
-    """Return a reader that holds every view against the first it read."""
+    """Return a reader that compares size and type of every view with the first."""
     known: list[tuple[Path, tuple[int, ...], np.dtype[Any]]] = []
 
     def checked(a: int, b: int) -> NDArray[Any]:
@@ -72,12 +72,12 @@ def checked_reader(path_of: Callable[[int, int], Path], read: Callable[[Path], N
 
 
 def read_view(path: str | os.PathLike[str]) -> NDArray[Any]:
-    """A picture as (T, S, 3): grey three times, an alpha channel left out if it says nothing.
+    """Read a picture as (T, S, 3); grey is repeated, and an opaque alpha channel is dropped.
 
     Raises
     ------
     ValueError
-        If it has another number of channels, or is transparent somewhere.
+        If it has another number of channels, or a transparent pixel.
     OSError
         If it cannot be read.
     """
@@ -96,7 +96,7 @@ def read_view(path: str | os.PathLike[str]) -> NDArray[Any]:
 
 
 def camera_views(picture: IIPicture) -> Iterator[tuple[int, int, NDArray[Any]]]:
-    """(row, column, view) in camera order from the top left, each view (L, K, 3).
+    """Yield (row, column, view) in camera order from the top left, each view (L, K, 3).
 
     Raises
     ------

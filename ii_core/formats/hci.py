@@ -25,7 +25,7 @@ from .grid import WHOLE_ORDER, Views, camera_views, listed
 from .pfm import write_pfm
 
 HCI_VIEW = re.compile(r"input_Cam(\d+)\.\w+")
-MAX_CONFIG = 1 << 20  # bytes of a parameters.cfg; those of the benchmark have a thousand
+MAX_CONFIG = 1 << 20  # bytes of a parameters.cfg; those of the benchmark have about 1000
 
 
 def hci_views(folder: Path, files: list[Path], grid: Pair | None) -> Views:
@@ -34,7 +34,7 @@ def hci_views(folder: Path, files: list[Path], grid: Pair | None) -> Views:
 
 
 def _hci_grid(folder: Path, count: int) -> Pair:
-    """(columns, rows) by the folder's parameters.cfg, or a square."""
+    """Return (columns, rows) of the folder's parameters.cfg, or of a square grid."""
     config = configparser.ConfigParser(interpolation=None)
     try:
         if os.path.lexists(folder / "parameters.cfg"):
@@ -52,17 +52,17 @@ def _hci_grid(folder: Path, count: int) -> Pair:
 
 @checks.checked(picture=checks.instance(IIPicture), folder=checks.path, depth=checks.array)
 def write_hci(picture: IIPicture, folder: str | os.PathLike[str], *, depth: NDArray[Any] | None = None) -> Path:
-    """The layout of the HCI benchmark: ``input_Cam000.png`` …, ``parameters.cfg`` and, with depth, a disparity map.
+    """Write the layout of the HCI benchmark: views, ``parameters.cfg`` and, with depth, a disparity map.
 
     ``gt_disp_lowres.pfm`` holds the disparity of the view at row V//2, column U//2; see `view_disparity`.
-    ``parameters.cfg`` says what is true of an II-picture: views are parallel projections, without focal length.
+    ``parameters.cfg`` has no focal length, since views of an II-picture are parallel projections.
 
     Parameters
     ----------
     picture : IIPicture
         Of 8 or 16 bit.
     depth : ndarray, (N, M), optional
-        Scene z of every pixel, mm, NaN where nothing is.
+        Scene z of every pixel, mm; NaN without a hit.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def write_hci(picture: IIPicture, folder: str | os.PathLike[str], *, depth: NDAr
     Raises
     ------
     ValueError
-        If the picture is of floats, or depth is given and does not fit or the picture has no camera.
+        If the picture has float pixels, or depth has another size or the picture no camera.
     OSError
         If a file cannot be written.
     """
@@ -96,11 +96,11 @@ def write_hci(picture: IIPicture, folder: str | os.PathLike[str], *, depth: NDAr
 
 
 def view_disparity(picture: IIPicture, depth: NDArray[Any]) -> NDArray[np.float32]:
-    """Disparity of the view at row V//2, column U//2 of a rendered picture, pixels per step between views.
+    """Return the disparity of the view at row V//2, column U//2 of a rendered picture, pixels per view step.
 
-    d = −δP·(z − Λ) / (Λ·δL): a point on the lens plane stays where it is in all views; what lies behind, and in an
-    II-picture all does, moves along with the viewer, hence the sign. Into the next view to the right a point at
-    column x goes to x − d. NaN where nothing is hit.
+    d = −δP·(z − Λ) / (Λ·δL). A point on the lens plane has the same position in all views. Points behind it, as all
+    points of an II-picture, move with the viewer, hence the sign: column x becomes x − d in the next view to the
+    right. NaN without a hit.
 
     Parameters
     ----------
@@ -116,8 +116,7 @@ def view_disparity(picture: IIPicture, depth: NDArray[Any]) -> NDArray[np.float3
     Raises
     ------
     ValueError
-        If the depth map is of another size, the picture has no camera, or something stands before its lenses, which
-        bends rays so that no such formula holds.
+        If the depth map has another size, the picture has no camera, or elements in front of its lenses refract rays.
     """
     camera = picture.camera
     if camera is None or camera.front:

@@ -17,7 +17,7 @@ from .grid import read_view
 
 @checks.checked(path=checks.path, ei_pixels=checks.whole_pair)
 def load_mosaic(path: str | os.PathLike[str], ei_pixels: Pair) -> IIPicture:
-    """A lenslet picture of integer pitch, as it is.
+    """Read a lenslet picture of integer lens pitch as an II-picture.
 
     Warns
     -----
@@ -53,11 +53,11 @@ def load_mosaic(path: str | os.PathLike[str], ei_pixels: Pair) -> IIPicture:
 
 
 def looks_hexagonal(pixels: NDArray[Any], ei_pixels: Pair) -> bool:
-    """Whether the borders of micro-images repeat as those of a hexagonal lattice of this pitch do.
+    """Return whether the borders of micro-images repeat as in a hexagonal lattice of this pitch.
 
     The edges of a picture repeat with its lenses. In straight rows of pitch p their spectrum has a peak at (1/p, 0).
     In a hexagonal lattice it has none there but at (1/p, ±1/(√3·p)); likewise with the axes exchanged. The
-    lattice counts as hexagonal if its weaker peak is twice the straight one's and stands out of what lies between.
+    lattice is hexagonal if its weaker peak is twice the straight one and thrice the value between the peaks.
     """
     size = min(1024, *pixels.shape[:2])
     top, left = ((n - size) // 2 for n in pixels.shape[:2])
@@ -70,7 +70,7 @@ def looks_hexagonal(pixels: NDArray[Any], ei_pixels: Pair) -> bool:
         power = np.abs(np.fft.fft2((edges - edges.mean()) * window * window[:, None]))
 
         def peak(across: float, down: float, power: NDArray[Any] = power) -> float:
-            # A pitch given in whole pixels is off by up to half of one.
+            # A pitch in whole pixels has an error of up to half a pixel.
             x, y = round(across * size), round(down * size)
             reach = max(2, abs(x) // 30)
             rows, columns = np.arange(y - 2, y + 3), np.arange(x - reach, x + reach + 1)

@@ -1,18 +1,17 @@
-"""How a grid of views hangs together: which number runs across, which way, and how far the scene moves.
+"""Arrangement of a grid of views: horizontal axis, directions and disparity, from file names and pictures.
 
-A stranger's grid has two numbers, say (a, b), for every view. What they mean is found from the pictures as far as
-pictures tell:
+Views of other programs have two numbers (a, b). Their meaning is estimated from the pictures:
 
-- **Which number runs across.** Between neighbours along it the scene moves sideways, along the other up or down.
-- **Whether the two run the same way.** With both from left to right and from top to bottom, a point has the same
-  disparity along both; if one of them runs backwards, the opposite.
-- **Which way both run** no shift can tell: turned about altogether, the grid shows the same shifts of a scene inside
-  out. Left to right is assumed, and the sign of the disparity that follows is reported: where all that is known to
-  lie before the plane of agreement comes out behind it, the grid is to be flipped both ways.
+- **The horizontal number.** Between neighbours along it the scene moves sideways; along the other it moves
+vertically.
+- **The relative direction.** With numbers from left to right and from top to bottom, a point has the same disparity
+  along both. If one number is reversed, the disparities have opposite signs.
+- **The absolute direction** has no effect on shifts: a grid reversed along both axes shows the same shifts of a scene
+  with inverted depth. Left to right is assumed, and the sign of the disparity is reported. If known depths contradict
+  it, flip both axes.
 
-Disparity is in view pixels per step and positive where a point moves to the left as the camera moves to the right
-(up as it moves down): the point is nearer than the plane on which the views agree. This is the sign of the HCI
-benchmark.
+Disparity is in view pixels per step. It is positive if a point moves to the left as the camera moves to the right (up
+as it moves down): the point is nearer than the plane of zero disparity. This is the sign of the HCI benchmark.
 """
 
 from __future__ import annotations
@@ -29,29 +28,29 @@ from ..colour import KB, KG, KR
 Floats = NDArray[np.float32]
 Read = Callable[[int, int], NDArray[Any]]
 
-SEARCHED_SIDE = 384  # larger views are shrunk to about this before the search
-REACH = 0.25  # of the side, how far a point may move; what moves as far is not believed
-FAR = 2  # pixels: motion that is seen well; below it views farther apart are compared
+SEARCHED_SIDE = 384  # pixels; larger views are shrunk to about this side
+REACH = 0.25  # of the side: search range; matches at its end are rejected
+FAR = 2  # pixels: sufficient disparity; below it, views farther apart are compared
 BLOCK = 8
-FEW = 12  # blocks that move: fewer show nothing
-CLEAR = 1.0  # 8-bit codes, and twice what is left, by which a block's best shift must beat its median one
-LEAN = 0.25  # of all that shifts along either axis gain, how much one must gain more
+FEW = 12  # least number of moving blocks for an estimate
+CLEAR = 1.0  # 8-bit codes: a block's best shift must beat its median by this plus twice its own cost
+LEAN = 0.25  # relative difference of gains along the axes that decides between them
 
 
 @dataclass(frozen=True, kw_only=True)
 class Arrangement:
-    """What the two numbers (a, b) of a view mean.
+    """Meaning of the two numbers (a, b) of a view.
 
     Parameters
     ----------
     transposed : bool
-        a runs across, b down; otherwise a down and b across.
+        True if a is horizontal and b vertical.
     flip_down, flip_across : bool
-        The number that runs down (across) runs from the bottom up (from right to left).
+        True if the vertical (horizontal) number counts from the bottom (from the right).
     disparity : (float, float) or None
-        Where most points lie, the 5th and the 95th percentile, pixels per step; None if not seen.
+        5th and 95th percentile of the disparity, pixels per step; None if not measurable.
     basis : str
-        How much of it was given, seen in the pictures, or assumed.
+        Which parts were given, estimated or assumed.
     """
 
     transposed: bool = False
@@ -65,13 +64,13 @@ class Arrangement:
         return shape if self.transposed else (shape[1], shape[0])
 
     def place(self, a: int, b: int, shape: tuple[int, int]) -> tuple[int, int]:
-        """(row, column) of view (a, b) as the cameras stood, from the top left."""
+        """Return the (row, column) of view (a, b) in the camera array, from the top left."""
         cols, rows = self.grid(shape)
         row, col = (b, a) if self.transposed else (a, b)
         return rows - 1 - row if self.flip_down else row, cols - 1 - col if self.flip_across else col
 
     def describe(self) -> str:
-        """One line on the order and the sign, and on what of it is more than an assumption."""
+        """Return the arrangement, its basis and the disparity in one line."""
         across = "right to left" if self.flip_across else "left to right"
         down = "bottom to top" if self.flip_down else "top to bottom"
         first, second = (across, down) if self.transposed else (down, across)
@@ -84,18 +83,18 @@ class Arrangement:
 
 
 def estimate(read: Read, shape: tuple[int, int], given: Arrangement, fixed: Set[str] = frozenset()) -> Arrangement:
-    """The arrangement of a grid of views, from a few of them around its middle.
+    """Estimate the arrangement of a grid of views from some views around its middle.
 
     Parameters
     ----------
     read : callable
-        Gives view (a, b) as (T, S, 3).
+        Returns view (a, b) as (T, S, 3).
     shape : (int, int)
-        Views along a and b.
+        Number of views along a and b.
     given : Arrangement
-        What is taken where nothing is seen.
+        Values where no estimate is possible.
     fixed : set of str
-        Of "transposed", "flip_down" and "flip_across": what stays as given whatever the pictures say.
+        Names among "transposed", "flip_down" and "flip_across" that are not estimated.
     """
     pairs = {axis: _pair(read, shape, axis) for axis in (0, 1) if shape[axis] > 1}
     seen: list[str] = []
@@ -124,7 +123,7 @@ def estimate(read: Read, shape: tuple[int, int], given: Arrangement, fixed: Set[
 
 
 def _pair(read: Read, shape: tuple[int, int], axis: int) -> tuple[Floats, Floats, float]:
-    """Two grey views along an axis, far enough apart to see motion, and view pixels per step in one of theirs."""
+    """Return two grey views along an axis with sufficient disparity, and view pixels per step of one grey pixel."""
     at = [count // 2 for count in shape]
     shrink = max(1, round(max(read(*at).shape[:2]) / SEARCHED_SIDE))
 
@@ -142,7 +141,7 @@ def _pair(read: Read, shape: tuple[int, int], axis: int) -> tuple[Floats, Floats
 
 
 def _grey(view: NDArray[Any], shrink: int) -> Floats:
-    """Luma in 8-bit codes, squares of pixels averaged."""
+    """Return luma in 8-bit codes, averaged over squares of pixels."""
     grey = view.astype(np.float32) @ np.array([KR, KG, KB], np.float32)
     grey *= np.float32(255 if view.dtype.kind == "f" else 255 / np.iinfo(view.dtype).max)
     height, width = (side // shrink for side in grey.shape)
@@ -155,7 +154,7 @@ def _typical_motion(a: Floats, b: Floats) -> float:
 
 
 def _moves(a: Floats, b: Floats) -> tuple[Floats, Floats, float]:
-    """How far each block of ``a`` lies to the left in ``b``, how clearly so, and what shifting gains in all."""
+    """Return the shift to the left of each block of ``a`` in ``b``, its weight, and the gain of all shifts."""
     reach = int(max(1, min(a.shape[1] * REACH, a.shape[1] - 1)))
     block = [min(BLOCK, side) for side in a.shape]
     rows, cols = (side // size for side, size in zip(a.shape, block, strict=True))
@@ -176,13 +175,13 @@ def _moves(a: Floats, b: Floats) -> tuple[Floats, Floats, float]:
 
 
 def _map(a: Floats, b: Floats, scale: float, *, upright: bool) -> tuple[Floats, Floats]:
-    """Disparity of each block, pixels per step along its own axis, and its weight; both upright."""
+    """Return the disparity of each block along its axis, pixels per step, and its weight, both upright."""
     moved, weight, _ = _moves(a, b) if upright else _moves(a.T, b.T)
     return (moved * scale, weight) if upright else (moved.T * scale, weight.T)
 
 
 def _agreement(maps: dict[int, tuple[Floats, Floats]]) -> int:
-    """1 if the disparities along the two numbers agree, −1 if they are opposite, 0 if neither is clear."""
+    """Return 1 if the disparities along the two numbers agree, −1 if they are opposite, 0 if undecided."""
     if len(maps) < 2:
         return 0
     (p, wp), (q, wq) = maps[0], maps[1]

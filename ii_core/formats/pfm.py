@@ -1,4 +1,4 @@
-"""Portable float maps, grey."""
+"""Portable float maps (PFM), single-channel."""
 
 from __future__ import annotations
 
@@ -28,10 +28,11 @@ def read_pfm(path: str | os.PathLike[str]) -> NDArray[np.float32]:
     return values.reshape(int(match[2]), int(match[1]))[::-1].astype(np.float32)
 
 
-def write_pfm(path: str | os.PathLike[str], values: NDArray[np.float32]) -> None:
-    """Write (T, S) as a little-endian portable float map, bottom row first."""
+def write_pfm(path: str | os.PathLike[str], values: NDArray[np.float32]) -> Path:
+    """Write (T, S) as a little-endian portable float map, bottom row first; return the file's path."""
     rows, cols = values.shape
     with atomic_path(path) as temporary:
         temporary.write_bytes(
             b"Pf\n%d %d\n-1.0\n" % (cols, rows) + np.ascontiguousarray(values[::-1], "<f4").tobytes()
         )
+    return Path(path)

@@ -1,4 +1,4 @@
-"""Quilt: tiles of views along one line, the leftmost at the bottom left, rows upward; ``name_qsCxRaA.png``."""
+"""Quilt of views along one line: tiles from the bottom left, rows upward; ``name_qsCxRaA.png``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ QUILT = re.compile(r"_qs(\d+)x(\d+)(?:a(\d+(?:\.\d+)?))?")
 
 
 def quilt_views(path: Path, grid: Pair | None) -> Views:
-    """Return the views of a quilt; ``grid`` is (columns, rows) of tiles, else by its name."""
+    """Return the views of a quilt; ``grid`` is (columns, rows) of tiles, by default that of the name."""
     match = QUILT.search(path.stem)
     if match is None and grid is None:
         raise ValueError(f"{path} is no folder and its name says no _qsCxRaA: its grid of tiles is needed")
@@ -44,12 +44,12 @@ def quilt_views(path: Path, grid: Pair | None) -> Views:
 
 
 def quilt_pixels(views: Iterable[NDArray[Any]], tiles: Pair) -> NDArray[Any]:
-    """Lay views, from left to right, out as the tiles of one picture.
+    """Return one picture with views, from left to right, as its tiles.
 
     Parameters
     ----------
     views : iterable of ndarray, (height, width, 3)
-        Columns · rows of them.
+        As many as tiles.
     tiles : (columns, rows)
 
     Returns
@@ -68,19 +68,19 @@ def quilt_pixels(views: Iterable[NDArray[Any]], tiles: Pair) -> NDArray[Any]:
 
 
 def quilt_name(path: str | os.PathLike[str], tiles: Pair, aspect: float) -> Path:
-    """Return the path with tiles and aspect of a view behind its stem, ``_qsCxRaA``."""
+    """Return the path with ``_qsCxRaA`` after its stem: tiles and the aspect of a view."""
     path = Path(path)
     return path.with_name(f"{QUILT.sub('', path.stem)}_qs{tiles[0]}x{tiles[1]}a{aspect:.4g}{path.suffix}")
 
 
 @checks.checked(picture=checks.instance(IIPicture), path=checks.path, row=checks.whole)
 def write_quilt(picture: IIPicture, path: str | os.PathLike[str], *, row: int | None = None) -> Path:
-    """One row of views as a quilt, left to right from the bottom left.
+    """Write one row of views as a quilt, left to right from the bottom left.
 
     Parameters
     ----------
     path : path
-        ``_qsCxRaA`` is put behind its stem unless it is there.
+        ``_qsCxRaA`` is added after its stem.
     row : int, optional
         Row of views; the middle one, V//2, if not given.
 
@@ -114,7 +114,7 @@ def quilt_row(picture: IIPicture, row: int | None = None) -> NDArray[Any]:
 
 
 def quilt_path(path: str | os.PathLike[str], picture: IIPicture) -> Path:
-    """Return the name under which `write_quilt` writes: tiles and aspect behind the stem."""
+    """Return the path that `write_quilt` writes, with tiles and aspect after the stem."""
     picture.check_regular()
     (k, l), (u, _) = picture.lenses, picture.ei_pixels
     pitch = picture.camera.lens_pitch_mm if picture.camera else (1.0, 1.0)
@@ -122,7 +122,7 @@ def quilt_path(path: str | os.PathLike[str], picture: IIPicture) -> Path:
 
 
 def _tiles(views: int, size: Pair) -> Pair:
-    """(columns, rows) of so many tiles that make the quilt as nearly square as can be."""
+    """Return (columns, rows) of ``views`` tiles for the most nearly square quilt."""
     divisors = [n for n in range(1, views + 1) if views % n == 0]
     down = min(divisors, key=lambda n: abs(math.log(views / n * size[0] / (n * size[1]))))
     return views // down, down

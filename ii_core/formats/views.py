@@ -21,7 +21,7 @@ from .hci import HCI_VIEW, hci_views
 PICTURES = (".png", ".tif", ".tiff", ".exr", ".hdr", ".jpg", ".jpeg", ".ppm", ".pgm", ".bmp", ".webp")
 NUMBER = re.compile(r"-?\d+\.\d+|\d+")
 STRUCTURE = "structure.json"
-LISTED = 5  # of many missing views, how many a message names
+LISTED = 5  # missing views that a message names
 
 
 def folder_views(folder: Path, grid: Pair | None) -> Views:
@@ -42,7 +42,7 @@ def folder_views(folder: Path, grid: Pair | None) -> Views:
 
 
 def _numbered(folder: Path, members: list[Path], grid: Pair | None) -> Views:
-    """Views whose names hold two numbers that make a grid, or one and a grid that is given."""
+    """Return views with two numbers in their names, or with one number and a given grid."""
     fields = list(zip(*(NUMBER.findall(path.stem) for path in members), strict=True))
     whole = [tuple(map(int, field)) for field in fields if all(text.isdigit() for text in field)]
     varying = [field for field in whole if len(set(field)) > 1]
@@ -80,7 +80,7 @@ def _numbered(folder: Path, members: list[Path], grid: Pair | None) -> Views:
 
 
 def _written(folder: Path, shape: tuple[int, int]) -> dict[str, Any]:
-    """What `write_views` knows of its own folder: order and structure."""
+    """Return the order and structure that `write_views` stored in the folder, if any."""
     path = folder / STRUCTURE
     if not os.path.lexists(path):
         return {}
@@ -96,7 +96,7 @@ def _written(folder: Path, shape: tuple[int, int]) -> dict[str, Any]:
 
 @checks.checked(picture=checks.instance(IIPicture), folder=checks.path)
 def write_views(picture: IIPicture, folder: str | os.PathLike[str]) -> Path:
-    """Every view as ``view_ROW_COLUMN.png`` (``.exr`` of float pictures), and the structure beside them.
+    """Write every view as ``view_ROW_COLUMN.png`` (``.exr`` for float pictures), and the structure.
 
     Returns
     -------

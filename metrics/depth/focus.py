@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IICamera, IIPicture, checks
+from ii_core.parallel import over_rows
+from ii_core.picture import peak
 from ii_core.view import camera_of, view_image, view_positions
 
-from ..pair import peak
 from . import kernels
 from .layers import Floats, check_layers, virtual_viewpoint
 
@@ -184,7 +183,6 @@ def depth_from_focus(
         raise ValueError("weights must be of two odd sides, finite, not negative and not all 0")
     _check_finite(picture)
 
-    workers = cores() if workers is None else workers
     nearest = interpolation == "nearest"
     if method == "dissertation":
         cost = _dissertation(picture, layers, b, r, h, nearest, workers)
@@ -199,7 +197,7 @@ def depth_from_focus(
 
 
 def _dissertation(
-    picture: IIPicture, layers: Floats, base: Steps, reference: Steps, h: Floats, nearest: bool, workers: int
+    picture: IIPicture, layers: Floats, base: Steps, reference: Steps, h: Floats, nearest: bool, workers: int | None
 ) -> Costs:
     """Σ_rgb |B_d − R_d| ∗ h, (L, K, layers)."""
     camera = camera_of(picture)
@@ -215,7 +213,7 @@ def _dissertation(
     return smooth
 
 
-def _robust(picture: IIPicture, layers: Floats, h: Floats, nearest: bool, workers: int) -> Costs:
+def _robust(picture: IIPicture, layers: Floats, h: Floats, nearest: bool, workers: int | None) -> Costs:
     """Halves of neighbours ∗ h by likeness, passed on along rows and columns; (L, K, layers)."""
     camera = camera_of(picture)
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
@@ -370,18 +368,6 @@ def _check_finite(picture: IIPicture) -> None:
             raise ValueError(f"picture pixel ({bad[0]}, {n}) is {row[bad[0]]}: finite values are needed")
 
 
-def cores() -> int:
-    """Cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _by_rows(workers: int, rows: int, work: Callable[..., None], *arguments: Any) -> None:
-    """Call a kernel with its first and last row, on plain threads: those of numba may abort when two callers meet."""
-    count = max(1, min(workers, rows))
-    bounds = np.linspace(0, rows, count + 1).astype(int)
-    if count == 1:
-        work(*arguments, 0, rows)
-        return
-    with ThreadPoolExecutor(count) as pool:
-        for done in [pool.submit(work, *arguments, a, b) for a, b in pairwise(bounds)]:
-            done.result()
+def _by_rows(workers: int | None, rows: int, kernel: Callable[..., None], *arguments: Any) -> None:
+    """Call a kernel whose last two arguments are its first and last row."""
+    over_rows(lambda first, last: kernel(*arguments, first, last), rows, workers=workers)

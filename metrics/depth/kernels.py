@@ -1,4 +1,4 @@
-"""The kernels of depth from focus: all in one file, as numba's cache asks for."""
+"""Kernels of depth from focus."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ import numpy as np
 
 from ii_core.jit import inline_kernel, kernel
 
-# Neighbours that a half needs: one alone agrees too easily. More would keep out wrong near layers, which few lenses
-# see, but also the lenses at the picture's edge.
+# Least neighbours of a half: a single one often agrees by chance. More would also exclude lenses at the border.
 FEWEST = 2
 
 
 @inline_kernel
 def _between(pixels, m, n, x, y):
-    """The colour x of the way from pixel (m, n) to its right neighbour and y of the way to the one below."""
-    # A weight of 0 must not reach for a pixel that may be off the picture.
+    """Interpolate the colour at the shares x and y from pixel (m, n) to its right and lower neighbours."""
+    # At a weight of 0 the neighbour may lie outside the picture.
     right, below = m + (x > 0), n + (y > 0)
     a, b, c, e = (1 - y) * (1 - x), (1 - y) * x, y * (1 - x), y * x
     return (
@@ -28,10 +27,10 @@ def _between(pixels, m, n, x, y):
 
 @kernel
 def focus_cost(pixels, cols, col_weights, rows, row_weights, where, members, out, first, last):
-    """out[l, k, d] = Σ_rgb |B_d − R_d|, NaN where nothing can be compared; rows ``first`` to ``last`` of lenses.
+    """out[l, k, d] = Σ_rgb |B_d − R_d|, NaN without a comparison, for lens rows ``first`` to ``last``.
 
-    Tables as of `pixel_tables`; ``where`` (n, 2) has the neighbours as rows of the tables, ``members`` (n, 2) says
-    which of B and R each is in.
+    The tables are those of `pixel_tables`. ``where`` (n, 2) holds the table rows of the neighbours, ``members`` (n,
+    2) their membership in B and R.
     """
     for l in range(first, last):
         for d in range(out.shape[2]):
@@ -61,7 +60,7 @@ def focus_cost(pixels, cols, col_weights, rows, row_weights, where, members, out
 def half_cost(pixels, cols, col_weights, rows, row_weights, where, sides, own, limit, out, first, last):
     """out[l, k, d] = min over halves of the mean over their neighbours of min(Σ_rgb |p − p_own|, limit), or NaN.
 
-    As `focus_cost`; ``sides`` (n, 4) says which half each neighbour is in, ``own`` is the neighbour at step 0.
+    As `focus_cost`. ``sides`` (n, 4) holds the halves of each neighbour, ``own`` is the neighbour at step 0.
     """
     total, count = np.empty(4), np.empty(4)
     for l in range(first, last):
@@ -97,9 +96,9 @@ def half_cost(pixels, cols, col_weights, rows, row_weights, where, sides, own, l
 
 @kernel
 def weigh(cost, h, view, alike, out, first, last):
-    """out = cost ∗ h for rows ``first`` to ``last``, over those neighbours that have a cost.
+    """out = cost ∗ h for rows ``first`` to ``last``, over the neighbours with a cost.
 
-    A neighbour counts exp(−Σ_rgb |Δview|/alike) times what h says: what looks alike is taken to lie at one depth.
+    The weights of h are multiplied by exp(−Σ_rgb |Δview|/alike): similar colours are assumed to have equal depth.
     """
     rows, cols, layers = cost.shape
     up, left = h.shape[0] // 2, h.shape[1] // 2
@@ -126,13 +125,13 @@ def weigh(cost, h, view, alike, out, first, last):
 
 @kernel
 def pass_on(cost, view, place, slope, leap, alike, down, back, total, first, last):
-    """Add to ``total`` what each lens's layers cost when those of the lenses before it on its row have a say.
+    """Aggregate costs along one scan direction (semi-global matching) and add them to ``total``.
 
-    From one lens to the next a layer may change at ``slope`` × the difference of its ``place``, or by any for
-    ``leap``; both weigh less where the view's colour changes, as in `weigh`. With ``down`` along columns, with
-    ``back`` from the far end. Rows (columns) ``first`` to ``last``.
+    A change of layer from one lens to the next costs ``slope`` times the difference of ``place``, at most ``leap``.
+    Both are smaller where the colour of the view changes, as in `weigh`. ``down`` scans columns, ``back`` scans
+    backwards. Rows (columns) ``first`` to ``last`` are scanned.
 
-    Where a layer has no cost it counts like the mean of the others: it neither attracts nor repels.
+    A layer without a cost has the mean cost of the other layers.
     """
     layers = cost.shape[2]
     count = cost.shape[0] if down else cost.shape[1]
@@ -158,7 +157,7 @@ def pass_on(cost, view, place, slope, leap, alike, down, back, total, first, las
                 low = before.min()
                 for d in range(layers):
                     now[d] = min(before[d] - low, leap * w)
-                # The lower envelope of a slope from every layer, in two passes.
+                # Lower envelope of slopes from all layers, in two passes.
                 for d in range(1, layers):
                     now[d] = min(now[d], now[d - 1] + slope * w * (place[d] - place[d - 1]))
                 for d in range(layers - 2, -1, -1):
@@ -170,9 +169,10 @@ def pass_on(cost, view, place, slope, leap, alike, down, back, total, first, las
 
 @kernel
 def choose(cost, tie, layer, fit, confidence, first, last):
-    """The nearest of the cheapest layers, −1 if all cost the same but for ``tie``, for rows ``first`` to ``last``.
+    """Choose the layer of least cost for lens rows ``first`` to ``last``, the nearest of equals.
 
-    ``fit`` is how many layers farther, −½ to ½, the parabola through it and its neighbours has its bottom.
+    The layer is −1 if all costs are equal within ``tie``. ``fit`` is the offset, −½ to ½ layers, of the minimum of
+    the parabola through the costs of the layer and its neighbours.
     """
     for l in range(first, last):
         for k in range(cost.shape[1]):
@@ -192,5 +192,5 @@ def choose(cost, tie, layer, fit, confidence, first, last):
                 if 0 < best < cost.shape[2] - 1:
                     before, after = np.float64(cost[l, k, best - 1]), np.float64(cost[l, k, best + 1])
                     bend = before - 2 * low + after
-                    if bend > 0:  # not NaN, and not three alike
+                    if bend > 0:  # false for NaN and for three equal costs
                         fit[l, k] = (before - after) / (2 * bend)

@@ -1,4 +1,4 @@
-"""Depth layers, and the point from which they are seen."""
+"""Depth layers, and the viewpoint of the virtual camera."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IICamera, checks
 
 LAYERS = 250
-ALIKE = 1e-6  # depths that differ by less than this share of them differ by the rounding of a float32 map
+ALIKE = 1e-6  # relative tolerance of equal depths: rounding of a float32 map
 Floats = NDArray[np.float64]
 
 
 @checks.checked(camera=checks.instance(IICamera), count=checks.whole)
 def linear_layers(camera: IICamera, count: int = LAYERS) -> Floats:
-    """Layers at z = d·f from the pixel array, d = 1 … count, with f = Λ in the pinhole approximation, mm.
+    """Return the dissertation's layers z = d·f, d = 1 … count, from the pixel array in mm; f = Λ for pinholes.
 
-    The dissertation's layers. They end at count·Λ, 46 mm in `setup1` and 366 mm at its scale 8.
+    They end at count·Λ: 46 mm in `setup1`, 366 mm at its scale 8.
     """
     if count < 1:
         raise ValueError(f"count is {count} layers: at least 1 is needed")
@@ -26,13 +26,13 @@ def linear_layers(camera: IICamera, count: int = LAYERS) -> Floats:
 
 
 def virtual_viewpoint(camera: IICamera) -> Floats:
-    """V, (0, 0, Λ − K·Λ) before the middle of the array, in camera coordinates."""
+    """Return V = (0, 0, Λ − K·Λ), in front of the middle of the array, in camera coordinates."""
     return np.array([0.0, 0.0, camera.gap_mm * (1 - camera.lenses[0])]) + camera.origin_mm
 
 
 @checks.checked(near_mm=checks.number, far_mm=checks.number, count=checks.whole)
 def logarithmic_layers(near_mm: float, far_mm: float, count: int = LAYERS) -> Floats:
-    """Layers from near to far in equal ratios, mm."""
+    """Return layers from near to far in equal ratios, mm."""
     if not 0 < near_mm < far_mm < math.inf:
         raise ValueError(f"near_mm is {near_mm}, far_mm {far_mm}: 0 < near < far is needed")
     if count < 1:
@@ -42,17 +42,16 @@ def logarithmic_layers(near_mm: float, far_mm: float, count: int = LAYERS) -> Fl
 
 @checks.checked(camera=checks.instance(IICamera), depth_mm=checks.numbers, count=checks.whole)
 def covering_layers(camera: IICamera, depth_mm: ArrayLike | None = None, count: int = LAYERS) -> Floats:
-    """Layers in equal ratios over all depths of a picture, mm; `q_depth`'s and `depth_from_focus`'s default.
+    """Return layers in equal ratios over all depths of a picture, mm: the default of depth functions.
 
     Parameters
     ----------
     camera : IICamera
     depth_mm : array_like, optional
-        Scene z in camera coordinates, NaN where nothing is hit. Layers run from its least to its greatest value
-        in front of the pixel array. All values alike give one layer.
-        If it is not given, or holds no such value, layers run over the depths that disparity can tell: from
-        3Λ, where a point moves half an elementary image from one lens to the next and no neighbour sees it nearer,
-        to (M + 1)Λ, where it moves one pixel over the whole array of M pixels.
+        Scene z in camera coordinates, NaN without a hit. Layers cover its range in front of the pixel array; equal
+        values give one layer. Without depth, layers cover the depths that disparity distinguishes, from 3Λ to (M +
+        1)Λ. At 3Λ the disparity between neighbouring lenses is half an elementary image; nearer points are in no
+        other elementary image. At (M + 1)Λ the disparity is one pixel over all lenses of an array of M pixels.
     count : int
         Number of layers. Distances from the pixel array grow by one ratio from layer to layer.
 
@@ -69,13 +68,19 @@ def covering_layers(camera: IICamera, depth_mm: ArrayLike | None = None, count: 
 
 
 def logarithmic(layers_mm: Floats) -> bool:
-    """Whether layers grow by one ratio, over more than a factor of ten: a chart of them has a logarithmic axis."""
+    """Return whether layers have equal ratios and span more than a factor of ten, for a logarithmic axis."""
     z = np.asarray(layers_mm)
     return bool(z.size > 2 and z[0] > 0 and z[-1] / z[0] > 10 and np.ptp(np.diff(np.log(z))) < 1e-6)
 
 
 def check_layers(layers_mm: ArrayLike | None, camera: IICamera, depth_mm: ArrayLike | None = None) -> Floats:
-    """The layers given, or those that cover; ValueError unless they are one or more positive depths that increase."""
+    """Return the given layers, or by default `covering_layers`.
+
+    Raises
+    ------
+    ValueError
+        If the layers are not positive, finite and increasing.
+    """
     if layers_mm is None:
         return covering_layers(camera, depth_mm)
     layers = np.asarray(layers_mm, dtype=np.float64)
@@ -87,10 +92,10 @@ def check_layers(layers_mm: ArrayLike | None, camera: IICamera, depth_mm: ArrayL
 
 
 def nearest_layer(z: Floats, layers_mm: Floats, gap_mm: float) -> NDArray[np.int64]:
-    """Row of the nearest layer for each depth, −1 beyond the outer ones by more than half a layer, and for NaN.
+    """Return the index of the nearest layer of each depth; −1 for NaN and beyond the outer layers by half a layer.
 
-    A depth halfway between two layers belongs to the farther one. A single layer reaches as far as one of the
-    dissertation's layers would, half a gap each way.
+    A depth halfway between two layers belongs to the farther one. A single layer is one gap thick, as the
+    dissertation's layers are.
     """
     if layers_mm.size == 1:
         edges = layers_mm[0] + gap_mm * np.array([-0.5, 0.5])

@@ -1,4 +1,4 @@
-"""PSNR over depth: how distortion spreads from near to far."""
+"""Q_depth: PSNR of each depth layer."""
 
 from __future__ import annotations
 
@@ -28,41 +28,40 @@ def q_depth(
     method: str = "dissertation",
     mask: ArrayLike | None = None,
 ) -> DepthQuality:
-    """PSNR of each depth layer, seen by a virtual camera that looks through every lens.
+    """Return the PSNR of each depth layer in the view of a virtual camera.
 
-    The camera stands at V = (0, 0, Λ − K·Λ), from where its field of view is the lenslets' viewing angle and
-    every lens of an array no higher than wide shows its own elementary image. Each lens gives one pixel, the
-    nearest, so that no interpolation softens the artefacts. The pixel falls into the layer nearest to its depth.
+    The camera stands at V = (0, 0, Λ − K·Λ). Its field of view is the lenslets' viewing angle, and every lens of an
+    array no higher than wide shows its own elementary image. Each lens contributes the nearest pixel, since
+    interpolation would smooth artefacts. A pixel belongs to the layer nearest to its depth.
 
     Parameters
     ----------
     reference, decoded : IIPicture
         Of the same structure and type; the reference has a camera.
     depth : array_like, (N, M), or FocusDepth, optional
-        Scene z at every pixel of the picture, mm, NaN where nothing is hit; or what `depth_from_focus` found in the
-        reference before, with its layers. If it is not given, depth is estimated from the reference now.
+        Scene z at every pixel of the picture, mm, NaN without a hit; or the result of `depth_from_focus` for the
+        reference, with its layers. If not given, it is estimated from the reference.
     layers_mm : array_like, (layers,), optional
-        Depths of the layers, increasing. If not given, `covering_layers`: 250 in equal ratios from the nearest to
-        the farthest depth in view, or, where depth is estimated, over all that can be told apart. The dissertation's,
-        z = d·Λ with d = 1 … 250, are `linear_layers`; see also `logarithmic_layers`.
+        Depths of the layers, increasing. The default is `covering_layers`: 250 in equal ratios over the depths in
+        view, or over all distinguishable depths if depth is estimated. The dissertation's layers z = d·Λ, d = 1 …
+        250, are `linear_layers`; see also `logarithmic_layers`.
     method : {"dissertation", "robust"}
-        How depth is estimated, if it is; see `depth_from_focus`.
+        Method of estimating depth; see `depth_from_focus`.
     mask : array_like of bool, (N, M), optional
-        Which pixels count; see `q_global`.
+        Pixels that count; see `q_global`.
 
     Returns
     -------
     DepthQuality
-        The outer layers reach half a layer outwards; what lies beyond is left out rather than moved in, so that a
-        layer's value always tells about its own depth. A pixel halfway between two layers belongs to the farther
-        one.
+        The outer layers extend half a layer outwards; pixels beyond are left out. A pixel halfway between two layers
+        belongs to the farther one.
 
     Raises
     ------
     ValueError
-        If the pictures differ in structure or type, have no camera, hold a pixel in view that is not finite, if
-        ``depth`` is of another shape or infinite, if it was found for other layers or lenses, or if the layers are
-        not depths that increase. Without ``depth`` also as `depth_from_focus`.
+        If the pictures differ in structure or type, have no camera, or hold a pixel in view that is not finite; if
+        ``depth`` has another shape, other layers or an infinite value; if the layers do not increase. Without
+        ``depth`` also as `depth_from_focus`.
 
     References
     ----------
@@ -72,7 +71,7 @@ def q_depth(
 
 
 def depth_quality(pair: PicturePair) -> DepthQuality:
-    """`q_depth` of a pair."""
+    """Return `q_depth` of a pair."""
     reference, depth, layers_mm = pair.reference, pair.depth, pair.layers_mm
     camera = camera_of(reference)
     n, m, lens_rows = seen_pixels(camera, reference.erect)

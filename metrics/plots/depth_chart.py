@@ -1,21 +1,23 @@
-"""Q_depth against rate, as an image; and its least, mean and greatest value."""
+"""Chart of Q_depth over rate: an image over depth, and its minimum, mean and maximum."""
 
 from __future__ import annotations
 
 import math
 import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import checks
+from ii_core.display.figure import COLOURS, LINES, MARKERS, check_suffix, new_figure, save
 
 from ..depth.layers import logarithmic
 from ..points import is_study
 from ..quality import told_outside
-from .rd_chart import COLOURS, LINES, MARKERS, check_suffix, edges, new_figure, save, set_rate_axis
+from .rd_chart import edges, set_rate_axis
 
 EXTREMES = ("q_depth_min", "q_depth_mean", "q_depth_max")
 Floats = NDArray[np.float64]
@@ -23,7 +25,7 @@ Floats = NDArray[np.float64]
 
 @checks.checked(study=is_study, scheme=checks.text)
 def depth_over_rate(study: Mapping[str, Any], scheme: str) -> tuple[Floats, Floats, Floats]:
-    """Q_depth of a scheme as a function of rate and depth.
+    """Return Q_depth of a scheme as a function of rate and depth.
 
     Parameters
     ----------
@@ -34,15 +36,15 @@ def depth_over_rate(study: Mapping[str, Any], scheme: str) -> tuple[Floats, Floa
     Returns
     -------
     rates : ndarray, (n,)
-        bpp, increasing, each once.
+        bpp, strictly increasing.
     depth_mm : ndarray, (layers,)
     values : ndarray, (n, layers)
-        dB; NaN where a layer has no pixels, +inf where it is identical.
+        dB; NaN for layers without pixels, +inf for identical layers.
 
     Raises
     ------
     ValueError
-        If the study has no Q_depth, not the scheme, or points of different layers.
+        If the study lacks Q_depth or the scheme, or its points have different layers.
 
     References
     ----------
@@ -61,30 +63,35 @@ def depth_over_rate(study: Mapping[str, Any], scheme: str) -> tuple[Floats, Floa
 
 
 @checks.checked(study=is_study, path=checks.path)
-def depth_rate_chart(study: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
-    """Draw Q_depth(r): for every scheme an image over rate and depth, and below it min, mean and max over rate.
+def depth_rate_chart(study: Mapping[str, Any], path: str | os.PathLike[str]) -> Path:
+    """Draw Q_depth over rate: for every scheme an image over rate and depth, and below it min, mean and max.
 
-    A column of the image reaches half way, in ratio, to the next rate measured; layers without pixels stay grey,
-    identical ones are hatched. The title names the share of view pixels that are in no layer.
+    A column of the image reaches halfway to the next measured rate on the logarithmic axis. Layers without pixels are
+    grey, identical layers hatched. The title gives the share of view pixels that are in no layer.
 
     Parameters
     ----------
     study : dict
         From `read_study`, measured with q_depth_min, q_depth_mean and q_depth_max.
     path : path
-        .png, .pdf or .svg. Replaced, whole.
+        .png, .pdf or .svg; replaced whole.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
     ValueError
-        If the suffix is another, or the study has no points or no Q_depth.
+        If the suffix is unknown, or the study has no points or no Q_depth.
     """
     check_suffix(path)
-    save(draw_depth_rate(study), path, dpi=150)
+    return save(draw_depth_rate(study), path, dpi=150)
 
 
 def draw_depth_rate(study: Mapping[str, Any]) -> Any:
-    """The matplotlib Figure; see `depth_rate_chart`."""
+    """Return the matplotlib Figure of `depth_rate_chart`."""
     points = study["points"]
     if not points:
         raise ValueError("the study has no points: nothing to draw")
@@ -111,13 +118,13 @@ def draw_depth_rate(study: Mapping[str, Any]) -> Any:
     figure.legend(handles, names, loc="outside lower right", ncols=3, frameon=False, fontsize=9)
     figure.colorbar(map_, ax=panels[0].tolist(), label=r"$Q_\mathrm{depth}$ [dB]")
     lost = [p["depth_outside"] for p in points if "depth_outside" in p]
-    told = f": {told_outside(max(lost))}" if lost else ""  # the same for all: depth is the reference's
+    told = f": {told_outside(max(lost))}" if lost else ""  # equal for all points: depth is that of the reference
     figure.suptitle(study.get("picture", {"name": ""})["name"] + told, x=0.01, ha="left", fontsize=12)
     return figure
 
 
 def _image(axes: Any, rates: Floats, depth: Floats, values: Floats, held: Any, scale: tuple[float, float]) -> Any:
-    """One scheme's image over those layers that any scheme has pixels in."""
+    """Draw the image of one scheme over all layers with pixels in any scheme."""
     rows = slice(*(np.flatnonzero(held)[[0, -1]] + [0, 1])) if held.any() else slice(None)
     across, down = np.exp(edges(np.log(rates), 0.35)), edges(depth, depth[0] / 2)[rows.start : _past(rows.stop)]
     shown = np.where(np.isfinite(values), values, np.nan)[:, rows]
@@ -134,7 +141,7 @@ def _past(stop: int | None) -> int | None:
 
 
 def _extremes(axes: Any, points: Sequence[Mapping[str, Any]]) -> None:
-    """Least, mean and greatest over rate."""
+    """Draw minimum, mean and maximum over rate."""
     points = sorted(points, key=lambda p: p["bpp"])
     rates = [p["bpp"] for p in points]
     for i, (name, text) in enumerate(zip(EXTREMES, ("min", "mean", "max"), strict=True)):

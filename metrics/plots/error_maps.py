@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture, checks
+from ii_core.display.figure import new_figure, save
+from ii_core.picture import peak
 
 from ..depth.virtual_camera import view_of
-from ..pair import peak
 from ..quality import DepthQuality
-from .rd_chart import new_figure, save
 
 COLOURS_OF_ERRORS = "magma"
 PANELS = 12  # of a sheet of layers: more would be too small to see anything in
@@ -38,11 +39,10 @@ def error_views_figure(shares: Mapping[str, Floats]) -> Any:
 
 
 @checks.checked(reference=checks.instance(IIPicture), quality=checks.instance(DepthQuality), path=checks.path)
-def plot_error_layers(reference: IIPicture, quality: DepthQuality, path: str | os.PathLike[str]) -> None:
-    """Draw where in each depth layer the errors are: a panel a layer, over the virtual camera's view in grey.
+def plot_error_layers(reference: IIPicture, quality: DepthQuality, path: str | os.PathLike[str]) -> Path:
+    """Draw the errors of each depth layer in a panel, over the virtual camera's view in grey.
 
-    Where there are more than 12 layers with pixels, neighbours are put together so that each panel has about as many
-    pixels.
+    More than 12 layers with pixels are merged with their neighbours into 12 panels of about equally many pixels.
 
     Parameters
     ----------
@@ -50,14 +50,19 @@ def plot_error_layers(reference: IIPicture, quality: DepthQuality, path: str | o
     quality : DepthQuality
         Of that picture, from `q_depth`.
     path : path
-        .png, .pdf or .svg. Replaced, whole.
+        .png, .pdf or .svg; replaced whole.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
     ValueError
-        If the suffix is another, or the quality is that of a picture of another size.
+        If the suffix is unknown, or the quality belongs to a picture of another size.
     """
-    save(_error_layers_figure(reference, quality), path)
+    return save(_error_layers_figure(reference, quality), path)
 
 
 def _error_layers_figure(reference: IIPicture, quality: DepthQuality) -> Any:
@@ -93,7 +98,7 @@ def _error_layers_figure(reference: IIPicture, quality: DepthQuality) -> Any:
 
 
 def layer_groups(counts: NDArray[np.int64], groups: int = PANELS) -> list[tuple[int, int]]:
-    """First and last layer of up to ``groups`` runs of layers with about as many pixels each; none of empty ones."""
+    """Return the first and last layer of up to ``groups`` runs of layers with about equally many pixels."""
     held = np.flatnonzero(counts)
     if held.size <= groups:
         return [(int(d), int(d)) for d in held]

@@ -1,8 +1,7 @@
-"""Rate–distortion charts, drawn from a study on disk and nothing else."""
+"""Rate–distortion chart of a study."""
 
 from __future__ import annotations
 
-import io
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -13,79 +12,46 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import checks
-from ii_core.files import atomic_path
+from ii_core.display.figure import COLOURS, LINES, MARKERS, check_suffix, new_figure, save
 
 from ..measure import measure_of
 from ..points import check_measured, is_study
 
-# Okabe and Ito's colours, told apart by colour-blind readers too; their yellow is too pale on white.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-LINES = ("-", "--", "-.")
-SUFFIXES = (".png", ".pdf", ".svg")
-
 
 @checks.checked(study=is_study, path=checks.path, measure=checks.text)
-def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str], *, measure: str = "q_global") -> None:
-    """Draw a quality over rate, a line a scheme.
+def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str], *, measure: str = "q_global") -> Path:
+    """Draw a quality over rate, one line per scheme.
 
-    Filled markers are targets met, joined. A hollow marker is what a scheme gave for a target it cannot meet, and a
-    dotted line marks the rate that it cannot go below (or above). Lossless points sit on the upper edge.
+    Filled markers are targets met, joined by lines. A hollow marker is the nearest rate to a target that the scheme
+    does not meet; a dotted line marks its least (or largest) rate. Lossless points lie on the upper edge.
 
     Parameters
     ----------
     study : dict
         From `read_study`.
     path : path
-        The suffix says what is written: .png, .pdf or .svg. Replaced, whole.
+        .png, .pdf or .svg; replaced whole.
     measure : str
-        Which quality, of those that the study has.
+        Name of a measure that the study holds.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
     ValueError
-        If the suffix is another, or the study has no points or not the measure.
+        If the suffix is unknown, or the study has no points or lacks the measure.
     OSError
         If the file cannot be written.
     """
     check_suffix(path)
-    save(draw(study, measure), path, dpi=150)
-
-
-def check_suffix(path: str | os.PathLike[str]) -> str:
-    """The kind of chart a path names; ValueError if it is none."""
-    suffix = Path(path).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise ValueError(f"{path} is no known chart type: known are {', '.join(SUFFIXES)}")
-    return suffix[1:]
-
-
-def save(figure: Any, path: str | os.PathLike[str], *, dpi: int = 130) -> None:
-    """Write a figure as its path's suffix says; text in PDF and SVG stays text that can be edited and searched."""
-    import matplotlib
-
-    kind = check_suffix(path)
-    undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {}}[kind]  # the same chart, the same file
-    text: Any = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "raytrace-ii"}
-    drawn = io.BytesIO()  # written to a file, PDF and SVG are cut short by a full disk without an error
-    with matplotlib.rc_context(text):
-        figure.savefig(drawn, dpi=dpi, format=kind, metadata=undated)
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(drawn.getvalue())
-
-
-def new_figure(width: float, height: float, layout: Any = "constrained") -> Any:
-    """An empty matplotlib Figure, inches, that no window knows of."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout=layout)
-    FigureCanvasAgg(figure)
-    return figure
+    return save(draw(study, measure), path, dpi=150)
 
 
 def draw(study: Mapping[str, Any], measure: str = "q_global") -> Any:
-    """The matplotlib Figure of a study; see `rd_chart`."""
+    """Return the matplotlib Figure of `rd_chart`."""
     points = study["points"]
     if not points:
         raise ValueError("the study has no points: nothing to draw")
@@ -99,15 +65,15 @@ def draw(study: Mapping[str, Any], measure: str = "q_global") -> Any:
         _draw(axes, [point for point in points if point["scheme"] == scheme], i, measure)
     if not all(point["reached"] for point in points):
         style = {"color": "0.4", "marker": "o", "linestyle": ":"}
-        axes.plot([], [], markerfacecolor="white", label="target out of reach: what came instead", **style)
+        axes.plot([], [], markerfacecolor="white", label="target not met: nearest rate", **style)
     axes.set_title(study.get("picture", {"name": ""})["name"], loc="left")
-    # Below the axes, where no curve can hide it and long scheme names have room.
+    # Below the axes there is room for long scheme names, and the legend covers no curve.
     figure.legend(loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3)
     return figure
 
 
 def set_rate_axis(axes: Any, points: Sequence[Mapping[str, Any]]) -> None:
-    """A logarithmic axis of rates that holds those of all points, and a quiet grid."""
+    """Set a logarithmic axis of rates that contains all points, and a light grid."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     rates = [point["bpp"] for point in points]
@@ -123,7 +89,7 @@ def set_rate_axis(axes: Any, points: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _draw(axes: Any, points: Sequence[Mapping[str, Any]], i: int, measure: str) -> None:
-    """One scheme, the i-th."""
+    """Draw the i-th scheme."""
     colour, marker = COLOURS[i % len(COLOURS)], MARKERS[i % len(MARKERS)]
     line = LINES[i // len(COLOURS) % len(LINES)]
     finite = [point for point in points if math.isfinite(point[measure])]
@@ -161,7 +127,7 @@ def _columns(pairs: Sequence[tuple[float, float]]) -> tuple[list[float], list[fl
 
 
 def edges(centres: NDArray[np.float64], alone: float) -> NDArray[np.float64]:
-    """Borders half way between centres; ``alone`` is half the width of a single one."""
+    """Return borders halfway between centres; ``alone`` is half the width of a single cell."""
     if centres.size == 1:
         return centres[0] + np.array([-alone, alone])
     inner = (centres[1:] + centres[:-1]) / 2

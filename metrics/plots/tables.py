@@ -1,10 +1,11 @@
-"""Rate–distortion studies as tables: for the terminal, for spreadsheets, for papers."""
+"""Tables of rate–distortion studies: text, CSV and LaTeX."""
 
 from __future__ import annotations
 
 import csv
 import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from ii_core import checks
@@ -16,8 +17,13 @@ from ..points import FIELDS, check_measured, check_points, is_study, measures_of
 
 
 @checks.checked(path=checks.path, records=checks.sequence)
-def write_csv(path: str | os.PathLike[str], records: Sequence[Mapping[str, Any]]) -> None:
-    """Write records as a table, one row a point, for spreadsheets. Qualities of single layers are left to the JSON.
+def write_csv(path: str | os.PathLike[str], records: Sequence[Mapping[str, Any]]) -> Path:
+    """Write records as a CSV table, one row per point; the qualities of single layers are only in the JSON file.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
@@ -35,35 +41,35 @@ def write_csv(path: str | os.PathLike[str], records: Sequence[Mapping[str, Any]]
         for record in records:
             options = " ".join(f"{key}={value}" for key, value in record["options"].items())
             writer.writerow({**record, "options": options})
+    return Path(path)
 
 
 @checks.checked(study=is_study, anchor=checks.text, measure=checks.text)
 def summary_table(
     study: Mapping[str, Any], *, anchor: str | None = None, measure: str = "q_global"
 ) -> list[dict[str, str]]:
-    """A study as rows of text, one a scheme, all with the same columns.
+    """Return a study as rows of text, one per scheme, with equal columns.
 
     Parameters
     ----------
     study : dict
         From `read_study`.
     anchor : str, optional
-        The scheme the others are compared with. That of the study, or else its first scheme, if not given.
+        Scheme of comparison. If not given, that of the study, else its first scheme.
     measure : str
-        Which quality, of those that the study has.
+        Name of a measure that the study holds.
 
     Returns
     -------
     list of dict
-        ``scheme``; a column a target rate with the quality, or the floor (or ceiling) of a scheme that cannot reach
-        it; ``gain``, the mean difference to the anchor over the target rates both reach; ``BD-rate`` and the
-        difference in quality at equal rate against it, or why they are not defined. That one is called ``BD-PSNR``
-        if the quality is in dB, else ``BD-quality``.
+        ``scheme``; one column per target rate with the quality, or the least or largest rate of a scheme that does
+        not meet it; ``gain``, the mean difference to the anchor over the target rates that both meet; ``BD-rate``,
+        and ``BD-PSNR`` for qualities in dB or ``BD-quality`` for others, or the reason why they are undefined.
 
     Raises
     ------
     ValueError
-        If the study does not have the measure.
+        If the study lacks the measure.
     """
     points, kind = study["points"], measure_of(measure)
     check_measured(points, measure)
@@ -113,7 +119,7 @@ def _signed(value: float, digits: int, unit: str) -> str:
     return f"{value:+.{digits}f}" + (f" {unit}" if unit else "")
 
 
-# What means something to LaTeX, and what its default fonts do not have as such.
+# Special characters of LaTeX, and characters that its default fonts lack.
 LATEX = {
     "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "_": r"\_", "%": r"\%",
     "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "<": r"\textless{}", ">": r"\textgreater{}",
@@ -123,21 +129,26 @@ LATEX = {
 
 
 def latex_text(text: str) -> str:
-    """Text as LaTeX prints it to the letter."""
+    """Return text with the special characters of LaTeX escaped."""
     return "".join(LATEX.get(letter, letter) for letter in text)
 
 
 @checks.checked(path=checks.path, rows=checks.list_of(Mapping), caption=checks.text)
-def write_latex(path: str | os.PathLike[str], rows: Sequence[Mapping[str, str]], caption: str = "") -> None:
-    """Write rows of text as a LaTeX table, of nothing but what LaTeX itself has.
+def write_latex(path: str | os.PathLike[str], rows: Sequence[Mapping[str, str]], caption: str = "") -> Path:
+    """Write rows of text as a LaTeX table that needs no package.
 
     Parameters
     ----------
     path : path
-        Replaced, whole.
+        Replaced whole.
     rows : sequence of dict
-        All with the same columns, as from `summary_table`. The first column is set left, others right.
+        All with the same columns, as from `summary_table`. The first column is aligned left, the others right.
     caption : str
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
@@ -159,3 +170,4 @@ def write_latex(path: str | os.PathLike[str], rows: Sequence[Mapping[str, str]],
     lines += [rf"\caption{{{latex_text(caption)}}}"] if caption else []
     with atomic_path(path) as temporary:
         temporary.write_text("\n".join([*lines, r"\end{table}"]) + "\n", encoding="utf-8")
+    return Path(path)

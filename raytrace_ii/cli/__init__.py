@@ -1,4 +1,4 @@
-"""The command ``raytrace-ii``: render, code, measure and study II-pictures.
+"""Command line ``raytrace-ii``: render, code, measure and study II-pictures.
 
 The only package that reaches every other; it does so inside its functions, so that help comes at once.
 """

@@ -1,4 +1,4 @@
-"""What every command shares: the app, checks of what is to be written, signs of life."""
+"""Common parts of commands: the app, checks of outputs, progress bars."""
 
 from __future__ import annotations
 

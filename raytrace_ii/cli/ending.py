@@ -1,4 +1,4 @@
-"""How a command ends when it is interrupted: cleaned up, and within two seconds whatever it is doing."""
+"""Interrupted commands: cleanup, and exit within two seconds."""
 
 from __future__ import annotations
 

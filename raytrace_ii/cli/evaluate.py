@@ -245,7 +245,7 @@ def run_study(
     Without rates they are `default_rates`. ``over_depth`` are depth, layers_mm and method of `measuring`.
     """
     from codec import encode, timed_decode
-    from ii_core.executors import cores
+    from ii_core.parallel import cores
     from metrics import PointLog, default_rates, measuring, rate_distortion, write_study
 
     more = measuring(picture, measures, **over_depth) if set(measures) - {"q_global"} else None

@@ -1,4 +1,4 @@
-"""Commands that turn II-pictures into other pictures and back: regular, import, export, components."""
+"""Commands that convert II-pictures: regular, import, export, components."""
 
 from __future__ import annotations
 

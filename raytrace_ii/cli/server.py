@@ -1,4 +1,4 @@
-"""The web server of ``raytrace-ii view --serve``: one folder, for this machine alone."""
+"""Web server of ``raytrace-ii view --serve``: one folder, on the local host only."""
 
 from __future__ import annotations
 

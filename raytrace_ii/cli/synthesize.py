@@ -1,4 +1,4 @@
-"""Commands about what there is to synthesize with: scenes, cameras, camera."""
+"""Commands that list scenes and cameras and store cameras: scenes, cameras, camera."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text for a terminal: no control characters from names and files, and letters that every terminal has."""
+"""Text for a terminal, without control characters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files that mesh files are, and that these name: regular, of bounded size, none outside their folder."""
+"""Files that a mesh file refers to: regular, of bounded size, inside its folder."""
 
 from __future__ import annotations
 

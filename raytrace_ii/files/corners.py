@@ -1,4 +1,4 @@
-"""Triangles of files without an order of vertices: corners smoothed where nothing else is said, and joined."""
+"""Corners of triangles: smooth normals where a file gives none, equal vertices merged."""
 
 from __future__ import annotations
 

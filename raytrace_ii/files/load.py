@@ -1,4 +1,4 @@
-"""Scenes from files: TOML, or a mesh file alone."""
+"""Scenes from files: TOML scene files and single mesh files."""
 
 from __future__ import annotations
 

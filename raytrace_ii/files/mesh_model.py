@@ -1,4 +1,4 @@
-"""What a mesh file holds, whatever its type: parts with materials, and lights."""
+"""Content of a mesh file of any type: parts with materials, and lights."""
 
 from __future__ import annotations
 

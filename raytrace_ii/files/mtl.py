@@ -1,4 +1,4 @@
-"""MTL files: the materials of OBJ, in Whitted's terms."""
+"""MTL files: materials of OBJ as Whitted materials."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OBJ files: polygons of objects and materials, smoothing groups, colours of vertices."""
+"""OBJ files: polygons of objects and materials, smoothing groups, vertex colours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""PLY files, ASCII and binary: polygons, triangle strips and what their vertices carry."""
+"""PLY files, ASCII and binary: polygons, triangle strips and vertex properties."""
 
 from __future__ import annotations
 

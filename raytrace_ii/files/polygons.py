@@ -1,4 +1,4 @@
-"""Polygons as triangles: fans where they are convex, ears cut off where they are not."""
+"""Triangulation of polygons: fans if convex, ear clipping if concave."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers of files that writers in float32 round past their bounds."""
+"""Tolerance for numbers in files that float32 rounding moved past their bounds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may stand in a scene file, checked by pydantic. docs/scenes.md describes every key for users."""
+"""Schema of scene files, checked by pydantic; docs/scenes.md describes every key."""
 
 from __future__ import annotations
 

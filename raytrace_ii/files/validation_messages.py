@@ -1,4 +1,4 @@
-"""pydantic's complaints in the words of the rest of the house; its own stand where none are given."""
+"""Validation errors of pydantic, reworded for users."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A contact sheet: what 2D cameras see of several scenes, with their depth, normals and objects, on one page."""
+"""Contact sheet of a set of scenes: 2-D pictures with depth, normals and object numbers."""
 
 from __future__ import annotations
 
@@ -18,8 +18,16 @@ WIDTH, GAP, LINE = 480, 8, 22  # of a panel, between panels, for a name
 COLUMNS = 2
 
 
-def contact_sheet(path: Path, panels: Sequence[tuple[str, Path, Path]]) -> None:
-    """Draw panels of a title, a picture and its support images in one EXR, as `render_to` writes them."""
+def contact_sheet(path: Path, panels: Sequence[tuple[str, Path, Path]]) -> Path:
+    """Draw a contact sheet, one panel per scene, and return the file's path.
+
+    Parameters
+    ----------
+    path : path
+        A picture file.
+    panels : sequence of (str, path, path)
+        Title, picture, and the EXR file of its support images as `render_to` writes it.
+    """
     drawn = [_panel(title, read_image(picture), read_channels(support)) for title, picture, support in panels]
     rows = -(-len(drawn) // COLUMNS)
     height, width = (max(p.shape[axis] for p in drawn) for axis in (0, 1))
@@ -27,7 +35,7 @@ def contact_sheet(path: Path, panels: Sequence[tuple[str, Path, Path]]) -> None:
     for i, panel in enumerate(drawn):
         top, left = GAP + i // COLUMNS * (height + GAP), GAP + i % COLUMNS * (width + GAP)
         page[top : top + panel.shape[0], left : left + panel.shape[1]] = panel
-    write_image(path, page)
+    return write_image(path, page)
 
 
 def _panel(title: str, picture: NDArray[Any], support: dict[str, NDArray[Any]]) -> NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""Blocks of a picture on threads, processes or a dask cluster; see `ii_core.executors`."""
+"""Execution of the tiles of a picture by threads, processes or a dask cluster; see `ii_core.executors`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One picture as a job: what a worker needs to render any block of it, and what comes back."""
+"""Render job: everything that a worker needs to render any tile of one picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Render options: what `render`, `render_to` and `render_set` have in common, checked."""
+"""Render options: the common parameters of `render`, `render_to` and `render_set`."""
 
 from __future__ import annotations
 

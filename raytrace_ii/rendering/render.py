@@ -1,4 +1,4 @@
-"""Pictures: a scene through a camera, kept in memory or written band by band."""
+"""Rendering of one picture, in memory or written band by band."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise
-from ii_core.executors import cores
 from ii_core.files import RowWriter, atomic_paths, check_type, image_rows
 from ii_core.picture import NOISE_ROWS, noisy_rows, picture_rows, sidecar
 
@@ -359,4 +358,4 @@ def _path(name: str, value: Any) -> str:
     return path
 
 
-__all__ = ["Shot", "Stats", "cores", "render", "render_to"]
+__all__ = ["Shot", "Stats", "render", "render_to"]

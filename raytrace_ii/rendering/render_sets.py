@@ -1,4 +1,4 @@
-"""Sets of scenes rendered into a folder: pictures, support images, projections, a contact sheet and a manifest.
+"""Render sets: scenes in a folder of pictures, support images, projections, a contact sheet and a manifest.
 
 The manifest says of every file what it was made of, as a hash, and what it is, as another. What is there already, of
 the same scene, camera, options and version, is not made again, so that an interrupted set goes on where it was.

@@ -1,4 +1,4 @@
-"""Tiles of a picture, and the order in which the rays of a tile are traced.
+"""Tiles of a picture, and the order of rays within a tile.
 
 Neighbouring lenses see nearly the same: rays of one place under the lens, of 4×4 lenses, have equal directions and
 origins a lens pitch apart, and make a packet. Tiles and order depend on the camera alone, so that all workers trace

@@ -1,4 +1,4 @@
-"""What a thing is made of as one number: the same content, the same hash, whatever file or process it came from."""
+"""Content hash (SHA-256) of scenes, cameras and options."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scene: bodies with materials, lights and surroundings, checked when they are made."""
+"""Scene: bodies, materials, lights and surroundings, validated on construction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Textures: images on (u, v), checkers, stripes and noise in space."""
+"""Textures: images on (u, v); checkers, stripes and noise in space."""
 
 from __future__ import annotations
 

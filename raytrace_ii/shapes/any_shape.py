@@ -1,4 +1,4 @@
-"""Any shape that a scene file names, told apart by its key ``shape``."""
+"""Union of all shapes of scene files, by the key ``shape``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Implicit body: parts joined, cut and blended by their distances, meshed by marching cubes."""
+"""Implicit body: union, difference and blend of parts by signed distance, meshed by marching cubes."""
 
 from __future__ import annotations
 

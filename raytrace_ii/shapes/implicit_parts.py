@@ -1,4 +1,4 @@
-"""Parts of an implicit body: signed distances of balls, blocks, capsules and tubes."""
+"""Parts of implicit bodies: signed distances of balls, blocks, capsules and tubes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Procedural meshes. Each shape is its own parameters and makes vertices, faces, normals and texture coordinates.
+"""Primitive shapes: sphere, box, plane, cylinder, surface of revolution, grid of boxes.
 
 Every mesh stands in its own frame, x right, y up, z away, millimetres, with outward faces.
 """

@@ -1,4 +1,4 @@
-"""Whether a mesh has an inside. Glass needs one: a ray is in it from the face it enters by to that it leaves by."""
+"""Watertightness of meshes, which glass needs: a ray is inside from its entry face to its exit face."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Registry and command line of the benchmarks: none is left out, files are where it says, bad arguments are named."""
+"""Registry and command line of the benchmarks."""
 
 import importlib
 import json
@@ -33,7 +33,7 @@ def test_every_file_of_results_and_every_picture_has_one_owner():
         owned = [
             path.relative_to(ROOT).as_posix()
             for one in BENCHMARKS.values()
-            for pattern in (*one.writes, f"benchmarks/results/{one.records}")
+            for pattern in (*one.outputs, f"benchmarks/results/{one.pattern}")
             if pattern.startswith(folder)
             for path in ROOT.glob(pattern)
             if path.suffix in endings
@@ -45,7 +45,7 @@ def test_every_file_of_results_and_every_picture_has_one_owner():
 @pytest.mark.parametrize("one", [one for one in BENCHMARKS.values() if one.tables], ids=lambda one: one.name)
 def test_pages_are_those_of_the_tables(one):
     pages = {page for page, _ in importlib.import_module(one.tables).tables()}
-    assert pages == {pattern for pattern in one.writes if pattern.endswith(".md")}
+    assert pages == set(one.fills)
 
 
 def test_cost_is_that_of_the_newest_records(monkeypatch, tmp_path):

@@ -1,4 +1,4 @@
-"""A camera modelled in the scene, lens meshes and all, takes the picture that its L/D maps take."""
+"""Camera modelled in the scene, with lens meshes, against its L/D maps."""
 
 from dataclasses import replace
 

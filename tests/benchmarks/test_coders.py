@@ -1,4 +1,4 @@
-"""What the table and the chart of coders say of curves, some of which were not measured on every scene."""
+"""Table and chart of coders, with schemes that were not measured on every scene."""
 
 from itertools import combinations
 

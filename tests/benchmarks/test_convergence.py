@@ -1,4 +1,4 @@
-"""Triangles become what they stand for at the rate they should, against a tracer that knows no triangles."""
+"""Order of convergence of meshes, against the closed-form ray tracer."""
 
 import numpy as np
 import pytest

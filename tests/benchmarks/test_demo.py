@@ -1,4 +1,4 @@
-"""The main job, small, and the README's example: both as a user runs them."""
+"""Demo and the example of the README, run as a user runs them."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The fuzzing script: it counts every mutation, and sees a worker die."""
+"""Fuzzing script: counts of mutations, death of a worker process."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What fuzzing of the readers found, each as the smallest case that shows it."""
+"""Findings of the fuzzing of readers, each as its smallest case."""
 
 import json
 import logging

@@ -1,4 +1,4 @@
-"""Fuzzing of every reader: a short run, and the script that runs cases."""
+"""Fuzzing of every reader: a short run, and the script."""
 
 import json
 import logging

@@ -1,4 +1,4 @@
-"""Leaving things out of scenes, and what counts as not to be told apart; figures come from `needs`."""
+"""Scenes with features left out, and the criterion of visible difference."""
 
 import numpy as np
 import pytest

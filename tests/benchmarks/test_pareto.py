@@ -1,4 +1,4 @@
-"""The bookkeeping of speed against accuracy; its figures come from `benchmarks.speed.pareto` itself."""
+"""Bookkeeping of the Pareto fronts of speed and accuracy."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""POV-Ray is a guest: without it the comparison says so and ends well; what it would be told is checked here."""
+"""Comparison with POV-Ray: scene description, and a message where POV-Ray is not installed."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Records of benchmarks: written by whoever measures, row by row, and the pages that show them."""
+"""Records of benchmarks: appended row by row; pages equal to the records."""
 
 import json
 import signal
@@ -74,7 +74,7 @@ def test_the_stamp_of_one_commit_over_rows_of_another_is_found(tmp_path):
 
 
 def test_a_row_that_was_committed_stays(tmp_path, monkeypatch):
-    """Lines are added; only rows of unsure provenance may go, once they are measured."""
+    """Lines are added; only rows whose commit is unknown may be removed, once they are measured again."""
     for command in (["init", "-q"], ["config", "user.email", "a@b.c"], ["config", "user.name", "a"]):
         git(*command, cwd=tmp_path)
     TOY.measure({"row": 1}, lambda: {"value": 1})
@@ -164,7 +164,7 @@ def test_tables_name_the_commits_where_they_differ():
         "| scene | dB | commit |", "|---|---|---|", "| car | 1 | `abc` |", "| twins | 2 | `def` |"
     ]  # fmt: skip
     assert origin([{"commit": "abc"}, {"commit": "abc"}]) == "Measured by `abc`."
-    assert "`abc`; rows without a commit are of unsure provenance" in origin(
+    assert "`abc`; the commits that measured the rows without one are unknown" in origin(
         [{"commit": "abc"}, {"commit": "unsure"}]
     )
     assert commit_of({"git": {"commit": "0123456789", "dirty": True}}) == "0123456+"

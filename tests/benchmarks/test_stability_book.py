@@ -1,4 +1,4 @@
-"""The limits that docs/stability.md states, at small size; its figures come from `benchmarks.stability` itself."""
+"""Limits of docs/stability.md at small size."""
 
 from pathlib import Path
 

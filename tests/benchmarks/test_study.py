@@ -1,4 +1,4 @@
-"""The study: steps are done once, come out the same again, and are compared with the dissertation as it is said."""
+"""Study: steps, records, reproducibility, comparison with the dissertation."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The study's way to the verification model of JPEG 2000 Part 10, and back; the model itself is not at hand here."""
+"""Files exchanged with the verification model of JPEG 2000 Part 10."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""What git carries stays light, and pictures of pages are as `write_picture` leaves them."""
+"""Size of tracked files, and form of the pictures of pages."""
 
 import subprocess
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The command line's cameras: stored as maps, rendered from maps, sets of arrays, structures that are not regular."""
+"""Cameras on the command line: stored maps, rendering from maps, camera arrays, irregular structures."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The command line, run in this process: what it writes, and that bad input is one line, exit code 2 and no file."""
+"""Command line in this process: outputs; one line and exit code 2 for bad input."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The command line against bad input and rough ends: one line, exit code 2, nothing of the user's lost."""
+"""Command line with bad input, interrupts and full disks: one line, exit code 2, no file lost."""
 
 import http.client
 import json

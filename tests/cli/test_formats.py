@@ -1,4 +1,4 @@
-"""raytrace-ii import, export and components."""
+"""Commands import, export and components."""
 
 import numpy as np
 import pytest

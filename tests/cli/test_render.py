@@ -1,4 +1,4 @@
-"""The command render: samples, support images, pictures of every type."""
+"""Command render: samples, support images, pictures of every type."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""One frame without the rest, and streams as files of their own."""
+"""Random access to frames and component images, and extraction of streams."""
 
 import io
 import json
@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 from functools import cache
+from typing import ClassVar
 
 import av
 import imagecodecs
@@ -13,13 +14,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from codec import Encoded, decode, decode_component, decode_frame, encode, schemes
-from codec.coders.pseudo_video import PseudoVideo, decoded_frames
+from codec import Coder, CodingResult, Encoded, Run, contract, decode, decode_component, decode_frame, encode, schemes
+from codec.coders.decoding import decoded_frames
+from codec.coders.pseudo_video import PseudoVideo
 from codec.contract import find
 from codec.inspect.extract import extract, suffixes
 from codec.inspect.random_access import sequence
 from codec.order import selection_order
-from ii_core import IIPicture, component_images
+from ii_core import IIPicture, component_images, sub_images
 
 VIDEOS = sorted(n for n in schemes() if isinstance(find(n), PseudoVideo))
 STILLS = sorted(set(schemes()) - set(VIDEOS))
@@ -140,9 +142,9 @@ def test_only_its_own_group_is_read():
 def test_refused():
     stream = coded("si-h264:gop=4")
     for index in (-1, 12, True):
-        with pytest.raises(ValueError, match="is asked for: there are 12, from 0"):
+        with pytest.raises(ValueError, match="does not exist: there are 12, from 0"):
             decode_frame(stream, index)
-    with pytest.raises(ValueError, match=r"component image \(4, 0\) is asked for: there are 4×3"):
+    with pytest.raises(ValueError, match=r"component image \(4, 0\) does not exist: there are 4×3"):
         decode_component(stream, (4, 0))
     with pytest.raises(ValueError, match="codes the picture as a whole"):
         decode_frame(coded("jpeg2000"), 0)
@@ -288,3 +290,33 @@ def test_the_bare_payload_is_a_stream(tmp_path):
     assert Encoded.load(tmp_path / "x.ii").payload == payload
     with av.open(io.BytesIO(payload), format="h264") as container:
         assert sum(1 for _ in container.decode(video=0)) == 12
+
+
+def test_a_coder_of_another_package_decodes_components_alone(monkeypatch):
+    """The coders that could were a fixed list of classes."""
+
+    class Raw(Coder):
+        name, about, kind, components_alone = "test-raw", "sub-images as they are", "si", True
+        versions: ClassVar = {}
+        rate_control = False
+
+        def lossless(self, options):
+            return True
+
+        def check(self, picture, options):
+            pass
+
+        def encode(self, picture, options, goal):
+            return CodingResult(run=Run(sub_images(picture).tobytes(), 0.0))
+
+        def decode(self, payload, blank, options):
+            raise AssertionError("decodes the whole picture")
+
+        def decode_component(self, payload, blank, options, index):
+            (k, l), size = blank.lenses, 3 * blank.lenses[0] * blank.lenses[1]
+            return np.frombuffer(payload, np.uint8, size, index * size).reshape(l, k, 3)
+
+    monkeypatch.setitem(contract._CODERS, "test-raw", Raw())
+    stream = encode(picture(), "test-raw")
+    assert np.array_equal(decode_component(stream, (1, 2)), sub_images(picture())[2, 1])
+    assert np.array_equal(decode_frame(stream, 9), sub_images(picture())[2, 1])

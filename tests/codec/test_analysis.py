@@ -1,4 +1,4 @@
-"""Correlation and residual energy against numpy on whole frames, and by hand."""
+"""Correlation and residual energy of frame orders, against numpy and by hand."""
 
 import itertools
 import json

@@ -1,4 +1,4 @@
-"""Wrong arguments of the public functions: TypeError or ValueError that name the argument, before any work."""
+"""Wrong arguments of the public functions of codec: errors that name the argument, before any work."""
 
 import numpy as np
 import pytest

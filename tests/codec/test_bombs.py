@@ -1,4 +1,4 @@
-"""Files that claim more than they are: refused in a second and in bounded memory, whatever the scheme.
+"""Files that state a false size: refused in a second and in bounded memory, with every scheme.
 
 In a process of its own whose address space is limited, with checksums that are right.
 """

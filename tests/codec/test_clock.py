@@ -1,4 +1,4 @@
-"""CPU time of encoders' own threads, while other threads come and go."""
+"""CPU time of encoder threads while other threads start and end."""
 
 import os
 import threading

@@ -1,4 +1,4 @@
-"""Compact values of file headers: exact inverses, one form only."""
+"""Compact values of file headers: exact inverse, unique form."""
 
 import json
 import math

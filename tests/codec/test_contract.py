@@ -1,4 +1,4 @@
-"""What every registered scheme must keep; see `codec.contract.Coder`."""
+"""Contract of every registered scheme; see `codec.contract.Coder`."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace

@@ -1,3 +1,5 @@
+"""Files ``.ii``: round trips, sizes, damage, versions."""
+
 import hashlib
 import json
 import struct

@@ -1,4 +1,4 @@
-"""Files coded once and kept: every scheme goes on decoding what it wrote before.
+"""Golden files: every scheme decodes the streams of earlier versions.
 
 ``pytest tests/codec/test_golden.py --make-golden`` codes what a new scheme lacks; what is there is never replaced.
 """

@@ -1,4 +1,4 @@
-"""The header portion: streams taken apart against FFmpeg's own reading, floors, and the analytic limits."""
+"""Header portion: streams parsed against FFmpeg, measured floors, analytic limits."""
 
 import re
 import shutil
@@ -105,7 +105,7 @@ def test_limits_of_the_dissertations_setups():
 
 def test_streams_that_are_none():
     coded = encode(picture(), "si-h264", qp=30)
-    with pytest.raises(ValueError, match="not taken apart: known are those of h264"):
+    with pytest.raises(ValueError, match="are not parsed: known are those of h264"):
         parts(encode(picture(), "jpeg2000", bpp=1))
     for payload in (b"", b"nothing", b"\0\0\1\x65\x88\x84", coded.payload[:30] + b"\0\0\1\x65"):
         with pytest.raises(ValueError, match="the stream of scheme si-h264 is damaged"):

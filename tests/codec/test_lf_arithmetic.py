@@ -1,4 +1,4 @@
-"""The arithmetic coder and the transforms of `si-lf`: both directions, and how near to the entropy it comes."""
+"""Arithmetic coder and transforms of `si-lf`: exact inverses, distance to the entropy."""
 
 import numpy as np
 import pytest

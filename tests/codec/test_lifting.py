@@ -1,4 +1,4 @@
-"""Wavelets along the slice axis: exact inverses, and gains against the filters of the standard."""
+"""Wavelets along the slice axis: exact inverses, gains against the filters of the standard."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What can be asked of pseudo video sequences, coder by coder, and pictures at the edge of what they take."""
+"""Options of pseudo video sequences, coder by coder, and pictures at the limits of size."""
 
 from dataclasses import replace
 
@@ -9,7 +9,8 @@ import pytest
 from codec import decode, encode, schemes
 from codec.bitstream import framing
 from codec.bitstream.obu import temporal_units
-from codec.coders.pseudo_video import PseudoVideo, stream_packets
+from codec.coders.decoding import stream_packets
+from codec.coders.pseudo_video import PseudoVideo
 from codec.contract import find, parse_scheme
 from ii_core import IIPicture
 from tests.codec.test_contract import finest, psnr, quick, textured

@@ -1,3 +1,5 @@
+"""Orders of component images."""
+
 import numpy as np
 import pytest
 from hypothesis import given

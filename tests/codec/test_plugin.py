@@ -1,4 +1,4 @@
-"""Coders and measures of other people: the page's example, as a file for ``--plugin`` and as an installed package."""
+"""Coders and measures of other packages: the example of the documentation, by ``--plugin`` and by an entry point."""
 
 import os
 import re

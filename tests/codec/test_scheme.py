@@ -1,3 +1,5 @@
+"""Scheme names, options and presets."""
+
 import numpy as np
 import pytest
 

@@ -1,3 +1,5 @@
+"""Frames of pseudo video sequences: layout, colour conversion, exact inverses."""
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""SPERR in its own process; what every scheme must keep is in test_codec_contract.py."""
+"""SPERR decoder process; test_contract.py tests what all schemes share."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""Coders of single pictures; what every scheme must keep is in test_codec_contract.py."""
+"""Coders of single pictures; test_contract.py tests what all schemes share."""
 
 import io
 from dataclasses import replace

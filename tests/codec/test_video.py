@@ -1,3 +1,5 @@
+"""Encoders of pseudo video sequences: settings, rates, structure of streams."""
+
 from fractions import Fraction
 
 import av

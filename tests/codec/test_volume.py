@@ -1,4 +1,4 @@
-"""The volume and component images coded alone; what every scheme must keep is in test_codec_contract.py."""
+"""Volumes and component images coded alone; test_contract.py tests what all schemes share."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""README, CHANGELOG and docs/: links lead somewhere, command lines parse, Python runs, names exist.
+"""README, CHANGELOG and docs/: links, command lines, Python examples, names.
 
 Every block of ```python runs, top to bottom of its page with one set of names, in a folder that holds a small
 ``apples.png``, its coding ``apples.ii`` and ``decoded.png``. Python that is not to run is written without the word.

@@ -1,1 +1,1 @@
-"""Bad input, full disks, kills and wrong arguments, across packages."""
+"""Bad input, full disks, killed processes and wrong arguments, across packages."""

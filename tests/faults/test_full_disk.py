@@ -1,4 +1,4 @@
-"""A disk that takes no more: every writer says so, and leaves whole files or none.
+"""Full disk: every writer reports it and leaves whole files or none.
 
 The limit on the size of a file stands in for the full disk. libpng and libtiff report neither; tests that only
 interrupted a run had not met them.
@@ -27,7 +27,7 @@ from ii_core.files import write_image, write_json
 from ii_core.formats.pfm import write_pfm
 from metrics import write_csv, write_latex
 from ii_core.display.viewer import write_viewer
-from metrics.plots.rd_chart import new_figure, save
+from ii_core.display.figure import new_figure, save
 from raytrace_ii import load_scene, render_to
 from raytrace_ii.rendering import contact_sheet
 

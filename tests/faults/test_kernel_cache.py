@@ -1,4 +1,4 @@
-"""The cache of compiled kernels: whatever lies there, kernels run, and the cache is whole again."""
+"""Cache of compiled kernels: kernels run whatever the cache holds, and it is repaired."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Files as units: picture and sidecar, equal bytes for equal content, remains of dead runs, pipes and devices."""
+"""Files as units: picture and sidecar, equal bytes, remains of dead processes, pipes and devices."""
 
 import json
 import os
@@ -16,8 +16,11 @@ from codec import encode
 from codec.inspect.extract import extract
 from ii_core import IIPicture, preset
 from ii_core.atomic import atomic_paths
+from ii_core.display.view_sheets import plot_pair, plot_views
 from ii_core.files import atomic_path, image_header, pixel_digest, read_image, read_json, write_image, write_json
+from ii_core.maps import write_maps
 from ii_core.picture import sidecar
+from metrics import rd_chart, read_study, write_csv, write_latex, write_study
 from raytrace_ii import load_scene, render
 
 RNG = np.random.default_rng(5)
@@ -212,3 +215,28 @@ def test_threads_at_once_give_what_they_give_alone():
         for name, (pixels, payload) in zip(names, pool.map(made, names), strict=True):
             np.testing.assert_array_equal(pixels, alone[name][0])
             assert payload == alone[name][1]
+
+
+def test_every_writer_returns_the_path_it_wrote(tmp_path):
+    grey, camera = picture(value=90), preset("setup1", scale=32)
+    rendered = IIPicture(np.zeros((*camera.pixels[::-1], 3), np.uint8), camera.lenses, camera.ei_pixels, camera)
+    coded = encode(grey, "jpeg", quality=50)
+    fields = {"options": {}, "target_bpp": 1.0, "reached": True, "nbytes": 9}
+    times = {"encode_seconds": 0.1, "decode_seconds": 0.1}
+    points = [{"scheme": "jpeg", "bpp": bpp, "q_global": 30.0 + bpp, **fields, **times} for bpp in (0.5, 1.0)]
+    writers = {
+        "p.png": lambda path: grey.save(path),
+        "a.png": lambda path: write_image(path, grey.pixels),
+        "a.json": lambda path: write_json(path, [1]),
+        "a.ii": lambda path: coded.save(path),
+        "maps": lambda path: write_maps([camera], path),
+        "v.png": lambda path: plot_views(rendered, rendered, path),
+        "s.png": lambda path: plot_pair(rendered, path),
+        "study.json": lambda path: write_study(path, "grey", points, picture=grey),
+        "study.csv": lambda path: write_csv(path, points),
+        "table.tex": lambda path: write_latex(path, [{"scheme": "jpeg"}]),
+        "chart.png": lambda path: rd_chart(read_study(tmp_path / "study.json"), path),
+    }
+    for name, write in writers.items():
+        assert write(str(tmp_path / name)) == tmp_path / name
+        assert (tmp_path / name).exists()

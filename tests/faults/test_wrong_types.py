@@ -1,4 +1,4 @@
-"""Calls with arguments of the wrong type: TypeError or ValueError that names the argument, before any work."""
+"""Arguments of wrong type: TypeError or ValueError that names the argument, before any work."""
 
 from dataclasses import fields
 from functools import partial

@@ -1,3 +1,5 @@
+"""II-cameras: rays, validation, JSON, presets."""
+
 import json
 import math
 

@@ -1,3 +1,5 @@
+"""Component images: exact rearrangements."""
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -53,7 +55,7 @@ def test_definitions_element_by_element(lenses, ei_pixels):
 @pytest.mark.parametrize("cpus", [1, 3, 64])
 def test_any_number_of_threads_gives_the_same(kind, cpus, monkeypatch):
     monkeypatch.setattr(component, "SMALL", 0)
-    monkeypatch.setattr(component.os, "cpu_count", lambda: cpus)
+    monkeypatch.setattr("ii_core.parallel.cores", lambda: cpus)
     source = make((7, 5), (3, 4))
     field = source.pixels.reshape(5, 4, 7, 3, 3)
     axes = {"ei": (0, 2, 1, 3, 4), "si": (1, 3, 0, 2, 4), "ri": (1, 0, 2, 3, 4)}[kind]

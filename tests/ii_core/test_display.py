@@ -1,3 +1,5 @@
+"""Displays: focused views, quilts, lenticular panels, simulations, films."""
+
 import av
 import numpy as np
 import pytest
@@ -154,7 +156,7 @@ def test_animation_holds_its_frames(tmp_path, apples, name):
     ("arguments", "said"),
     [
         (["--as", "hologram", "-o", "a.png"], "unknown kind 'hologram'"),
-        (["-o", "a.avi"], "no known moving picture"),
+        (["-o", "a.avi"], "no known film type"),
         (["-o", "a.mp4", "--fps", "0"], "fps is 0"),
         (["-o", "a.mp4", "--frames", "0"], "at least 1"),
         (["-o", "a.mp4", "--size", "big"], "two whole numbers"),

@@ -1,4 +1,4 @@
-"""Light fields from elsewhere: round trips exact to the bit, orders found, and what is refused."""
+"""Light-field formats: exact round trips, orders of views, refused files."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""Which lens a pixel is under: against distances to every lens there is."""
+"""Lens of each pixel, against distances to all lenses."""
 
 import math
 

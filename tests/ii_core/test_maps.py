@@ -1,4 +1,4 @@
-"""Cameras stored as L and D maps: half a code word, exact ends, hand-made maps, and pictures rendered from them."""
+"""Cameras stored as L and D maps: half a code of error, exact ends, hand-made maps, rendered pictures."""
 
 import json
 
@@ -211,5 +211,5 @@ def test_what_cannot_be_stored(tmp_path):
         pixels=(4, 4), lenses=(2, 2), pixel_pitch_mm=1, gap_mm=1, name="blind",
         optics=["pinhole", {"kind": "lens", "z_mm": 2, "focal_mm": 9, "diameter_mm": 0.5}],
     )  # fmt: skip
-    with pytest.raises(ValueError, match="camera 'blind' lets no ray out"):
+    with pytest.raises(ValueError, match="camera 'blind' blocks every ray"):
         write_maps([blind], tmp_path)

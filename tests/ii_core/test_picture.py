@@ -1,3 +1,5 @@
+"""II-pictures: structure, files and sidecars, sensor noise."""
+
 import json
 import os
 import re

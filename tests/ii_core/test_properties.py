@@ -1,3 +1,5 @@
+"""Properties and design of cameras, against the equations of the dissertation."""
+
 import math
 import re
 from dataclasses import replace

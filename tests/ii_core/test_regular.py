@@ -1,3 +1,5 @@
+"""Conversion to regular structures."""
+
 import time
 import tracemalloc
 

@@ -1,3 +1,5 @@
+"""View images: geometry, interpolation, refocusing."""
+
 import math
 from dataclasses import replace
 

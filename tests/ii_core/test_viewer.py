@@ -1,4 +1,4 @@
-"""The page in a real browser shows what the picture holds, and its commands refuse what they cannot show."""
+"""Viewer page in an installed browser; refusals of its commands."""
 
 import io
 import json

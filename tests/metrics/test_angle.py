@@ -1,3 +1,5 @@
+"""YCbCr PSNR, SSIM and MS-SSIM of sub-images."""
+
 import math
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Q_depth: layers, values, missing pixels."""
+
 import math
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Depth from focus: planes at known depth, patterns, costs."""
+
 import math
 from dataclasses import replace
 from itertools import product

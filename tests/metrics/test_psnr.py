@@ -1,3 +1,5 @@
+"""Q_global and Q_angle."""
+
 import math
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Rate–distortion points, Bjøntegaard differences, tables and charts."""
+
 import csv
 import json
 import math

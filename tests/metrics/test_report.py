@@ -1,4 +1,4 @@
-"""What `measure` says, for all kinds of pictures: a quality or the reason why there is none."""
+"""Report of `measure` for all kinds of pictures: a quality, or the reason why it is missing."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Rate–distortion by any quality: tables, charts, Q_depth over rate."""
+"""Rate–distortion studies of any measure: tables, charts, Q_depth over rate."""
 
 import csv
 import json

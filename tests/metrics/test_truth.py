@@ -1,4 +1,4 @@
-"""The metrics against what is known from elsewhere: published values, closed forms, rays traced directly."""
+"""Metrics against truth: published values, closed forms, directly traced rays."""
 
 import math
 

@@ -1,3 +1,5 @@
+"""Q_view and error maps."""
+
 import numpy as np
 import pytest
 from skimage.metrics import structural_similarity

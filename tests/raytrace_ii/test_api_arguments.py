@@ -1,4 +1,4 @@
-"""Wrong arguments of the public functions of ii_core and metrics: TypeError or ValueError that name the argument."""
+"""Wrong arguments of the public functions of ii_core and metrics: errors that name the argument."""
 
 import inspect
 import re

@@ -1,1 +1,1 @@
-"""Scenes, files and pictures that several tests share."""
+"""Scenes, files and pictures for several test files."""

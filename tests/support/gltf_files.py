@@ -1,4 +1,4 @@
-"""Small glTF files for tests, written by hand: trimesh would leave out what is to be read."""
+"""Small glTF files, written byte by byte."""
 
 import base64
 import io

@@ -1,4 +1,4 @@
-"""Small scenes and rays that the tracer's tests share."""
+"""Small scenes and rays for the tests of the tracer."""
 
 import math
 

@@ -40,6 +40,7 @@ class LightField(Coder):
     """Sub-images as views of a light field; docs/lf.md explains the stream."""
 
     kind = "si"
+    components_alone: ClassVar[bool] = True
     name = "si-lf"
     about = "Sub-images as a light field: a pyramid of views, disparity, synthesis at the decoder"
     dtypes: ClassVar[tuple[str, ...]] = ("uint8", "uint16")
@@ -95,7 +96,7 @@ class LightField(Coder):
             planes.scatter(field.views, number, grid, row, col, header.axes, pixels.itemsize == 2, pixels)
         return pixels, clock.cpu_seconds() - started
 
-    def decode_slice(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
+    def decode_component(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
         """One sub-image, counted row by row, decoded with the levels above it and the views before it in its own.
 
         Raises

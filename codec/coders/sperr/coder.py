@@ -1,4 +1,4 @@
-"""Volumes by SPERR: component images as slices, CDF 9/7 in three dimensions and SPECK, through imagecodecs.
+"""SPERR coder of volumes: component images as slices, CDF 9/7 in three dimensions, SPECK; by imagecodecs.
 
 Colours are rotated to their principal axes as in `codec.coders.volume`. Each colour is a volume of its own. One step
 for all colours makes one rate–distortion slope for all; see `codec.coders.sperr.stream`.

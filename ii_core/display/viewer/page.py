@@ -1,4 +1,4 @@
-"""Viewer page of an II-picture: one HTML file with everything in it, or a folder for a web server.
+"""Viewer page of an II-picture: one self-contained HTML file, or a folder for a web server.
 
 The page holds the mosaic of sub-images (2.13) cut into square pages, which become the layers of one texture; its
 shader looks through the lenses as `ii_core.view_image` does (4.1), and focuses by shifting and adding.

@@ -1,4 +1,4 @@
-"""glTF 2.0 files as they are stored: container, buffers, accessors and images."""
+"""Storage of glTF 2.0 files: container, buffers, accessors and images."""
 
 from __future__ import annotations
 

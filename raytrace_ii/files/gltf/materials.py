@@ -1,4 +1,4 @@
-"""Materials of glTF 2.0 in Whitted's terms. docs/scenes.md gives the mapping and its reasons."""
+"""Materials of glTF 2.0 as Whitted materials; docs/scenes.md explains the mapping."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""glTF 2.0 scenes: nodes, meshes, skins and lights, with the materials of materials.py."""
+"""Scenes of glTF 2.0: nodes, meshes, skins, lights and materials."""
 
 from __future__ import annotations
 

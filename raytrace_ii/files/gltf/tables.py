@@ -1,4 +1,4 @@
-"""The tables of a glTF 2.0 file as far as they are read, checked by pydantic.
+"""JSON tables of glTF 2.0 files, checked by pydantic.
 
 What else stands in a file is kept by pydantic as an extra, from which `left_out` tells it: nothing is dropped
 without a word.

@@ -1,4 +1,4 @@
-"""glTF files: geometry, nodes, textures, lights and the warning, each against what the file says."""
+"""glTF files: geometry, nodes, textures, lights and warnings."""
 
 import warnings
 

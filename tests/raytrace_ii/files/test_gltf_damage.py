@@ -1,4 +1,4 @@
-"""Damaged glTF files: one line that names the file and the part, and never a traceback or a silent wrong picture."""
+"""Damaged glTF files: one line that names the file and the part; no traceback, no wrong picture."""
 
 import json
 import struct

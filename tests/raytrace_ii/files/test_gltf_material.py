@@ -1,4 +1,4 @@
-"""PBR to Whitted: limits that are known, energy, and the same scene in TOML and in glTF."""
+"""PBR materials as Whitted materials: limits, energy, equal scenes in TOML and glTF."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Scene files: everything that may stand in them works, and what may not is named."""
+"""Scene files: every allowed key works, every other is named."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""Mesh files as shapes: not mirrored, with normals and texture coordinates."""
+"""Mesh files as shapes: handedness, normals, texture coordinates."""
 
 import struct
 

@@ -1,4 +1,4 @@
-"""Pictures made by threads, processes and a dask cluster: the same to the bit, also when a worker dies."""
+"""Pictures by threads, processes and a dask cluster: equal to the bit, also after the death of a worker."""
 
 import multiprocessing
 import os

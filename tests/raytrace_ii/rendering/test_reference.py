@@ -1,4 +1,4 @@
-"""Sets of scenes: what is made, what is made again, what survives an interrupt; and what scenes hash to."""
+"""Render sets: renders, repeats, interrupts, and hashes of scenes."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""Pictures: the same to the bit however they are made, and what they cost."""
+"""Rendered pictures: equal to the bit whatever the tiles and threads; counts of rays."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Files written band by band: what `render` gives, in bounded memory, whole or not at all; and support images."""
+"""Pictures written band by band: equal to `render`, bounded memory, whole files or none; support images."""
 
 import json
 import subprocess

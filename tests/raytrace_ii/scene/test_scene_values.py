@@ -1,4 +1,4 @@
-"""What a scene made by hand is refused for: one clear error that names the field and its value."""
+"""Invalid scenes: one error that names the field and its value."""
 
 import math
 

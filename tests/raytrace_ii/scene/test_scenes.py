@@ -1,4 +1,4 @@
-"""The reference scenes are what they are said to be: their detail, depth and fill are measured at a small scale.
+"""Reference scenes: detail, depth and fill, measured at small scale.
 
 The subject of a scene are all bodies but those that only lie under and behind it. Detail is the share of the 2D
 projection's pixels whose brightness changes by more than 12 of 255 steps to the next; depth is that of the subject's

@@ -1,4 +1,4 @@
-"""Textures: checkers counted by hand, noise on its lattice, images texel by texel, and codes that survive."""
+"""Textures: counted checkers, noise on its lattice, texels of images, exact codes."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Whether meshes have an inside, and the warning if glass has none."""
+"""Watertightness of meshes, and the warning for open glass."""
 
 import warnings
 

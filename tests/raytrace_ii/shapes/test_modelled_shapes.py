@@ -1,4 +1,4 @@
-"""Implicit bodies, terrain and strands: closed or not as they should be, of the right size and colours."""
+"""Implicit bodies, terrain and strands: watertightness, size, colours."""
 
 import math
 

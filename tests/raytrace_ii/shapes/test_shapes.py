@@ -1,4 +1,4 @@
-"""Procedural meshes: closed, outward, of the right size, with textures the right way round."""
+"""Primitive shapes: watertight, outward, of the right size, textures unmirrored."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Embree in packets: the hits of single rays for every width, order, thread and process; what happens without."""
+"""Embree in packets: equal to single rays for every width, order, thread and process; fallback."""
 
 import os
 import subprocess

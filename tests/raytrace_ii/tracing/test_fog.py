@@ -1,4 +1,4 @@
-"""Air perspective and vertex colours, in closed form."""
+"""Fog and vertex colours, in closed form."""
 
 import math
 

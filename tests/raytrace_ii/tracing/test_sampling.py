@@ -1,4 +1,4 @@
-"""Adaptive samples: where they lie, who gets them, what error is left."""
+"""Adaptive supersampling: positions, allocation, remaining error."""
 
 import numpy as np
 import pytest

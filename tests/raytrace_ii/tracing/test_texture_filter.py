@@ -1,4 +1,4 @@
-"""Images read over the width of a ray: means that are known, and fewer errors than points make."""
+"""Texture filter: known means, smaller errors than point samples."""
 
 import math
 

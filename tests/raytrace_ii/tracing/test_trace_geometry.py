@@ -1,4 +1,4 @@
-"""Where rays hit: against closed forms and float64 triangle tests, under any pose, and as disparity in pictures."""
+"""Hit points: closed forms, float64 triangles, any pose, disparity in pictures."""
 
 import math
 

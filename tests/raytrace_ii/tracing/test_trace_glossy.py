@@ -1,4 +1,4 @@
-"""Rough mirrors against the integral of the GGX lobe, maps per texel, and surfaces that are partly there."""
+"""Rough mirrors against the integral of the GGX lobe, texture maps, partial coverage."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Spot lights, surfaces that give off light, and equirectangular surroundings, in closed form."""
+"""Spot lights, emissive surfaces and equirectangular surroundings, in closed form."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Glass in water in glass: bodies in one another, touching and overlapping, by priority, against closed forms."""
+"""Nested glass: bodies inside, touching and overlapping each other, by priority, in closed form."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What light does at surfaces, against closed forms."""
+"""Reflection, refraction, Fresnel term and absorption, in closed form."""
 
 import math
 from dataclasses import replace

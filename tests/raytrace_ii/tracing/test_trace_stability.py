@@ -1,4 +1,4 @@
-"""Where numbers get difficult: acne, leaks, grazing light, extreme scales, bad geometry and bad rays."""
+"""Numerical limits of the tracer: self-hits, leaks, grazing light, extreme scales, bad geometry and rays."""
 
 import math
 

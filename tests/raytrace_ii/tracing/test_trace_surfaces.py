@@ -1,4 +1,4 @@
-"""Normal maps and cut-outs: what a surface pretends to be, and where it is not."""
+"""Normal maps and cut-outs."""
 
 import math
 
