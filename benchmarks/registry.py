@@ -201,6 +201,7 @@ BENCHMARKS = {
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
         Benchmark("speed.before_after", needs="git history", records=OWN),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
+        Benchmark("pages.hero", writes=(f"{IMAGES}/apples.webp",)),
         Benchmark("pages.gallery", needs=f"{BROWSER} for --stills", writes=("docs/gallery/*",)),
         Benchmark(
             "pages.readme",

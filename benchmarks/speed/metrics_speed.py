@@ -225,32 +225,34 @@ def compared(shot: Shot, decoded: IIPicture, found: Any, measured: Any) -> dict[
 
 
 def draw(data: dict[str, Any]) -> Any:
-    """Accuracy against time, a column a parameter."""
+    """Accuracy against time, a row a parameter."""
     points = data["accuracy"]
     kinds = list(dict.fromkeys(point["what"] for point in points))
     titles = {"layers": "number of layers", "EIs": "number of EIs, B + R", "filter": "side of the filter h"}
-    figure = new_figure(4 * len(kinds) + 0.5, 6.5)
-    panels = figure.subplots(2, len(kinds), sharey="row", squeeze=False)
+    figure = new_figure(8.5, 3 * len(kinds) + 0.8)
+    panels = figure.subplots(len(kinds), 2, sharey="col", squeeze=False)
     lines = list(dict.fromkeys((point["scene"], point["method"]) for point in points))
-    for column, what in zip(panels.T, kinds, strict=True):
+    for row, what in zip(panels, kinds, strict=True):
         for i, (scene, method) in enumerate(lines):
             line = [p for p in points if (p["what"], p["scene"], p["method"]) == (what, scene, method)]
-            for axes, value in zip(column, ("right", "off_db"), strict=True):
+            for axes, value in zip(row, ("right", "off_db"), strict=True):
                 x, y = [p["cpu_seconds"] for p in line], [p[value] for p in line]
                 axes.plot(x, y, marker=MARKERS[i], color=COLOURS[i], label=f"{scene}, {method}")
                 for at, point in zip(zip(x, y, strict=True), line, strict=True):
-                    axes.annotate(point["number"], at, xytext=(3, 4), textcoords="offset points", fontsize=7)
-        column[0].set_title(titles[what], loc="left", fontsize=11)
-        column[1].set_xlabel("CPU time [s]")
-    panels[0, 0].set_ylabel("depths right within 10 % [share]")
-    panels[1, 0].set_ylabel(r"$Q_\mathrm{depth}$ off that with true depth [dB]")
+                    axes.annotate(point["number"], at, xytext=(3, 4), textcoords="offset points", fontsize=9)
+        for axes in row:
+            axes.set_title(titles[what], loc="left", fontsize=11)
+        row[0].set_ylabel("depths right within 10 % [share]")
+        row[1].set_ylabel(r"$Q_\mathrm{depth}$ off that with true depth [dB]")
+    for axes in panels[-1]:
+        axes.set_xlabel("CPU time [s]")
     for axes in panels.flat:
         axes.set_xlim(left=0)
         axes.grid(True, color="0.9", linewidth=0.8)
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
     handles, names = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=len(lines), frameon=False)
+    figure.legend(handles, names, loc="outside lower center", ncols=2, frameon=False)
     return figure
 
 
@@ -299,7 +301,7 @@ def front_table(data: dict[str, Any]) -> list[str]:
 
 def draw_front(points: list[dict[str, Any]]) -> Any:
     """All settings of depth from focus, a panel a scene, with the front and the recommended one."""
-    figure = new_figure(11, 4.8)
+    figure = new_figure(8.5, 5)
     best = fronts(points)
     kinds = list(dict.fromkeys((p["what"], p["method"]) for p in points))
     for axes, (scene, edge) in zip(figure.subplots(1, len(best), squeeze=False).flat, best.items(), strict=True):
@@ -313,7 +315,7 @@ def draw_front(points: list[dict[str, Any]]) -> Any:
                       label=f"{what}, {method}", zorder=3)  # fmt: skip
             for p in line:
                 axes.annotate(
-                    p["number"], (p["cpu_seconds"], p["right"]), (4, 4), textcoords="offset points", fontsize=7
+                    p["number"], (p["cpu_seconds"], p["right"]), (4, 4), textcoords="offset points", fontsize=9
                 )
         pick = recommended(edge)
         axes.plot(
@@ -326,7 +328,7 @@ def draw_front(points: list[dict[str, Any]]) -> Any:
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
     handles, names = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    figure.legend(handles, names, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     return figure
 
 

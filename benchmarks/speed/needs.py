@@ -380,8 +380,8 @@ def fewer_table(scenes: dict[str, Any]) -> list[str]:
 
 def draw(scenes: dict[str, Any]) -> Any:
     """A panel a scene: how far the picture is off without each thing, and what that saves."""
-    figure = new_figure(15, 8.5)
-    for axes, (name, one) in zip(figure.subplots(2, 4).flat, scenes.items(), strict=True):
+    figure = new_figure(8.5, 13)
+    for axes, (name, one) in zip(figure.subplots(4, 2).flat, scenes.items(), strict=True):
         rows = sorted(one["left_out"], key=lambda row: _place(row["what"]), reverse=True)
         limit = one["limit"]["psnr"]
         top = limit + 25  # the same picture has no PSNR: it stands at the edge
@@ -391,14 +391,14 @@ def draw(scenes: dict[str, Any]) -> Any:
             axes.plot([0, at], [y, y], color="0.88", linewidth=1, zorder=1)
             axes.plot(at, y, "o", color=COLOURS[2 if fine else 1], markersize=7, zorder=3)
             saved = "" if row["time"] is None else percent(row["time"])
-            axes.annotate(saved, (top + 3, y), va="center", fontsize=8, annotation_clip=False)
+            axes.annotate(saved, (top + 3, y), va="center", fontsize=9, annotation_clip=False)
         axes.axvline(limit, color="0.4", linestyle=":", linewidth=1)
-        axes.set_yticks(range(len(rows)), [row["what"] for row in rows], fontsize=8)
+        axes.set_yticks(range(len(rows)), [row["what"] for row in rows], fontsize=9)
         axes.set_xlim(0, top + 1)
         axes.set_title(name, loc="left", fontsize=11)
-        axes.set_title("CPU time", loc="right", fontsize=8)
+        axes.set_title("CPU time", loc="right", fontsize=9)
         axes.spines[["top", "right"]].set_visible(False)
-    for axes in figure.axes[4:]:
+    for axes in figure.axes[6:]:
         axes.set_xlabel("PSNR against the full picture [dB]")
     for fine, label in ((2, "not to be told apart"), (1, "seen to be missing")):
         figure.axes[0].plot([], [], "o", color=COLOURS[fine], label=label)

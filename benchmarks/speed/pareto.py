@@ -219,9 +219,9 @@ def chart(data: dict[str, Any], target: Path) -> None:
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    figure = Figure(figsize=(14, 7.4), layout="constrained")
+    figure = Figure(figsize=(8.5, 12), layout="constrained")
     FigureCanvasAgg(figure)
-    for axes, (name, one) in zip(figure.subplots(2, 4).flat, data.items(), strict=True):
+    for axes, (name, one) in zip(figure.subplots(4, 2).flat, data.items(), strict=True):
         rows = one["rows"]
         best = [rows[i] for i in one["front"]]
         axes.step(
@@ -246,16 +246,16 @@ def chart(data: dict[str, Any], target: Path) -> None:
         axes.grid(True, color="0.92", linewidth=0.8)
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
-    for axes in figure.axes[4:]:
+    for axes in figure.axes[6:]:
         axes.set_xlabel("CPU time [s]")
-    for axes in (figure.axes[0], figure.axes[4]):
+    for axes in figure.axes[::2]:
         axes.set_ylabel("PSNR [dB]")
     handles = {label: h for axes in figure.axes for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     figure.legend(
         [*handles.values(), figure.axes[0].plot([], [], color="0.75", linewidth=4)[0]], [*handles, "Pareto front"],
-        loc="outside lower center", ncols=6, frameon=False, fontsize=9,
+        loc="outside lower center", ncols=3, frameon=False, fontsize=9,
     )  # fmt: skip
-    figure.savefig(target, dpi=120)
+    figure.savefig(target, dpi=150)
     write_picture(target, target)
 
 

@@ -182,9 +182,9 @@ def chart(cases: Mapping[str, list[Row]], target: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(14, 11.5), layout="constrained")
+    figure = Figure(figsize=(8.5, 19), layout="constrained")
     FigureCanvasAgg(figure)
-    for axes, (case, across, names, logarithmic, title) in zip(figure.subplots(4, 4).flat, PANELS, strict=True):
+    for axes, (case, across, names, logarithmic, title) in zip(figure.subplots(8, 2).flat, PANELS, strict=True):
         rows = [row for row in cases[case] if row[across] is not None]
         smallest = min(row[across] for row in rows if row[across] > 0)
         for i, name in enumerate(names):
@@ -205,8 +205,8 @@ def chart(cases: Mapping[str, list[Row]], target: Path) -> None:
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
         if len(names) > 1:
-            axes.legend(frameon=False, fontsize=8)
-    figure.savefig(target, dpi=110)
+            axes.legend(frameon=False, fontsize=9)
+    figure.savefig(target, dpi=150)
     write_picture(target, target)
 
 

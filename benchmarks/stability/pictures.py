@@ -1,4 +1,4 @@
-"""Pictures of failures for docs/stability.md: two strips of details."""
+"""Pictures of failures for docs/stability.md: two sheets of details."""
 
 from __future__ import annotations
 
@@ -10,12 +10,22 @@ from numpy.typing import NDArray
 
 from benchmarks.accuracy.analytic import still_life
 from benchmarks.stability import depth, geometry, light
+from benchmarks.study.sheets import enlarged, sheet
 from codec import decode, encode
 from ii_core import add_sensor_noise, preset, read_maps, view_image, write_maps
 from ii_core.colour import srgb
 from metrics.depth.focus import METHODS
 from raytrace_ii import Body, Scene, load_scene, render, trace
 from raytrace_ii.shapes.primitives import rotation
+
+RENDERING = [
+    "1 ball, 12 segments", "2 ball, 48 segments", "3 walls 6e-8 apart", "4 walls 1e-7 apart", "5 faces reversed",
+    "6 faces missing",
+]  # fmt: skip
+CODING_AND_DEPTH = [
+    "1 from aside", "2 lowest rate", "3 camera in 8 bits", "4 flat wall, dissertation", "5 flat wall, robust",
+    "6 half mirror",
+]  # fmt: skip
 
 
 def rendering() -> NDArray[np.uint8]:
@@ -41,7 +51,7 @@ def rendering() -> NDArray[np.uint8]:
             for b in still.bodies
         ]
         pictures.append(_seen(replace(still, bodies=broken), (4, -4, 26), 0.2))
-    return _row(pictures)
+    return sheet(pictures, 3, RENDERING)
 
 
 def coding_and_depth() -> NDArray[np.uint8]:
@@ -61,13 +71,7 @@ def coding_and_depth() -> NDArray[np.uint8]:
     maps = [depth.shown(depth.estimated(even, method)) for method in METHODS]
     maps.append(depth.shown(depth.estimated(half, "dissertation")))
     tiles = [*views, *(np.repeat(one[..., None], 3, axis=2) for one in maps)]
-    return _row([np.rint(tile).astype(np.uint8).repeat(3, axis=0).repeat(3, axis=1) for tile in tiles])
-
-
-def _row(pictures: list[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """Side by side, with white between them."""
-    gap = np.full((pictures[0].shape[0], 6, 3), 255, np.uint8)
-    return np.concatenate([part for one in pictures for part in (one, gap)][:-1], axis=1)
+    return sheet([enlarged(np.rint(tile).astype(np.uint8), 3) for tile in tiles], 3, CODING_AND_DEPTH)
 
 
 def _seen(scene: Scene, towards: tuple[float, float, float], half: float, size: int = 200) -> NDArray[np.uint8]:

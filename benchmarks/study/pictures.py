@@ -46,6 +46,12 @@ def steps(scale: int) -> list[Step]:
     ]
 
 
+_KINDS = ("elementary images", "sub-images", "ray-space images")
+COMPONENT_LABELS = (*_KINDS, *(f"{kind}, middle 16" for kind in _KINDS))
+_CAMERAS = [f"{scene}, {camera}" for scene in ("Objects", "Hairdo") for camera in ("HPO", "GRIN")]
+CAMERA_LABELS = [name + part for name in _CAMERAS for part in ("", ", detail")]
+
+
 def components(folder: Path, *, scale: int) -> dict[str, Any]:
     """*Twins* as elementary, sub- and ray-space images: all of them, and the middlemost 4×4."""
     picture = shot("twins", "setup1", scale).picture
@@ -60,7 +66,7 @@ def components(folder: Path, *, scale: int) -> dict[str, Any]:
         top, left = max(rows // 2 - 2, 0), max(columns // 2 - 2, 0)
         whole.append(fitted(laid_out(stack)))
         close.append(fitted(laid_out(stack[top : top + 4, left : left + 4], gap=1)))
-    write_image(folder / "component-images.png", sheet([*whole, *close], 3))
+    write_image(folder / "component-images.png", sheet([*whole, *close], 3, COMPONENT_LABELS))
     return {"shapes": {kind: list(stack.shape[:4]) for kind, stack in stacks.items()}}
 
 
@@ -86,7 +92,7 @@ def cameras(folder: Path, *, scale: int) -> dict[str, Any]:
         for name in ("hpo", "grin"):
             picture = render(loaded, preset(name, scale=scale), samples=4, support=()).picture
             panels += [fitted(picture.pixels), fitted(detail(picture))]
-    write_image(folder / "other-cameras.png", sheet(panels, 4))
+    write_image(folder / "other-cameras.png", sheet(panels, 4, CAMERA_LABELS))
     return {}
 
 
@@ -108,5 +114,5 @@ def five_views(folder: Path, *, scale: int) -> dict[str, Any]:
     }
     blank = np.full_like(views["front"], 255)
     order = (blank, views["up"], blank, views["left"], views["front"], views["right"], blank, views["down"], blank)
-    write_image(folder / "five-views.png", sheet(order, 3))
+    write_image(folder / "five-views.png", sheet(order, 3, ("", "up", "", "left", "front", "right", "", "down", "")))
     return {"gap": GAP, "viewpoints_mm": {n: p.tolist() for n, p in five_viewpoints(picture.camera).items()}}

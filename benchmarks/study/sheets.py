@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
 
 GAP = 4
+LETTERS, STRIP = 15, 22  # pixels, of a label and of the strip it stands in
 
 
 def enlarged(image: NDArray[Any], times: int) -> NDArray[Any]:
@@ -16,8 +18,18 @@ def enlarged(image: NDArray[Any], times: int) -> NDArray[Any]:
     return image.repeat(times, axis=0).repeat(times, axis=1)
 
 
-def sheet(images: Sequence[NDArray[np.uint8]], columns: int) -> NDArray[np.uint8]:
-    """Images of one size in rows, on white."""
+def labelled(image: NDArray[np.uint8], text: str) -> NDArray[np.uint8]:
+    """An image below a strip that names it."""
+    strip = Image.new("RGB", (image.shape[1], STRIP), "white")
+    font = ImageFont.load_default(LETTERS)
+    ImageDraw.Draw(strip).text((2, STRIP // 2), text, "black", font, anchor="lm")
+    return np.concatenate([np.asarray(strip), image])
+
+
+def sheet(images: Sequence[NDArray[np.uint8]], columns: int, labels: Sequence[str] = ()) -> NDArray[np.uint8]:
+    """Images of one size in rows, on white, each below its label if there are any."""
+    if labels:
+        images = [labelled(image, text) for image, text in zip(images, labels, strict=True)]
     height, width = images[0].shape[:2]
     rows = -(-len(images) // columns)
     page = np.full((rows * (height + GAP) - GAP, columns * (width + GAP) - GAP, 3), 255, np.uint8)

@@ -36,6 +36,7 @@ from .sheets import enlarged, sheet
 
 PVS = ("si-h264:chroma=420", "ei-h264:chroma=420", "ri-h264:chroma=420")
 SHOWN = (REFERENCE, VOLUME, *PVS)  # the order of Figures 5.13 to 5.18
+LABELS = ("uncoded", "JPEG 2000", "SI-PVI", "SI-PVS", "EI-PVS", "RI-PVS")
 BEYOND = ("si-h264", "ei-h264", "si-hevc", "ei-hevc:fast", "si-av1", "ei-av1:fast", "si-jp3d")
 MEASURES = ("q_view", "q_view_min", "q_depth_min", "q_depth_mean", "q_depth_max")
 ARTEFACT_RATE = 0.15  # bit per pixel
@@ -94,7 +95,7 @@ def artefacts(folder: Path, *, scene: str, scale: int, camera: str, crop: int | 
     apart = [255 - np.abs(view.astype(np.int16) - views[0]).astype(np.uint8) for view in views]
     name = "artefacts-setup1" if camera == "setup1" else f"artefacts-{scene}"
     for kind, images in (("views", views), ("differences", apart)):
-        write_image(folder / f"{name}_{kind}.png", sheet([large(middle(image, crop)) for image in images], 3))
+        write_image(folder / f"{name}_{kind}.png", sheet([large(middle(image, crop)) for image in images], 3, LABELS))
     points = [
         {
             "scheme": scheme,
@@ -116,7 +117,7 @@ def equal(folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> 
     with ThreadPoolExecutor(cores()) as pool:
         found = list(pool.map(lambda scheme: at_quality(made.picture, scheme, EQUAL_DB), schemes))
     views = [front(made.picture), *(front(decoded) for _, decoded in found)]
-    write_image(folder / f"equal-{scene}_views.png", sheet([large(view) for view in views], 3))
+    write_image(folder / f"equal-{scene}_views.png", sheet([large(view) for view in views], 3, LABELS))
     focus = depth_from_focus(made.picture, layers_mm=truth(made)["layers_mm"])
     rows = [
         judged(made, focus, decoded, coded) | {"scheme": scheme}

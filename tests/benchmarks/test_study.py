@@ -13,6 +13,7 @@ from benchmarks.study.__main__ import main
 from benchmarks.study.page import PAGE, largest, publish, tables
 from benchmarks.study.runner import Step, code_of, known, perform, records, timeless
 from benchmarks.study.scripts import SCRIPTS
+from benchmarks.study.sheets import STRIP
 from benchmarks.study.steps import all_steps
 from benchmarks.study.views import towards
 from ii_core import IIPicture
@@ -84,7 +85,9 @@ def test_a_small_study_resumes_repeats_and_fills_the_page(tmp_path, capsys):
     main([*only, "--force"])
     assert capsys.readouterr().out.count("the same to the bit") == 2
     differences = read_image(tmp_path / "out" / "artefacts-setup1_differences.png")
-    assert differences.std() > 1 and (differences[:10, :20] == 255).all()  # the uncoded view, by itself
+    assert differences.std() > 1
+    assert (differences[STRIP : STRIP + 10, :20] == 255).all()  # the uncoded view, by itself
+    assert (differences[:STRIP, :70] < 128).any()  # under its name
     page = tmp_path / "study.md"
     page.write_text(
         "".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in [mark for _, mark in tables(tmp_path)])
