@@ -8,7 +8,9 @@ from .formats.mosaic import load_mosaic
 from .formats.quilt import write_quilt
 from .formats.views import write_views
 from .maps import MapCamera, read_maps, write_maps
+from .panel import PanelDesign, panel_display
 from .picture import IIPicture, add_sensor_noise
+from .pose import camera_pose
 from .presets import camera_names, preset, preset_cameras
 from .regular import from_smallest_rectangle, resampled, smallest_rectangle
 from .video import IIVideo, open_video, video_of, write_view_folders
@@ -20,8 +22,10 @@ __all__ = [
     "IIPicture",
     "IIVideo",
     "MapCamera",
+    "PanelDesign",
     "add_sensor_noise",
     "camera_names",
+    "camera_pose",
     "component_images",
     "elementary_images",
     "find_views",
@@ -30,6 +34,7 @@ __all__ = [
     "load_mosaic",
     "open_video",
     "orthoscopic",
+    "panel_display",
     "picture_of",
     "picture_pixels",
     "preset",

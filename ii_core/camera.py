@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import Pair, finite, one_of, positive, whole_pair
+from .checks import Pair, finite, number, one_of, positive, whole_pair
 from .lattice import LATTICES, Lattice
 from .optics import Bundle, Element, FrontElement, LensModel, Under, chain, unit_disk
 
@@ -63,7 +63,7 @@ class IICamera:
     gap_mm : float
         Λ, the distance from the pixel array to the lens plane.
     lens_pitch_mm : float or (float, float), optional
-        δL across and down; the size of the pixel array over the number of lenses if not given.
+        δL across and down; if not given, the pitch with which the elementary images fill the pixel array.
     lattice : {"rectangular", "hexagonal"}
         Odd rows of a hexagonal array are shifted half a pitch to the right.
     optics : sequence of `Element` or their plain values
@@ -72,6 +72,13 @@ class IICamera:
         Shift of the lens array against the pixel array, for moving lenslets.
     origin_mm : (x, y, z)
         Centre of the pixel array, for stacks of sensors and arrays of cameras.
+    start_mm : float
+        Distance behind the lens plane, on the viewer's side, at which rays start. With 0 they start at the lenses,
+        and the scene stands behind the display. With more, the lens plane is a virtual display in the midst of the
+        scene: things before it stand before the display.
+    viewer_mm : float, optional
+        d, distance before the lens plane at which the viewing zones of all lenses meet; parallel if not given.
+        The pitch of elementary images is δL·(1 + Λ/d) of erect ones, and of others δL·(1 − Λ/d).
     name : str
         Name in files and messages.
 
@@ -94,6 +101,8 @@ class IICamera:
     optics: tuple[Element, ...] = ()
     lens_offset_mm: tuple[float, float] = (0.0, 0.0)
     origin_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    start_mm: float = 0.0
+    viewer_mm: float | None = None
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -107,11 +116,15 @@ class IICamera:
             put(field, (across, down))
         for field in ("pixel_pitch_mm", "gap_mm"):
             put(field, positive(field, getattr(self, field)))
+        model, front = chain(self.optics)
+        put("optics", (model, *front))
+        self._check_start()
+        put("viewer_mm", None if self.viewer_mm is None else positive("viewer_mm", self.viewer_mm))
+        if not self._ei_per_lens > 0:
+            raise ValueError(f"viewer_mm is {self.viewer_mm:g}: more than gap_mm, {self.gap_mm:g}, is needed")
         if self.lens_pitch_mm is None:
-            put(
-                "lens_pitch_mm",
-                tuple(m * self.pixel_pitch_mm / k for m, k in zip(self.pixels, self.lenses, strict=True)),
-            )
+            even = (m * self.pixel_pitch_mm / k for m, k in zip(self.pixels, self.lenses, strict=True))
+            put("lens_pitch_mm", tuple(pitch / self._ei_per_lens for pitch in even))
         else:
             given = self.lens_pitch_mm
             both = tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else (given,) * 2
@@ -124,8 +137,6 @@ class IICamera:
         one_of(*LATTICES)("lattice", self.lattice)
         for field, count in (("lens_offset_mm", 2), ("origin_mm", 3)):
             put(field, finite(field, getattr(self, field), count))
-        model, front = chain(self.optics)
-        put("optics", (model, *front))
         if hasattr(model, "thickness"):
             model.thickness(self.lens_pitch_mm)  # raises ValueError if the sphere is too small for its cell
         behind = self.gap_mm
@@ -136,6 +147,27 @@ class IICamera:
                     "elements are needed in order, away from the pixels"
                 )
             behind = element.z_mm
+
+    def _check_start(self) -> None:
+        start = number("start_mm", self.start_mm)
+        if not 0 <= start < math.inf:
+            raise ValueError(f"start_mm is {start:g}: a distance in mm of at least 0 is needed")
+        if self.front and start:
+            raise ValueError(f"start_mm is {start:g}: rays start at the lenses if a {self.front[0].kind} is in front")
+        object.__setattr__(self, "start_mm", start)
+
+    @property
+    def _ei_per_lens(self) -> float:
+        """Pitch of elementary images over that of lenses: not 1 if viewing zones meet at a viewer."""
+        if self.viewer_mm is None:
+            return 1.0
+        return 1 + (1 if self.erect else -1) * self.gap_mm / self.viewer_mm
+
+    @property
+    def ei_pitch_mm(self) -> tuple[float, float]:
+        """Pitch of the elementary images on the pixel array, across and down."""
+        across, down = self.lens_pitch_mm
+        return across * self._ei_per_lens, down * self._ei_per_lens
 
     @property
     def lens_model(self) -> LensModel:
@@ -149,9 +181,12 @@ class IICamera:
 
     @cached_property
     def lens_lattice(self) -> Lattice:
-        """The lens centres, in pixels from the top left corner of the pixel array."""
+        """The centres of elementary images, in pixels from the top left corner of the pixel array.
+
+        They lie under the lens centres, but for cameras with a `viewer_mm`.
+        """
         pitch = []
-        for pixels, lenses, lens_pitch in zip(self.pixels, self.lenses, self.lens_pitch_mm, strict=True):
+        for pixels, lenses, lens_pitch in zip(self.pixels, self.lenses, self.ei_pitch_mm, strict=True):
             even, given = pixels / lenses, lens_pitch / self.pixel_pitch_mm
             # Quotients of millimetres are whole pixels only within rounding: 1e-9 is the tolerance.
             pitch.append(even if abs(given - even) < 1e-9 * even else round(given, 9))
@@ -298,15 +333,21 @@ class IICamera:
         lattice, pitch, (width, height) = self.lens_lattice, self.pixel_pitch_mm, self.size_mm
         k, l = lattice.nearest(m, n)
         x, y = lattice.centres(k, l)
+        cx, cy = x * pitch - width / 2, height / 2 - y * pitch
+        if self.viewer_mm is not None:  # lenses stand closer, or wider, than their elementary images
+            (sx, sy), ratio = self.lens_offset_mm, self._ei_per_lens
+            cx, cy = sx + (cx - sx) / ratio, sy + (cy - sy) / ratio
         ax, ay = unit_disk(place) if self.lens_model.samples_aperture else (np.float64(0), np.float64(0))
         under = Under(
             px=(m + sample[..., 0]) * pitch - width / 2,
             py=height / 2 - (n + sample[..., 1]) * pitch,
-            cx=x * pitch - width / 2,
-            cy=height / 2 - y * pitch,
+            cx=cx,
+            cy=cy,
             k=k, l=l, ax=ax, ay=ay, gap=self.gap_mm, cell=self.lens_pitch_mm, hexagonal=lattice.hexagonal,
         )  # fmt: skip
         rays = self.lens_model.leave(under)
+        if self.start_mm:
+            rays = _started(rays, self.gap_mm - self.start_mm)
         for front in self.front:
             rays = front.pass_on(rays)
         return rays
@@ -324,7 +365,7 @@ class IICamera:
         usual = IICamera(
             pixels=self.pixels, lenses=self.lenses, pixel_pitch_mm=self.pixel_pitch_mm, gap_mm=self.gap_mm
         )
-        for field in ("lens_pitch_mm", "lattice", "lens_offset_mm", "origin_mm"):
+        for field in ("lens_pitch_mm", "lattice", "lens_offset_mm", "origin_mm", "start_mm", "viewer_mm"):
             value = getattr(self, field)
             if value != getattr(usual, field):
                 data[field] = list(value) if isinstance(value, tuple) else value
@@ -350,6 +391,8 @@ class IICamera:
             "optics",
             "lens_offset_mm",
             "origin_mm",
+            "start_mm",
+            "viewer_mm",
             "about",
             "notes",
         }
@@ -368,6 +411,13 @@ class IICamera:
             return cls(**{**parameters, "name": str(parameters.get("name", ""))})
         except TypeError as error:
             raise ValueError(f"camera has a value of the wrong type: {error}") from None
+
+
+def _started(rays: Bundle, z_mm: float) -> Bundle:
+    """The same lines of sight, from a plane behind the lenses on."""
+    lx, ly, lz, dx, dy, dz, weight = rays
+    back = (z_mm - lz) / np.where(dz > 0, dz, 1.0)  # blocked rays may go anywhere
+    return Bundle(lx + dx * back, ly + dy * back, np.float64(z_mm), dx, dy, dz, weight)
 
 
 def _inside(name: str, value: ArrayLike) -> Floats:

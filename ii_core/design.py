@@ -117,6 +117,13 @@ def report(camera: IICamera) -> str:
     lines = _structure_lines(p) + _plane_lines(camera, p)
     if camera.lenses != (1, 1):
         lines += _zone_lines(p)
+    if camera.start_mm:
+        lines.append(f"rays start         {camera.start_mm:.4g} mm behind the lenses: a virtual display plane")
+    if camera.viewer_mm is not None:
+        pitch = _pair(list(camera.ei_pitch_mm))
+        lines.append(
+            f"zones meet         {camera.viewer_mm:.4g} mm before the lenses, one elementary image every {pitch} mm"
+        )
     lines += _cell_lines(camera, p)
     sizes = ", ".join(f"{name} {size / 1e6:.4g} MB" for name, size in p["map_bytes"].items())
     lines += [f"L and D maps       {sizes}, unpacked", ""]
@@ -166,7 +173,7 @@ def _zone_lines(p: dict[str, Any]) -> list[str]:
     there, further = _pair(zone["width_mm"]), _pair(zone["usual_width_mm"])
     return [
         f"viewing zone       every lens shows its own image from {zone['nearest_mm']:.4g} mm on",
-        f"  width            {there} mm there, {further} mm three times as far",
+        f"  width            {there} mm there, {further} mm at {zone['usual_mm']:.4g} mm",
     ]
 
 

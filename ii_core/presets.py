@@ -95,6 +95,9 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
     Further lenses in front
         Position and focal length do not change.
 
+    Start of rays, meeting of viewing zones
+        Their positions in the scene do not change.
+
     Apertures grow with the lens pitch, so the blur of planes out of focus, in pixels of a view, does not change. The
     field of view of a main lens grows by a/(a − d).
 
@@ -119,11 +122,14 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
         return replace(camera, pixels=pixels, pixel_pitch_mm=pitch)
     # The depth of a sensor in a stack grows with the gap; the position of a camera in an array does not.
     forward = camera.origin_mm[2] * (scale - 1)
+    nearer = camera.gap_mm * (scale - 1)
+    viewer = None if camera.viewer_mm is None else camera.viewer_mm + nearer
+    start = camera.start_mm + nearer if camera.start_mm else 0.0
     scaling = Scaling(
         factor=scale,
         gap_mm=camera.gap_mm,
         cell_mm=camera.lens_pitch_mm,
-        forward_mm=camera.gap_mm * (scale - 1) + forward,
+        forward_mm=nearer + forward,
         front_mm=camera.front[0].z_mm - camera.gap_mm if camera.front else None,
     )
     try:
@@ -136,7 +142,9 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
         lenses=(camera.lenses[0] // scale, camera.lenses[1] // scale),
         pixel_pitch_mm=pitch,
         gap_mm=camera.gap_mm * scale,
-        lens_pitch_mm=_times(camera.lens_pitch_mm, scale),
+        lens_pitch_mm=_times(camera.lens_pitch_mm, scale) if viewer is None else None,  # type: ignore[arg-type]
+        start_mm=start,
+        viewer_mm=viewer,
         lens_offset_mm=_times(camera.lens_offset_mm, scale),
         origin_mm=(*camera.origin_mm[:2], camera.origin_mm[2] + forward),
         optics=optics,

@@ -213,24 +213,32 @@ def viewing_zone(camera: IICamera) -> dict[str, Any]:
     -------
     dict
         ``nearest_mm``, the least distance of a central viewer from the lens plane, for whole lenses; ``width_mm``,
-        the width across and down at that distance; ``usual_width_mm``, the width at three times that distance, which
-        `five_viewpoints` uses. Widths down are infinite without vertical parallax.
+        the width across and down at that distance; ``usual_width_mm``, the width at ``usual_mm``, which
+        `five_viewpoints` uses: where viewing zones meet, else three times the least distance. Widths down are infinite
+        without vertical parallax.
     """
     vertical, tangents, spans = camera.lens_model.vertical_parallax, [], []
     for axis in range(2):
         lattice, count = camera.lens_lattice, camera.lenses[axis]
         shift = 0.5 if lattice.hexagonal and axis == 0 and camera.lenses[1] > 1 else 0.0
-        tangents.append(camera.lens_pitch_mm[axis] / (2 * camera.gap_mm))
+        tangents.append(camera.ei_pitch_mm[axis] / (2 * camera.gap_mm))
         spans.append((count - 1 + shift) * camera.lens_pitch_mm[axis])
     used = (0, 1) if vertical else (0,)
-    nearest = max((spans[axis] + camera.lens_pitch_mm[axis]) / 2 / tangents[axis] for axis in used)
+    meeting = 0.0 if camera.viewer_mm is None else 1 / camera.viewer_mm
+    halves = [(span + pitch) / 2 for span, pitch in zip(spans, camera.lens_pitch_mm, strict=True)]
+    nearest = max(halves[axis] / (tangents[axis] + halves[axis] * meeting) for axis in used)
 
     def width(distance: float) -> list[float]:
+        apart = abs(1 - distance * meeting)  # of the zones of the outermost lenses, as a share of the array
         return [
-            max(0.0, 2 * distance * tangents[axis] - spans[axis]) if axis in used else math.inf for axis in range(2)
+            max(0.0, 2 * distance * tangents[axis] - spans[axis] * apart) if axis in used else math.inf
+            for axis in range(2)
         ]
 
-    return {"nearest_mm": nearest, "width_mm": width(nearest), "usual_width_mm": width(3 * nearest)}
+    return {
+        "nearest_mm": nearest, "width_mm": width(nearest), "usual_mm": camera.viewer_mm or 3 * nearest,
+        "usual_width_mm": width(camera.viewer_mm or 3 * nearest),
+    }  # fmt: skip
 
 
 def cells(camera: IICamera) -> dict[str, Any]:

@@ -237,6 +237,8 @@ def _in_cell(lattice: Lattice, dx: NDArray[Any], dy: NDArray[Any]) -> Mask:
 def _regular_camera(camera: IICamera, ei_pixels: Pair, *, shrink: bool) -> IICamera:
     """Return the camera of the regular picture; ``shrink`` scales the gap with the pixels to keep directions."""
     (u, v), (k, l) = ei_pixels, camera.lenses
+    if shrink and camera.viewer_mm is not None:
+        raise ValueError(f"viewer_mm is {camera.viewer_mm:g}: a camera whose viewing zones meet is to be resampled")
     ratio = camera.lens_lattice.pitch[0] / u
     gap = camera.gap_mm * ratio if shrink else camera.gap_mm
     forward = camera.gap_mm - gap  # keeps the lens plane in place
@@ -249,6 +251,8 @@ def _regular_camera(camera: IICamera, ei_pixels: Pair, *, shrink: bool) -> IICam
         pixel_pitch_mm=camera.pixel_pitch_mm * ratio,
         gap_mm=gap,
         origin_mm=origin,  # type: ignore[arg-type]
+        start_mm=camera.start_mm,
+        viewer_mm=camera.viewer_mm,
         optics=(_same_focus(camera, gap), *(_nearer(element, forward) for element in camera.front)),
     )
 

@@ -91,32 +91,43 @@ def view_positions(
     e = e - camera.origin_mm
     (k, l), (u, v) = camera.lenses, camera.ei_pixels
     sign = -1.0 if erect else 1.0
-    lens_x = (np.arange(k) + 0.5) * camera.lens_pitch_mm[0] - camera.size_mm[0] / 2
-    lens_y = camera.size_mm[1] / 2 - (np.arange(l) + 0.5) * camera.lens_pitch_mm[1]
+    width, height = lens_array_mm(camera)
+    lens_x = (np.arange(k) + 0.5) * camera.lens_pitch_mm[0] - width / 2
+    lens_y = height / 2 - (np.arange(l) + 0.5) * camera.lens_pitch_mm[1]
     to_pixels = sign * camera.gap_mm / ((camera.gap_mm - e[2]) * camera.pixel_pitch_mm)
     x = np.arange(k) * u + (u - 1) / 2 - (lens_x - e[0]) * to_pixels
     y = np.arange(l) * v + (v - 1) / 2 + (lens_y - e[1]) * to_pixels * camera.lens_model.vertical_parallax
+    if camera.viewer_mm is not None:  # elementary images stand beside their lenses
+        aside = sign * camera.gap_mm / (camera.viewer_mm * camera.pixel_pitch_mm)
+        x, y = x + lens_x * aside, y - lens_y * aside * camera.lens_model.vertical_parallax
     return x, y
+
+
+def lens_array_mm(camera: IICamera) -> tuple[float, float]:
+    """Width and height of the lens array of a regular structure."""
+    if camera.viewer_mm is None:
+        return camera.size_mm
+    return camera.lenses[0] * camera.lens_pitch_mm[0], camera.lenses[1] * camera.lens_pitch_mm[1]
 
 
 @checks.checked(camera=checks.instance(IICamera))
 def five_viewpoints(camera: IICamera) -> dict[str, NDArray[np.float64]]:
     """Return the viewpoints front, up, down, left and right, from which every lens shows its own elementary image.
 
-    Their distance is three times the nearest distance of the viewing zone. The rotations about the centre of the
-    display are the largest within the viewing zone, less half a pixel.
+    Their distance is that at which viewing zones meet, or else three times the nearest distance of the viewing zone.
+    The rotations about the centre of the display are the largest within the viewing zone, less half a pixel.
 
     References
     ----------
     Olsson 2008, §4.3.2, with r, φ and θ from the viewing zone.
     """
-    (width, height), (pitch_x, pitch_y) = camera.size_mm, camera.lens_pitch_mm
-    gap = camera.gap_mm
+    (width, height), (pitch_x, pitch_y) = lens_array_mm(camera), camera.ei_pitch_mm
+    gap, meeting = camera.gap_mm, 0.0 if camera.viewer_mm is None else 1 / camera.viewer_mm
     tan_x, tan_y = pitch_x / 2 / gap, pitch_y / 2 / gap
-    r = 3 * max(width / 2 / tan_x, height / 2 / tan_y)
-    # A lens at the far edge, W/2, sees its own EI while (W/2 + r·sin φ) / (r·cos φ) ≤ tan.
-    inside_x = tan_x - 0.5 * camera.pixel_pitch_mm / gap
-    inside_y = tan_y - 0.5 * camera.pixel_pitch_mm / gap
+    r = camera.viewer_mm or 3 * max(width / 2 / tan_x, height / 2 / tan_y)
+    # A lens at the far edge, W/2, sees its own EI while (W/2 + r·sin φ) / (r·cos φ) ≤ tan + W/2d.
+    inside_x = tan_x - 0.5 * camera.pixel_pitch_mm / gap + width / 2 * meeting
+    inside_y = tan_y - 0.5 * camera.pixel_pitch_mm / gap + height / 2 * meeting
     phi = max(0.0, _rotation(inside_x, width / 2 / r))
     theta = max(0.0, _rotation(inside_y, height / 2 / r))
 
@@ -190,7 +201,8 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
     Parameters
     ----------
     depth_mm : float
-        z of the plane in camera coordinates, beyond the lens plane.
+        z of the plane in camera coordinates, beyond where rays start: the lens plane, unless the camera has a
+        ``start_mm``.
 
     Returns
     -------
@@ -198,12 +210,15 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
         In code values. A pixel is the mean over the sub-images that cover it.
     """
     camera = camera_of(picture)
-    if not camera.gap_mm <= depth_mm < math.inf:
-        raise ValueError(f"depth_mm {depth_mm:g} is not beyond the lens plane at {camera.gap_mm:g} mm")
+    start = camera.gap_mm - camera.start_mm
+    if not start <= depth_mm < math.inf:
+        where = f"where rays start, {start:g} mm" if camera.start_mm else f"the lens plane at {start:g} mm"
+        raise ValueError(f"depth_mm {depth_mm:g} is not beyond {where}")
     stack = sub_images(picture)
     v_count, u_count, rows, cols, _ = stack.shape
     sign = -1.0 if picture.erect else 1.0
     per_step = sign * camera.pixel_pitch_mm * (depth_mm - camera.gap_mm) / camera.gap_mm
+    per_step /= widening(camera, depth_mm - camera.gap_mm)
     total, weight = np.zeros((rows, cols, 3)), np.zeros((rows, cols, 1))
     for v in range(v_count):
         i0, i1, di, in_y = _shifted(rows, (v - (v_count - 1) / 2) * per_step / camera.lens_pitch_mm[1])
@@ -227,6 +242,11 @@ def orthoscopic(picture: IIPicture) -> IIPicture:
 def turned_pixels(picture: IIPicture) -> NDArray[Any]:
     """Return the pixels with every elementary image rotated by 180°, (N, M, 3)."""
     return picture_pixels(picture.light_field[:, :, ::-1, ::-1], "ei")
+
+
+def widening(camera: IICamera, beyond_mm: float) -> float:
+    """How much wider a sub-image samples a plane beyond the lenses than the lens plane: 1 if zones are parallel."""
+    return 1.0 if camera.viewer_mm is None else 1 + beyond_mm / camera.viewer_mm
 
 
 def camera_of(picture: IIPicture) -> IICamera:

@@ -42,6 +42,7 @@ _WORDS = """
     plenoptic plenoptic1 plenoptic2 hdtv hpo multi-focus multi-view moving-lenslets stacked-sensors depth-control
     depth-priority resolution-priority grin-hexagonal-depth-control spherical pinhole2d
     si-lf stride sources
+    start_mm viewer_mm
 """
 WORDS = tuple(_WORDS.split())
 _NUMBER = {word: number for number, word in enumerate(WORDS)}

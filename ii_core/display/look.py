@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..camera import IICamera, Pair, whole_pair
 from ..jit import kernel
 from ..picture import IIPicture, codes8
-from ..view import camera_of, five_viewpoints, view_positions
+from ..view import camera_of, five_viewpoints, view_positions, widening
 
 ASSUMED_ANGLE_DEG = 20.0
 MOST_FRAMES = 3000  # of a film: two minutes at 25 frames per second
@@ -92,7 +92,8 @@ def _shifts(camera: IICamera, erect: bool, depth_mm: float | None) -> NDArray[np
     if not math.isfinite(depth_mm):
         raise ValueError(f"depth is {depth_mm} mm: a finite number is needed")
     per_mm = (-1 if erect else 1) * camera.pixel_pitch_mm / camera.gap_mm
-    shift = per_mm * (depth_mm - camera.origin_mm[2] - camera.gap_mm) / np.array(camera.lens_pitch_mm)
+    beyond = depth_mm - camera.origin_mm[2] - camera.gap_mm
+    shift = per_mm * beyond / widening(camera, beyond) / np.array(camera.lens_pitch_mm)
     return shift * [1, camera.lens_model.vertical_parallax]
 
 

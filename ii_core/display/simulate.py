@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..camera import IICamera, Pair, whole_pair
 from ..picture import IIPicture, codes8
-from ..view import camera_of, view_positions
+from ..view import camera_of, lens_array_mm, view_positions
 
 
 def display_simulation(
@@ -40,8 +40,9 @@ def display_simulation(
     x, y = view_positions(camera, viewpoint_mm, erect=picture.erect)
     spot = _spots(camera, np.asarray(viewpoint_mm, np.float64) - camera.origin_mm, (width, height))
     (k, l), pitch = picture.lenses, camera.lens_pitch_mm
-    across = (spot[..., 0] + camera.size_mm[0] / 2) / pitch[0]
-    down = (camera.size_mm[1] / 2 - spot[..., 1]) / pitch[1]
+    wide, high = lens_array_mm(camera)
+    across = (spot[..., 0] + wide / 2) / pitch[0]
+    down = (high / 2 - spot[..., 1]) / pitch[1]
     with np.errstate(invalid="ignore"):
         inside = (across >= 0) & (across < k) & (down >= 0) & (down < l)
     column, row = (np.where(inside, n, 0).astype(np.int64) for n in (across, down))

@@ -119,8 +119,9 @@ def view_disparity(picture: IIPicture, depth: NDArray[Any]) -> NDArray[np.float3
         If the depth map has another size, the picture has no camera, or elements in front of its lenses refract rays.
     """
     camera = picture.camera
-    if camera is None or camera.front:
-        what = "has no camera" if camera is None else "was taken through a lens before the array"
+    if camera is None or camera.front or camera.viewer_mm is not None:
+        front = "viewing zones that meet" if camera and not camera.front else "a lens before the array"
+        what = "has no camera" if camera is None else f"was taken through {front}"
         raise ValueError(f"the picture {what}: its disparity does not follow from depth")
     if depth.shape != picture.pixels.shape[:2]:
         raise ValueError(f"depth is {depth.shape}: {picture.pixels.shape[:2]} is needed")

@@ -174,6 +174,8 @@ def depth_from_focus(
         raise ValueError(f"unknown method {method!r}: known are {', '.join(METHODS)}")
     camera = camera_of(picture)
     picture.check_regular()
+    if camera.viewer_mm is not None:
+        raise ValueError("viewing zones that meet bend the planes of equal disparity: give depth=")
     if camera.front:
         raise ValueError(f"{camera.front[0].kind} before the lens array bends lines of sight: give depth=")
     layers = check_layers(layers_mm, camera)

@@ -33,6 +33,11 @@ def render(
     clip: Annotated[str, typer.Option(help="Of a glTF file that moves: the name of its animation.")] = "",
     fps: Annotated[float | None, typer.Option(help="Frames a second, in place of the file's.")] = None,
     at: Annotated[str | None, typer.Option(help="Where the camera stands in the scene, mm: x,y,z.")] = None,
+    look_at: Annotated[str | None, typer.Option(help="A point of the scene that it looks at, mm: x,y,z.")] = None,
+    up: Annotated[str | None, typer.Option(help="Where its top points to, as near as it can: 0,1,0.")] = None,
+    turn: Annotated[
+        str | None, typer.Option(help="Then turn it by degrees: right, or right,up or right,up,clockwise.")
+    ] = None,
     samples: Annotated[str, typer.Option(help="Rays per pixel; adaptive between two powers of 2: 4..64.")] = "1",
     error: Annotated[
         float | None,
@@ -76,7 +81,7 @@ def render(
     wanted |= {"object_id": object_id, "shading_normal": shading_normal}
     extra = {name: path for name, path in wanted.items() if path is not None}
     arrays = _cameras(camera, scale)
-    poses = [_pose(array, at) for array in arrays]
+    poses = [_pose(array, at, look_at, up, turn) for array in arrays]
     if frames:
         from ..rendering.executors import identity
         from .take import render_frames, support_files
@@ -184,20 +189,33 @@ def _cameras(name: str, scale: int) -> Sequence[Any]:
     return read_maps(name)
 
 
-def _pose(camera: Any, at: str | None) -> Any:
+def _pose(camera: Any, at: str | None, look_at: str | None, up: str | None, turn: str | None) -> Any:
     """Where a camera stands: where it is told, or, if it has but one lens, where z = 0 fills its picture."""
-    import numpy as np
+    from ii_core import camera_pose, stand_back
 
-    from ii_core import stand_back
+    usual = stand_back(camera.model) if camera.lenses == (1, 1) and camera.model else None
+    if at is look_at is up is turn is None:
+        return usual
+    usual_place = (0.0, 0.0, 0.0) if usual is None else usual[:3, 3]
+    turns = _floats("turn", turn, 1, 3) if turn is not None else []
+    return camera_pose(
+        usual_place if at is None else _floats("at", at, 3, 3),
+        look_at_mm=None if look_at is None else _floats("look-at", look_at, 3, 3),
+        up=(0.0, 1.0, 0.0) if up is None else _floats("up", up, 3, 3),
+        turn_deg=turns + [0.0] * (3 - len(turns)),
+    )
 
-    if at is None:
-        return stand_back(camera.model) if camera.lenses == (1, 1) and camera.model else None
-    pose = np.eye(4)
+
+def _floats(name: str, text: str, least: int, most: int) -> list[float]:
+    """Numbers parted by commas."""
     try:
-        pose[:3, 3] = [float(x) for x in at.split(",")]
+        numbers = [float(x) for x in text.split(",")]
     except ValueError:
-        raise ValueError(f"at is {at!r}: three numbers x,y,z are needed") from None
-    return pose
+        numbers = []
+    if not least <= len(numbers) <= most:
+        needed = "three numbers x,y,z are" if least == most else "one to three numbers as in 20,-5 are"
+        raise ValueError(f"{name} is {text!r}: {needed} needed")
+    return numbers
 
 
 def _numbered(count: int, i: int) -> Callable[[Path], Path]:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .common import Force, app, check_outputs, columns, progress_bar
+from .common import Force, app, check_outputs, columns, pair, progress_bar
 from .words import say
 
 
@@ -30,22 +30,34 @@ def cameras() -> None:
 @app.command()
 def camera(
     name: Annotated[str, typer.Argument(help="A camera's name, or a .json file.")] = "",
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="A folder for L and D maps.")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="A folder for L and D maps; with --design a camera file, .json."),
+    ] = None,
     scale: Annotated[int, typer.Option(help="Divides the number of lenses.")] = 1,
     format: Annotated[str, typer.Option(help="Of the maps: png16, png8, exr or hdr.")] = "png16",
     report: Annotated[
         bool, typer.Option("--report", help="Print what the camera can do, and what limits it.")
     ] = False,
+    design: Annotated[
+        str | None,
+        typer.Option(
+            help="A display: panel=15.6in,pixels=3840x2160,pitch=1mm,distance=600mm; also gap, angle, start, lenses."
+        ),
+    ] = None,
     solve: Annotated[str | None, typer.Option(help="Find what is missing: pitch=0.39,gap=0.73,pixel=0.0061")] = None,
     force: Force = False,
 ) -> None:
-    """Store a camera as L and D maps, report on it, or solve for a missing measure."""
+    """Store a camera as L and D maps, report on it, design one for a panel, or solve for a missing measure."""
     from ii_core import preset_cameras, write_maps
     from ii_core.maps import check_format, map_files
 
     check_format(format)
     if solve is not None:
         _print_solution(solve)
+        return
+    if design is not None:
+        _design(design, output, force)
         return
     if not name:
         raise ValueError("no camera is named: see raytrace-ii cameras")
@@ -80,3 +92,66 @@ def _print_solution(text: str) -> None:
         except (KeyError, ValueError):
             raise ValueError(f"{item!r} is no measure: {', '.join(MEASURES)} = number are known") from None
     columns({key: f"{value:.6g}" for key, value in solve(**given).items()})
+
+
+LENGTHS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, '"': 25.4}
+WISHES = {"pitch": "lens_pitch_mm", "distance": "viewer_mm", "gap": "gap_mm", "start": "start_mm"}
+
+
+def _design(text: str, output: Path | None, force: bool) -> None:
+    """Print a display's report, and write its camera file."""
+    from ii_core.design import report
+    from ii_core.files import write_json
+    from ii_core.panel import panel_display
+
+    wishes: dict[str, Any] = {}
+    for item in text.split(","):
+        key, _, value = (part.strip() for part in item.partition("="))
+        if key in WISHES:
+            wishes[WISHES[key]] = _length(key, value)
+        elif key == "panel":
+            wishes["size_mm"] = _sides(value)
+        elif key in ("pixels", "lenses"):
+            wishes[key] = pair(key, value)
+        elif key == "angle":
+            wishes["view_angle_deg"] = _number(key, value)
+        else:
+            known = ", ".join(["panel", "pixels", *WISHES, "angle", "lenses"])
+            raise ValueError(f"{item!r} is no wish for a design: known are {known}")
+    needed = {"size_mm": "panel", "pixels": "pixels", "lens_pitch_mm": "pitch", "viewer_mm": "distance"}
+    if missing := [key for name, key in needed.items() if name not in wishes]:
+        raise ValueError(f"the design has no {', '.join(missing)}: {', '.join(needed.values())} are needed")
+    if output is not None:
+        if output.suffix != ".json":
+            raise ValueError(f"{output} is no camera file: .json is needed")
+        check_outputs([output], force)
+    made = panel_display(**wishes, name="panel" if output is None else output.stem)
+    say(report(made.camera))
+    for note in made.notes:
+        say(f"- {note}")
+    if output is not None:
+        write_json(output, made.camera.to_json())
+        say(f"{output}: raytrace-ii render SCENE --camera {output} --at x,y,z -o PICTURE.png")
+
+
+def _sides(text: str) -> float | list[float]:
+    """A diagonal, as 15.6in, or two sides, as 345x194mm."""
+    first, times, second = text.lower().replace("×", "x").partition("x")
+    if not times:
+        return _length("panel", first)
+    unit = "".join(c for c in second if c not in "0123456789.")
+    return [_length("panel", first if first.endswith(unit) else first + unit), _length("panel", second)]
+
+
+def _length(key: str, text: str) -> float:
+    """Millimetres, from a number with a unit; without one it is millimetres."""
+    unit = next((unit for unit in sorted(LENGTHS, key=len, reverse=True) if text.endswith(unit)), "")
+    return _number(key, text.removesuffix(unit)) * LENGTHS.get(unit, 1.0)
+
+
+def _number(key: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        units = ", ".join(LENGTHS)
+        raise ValueError(f"{key} is {text!r}: a number, or a length in {units}, is needed") from None

@@ -192,7 +192,8 @@ def footprint(camera: Camera) -> tuple[float, float]:
     """Distance of the rays of neighbouring pixels at their origins, mm, and how much it grows a mm of their way.
 
     The median over the middle of the picture, so that pairs under two lenses do not count, and the mean of across and
-    down. Through a pinhole: 0, and the pixel pitch over the distance from pixel to pinhole.
+    down. Through a pinhole: 0, and the pixel pitch over the distance from pixel to pinhole. Negative at the origins
+    if rays start behind the lenses: at the lenses they meet, and then part.
     """
     columns, rows = camera.pixels
     down, across = (slice(max(n // 2 - 32, 0), n // 2 + 32) for n in (rows, columns))
@@ -201,6 +202,8 @@ def footprint(camera: Camera) -> tuple[float, float]:
     D = np.divide(D, length, out=np.zeros_like(D), where=length > 0)
     steps = [[np.linalg.norm(np.diff(rays, axis=axis), axis=-1) for axis in (0, 1)] for rays in (L, D)]
     width, spread = (float(np.mean([np.median(step) for step in two if step.size] or [0.0])) for two in steps)
+    if camera.model is not None and camera.model.start_mm:
+        width = -spread * float(np.median(camera.model.start_mm / D[..., 2]))
     return width, spread
 
 
@@ -218,12 +221,13 @@ def check_disparity(camera: Camera) -> None:
 def disparity(camera: Camera, depth: NDArray[np.float32]) -> NDArray[np.float32]:
     """How far a point at depth z moves from one elementary image to the next on the right, in pixels to the right.
 
-    ±Λ·δL / ((z − z₀ − Λ)·δP), negative if elementary images are erect; z₀ is where the pixel array stands. Downwards
-    it moves as far per lens pitch. NaN where depth is.
+    ±Λ·δL·(1/(z − z₀ − Λ) + 1/d) / δP, negative if elementary images are erect; z₀ is where the pixel array stands, d
+    where viewing zones meet. Downwards it moves as far per lens pitch. NaN where depth is.
     """
     model = camera.model
     assert model is not None
     ahead = depth.astype(np.float64) - (model.gap_mm + model.origin_mm[2])
     per_lens = model.gap_mm * model.lens_pitch_mm[0] / model.pixel_pitch_mm * (-1 if model.erect else 1)
     with np.errstate(divide="ignore"):
-        return (per_lens / ahead).astype(np.float32)
+        inverse = 1 / ahead if model.viewer_mm is None else 1 / ahead + 1 / model.viewer_mm
+        return (per_lens * inverse).astype(np.float32)

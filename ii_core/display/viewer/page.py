@@ -24,7 +24,7 @@ from PIL import Image
 
 from ...files import atomic_path
 from ...picture import IIPicture, codes8
-from ...view import camera_of, five_viewpoints, view_image
+from ...view import camera_of, five_viewpoints, lens_array_mm, view_image
 from ..look import ASSUMED_ANGLE_DEG, with_assumed_camera
 
 PAGE_SIDE = 2048  # the largest texture every WebGL2 takes
@@ -210,7 +210,8 @@ class _Page:
                 "gap_mm": camera.gap_mm,
                 "pixel_pitch_mm": camera.pixel_pitch_mm,
                 "lens_pitch_mm": list(camera.lens_pitch_mm),
-                "size_mm": list(camera.size_mm),
+                "size_mm": list(lens_array_mm(camera)),
+                "viewer_mm": camera.viewer_mm,
                 "vertical_parallax": camera.lens_model.vertical_parallax,
                 "distance_mm": plane - front[2],
                 "phi": math.atan2(camera.origin_mm[0] - left[0], plane - left[2]),

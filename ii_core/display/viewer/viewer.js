@@ -115,10 +115,14 @@ class Viewer {
   lines(eye = 0) {
     const { camera: c, ei, sign } = this.meta, e = this.viewpoint(eye);
     const scale = (sign * c.gap_mm) / ((c.gap_mm - e[2]) * c.pixel_pitch_mm), down = scale * (c.vertical_parallax ? 1 : 0);
+    // Elementary images stand beside their lenses where viewing zones meet at a viewer.
+    const aside = c.viewer_mm ? sign * c.gap_mm / (c.viewer_mm * c.pixel_pitch_mm) : 0;
+    const beside = c.vertical_parallax ? aside : 0;
+    const first = [c.lens_pitch_mm[0] / 2 - c.size_mm[0] / 2, c.size_mm[1] / 2 - c.lens_pitch_mm[1] / 2];
     return {
-      base: [(ei[0] - 1) / 2 - scale * (c.lens_pitch_mm[0] / 2 - c.size_mm[0] / 2 - e[0]),
-        (ei[1] - 1) / 2 + down * (c.size_mm[1] / 2 - c.lens_pitch_mm[1] / 2 - e[1])],
-      slope: [-scale * c.lens_pitch_mm[0], -down * c.lens_pitch_mm[1]],
+      base: [(ei[0] - 1) / 2 - scale * (first[0] - e[0]) + aside * first[0],
+        (ei[1] - 1) / 2 + down * (first[1] - e[1]) - beside * first[1]],
+      slope: [(aside - scale) * c.lens_pitch_mm[0], (beside - down) * c.lens_pitch_mm[1]],
     };
   }
 

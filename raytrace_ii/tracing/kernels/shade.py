@@ -140,8 +140,8 @@ def shade(
     ``keys`` are places in the lobes of rough mirrors, as `sampling.lobe_keys` gives them, of no length if there are
     none; up to ``lobe_rays`` rays go over a lobe, whose places stand ``lobe_stride`` apart.
 
-    A ray is ``widths`` wide where it starts, ``first_width`` if they are of no length, and grows by ``spread`` a mm:
-    images are filtered over its width, not at all if both are 0.
+    A ray is ``widths`` wide where it starts, ``first_width`` if they are of no length, and grows by ``spread`` a mm,
+    from a negative width through 0: images are filtered over its width, not at all if both are 0.
 
     Of each ray are noted, where there is room, the depth from ``eye`` along the camera's ``axis``, the face's normal,
     the object, the ray's length and the normal of shading.
@@ -200,7 +200,7 @@ def shade(
             radiance[pixel, 1] += w1 * (1.0 - through) * fog[1]
             radiance[pixel, 2] += w2 * (1.0 - through) * fog[2]
             w0, w1, w2 = w0 * through, w1 * through, w2 * through
-        width = (widths[i] if widths.shape[0] > 0 else first_width) + spread * float(distances[i])
+        width = abs((widths[i] if widths.shape[0] > 0 else first_width) + spread * float(distances[i]))
         au, av, bu, bv = 0.0, 0.0, 0.0, 0.0
         if width > 0.0 and materials[body, _IMAGES] > 0.0:
             au, av, bu, bv = _footprint(corners, coordinates, f, width, dx, dy, dz, gx, gy, gz)
