@@ -214,8 +214,8 @@ def viewing_zone(camera: IICamera) -> dict[str, Any]:
     dict
         ``nearest_mm``, the least distance of a central viewer from the lens plane, for whole lenses; ``width_mm``,
         the width across and down at that distance; ``usual_width_mm``, the width at ``usual_mm``, which
-        `five_viewpoints` uses: where viewing zones meet, else three times the least distance. Widths down are infinite
-        without vertical parallax.
+        `five_viewpoints` uses: where viewing zones meet, else three times the least distance. Widths down are
+        infinite without vertical parallax.
     """
     vertical, tangents, spans = camera.lens_model.vertical_parallax, [], []
     for axis in range(2):
