@@ -18,6 +18,9 @@ from .inspect.extract import extract
 from .inspect.order_analysis import analyse_orders
 from .inspect.random_access import decode_component, decode_frame
 from .search import Axis, CodingResult, Run, meet_size
+from .takes.api import EncodedTake, encode_take, open_take
+from .takes.container import DamagedTake, is_take
+from .takes.order import AccessCost, Plan, component_cost, view_cost
 
 for _kind in ("ei", "si", "ri"):
     for _video in (H264, Hevc, Av1, Vp9, Ffv1):
@@ -32,23 +35,32 @@ register(Avif("si"))
 register(LightField())
 
 __all__ = [
+    "AccessCost",
     "Axis",
     "Coder",
     "CodingResult",
+    "DamagedTake",
     "Encoded",
+    "EncodedTake",
     "Goal",
     "Option",
+    "Plan",
     "Run",
     "analyse_orders",
+    "component_cost",
     "decode",
     "decode_component",
     "decode_frame",
     "encode",
+    "encode_take",
     "extract",
+    "is_take",
     "meet_size",
+    "open_take",
     "options",
     "parse_scheme",
     "register",
     "schemes",
     "timed_decode",
+    "view_cost",
 ]

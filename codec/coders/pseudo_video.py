@@ -230,11 +230,14 @@ class PseudoVideo(Coder, Generic[Settings]):
 
     def encode(self, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
         """Write one stream with its parameter sets in band."""
-        film = self.film(picture, options)
-        source = Source(coder=self, pixels=np.ascontiguousarray(picture.pixels), film=film, options=options)
+        return self.encode_film(np.ascontiguousarray(picture.pixels), self.film(picture, options), options, goal)
+
+    def encode_film(self, pixels: NDArray[Any], film: Film, options: Options, goal: Goal) -> CodingResult:
+        """Code the frames of a film over pixels (N, M, 3), at a rate per pixel or a quantiser."""
+        source = Source(coder=self, pixels=pixels, film=film, options=options)
         if goal.bpp is None:
             return CodingResult(run=source.run_at(goal.qp or 0))
-        target = min(goal.bpp * picture.size[0] * picture.size[1] / 8, MAX_TARGET)
+        target = min(goal.bpp * pixels.shape[0] * pixels.shape[1] / 8, MAX_TARGET)
         if target < self.min_frame_bytes * film.frames:  # headers alone exceed it
             assert self.qp_range is not None
             return CodingResult(run=source.run_at(self.qp_range[1]))
@@ -242,8 +245,12 @@ class PseudoVideo(Coder, Generic[Settings]):
 
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
         """Decode frame by frame, at most one batch in memory."""
+        return self.decode_film(payload, self.film(blank, options), blank.pixels)
+
+    def decode_film(self, payload: bytes, film: Film, blank: NDArray[Any]) -> tuple[Pixels, float]:
+        """Decode the frames of a film into pixels of the shape and type of ``blank``; errors as `decode`."""
         try:
-            return _decode(self, payload, self.film(blank, options), blank.pixels)
+            return _decode(self, payload, film, blank)
         except av.FFmpegError as error:
             raise ValueError(f"its {self.standard} stream does not decode ({error.strerror})") from None
 

@@ -63,6 +63,7 @@ class H264(Video):
         "pyramid": Option(about="whether B pictures predict B pictures", default=0, low=0, high=1),
         "pbratio": Option(about="quantiser step of B over that of P pictures", default=1.3, low=0.5, high=4.0),
         "preset": Option(about="x264's preset, the effort", default="medium", choices=SPEEDS),
+        "refs": Option(about="reference pictures, 0 for the preset's", default=0, low=0, high=16),
         "chroma": chroma("444"),
         "depth": Option(about="bits of a sample inside the coder", default="8", choices=("8", "10")),
         "threads": THREADS,
@@ -130,6 +131,7 @@ def _settings(options: Options, film: Film, rate: str, frame_rate: int = 25) -> 
         f"me=umh:merange={options['merange']}:mvrange=512",
         f"weightp=0:psy=0:mbtree={int(tree)}",
         *(["rc-lookahead=250:aq-mode=0"] if options["rate"] == "crf" else []),
+        *([f"ref={options['refs']}"] if options["refs"] else []),
         # Without a limit x264 exceeds the standard's coarsest quantiser to hold a rate, and drops residuals.
         f"qpmax={_qp(COARSEST, options)}",
         rate,

@@ -40,6 +40,7 @@ class Hevc(Video):
             choices=("crf", "cq", "2pass"),
         ),
         "preset": Option(about="x265's preset, the effort", default="slow", choices=SPEEDS),
+        "refs": Option(about="reference pictures, 0 for the preset's", default=0, low=0, high=16),
         "chroma": chroma("444"),
         "depth": DEPTH,
         "threads": THREADS,
@@ -95,6 +96,7 @@ def _settings(options: Options, film: Film, rate: str, frame_rate: int = 25) -> 
         "weightp=0:weightb=0",
         f"psy-rd=0:psy-rdoq=0:aq-mode=0:cutree={int(tree)}:pools={pools}:wpp={int(pools != 'none')}:frame-threads=1",
         "info=0:log-level=none",
+        *([f"ref={options['refs']}"] if options["refs"] else []),
         rate,
     ]
     return Settings(

@@ -34,21 +34,34 @@ def schemes(
 
 @app.command()
 def encode(
-    picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar.")],
+    picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar, or a folder of frames.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The coded file.")],
     scheme: Annotated[str, typer.Option(help="As in `raytrace-ii schemes`, options after a colon.")] = "si-h264",
     bpp: Annotated[float | None, typer.Option(help="Bits per pixel to aim at.")] = None,
     qp: Annotated[int | None, typer.Option(help="Quantiser to keep.")] = None,
     quality: Annotated[float | None, typer.Option(help="Quality to keep, where a scheme has a scale for it.")] = None,
+    walk: Annotated[str, typer.Option(help="Of frames: view-first, time-first or interleaved.")] = "view-first",
+    span: Annotated[int, typer.Option(help="Of frames: instants of a group of pictures, 0 for all.")] = 8,
+    group: Annotated[int, typer.Option(help="Of frames: views of a group of pictures, 0 for all.")] = 0,
+    strip: Annotated[int, typer.Option(help="Of the interleaved walk: views of a strip.")] = 4,
+    rate: Annotated[str, typer.Option(help="Of frames: meet --bpp over the take, or by segment.")] = "take",
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
-    """Code an II-picture."""
-    from codec import encode
+    """Code an II-picture, or a folder of frames as II-video."""
+    from codec import Plan, encode
     from ii_core import IIPicture
 
     load_plugins(plugin)
     check_outputs([output], force)
+    if picture.is_dir():
+        from .take import encode_frames
+
+        if quality is not None:
+            raise ValueError(f"quality is {quality:g}: II-video is coded by --bpp or --qp")
+        plan = Plan(walk=walk, span=span, group=group, strip=strip)
+        encode_frames(picture, output, scheme, plan, bpp=bpp, qp=qp, rate=rate)
+        return
     original = IIPicture.load(picture)
     with spinner(f"{scheme} codes {picture.name}"):
         coded = encode(original, scheme, bpp=bpp, qp=qp, quality=quality)
@@ -61,7 +74,7 @@ def encode(
 @app.command()
 def decode(
     coded: Annotated[Path, typer.Argument(help="A file that `encode` wrote.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help=".png or .tif.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help=".png or .tif; a folder for all frames of a take.")],
     component: Annotated[
         str | None,
         typer.Option(help="Only one component image, without the rest: u,v of SIs, k,l of EIs, v,l of RIs."),
@@ -69,21 +82,33 @@ def decode(
     max_pixels: Annotated[
         int | None, typer.Option(help="Pixels of the largest picture to decode, 2^27 if not given; bounds memory.")
     ] = None,
+    frame: Annotated[int | None, typer.Option(help="Of a take: only this frame, from 0.")] = None,
+    partial: Annotated[
+        bool, typer.Option("--partial", help="Of a take that is truncated or damaged: the frames before the damage.")
+    ] = False,
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
-    """Decode an II-picture, or one component image of it."""
-    from codec import Encoded, decode, decode_component
+    """Decode an II-picture, one component image of it, or the frames of a take."""
+    from codec import Encoded, decode, decode_component, is_take
     from ii_core.files import check_file, write_image
 
     load_plugins(plugin)
     check_file(coded)
+    limit = {} if max_pixels is None else {"max_pixels": max_pixels}
+    if is_take(coded):
+        from .take import decode_frames
+
+        place = None if component is None else _place(component)
+        decode_frames(coded, output, frame, place, force, {"partial": partial, **limit})
+        return
+    if partial or frame is not None:
+        raise ValueError(f"{coded} is one picture: --frame and --partial are of takes")
     stream = Encoded.load(coded)
     files = picture_files if component is None else image_file
     check_outputs(files(output, stream.dtype), force)
     with spinner(f"decode {coded.name}"):
         if component is None:
-            limit = {} if max_pixels is None else {"max_pixels": max_pixels}
             decode(stream, **limit).save(output)
         else:
             write_image(output, decode_component(stream, _place(component)))

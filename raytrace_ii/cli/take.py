@@ -1,11 +1,11 @@
-"""Takes on the command line: render --frames."""
+"""Takes on the command line: render --frames, and coding of folders of frames."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from .common import check_outputs, progress_bar
+from .common import check_folder, check_outputs, image_file, picture_files, progress_bar, spinner
 from .words import say
 
 
@@ -50,3 +50,49 @@ def support_files(kinds: list[str], together: Path | None, extra: dict[str, Path
     for kind, path in extra.items():
         found.setdefault(path.name, []).append(kind)
     return found
+
+
+def encode_frames(folder: Path, output: Path, scheme: str, plan: Any, **goal: Any) -> None:
+    """Code a folder of frames."""
+    from codec import encode_take
+    from ii_core import open_video
+
+    video = open_video(folder)
+    with progress_bar(f"{scheme} codes {folder.name}") as report:
+        coded = encode_take(
+            video, scheme, plan=plan, path=output, progress=lambda done, total: report(done, total, ""), **goal
+        )
+    say(
+        f"{output}: {coded.frames} frames in {coded.nbytes} bytes, {coded.bpp:.4g} bpp, "
+        f"{coded.mbit_per_second:.4g} Mbit/s in {coded.encode_seconds:.1f} s"
+    )
+    if not coded.reached:
+        say(f"{scheme} cannot reach {goal['bpp']:g} bpp with this take: {coded.bpp:.4g} is as near as it comes")
+
+
+def decode_frames(
+    coded: Path, output: Path, frame: int | None, place: tuple[int, int] | None, force: bool, options: dict[str, Any]
+) -> None:
+    """Decode a take into a folder, or one frame or component image of it into a file."""
+    from codec import EncodedTake, open_take
+    from ii_core.files import write_image
+
+    stream = EncodedTake.load(coded, partial=options.pop("partial"))
+    video = open_take(stream, **options)
+    if frame is None:
+        if place is not None:
+            raise ValueError("a component image of a take needs its --frame")
+        check_folder(output, force)
+        with progress_bar(f"decode {coded.name}") as report:
+            video.save(output, lambda done, total: report(done, total, ""))
+        say(f"{output}: {video.frames} frames")
+        return
+    if not 0 <= frame < video.frames:
+        raise ValueError(f"frame is {frame}: {coded} has frames 0..{video.frames - 1}")
+    files = picture_files if place is None else image_file
+    check_outputs(files(output, stream.dtype), force)
+    with spinner(f"decode {coded.name}"):
+        if place is None:
+            video[frame].save(output)
+        else:
+            write_image(output, video.component(frame, stream.scheme.partition("-")[0], place))

@@ -18,7 +18,9 @@ TO = ("frames", "views", "quilt", "films", "parallax")
 
 @app.command()
 def video(
-    source: Annotated[Path, typer.Argument(help="A folder of frames or a quilt video (name_qsCxRaA.mp4).")],
+    source: Annotated[
+        Path, typer.Argument(help="A folder of frames, a coded take, or a quilt video: name_qsCxRaA.mp4.")
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder; for quilt and parallax an .mp4.")],
     to: Annotated[str, typer.Option(help="frames, views, quilt, films (one a view) or parallax.")] = "parallax",
     fps: Annotated[float | None, typer.Option(help="Frames a second, in place of the source's.")] = None,
@@ -66,8 +68,17 @@ def video(
 
 
 def opened(source: Path, fps: float | None = None) -> IIVideo:
-    """An II-video of a folder or a quilt video."""
+    """An II-video of a folder, a coded take or a quilt video."""
     from ii_core import open_video
+
+    if source.suffix == ".ii":
+        from codec import open_take
+        from ii_core.files import check_file
+
+        check_file(source)
+        coded = open_take(source)
+        coded.fps = coded.fps if fps is None else fps
+        return coded
 
     if source.suffix.lower() in (".mp4", ".mov", ".mkv", ".webm"):
         from ii_core.display.video import open_quilt_video

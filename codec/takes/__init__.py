@@ -1,0 +1,1 @@
+"""II-video: orders over view and time, coding, random access."""

@@ -1,0 +1,453 @@
+"""Coding of II-video: takes as segments of pseudo video sequences, and the take's ``.ii`` file."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ii_core import IIVideo
+from ii_core.files import one_line, read_json, write_json
+
+from .. import file_header
+from ..api import blank_picture
+from ..checks import check_type, whole
+from ..clock import cpu_seconds
+from ..coders.pseudo_video import PseudoVideo, Source
+from ..contract import MAX_DECODED_PIXELS, Goal, Value, check_picture, checked_goal, find, parse_scheme
+from ..search import Axis, Run, Trial, bracket, nearest, trials, within
+from . import container
+from .container import DamagedTake
+from .decoding import CodedFrames
+from .order import Plan
+from .segments import SegmentFilm, segment_film, segment_options
+
+RATES = ("take", "segment")
+MAX_FRAMES = 1 << 24
+QUANTISER_RUNS = 7  # of the whole take
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EncodedTake:
+    """A coded II-video.
+
+    Parameters
+    ----------
+    scheme, options, structure, dtype, target_bpp, qp, quality
+        As of `codec.Encoded`; the structure is that of a frame.
+    frames : int
+        Number T of frames that are there.
+    fps : float
+        Frames a second.
+    plan : Plan
+        Order and groups.
+    segments : list of bytes
+        Payloads.
+    runs : int or None
+        Encoder runs over the whole take. None if read from a file.
+    encode_seconds, codec_seconds : float or None
+        CPU time of coding, and inside the encoder for the runs that were kept. None if read from a file.
+    """
+
+    scheme: str
+    options: Mapping[str, Value]
+    structure: Mapping[str, Any]
+    dtype: str
+    frames: int
+    fps: float
+    plan: Plan
+    segments: list[bytes] = field(repr=False)
+    target_bpp: float | None = None
+    qp: int | None = None
+    quality: float | None = None
+    runs: int | None = None
+    encode_seconds: float | None = None
+    codec_seconds: float | None = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(M, N) of a frame."""
+        (k, l), (u, v) = self.structure["lenses"], self.structure["ei_pixels"]
+        return k * u, l * v
+
+    @property
+    def overhead(self) -> int:
+        """Bytes of the file beyond the payloads."""
+        framing = sum(len(container.framed(i, b"")) for i in range(len(self.segments)))
+        lengths = sum(len(container.leb128(len(payload))) - 1 for payload in self.segments)
+        return len(container.head(_values(self))) + framing + lengths
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the ``.ii`` file."""
+        return self.overhead + sum(map(len, self.segments))
+
+    @property
+    def bpp(self) -> float:
+        """Bits of the file per pixel of all frames."""
+        return 8 * self.nbytes / (self.frames * math.prod(self.size))
+
+    @property
+    def mbit_per_second(self) -> float:
+        """Bits of the file per second of the take, in millions."""
+        return 8e-6 * self.nbytes / (self.frames / self.fps)
+
+    @property
+    def reached(self) -> bool:
+        """Whether the rate is within 2 % of its target, if there was one."""
+        pixels = self.frames * math.prod(self.size)
+        return self.target_bpp is None or within(self.nbytes, self.target_bpp * pixels / 8)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an ``.ii`` file, whole or not at all."""
+        check_type("path", path, (str, os.PathLike), "a path")
+        container.write(path, _values(self), self.segments)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, partial: bool = False) -> EncodedTake:
+        """Read an ``.ii`` file of a take without decoding it.
+
+        Parameters
+        ----------
+        partial : bool
+            Of a file that ends early or is damaged, take the whole segments before the damage.
+
+        Raises
+        ------
+        DamagedTake
+            If it is truncated or damaged in a segment, without ``partial`` or in the first one.
+        ValueError
+            If it is no coded take, or its header is damaged.
+        OSError
+            If it cannot be read.
+        """
+        check_type("path", path, (str, os.PathLike), "a path")
+        name = os.fspath(path)
+        values, start = container.read_header(path)
+        try:
+            coded = _from_values(values)
+            count = len(coded.plan.segments(coded.frames))
+        except (ValueError, TypeError, OverflowError, KeyError) as error:
+            raise ValueError(f"{name} is damaged: {one_line(error)}") from None
+        segments, wrong = container.read_segments(path, start, count)
+        if not wrong:
+            return replace(coded, segments=segments)
+        there = sum(map(len, coded.plan.segments(coded.frames)[: len(segments)]))
+        if partial and there:
+            return replace(coded, segments=segments, frames=there)
+        can = f"frames 0..{there - 1} can be decoded with partial=True (--partial)" if there else "no frame is whole"
+        place = f"segment {min(len(segments) + 1, count)} of {count}"
+        raise DamagedTake(f"{name} {wrong}, in {place}: {can}", len(segments))
+
+
+def _values(coded: EncodedTake) -> list[Any]:
+    """The header: that of a picture, then frames, rate and plan."""
+    plan = coded.plan
+    return [*file_header.values(coded), coded.frames, coded.fps, plan.walk, plan.span, plan.group, plan.strip]
+
+
+def _from_values(values: list[Any]) -> EncodedTake:
+    if len(values) != 15:
+        raise ValueError(f"its header has {len(values)} values: 15 are needed")
+    frames, fps, walk, span, group, strip = values[9:]
+    fields = file_header.fields(values[:9])
+    blank = blank_picture(fields["structure"], fields["dtype"])
+    whole("its number of frames", frames, 1, MAX_FRAMES)
+    if not isinstance(fps, int | float) or not 0 < fps < math.inf:
+        raise ValueError(f"its frame rate is {fps!r}: a number above 0 is needed")
+    coder, plan = _coder_of(fields["scheme"]), Plan(walk=walk, span=span, group=group, strip=strip)
+    plan.check(coder.film(blank, fields["options"]).layout.frames)
+    known = {name: fields[name] for name in ("scheme", "options", "dtype", "target_bpp", "qp", "quality")}
+    return EncodedTake(
+        **known, structure=blank.structure_json(), frames=frames, fps=float(fps), plan=plan, segments=[]
+    )
+
+
+def _coder_of(name: str) -> PseudoVideo[Any]:
+    coder = find(name)
+    if not isinstance(coder, PseudoVideo):
+        raise ValueError(f"scheme {name} codes no takes: a pseudo video sequence, as si-h264, is needed")
+    return coder
+
+
+def encode_take(
+    video: IIVideo,
+    scheme: str,
+    *,
+    bpp: float | None = None,
+    qp: int | None = None,
+    plan: Plan | None = None,
+    rate: str = "take",
+    path: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    **options: Value,
+) -> EncodedTake:
+    """Code an II-video by a pseudo video scheme.
+
+    Memory holds the frames of one segment.
+
+    Parameters
+    ----------
+    video : IIVideo
+    scheme : str
+        A pseudo video scheme with options after a colon, as for `encode`.
+    bpp : float
+        Target: bits of the file per pixel of all frames.
+    qp : int
+        Quantiser, in the scheme's range. None of both for lossless coding.
+    plan : Plan, optional
+        Order over view and time, and groups; the default plan if not given.
+    rate : {"take", "segment"}
+        How a target is met: by one quantiser for the whole take, searched, and the next finer one in its first
+        segments (constant quality); or segment by segment (constant rate).
+    path : path, optional
+        Write the ``.ii`` file here. Segments of ``qp`` and of ``rate="segment"`` are kept in ``path.part`` until all
+        are done: a run that was killed goes on after its last whole segment.
+    progress : callable, optional
+        Called with segments done and in all; a search goes over all of them several times.
+    **options
+        Options of the scheme. ``gop`` follows from the plan.
+
+    Returns
+    -------
+    EncodedTake
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is unknown or out of range, or the scheme codes no takes or not this one; before long work.
+    OSError
+        If a frame cannot be read, or the file not be written.
+    """
+    started = cpu_seconds()
+    check_type("video", video, IIVideo, "an IIVideo")
+    if plan is None:
+        plan = Plan()
+    check_type("plan", plan, Plan, "a Plan")
+    if rate not in RATES:
+        raise ValueError(f"unknown rate {rate!r}: known are {', '.join(RATES)}")
+    parsed, settings = parse_scheme(scheme, **options)
+    coder = _coder_of(parsed.name)
+    if settings.get("gop"):
+        raise ValueError(f"gop is {settings['gop']}: the plan's span and group set the groups of a take")
+    goal = checked_goal(coder, settings, bpp, qp, None)
+    if goal.bpp is not None and rate == "take" and settings.get("rate") in ("cbr", "2pass"):
+        settings = {**settings, "rate": "cq"}  # the take's own search is the rate control
+    check_picture(coder, settings, video.structure)
+    views = coder.film(video.structure, settings).layout.frames
+    plan.check(views)
+    segment_options(coder, settings, plan, views, 1)
+    coded = EncodedTake(
+        scheme=coder.name, options=settings, structure=video.structure.structure_json(),
+        dtype=video.structure.pixels.dtype.name, frames=video.frames, fps=float(video.fps), plan=plan, segments=[],
+        target_bpp=goal.bpp, qp=goal.qp,
+    )  # fmt: skip
+    work = _Work(video, coder, settings, plan, views, coded)
+    if goal.bpp is not None and rate == "take":
+        runs, times = work.search(goal.bpp, progress)
+    else:
+        part = None if path is None else _Part(Path(os.fspath(path)), coded)
+        runs, times = work.one_by_one(goal, part, progress), 1
+    seconds = sum(run.codec_seconds for run in runs)
+    coded = replace(coded, segments=[run.payload for run in runs], runs=times, codec_seconds=seconds)
+    coded = replace(coded, encode_seconds=cpu_seconds() - started)
+    if path is not None:
+        coded.save(path)
+        _Part(Path(os.fspath(path)), coded).remove()
+    return coded
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """A take to be coded, segment by segment."""
+
+    video: IIVideo
+    coder: PseudoVideo[Any]
+    options: Mapping[str, Value]
+    plan: Plan
+    views: int
+    coded: EncodedTake
+
+    def segments(self) -> list[range]:
+        """Instants of each segment."""
+        return self.plan.segments(self.video.frames)
+
+    def film(self, instants: int) -> SegmentFilm:
+        """Frames of a segment."""
+        return segment_film(self.coder, self.video.structure, self.options, self.plan, instants)
+
+    def stack(self, part: range) -> NDArray[Any]:
+        """Pictures of a segment, one below the other."""
+        width, height = self.video.size
+        pixels = np.empty((len(part) * height, width, 3), self.video.structure.pixels.dtype)
+        for i, frame in enumerate(part):
+            pixels[i * height : (i + 1) * height] = self.video[frame].pixels
+        return pixels
+
+    def run(self, part: range, pixels: NDArray[Any], goal: Goal) -> Run:
+        """Code a segment."""
+        options = segment_options(self.coder, self.options, self.plan, self.views, len(part))
+        return self.coder.encode_film(pixels, self.film(len(part)), options, goal).run
+
+    def one_by_one(self, goal: Goal, kept: _Part | None, progress: Progress | None) -> list[Run]:
+        """Every segment at the goal, those of an earlier run taken over."""
+        parts, runs = self.segments(), []
+        if goal.bpp is not None:
+            goal = Goal(bpp=max(goal.bpp - self.framing(len(parts)), goal.bpp / 2))
+        for number, part in enumerate(parts):
+            pixels = self.stack(part)
+            known = kept.payload(number, pixels) if kept else None
+            run = Run(known, 0.0) if known is not None else self.run(part, pixels, goal)
+            runs.append(run)
+            if kept and known is None:
+                kept.keep(number, pixels, run.payload)
+            if progress:
+                progress(number + 1, len(parts))
+        return runs
+
+    def framing(self, segments: int) -> float:
+        """Bits of header and framing per pixel of the take."""
+        framed = replace(self.coded, segments=[b"\0" * 128] * segments).overhead  # of lengths of two bytes
+        return 8 * framed / (self.video.frames * math.prod(self.video.size))
+
+    def search(self, bpp: float, progress: Progress | None) -> tuple[list[Run], int]:
+        """One quantiser for all segments, and the next finer one in the first, that meet a rate."""
+        parts = self.segments()
+        pixels = self.video.frames * math.prod(self.video.size)
+        target = max((bpp - self.framing(len(parts))) * pixels / 8, 1.0)
+        done = 0
+
+        def at(quantiser: float) -> list[Run]:
+            nonlocal done
+            runs = []
+            for part in parts:
+                stack, film = self.stack(part), self.film(len(part))
+                options = segment_options(self.coder, self.options, self.plan, self.views, len(part))
+                settings = self.coder.constant(quantiser, film, options)
+                source = Source(coder=self.coder, pixels=stack, film=film, options=options)
+                runs.append(source.run(settings))
+                done += 1
+                if progress:
+                    progress(min(done, len(parts) * QUANTISER_RUNS - 1), len(parts) * QUANTISER_RUNS)
+            return runs
+
+        def miss(runs: list[Run]) -> float:
+            return math.log2(sum(len(run.payload) for run in runs) / target)
+
+        axis = self.axis()
+        tried = list(trials(at, miss, axis))
+        best = nearest(tried).result
+        pair = bracket(tried, axis)
+        if pair is not None:
+            best = min((best, *_mixtures(pair)), key=lambda runs: abs(miss(runs)))
+        if progress:
+            progress(len(parts) * QUANTISER_RUNS, len(parts) * QUANTISER_RUNS)
+        return best, len(tried)
+
+    def axis(self) -> Axis:
+        """Quantisers to search over the take."""
+        return replace(self.coder.axis(self.options), runs=QUANTISER_RUNS)
+
+
+def _mixtures(pair: tuple[Trial[list[Run]], Trial[list[Run]]]) -> Iterator[list[Run]]:
+    """First segments of the finer quantiser, the others of the coarser one."""
+    coarse, fine = (trial.result for trial in pair)
+    for first in range(1, len(fine)):
+        yield [*fine[:first], *coarse[first:]]
+
+
+class _Part:
+    """Segments of a take that is being coded, kept in ``path.part`` beside a list of what they were made of."""
+
+    def __init__(self, path: Path, coded: EncodedTake) -> None:
+        self.path, self.index = path.with_name(path.name + ".part"), path.with_name(path.name + ".part.json")
+        self.header = hashlib.sha256(container.head(_values(coded))).hexdigest()
+        self._made: list[str] = []
+        self._payloads: list[bytes] = []
+        try:
+            index = read_json(self.index)
+            if index["header"] == self.header:
+                self._payloads, _ = container.read_segments(self.path, 0, len(index["segments"]))
+                self._made = list(index["segments"][: len(self._payloads)])
+        except (OSError, ValueError, KeyError, TypeError):
+            pass
+
+    def payload(self, number: int, pixels: NDArray[Any]) -> bytes | None:
+        """A segment of an earlier run, if it was made of these pixels."""
+        if number < len(self._payloads) and self._made[number] == _pixel_hash(pixels):
+            return self._payloads[number]
+        del self._payloads[number:], self._made[number:]
+        return None
+
+    def keep(self, number: int, pixels: NDArray[Any], payload: bytes) -> None:
+        """Append a segment; those before it are there."""
+        mode = "r+b" if self.path.exists() and number else "wb"
+        with open(self.path, mode) as file:
+            file.seek(sum(len(container.framed(i, old)) for i, old in enumerate(self._payloads)))
+            file.write(container.framed(number, payload))
+            file.truncate()
+            file.flush()
+            os.fsync(file.fileno())
+        self._payloads.append(payload)
+        self._made.append(_pixel_hash(pixels))
+        write_json(self.index, {"header": self.header, "segments": self._made})
+
+    def remove(self) -> None:
+        """Remove both files."""
+        self.path.unlink(missing_ok=True)
+        self.index.unlink(missing_ok=True)
+
+
+def _pixel_hash(pixels: NDArray[Any]) -> str:
+    return hashlib.sha256(np.ascontiguousarray(pixels).data).hexdigest()
+
+
+def open_take(
+    coded: EncodedTake | str | os.PathLike[str], *, partial: bool = False, max_pixels: int = MAX_DECODED_PIXELS
+) -> IIVideo:
+    """II-video of a coded take, decoded when frames are used.
+
+    A frame needs its segment, which is kept until another is used. A component image of the scheme's kind needs the
+    frames of its group of pictures up to it (`IIVideo.component`).
+
+    Parameters
+    ----------
+    coded : EncodedTake or path
+    partial : bool
+        As for `EncodedTake.load`.
+    max_pixels : int
+        Largest number of pixels of a segment.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If ``coded`` is neither, the file is damaged, or a segment has more than ``max_pixels``.
+    OSError
+        If the file cannot be read.
+    """
+    check_type("coded", coded, (EncodedTake, str, os.PathLike), "a coded take or a path")
+    name = "the coded take"
+    if not isinstance(coded, EncodedTake):
+        name, coded = os.fspath(coded), EncodedTake.load(coded, partial=partial)
+    longest = max(map(len, coded.plan.segments(coded.frames)))
+    pixels = longest * math.prod(coded.size)
+    if pixels > whole("max_pixels", max_pixels, 1, 1 << 40):
+        raise ValueError(
+            f"{name} has segments of {pixels} pixels: at most {max_pixels} are decoded, "
+            "raise max_pixels (--max-pixels)"
+        )
+    blank = blank_picture(coded.structure, coded.dtype)
+    coder = _coder_of(coded.scheme)
+    source = CodedFrames(coder, coded.options, coded.plan, coded.segments, coded.frames, blank, name)
+    return IIVideo(coded.frames, coded.fps, source, blank)
+
+
+__all__ = ["DamagedTake", "EncodedTake", "Plan", "encode_take", "open_take"]
