@@ -33,7 +33,7 @@ from .contract import (
 from .search import Axis, CodingResult, Run, meet_size, within
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Encoded:
     """A coded II-picture.
 
@@ -82,6 +82,11 @@ class Encoded:
     encode_seconds: float | None = None
     codec_seconds: float | None = None
     versions: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        missed = "" if self.reached else f", {self.target_bpp:g} bpp not reached"
+        spent = "" if self.encode_seconds is None else f", {self.encode_seconds:.2g} CPU s"
+        return f"Encoded({self.scheme}, {self.bpp:.4g} bpp, {self.nbytes} bytes{missed}{spent})"
 
     @property
     def nbytes(self) -> int:

@@ -2,6 +2,7 @@
 
 from .camera import Camera, IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
+from .display.notebook import EmbeddedViewer, embed_viewer
 from .formats.find import find_views, picture_of
 from .formats.hci import write_hci
 from .formats.mosaic import load_mosaic
@@ -18,6 +19,7 @@ from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stan
 
 __all__ = [
     "Camera",
+    "EmbeddedViewer",
     "IICamera",
     "IIPicture",
     "IIVideo",
@@ -28,6 +30,7 @@ __all__ = [
     "camera_pose",
     "component_images",
     "elementary_images",
+    "embed_viewer",
     "find_views",
     "five_viewpoints",
     "from_smallest_rectangle",

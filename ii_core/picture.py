@@ -36,7 +36,7 @@ BINDING = "pixels_blake2b"  # key of the sidecar: hash of its picture's pixels
 SAME_PITCH = 1e-7  # relative tolerance of the pitch: 0.001 pitches over 10 000 lenses
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class IIPicture:
     """Integral-imaging picture.
 
@@ -81,6 +81,27 @@ class IIPicture:
         else:
             object.__setattr__(self, "ei_pixels", whole_pair("ei_pixels", self.ei_pixels))
             self._check_regular(camera)
+
+    @property
+    def about(self) -> str:
+        """Structure, pixel type and camera in one line."""
+        (k, l), (u, v) = self.lenses, self.ei_pixels
+        camera = "no camera" if self.camera is None else f"camera {self.camera.name or 'without a name'}"
+        return f"{k}×{l} lenses of {u:.4g}×{v:.4g} px, {self.pixels.dtype.name}, {camera}"
+
+    def __repr__(self) -> str:
+        return f"IIPicture({self.about})"
+
+    def _repr_png_(self) -> bytes:
+        """The view from the front, for notebooks."""
+        from .display.notebook import front_png
+
+        return front_png(self)
+
+    def _repr_html_(self) -> str:
+        from .display.notebook import captioned
+
+        return captioned(self._repr_png_(), self.about)
 
     def _check_regular(self, camera: IICamera | None) -> None:
         (k, l), (u, v), (width, height) = self.lenses, self.ei_pixels, self.size

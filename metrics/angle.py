@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IIPicture, checks
+from ii_core import checks
 from ii_core.colour import CB, CR, KB, KG, KR
 
 from .global_angle import angle_quality
-from .pair import PicturePair
+from .pair import Compared, PicturePair, Structure, picture_pair
 from .quality import AngleQuality
 from .view import LUMA, WINDOW
 
@@ -26,7 +26,7 @@ YCBCR = np.array([
 SCALES = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 
 
-def q_angle_ycbcr(reference: IIPicture, decoded: IIPicture) -> AngleQuality:
+def q_angle_ycbcr(reference: Compared, decoded: Compared, *, structure: Structure | None = None) -> AngleQuality:
     """Return (6·PSNR_Y + PSNR_Cb + PSNR_Cr)/8 of each sub-image, in dB.
 
     Luma and chroma are those of BT.709 in full range, unrounded.
@@ -35,6 +35,9 @@ def q_angle_ycbcr(reference: IIPicture, decoded: IIPicture) -> AngleQuality:
     ----------
     reference, decoded : IIPicture
         Regular, of the same structure and type.
+    structure : IIPicture, IICamera or dict, optional
+        Structure of pictures given as arrays (N, M, 3): that of a picture or a camera, or
+        ``{"lenses": (K, L), "ei_pixels": (U, V)}``.
 
     Returns
     -------
@@ -51,7 +54,7 @@ def q_angle_ycbcr(reference: IIPicture, decoded: IIPicture) -> AngleQuality:
     ----------
     JPEG Pleno Light Field Coding common test conditions (the weights 6:1:1, from video coding).
     """
-    return angle_ycbcr(PicturePair(reference, decoded))
+    return angle_ycbcr(picture_pair(reference, decoded, structure))
 
 
 def angle_ycbcr(pair: PicturePair) -> AngleQuality:
@@ -67,7 +70,9 @@ def angle_ycbcr(pair: PicturePair) -> AngleQuality:
 
 
 @checks.checked(scales=checks.whole)
-def q_angle_ssim(reference: IIPicture, decoded: IIPicture, *, scales: int = 1) -> AngleQuality:
+def q_angle_ssim(
+    reference: Compared, decoded: Compared, *, scales: int = 1, structure: Structure | None = None
+) -> AngleQuality:
     """Return the SSIM of each sub-image; with five ``scales``, its MS-SSIM.
 
     Luma and window are those of `q_view`. Each further scale averages over 2×2 pixels. The result is the product of
@@ -80,6 +85,9 @@ def q_angle_ssim(reference: IIPicture, decoded: IIPicture, *, scales: int = 1) -
         Regular, of the same structure and type.
     scales : int
         1 to 5.
+    structure : IIPicture, IICamera or dict, optional
+        Structure of pictures given as arrays (N, M, 3): that of a picture or a camera, or
+        ``{"lenses": (K, L), "ei_pixels": (U, V)}``.
 
     Returns
     -------
@@ -98,7 +106,7 @@ def q_angle_ssim(reference: IIPicture, decoded: IIPicture, *, scales: int = 1) -
     """
     if not isinstance(scales, int | np.integer) or not 1 <= scales <= len(SCALES):
         raise ValueError(f"scales is {scales!r}: 1 to {len(SCALES)} are needed")
-    return angle_ssim(PicturePair(reference, decoded), scales=int(scales))
+    return angle_ssim(picture_pair(reference, decoded, structure), scales=int(scales))
 
 
 def angle_ssim(pair: PicturePair, *, scales: int = 1) -> AngleQuality:

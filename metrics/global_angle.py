@@ -13,11 +13,13 @@ from ii_core.component import light_field
 from ii_core.jit import kernel
 from ii_core.picture import peak
 
-from .pair import PicturePair
+from .pair import Compared, PicturePair, Structure, picture_pair
 from .quality import AngleQuality
 
 
-def q_global(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None = None) -> float:
+def q_global(
+    reference: Compared, decoded: Compared, *, mask: ArrayLike | None = None, structure: Structure | None = None
+) -> float:
     """Return the PSNR of the whole picture, from the mean squared error pooled over all 3·M·N values.
 
     Parameters
@@ -26,6 +28,9 @@ def q_global(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None
         Of the same structure and type. The peak is 255 for uint8, 65535 for uint16 and 1.0 for float32.
     mask : array_like of bool, (N, M), optional
         Pixels that count, such as those with an owner after conversion to a regular structure; all if not given.
+    structure : IIPicture, IICamera or dict, optional
+        Structure of pictures given as arrays (N, M, 3): that of a picture or a camera, or
+        ``{"lenses": (K, L), "ei_pixels": (U, V)}``.
 
     Returns
     -------
@@ -42,7 +47,7 @@ def q_global(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None
     ----------
     Olsson 2008, (2.15)–(2.17).
     """
-    return global_psnr(PicturePair(reference, decoded, mask=mask))
+    return global_psnr(picture_pair(reference, decoded, structure, mask=mask))
 
 
 def global_psnr(pair: PicturePair) -> float:
@@ -51,13 +56,18 @@ def global_psnr(pair: PicturePair) -> float:
     return float(psnr(total.sum(), 3 * count.sum(), pair.dtype))
 
 
-def q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None = None) -> AngleQuality:
+def q_angle(
+    reference: Compared, decoded: Compared, *, mask: ArrayLike | None = None, structure: Structure | None = None
+) -> AngleQuality:
     """Return the PSNR of each sub-image: quality over the viewing angle.
 
     Parameters
     ----------
     reference, decoded, mask
         As for `q_global`.
+    structure : IIPicture, IICamera or dict, optional
+        Structure of pictures given as arrays (N, M, 3): that of a picture or a camera, or
+        ``{"lenses": (K, L), "ei_pixels": (U, V)}``.
 
     Returns
     -------
@@ -74,7 +84,7 @@ def q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None 
     ----------
     Olsson 2008, (2.18).
     """
-    return angle_psnr(PicturePair(reference, decoded, mask=mask))
+    return angle_psnr(picture_pair(reference, decoded, structure, mask=mask))
 
 
 def angle_psnr(pair: PicturePair) -> AngleQuality:
@@ -84,14 +94,16 @@ def angle_psnr(pair: PicturePair) -> AngleQuality:
     return angle_quality(psnr(total, 3 * count, pair.dtype), pair.reference)
 
 
-def mean_q_angle(reference: IIPicture, decoded: IIPicture, *, mask: ArrayLike | None = None) -> float:
+def mean_q_angle(
+    reference: Compared, decoded: Compared, *, mask: ArrayLike | None = None, structure: Structure | None = None
+) -> float:
     """Return the mean of the PSNRs of sub-images, in dB.
 
     It is at least `q_global`, which pools errors over all sub-images, and exceeds it by several dB if distortion
     varies with the angle. It is +inf if one sub-image is identical. Sub-images without a pixel that counts are left
     out.
     """
-    return q_angle(reference, decoded, mask=mask).mean
+    return q_angle(reference, decoded, mask=mask, structure=structure).mean
 
 
 def angle_quality(values: NDArray[np.float64], picture: IIPicture) -> AngleQuality:

@@ -2,17 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IIPicture
+from ii_core import IICamera, IIPicture
 from ii_core.picture import peak as peak_of
 
 if TYPE_CHECKING:
     from .depth.focus import FocusDepth
+
+
+Compared = IIPicture | NDArray[Any]
+Structure = IIPicture | IICamera | Mapping[str, Any]
+
+
+def picture_pair(
+    reference: Compared, decoded: Compared, structure: Structure | None = None, **conditions: Any
+) -> PicturePair:
+    """Return a pair of pictures, or of arrays of pixels with a structure.
+
+    Parameters
+    ----------
+    reference, decoded : IIPicture or ndarray, (N, M, 3)
+    structure : IIPicture, IICamera or dict, optional
+        Structure of arrays: that of a picture or a camera, or ``{"lenses": (K, L), "ei_pixels": (U, V)}``. An array
+        beside a picture has the structure of the picture.
+    **conditions
+        Those of `PicturePair`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `PicturePair`, or if a structure does not fit the pixels.
+    """
+    if structure is not None:
+        reference, decoded = (_as_picture(pixels, structure) for pixels in (reference, decoded))
+    elif isinstance(reference, IIPicture) and isinstance(decoded, np.ndarray):
+        decoded = reference.with_pixels(decoded)
+    return PicturePair(reference, decoded, **conditions)  # type: ignore[arg-type]
+
+
+def _as_picture(pixels: Any, structure: Structure) -> Any:
+    if not isinstance(pixels, np.ndarray):
+        return pixels
+    if isinstance(structure, IIPicture):
+        return structure.with_pixels(pixels)
+    if isinstance(structure, IICamera):
+        return IIPicture(pixels, structure.lenses, structure.ei_pixels, structure, structure.erect)
+    if not isinstance(structure, Mapping) or set(structure) != {"lenses", "ei_pixels"}:
+        raise TypeError(f"structure is {structure!r}: a picture, a camera or lenses and ei_pixels are needed")
+    return IIPicture(pixels, structure["lenses"], structure["ei_pixels"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +90,9 @@ class PicturePair:
         for name in ("reference", "decoded"):
             picture = getattr(self, name)
             if not isinstance(picture, IIPicture):
-                raise TypeError(f"{name} is a {type(picture).__name__}: an IIPicture is needed")
+                raise TypeError(
+                    f"{name} is a {type(picture).__name__}: an IIPicture is needed, or an array and structure="
+                )
         self.reference.check_same_structure(self.decoded)
         if self.decoded.camera is not self.reference.camera:
             object.__setattr__(self, "decoded", self.reference.with_pixels(self.decoded.pixels))

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ii_core import IIPicture
 
 from .measure import Measure, known_measures, measure_of
-from .pair import PicturePair
+from .pair import Compared, PicturePair, Structure, picture_pair
 from .points import spelt
 from .quality import AngleQuality, DepthQuality, ViewQuality, told_outside
 
@@ -67,8 +67,8 @@ class Row:
 
 
 def report(
-    reference: IIPicture,
-    decoded: IIPicture,
+    reference: Compared,
+    decoded: Compared,
     *,
     mask: ArrayLike | None = None,
     ssim: bool = False,
@@ -76,6 +76,7 @@ def report(
     depth: ArrayLike | None = None,
     layers_mm: ArrayLike | None = None,
     method: str = "dissertation",
+    structure: Structure | None = None,
 ) -> Report:
     """Compute all measures that the pictures allow.
 
@@ -91,6 +92,9 @@ def report(
         Also Q_depth.
     depth, layers_mm, method
         As for `q_depth`.
+    structure : IIPicture, IICamera or dict, optional
+        Structure of pictures given as arrays (N, M, 3): that of a picture or a camera, or
+        ``{"lenses": (K, L), "ei_pixels": (U, V)}``.
 
     Returns
     -------
@@ -104,7 +108,7 @@ def report(
         If the pictures differ in structure or type, hold a pixel that counts and is not finite, or a parameter is
         refused.
     """
-    pair = PicturePair(reference, decoded, mask=mask, depth=depth, layers_mm=layers_mm, method=method)
+    pair = picture_pair(reference, decoded, structure, mask=mask, depth=depth, layers_mm=layers_mm, method=method)
     made = Report(numbers={"unit": "dB"})
     for row in ROWS:
         if (ssim or row not in SLOW) and (over_depth or row is not DEPTH):

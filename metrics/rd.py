@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IIPicture, checks
 from ii_core.executors import as_they_come, check_executor, lost
 from ii_core.identity import library_versions, source_hash
+from ii_core.progress import reporter
 
 from .global_angle import q_global
 
@@ -182,7 +183,7 @@ def rate_distortion(
     *,
     encode: Callable[..., Any],
     decode: Callable[[Any], Any],
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Callable[[int, int, str], None] | bool | None = None,
     workers: int | None = None,
     executor: Any = None,
     measure: Callable[[IIPicture], Mapping[str, Any]] | None = None,
@@ -204,8 +205,8 @@ def rate_distortion(
     decode : callable
         ``decode(coded)`` gives the picture back, or an object with ``picture`` and ``seconds``, as
         `codec.timed_decode` does.
-    progress : callable, optional
-        ``progress(done, total, text)`` after every point, in the calling thread.
+    progress : callable or bool, optional
+        ``progress(done, total, text)`` after every point, in the calling thread; True prints a line.
     workers : int, optional
         Points measured at a time, in threads; 2 if not given. Everything but the seconds is the same for any number.
     executor : optional
@@ -247,6 +248,7 @@ def rate_distortion(
     points = [(scheme, rate) for scheme in schemes for rate in rates]
     records: list[dict[str, Any]] = [dict((known or {}).get(point, {})) for point in points]
     missing = [i for i, record in enumerate(records) if not record]
+    report = reporter(progress, "study")
     work = _Point(picture, encode, decode, measure)
     threads = (WORKERS if workers is None else workers) if executor is None else None
     try:
@@ -256,8 +258,8 @@ def rate_distortion(
                 records[missing[number]] = record
                 if keep is not None:
                     keep(record)
-                if progress is not None:
-                    progress(done, len(points), _told(record))
+                if report is not None:
+                    report(done, len(points), _told(record))
     except Exception as error:
         if (reason := lost(error, executor)) is not None:
             raise OSError(f"{reason} while it measured: the study is not finished") from error

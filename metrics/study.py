@@ -26,6 +26,27 @@ PACKAGES = ("ii_core", "raytrace_ii", "codec", "metrics", "assets", "benchmarks"
 CODE = (*(f":(top){package}" for package in PACKAGES), ":(top)pyproject.toml", ":(top,exclude)benchmarks/results")
 
 
+class Study(dict[str, Any]):
+    """A study as a dict; notebooks show its table and chart."""
+
+    def __repr__(self) -> str:
+        points = self["points"]
+        schemes = dict.fromkeys(point["scheme"] for point in points)
+        return f"Study({self['picture']['name']}: {len(points)} points of {', '.join(schemes) or 'no scheme'})"
+
+    def _repr_png_(self) -> bytes:
+        from .plots.rd_chart import chart_png
+
+        return chart_png(self)
+
+    def _repr_html_(self) -> str:
+        from ii_core.display.notebook import captioned
+
+        from .plots.tables import html_table, summary_table
+
+        return html_table(summary_table(self)) + captioned(self._repr_png_(), repr(self))
+
+
 @checks.checked(
     path=checks.path,
     picture_name=checks.text,
@@ -102,7 +123,7 @@ def picture_json(name: str, picture: IIPicture) -> dict[str, Any]:
 
 
 @checks.checked(path=checks.path)
-def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
+def read_study(path: str | os.PathLike[str]) -> Study:
     """Read a study of `write_study`; its ``["points"]`` equal the records, infinite qualities included.
 
     Raises
@@ -126,7 +147,7 @@ def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise ValueError(f"{path}: not a study: it is nested too deeply") from None
     except ValueError as error:
         raise ValueError(f"{path}: {one_line(error)}") from None
-    return study
+    return Study(study)
 
 
 def provenance() -> dict[str, Any]:

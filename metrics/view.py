@@ -14,7 +14,7 @@ from ii_core.picture import peak
 from ii_core.view import camera_of
 
 from .global_angle import psnr
-from .pair import PicturePair
+from .pair import Compared, PicturePair, Structure, picture_pair
 from .quality import ViewQuality
 
 WINDOW = 11  # pixels across the Gaussian of Wang 2004
@@ -24,11 +24,12 @@ LUMA = np.array([0.2989, 0.5870, 0.1140])
 
 @checks.checked(viewpoints=checks.mapping)
 def q_view(
-    reference: IIPicture,
-    decoded: IIPicture,
+    reference: Compared,
+    decoded: Compared,
     *,
     viewpoints: Mapping[str, ArrayLike] | None = None,
     mask: ArrayLike | None = None,
+    structure: Structure | None = None,
 ) -> ViewQuality:
     """Return mean structural similarity and PSNR of five view images: front, up, down, left and right.
 
@@ -44,6 +45,9 @@ def q_view(
         Viewpoints by name, mm in camera coordinates; `five_viewpoints` if not given.
     mask : array_like of bool, (N, M), optional
         Pixels that count; see `q_global`. A view pixel counts if all pixels of its interpolation count.
+    structure : IIPicture, IICamera or dict, optional
+        Structure of pictures given as arrays (N, M, 3): that of a picture or a camera, or
+        ``{"lenses": (K, L), "ei_pixels": (U, V)}``.
 
     Returns
     -------
@@ -61,7 +65,7 @@ def q_view(
     ----------
     Olsson 2008, (4.3).
     """
-    return view_quality(PicturePair(reference, decoded, mask=mask), viewpoints)
+    return view_quality(picture_pair(reference, decoded, structure, mask=mask), viewpoints)
 
 
 def view_quality(pair: PicturePair, viewpoints: Mapping[str, ArrayLike] | None = None) -> ViewQuality:

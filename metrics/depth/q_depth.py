@@ -11,7 +11,7 @@ from ii_core import IIPicture, checks
 from ii_core.view import camera_of
 
 from ..global_angle import psnr
-from ..pair import PicturePair
+from ..pair import Compared, PicturePair, Structure, picture_pair
 from ..quality import DepthQuality
 from .focus import METHODS, FocusDepth, depth_from_focus
 from .layers import check_layers, nearest_layer
@@ -20,13 +20,14 @@ from .virtual_camera import seen_pixels
 
 @checks.checked(layers_mm=checks.numbers, method=checks.one_of(*METHODS))
 def q_depth(
-    reference: IIPicture,
-    decoded: IIPicture,
+    reference: Compared,
+    decoded: Compared,
     *,
     depth: ArrayLike | FocusDepth | None = None,
     layers_mm: ArrayLike | None = None,
     method: str = "dissertation",
     mask: ArrayLike | None = None,
+    structure: Structure | None = None,
 ) -> DepthQuality:
     """Return the PSNR of each depth layer in the view of a virtual camera.
 
@@ -49,6 +50,9 @@ def q_depth(
         Method of estimating depth; see `depth_from_focus`.
     mask : array_like of bool, (N, M), optional
         Pixels that count; see `q_global`.
+    structure : IIPicture, IICamera or dict, optional
+        Structure of pictures given as arrays (N, M, 3): that of a picture or a camera, or
+        ``{"lenses": (K, L), "ei_pixels": (U, V)}``.
 
     Returns
     -------
@@ -67,7 +71,9 @@ def q_depth(
     ----------
     Olsson 2008, (4.4)–(4.9).
     """
-    return depth_quality(PicturePair(reference, decoded, mask=mask, depth=depth, layers_mm=layers_mm, method=method))
+    return depth_quality(
+        picture_pair(reference, decoded, structure, mask=mask, depth=depth, layers_mm=layers_mm, method=method)
+    )
 
 
 def depth_quality(pair: PicturePair) -> DepthQuality:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -48,6 +49,13 @@ def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str], *, measure:
     """
     check_suffix(path)
     return save(draw(study, measure), path, dpi=150)
+
+
+def chart_png(study: Mapping[str, Any], measure: str = "q_global") -> bytes:
+    """The PNG of `rd_chart`, without a file."""
+    drawn = io.BytesIO()
+    draw(study, measure).savefig(drawn, dpi=100, format="png")
+    return drawn.getvalue()
 
 
 def draw(study: Mapping[str, Any], measure: str = "q_global") -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import html
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -117,6 +118,16 @@ def _cell(point: Mapping[str, Any] | None, measure: str) -> str:
 
 def _signed(value: float, digits: int, unit: str) -> str:
     return f"{value:+.{digits}f}" + (f" {unit}" if unit else "")
+
+
+def html_table(rows: Sequence[Mapping[str, str]]) -> str:
+    """Return rows of text, all with the same columns, as an HTML table."""
+
+    def line(cells: Sequence[str], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+    body = "".join(line(list(row.values()), "td") for row in rows)
+    return f"<table>{line(list(rows[0]), 'th') if rows else ''}{body}</table>"
 
 
 # Special characters of LaTeX, and characters that its default fonts lack.

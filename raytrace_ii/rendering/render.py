@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise
+from ii_core.display.notebook import captioned
 from ii_core.files import RowWriter, atomic_paths, check_type, image_rows
 from ii_core.picture import NOISE_ROWS, noisy_rows, picture_rows, sidecar
+from ii_core.progress import reporter
 
 from ..scene.scene import Scene
 from ..tracing.sampling import sampling
@@ -54,7 +56,7 @@ class Stats:
         return sum(n * pixels for n, pixels in self.samples.items()) / sum(self.samples.values())
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Shot:
     """A rendered picture and its support images, of the first sample of each pixel. Those not asked for are None.
 
@@ -90,13 +92,29 @@ class Shot:
     object_names: list[str]
     stats: Stats
 
+    @property
+    def about(self) -> str:
+        """Picture, support images and cost in one line."""
+        kept = [name for name in SUPPORT_IMAGES if getattr(self, name) is not None]
+        cost = f"{sum(self.stats.rays.values()) / 1e6:.3g} M rays in {self.stats.seconds:.1f} s"
+        return "; ".join([self.picture.about, *([", ".join(kept)] if kept else []), cost])
+
+    def __repr__(self) -> str:
+        return f"Shot({self.about})"
+
+    def _repr_png_(self) -> bytes:
+        return self.picture._repr_png_()
+
+    def _repr_html_(self) -> str:
+        return captioned(self._repr_png_(), self.about)
+
 
 def render(
     scene: Scene,
     camera: IICamera | MapCamera,
     *,
     support: tuple[str, ...] = SUPPORT,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     **options: Unpack[RenderKeywords],
 ) -> Shot:
     """Ray trace a scene through a camera.
@@ -151,7 +169,7 @@ def render_to(
     *,
     support: Mapping[str, Paths] | None = None,
     upright: bool = False,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     **options: Unpack[RenderKeywords],
 ) -> Stats:
     """Ray trace into files band by band: pictures may be larger than memory.
@@ -264,15 +282,16 @@ class _Tally:
 
 
 def _rendered(
-    job: Job, tiles: Sequence[Tile], options: RenderOptions, progress: Progress | None, tally: _Tally
+    job: Job, tiles: Sequence[Tile], options: RenderOptions, progress: Progress | bool | None, tally: _Tally
 ) -> Generator[Block, None, None]:
     """The blocks in their order, counted and told."""
     with closing(run(job, tiles, workers=options.workers, executor=options.executor)) as blocks:
+        report = reporter(progress, "render")
         for done, block in enumerate(blocks, 1):
             tally.add(block)
             yield block
-            if progress:
-                progress(done, len(tiles))
+            if report:
+                report(done, len(tiles))
 
 
 def _strips(tiles: Sequence[Tile]) -> list[list[Tile]]:
@@ -318,8 +337,8 @@ def _options(scene: Any, camera: Any, options: RenderKeywords, progress: Any) ->
     check_scene(scene)
     if not isinstance(camera, IICamera | MapCamera):
         raise TypeError(f"camera is a {type(camera).__name__}: an IICamera or a MapCamera is needed")
-    if progress is not None and not callable(progress):
-        raise TypeError(f"progress is {progress!r}: a function of blocks done and blocks in all is needed")
+    if progress is not None and not callable(progress) and not isinstance(progress, bool):
+        raise TypeError(f"progress is {progress!r}: True, or a function of blocks done and blocks in all, is needed")
     check_keywords(options, RenderKeywords)
     return RenderOptions(**options)
 

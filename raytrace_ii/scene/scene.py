@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -285,7 +286,7 @@ class Fog:
             raise ValueError(f"fog has a density of {self.density_per_mm} per mm: more than 0 is needed")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Body:
     """One object: a triangle mesh in scene coordinates (mm) with its material.
 
@@ -342,8 +343,11 @@ class Body:
             if image is not None and self.texture_coordinates is None:
                 raise ValueError(f"object {self.name!r}: {what} needs texture coordinates, there are none")
 
+    def __repr__(self) -> str:
+        return f"Body({self.name!r}, {len(self.faces)} triangles)"
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Scene:
     """Bodies, lights and surroundings, in millimetres in the camera's frame (x right, y up, z away).
 
@@ -371,6 +375,26 @@ class Scene:
         # be tested against alone.
         ordered = sorted(self.bodies, key=lambda b: (b.material.transmissive, b.material.has_holes))
         object.__setattr__(self, "bodies", tuple(ordered))
+
+    @property
+    def about(self) -> str:
+        """Name and numbers of bodies, triangles and lights in one line."""
+        triangles = sum(len(body.faces) for body in self.bodies)
+        return (
+            f"{self.name or 'scene'}: {len(self.bodies)} bodies of {triangles} triangles, {len(self.lights)} lights"
+        )
+
+    def __repr__(self) -> str:
+        return f"Scene({self.about})"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{html.escape(body.name)}</td><td>{len(body.faces)}</td><td>{size}</td></tr>"
+            for body in self.bodies
+            for size in ["×".join(f"{side:.4g}" for side in np.ptp(np.asarray(body.vertices), axis=0))]
+        )
+        head = "<tr><th>body</th><th>triangles</th><th>size, mm</th></tr>"
+        return f"<details><summary>{html.escape(self.about)}</summary><table>{head}{rows}</table></details>"
 
     def with_depth(self, max_depth: int) -> Scene:
         """The same scene with another recursion depth."""

@@ -61,6 +61,7 @@ CALLS = {
     "resampled": {"picture": PICTURE, "ei_pixels": (4, 4)},
     "smallest_rectangle": {"picture": PICTURE},
     "from_smallest_rectangle": {"picture": PICTURE, "camera": CAMERA},
+    "embed_viewer": {"picture": PICTURE, "height": 300},
     "camera_pose": {"at_mm": (0.0, 0.0, 0.0), "look_at_mm": (0.0, 0.0, 1.0), "up": (0.0, 1.0, 0.0),
                     "turn_deg": (0.0, 0.0, 0.0)},
     "panel_display": {"size_mm": 100.0, "pixels": (320, 160), "lens_pitch_mm": 3.0, "viewer_mm": 500.0,
