@@ -29,8 +29,7 @@ def picture_pair(
     ----------
     reference, decoded : IIPicture or ndarray, (N, M, 3)
     structure : IIPicture, IICamera or dict, optional
-        Structure of arrays: that of a picture or a camera, or ``{"lenses": (K, L), "ei_pixels": (U, V)}``. An array
-        beside a picture has the structure of the picture.
+        Structure of arrays: that of a picture or a camera, or ``{"lenses": (K, L), "ei_pixels": (U, V)}``.
     **conditions
         Those of `PicturePair`.
 
@@ -41,8 +40,6 @@ def picture_pair(
     """
     if structure is not None:
         reference, decoded = (_as_picture(pixels, structure) for pixels in (reference, decoded))
-    elif isinstance(reference, IIPicture) and isinstance(decoded, np.ndarray):
-        decoded = reference.with_pixels(decoded)
     return PicturePair(reference, decoded, **conditions)  # type: ignore[arg-type]
 
 
