@@ -1,6 +1,6 @@
-"""A Whitted ray tracer driven by an II-camera's rays.
+"""Whitted ray tracer for the rays of II-cameras.
 
-Names are imported when they are first used: the command's help must not wait for numba.
+Names are imported on first use: the help of the command does not wait for numba.
 """
 
 import importlib

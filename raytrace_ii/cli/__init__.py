@@ -1,6 +1,6 @@
 """Command line ``raytrace-ii``: render, code, measure and study II-pictures.
 
-The only package that reaches every other; it does so inside its functions, so that help comes at once.
+Only this package imports all others. It does so inside functions, so that help starts quickly.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from .words import one_line, say
 @app.command()
 def schemes(
     names: Annotated[list[str] | None, typer.Argument(help="Only these.")] = None,
-    help_options: Annotated[bool, typer.Option("--help-options", help="Say what can be asked of each.")] = False,
+    help_options: Annotated[bool, typer.Option("--help-options", help="List the options of each.")] = False,
     plugin: Plugins = None,
 ) -> None:
     """List the coding schemes."""
@@ -23,7 +23,7 @@ def schemes(
 
     load_plugins(plugin)
     known = schemes()
-    asked = {name: options(name) for name in names or known}  # a misspelt one is found before anything is printed
+    asked = {name: options(name) for name in names or known}  # an unknown name is an error before any output
     if not help_options:
         columns({name: known[name] for name in asked})
         return
@@ -39,7 +39,7 @@ def encode(
     scheme: Annotated[str, typer.Option(help="As in `raytrace-ii schemes`, options after a colon.")] = "si-h264",
     bpp: Annotated[float | None, typer.Option(help="Bits per pixel to aim at.")] = None,
     qp: Annotated[int | None, typer.Option(help="Quantiser to keep.")] = None,
-    quality: Annotated[float | None, typer.Option(help="Quality to keep, where a scheme has a scale for it.")] = None,
+    quality: Annotated[float | None, typer.Option(help="Quality on the scheme's own scale.")] = None,
     walk: Annotated[str, typer.Option(help="Of frames: view-first, time-first or interleaved.")] = "view-first",
     span: Annotated[int, typer.Option(help="Of frames: instants of a group of pictures, 0 for all.")] = 8,
     group: Annotated[int, typer.Option(help="Of frames: views of a group of pictures, 0 for all.")] = 0,
@@ -68,19 +68,19 @@ def encode(
     coded.save(output)
     say(f"{output}: {coded.nbytes} bytes, {coded.bpp:.4g} bpp in {coded.encode_seconds:.1f} s")
     if not coded.reached:
-        say(f"{scheme} cannot reach {bpp:g} bpp with this picture: {coded.bpp:.4g} is as near as it comes")
+        say(f"{scheme} cannot reach {bpp:g} bpp with this picture: the nearest rate is {coded.bpp:.4g} bpp")
 
 
 @app.command()
 def decode(
-    coded: Annotated[Path, typer.Argument(help="A file that `encode` wrote.")],
+    coded: Annotated[Path, typer.Argument(help="A file from `raytrace-ii encode`.")],
     output: Annotated[Path, typer.Option("-o", "--output", help=".png or .tif; a folder for all frames of a take.")],
     component: Annotated[
         str | None,
-        typer.Option(help="Only one component image, without the rest: u,v of SIs, k,l of EIs, v,l of RIs."),
+        typer.Option(help="Decode one component image only: u,v of SIs, k,l of EIs, v,l of RIs."),
     ] = None,
     max_pixels: Annotated[
-        int | None, typer.Option(help="Pixels of the largest picture to decode, 2^27 if not given; bounds memory.")
+        int | None, typer.Option(help="Largest number of pixels to decode, 2^27 by default; bounds memory.")
     ] = None,
     frame: Annotated[int | None, typer.Option(help="Of a take: only this frame, from 0.")] = None,
     partial: Annotated[
@@ -116,14 +116,14 @@ def decode(
 
 @app.command()
 def extract(
-    coded: Annotated[Path, typer.Argument(help="A file that `encode` wrote.")],
+    coded: Annotated[Path, typer.Argument(help="A file from `raytrace-ii encode`.")],
     output: Annotated[
         Path, typer.Option("-o", "--output", help="A video or picture file: .mkv, .mp4, .obu, .jp2, … by the scheme.")
     ],
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
-    """Take the coded stream out as a file that other programs open, without coding it again."""
+    """Extract the coded stream into a file for other programs, without coding it again."""
     from codec import Encoded, extract
     from ii_core.files import check_file
 
@@ -145,7 +145,7 @@ def _place(text: str) -> tuple[int, int]:
 
 
 def study_orders(path: Path, folder: Path, force: bool) -> None:
-    """Leave name_orders.json in a folder and print its table: what each order promises before coding."""
+    """Write NAME_orders.json and print its table of correlation and residuals by order."""
     from rich.table import Table
 
     from codec import analyse_orders

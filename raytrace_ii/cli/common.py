@@ -25,12 +25,12 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Force = Annotated[bool, typer.Option("--force", help="Replace files that are there already.")]
-Workers = Annotated[int | None, typer.Option(help="Threads; as many as cores if not given.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
+Workers = Annotated[int | None, typer.Option(help="Number of threads; the number of cores by default.")]
 
 
 def load_any(path: Path) -> IIPicture:
-    """An II-picture, or the one in a coded file."""
+    """Return an II-picture from its file or from a coded file."""
     from ii_core import IIPicture
     from ii_core.files import IMAGE_TYPES, check_file
 
@@ -43,7 +43,13 @@ def load_any(path: Path) -> IIPicture:
 
 
 def image_file(path: Path | None, dtype: str) -> list[Path]:
-    """The file of a plain image for `check_outputs`, none for None; ValueError if it cannot hold the pixel type."""
+    """Return the file of a plain image for `check_outputs`, none for None.
+
+    Raises
+    ------
+    ValueError
+        If the file type cannot store the pixel type.
+    """
     from ii_core.files import check_type
 
     if path is None:
@@ -53,23 +59,23 @@ def image_file(path: Path | None, dtype: str) -> list[Path]:
 
 
 def picture_files(path: Path, dtype: str) -> list[Path]:
-    """The files of an II-picture for `check_outputs`: it and its sidecar."""
+    """Return the files of an II-picture for `check_outputs`: picture and sidecar."""
     from ii_core.picture import sidecar
 
     return [*image_file(path, dtype), sidecar(path)]
 
 
 def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = False) -> None:
-    """Raise, before any work, unless all files of a command can be written without losing another.
+    """Raise an error, before any work, unless all files of a command can be written without loss of others.
 
     Parameters
     ----------
     paths : iterable of Path
-        All that the command writes, sidecars too.
+        All files that the command writes, with sidecars.
     force : bool
-        Files that are there may be replaced. Folders, devices and pipes never are.
+        Replace existing files; folders, devices and pipes are never replaced.
     make_folder : bool
-        Make the folders that are missing.
+        Create missing folders.
     """
     from ii_core.files import check_name
 
@@ -92,7 +98,7 @@ def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = Fal
 
 
 def _check_place(folder: Path, path: Path, make_folder: bool) -> None:
-    """Raise unless a folder is there, or can be made, and can be written."""
+    """Raise an error unless a folder exists, or can be created, and can be written."""
     if make_folder:
         folder = next(place for place in (folder, *folder.parents) if place.exists() or place == place.parent)
     if not folder.is_dir():
@@ -102,14 +108,14 @@ def _check_place(folder: Path, path: Path, make_folder: bool) -> None:
 
 
 def check_folder(folder: Path, force: bool) -> None:
-    """Make a folder to fill, unless it would mix with what is there."""
+    """Create an output folder; raise an error if it is not empty."""
     folder.mkdir(parents=True, exist_ok=True)
     if any(folder.iterdir()) and not force:
         raise FileExistsError(f"{folder} is not empty: --force writes into it all the same")
 
 
 def pair(name: str, text: str, limit: int = 1 << 16) -> tuple[int, int]:
-    """Two counts from text like 9x9."""
+    """Return two numbers from text like 9x9."""
     try:
         a, b = (int(part) for part in text.lower().replace("×", "x").split("x"))
     except ValueError:
@@ -120,14 +126,14 @@ def pair(name: str, text: str, limit: int = 1 << 16) -> tuple[int, int]:
 
 
 def columns(rows: dict[str, str]) -> None:
-    """Names and what they are, in two columns."""
+    """Print names and descriptions in two columns."""
     width = max(map(len, rows), default=0)
     for name, text in rows.items():
         say(f"{name:<{width}}  {text}")
 
 
 def console(**options: Any) -> Console:
-    """A console that prints names as they are: brackets are no markup, colons no pictures."""
+    """Return a console without markup: brackets and colons are printed unchanged."""
     from rich.console import Console
 
     return Console(markup=False, emoji=False, highlight=False, **options)
@@ -135,7 +141,7 @@ def console(**options: Any) -> Console:
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[int, int, str], None]]:
-    """A bar on the terminal's error stream; yields what to call with done, total and a word on the last step."""
+    """Show a progress bar on the error stream; yield a function of done, total and a text on the last step."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     named = TextColumn("{task.description}", markup=False)
@@ -144,7 +150,7 @@ def progress_bar(title: str) -> Iterator[Callable[[int, int, str], None]]:
     task = bar.add_task(one_line(title), total=None, step="")
 
     def report(done: int, total: int, step: str) -> None:
-        bar.start()  # only now: what fails before its first step leaves no empty bar
+        bar.start()  # late start: a failure before the first step leaves no empty bar
         bar.update(task, completed=done, total=total, step=one_line(step))
 
     try:
@@ -156,7 +162,7 @@ def progress_bar(title: str) -> Iterator[Callable[[int, int, str], None]]:
 
 @contextmanager
 def spinner(title: str) -> Iterator[None]:
-    """A sign of life on the terminal's error stream, for work whose steps cannot be counted."""
+    """Show a spinner on the error stream, for work without countable steps."""
     from rich.text import Text
 
     out = console(stderr=True)

@@ -11,17 +11,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-GRACE_SECONDS = 1.5  # for the cleanup; compiled code that runs longer is not waited for
+GRACE_SECONDS = 1.5  # for the cleanup, also if compiled code runs longer
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
 SHOW_CURSOR = b"\x1b[?25h"  # a progress bar hides it
 
 
 @contextmanager
 def ends_soon() -> Iterator[None]:
-    """Turn SIGTERM into an exit that cleans up, and end the process if neither it nor Ctrl-C has done so in time.
+    """Exit with cleanup on SIGTERM; end the process if an exit by SIGTERM or Ctrl-C takes too long.
 
-    Python runs handlers of signals between its own instructions: not while the main thread is in a coder or waits
-    for threads that trace. The number of a signal is written to a socket at once, which a thread reads.
+    Python runs signal handlers between its instructions, not while the main thread is in a coder or waits for tracing
+    threads. The number of a signal is written to a socket immediately; a thread reads it.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -36,7 +36,7 @@ def ends_soon() -> Iterator[None]:
     finally:
         signal.set_wakeup_fd(wakeup)
         signal.signal(signal.SIGTERM, before)
-        told.close()  # which ends the thread
+        told.close()  # ends the thread
 
 
 def _terminate(number: int, frame: Any) -> None:
@@ -51,14 +51,14 @@ def _watch(heard: socket.socket) -> None:
             return
         heard.settimeout(GRACE_SECONDS)
         try:
-            while heard.recv(64):  # more signals change nothing; the end of the command closes the socket
+            while heard.recv(64):  # further signals have no effect; the end of the command closes the socket
                 pass
         except TimeoutError:
             _stop(CODES[signal.Signals(data[0])])
 
 
 def _stop(code: int) -> None:
-    """End the process, without its threads, and without its unfinished files."""
+    """End the process without waiting for threads; remove its unfinished files."""
     from ii_core.atomic import remove_temporaries
 
     remove_temporaries()

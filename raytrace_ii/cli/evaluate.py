@@ -28,7 +28,7 @@ Layers = Annotated[
         "dissertation for 250 of these. 250 over all depths of the picture if not given."
     ),
 ]
-Method = Annotated[str, typer.Option(help="Of depth from focus: dissertation or robust.")]
+Method = Annotated[str, typer.Option(help="Method of depth from focus: dissertation or robust.")]
 
 
 @app.command()
@@ -43,15 +43,19 @@ def measures(plugin: Plugins = None) -> None:
 @app.command()
 def measure(
     reference: Annotated[Path, typer.Argument(help="The II-picture as it was.")],
-    decoded: Annotated[Path, typer.Argument(help="The II-picture to judge, bare of the same size, or a coded file.")],
+    decoded: Annotated[
+        Path, typer.Argument(help="The decoded II-picture, a plain picture of the same size, or a coded file.")
+    ],
     json: Annotated[Path | None, typer.Option(help="Write the numbers here.")] = None,
-    plots: Annotated[Path | None, typer.Option(help="Draw angles, depth, views and errors into this folder.")] = None,
-    depth: Annotated[Path | None, typer.Option(help="Quality over depth, of this map: z in mm, an .exr.")] = None,
-    focus: Annotated[bool, typer.Option("--focus", help="Quality over depth, estimated from focus.")] = False,
+    plots: Annotated[
+        Path | None, typer.Option(help="Write charts of angles, depth, views and errors into this folder.")
+    ] = None,
+    depth: Annotated[Path | None, typer.Option(help="Q_depth with this map of z in mm (.exr).")] = None,
+    focus: Annotated[bool, typer.Option("--focus", help="Q_depth with depth from focus.")] = False,
     method: Method = "dissertation",
     layers: Layers = None,
     ssim: Annotated[bool, typer.Option("--ssim", help="Also SSIM and MS-SSIM of every sub-image.")] = False,
-    mask: Annotated[Path | None, typer.Option(help="Only pixels that are white in this picture count.")] = None,
+    mask: Annotated[Path | None, typer.Option(help="Measure only the pixels that are white in this picture.")] = None,
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
@@ -88,7 +92,7 @@ def measure(
 
 
 def _judged(path: Path, reference: IIPicture) -> IIPicture:
-    """The picture to judge; one without a sidecar, as other tools write, has the structure of the reference."""
+    """Return the decoded picture; without a sidecar it has the structure of the reference."""
     from ii_core.files import IMAGE_TYPES, image_header, read_image
     from ii_core.picture import sidecar
 
@@ -104,7 +108,7 @@ def _judged(path: Path, reference: IIPicture) -> IIPicture:
 
 
 def _layers(text: str | None, picture: IIPicture) -> Any:
-    """Depths of layers, from ``dissertation``, ``250`` or ``5:200:60``; None for the default."""
+    """Return depths of layers from ``dissertation``, ``250`` or ``5:200:60``; None for the default."""
     from ii_core.view import camera_of
     from metrics import linear_layers, logarithmic_layers
 
@@ -128,24 +132,26 @@ def _layers(text: str | None, picture: IIPicture) -> Any:
 def study(
     pictures: Annotated[list[Path], typer.Argument(help="II-pictures with their sidecars.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder for charts and numbers.")],
-    schemes: Annotated[str, typer.Option(help="Schemes, parted by commas; options of one by semicolons.")] = ",".join(
-        SCHEMES
-    ),
+    schemes: Annotated[
+        str, typer.Option(help="Schemes separated by commas; options of a scheme by semicolons.")
+    ] = ",".join(SCHEMES),
     anchor: Annotated[
         str | None, typer.Option(help="The scheme that others are compared with; the first if not given.")
     ] = None,
     rates: Annotated[
         str | None,
-        typer.Option(help="Bits per pixel, parted by commas; five that all schemes reach if not given."),
+        typer.Option(help="Bits per pixel, separated by commas; five that all schemes reach if not given."),
     ] = None,
     measures: Annotated[
-        str, typer.Option(help="What to chart, parted by commas: q_global, q_view, q_depth …")
+        str, typer.Option(help="Measures to chart, separated by commas: q_global, q_view, q_depth …")
     ] = "q_global",
-    depth: Annotated[Path | None, typer.Option(help="For q_depth: z in mm, an .exr; else found from focus.")] = None,
+    depth: Annotated[
+        Path | None, typer.Option(help="For q_depth: map of z in mm (.exr); by default from focus.")
+    ] = None,
     method: Method = "dissertation",
     layers: Layers = None,
     orders: Annotated[
-        bool, typer.Option("--orders", help="Code nothing: correlation and residuals of every order instead.")
+        bool, typer.Option("--orders", help="Compute correlation and residuals of every order instead of coding.")
     ] = False,
     workers: Workers = None,
     dask: Dask = None,
@@ -162,7 +168,7 @@ def study(
     from metrics.rd import identity
 
     if dask and workers is not None:
-        raise ValueError("--workers are threads of this machine: with --dask there are none")
+        raise ValueError("--workers is for threads of this machine: leave it out with --dask")
     if dask and plugin:
         raise ValueError("--plugin is for this machine alone: with --dask, install it as a package on all workers")
     load_plugins(plugin)
@@ -175,7 +181,7 @@ def study(
         return
     names = [_scheme(name) for name in schemes.split(",")]
     for name in names:
-        parse_scheme(name)  # a misspelt one is found before anything is made
+        parse_scheme(name)  # an unknown name is an error before any output
     if anchor is not None and (anchor := _scheme(anchor)) not in names:
         raise ValueError(f"anchor is {anchor!r}: one of the schemes {', '.join(names)} is needed")
     if depth is not None and len(pictures) > 1:
@@ -205,11 +211,11 @@ def _rates(text: str | None) -> list[float] | None:
     try:
         return [float(rate) for rate in text.split(",")]
     except ValueError:
-        raise ValueError(f"rates are {text!r}: numbers parted by commas are needed") from None
+        raise ValueError(f"rates are {text!r}: numbers separated by commas are needed") from None
 
 
 def _measures(text: str) -> list[str]:
-    """Names of measures, each once; ``q_depth`` stands for its least, mean and greatest value."""
+    """Return names of measures, each once; ``q_depth`` means its minimum, mean and maximum."""
     from metrics import known_measures
 
     names = dict.fromkeys(
@@ -222,7 +228,7 @@ def _measures(text: str) -> list[str]:
 
 
 def study_files(folder: Path, name: str, measures: Sequence[str]) -> list[Path]:
-    """What `run_study` leaves: numbers, and for each measure a table and charts."""
+    """Return the files of `run_study`: numbers, and a table and charts per measure."""
     stems = [_stem(name, measure) for measure in measures]
     files = [f"{name}_rd.json", f"{name}_rd.csv", *(f"{stem}{end}" for stem in stems for end in STUDY_ENDS)]
     if set(OVER_DEPTH) <= set(measures):
@@ -251,7 +257,7 @@ def run_study(
     more = measuring(picture, measures, **over_depth) if set(measures) - {"q_global"} else None
     log = PointLog(folder / f"{name}_rd.points.jsonl", picture, measures=sorted(measures), **over_depth)
     if log.known:
-        print(f"{name}: {len(log.known)} points are there from a run that was stopped")
+        print(f"{name}: {len(log.known)} points are kept from an interrupted run")
     means: dict[str, Any] = {"workers": None if executor else workers or cores(), "executor": executor}
     means |= {"encode": encode, "decode": timed_decode, "measure": more, "keep": log.keep}
     if rates is None:
@@ -323,14 +329,14 @@ def _means(found: dict[str, Any], measure: str) -> str:
 
 
 def about(measure: str, anchor: str) -> str:
-    """What a table of this measure shows."""
+    """Return the caption of the table of a measure."""
     from metrics.measure import measure_of
 
     return f"{measure_of(measure).caption} at bits per pixel; gain and Bjøntegaard differences against {anchor}"
 
 
 def print_summary(name: str, study: dict[str, Any], measure: str = "q_global") -> None:
-    """The study as a table in the terminal."""
+    """Print the study as a table in the terminal."""
     from rich.table import Table
 
     from metrics import summary_table

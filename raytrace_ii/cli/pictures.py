@@ -31,12 +31,14 @@ def regular(
         str, typer.Option(help="rectangle (no pixel changes) or resample (centred on lenses).")
     ] = "resample",
     deshift: Annotated[
-        bool, typer.Option("--deshift", help="Resample: odd rows of a hexagonal array move under even ones.")
+        bool, typer.Option("--deshift", help="Resample: remove the half-lens shift of odd rows of a hexagonal array.")
     ] = False,
-    mask: Annotated[Path | None, typer.Option(help="Write which pixels a lens owns, white, to this .png.")] = None,
+    mask: Annotated[
+        Path | None, typer.Option(help="Write a .png with white pixels where a lens owns the pixel.")
+    ] = None,
     force: Force = False,
 ) -> None:
-    """Bring an II-picture to a regular structure, which coding and views need."""
+    """Convert an II-picture to a regular structure, which coding and views need."""
     import numpy as np
 
     from ii_core import IIPicture, resampled, smallest_rectangle
@@ -46,7 +48,7 @@ def regular(
     if method not in methods:
         raise ValueError(f"unknown method {method!r}: known are {', '.join(methods)}")
     if deshift and method != "resample":
-        raise ValueError(f"deshift has no place in method {method}: resample takes it")
+        raise ValueError(f"deshift is no option of method {method}: use --method resample")
     original = IIPicture.load(picture)
     files = [*picture_files(output, original.pixels.dtype.name), *image_file(mask, "uint8")]
     check_outputs(files, force)
@@ -66,23 +68,25 @@ def import_(
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="The II-picture: .png, .tif or .exr.")],
     ei_pixels: Annotated[
-        str | None, typer.Option(help="U×V pixels under each lens, as 15x15: the source is a lenslet picture.")
+        str | None, typer.Option(help="U×V pixels under each lens of a lenslet picture, such as 15x15.")
     ] = None,
-    grid: Annotated[str | None, typer.Option(help="Columns × rows of views, as 9x9, where names do not say.")] = None,
+    grid: Annotated[
+        str | None, typer.Option(help="Columns × rows of views, such as 9x9, if names do not contain them.")
+    ] = None,
     transposed: Annotated[
-        bool | None, typer.Option("--transposed/--not-transposed", help="The first number runs across.")
+        bool | None, typer.Option("--transposed/--not-transposed", help="The first number is horizontal.")
     ] = None,
     flip_down: Annotated[
-        bool | None, typer.Option("--flip-down/--no-flip-down", help="Views are numbered from the bottom up.")
+        bool | None, typer.Option("--flip-down/--no-flip-down", help="Views are numbered from bottom to top.")
     ] = None,
     flip_across: Annotated[
         bool | None, typer.Option("--flip-across/--no-flip-across", help="Views are numbered from right to left.")
     ] = None,
     force: Force = False,
 ) -> None:
-    """Make an II-picture of a light field from elsewhere.
+    """Import a light field of other programs as an II-picture.
 
-    In which order the views lie is found from the pictures, as far as they tell, and said.
+    The arrangement of views is estimated from the pictures and printed.
     """
     from ii_core import find_views, load_mosaic, picture_of
     from ii_core.files import check_type, image_types
@@ -109,12 +113,14 @@ def export(
     picture: Annotated[Path, typer.Argument(help="An II-picture of regular structure, or a coded file.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder, or a file for a quilt or mosaic.")],
     to: Annotated[str, typer.Option(help="views, hci, quilt or mosaic.")] = "views",
-    depth: Annotated[Path | None, typer.Option(help="z in mm, an .exr: hci gets its disparity map.")] = None,
-    row: Annotated[int | None, typer.Option(help="Row of views for a quilt, from 0; the middle one.")] = None,
+    depth: Annotated[Path | None, typer.Option(help="Map of z in mm (.exr), for the disparity map of hci.")] = None,
+    row: Annotated[
+        int | None, typer.Option(help="Row of views for a quilt, from 0; the middle one by default.")
+    ] = None,
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
-    """Write an II-picture as other light field programs read it."""
+    """Export an II-picture for other light-field programs."""
     from ii_core import write_hci, write_quilt, write_views
     from ii_core.files import read_depth, write_image
     from ii_core.formats.quilt import quilt_path
@@ -123,7 +129,7 @@ def export(
     if to not in ("views", "hci", "quilt", "mosaic"):
         raise ValueError(f"unknown layout {to!r}: known are views, hci, quilt, mosaic")
     if depth is not None and to != "hci":
-        raise ValueError(f"depth has no place in layout {to}: hci takes it")
+        raise ValueError(f"depth is no option of layout {to}: use --to hci")
     original = load_any(picture)
     if to in ("views", "hci"):
         check_folder(output, force)
@@ -150,7 +156,9 @@ def components(
     picture: Annotated[Path, typer.Argument(help="An II-picture of regular structure, or a coded file.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder for the component images.")],
     type: Annotated[str, typer.Option(help="ei, si or ri.")] = "si",
-    sheet: Annotated[Path | None, typer.Option(help="Write all of them side by side, a line between, here.")] = None,
+    sheet: Annotated[
+        Path | None, typer.Option(help="Write all of them into one picture, with lines between.")
+    ] = None,
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:

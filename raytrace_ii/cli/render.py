@@ -32,50 +32,49 @@ def render(
     ] = "",
     clip: Annotated[str, typer.Option(help="Of a glTF file that moves: the name of its animation.")] = "",
     fps: Annotated[float | None, typer.Option(help="Frames a second, in place of the file's.")] = None,
-    at: Annotated[str | None, typer.Option(help="Where the camera stands in the scene, mm: x,y,z.")] = None,
-    look_at: Annotated[str | None, typer.Option(help="A point of the scene that it looks at, mm: x,y,z.")] = None,
-    up: Annotated[str | None, typer.Option(help="Where its top points to, as near as it can: 0,1,0.")] = None,
+    at: Annotated[str | None, typer.Option(help="Position of the camera in the scene, mm: x,y,z.")] = None,
+    look_at: Annotated[str | None, typer.Option(help="Scene point on the axis of the camera, mm: x,y,z.")] = None,
+    up: Annotated[str | None, typer.Option(help="Direction of the camera's top, such as 0,1,0.")] = None,
     turn: Annotated[
-        str | None, typer.Option(help="Then turn it by degrees: right, or right,up or right,up,clockwise.")
+        str | None, typer.Option(help="Rotation afterwards, degrees: right, or right,up or right,up,clockwise.")
     ] = None,
     samples: Annotated[str, typer.Option(help="Rays per pixel; adaptive between two powers of 2: 4..64.")] = "1",
     error: Annotated[
         float | None,
-        typer.Option(help="Of adaptive samples: standard error to reach, in 8-bit steps [0.5]."),
+        typer.Option(help="Target standard error of adaptive samples, in 8-bit steps [0.5]."),
     ] = None,
     seed: Annotated[int, typer.Option(help="Of samples and noise.")] = 0,
-    noise: Annotated[float, typer.Option(help="σ of sensor noise, in steps of 8 bits.")] = 0.0,
+    noise: Annotated[float, typer.Option(help="σ of sensor noise, in 8-bit steps.")] = 0.0,
     texture_filter: Annotated[
         bool, typer.Option(help="Read image textures over a ray's width; --no-texture-filter reads them at a point.")
     ] = True,
     bits: Annotated[int, typer.Option(help="8 or 16, for .png and .tif.")] = 8,
     support: Annotated[Exr, typer.Option(help="Write all support images to this .exr, as named channels.")] = None,
     depth: Annotated[Exr, typer.Option(help="Write z in mm from the pixel plane to this .exr.")] = None,
-    ray_length: Annotated[Exr, typer.Option(help="Write mm along the ray from its lens to this .exr.")] = None,
-    disparity: Annotated[Exr, typer.Option(help="Write pixels from lens to lens to this .exr.")] = None,
+    ray_length: Annotated[Exr, typer.Option(help="Write ray length in mm from the lens to this .exr.")] = None,
+    disparity: Annotated[Exr, typer.Option(help="Write disparity in pixels between lenses to this .exr.")] = None,
     normal: Annotated[Exr, typer.Option(help="Write unit normals of the faces to this .exr.")] = None,
-    shading_normal: Annotated[Exr, typer.Option(help="Write unit normals as shaded to this .exr.")] = None,
+    shading_normal: Annotated[Exr, typer.Option(help="Write unit shading normals to this .exr.")] = None,
     object_id: Annotated[Exr, typer.Option(help="Write object numbers to this .exr, −1 for none.")] = None,
-    projection: Annotated[Path | None, typer.Option(help="Write what a 2D camera sees to this .png.")] = None,
+    projection: Annotated[Path | None, typer.Option(help="Write the picture of a 2-D camera to this .png.")] = None,
     workers: Workers = None,
     dask: Dask = None,
     force: Force = False,
 ) -> None:
     """Ray trace a scene, or a set of scenes, through a camera.
 
-    A camera of one lens stands back and gives its picture upright. A camera of several pixel arrays gives as many
-    pictures, numbered. Pictures are written as they come and may be larger than memory. An interrupted set goes on
-    where it was when the same command is given again.
+    The picture of a camera of one lens is upright, and fills z = 0. A camera of several pixel arrays gives numbered
+    pictures. Pictures may be larger than memory. The same command continues an interrupted set.
 
     With --frames a scene that moves is rendered into a folder, frame_0000.png and on; support images stand beside
     each, with its name before theirs. Frames that are there and would be the same are kept.
     """
     if bool(scene) == bool(set_name):
-        raise ValueError("a scene is needed, or --set and no scene: see raytrace-ii scenes")
+        raise ValueError("a scene, or --set, is needed: `raytrace-ii scenes` lists scenes")
     if bits not in (8, 16):
         raise ValueError(f"bits is {bits}: 8 or 16 is needed")
     if dask and workers is not None:
-        raise ValueError("--workers are threads of this machine: with --dask there are none")
+        raise ValueError("--workers is for threads of this machine: leave it out with --dask")
     options = {**_sampling(samples, error), "seed": seed, "noise": noise, "texture_filter": texture_filter}
     wanted = {"depth": depth, "ray_length": ray_length, "disparity": disparity, "normal": normal}
     wanted |= {"object_id": object_id, "shading_normal": shading_normal}
@@ -100,7 +99,7 @@ def render(
         from ..rendering.executors import identity
 
         if extra or support or projection:
-            raise ValueError("a set has all its support images and projections: none is asked for by name")
+            raise ValueError("a set includes all support images and projections: leave out their options")
         with cluster(dask, identity) as executor:
             _render_set(set_name, output, arrays, poses, options, bits, workers, executor, force)
         return
@@ -122,7 +121,7 @@ def _render_scene(
     extra: dict[str, Path], support: Path | None, projection: Path | None, dask: str | None, workers: int | None,
     dtype: str, options: dict[str, Any],
 ) -> None:  # fmt: skip
-    """One scene through every pixel array, and its projection."""
+    """Render one scene through every pixel array, and its projection."""
     from ..files.load import load_scene
     from ..rendering.executors import identity
 
@@ -146,7 +145,7 @@ def _all_support(array: Any) -> list[str]:
 
 
 def _sampling(samples: str, error: float | None) -> dict[str, Any]:
-    """The number of samples or their range, and the error that ranges have."""
+    """Return the number of samples or their range, and the target error of a range."""
     least, dots, most = samples.partition("..")
     try:
         numbers = (int(least), int(most)) if dots else int(least)
@@ -179,18 +178,18 @@ def _render_set(
 
 
 def _cameras(name: str, scale: int) -> Sequence[Any]:
-    """The pixel arrays of a camera: by name, from a file, or from a folder of maps."""
+    """Return the pixel arrays of a camera by name, from a file, or from a folder of maps."""
     from ii_core import preset_cameras, read_maps
 
     if not Path(name).is_dir():
         return preset_cameras(name, scale=scale)
     if scale != 1:
-        raise ValueError(f"scale is {scale}: maps have the size they have")
+        raise ValueError(f"scale is {scale}: stored maps have a fixed size, leave --scale out")
     return read_maps(name)
 
 
 def _pose(camera: Any, at: str | None, look_at: str | None, up: str | None, turn: str | None) -> Any:
-    """Where a camera stands: where it is told, or, if it has but one lens, where z = 0 fills its picture."""
+    """Return the pose of a camera: as given; by default z = 0 fills the picture of a camera of one lens."""
     from ii_core import camera_pose, stand_back
 
     usual = stand_back(camera.model) if camera.lenses == (1, 1) and camera.model else None
@@ -230,14 +229,14 @@ def _shoot(path: Path, scene: Any, camera: Any, **options: Any) -> Stats:
 
 
 def _save_projection(scene: Any, camera: Any, path: Path, means: dict[str, Any]) -> None:
-    """A plain picture, without a structure beside it."""
+    """Write a plain picture without a sidecar."""
     from ii_core import orthoscopic, projection_camera
     from ii_core.files import write_image
 
     from ..rendering.render import render as shot_of
 
     if camera.model is None:
-        raise ValueError("the maps do not say what camera they are of: there is no 2D projection to match")
+        raise ValueError("the maps have no camera parameters: a 2-D projection needs them")
     pinhole, pose = projection_camera(camera.model, 1024)
     with progress_bar(f"render {path.stem}") as report:
         view = shot_of(
@@ -250,7 +249,7 @@ def _save_projection(scene: Any, camera: Any, path: Path, means: dict[str, Any])
 def _say_stats(s: Stats) -> None:
     counts = ", ".join(f"{count / 1e6:.2f} M {kind}" for kind, count in s.rays.items() if count)
     if sum(s.skipped.values()):
-        counts += f", {sum(s.skipped.values()) / 1e6:.2f} M too weak to shoot,"
+        counts += f", {sum(s.skipped.values()) / 1e6:.2f} M too weak to trace,"
     spread = f" ({s.mean_samples:.1f} per pixel)" if len(s.samples) > 1 else ""
     say(
         f"{counts} rays{spread} in {s.seconds:.1f} s, {s.embree_seconds:.1f} s of {s.cpu_seconds:.1f} CPU s in Embree"

@@ -10,22 +10,22 @@ from urllib.parse import unquote
 
 
 class PageServer(ThreadingHTTPServer):
-    """Says nothing when a browser closes a connection early."""
+    """Server that ignores connections closed early by the browser."""
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Report an error of the server, none of the connection."""
+        """Report errors of the server, not of the connection."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
 
 class Pages(SimpleHTTPRequestHandler):
-    """Answers requests to this machine by one of its own names, with files of one folder.
+    """Handler of requests for files of one folder, for host names of this machine only.
 
-    A page of another site whose name is made to lead to 127.0.0.1 (DNS rebinding) sends its own name as host.
+    This refuses DNS rebinding: a page of another site, resolved to 127.0.0.1, sends its own host name.
     """
 
     def send_head(self) -> Any:
-        """Refuse other hosts and names that no file can have."""
+        """Refuse other hosts and invalid file names."""
         assert isinstance(self.server, PageServer)
         port = self.server.server_port
         if self.headers.get("Host", "").lower() not in (f"127.0.0.1:{port}", f"localhost:{port}"):

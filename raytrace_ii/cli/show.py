@@ -17,17 +17,17 @@ from .words import say
 def view(
     picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar.")],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The page, .html.")] = None,
-    compare: Annotated[Path | None, typer.Option(help="A decoded II-picture, or a coded file, beside it.")] = None,
-    depth: Annotated[Path | None, typer.Option(help="A map of z in mm, .exr, by which clicks focus.")] = None,
-    lossless: Annotated[bool, typer.Option("--lossless", help="Pixels as they are, in a larger page.")] = False,
+    compare: Annotated[Path | None, typer.Option(help="A decoded II-picture, or a coded file, to compare.")] = None,
+    depth: Annotated[Path | None, typer.Option(help="Map of z in mm (.exr) for focusing by a click.")] = None,
+    lossless: Annotated[bool, typer.Option("--lossless", help="Lossless pixels, in a larger page.")] = False,
     serve: Annotated[
         bool, typer.Option("--serve", help="Serve the page on this machine instead of writing it.")
     ] = False,
-    port: Annotated[int, typer.Option(help="To serve on; 0 for any that is free.")] = 0,
+    port: Annotated[int, typer.Option(help="Port of --serve; 0 for any free one.")] = 0,
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
-    """Look at an II-picture in a browser: parallax, focus, comparison, stereo."""
+    """Write a viewer page of an II-picture for a browser: parallax, focus, comparison, stereo."""
     from ii_core import IIPicture
     from ii_core.display.viewer import JPEG_QUALITY, write_viewer, write_viewer_folder
     from ii_core.files import read_depth
@@ -78,7 +78,7 @@ def _coding(path: Path) -> list[str]:
 
 
 def _serve(folder: str, port: int) -> None:
-    """Serve a folder to this machine alone, until interrupted."""
+    """Serve a folder on this machine only, until interrupted."""
     from functools import partial
 
     from .server import Pages, PageServer
@@ -88,7 +88,7 @@ def _serve(folder: str, port: int) -> None:
     except OSError as error:
         raise OSError(f"port {port} cannot be served: {error.strerror}") from None
     with server:
-        print(f"http://127.0.0.1:{server.server_port}/ shows it, until Ctrl-C", flush=True)
+        print(f"http://127.0.0.1:{server.server_port}/ shows the page; Ctrl-C ends the server", flush=True)
         server.serve_forever()
 
 
@@ -104,25 +104,29 @@ def display(
         ),
     ],
     kind: Annotated[str, typer.Option("--as", help="quilt, lenticular, simulation or parallax.")] = "parallax",
-    size: Annotated[str, typer.Option(help="Pixels of a tile, the panel, the eye's picture or a frame.")] = "800x400",
-    depth: Annotated[float | None, typer.Option(help="z in mm of what appears in the display's plane.")] = None,
-    cone: Annotated[float, typer.Option(help="Share of the viewing zone that the views span.")] = 0.9,
+    size: Annotated[
+        str, typer.Option(help="Pixels of a tile, of the panel, of the eye's picture or of a frame.")
+    ] = "800x400",
+    depth: Annotated[
+        float | None, typer.Option(help="z in mm of the scene plane that appears in the plane of the display.")
+    ] = None,
+    cone: Annotated[float, typer.Option(help="Share of the viewing zone that the views cover.")] = 0.9,
     tiles: Annotated[str, typer.Option(help="Quilt: columns x rows.")] = "8x6",
-    pitch: Annotated[float, typer.Option(help="Lenticular: pixels from lens to lens.")] = 5.0,
-    slope: Annotated[float, typer.Option(help="Lenticular: pixels by which lenses lean left a row.")] = 0.0,
+    pitch: Annotated[float, typer.Option(help="Lenticular: lens pitch in pixels.")] = 5.0,
+    slope: Annotated[float, typer.Option(help="Lenticular: shift of lenses to the left per row, in pixels.")] = 0.0,
     centre: Annotated[
         float, typer.Option(help="Lenticular: column of a border between lenses, in the top row.")
     ] = 0.0,
-    at: Annotated[str | None, typer.Option(help="Simulation: where the eye is, mm: x,y,z.")] = None,
-    fill: Annotated[float, typer.Option(help="Simulation: diameter of a lens as a share of the pitch.")] = 1.0,
+    at: Annotated[str | None, typer.Option(help="Simulation: position of the eye, mm: x,y,z.")] = None,
+    fill: Annotated[float, typer.Option(help="Simulation: diameter of a lens over the pitch.")] = 1.0,
     frames: Annotated[int, typer.Option(help="Parallax: views around the viewing zone, at most 3000.")] = 60,
     fps: Annotated[int, typer.Option(help="Parallax: frames a second.")] = 25,
     force: Force = False,
 ) -> None:
-    """Make pictures for other displays, and films that show the parallax.
+    """Write pictures for other displays, and films with parallax.
 
     quilt: tiles for Looking Glass displays; lenticular: views interlaced for slanted cylindrical lenses; simulation:
-    how the integral-imaging display itself looks from one place; parallax: a film around the viewing zone.
+    the integral-imaging display seen from one position; parallax: a film around the viewing zone.
     """
     from ii_core import IIPicture
     from ii_core.display.lenticular import lenticular
@@ -177,7 +181,7 @@ def _film(
 
 
 def _eye(picture: Any, at: str | None) -> Any:
-    """Where the eye is told to be, or in front."""
+    """Return the given position of the eye, by default the front viewpoint."""
     from ii_core import five_viewpoints
 
     if at is None:

@@ -13,7 +13,7 @@ from .words import say
 
 @app.command()
 def scenes() -> None:
-    """List the scenes that come with the package."""
+    """List the scenes of the package."""
     from ..files.load import scene_names
 
     columns(scene_names())
@@ -35,20 +35,20 @@ def camera(
         typer.Option("-o", "--output", help="A folder for L and D maps; with --design a camera file, .json."),
     ] = None,
     scale: Annotated[int, typer.Option(help="Divides the number of lenses.")] = 1,
-    format: Annotated[str, typer.Option(help="Of the maps: png16, png8, exr or hdr.")] = "png16",
-    report: Annotated[
-        bool, typer.Option("--report", help="Print what the camera can do, and what limits it.")
-    ] = False,
+    format: Annotated[str, typer.Option(help="Format of the maps: png16, png8, exr or hdr.")] = "png16",
+    report: Annotated[bool, typer.Option("--report", help="Print properties and limits of the camera.")] = False,
     design: Annotated[
         str | None,
         typer.Option(
             help="A display: panel=15.6in,pixels=3840x2160,pitch=1mm,distance=600mm; also gap, angle, start, lenses."
         ),
     ] = None,
-    solve: Annotated[str | None, typer.Option(help="Find what is missing: pitch=0.39,gap=0.73,pixel=0.0061")] = None,
+    solve: Annotated[
+        str | None, typer.Option(help="Solve for the missing lengths: pitch=0.39,gap=0.73,pixel=0.0061")
+    ] = None,
     force: Force = False,
 ) -> None:
-    """Store a camera as L and D maps, report on it, design one for a panel, or solve for a missing measure."""
+    """Store a camera as L and D maps, print its properties, design one for a panel, or solve for missing lengths."""
     from ii_core import preset_cameras, write_maps
     from ii_core.maps import check_format, map_files
 
@@ -60,7 +60,7 @@ def camera(
         _design(design, output, force)
         return
     if not name:
-        raise ValueError("no camera is named: see raytrace-ii cameras")
+        raise ValueError("a camera is needed: `raytrace-ii cameras` lists cameras")
     arrays = preset_cameras(name, scale=scale)
     if output is None or report:
         from ii_core.design import report as describe

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 
-# What our own messages hold beyond ASCII, for terminals that have no more.
+# Replacements for the characters of our messages on ASCII terminals.
 ASCII = {
     "×": "x", "–": "-", "−": "-", "…": "...", "·": "*", "°": " deg", "±": "+-", "≥": ">=", "≤": "<=", "∞": "inf",
     "σ": "sigma", "δ": "d", "Λ": "Lambda", "Γ": "Gamma", "φ": "phi", "θ": "theta", "λ": "lambda", "µ": "u", "μ": "u",
@@ -20,7 +20,7 @@ def plain(text: str) -> str:
 
 
 def one_line(text: str) -> str:
-    """`plain`, on one line."""
+    """Return `plain` text on one line."""
     return plain(" ".join(text.split()))
 
 

@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 
 from ii_core.files import check_file, image_header, read_image
 
-MOST_BYTES = 4 << 30  # of a mesh file or a buffer of one
+MOST_BYTES = 4 << 30  # of a mesh file or its buffer
 MOST_TEXELS = 1 << 28  # of a texture: 16384², 3 GB as linear float32
 
 
 def read_bytes(path: Path) -> bytes:
-    """What a file holds.
+    """Return the bytes of a file.
 
     Raises
     ------
     ValueError
         If it is longer than `MOST_BYTES`.
     OSError
-        If it does not exist or is not a regular file: a pipe or device may never end.
+        If it does not exist or is not a regular file.
     """
     check_file(path)
     size = path.stat().st_size
@@ -32,7 +32,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_texture(path: Path) -> NDArray[Any]:
-    """The stored pixels (H, W, channels) of a picture; its header is held against `MOST_TEXELS` first.
+    """Return the stored pixels (H, W, channels) of a picture; its header is compared with `MOST_TEXELS` first.
 
     Raises
     ------
@@ -48,12 +48,12 @@ def read_texture(path: Path) -> NDArray[Any]:
 
 
 def beside(folder: Path, name: str) -> Path:
-    """The file that a file in ``folder`` names.
+    """Return the path of a file that a file in ``folder`` refers to.
 
     Raises
     ------
     ValueError
-        If the name is absolute or leads out of the folder, by ``..`` or by a link.
+        If the name is absolute, or points outside the folder by ``..`` or by a link.
     """
     if "\0" in name or Path(name).is_absolute() or PureWindowsPath(name).anchor:
         raise ValueError(f"{name[:80]!r}: the relative name of a file is needed")
@@ -64,5 +64,5 @@ def beside(folder: Path, name: str) -> Path:
 
 
 def decoded_text(data: bytes) -> str:
-    """Text of a file in whatever coding: bytes that are not UTF-8, in names and comments, stand as �."""
+    """Return the text of a file; bytes that are not UTF-8 become �."""
     return data.decode("utf-8-sig", "replace")

@@ -14,12 +14,12 @@ from ..shapes.primitives import Mesh
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
-CREASE_DEG = 60.0  # faces that meet at a greater angle keep a sharp edge: a cube does, a pipe of six sides does not
+CREASE_DEG = 60.0  # edges of greater angle are sharp: those of a cube, not those of a six-sided pipe
 FLIP = np.array([1.0, 1.0, -1.0])  # right-handed with −z ahead to left-handed with z ahead
 
 
 class Table(NamedTuple):
-    """Values, and which row of them each corner (F, 3) of the faces has; −1 for none."""
+    """Values, and their row for each corner (F, 3) of the faces; −1 for none."""
 
     values: Array
     rows: Rows
@@ -29,7 +29,7 @@ def joined(
     places: Array, faces: Rows, *, uv: Table | None = None, normals: Table | None = None,
     colours: Array | None = None, groups: Rows | None = None,
 ) -> Mesh:  # fmt: skip
-    """A mesh in the scene's frame whose corners are one vertex where place, normal and (u, v) are the same.
+    """Return a mesh in the scene's frame; corners of equal position, normal and (u, v) share a vertex.
 
     Parameters
     ----------
@@ -37,8 +37,8 @@ def joined(
         In the file's frame, right-handed.
     faces : ndarray of int, (F, 3)
     uv, normals : Table, optional
-        (u, v) count only if every corner has them. Corners without a normal, or with one of length 0, get a smooth
-        one, see `smooth_corners`.
+        (u, v) are used if every corner has them. Corners without a normal, or with one of length 0, get a smooth one;
+        see `smooth_corners`.
     colours : ndarray, (V, 3), optional
     groups : ndarray of int, (F,), optional
         As in `smooth_corners`.
@@ -54,7 +54,7 @@ def joined(
         values = np.concatenate([values, smooth])
     over = uv if uv is not None and (uv.rows >= 0).all() else None
     key = faces if over is None else faces * len(over.values) + over.rows
-    _, key = np.unique(key, return_inverse=True)  # twice, so that products stay small
+    _, key = np.unique(key, return_inverse=True)  # renumbered, so that products stay small
     _, one, vertex = np.unique(
         key.reshape(-1) * len(values) + which.reshape(-1), return_index=True, return_inverse=True
     )
@@ -69,17 +69,17 @@ def joined(
 
 
 def smooth_corners(places: Array, faces: Rows, groups: Rows | None = None) -> tuple[Array, Rows]:
-    """Unit normals (n, 3) of the smooth surface that a mesh stands for, and which one each corner (F, 3) has.
+    """Return the unit normals (n, 3) of the smooth surface of a mesh, and their row for each corner (F, 3).
 
-    Corners in one place share a normal if smooth edges lead from one to the other; it is the mean of their faces'
-    normals, weighted by the angle at the corner (Thürmer and Wüthrich 1998). Vertices doubled in one place count as
-    one: a seam of texture coordinates does not show.
+    Corners at one position share a normal if smooth edges connect their faces. It is the mean of the faces' normals
+    weighted by the angle at the corner (Thürmer and Wüthrich 1998). Doubled vertices at one position count as one, so
+    that seams of texture coordinates are invisible.
 
     Parameters
     ----------
     groups : ndarray of int, (F,), optional
-        OBJ's smoothing groups: edges within a group above 0 are smooth, those of group 0 and between groups sharp.
-        Within −1, where nothing is said, as everywhere without groups, edges are smooth up to `CREASE_DEG`.
+        OBJ's smoothing groups. Edges within a group above 0 are smooth; edges of group 0 and between groups are
+        sharp. Edges of group −1 (no group), and all edges if groups are not given, are smooth up to `CREASE_DEG`.
     """
     _, place = np.unique(places + 0.0, axis=0, return_inverse=True)
     at = place.reshape(-1)[faces]
@@ -97,7 +97,7 @@ def smooth_corners(places: Array, faces: Rows, groups: Rows | None = None) -> tu
 
 
 def _linked(at: Rows, normal: Array, groups: Rows) -> coo_matrix:
-    """Which corners (3 F) a smooth edge joins, by the places (F, 3) that the corners are in."""
+    """Return the corners (3 F) that smooth edges connect, from the positions (F, 3) of corners."""
     face = np.tile(np.arange(len(at)), 3)
     start, end = np.concatenate([np.arange(3 * len(at)).reshape(-1, 3)[:, [i, (i + 1) % 3]] for i in range(3)]).T
     place = at.reshape(-1)
@@ -108,7 +108,9 @@ def _linked(at: Rows, normal: Array, groups: Rows) -> coo_matrix:
     same = (place[low][1:] == place[low][:-1]) & (place[high][1:] == place[high][:-1])
     one, other = face[:-1], face[1:]
     cosine = np.einsum("ij,ij->i", normal[one], normal[other])
-    flat = ~(normal[one].any(axis=1) & normal[other].any(axis=1))  # a sliver has no angle to its neighbours
+    flat = ~(
+        normal[one].any(axis=1) & normal[other].any(axis=1)
+    )  # faces without area have no angle to their neighbours
     within = (groups[one] == groups[other]) & (groups[one] != 0)
     smooth = same & within & ((groups[one] > 0) | flat | (cosine >= np.cos(np.radians(CREASE_DEG)) - 1e-9))
     pairs = np.concatenate([np.stack([tip[:-1][smooth], tip[1:][smooth]], axis=1) for tip in (low, high)])

@@ -63,13 +63,13 @@ if TYPE_CHECKING:
 Made = TypeVar("Made")
 GLTF_TYPES = (".glb", ".gltf")
 MESH_TYPES = (*GLTF_TYPES, ".obj", ".ply", ".stl")
-MOST_NAMED = 40  # of what a file holds that is left out
-# Where a mesh file alone is put, mm: as large as fits, its front at the near side; setup1 sees all of it.
+MOST_NAMED = 40  # names of left-out parts in a warning
+# Box of a scene of one mesh file, mm: scaled to fit, front at the near side; setup1 sees all of it.
 WORKING_VOLUME = np.array([[-20.0, -10.0, 20.0], [20.0, 10.0, 80.0]])
 
 
 def scene_names() -> dict[str, str]:
-    """Names of the scenes that come with the package, each with its line of description."""
+    """Return the names of the scenes of the package with a description in one line."""
     found = {}
     for file in sorted(Path(str(files("assets") / "scenes")).glob("*.toml")):
         found[file.stem] = str(tomllib.loads(file.read_text(encoding="utf-8")).get("about", ""))
@@ -77,14 +77,14 @@ def scene_names() -> dict[str, str]:
 
 
 def load_scene(name: str | os.PathLike[str]) -> Scene:
-    """A scene by its name, from a TOML file, or of a mesh file alone.
+    """Load a scene by name, from a TOML file, or from a single mesh file.
 
     Parameters
     ----------
     name : str or path
         One of `scene_names`, a file that ends in ``.toml``, or a mesh file (.glb, .gltf, .obj, .ply, .stl), which is
-        scaled and placed to fill `WORKING_VOLUME` and lit by its own lights or, without any, by two. Other files
-        named in a file are looked for beside it.
+        scaled and placed to fill `WORKING_VOLUME`, with its own lights or, without any, two lights. Paths in a file
+        are relative to its folder.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
     Raises
     ------
     TypeError
-        If the name is no text and no path.
+        If the name is neither text nor a path.
     ValueError
         If the name is unknown, the file is wrong, or a mesh or texture is.
     OSError
@@ -102,8 +102,8 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
     Warns
     -----
     UserWarning
-        Once for each mesh file that holds something unsupported, naming all of it; and once if glass is not closed
-        or looks inwards, naming the objects.
+        Once per mesh file with unsupported parts, with their names; and once with the names of objects of glass that
+        are not watertight.
     """
     path = scene_path(name)
     files = MeshFiles()
@@ -185,7 +185,7 @@ class MeshFiles:
 def read_model(
     path: Path, clip: str | None = None, seconds: float = 0.0, scenes: dict[Path, GltfScene] | None = None
 ) -> Model:
-    """Meshes, materials and lights of a file, brought to the scene's left-handed frame by z → −z.
+    """Read meshes, materials and lights of a file in the scene's left-handed frame, by z → −z.
 
     Parameters
     ----------
@@ -197,9 +197,9 @@ def read_model(
     Raises
     ------
     ValueError
-        If the file holds no triangles, is damaged, or is of no known type.
+        If the file has no triangles, is damaged, or is of unknown type.
     OSError
-        If it, or a file that it names, does not exist.
+        If it, or a file that it refers to, does not exist.
     """
     kind = path.suffix.lower()
     if kind not in MESH_TYPES:
@@ -235,7 +235,7 @@ def read_model(
 
 def _has_area(mesh: Mesh) -> bool:
     p = mesh.vertices[mesh.faces]
-    with np.errstate(over="ignore", invalid="ignore"):  # reaching too far is refused later, with its place
+    with np.errstate(over="ignore", invalid="ignore"):  # overflow is refused later, with its position
         return bool((np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) != 0).any())
 
 
@@ -314,7 +314,7 @@ class SceneLoader:
     def _model(
         self, i: int, value: ObjectTable, materials: dict[str, Material], seconds: float
     ) -> tuple[Model, str, float]:
-        """What an object shows, with the material it names; what to call it; and how strong its lights are."""
+        """Return the parts of an object with its material, its name, and the strength of its lights."""
         parameters = value.model_extra or {}
         if value.material is not None and value.material not in materials:
             raise ValueError(f"unknown material {value.material!r}: known are {_known(materials)}")
@@ -375,7 +375,7 @@ class SceneLoader:
         values["texture"] = textures[value.texture] if value.texture is not None else None
         if value.texture is not None and "colour" not in value.model_fields_set:
             values["colour"] = (1.0, 1.0, 1.0)
-        # a factor that is not given is 1 beside its map, else 0
+        # factors not given are 1 with a map, else 0
         maps = {"emission": value.emission_map, "roughness": value.metallic_roughness_map}
         maps["metallic"] = value.metallic_roughness_map
         for factor, file in maps.items():
@@ -420,7 +420,7 @@ def _light(index: int, value: AnyLight) -> Light:
 
 
 def _bodies(value: ObjectTable, parts: list[Part], label: str) -> Iterator[Body]:
-    """An object's parts where it stands."""
+    """Return the parts of an object in its pose."""
     size = np.array(value.scale)
     turn = rotation(value.rotate_deg)
     name = value.name or label

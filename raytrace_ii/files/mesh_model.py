@@ -10,9 +10,9 @@ from ..shapes.primitives import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A mesh in the file's units and the scene's left-handed frame, with its material, if the file says one.
+    """Part of a file: a mesh in the file's units and the scene's left-handed frame, with its material, if any.
 
-    ``name`` is empty where the file has but one nameless part.
+    ``name`` is empty for a single unnamed part.
     """
 
     name: str
@@ -22,9 +22,9 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Parts and lights of a file. ``left_out`` names what stands in the file and is not supported, each once.
+    """Parts and lights of a file. ``left_out`` names the unsupported parts of the file, each once.
 
-    Materials count lengths in the file's units, absorption too.
+    Lengths in materials, as in absorption, have the file's units.
     """
 
     parts: list[Part]

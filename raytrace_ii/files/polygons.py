@@ -6,19 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-MOST_CORNERS = 4000  # of a polygon that is not convex: cutting its ears takes time with the square, here seconds
-FLAT = 1e-12  # of the square of a polygon's size: a corner that turns by less is straight
+MOST_CORNERS = 4000  # of a concave polygon: the time of ear clipping is quadratic, here seconds
+FLAT = 1e-12  # of the squared size of a polygon: corners of smaller turn are straight
 
 
 def triangulated(places: Array, counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles of polygons in space, in the polygons' order, turned as these are.
+    """Return triangles of polygons in space, in their order and orientation.
 
     Parameters
     ----------
     places : ndarray, (C, 3)
         Corners of all polygons, one after another.
     counts : ndarray of int, (P,)
-        How many corners each polygon has, at least 3.
+        Number of corners of each polygon, at least 3.
 
     Returns
     -------
@@ -28,7 +28,7 @@ def triangulated(places: Array, counts: NDArray[np.int64]) -> NDArray[np.int64]:
     Raises
     ------
     ValueError
-        If a polygon that is not convex has more than `MOST_CORNERS` corners.
+        If a concave polygon has more than `MOST_CORNERS` corners.
 
     References
     ----------
@@ -55,13 +55,13 @@ def triangulated(places: Array, counts: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _newell(p: Array) -> Array:
-    """Normals (P, 3) of polygons (P, n, 3), as long as twice their area (Newell's mean plane)."""
+    """Return the normals (P, 3) of polygons (P, n, 3), of twice their area in length (Newell's mean plane)."""
     p = p - p[:, :1]
     return np.asarray(np.cross(p, np.roll(p, -1, axis=1)).sum(axis=1))
 
 
 def _convex(p: Array) -> NDArray[np.bool_]:
-    """Whether polygons (P, n, 3) turn to the same side at every corner, seen along their normals."""
+    """Return whether polygons (P, n, 3) are convex: all corners turn to the same side about the normal."""
     normal = _newell(p)
     before, after = p - np.roll(p, 1, axis=1), np.roll(p, -1, axis=1) - p
     turn = np.einsum("pnj,pj->pn", np.cross(before, after), normal)
@@ -70,7 +70,7 @@ def _convex(p: Array) -> NDArray[np.bool_]:
 
 
 def _flattened(p: Array) -> Array:
-    """A polygon (n, 3) in its mean plane, (n, 2), counter-clockwise, of size 1."""
+    """Return a polygon (n, 3) projected to its mean plane, (n, 2), counter-clockwise, of size 1."""
     normal = _newell(p[None])[0]
     axis = np.eye(3)[np.argmin(np.abs(normal))]
     x = np.cross(axis, normal)
@@ -80,13 +80,13 @@ def _flattened(p: Array) -> Array:
 
 
 def _ears(p: Array) -> NDArray[np.int64]:
-    """Triangles (n − 2, 3) of a polygon (n, 2): an ear is a corner whose triangle holds no other corner."""
+    """Return triangles (n − 2, 3) of a polygon (n, 2) by ear clipping; an ear has no corner inside."""
     left, triangles, k = list(range(len(p))), [], 0
     failed = 0
     while len(left) > 3:
         k %= len(left)
         a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
-        # a polygon that crosses itself may have no ear left: any corner is cut then
+        # a self-intersecting polygon may have no ear: clip any corner
         if failed >= len(left) or _is_ear(p, a, b, c, left):
             triangles.append((a, b, c))
             del left[k]
@@ -103,11 +103,11 @@ def _is_ear(p: Array, a: int, b: int, c: int, left: list[int]) -> bool:
         return bool(turn >= -FLAT)  # a straight corner is a triangle without area
     q = p[left]
     inside = (_turn(p[a], p[b], q) >= 0) & (_turn(p[b], p[c], q) >= 0) & (_turn(p[c], p[a], q) >= 0)
-    for corner in (p[a], p[b], p[c]):  # themselves, and where a slit to a hole comes back to one
+    for corner in (p[a], p[b], p[c]):  # the corners themselves, also where a slit to a hole returns to one
         inside &= (q != corner).any(axis=1)
     return not inside.any()
 
 
 def _turn(a: Array, b: Array, c: Array) -> Array:
-    """Twice the area of triangles, positive if they go counter-clockwise; ``c`` may be many points."""
+    """Return twice the signed area of triangles, positive if counter-clockwise; ``c`` may be many points."""
     return np.asarray((b[0] - a[0]) * (c[..., 1] - a[1]) - (b[1] - a[1]) * (c[..., 0] - a[0]))

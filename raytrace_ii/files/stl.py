@@ -21,7 +21,7 @@ CORNER = re.compile(rb"^\s*vertex\b", re.M | re.I)
 
 
 def read_stl(path: Path) -> Model:
-    """The one part of an .stl file, smooth up to `corners.CREASE_DEG`; the file's normals, one a face, are not used.
+    """Read the part of an .stl file, smooth up to `corners.CREASE_DEG`; the normals of the file are ignored.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def read_stl(path: Path) -> Model:
 
 
 def _is_text(data: bytes) -> bool:
-    """Whether a file is ASCII; some binary files start with the word too, but have the length of their count."""
+    """Return whether a file is ASCII. Binary files may start with the same word."""
     return data.lstrip()[:5].lower() == b"solid" and len(data) != _length(data)
 
 
@@ -50,7 +50,7 @@ def _length(data: bytes) -> int:
 
 
 def _whole(data: bytes) -> bytes:
-    """A binary file up to its last triangle: trimesh refuses bytes after it."""
+    """Return a binary file up to its last triangle: trimesh refuses further bytes."""
     length = max(_length(data), HEADER)
     if len(data) < length:
         raise ValueError(f"has {len(data)} bytes, {length} are needed: the file is cut off")
@@ -58,8 +58,8 @@ def _whole(data: bytes) -> bytes:
 
 
 def _text(data: bytes) -> NDArray[np.float64]:
-    """Corners of an ASCII file, all of them: trimesh leaves out a solid without an end."""
-    places = _parsed(NAME.sub(rb"\1", data))  # trimesh takes a name with the word vertex for a corner
+    """Return all corners of an ASCII file; trimesh omits a solid without an end."""
+    places = _parsed(NAME.sub(rb"\1", data))  # trimesh reads a name with the word vertex as a corner
     written = len(CORNER.findall(data))
     if len(places) != written:
         raise ValueError(f"has {written} corners, {len(places)} of them readable: the file is damaged or cut off")
@@ -67,17 +67,17 @@ def _text(data: bytes) -> NDArray[np.float64]:
 
 
 def _parsed(data: bytes) -> NDArray[np.float64]:
-    """Corners (3 F, 3) of all triangles, one after another."""
-    from trimesh.exchange.stl import load_stl  # half a second that scenes without files need not wait for
+    """Return the corners (3 F, 3) of all triangles, one after another."""
+    from trimesh.exchange.stl import load_stl  # imported late: it takes half a second
 
     log = logging.getLogger("trimesh")
-    if not log.handlers:  # else Python prints a traceback of each normal that trimesh cannot read
+    if not log.handlers:  # otherwise Python prints a traceback for each unreadable normal
         log.addHandler(logging.NullHandler())
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)  # numpy's for words that are no numbers
         try:
             loaded = load_stl(BytesIO(data))
-        except Exception as error:  # trimesh raises whatever its parsers do
+        except Exception as error:  # trimesh raises errors of any type
             raise ValueError(f"cannot be read as STL: {' '.join(str(error).split())}") from None
     solids = [loaded] if "vertices" in loaded else loaded["geometry"].values()
     return np.concatenate([np.empty((0, 3)), *(solid["vertices"] for solid in solids)])

@@ -6,7 +6,7 @@ BEYOND = 1e-5
 
 
 def share(value: float) -> float:
-    """A share from 0 to 1: at most 1e-5 beyond a bound is the bound, what is further off is left to be refused."""
+    """Return a share clipped to [0, 1] if it is at most 1e-5 outside; other values are returned unchanged."""
     if -BEYOND <= value < 0:
         return 0.0
     return 1.0 if 1 < value <= 1 + BEYOND else value

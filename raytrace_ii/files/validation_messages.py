@@ -34,7 +34,7 @@ _WORDS = {
 
 
 def words(complaint: Any) -> str:
-    """One of ``ValidationError.errors()`` as a phrase."""
+    """Return the message of one entry of ``ValidationError.errors()``."""
     if complaint["type"] not in _WORDS:
         return str(complaint["msg"]).removeprefix("Value error, ")
     context = {k: v.replace("'", "") if isinstance(v, str) else v for k, v in complaint.get("ctx", {}).items()}
@@ -42,6 +42,6 @@ def words(complaint: Any) -> str:
 
 
 def line(error: ValidationError, place: Sequence[Any], text: str) -> str:
-    """Place and phrase of the first complaint, and how many more there are."""
+    """Return place and message of the first error, and the number of others."""
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
     return f"{'.'.join(map(str, place))}{': ' if place else ''}{text}{more}"

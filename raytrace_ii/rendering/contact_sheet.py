@@ -39,7 +39,7 @@ def contact_sheet(path: Path, panels: Sequence[tuple[str, Path, Path]]) -> Path:
 
 
 def _panel(title: str, picture: NDArray[Any], support: dict[str, NDArray[Any]]) -> NDArray[np.uint8]:
-    """A name, the picture, and small beside it depth (near is bright), normals and objects."""
+    """Return a title, the picture, and small pictures of depth (near is bright), normals and objects."""
     normal = np.stack([support[name] for name in SUPPORT_IMAGES["normal"].channels], axis=-1)
     small = (WIDTH - 2 * GAP) // 3
     images = _depth(support["depth.Z"]), _normal(normal), _ids(support["objectId"])
@@ -65,7 +65,7 @@ def _fitted(pixels: NDArray[Any], width: int) -> NDArray[np.uint8]:
 
 
 def _depth(z: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Grey by the logarithm of depth from the nearest, white, to the farthest of all but the last hundredth."""
+    """Return grey values by the logarithm of depth: white is the nearest, black the 99th percentile."""
     hit = np.isfinite(z) & (z > 0)
     grey = np.zeros(z.shape)
     if hit.any():
@@ -80,7 +80,7 @@ def _normal(normal: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def _ids(ids: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """A colour for each object, far from its neighbours' by steps of the golden ratio round the hues."""
+    """Return a colour per object; hues advance by the golden ratio."""
     number = ids.astype(np.int64)[..., None]
     hue = 6 * ((number * 0.618034) % 1)
     colour = np.clip(np.abs((hue + np.array([0, 4, 2])) % 6 - 3) - 1, 0, 1)

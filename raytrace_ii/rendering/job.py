@@ -21,11 +21,11 @@ from ..tracing.sampling import Adaptive, Sampling, adaptive_mean, fixed_places
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
 from .tiles import Order, Tile, ray_order, tiles
 
-TILE_RAYS = 65536  # enough that numpy's overhead vanishes, few enough that work arrays stay in cache
+TILE_RAYS = 65536  # large against the overhead of numpy, small enough for work arrays to stay in cache
 
 
 def _curve(peak: int, samples: int) -> NDArray[np.float64]:
-    """Integer sRGB codes, not yet rounded, at even steps of linear light."""
+    """Return unrounded sRGB codes at even steps of linear light."""
     return peak * srgb(np.linspace(0, 1, samples))
 
 
@@ -34,7 +34,7 @@ CURVES = {"uint8": _curve(255, 4097), "uint16": _curve(65535, 65537), "float32":
 
 
 def encoded(radiance: NDArray[np.float32], rows: NDArray[np.int32], divisor: int, dtype: str) -> NDArray[Any]:
-    """Summed radiance (n, 3) as pixels, each at its row: integers are sRGB, floats linear light."""
+    """Return pixels of summed radiance (n, 3), each at its row: integers are sRGB, floats linear light."""
     out = np.empty(radiance.shape, dtype)
     curve = CURVES[dtype]
     if curve is None:
@@ -46,7 +46,7 @@ def encoded(radiance: NDArray[np.float32], rows: NDArray[np.int32], divisor: int
 
 @dataclass(frozen=True)
 class Block:
-    """A rendered block: ``pixels`` and support images by name, and what they cost."""
+    """Rendered tile: ``pixels`` and support images by name, and their cost."""
 
     rows: slice
     cols: slice
@@ -58,7 +58,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Job:
-    """One picture to be rendered; `tile` runs on any thread of any process. Pickles without its working arrays."""
+    """Picture to render. `tile` runs on any thread of any process; pickling omits working arrays."""
 
     scene: Scene
     camera: IICamera | MapCamera
@@ -81,7 +81,7 @@ class Job:
         return list(tiles(self.camera, TILE_RAYS, whole_lenses=isinstance(self.sampling, Adaptive)))
 
     def tile(self, rows: slice, cols: slice) -> Block:
-        """Render one block."""
+        """Render one tile."""
         started = time.thread_time()
         tracer = self._tracer()
         shape = rows.stop - rows.start, cols.stop - cols.start
@@ -211,7 +211,7 @@ def check_disparity(camera: Camera) -> None:
     """Raise ValueError unless neighbouring lenses of a camera see a point at a known distance from each other."""
     model, named = camera.model, f"camera {camera.name!r}"
     if model is None:
-        raise ValueError(f"disparity: the maps of {named} do not say what camera they are of")
+        raise ValueError(f"disparity: the maps of {named} have no camera parameters")
     if model.lenses[0] < 2:
         raise ValueError(f"disparity: {named} has no neighbouring lenses: at least 2 across are needed")
     if model.front:

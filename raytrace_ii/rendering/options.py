@@ -14,7 +14,7 @@ from ii_core.executors import check_executor
 from .job import CURVES
 
 MOST_WORKERS = 1024
-MOST_NOISE = 1e6  # steps of 8 bits; 255 is white
+MOST_NOISE = 1e6  # 8-bit steps; white is 255
 
 
 class SetKeywords(TypedDict, total=False):
@@ -38,39 +38,38 @@ class RenderKeywords(SetKeywords, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class RenderOptions:
-    """How a picture is rendered; ``samples``, ``error`` and ``pose`` are checked with the camera.
+    """Options of rendering; ``samples``, ``error`` and ``pose`` are checked with the camera.
 
     Parameters
     ----------
     samples : int or (least, most)
-        Rays per pixel: 1 goes through the pixel's centre, more are spread over the pixel, one in each cell of a
-        grid, by a hash of ``seed`` and the pixel. They stay under the pixel's own lens. Over an aperture they are
-        spread likewise. Of a pair, pixels get the least and then more, up to the most, until they are within
-        ``error``. Stored maps have their own number.
+        Rays per pixel. One ray starts at the pixel's centre. Several are stratified: one in each cell of a grid over
+        the pixel, at a position hashed from ``seed`` and the pixel, and likewise over an aperture. All pass the lens
+        of the pixel. A pair selects adaptive sampling: pixels get the least number, then more up to the most, until
+        they meet ``error``. Stored maps have a number of their own.
     error : float
-        Target of adaptive sampling: standard error of a pixel, in steps of 8 bits, estimated from its samples and
-        its neighbours under the same lens; see `sampling` for how, and for what that does not see.
+        Target of adaptive sampling: standard error of a pixel in 8-bit steps, estimated from its samples and from its
+        neighbours under the same lens; see `sampling` for the estimate and its limits.
     seed : int
-        For samples and noise.
+        Seed of samples and noise.
     noise : float
-        σ of monochromatic sensor noise, in steps of 8 bits; see `add_sensor_noise`.
+        σ of monochromatic sensor noise in 8-bit steps; see `add_sensor_noise`.
     dtype : {"uint8", "uint16", "float32"}
         Integers are sRGB, floats linear light.
     workers : int, optional
         Threads; as many as cores if not given.
     executor : concurrent.futures.Executor or dask.distributed.Client, optional
-        What renders instead: threads, processes that share this machine's files, or a cluster. It stays open.
+        Threads, processes on this machine, or a cluster that renders. It is not closed.
     pose : array_like, (4, 4), optional
         Rigid transform from the camera's frame to the scene's.
     texture_filter : bool
-        Read images of textures, maps and skies over the width that a ray has where it meets them, each sample its
-        part of the pixel; see `job.footprint`. If not, at a point, which shows texels that are finer than pixels as
-        noise.
+        Filter image textures, maps and skies over the width of a ray at its hit point; every sample has its part of
+        the pixel, see `job.footprint`. Point sampling, the alternative, shows texels finer than pixels as noise.
 
     Raises
     ------
     TypeError, ValueError
-        If an option is of another type or out of range.
+        If an option has another type or is out of range.
     """
 
     samples: int | tuple[int, int] = 1
@@ -104,12 +103,12 @@ class RenderOptions:
 
 
 def check_keywords(given: Iterable[str], known: type) -> None:
-    """Raise TypeError, with the known ones, unless all are keywords of a TypedDict."""
+    """Raise TypeError with the known names unless all are keywords of a TypedDict."""
     if unknown := set(given) - set(known.__annotations__):
         raise TypeError(f"unknown option {min(unknown)}: known are {', '.join(known.__annotations__)}")
 
 
 def _short(value: Any) -> str:
-    """A value for a message; a number of 400 digits is not read by anyone."""
+    """Return a value for a message; long numbers are shortened."""
     text = repr(value)
     return text if len(text) < 40 else f"{text[:20]}… ({len(text)} characters)"

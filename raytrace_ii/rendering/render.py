@@ -34,12 +34,12 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Stats:
-    """What a picture cost.
+    """Cost of a picture.
 
-    ``rays`` by kind (primary, shadow, reflection, refraction), and those ``skipped`` because no 8-bit pixel would
-    show them; ``seconds`` by the clock; ``embree_seconds`` and
-    ``cpu_seconds`` summed over all threads and processes that rendered; ``samples`` says how many pixels got how
-    many; ``embree`` is Embree's version and the rays of a packet, or why rays went one by one.
+    ``rays`` counts rays by kind (primary, shadow, reflection, refraction), and ``skipped`` those too weak to change
+    an 8-bit pixel. ``seconds`` is wall-clock time. ``embree_seconds`` and ``cpu_seconds`` are sums over all threads
+    and processes. ``samples`` counts pixels by their number of samples. ``embree`` is Embree's version and packet
+    size, or the reason for single rays.
     """
 
     rays: dict[str, int]
@@ -58,27 +58,27 @@ class Stats:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Shot:
-    """A rendered picture and its support images, of the first sample of each pixel. Those not asked for are None.
+    """Rendered picture and support images of the first sample of each pixel; images not requested are None.
 
     Parameters
     ----------
     depth : ndarray, (N, M)
-        z in mm in the camera's frame, measured from its pixel plane z = 0; NaN where nothing is hit.
+        z in mm in the camera's frame, measured from its pixel plane z = 0; NaN without a hit.
     normal : ndarray, (N, M, 3)
-        The faces' outward unit normals in the scene's frame, 0 where nothing is hit.
+        Outward unit normals of the faces in the scene's frame, 0 without a hit.
     object_id : ndarray of int, (N, M)
-        The row of ``object_names``, −1 where nothing is hit.
+        Row of ``object_names``, −1 without a hit.
     ray_length : ndarray, (N, M)
-        mm along the ray from its origin L, the pinhole or the place on the lens; NaN where nothing is hit. starts at
-        the pixel plane instead: on the axis of a pinhole lens it is greater by the gap.
+        mm along the ray from its origin L on the lens; NaN without a hit. ``depth`` is measured from the pixel plane
+        and is larger by the gap on the axis of a pinhole.
     shading_normal : ndarray, (N, M, 3)
-        Unit normals that shading used, in the scene's frame and outward: interpolated between vertices and tilted by
-        normal maps; the face's normal where there are none; 0 where nothing is hit.
+        Outward unit normals of shading in the scene's frame: interpolated between vertices and changed by normal
+        maps, or those of the faces; 0 without a hit.
     disparity : ndarray, (N, M)
-        How far the point moves from one elementary image to the next on the right, in pixels to the right; see
+        Shift of the point from one elementary image to the next on the right, in pixels to the right; see
         `job.disparity`.
     samples : ndarray of int, (N, M)
-        How many samples the pixel got.
+        Number of samples of the pixel.
     """
 
     picture: IIPicture
@@ -119,14 +119,14 @@ def render(
 ) -> Shot:
     """Ray trace a scene through a camera.
 
-    The picture is the same to the bit whatever renders it.
+    The picture is bitwise equal for all numbers of threads, processes and workers.
 
     Parameters
     ----------
     support : tuple of str
-        Which of depth, normal, object_id, ray_length, shading_normal, disparity and samples to keep.
+        Support images to return, of depth, normal, object_id, ray_length, shading_normal, disparity and samples.
     progress : callable, optional
-        Called with blocks done and blocks in all, from the calling thread.
+        Called in the calling thread with the number of finished tiles and of all tiles.
     **options
         Fields of `RenderOptions`: ``samples``, ``error``, ``seed``, ``noise``, ``dtype``, ``workers``, ``executor``,
         ``pose`` and ``texture_filter``.
@@ -138,7 +138,7 @@ def render(
     Raises
     ------
     TypeError, ValueError
-        If a parameter is of another type or out of range.
+        If a parameter has another type or is out of range.
     OSError
         If worker processes die and are not replaced.
     """
@@ -172,21 +172,20 @@ def render_to(
     progress: Progress | bool | None = None,
     **options: Unpack[RenderKeywords],
 ) -> Stats:
-    """Ray trace into files band by band: pictures may be larger than memory.
+    """Ray trace into files band by band, for pictures larger than memory.
 
-    The files hold to the bit what `render` gives. They appear when all is done, or not at all.
-
-    Parameters that are not named here are those of `render`, and so are errors.
+    The files are bitwise equal to the result of `render`. They appear when all are complete, or not at all. Other
+    parameters and errors are those of `render`.
 
     Parameters
     ----------
     picture : path or None
-        PNG, TIFF or EXR; its structure stands beside it as with `IIPicture.save`. None for support images alone.
+        PNG, TIFF or EXR, with a sidecar as from `IIPicture.save`. None for support images alone.
     support : mapping of str to path or sequence of paths, optional
-        Files of support images by name. Several images may name one EXR, which then has named channels; the names of
-        objects stand in its header. One image may have several files.
+        Files of support images by name. Several images in one EXR have named channels, and the names of objects in
+        its header. One image may have several files.
     upright : bool
-        Turn the picture of a camera of one lens, which stands on its head.
+        Turn the upside-down picture of a camera of one lens.
 
     Raises
     ------
@@ -222,9 +221,9 @@ def render_to(
 def _outputs(
     job: Job, picture: str | os.PathLike[str] | None, files: dict[str, list[str]], upright: bool
 ) -> Iterator[tuple[ExitStack, list[tuple[RowWriter, list[str]]]]]:
-    """Open all files; a stack to end with them, and what to call with rows of which images.
+    """Open all files; return a stack that closes them, and the writers of rows by image.
 
-    All files are whole and checked before the first appears.
+    All files are complete and checked before the first appears.
     """
     camera, unique = job.camera, list(dict.fromkeys(file for paths in files.values() for file in paths))
     for file, dtype in [*([(picture, job.dtype)] if picture is not None else []), *((f, "float32") for f in unique)]:
@@ -256,7 +255,7 @@ def _paths(value: Paths) -> list[str]:
 
 @dataclass
 class _Tally:
-    """Sums up what the blocks of a picture cost."""
+    """Sum of the costs of tiles."""
 
     started: float = field(default_factory=time.perf_counter)
     cpu: float = field(default_factory=time.thread_time)
@@ -284,7 +283,7 @@ class _Tally:
 def _rendered(
     job: Job, tiles: Sequence[Tile], options: RenderOptions, progress: Progress | bool | None, tally: _Tally
 ) -> Generator[Block, None, None]:
-    """The blocks in their order, counted and told."""
+    """Yield tiles in their order; count them and report progress."""
     with closing(run(job, tiles, workers=options.workers, executor=options.executor)) as blocks:
         report = reporter(progress, "render")
         for done, block in enumerate(blocks, 1):
@@ -295,7 +294,7 @@ def _rendered(
 
 
 def _strips(tiles: Sequence[Tile]) -> list[list[Tile]]:
-    """Tiles by the rows that they cover."""
+    """Return the tiles of each strip of rows."""
     strips: dict[int, list[Tile]] = {}
     for tile in tiles:
         strips.setdefault(tile[0].start, []).append(tile)
@@ -305,9 +304,9 @@ def _strips(tiles: Sequence[Tile]) -> list[list[Tile]]:
 def _bands(
     blocks: Iterator[Block], pixels: tuple[int, int], backwards: bool
 ) -> Iterator[tuple[int, dict[str, NDArray[Any]]]]:
-    """Whole rows as soon as they are complete, with the number of the first: always whole blocks of noise.
+    """Yield complete rows with the number of the first, in whole blocks of noise.
 
-    The blocks come by strips, from the top or from the bottom.
+    Tiles arrive in strips, from the top or from the bottom.
     """
     columns, rows = pixels
     strip: list[Block] = []
@@ -333,7 +332,7 @@ def _bands(
 
 
 def _options(scene: Any, camera: Any, options: RenderKeywords, progress: Any) -> RenderOptions:
-    """The options, after what is to be rendered is known to be a scene and a camera."""
+    """Return the options; check the types of scene and camera first."""
     check_scene(scene)
     if not isinstance(camera, IICamera | MapCamera):
         raise TypeError(f"camera is a {type(camera).__name__}: an IICamera or a MapCamera is needed")
@@ -344,7 +343,7 @@ def _options(scene: Any, camera: Any, options: RenderKeywords, progress: Any) ->
 
 
 def _job(scene: Scene, camera: IICamera | MapCamera, options: RenderOptions, support: tuple[str, ...]) -> Job:
-    """A picture to be rendered, all of it checked."""
+    """Return the checked job of a picture."""
     samples = options.samples
     if isinstance(camera, MapCamera):
         if samples not in (1, camera.stored_samples):
@@ -371,7 +370,7 @@ def _items(name: str, value: Any) -> Iterator[Any]:
 
 
 def _path(name: str, value: Any) -> str:
-    """A path as text; TypeError that names the argument."""
+    """Return a path as text; raise TypeError that names the argument."""
     if not isinstance(value, str | os.PathLike) or not isinstance(path := os.fspath(value), str):
         raise TypeError(f"{name} is {value!r}: a path is needed")
     return path

@@ -1,7 +1,7 @@
 """Render sets: scenes in a folder of pictures, support images, projections, a contact sheet and a manifest.
 
-The manifest says of every file what it was made of, as a hash, and what it is, as another. What is there already, of
-the same scene, camera, options and version, is not made again, so that an interrupted set goes on where it was.
+The manifest holds a hash of the inputs and a hash of the content of every file. Files of the same scene, camera,
+options and version are not rendered again, so that an interrupted set continues.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from .render import render_to
 SETS = {"reference": ("apples", "car", "cuboid", "dolphin", "hairdo", "mountains", "objects", "twins")}
 MANIFEST, CONTACT = "manifest.json", "contact.png"
 PICTURE_OPTIONS = ("samples", "error", "seed", "noise", "dtype", "texture_filter")
-FLAT_PIXELS, FLAT_SAMPLES = 1024, 4  # across, and a pixel
+FLAT_PIXELS, FLAT_SAMPLES = 1024, 4  # pixels across, samples per pixel
 
 Progress = Callable[[str, int, int], None]
 
@@ -48,26 +48,26 @@ def render_set(
     progress: Progress | None = None,
     **options: Unpack[SetKeywords],
 ) -> dict[str, Any]:
-    """Render a set of scenes, or what is left of it.
+    """Render a set of scenes, or the rest of it.
 
-    Of every scene there are NAME.png, the II-picture; NAME_support.exr, depth, ray length, disparity where the camera
-    has it, normals and object ids through the pixels' centres; NAME_flat.png and NAME_flat_support.exr, what a 2D
-    camera sees; of several pixel arrays, pictures and support images are numbered.
+    The files of a scene are NAME.png, the II-picture; NAME_support.exr, its support images at the pixels' centres
+    (depth, ray length, disparity if the camera has it, normals, object numbers); NAME_flat.png and
+    NAME_flat_support.exr, the picture of a 2-D camera. Files of several pixel arrays are numbered.
 
     Parameters
     ----------
     name : str
         One of `SETS`.
     cameras : sequence
-        The pixel arrays of one camera.
+        Pixel arrays of one camera.
     poses : sequence
-        Where each stands.
+        Pose of each pixel array.
     bits : {8, 16}
-        Of the pictures.
+        Bits of the pictures.
     force : bool
-        Replace files of these names that no manifest accounts for.
+        Replace files of these names that are not in the manifest.
     progress : callable, optional
-        Called with the file being made, blocks done and blocks in all.
+        Called with the name of the file, and the numbers of finished and of all tiles.
     **options
         Fields of `RenderOptions`: ``samples``, ``error``, ``seed``, ``noise``, ``texture_filter``, ``workers`` and
         ``executor``.
@@ -75,19 +75,19 @@ def render_set(
     Returns
     -------
     dict
-        The manifest, which also lies in the folder.
+        The manifest, which is also written into the folder.
 
     Raises
     ------
     ValueError
-        If a parameter is out of range, or the manifest of another set is there.
+        If a parameter is out of range, or the folder has the manifest of another set.
     OSError
-        If a file cannot be written, or one of its name is there that this did not make.
+        If a file cannot be written, or exists and is not in the manifest.
     """
     if name not in SETS:
         raise ValueError(f"unknown set {name!r}: known are {', '.join(SETS)}")
     if cameras[0].model is None:
-        raise ValueError("the maps do not say what camera they are of: there is no 2D projection to match")
+        raise ValueError("the maps have no camera parameters: a 2-D projection needs them")
     check_keywords(options, SetKeywords)
     wanted = RenderOptions(**options, dtype=f"uint{bits}")
     of_pictures = {field: getattr(wanted, field) for field in PICTURE_OPTIONS}
@@ -118,7 +118,7 @@ def _products(
     folder: Path, title: str, scene: Scene, scene_hash: str, cameras: Sequence[Any], poses: Sequence[Any],
     options: dict[str, Any], means: dict[str, Any],
 ) -> Iterator[tuple[str, Product]]:  # fmt: skip
-    """What there is to make of a scene."""
+    """Return the renders of a scene."""
     release = version("raytrace-ii")
     for i, (camera, pose) in enumerate(zip(cameras, poses, strict=True)):
         number = "" if len(cameras) == 1 else f"_{i}"
@@ -128,7 +128,7 @@ def _products(
 
         common = {"pose": pose, "upright": camera.lenses == (1, 1), **means}
         shoot = partial(render_to, picture, scene, camera, **options, **common)
-        # one ray through every pixel's centre, and no light
+        # one ray through every pixel's centre, without shading
         survey = partial(render_to, None, replace(scene, lights=()), camera, support=images, **common)
         yield f"picture{number}", Product((picture,), content_hash("picture", *seen, options), shoot)
         yield f"support{number}", Product((support,), content_hash("support", *seen, list(images)), survey)
@@ -142,7 +142,7 @@ def _products(
 
 
 def support_images(camera: Camera) -> list[str]:
-    """All support images that a camera has, but for the number of samples."""
+    """Return all support images of a camera except the number of samples."""
     names = [name for name in SUPPORT_IMAGES if name != "samples"]
     try:
         check_disparity(camera)
@@ -167,7 +167,7 @@ def _header(name: str, cameras: Sequence[Any], options: dict[str, Any]) -> dict[
 
 
 def _read_manifest(folder: Path, name: str) -> dict[str, Any]:
-    """What the folder's manifest says, nothing if there is none."""
+    """Return the manifest of the folder; empty if there is none."""
     path = folder / MANIFEST
     if not path.exists():
         return {}
@@ -180,7 +180,7 @@ def _read_manifest(folder: Path, name: str) -> dict[str, Any]:
 
 
 def _is_well_formed(manifest: dict[str, Any]) -> bool:
-    """Whether whatever a manifest holds is of the type that this module writes."""
+    """Return whether the values of a manifest have the types that this module writes."""
     claims, scenes = manifest.get("claims", []), manifest.get("scenes", {})
     if not isinstance(claims, list) or not isinstance(scenes, dict) or not all(isinstance(c, str) for c in claims):
         return False
@@ -200,7 +200,7 @@ def _is_well_formed(manifest: dict[str, Any]) -> bool:
 
 
 def _write_manifest(folder: Path, manifest: dict[str, Any], old: dict[str, Any]) -> None:
-    """The manifest so far; scenes and products not come to yet stay as they were."""
+    """Write the manifest of finished renders; entries of others do not change."""
     scenes = dict(old.get("scenes", {}))
     for title, entry in manifest["scenes"].items():
         before = scenes.get(title, {}).get("products", {})
@@ -209,12 +209,12 @@ def _write_manifest(folder: Path, manifest: dict[str, Any], old: dict[str, Any])
 
 
 def _claims(folder: Path, name: str, arrays: int, old: dict[str, Any], force: bool) -> list[str]:
-    """Names of all files of the set; FileExistsError if one is there that no manifest has claimed."""
+    """Return the names of all files of the set; raise FileExistsError if one exists outside the manifest."""
     numbers = [""] if arrays == 1 else [f"_{i}" for i in range(arrays)]
     pictures = [f"{title}{end}.png" for title in SETS[name] for end in (*numbers, "_flat")]
     ours = [file for picture in pictures for file in (picture, sidecar(picture).name, f"{picture[:-4]}_support.exr")]
     ours.append(CONTACT)
-    # Manifests of before did not claim sidecars: one beside a claimed picture is of the set.
+    # Older manifests do not list sidecars: a sidecar of a listed picture belongs to the set.
     known = {file for claim in old.get("claims", ()) for file in (claim, sidecar(claim).name)}
     strange = [file for file in ours if (folder / file).exists() and file not in known]
     if strange and not force:

@@ -1,8 +1,7 @@
 """Tiles of a picture, and the order of rays within a tile.
 
-Neighbouring lenses see nearly the same: rays of one place under the lens, of 4×4 lenses, have equal directions and
-origins a lens pitch apart, and make a packet. Tiles and order depend on the camera alone, so that all workers trace
-the same packets.
+Rays from one position under 4×4 neighbouring lenses have equal directions and origins one lens pitch apart; they form
+a packet. Tiles and order depend on the camera alone, so that all workers trace the same packets.
 """
 
 from __future__ import annotations
@@ -18,8 +17,8 @@ from numpy.typing import NDArray
 from ii_core import Camera
 from ii_core.lattice import Lattice
 
-SIDE = 4  # lenses, or pixels, across and down a packet of 16 rays
-# From this many pixels per lens on, 4×4 neighbouring pixels lie closer together than those under 4×4 lenses.
+SIDE = 4  # lenses or pixels along each axis of a packet of 16 rays
+# From this number of pixels per lens on, 4×4 neighbouring pixels are closer than pixels under 4×4 lenses.
 LARGE_LENS = 96
 
 Tile = tuple[slice, slice]
@@ -27,7 +26,7 @@ Integers = NDArray[np.int64]
 
 
 class Order(NamedTuple):
-    """The pixels of a tile in the order of their rays: number in C order, row and column."""
+    """Pixels of a tile in the order of their rays: C-order number, row and column."""
 
     pixels: NDArray[np.int32]
     rows: NDArray[np.int32]
@@ -35,9 +34,9 @@ class Order(NamedTuple):
 
 
 def tiles(camera: Camera, rays: int, *, whole_lenses: bool = False) -> Iterator[Tile]:
-    """Tiles of at most so many rays, in rows of tiles; of a regular camera they hold whole packets.
+    """Return tiles of at most ``most`` rays, in rows of tiles; those of a regular camera hold whole packets.
 
-    ``whole_lenses`` keeps the pixels under one lens of a regular camera together, even if they are more.
+    ``whole_lenses`` keeps the pixels under one lens of a regular camera in one tile, even if they are more.
     """
     columns, rows = camera.pixels
     cells = _regular_cells(camera) or (1, 1)
@@ -50,7 +49,7 @@ def tiles(camera: Camera, rays: int, *, whole_lenses: bool = False) -> Iterator[
 
 
 def _span(most: int, cell: int, whole: bool) -> int:
-    """The largest multiple of a packet's lenses, or of a lens, up to ``most`` pixels."""
+    """Return the largest multiple of a packet's lenses, or of a lens, up to ``most`` pixels."""
     for unit in (SIDE * cell, cell):
         if unit <= most:
             return most // unit * unit
@@ -58,9 +57,10 @@ def _span(most: int, cell: int, whole: bool) -> int:
 
 
 def ray_order(camera: Camera, rows: slice, cols: slice) -> Order:
-    """The order of the rays of a tile: by place under the lens, then by blocks of 4×4 lenses.
+    """Return the order of the rays of a tile: by position under the lens, then by blocks of 4×4 lenses.
 
-    Under large lenses, or a single one, by blocks of 4×4 pixels; for maps without lenses by direction and origin.
+    Under large lenses, or a single one, the order is by blocks of 4×4 pixels; for maps without lenses, by direction
+    and origin.
     """
     shape = rows.stop - rows.start, cols.stop - cols.start
     lattice = _lattice(camera)
@@ -83,13 +83,13 @@ def ray_order(camera: Camera, rows: slice, cols: slice) -> Order:
 
 @lru_cache(maxsize=64)
 def _in_cells(shape: tuple[int, int], start: tuple[int, int], cells: tuple[int, int]) -> Order:
-    """The order of a tile whose pixels fill cells of equal size; its corner lies at ``start`` in a packet's cells."""
+    """Return the order of a tile of cells of equal size; its corner lies at ``start`` in the cells of a packet."""
     n, m = np.arange(shape[0])[:, None] + start[0], np.arange(shape[1])[None] + start[1]
     return _order(_keys(m // cells[0], n // cells[1], m % cells[0], n % cells[1]), shape[1])
 
 
 def _keys(k: Integers, l: Integers, u: Integers, v: Integers) -> Integers:
-    """Ranks of pixels by their place (u, v) under the lens, then by packet, then by lens (k, l)."""
+    """Return the ranks of pixels by position (u, v) under the lens, then by packet, then by lens (k, l)."""
     across, down = k // SIDE - k.min() // SIDE, l // SIDE - l.min() // SIDE
     packet = down * (across.max() + 1) + across
     place = v * (u.max() + 1) + u
@@ -97,7 +97,7 @@ def _keys(k: Integers, l: Integers, u: Integers, v: Integers) -> Integers:
 
 
 def _along_rays(camera: Camera, rows: slice, cols: slice) -> Integers:
-    """Ranks of pixels by coarse direction, by origin, and by fine direction, each along a Morton curve."""
+    """Return the ranks of pixels by coarse direction, origin and fine direction, each along a Morton curve."""
     L, D = camera.rays(rows, cols)
     D = D / np.maximum(np.abs(D).sum(axis=2, keepdims=True), 1e-300)
     axes = np.argsort(np.ptp(L.reshape(-1, 3), axis=0))[1:]  # the two along which the origins lie
@@ -106,7 +106,7 @@ def _along_rays(camera: Camera, rows: slice, cols: slice) -> Integers:
 
 
 def _morton(points: NDArray[np.float64], bits: int) -> Integers:
-    """Ranks of points (h, w, 2) along a Morton curve through their box of 2^bits cells across and down."""
+    """Return the ranks of points (h, w, 2) along a Morton curve of 2^bits cells across and down."""
     low, size = points.min(axis=(0, 1)), np.ptp(points, axis=(0, 1))
     cells = ((points - low) / np.where(size > 0, size, 1) * (2**bits - 1e-6)).astype(np.int64)
     return sum((cells[..., axis] >> bit & 1) << (2 * bit + axis) for bit in range(bits) for axis in (0, 1))
@@ -121,14 +121,14 @@ def _order(keys: Integers, width: int) -> Order:
 
 
 def _lattice(camera: Camera) -> Lattice | None:
-    """The lenses of a camera; none of maps that tell of none."""
+    """Return the lenses of a camera; none for maps without lenses."""
     if camera.model is not None:
         return camera.model.lens_lattice
     return Lattice(camera.lenses, camera.ei_pixels, (0.0, 0.0), False) if camera.lenses != (1, 1) else None
 
 
 def _regular_cells(camera: Camera) -> tuple[int, int] | None:
-    """(U, V) of a camera of several lenses over whole pixels."""
+    """Return (U, V) of a camera of several lenses over whole pixels."""
     lenses = _lattice(camera)
     regular = lenses is not None and (camera.model is None or camera.model.regular) and camera.lenses != (1, 1)
     return (int(lenses.pitch[0]), int(lenses.pitch[1])) if lenses is not None and regular else None

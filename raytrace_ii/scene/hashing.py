@@ -14,15 +14,15 @@ Digest = Any
 
 
 def content_hash(*values: Any) -> str:
-    """SHA-256 of numbers, texts, arrays, and whatever dataclasses, lists and mappings hold of them.
+    """Return the SHA-256 of numbers, texts and arrays, and of dataclasses, lists and mappings of them.
 
-    A scene's hash covers what its file says and all that the file uses, meshes, textures and the procedures that
-    model its shapes: it is taken of what came out of them.
+    The hash of a scene covers its file and everything that the file uses, since it is computed from the loaded
+    meshes, textures and shapes.
 
     Raises
     ------
     TypeError
-        If a value is none of these.
+        If a value has another type.
     """
     digest = hashlib.sha256()
     for value in values:
@@ -31,13 +31,13 @@ def content_hash(*values: Any) -> str:
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file."""
+    """Return the SHA-256 of a file."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _add(digest: Digest, value: Any) -> None:
-    # every value is led by its kind and size: no two different ones give the same bytes
+    # every value starts with its kind and size: different values give different bytes
     if value is None or isinstance(value, bool | int | float | str | np.generic):
         plain = value.item() if isinstance(value, np.generic) else value
         text = repr(plain).encode()

@@ -17,7 +17,7 @@ Vector = tuple[float, float, float]
 
 
 def _numbers(what: str, value: Any, count: int = 3, least: float = -math.inf) -> None:
-    """Refuse anything but ``count`` finite numbers of at least ``least``."""
+    """Raise ValueError unless a value is ``count`` finite numbers of at least ``least``."""
     numbers = np.asarray(value, np.float64) if np.ndim(value) == 1 else np.empty(0)
     if numbers.shape != (count,) or not (np.isfinite(numbers).all() and (numbers >= least).all()):
         floor = f" of at least {least:g}" if least > -math.inf else ""
@@ -25,7 +25,7 @@ def _numbers(what: str, value: Any, count: int = 3, least: float = -math.inf) ->
 
 
 def _number(what: str, value: float, least: float, *, above: bool = False) -> None:
-    """Refuse a number that is not finite or too small; ``above`` refuses the least itself."""
+    """Raise ValueError unless a number is finite and at least ``least``; with ``above``, greater."""
     if not (least < value < math.inf or (value == least and not above)):
         raise ValueError(
             f"{what} is {value}: a finite number {'above' if above else 'of at least'} {least:g} is needed"
@@ -33,7 +33,7 @@ def _number(what: str, value: float, least: float, *, above: bool = False) -> No
 
 
 def unit_rows(vectors: Any) -> NDArray[np.float64]:
-    """Vectors (..., 3) brought to length 1; zero stays zero."""
+    """Return vectors (..., 3) of length 1; zero stays zero."""
     rows = np.asarray(vectors, np.float64)
     length = np.linalg.norm(rows, axis=-1, keepdims=True)
     return np.asarray(np.divide(rows, length, out=np.zeros_like(rows), where=length > 0))
@@ -41,9 +41,9 @@ def unit_rows(vectors: Any) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """How a surface answers light, in Whitted's terms. Colours are linear.
+    """Whitted material of a surface. Colours are linear.
 
-    The matt share is what ``mirror`` and ``transmission`` leave: energy stays in bounds.
+    The matt share is 1 − ``mirror`` − ``transmission``, which conserves energy.
 
     Parameters
     ----------
@@ -53,45 +53,44 @@ class Material:
         Strength and exponent of the Blinn–Phong highlight. With a metallic-roughness map both follow from the map and
         ``specular`` is a factor.
     mirror : (3,)
-        Share of light reflected as by a mirror.
+        Share of light in mirror reflection.
     roughness : float
-        Of the reflection, 0 to 1: a GGX lobe of α = roughness² with single scattering; 0 is a sharp mirror. Refracted
-        light stays sharp.
+        Roughness of the reflection, 0 to 1: a GGX lobe of α = roughness² with single scattering; 0 is a sharp mirror.
+        Refraction is always sharp.
     metallic : float
-        Share of the surface that is metal, 0 to 1: it mirrors ``colour``, times the texture, and has no matt share,
+        Share of metal in the surface, 0 to 1. Metal reflects ``colour`` times the texture and has no matt share,
         transmission or ``mirror``.
     metallic_roughness_map : Image, optional
         As `texture.metallic_roughness_map` reads it: green multiplies ``roughness``, blue ``metallic``.
     transmission : (3,)
-        Share of light that each face of the body hands on, split by Fresnel into reflected and refracted: a pane
-        takes it twice.
+        Share of light at each face that is split into reflection and refraction by the Fresnel equations. A pane has
+        two faces.
     ior : float or (3,)
-        Index of refraction of the body; three for red, green and blue disperse.
+        Index of refraction of the body; three numbers for red, green and blue give dispersion.
     absorption_per_mm : (3,)
         Beer–Lambert coefficient inside the body.
     texture : Texture, optional
     emission : (3,)
-        Light that the surface gives off on both sides, whatever falls on it; of any strength. It lights nothing else.
+        Light emitted on both sides, of any strength. It does not illuminate other surfaces.
     emission_map : Image, optional
-        Multiplies the emission.
+        Factor of the emission.
     normal_map : Image, optional
-        As `texture.normal_map` reads it. All maps lie over (u, v), so that the texture, if any, must lie on the
-        surface too.
+        As `texture.normal_map` reads it. Maps need (u, v); a texture beside them must be one on the surface, too.
     normal_scale : float
         Factor of the map's x and y.
     alpha_cutoff : float
-        Where the texture's alpha is below it there is no surface; 0 for no cut-outs.
+        Surface points whose texture alpha is below it are cut out; 0 for no cut-outs.
     alpha_blend : float
-        The surface is there to this share, times the texture's alpha where it has one, and is seen through, unbent,
-        to the rest; 0 for no blending.
+        Coverage of the surface, multiplied by the texture's alpha if any; the rest of the light passes straight. 0
+        for no blending.
     priority : int
-        Where transmissive bodies overlap the one of higher priority is there (Schmidt and Budge 2002); of equal
-        ones the one entered first.
+        In overlapping transmissive bodies the one of higher priority counts (Schmidt and Budge 2002); of equal ones
+        the one entered first.
 
     Raises
     ------
     ValueError
-        If a value is out of range, or cut-outs have no alpha.
+        If a value is out of range, or cut-outs lack a texture with alpha.
     """
 
     colour: Vector = (0.8, 0.8, 0.8)
@@ -150,7 +149,7 @@ class Material:
 
     @property
     def maps(self) -> dict[str, Image | None]:
-        """Images over (u, v) beside the texture, by what they are."""
+        """Maps over (u, v) by field."""
         return {
             "a normal map": self.normal_map,
             "an emission map": self.emission_map,
@@ -186,20 +185,20 @@ LIGHTS = ("point", "directional", "spot")
 
 @dataclass(frozen=True, kw_only=True)
 class Light:
-    """A light in the scene's frame, mm. None falls off with distance.
+    """Light in the scene's frame, mm, without falloff over distance.
 
     Parameters
     ----------
     kind : {"point", "directional", "spot"}
     vector : (3,)
-        Where a point or a spot light stands, or along which direction a directional one shines.
+        Position of a point or spot light, or direction of a directional light.
     colour : (3,)
         Linear.
     direction : (3,)
-        Along which a spot light shines.
+        Axis of a spot light.
     cone_deg : (inner, outer)
-        Half angles of a spot light: all its light within the inner cone, none outside the outer one, between them
-        ((cos θ − cos outer)/(cos inner − cos outer))², as in glTF's KHR_lights_punctual.
+        Half angles of a spot light. It has full strength within the inner cone, none outside the outer cone, and
+        ((cos θ − cos outer)/(cos inner − cos outer))² between them, as in glTF's KHR_lights_punctual.
 
     Raises
     ------
@@ -230,17 +229,17 @@ class Light:
 
 @dataclass(frozen=True, kw_only=True)
 class Background:
-    """Sky: a gradient, or an image of all directions. Linear colours.
+    """Background: a gradient, or an image of all directions, in linear colours.
 
     Parameters
     ----------
     horizon, zenith, nadir : (3,)
-        The gradient runs from horizon to zenith and nadir at ``spread_deg`` above and below it, as the sine.
+        Colours of the gradient. It is linear in the sine of the elevation, up to ``spread_deg`` above and below.
     image : Image, optional
-        Equirectangular, in place of the gradient. Its centre lies towards +z, straight ahead of a camera; right of
-        it +x, its top row up at +y, its left and right edges meet behind at −z.
+        Equirectangular image in place of the gradient. Its centre is at +z, its top row at +y, +x is right of the
+        centre, and its left and right edges meet at −z.
     turn_deg : float
-        Turns the image about y, +z towards +x: by 90 its centre lies towards +x.
+        Rotation of the image about y, +z towards +x; 90 turns its centre to +x.
     intensity : float
         Factor of the image.
 
@@ -270,11 +269,10 @@ class Background:
 
 @dataclass(frozen=True, kw_only=True)
 class Fog:
-    """Air perspective: what lies at a distance t keeps the share exp(−density·t), ``colour`` (linear) comes in.
+    """Fog: light over a distance t has the share exp(−density·t); the rest is ``colour`` (linear).
 
-    It fills all space outside transmissive bodies, along reflected and refracted ways too; lights and the sky
-    shine through it: the sky's colours are taken as they are seen. Give the fog the horizon's colour and far
-    things fade into it.
+    It fills all space outside transmissive bodies, for reflected and refracted rays, too. It does not change lights
+    and the background. With the colour of the horizon, distant objects fade into it.
     """
 
     colour: Vector
@@ -288,23 +286,23 @@ class Fog:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Body:
-    """One object: a triangle mesh in scene coordinates (mm) with its material.
+    """Object: a triangle mesh in scene coordinates (mm) with its material.
 
     Parameters
     ----------
     vertices : ndarray, (V, 3)
     faces : ndarray of int, (F, 3)
-        Counter-clockwise about the outward normal: (v1 − v0) × (v2 − v0) points out.
+        Counter-clockwise about the outward normal: (v1 − v0) × (v2 − v0) points outwards.
     normals : ndarray, (V, 3), optional
-        Vertex normals for smooth shading, of any length; None shades flat.
+        Vertex normals for smooth shading, of any length; None for flat shading.
     texture_coordinates : ndarray, (V, 3), optional
-        (u, v, 0) for textures on the surface and normal maps, positions in the body's own frame for solid ones,
-        linear colours for those of the vertices.
+        (u, v, 0) for textures on the surface and for maps; positions in the body's frame for solid textures; linear
+        colours for vertex colours.
 
     Raises
     ------
     ValueError
-        If there is no geometry, it does not fit together, or the material needs coordinates that are not there.
+        If there is no geometry, array sizes differ, or the material needs missing coordinates.
     """
 
     name: str
@@ -354,7 +352,7 @@ class Scene:
     Raises
     ------
     ValueError
-        If there is no body, ``max_depth`` is negative or ``ambient`` is no colour.
+        If there is no body, ``max_depth`` is negative, or ``ambient`` is not a colour.
     """
 
     bodies: Sequence[Body]
@@ -371,8 +369,8 @@ class Scene:
         if not self.max_depth >= 0:
             raise ValueError(f"max_depth is {self.max_depth}: at least 0 is needed")
         _numbers("ambient", self.ambient, least=0)
-        # Transmissive bodies go last, before them those with holes: opaque faces are a prefix that shadow rays may
-        # be tested against alone.
+        # Order: opaque bodies, bodies with holes, transmissive bodies. Shadow rays are tested against the opaque
+        # prefix alone.
         ordered = sorted(self.bodies, key=lambda b: (b.material.transmissive, b.material.has_holes))
         object.__setattr__(self, "bodies", tuple(ordered))
 
@@ -397,11 +395,11 @@ class Scene:
         return f"<details><summary>{html.escape(self.about)}</summary><table>{head}{rows}</table></details>"
 
     def with_depth(self, max_depth: int) -> Scene:
-        """The same scene with another recursion depth."""
+        """Return the scene with another recursion depth."""
         return replace(self, max_depth=max_depth)
 
     @property
     def bounds_mm(self) -> NDArray[np.float64]:
-        """(2, 3): least and greatest corner."""
+        """Return the least and greatest corner, (2, 3)."""
         every = np.concatenate([np.asarray(b.vertices, np.float64) for b in self.bodies])
         return np.stack([every.min(axis=0), every.max(axis=0)])

@@ -16,12 +16,12 @@ WRAPS = ("repeat", "mirror", "clamp")
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """An image, linear float32 (H, W, 3), row 0 on top at v = 1; bilinear.
+    """Image texture, linear float32 (H, W, 3), row 0 on top at v = 1, read bilinearly.
 
-    Made from ``codes``, uint8 sRGB of the same shape, it is kept in a quarter of the memory, which is faster to read.
-    ``repeat`` is how often a scene file lays it over the unit square: texture coordinates are multiplied by it
-    when the body is made. ``alpha`` (H, W), 0…1, is kept for cut-outs where the file has it. ``wrap`` names for u and
-    for v how the image goes on beyond [0, 1]: it repeats, repeats mirrored every other time, or keeps its last texel.
+    With ``codes``, uint8 sRGB of the same shape, it takes a quarter of the memory and is faster to read. ``repeat``
+    is the factor of texture coordinates from a scene file, applied when the body is built. ``alpha`` (H, W), 0…1, is
+    the alpha of the file, if any, for cut-outs. ``wrap`` names the wrapping beyond [0, 1] along u and v: repeat,
+    mirrored repeat, or clamp to the edge.
 
     Raises
     ------
@@ -43,7 +43,7 @@ class Image:
 
 @dataclass(frozen=True)
 class Checker:
-    """Two linear colours in cubes of ``size`` (mm along each axis; in (u, v) units if ``on_surface``)."""
+    """Checkers: two linear colours in cubes of ``size`` (mm along each axis; (u, v) units if ``on_surface``)."""
 
     colours: tuple[tuple[float, float, float], tuple[float, float, float]]
     size: tuple[float, float, float]
@@ -52,9 +52,9 @@ class Checker:
 
 @dataclass(frozen=True)
 class Stripes:
-    """Two linear colours in turn, each ``width`` wide (mm; in (u, v) units if ``on_surface``) along ``axis``.
+    """Stripes: two linear colours, each ``width`` wide (mm; (u, v) units if ``on_surface``), along ``axis``.
 
-    The first starts at the origin. ``soft`` is the share of the width over which they run into each other.
+    The first starts at the origin. ``soft`` is the share of the width over which the colours are blended.
 
     Raises
     ------
@@ -79,9 +79,9 @@ class Stripes:
 
 @dataclass(frozen=True)
 class Noise:
-    """Two linear colours mixed by fractal gradient noise with features of ``size`` mm along each axis.
+    """Noise: two linear colours mixed by fractal gradient noise with features of ``size`` mm along each axis.
 
-    ``contrast`` 1 uses the whole mix where the noise reaches ±0.5.
+    With ``contrast`` 1, noise of ±0.5 gives the pure colours.
     """
 
     colours: tuple[tuple[float, float, float], tuple[float, float, float]]
@@ -94,7 +94,7 @@ class Noise:
 
 @dataclass(frozen=True)
 class VertexColours:
-    """The linear colours of the mesh's own vertices, which stand in the place of texture coordinates."""
+    """Vertex colours: linear colours of the mesh, stored in place of texture coordinates."""
 
     on_surface = True
 
@@ -103,7 +103,7 @@ Texture = Image | Checker | Stripes | Noise | VertexColours
 
 
 def srgb_colour(value: Any) -> tuple[float, float, float]:
-    """``"#rrggbb"`` or three sRGB numbers in [0, 1], to linear."""
+    """Return the linear colour of ``"#rrggbb"`` or of three sRGB numbers in [0, 1]."""
     if isinstance(value, str):
         if not (len(value) == 7 and value[0] == "#" and all(c in "0123456789abcdefABCDEF" for c in value[1:])):
             raise ValueError(f"colour {value!r}: #rrggbb or three numbers from 0 to 1 are needed")
@@ -122,7 +122,7 @@ Colour = Annotated[tuple[float, float, float], BeforeValidator(srgb_colour)]
 
 
 def image_texture(pixels: NDArray[Any]) -> Image:
-    """An image texture from stored pixels: integers are sRGB, floats linear; grey is spread, alpha kept aside.
+    """Return the image texture of stored pixels: integers are sRGB, floats linear; grey is repeated.
 
     Raises
     ------
@@ -141,9 +141,9 @@ def image_texture(pixels: NDArray[Any]) -> Image:
 
 
 def normal_map(pixels: NDArray[Any]) -> Image:
-    """A normal map from stored pixels, which are data and not sRGB: x, y, z of −1…1 stand as 0…1.
+    """Return the normal map of stored pixels, which are linear data: 0…1 means −1…1 for x, y and z.
 
-    Tangent space as in glTF 2.0, §3.9.3: x along growing u, y along growing v, z out of the face.
+    Tangent space is that of glTF 2.0, §3.9.3: x towards larger u, y towards larger v, z out of the face.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def normal_map(pixels: NDArray[Any]) -> Image:
 
 
 def metallic_roughness_map(pixels: NDArray[Any]) -> Image:
-    """A map of roughness in green and metal in blue from stored pixels, which are data and not sRGB (glTF 2.0).
+    """Return the map of roughness (green) and metal (blue) of stored pixels, which are linear data (glTF 2.0).
 
     Raises
     ------
@@ -174,7 +174,7 @@ def _data(pixels: NDArray[Any], what: str) -> Image:
 
 
 def _split(pixels: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.float32] | None]:
-    """Three channels of colour, and alpha as 0…1 if there is a second or fourth."""
+    """Return three channels of colour, and alpha as 0…1 if there is a second or fourth channel."""
     channels = pixels.shape[2]
     alpha = None
     if channels in (2, 4):

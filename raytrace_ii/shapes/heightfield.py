@@ -18,28 +18,28 @@ Array = NDArray[Any]
 
 
 class Heightfield(Shape):
-    """Terrain or water: a fractal surface over x and z that faces up, nearest row at z = 0, x about 0.
+    """Heightfield: a fractal surface over x and z, upward, with its nearest row at z = 0 and centred in x.
 
     Parameters
     ----------
     size_mm : (x, z)
         Width at the near edge and depth.
     widen : float
-        How many times wider the far edge is; rows stand apart in the same proportion.
+        Width of the far edge over that of the near edge; distances of rows grow alike.
     cells : (x, z)
     height_mm, feature_mm : float
         Height and wavelength of the coarsest octave.
     swell : bool
-        Let heights grow with the rows' width, up to ``height_mm`` at the far edge.
+        True if heights grow with the width of rows, up to ``height_mm`` at the far edge.
     octaves, ridged : int, bool
         Octaves of noise, each of half the wavelength and ``rough`` times the height; folded into ridges or not.
     rise_mm : float
-        How much the ground rises from near to far.
+        Rise of the ground from the near to the far edge.
     valley_mm : float
-        Half width of a valley along x = 0 at the near edge, wider as the rows are; its floor keeps a quarter of the
-        height. 0 for none.
+        Half width of a valley along x = 0 at the near edge; it widens with the rows. Its floor has a quarter of the
+        height. 0 for no valley.
     colours : list of (height_mm, colour)
-        Colours from the bottom up, mixed in between.
+        Colours from the bottom up, interpolated.
     steep : colour, optional
         Colour where the slope is too steep for the others.
     """
@@ -66,7 +66,7 @@ class Heightfield(Shape):
     def mesh(self) -> Mesh:
         nx, nz = self.cells
         across, away = np.linspace(-0.5, 0.5, nx + 1), np.linspace(0, 1, nz + 1)
-        if self.widen > 1:  # each row as much wider and further from the next as it is further away
+        if self.widen > 1:  # width and distance of rows grow with their distance
             away = (self.widen**away - 1) / (self.widen - 1)
         wide = 1 + (self.widen - 1) * away
         x = self.size_mm[0] * across * wide[:, None]
@@ -93,7 +93,7 @@ class Heightfield(Shape):
             return None
         heights = [height for height, _ in self.colours]
         levels = np.array([colour for _, colour in self.colours])
-        # a border that follows no contour line: the steeper, the lower it seems
+        # the border of colours follows no contour line: steep slopes count as lower
         seems = y - 0.25 * self.height_mm * (1 - normals[..., 1])
         out = np.stack([np.interp(seems, heights, levels[:, c]) for c in range(3)], axis=-1)
         if self.steep is not None:

@@ -16,18 +16,18 @@ MOST_CELLS = 40_000_000  # of the grid: 160 MB
 
 
 class Implicit(Shape):
-    """A closed smooth body put together from parts that flow into one another, in the parts' order.
+    """Implicit body: a closed smooth body of blended parts, combined in their order.
 
     Parameters
     ----------
     parts : list
         Balls, blocks, capsules and tubes; see `Ball`, `Block`, `Capsule`, `Tube`.
     cell_mm : float
-        Side of a cell of the grid that the surface is found on (marching cubes).
+        Side of a cell of the grid of marching cubes.
     grow_mm : float
-        Push the surface outwards (before any part that keeps or cuts).
+        Offset of the surface outwards, before parts that keep or cut.
     front_mm : (x, y, x, y), optional
-        The rectangle that a texture fills, thrown onto the body along z.
+        Rectangle of the texture, projected onto the body along z.
     """
 
     shape: Literal["implicit"]
@@ -57,7 +57,7 @@ class Implicit(Shape):
         if not field.min() < 0:
             raise ValueError("the parts leave nothing, or nothing as large as a cell")
         points, faces, normals, _ = marching_cubes(field, 0.0, gradient_direction="ascent", allow_degenerate=False)
-        # gradients of the field itself: marching cubes' own are those of whole cells
+        # gradients of the field: those of marching cubes are differences over whole cells
         slopes = np.stack([_sample(np.gradient(field, axis=axis), points) for axis in range(3)], axis=1)
         length = np.linalg.norm(slopes, axis=1, keepdims=True)
         normals = np.where(length > 1e-6, slopes / np.maximum(length, 1e-6), normals)
@@ -73,7 +73,7 @@ class Implicit(Shape):
         return Mesh(vertices, faces, unit_rows(normals.astype(np.float64)), uv, self._colours(vertices))
 
     def _placed(self) -> list[tuple[Any, float]]:
-        """Every part with the sign of its x; a mirrored one twice."""
+        """Yield every part with the sign of its x; mirrored parts twice."""
         return [(part, sign) for part in self.parts for sign in ((1.0, -1.0) if part.mirrored else (1.0,))]
 
     def _box(self, part: Part, sign: float) -> tuple[Array, Array]:
@@ -85,14 +85,14 @@ class Implicit(Shape):
         return low - reach, high + reach
 
     def _grid(self) -> tuple[Array, Array]:
-        """Least corner, and number of points along each axis."""
+        """Return the least corner and the number of points along each axis."""
         every = [self._box(part, sign) for part, sign in self._placed() if part.op == "add"]
         low = np.min([box[0] for box in every], axis=0)
         high = np.max([box[1] for box in every], axis=0)
         return low, np.ceil((high - low) / self.cell_mm).astype(int) + 1
 
     def _field(self, x: Array, y: Array, z: Array) -> NDArray[np.float32]:
-        """The parts' joint distance on a grid; each is worked out only where it can matter."""
+        """Return the distance of the whole body on a grid; parts are evaluated only near their surface."""
         far = np.float32(1e3 * self.cell_mm)
         field = np.full((len(x), len(y), len(z)), far, np.float32)
         for part, sign in self._placed():
@@ -118,7 +118,7 @@ class Implicit(Shape):
         return -_smooth_least(-so_far, -near, part.blend_mm)
 
     def _colours(self, vertices: Array) -> Array | None:
-        """Each vertex has the colour of the part it lies on, running over where two blend."""
+        """Return the colours of vertices by part, interpolated where parts blend."""
         if all(part.colour == (1.0, 1.0, 1.0) for part in self.parts):
             return None
         x, y, z = vertices.T
@@ -139,7 +139,7 @@ class Implicit(Shape):
 
 
 def _smooth_least(a: Array, b: Array, blend: float) -> Array:
-    """The lesser, lowered where the two are less than ``blend`` apart so that it has no kink."""
+    """Return the smooth minimum of two distances, which blends differences below ``blend``."""
     least = np.minimum(a, b)
     if blend == 0:
         return least
@@ -148,7 +148,7 @@ def _smooth_least(a: Array, b: Array, blend: float) -> Array:
 
 
 def _sample(values: Array, points: Array) -> Array:
-    """Values of a grid at points on its edges, in cells."""
+    """Return the values of a grid at points on its edges, in cells."""
     first = np.minimum(np.floor(points).astype(int), np.array(values.shape) - 2)
     part = points - first
     i, j, k = first.T

@@ -16,18 +16,18 @@ Array = NDArray[Any]
 
 
 class Part(BaseModel):
-    """What all parts of an implicit body share.
+    """Base of the parts of an implicit body.
 
     Parameters
     ----------
     op : {"add", "cut", "keep", "paint"}
-        Join it to the parts before, take it away from them, leave only what lies in it, or only colour what does.
+        Union with the parts before, difference, intersection, or only a change of colour.
     blend_mm : float
-        Over what distance the joint is rounded; of a painted part, how soft its border is.
+        Distance over which the joint is rounded, or over which a painted colour is blended.
     mirrored : bool
-        The same part once more, at −x.
+        True for a second copy of the part at −x.
     colour : sRGB, optional
-        Colour of the vertices that this part brings about; a part without one leaves them white.
+        Colour of the vertices of this part; white without one.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -38,11 +38,11 @@ class Part(BaseModel):
     colour: Colour = (1.0, 1.0, 1.0)
 
     def distance(self, x: Array, y: Array, z: Array) -> Array:
-        """About the distance from the surface, negative inside, exact on it."""
+        """Return the approximate signed distance to the surface: exact on it, negative inside."""
         raise NotImplementedError
 
     def bounds(self) -> tuple[Array, Array]:
-        """Least and greatest corner of a box around it."""
+        """Return the least and greatest corner of a bounding box."""
         raise NotImplementedError
 
 
@@ -50,7 +50,7 @@ class _Turned(Part):
     rotate_deg: Point3 = (0.0, 0.0, 0.0)
 
     def own(self, x: Array, y: Array, z: Array) -> list[Array]:
-        """Points in the part's own frame."""
+        """Return points in the frame of the part."""
         turn = rotation(self.rotate_deg)
         dx, dy, dz = x - self.at_mm[0], y - self.at_mm[1], z - self.at_mm[2]
         if not any(self.rotate_deg):
@@ -63,7 +63,7 @@ class _Turned(Part):
 
 
 class Ball(_Turned):
-    """An ellipsoid of three half axes."""
+    """Ellipsoid of three half axes."""
 
     part: Literal["ball"]
     radii_mm: Sizes
@@ -72,7 +72,7 @@ class Ball(_Turned):
         own, r = self.own(x, y, z), self.radii_mm
         once = np.sqrt(sum((p / a) ** 2 for p, a in zip(own, r, strict=True)))
         twice = np.sqrt(sum((p / a**2) ** 2 for p, a in zip(own, r, strict=True)))
-        # first order: exact on the surface, and of slope 1 there
+        # first order: exact, with slope 1, on the surface
         return np.where(twice > 0, once * (once - 1) / np.maximum(twice, 1e-12), -min(r))
 
     def bounds(self) -> tuple[Array, Array]:
@@ -80,7 +80,7 @@ class Ball(_Turned):
 
 
 class Block(_Turned):
-    """A box with edges rounded by ``round_mm``."""
+    """Box with edges rounded by ``round_mm``."""
 
     part: Literal["block"]
     size_mm: Sizes
@@ -101,7 +101,7 @@ class Block(_Turned):
 
 
 class Capsule(Part):
-    """A rounded rod from ``at_mm`` to ``to_mm``, of ``radius_mm`` running to ``end_radius_mm``."""
+    """Capsule from ``at_mm`` to ``to_mm``, with radii from ``radius_mm`` to ``end_radius_mm``."""
 
     part: Literal["capsule"]
     to_mm: Point3
@@ -127,9 +127,9 @@ class Capsule(Part):
 
 
 class Tube(Part):
-    """A smooth curve through points (x, y, z, radius), thickened by the radius.
+    """Tube: a smooth curve through points (x, y, z, radius), thickened by the radius.
 
-    The nearest point is looked for on ``steps`` straight pieces; the curve itself is smooth.
+    The search for the nearest point starts on ``steps`` straight pieces; the curve is smooth.
     """
 
     part: Literal["tube"]
@@ -149,7 +149,7 @@ class Tube(Part):
             closer = off < nearest
             np.copyto(nearest, off, where=closer)
             np.copyto(place, t + i, where=closer)
-        # From there to the curve itself, by two steps of Gauss and Newton: pieces would show as rings.
+        # Two Gauss–Newton steps towards the smooth curve; straight pieces would be visible as rings.
         fine = self._curve(32 * self.steps)
         parameter = np.linspace(0, self.steps, len(fine))
         speed = np.gradient(fine[:, :3], parameter, axis=0)
@@ -167,7 +167,7 @@ class Tube(Part):
 
     def _curve(self, steps: int) -> Array:
         curve = smooth_curve(np.array(self.points_mm, float), steps) + np.array([*self.at_mm, 0.0])
-        # between a thick and a thin point the curve may dip below the thin one
+        # between a thick and a thin point the interpolated radius may fall below the thin one
         curve[:, 3] = np.maximum(curve[:, 3], min(point[3] for point in self.points_mm))
         return np.asarray(curve)
 

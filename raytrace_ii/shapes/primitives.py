@@ -1,6 +1,6 @@
 """Primitive shapes: sphere, box, plane, cylinder, surface of revolution, grid of boxes.
 
-Every mesh stands in its own frame, x right, y up, z away, millimetres, with outward faces.
+Meshes are in a frame of their own: x right, y up, z away, millimetres. Faces are outward.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ NotNegative = Annotated[float, Field(ge=0)]
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Vertices (V, 3) and faces (F, 3); normals (V, 3), or None for flat shading; uv (V, 2), or None.
+    """Mesh: vertices (V, 3), faces (F, 3), normals (V, 3) or None for flat shading, uv (V, 2) or None.
 
-    ``colours`` (V, 3) are linear colours of the vertices, or None.
+    ``colours`` (V, 3) are linear vertex colours, or None.
     """
 
     vertices: NDArray[np.float64]
@@ -34,11 +34,11 @@ class Mesh:
     colours: NDArray[np.float64] | None = None
 
 
-MOST_TRIANGLES = 8_000_000  # of one shape: about 7 s and 1.2 GB to make (heightfield), 1.6 GB when it is traced
+MOST_TRIANGLES = 8_000_000  # of one shape; a heightfield of this size takes 7 s and 1.2 GB, and 1.6 GB in tracing
 
 
 class Shape(BaseModel):
-    """What all shapes share: only known parameters, only finite numbers, no more triangles than fit in memory."""
+    """Base of all shapes: known parameters only, finite numbers, a bounded number of triangles."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -46,18 +46,20 @@ class Shape(BaseModel):
         raise NotImplementedError
 
     def triangles(self) -> int:
-        """About how many triangles the mesh has, told before it is made."""
+        """Return an estimate of the number of triangles, before the mesh is computed."""
         return 12
 
     @model_validator(mode="after")
     def _bounded(self) -> Self:
         if (count := self.triangles()) > MOST_TRIANGLES:
-            raise ValueError(f"about {float(min(count, 10**300)):.2g} triangles: at most {MOST_TRIANGLES} are made")
+            raise ValueError(
+                f"about {float(min(count, 10**300)):.2g} triangles: at most {MOST_TRIANGLES} are allowed"
+            )
         return self
 
 
 class Sphere(Shape):
-    """A sphere about the origin; ``segments`` around, half as many from pole to pole."""
+    """Sphere about the origin; ``segments`` around, half as many from pole to pole."""
 
     shape: Literal["sphere"]
     radius_mm: PositiveFloat
@@ -75,7 +77,7 @@ class Sphere(Shape):
 
 
 class Box(Shape):
-    """A box about the origin, flat; every side shows the whole texture."""
+    """Box about the origin, flat-shaded; every side shows the whole texture."""
 
     shape: Literal["box"]
     size_mm: Sizes
@@ -85,7 +87,7 @@ class Box(Shape):
 
 
 class Plane(Shape):
-    """A rectangle in y = 0 that faces up, ``size_mm`` along x and z."""
+    """Upward rectangle in y = 0, ``size_mm`` along x and z."""
 
     shape: Literal["plane"]
     size_mm: tuple[PositiveFloat, PositiveFloat]
@@ -98,7 +100,7 @@ class Plane(Shape):
 
 
 class Cylinder(Shape):
-    """A closed cylinder about y, its base at y = 0; a ``top_mm`` other than ``radius_mm`` makes it a cone."""
+    """Closed cylinder about y with its base at y = 0; a cone if ``top_mm`` differs from ``radius_mm``."""
 
     shape: Literal["cylinder"]
     radius_mm: PositiveFloat
@@ -118,16 +120,16 @@ class Cylinder(Shape):
 
 
 class Revolve(Shape):
-    """A smooth curve through points (radius, height) turned about y.
+    """Surface of revolution: a smooth curve through points (radius, height), revolved about y.
 
     Parameters
     ----------
     profile_mm : list of (radius, height)
-        From the bottom up along the outside; ends on radius 0 close the body.
+        From the bottom up along the outside; ends at radius 0 close the body.
     lobes, lobe_depth : int, float
-        That many bulges around, of that share of the radius, strongest at the bottom: the foot of an apple.
+        Number and relative height of bulges around, strongest at the bottom, as at the foot of an apple.
     sideways_mm : (x, z)
-        How far the top leans over, growing with the square of the height.
+        Shift of the top; points shift with the square of their height.
     """
 
     shape: Literal["revolve"]
@@ -161,18 +163,18 @@ class Revolve(Shape):
 
 
 class BoxGrid(Shape):
-    """Many boxes in rows: ``count`` along x, y, z, ``spacing_mm`` apart from centre to centre, about the origin.
+    """Grid of boxes: ``count`` along x, y and z, centres ``spacing_mm`` apart, about the origin.
 
     Parameters
     ----------
     box_mm : float
         Side of a box.
     jitter : float
-        How far a box may turn and shift at random, 0 to 1.
+        Strength of random rotations and shifts, 0 to 1.
     grow : float
-        How much wider rows stand apart per row further back; 0 is a regular grid.
+        Growth of the distance between rows, per row towards the back; 0 is a regular grid.
     tiles : int
-        The texture image holds tiles × tiles pictures; each side of each box shows one of them.
+        Side of the grid of pictures in the texture image; each side of a box shows one picture.
     """
 
     shape: Literal["box_grid"]
@@ -201,9 +203,9 @@ class BoxGrid(Shape):
 
 
 def revolve(profile: NDArray[np.float64], segments: int, bend: Any = None) -> Mesh:
-    """A polyline (n, 2) of (radius, height), bottom to top, turned about y, smooth; ``bend`` moves its points.
+    """Return the smooth mesh of a polyline (n, 2) of (radius, height), revolved about y; ``bend`` moves its points.
 
-    The seam is doubled, so that u runs from 0 to 1; v runs along the profile.
+    Vertices of the seam are doubled, so that u runs from 0 to 1; v runs along the profile.
     """
     rows = len(profile)
     angle = np.linspace(0, 2 * np.pi, segments + 1)
@@ -217,7 +219,7 @@ def revolve(profile: NDArray[np.float64], segments: int, bend: Any = None) -> Me
     along = np.gradient(points, axis=0)
     ring = points[:, :-1]
     around = (np.roll(ring, -1, axis=1) - np.roll(ring, 1, axis=1))[:, [*range(segments), 0]]
-    for end, inner in ((0, 1), (-1, -2)):  # a pole has no way around it: its neighbours' is the same way
+    for end, inner in ((0, 1), (-1, -2)):  # a pole has no tangent around the axis: use that of its neighbours
         if np.ptp(profile[end, 0]) == 0 and profile[end, 0] == 0:
             around[end] = around[inner]
     normals = np.cross(along, around)
@@ -239,18 +241,18 @@ def boxes(
     tile: NDArray[np.int64] | None = None,
     tiles: int = 1,
 ) -> Mesh:
-    """Flat boxes (n, 3), of sizes (n, 3), turned by matrices (n, 3, 3), with one of tiles² texture tiles a side."""
+    """Return boxes at (n, 3), of sizes (n, 3), rotated by (n, 3, 3), with one of tiles² texture tiles per side."""
     n = len(centres)
     corners, uv = [], []
     for axis in range(3):
         for sign in (-1.0, 1.0):
-            # Two edges that turn into the outward normal, so that the corners go round it.
+            # Two edges whose cross product is the outward normal.
             first, second = ((axis + 1) % 3, (axis + 2) % 3) if sign > 0 else ((axis + 2) % 3, (axis + 1) % 3)
             side = np.zeros((4, 3))
             side[:, axis] = sign
             side[:, first], side[:, second] = (-1, 1, 1, -1), (-1, -1, 1, 1)
             corners.append(side / 2)
-            # Seen from outside, u runs to the right; v runs up on standing sides.
+            # From outside, u runs to the right, and v runs up on vertical sides.
             along_second = [[0, 0], [0, 1], [1, 1], [1, 0]]
             against_first = [[1, 0], [0, 0], [0, 1], [1, 1]]
             uv.append(np.array(against_first if second == 1 else along_second, float))
@@ -266,7 +268,7 @@ def boxes(
 
 
 def smooth_curve(points: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
-    """A Catmull–Rom curve through points (n, any), ``steps`` pieces in all, evenly in parameter."""
+    """Return a Catmull–Rom curve through points (n, any) in ``steps`` pieces, even in parameter."""
     padded = np.concatenate([[2 * points[0] - points[1]], points, [2 * points[-1] - points[-2]]])
     t = np.linspace(0, len(points) - 1, steps + 1)
     i = np.minimum(t.astype(int), len(points) - 2)
@@ -278,7 +280,7 @@ def smooth_curve(points: NDArray[np.float64], steps: int) -> NDArray[np.float64]
 
 
 def rotation(degrees: Point3) -> NDArray[np.float64]:
-    """Turn about x (y towards z), then y (z towards x), then z (x towards y)."""
+    """Return the rotation about x (y towards z), then y (z towards x), then z (x towards y)."""
     return _rotations(np.radians([degrees]))[0]
 
 
@@ -296,7 +298,7 @@ def _rotations(radians: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _without_slivers(mesh: Mesh) -> Mesh:
-    """The mesh without faces that have two corners in one place, as at the poles of a body of revolution."""
+    """Return the mesh without faces with two equal corners, as at the poles of a surface of revolution."""
     p = mesh.vertices[mesh.faces]
     good = ~((p[:, 0] == p[:, 1]).all(1) | (p[:, 1] == p[:, 2]).all(1) | (p[:, 2] == p[:, 0]).all(1))
     return Mesh(mesh.vertices, mesh.faces[good], mesh.normals, mesh.uv)

@@ -16,9 +16,9 @@ Array = NDArray[Any]
 
 
 class Strands(Shape):
-    """Hair: thin ribbons that grow from a head about the origin, are combed, fall, and lie on the head.
+    """Hair: thin ribbons from a head about the origin, combed, falling, and lying on the head.
 
-    The head is an ellipsoid that looks to −z.
+    The head is an ellipsoid that faces −z.
 
     Parameters
     ----------
@@ -26,21 +26,21 @@ class Strands(Shape):
     radii_mm : (x, y, z)
         Half axes of the head.
     length_mm, width_mm : float
-        Of a strand; lengths vary by a fifth.
+        Size of a strand; lengths vary by a fifth.
     steps : int
         Pieces of a strand.
     volume : float
-        How far the outermost strands lie off the head, as a share of its size.
+        Distance of the outermost strands from the head, relative to its size.
     parting_mm : float
-        x of the parting, from which hair is combed to both sides.
+        x of the parting.
     weight : float
-        How soon a strand turns down: 0 stands off straight.
+        How soon a strand turns down; 0 is straight.
     wave_mm, wavelength_mm : float
-        How far strands swing aside, in locks, and over what length.
+        Amplitude and wavelength of the waves of locks.
     face : float
-        Half width of the face left free, as a share of the head's.
+        Half width of the uncovered face, relative to the head's.
     colours : (dark, light)
-        Each strand has a colour between these.
+        Range of the colours of strands.
     """
 
     shape: Literal["strands"]
@@ -74,7 +74,7 @@ class Strands(Shape):
         across = np.cross(along, facing)
         half = (0.5 * widths)[..., None] * across
         sides = np.stack([points - half, points + half], axis=2)
-        # bent as if the strand were round, so that each shows a light and a dark side
+        # normals of a round strand, so that each has a light and a dark side
         normals = unit_rows(np.stack([facing - 0.8 * across, facing + 0.8 * across], axis=2))
         n, rows = self.count, self.steps + 1
         first = (np.arange(n)[:, None] * rows + np.arange(self.steps)).reshape(-1) * 2
@@ -96,7 +96,7 @@ class Strands(Shape):
         )
 
     def _roots(self, generator: np.random.Generator) -> Array:
-        """Directions from the head's middle to where hair grows: not on the face, not under the chin."""
+        """Return directions from the centre of the head to roots of hair, without face and chin."""
         found = np.empty((0, 3))
         while len(found) < self.count:
             n = unit_rows(generator.normal(size=(4 * self.count, 3)))
@@ -109,12 +109,12 @@ class Strands(Shape):
         n = self.count
         step = self.length_mm * generator.uniform(0.8, 1.0, n) / self.steps
         layer = 1 + self.volume * generator.uniform(0.05, 1, n) ** 0.8
-        # hair lies in locks: neighbours share their swing
+        # locks: neighbouring strands have equal waves
         lock = np.round(np.arctan2(out[:, 0], out[:, 2]) * 7) + 37 * np.round(out[:, 1] * 4)
         phase = 2.4 * lock + generator.normal(0, 0.35, n)
         side = np.where(out[:, 0] * radii[0] >= self.parting_mm, 1.0, -1.0)
         point = out * radii * 1.01
-        behind = np.maximum(out[:, 2], 0)  # what grows there falls where it is
+        behind = np.maximum(out[:, 2], 0)  # strands at the back fall straight
         combed = np.column_stack([side * 0.9 * (1 - behind) ** 2, 0.15 * np.ones(n), 0.45 * np.ones(n)])
         heading = unit_rows(0.6 * out + combed + generator.normal(0, 0.08, (n, 3)))
         points = [point]
@@ -140,9 +140,9 @@ class Strands(Shape):
         return line, widths
 
     def _off_head(self, point: Array, radii: Array, layer: Array, side: Array) -> Array:
-        """Push points out of the head, and off the face to their own side."""
+        """Move points out of the head, and away from the face to their side."""
         size = np.linalg.norm(point / radii, axis=1)
-        # below its middle the head has a neck: hair hangs straight down round it
+        # below its centre the head is a cylinder: hair hangs straight down
         flat = np.array([1.0, 0.0, 1.0])
         below = point[:, 1] < 0
         ring = np.linalg.norm(point * flat / radii, axis=1)
@@ -154,7 +154,7 @@ class Strands(Shape):
         return self._off_face(point, radii, side)
 
     def _off_face(self, point: Array, radii: Array, side: Array) -> Array:
-        """A curtain that opens from the hairline down, and under the chin lies wholly to the sides and behind."""
+        """Return the half width of the opening of hair: it grows from the hairline down to the chin."""
         high = point[..., 1] / radii[1]
         free = self.face * radii[0] * np.sqrt(np.clip((0.62 - high) / 0.55, 0, 1))
         inside = (point[..., 2] < np.where(high < -0.6, 0.35, -0.1) * radii[2]) & (np.abs(point[..., 0]) < free)

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-SAME = 1e-6  # of the largest coordinate: corners nearer than this are one, as single precision places them
+SAME = 1e-6  # of the largest coordinate: nearer corners are equal, as in single precision
 
 
 def flaw(vertices: NDArray[Any], faces: NDArray[Any]) -> str | None:
-    """Why a mesh has no inside, in a few words; None if it has one and its faces look out of it.
+    """Return the reason why a mesh is not watertight; None if it is, with outward faces.
 
-    Closed is what runs through every edge as often one way as the other, so that bodies may touch along an edge.
-    Corners in one place are one corner, whatever their numbers: seams of texture coordinates do no harm.
+    In a closed mesh, faces run through every edge equally often in both directions; bodies may touch along an edge.
+    Corners at one position count as one, so that seams of texture coordinates do not matter.
     """
     vertices, faces = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
     open_edges = _open_edges(faces)
@@ -28,18 +28,18 @@ def flaw(vertices: NDArray[Any], faces: NDArray[Any]) -> str | None:
 
 
 def _open_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(n, 2) edges, low corner first, that are not run through as often one way as the other."""
+    """Return the edges (n, 2), low corner first, with unequal numbers of faces in both directions."""
     start, end = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     span = int(faces.max()) + 1
     up, ups = np.unique((start * span + end)[start < end], return_counts=True)
-    down, downs = np.unique((end * span + start)[end < start], return_counts=True)  # start = end: a face of no area
+    down, downs = np.unique((end * span + start)[end < start], return_counts=True)  # start = end: a face without area
     _, i, j = np.intersect1d(up, down, assume_unique=True, return_indices=True)
     paired = ups[i] == downs[j]
     return np.column_stack(np.divmod(np.union1d(np.delete(up, i[paired]), np.delete(down, j[paired])), span))
 
 
 def _merged(vertices: NDArray[np.float64], loose: NDArray[np.int64]) -> NDArray[np.int64]:
-    """A number for every vertex, the same for those of ``loose`` that lie in one place."""
+    """Return a number for every vertex, equal for vertices of ``loose`` at one position."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree

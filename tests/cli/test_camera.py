@@ -73,13 +73,16 @@ def test_where_a_camera_stands(run, refused, tmp_path):
 
 def test_cameras_that_cannot_be(run, refused, tmp_path):
     refused(run("camera", "nope", "-o", tmp_path / "c"), "unknown camera 'nope'")
-    refused(run("camera"), "no camera is named")
+    refused(run("camera"), "a camera is needed")
     refused(run("camera", "setup1", "--scale", 64, "--format", "bmp", "-o", tmp_path / "c"), "unknown format 'bmp'")
     assert not list(tmp_path.iterdir())
     folder = tmp_path / "cam"
     assert run("camera", "setup1", "--scale", 64, "-o", folder)[0] == 0
     refused(run("camera", "setup1", "--scale", 64, "-o", folder), "--force replaces it")
-    refused(run("render", "apples", "--camera", folder, "--scale", 2, "-o", tmp_path / "a.png"), "maps have the size")
+    refused(
+        run("render", "apples", "--camera", folder, "--scale", 2, "-o", tmp_path / "a.png"),
+        "stored maps have a fixed size",
+    )
     (folder / "L.png").unlink()
     refused(run("render", "apples", "--camera", folder, "-o", tmp_path / "a.png"), "L.png does not exist")
     assert not (tmp_path / "a.png").exists()

@@ -160,7 +160,7 @@ def test_points_of_another_picture_or_measure_are_not_taken(tmp_path):
 
 def test_a_study_that_cannot_be_leaves_nothing(run, refused, picture, tmp_path):
     refused(run("study", picture, "--schemes", "si-h264,si-h26", "-o", tmp_path / "s"), "unknown scheme 'si-h26'")
-    refused(run("study", picture, "--rates", "1,two", "-o", tmp_path / "s"), "numbers parted by commas")
+    refused(run("study", picture, "--rates", "1,two", "-o", tmp_path / "s"), "numbers separated by commas")
     assert not list(tmp_path.iterdir())
 
 

@@ -72,7 +72,7 @@ def test_components(run, shot, tmp_path, kind, count, size):
 def test_refused(run, refused, shot, tmp_path):
     out = tmp_path / "o.png"
     refused(run("export", shot, "--to", "cube", "-o", out), "unknown layout 'cube': known are views, hci")
-    refused(run("export", shot, "--depth", shot, "-o", out), "depth has no place in layout views")
+    refused(run("export", shot, "--depth", shot, "-o", out), "depth is no option of layout views")
     refused(run("export", shot, "--to", "quilt", "--row", 16, "-o", out), "row is 16: the picture has 16 rows")
     refused(run("components", shot, "--type", "vi", "-o", out), "unknown component image 'vi'")
     refused(run("import", shot, "-o", out), "is no folder and its name says no _qsCxRaA")

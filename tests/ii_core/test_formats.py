@@ -380,4 +380,4 @@ def test_deshift_is_on_the_command_line(run, refused, tmp_path):
     assert run("regular", tmp_path / "h.png", "--deshift", "-o", tmp_path / "r.png")[0] == 0
     np.testing.assert_array_equal(IIPicture.load(tmp_path / "r.png").pixels, resampled(made, deshift=True)[0].pixels)
     command = ("regular", tmp_path / "h.png", "--deshift", "--method", "rectangle", "-o", tmp_path / "s.png")
-    refused(run(*command), "deshift has no place in method rectangle")
+    refused(run(*command), "deshift is no option of method rectangle")

@@ -608,7 +608,7 @@ material = "m"
 @pytest.mark.parametrize(
     ("shape", "says"),
     [
-        ('shape = "sphere"\nradius_mm = 1\nsegments = 20000', "about 4e+08 triangles: at most 8000000 are made"),
+        ('shape = "sphere"\nradius_mm = 1\nsegments = 20000', "about 4e+08 triangles: at most 8000000 are allowed"),
         ('shape = "cylinder"\nradius_mm = 1\nheight_mm = 1\nsegments = 900000000', "about 3.6e+09 triangles"),
         ('shape = "revolve"\nprofile_mm = [[1, 0], [1, 1]]\nsteps = 2000000000', "about 3.8e+11 triangles"),
         ('shape = "box_grid"\ncount = [9999, 9999, 9999]\nspacing_mm = [1, 1, 1]\nbox_mm = 1', "about 1.2e+13"),
@@ -620,7 +620,7 @@ material = "m"
             'shape = "heightfield"\nsize_mm = [1, 1]\nheight_mm = 1\nfeature_mm = 1\ncells = [100000, 100000]',
             "about 2e+10 triangles",
         ),
-        ('shape = "sphere"\nradius_mm = 1\nsegments = ' + "9" * 400, "triangles: at most 8000000 are made"),
+        ('shape = "sphere"\nradius_mm = 1\nsegments = ' + "9" * 400, "triangles: at most 8000000 are allowed"),
         ('shape = "sphere"\nradius_mm = ' + "9" * 400, "radius_mm: "),
     ],
 )
