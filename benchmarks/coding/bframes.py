@@ -1,8 +1,8 @@
 """B pictures: loss in Table 5.5 of the dissertation, gain elsewhere; one condition changed at a time.
 
 ``python -m benchmarks run bframes --scale 4`` codes sub-images of four scenes with 0 to 3 and 7 B pictures between P
-pictures under several conditions. What is kept is the Bjøntegaard difference in PSNR to the same condition without
-B pictures, a row a scene and condition, in ``benchmarks/results/bframes.jsonl``.
+pictures under several conditions. The result is the Bjøntegaard difference in PSNR to the same condition without B
+pictures, one row per scene and condition in ``benchmarks/results/bframes.jsonl``.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ COUNTS = (1, 2, 3, 7)
 QUANTISERS = (21, 27, 33, 39, 45)
 RATES = (0.1, 0.2, 0.4, 0.8, 1.6)
 CQ = [{"qp": quantiser} for quantiser in QUANTISERS]
-# What is changed, the scheme, what it is asked for.
+# Condition: scheme and goals.
 CONDITIONS: list[tuple[str, str, list[dict[str, Any]]]] = [
     ("constant quantiser, B coarser by 1.3, 4:2:0", "si-h264:rate=cq,chroma=420", CQ),
     ("the same at 4:4:4", "si-h264:rate=cq", CQ),
@@ -43,7 +43,7 @@ CONDITIONS: list[tuple[str, str, list[dict[str, Any]]]] = [
 
 
 def main() -> None:
-    """Measure, print and keep."""
+    """Measure, print and record."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, default=SCALE, help="divides the number of lenses of setup1")
     parser.add_argument("--scenes", default="apples,twins,car,cuboid")
@@ -69,7 +69,7 @@ def main() -> None:
 
 
 def table() -> list[str]:
-    """Difference in dB against no B pictures, by condition and number."""
+    """Return the table of differences in dB to no B pictures, by condition and number."""
     rows = RECORDS.rows(scale=SCALE)
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     lines = [f"| `setup1` at scale {SCALE} | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]
@@ -87,7 +87,7 @@ def _decibel(value: float | None) -> str:
 
 
 def differences(picture: IIPicture, scheme: str, asked: list[dict[str, Any]]) -> dict[str, float | None]:
-    """Number of B pictures to the mean difference in dB against none; None where the curves cannot be compared."""
+    """Return mean differences in dB to no B pictures by their number; None for undefined differences."""
     most = 3 if "mpeg2" in scheme else max(COUNTS)
     without = curve(picture, scheme, 0, asked)
     out: dict[str, float | None] = {}
@@ -103,7 +103,7 @@ def differences(picture: IIPicture, scheme: str, asked: list[dict[str, Any]]) ->
 def curve(
     picture: IIPicture, scheme: str, count: int, asked: list[dict[str, Any]]
 ) -> tuple[list[float], list[float]]:
-    """Rates and PSNR with so many B pictures."""
+    """Return rates and PSNR with a number of B pictures."""
     comma = "," if ":" in scheme else ":"
     points = []
     for goal in asked:

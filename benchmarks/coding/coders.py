@@ -2,10 +2,10 @@
 
     python -m benchmarks run coders [--scale 4] [--scenes apples,car] [--schemes 'si-h264,si-av1*'] [--workers 2]
 
-The four coding scenes are rendered and coded with everything that is registered and with the trials below. Every
-scheme on every scene is a row of ``benchmarks/results/coders.jsonl``, written when it is measured: a run that was
-stopped goes on where it was. ``python -m benchmarks run coding_docs`` draws charts and fills pages from the rows. The
-anchor is the dissertation's SI-PVS: H.264, one I picture and P pictures, 4:2:0, constant quantiser, parallel order.
+The four coding scenes are rendered and coded with all registered schemes and with the trials below. Every scheme on
+every scene is a row of ``benchmarks/results/coders.jsonl``, written when it is measured, so that an interrupted run
+continues. ``python -m benchmarks run coding_docs`` draws charts and fills pages from the rows. The anchor is the
+dissertation's SI-PVS: H.264, one I picture and P pictures, 4:2:0, constant quantiser, parallel order.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ RECORDS = Records("coders", ("benchmarks.coding.coders", "benchmarks.coding.rd")
 SCENES = ("apples", "twins", "car", "cuboid")
 ANCHOR = "si-h264:chroma=420,rate=cq"
 RATES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
-# Quantisers, by coder, that spread over the qualities of the anchor's.
+# Quantisers by coder, over the anchor's range of quality.
 QUANTISERS = {
     "h264": (16, 21, 26, 31, 36, 41, 46),
     "hevc": (14, 19, 24, 29, 34, 39, 44),
@@ -45,9 +45,9 @@ QUANTISERS = {
     "avif": (8, 18, 28, 38, 46, 54, 62),
     "mpeg2": (1, 2, 4, 7, 12, 20, 31),
 }
-LETTERS = 8  # points high, of labels in the chart
-NEAR = 0.1  # of the least rate: what the recommended setting may cost more
-# One thing changed at a time: what the defaults and presets were found by.
+LETTERS = 8  # height of labels in the chart, points
+NEAR = 0.1  # of the least rate: tolerance of the recommended setting
+# Trials with one option changed, which led to defaults and presets.
 TRIALS = (
     "si-h264:rate=cq",
     "si-h264:rate=cq,depth=10",
@@ -76,14 +76,14 @@ TRIALS = (
 
 
 def main() -> None:
-    """Measure the rows that are asked for and print the table."""
+    """Measure the chosen rows and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
     parser.add_argument("--scenes", default=",".join(SCENES))
     parser.add_argument(
         "--schemes",
         default="*",
-        help="only these, * for anything, options parted by semicolons: si-av1*,si-h264:balanced;merange=64",
+        help="only these, with *, options separated by semicolons: si-av1*,si-h264:balanced;merange=64",
     )
     parser.add_argument("--workers", type=int, default=1)
     add_again(parser)
@@ -122,14 +122,14 @@ def studied(scale: int) -> list[dict[str, Any]]:
 
 
 def candidates() -> list[str]:
-    """The anchor, every scheme that can trade rate for quality, its presets, and the trials."""
+    """Return the anchor, every scheme with adjustable quality, its presets, and the trials."""
     lossy = [name for name in schemes() if qualities(name)]
     named = [f"{name}:{setting}" for name in lossy for setting in find(name).presets]
     return list(dict.fromkeys([ANCHOR, *lossy, *named, *TRIALS]))
 
 
 def qualities(scheme: str) -> list[dict[str, Any]]:
-    """What to ask a scheme for, point by point; nothing of what is lossless."""
+    """Return the goals of a scheme, point by point; none for lossless coding."""
     coder, options = parse_scheme(scheme)
     if coder.lossless(options):
         return []
@@ -146,7 +146,7 @@ def qualities(scheme: str) -> list[dict[str, Any]]:
 
 
 def curve(picture: IIPicture, scheme: str) -> list[dict[str, float]]:
-    """Rate, PSNR and CPU seconds of one run of the coder, at every quality."""
+    """Return rate, PSNR and CPU seconds of one encoder run at every quality."""
     points = []
     for goal in qualities(scheme):
         point = rd_point(picture, scheme, **goal)
@@ -164,7 +164,7 @@ def curve(picture: IIPicture, scheme: str) -> list[dict[str, float]]:
 
 
 def compared(anchor: list[dict[str, float]], points: list[dict[str, float]]) -> dict[str, Any]:
-    """Bjøntegaard rate against the anchor in percent, or why there is none; mean CPU seconds of a run."""
+    """Return the Bjøntegaard rate to the anchor in percent, or the reason without one, and mean CPU seconds."""
     seconds = statistics.mean(point["codec_seconds"] for point in points)
     pairs = [[(p["bpp"], p["psnr"]) for p in climbing(some)] for some in (anchor, points)]
     try:
@@ -175,7 +175,7 @@ def compared(anchor: list[dict[str, float]], points: list[dict[str, float]]) -> 
 
 
 def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Per scheme: the rate of every scene, their mean where all have one, and the mean seconds; best first."""
+    """Return rates of all scenes, their mean if complete, and mean seconds by scheme, best first."""
     out = []
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     for scheme in dict.fromkeys(row["scheme"] for row in rows):
@@ -190,7 +190,7 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def table(rows: list[dict[str, Any]]) -> list[str]:
-    """Lines of a Markdown table."""
+    """Return the lines of a Markdown table."""
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     lines = [f"| scheme | {' | '.join(scenes)} | mean | CPU s |", "|---" * (len(scenes) + 3) + "|"]
     best = summary(rows)
@@ -205,7 +205,7 @@ def _percent(rate: float | None) -> str:
 
 
 def front(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Those that nothing as quick is better than."""
+    """Return the Pareto front of rate and time."""
     best: list[dict[str, Any]] = []
     for row in sorted((r for r in summary(rows) if r["mean"] is not None), key=lambda r: r["seconds"]):
         if not best or row["mean"] < best[-1]["mean"]:
@@ -214,13 +214,13 @@ def front(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def recommended(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Of the front, the quickest whose rate is within NEAR of the least."""
+    """Return the fastest scheme of the front whose rate is within NEAR of the least."""
     edge = front([row for row in rows if row["scheme"] not in TRIALS])
     return next(row for row in edge if 100 + row["mean"] <= (1 + NEAR) * (100 + edge[-1]["mean"]))
 
 
 def together(shown: list[dict[str, Any]]) -> list[tuple[str, dict[str, Any]]]:
-    """A label for each point: names whose rates are alike, as a default's and a preset's, share one."""
+    """Return a label for each point; names of equal rates, such as a default and its preset, share one."""
     groups: dict[Any, list[dict[str, Any]]] = {}
     for row in shown:
         groups.setdefault((row["scheme"].partition(":")[0], round(row["mean"])), []).append(row)
@@ -233,7 +233,7 @@ def together(shown: list[dict[str, Any]]) -> list[tuple[str, dict[str, Any]]]:
 
 
 def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
-    """Encode time against rate, with the front of what is worth its time."""
+    """Draw encoding time against rate with the Pareto front."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -268,7 +268,7 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.grid(alpha=0.3, which="both")
-    figure.canvas.draw()  # only now is it known where points lie
+    figure.canvas.draw()  # fixes the positions of points
     for (names, at, _), offset in zip(named, offsets(named, axes), strict=True):
         axes.annotate(names, at, offset, textcoords="offset points", fontsize=LETTERS)
     figure.savefig(path, dpi=150)
@@ -277,7 +277,7 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
 
 
 def offsets(named: list[tuple[str, tuple[float, float], str]], axes: Any) -> list[tuple[float, float]]:
-    """Where labels stand, in typographic points from theirs: the first place that nothing else takes."""
+    """Return offsets of labels in typographic points: the first free position of each."""
     per_point = axes.figure.dpi / 72
     spots = [axes.transData.transform(at) / per_point for _, at, _ in named]
     taken = [(x - 4, y - 4, x + 4, y + 4) for x, y in spots]
@@ -294,7 +294,7 @@ def offsets(named: list[tuple[str, tuple[float, float], str]], axes: Any) -> lis
 
 
 def touch(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    """Whether two boxes (left, bottom, right, top) overlap."""
+    """Return whether two boxes (left, bottom, right, top) overlap."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 

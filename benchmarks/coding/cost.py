@@ -2,11 +2,10 @@
 
     python -m benchmarks run cost [--scale 2] [--scene apples] [--schemes si-h264,...] [--runs 3]
 
-Every scheme has a process of its own. After a small picture, which pays for imports and compiled kernels, the picture
-is coded and decoded ``runs`` times; medians of CPU time, and the growth of resident memory at its peak over what was
-there with the picture loaded, divided by the picture's own bytes (3 a pixel). Coded in the middle of the scheme's
-quantisers or qualities, in one run without search for a rate. Numbers go to ``benchmarks/results/cost.jsonl``, the
-table into ``docs/structure.md``.
+Every scheme has a process of its own. A small picture is coded first, to import libraries and compile kernels. Then
+the picture is coded and decoded ``runs`` times, in the middle of the scheme's quantisers or qualities, in one encoder
+run each. The results are medians of CPU time, and the peak growth of resident memory over the bytes of the picture.
+Numbers go to ``benchmarks/results/cost.jsonl``, the table into ``docs/structure.md``.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ PAGES = Path("/proc/self/statm")
 
 
 def main() -> None:
-    """Measure, print, keep and fill the table."""
+    """Measure, print, record and fill the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, default=SCALE)
     parser.add_argument("--scene", default=SCENE)
@@ -68,7 +67,7 @@ def tables() -> Tables:
 
 
 def apart(scheme: str, path: Path, runs: int) -> dict[str, Any]:
-    """Times and memory of one scheme in a process of its own."""
+    """Return times and memory of one scheme, from a process of its own."""
     command = [sys.executable, "-m", "benchmarks.coding.cost", "--runs", str(runs), "--one", scheme, str(path)]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
     found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
@@ -76,7 +75,7 @@ def apart(scheme: str, path: Path, runs: int) -> dict[str, Any]:
 
 
 def measured(scheme: str, picture: IIPicture, runs: int) -> dict[str, Any]:
-    """Times and memory of one scheme in this process."""
+    """Return times and memory of one scheme in this process."""
     timed_decode(sample(scheme))
     found: dict[str, list[float]] = {name: [] for name in ("encode", "encoder", "decode", "decoder")}
     encode_peak = decode_peak = 0
@@ -105,7 +104,7 @@ def measured(scheme: str, picture: IIPicture, runs: int) -> dict[str, Any]:
 
 
 def in_the_middle(picture: IIPicture, scheme: str) -> Encoded:
-    """One run of the encoder, without search."""
+    """Code with one encoder run, without search."""
     coder = find(scheme)
     if coder.lossless({key: option.default for key, option in coder.options.items()}):
         return encode(picture, scheme)
@@ -118,21 +117,21 @@ def in_the_middle(picture: IIPicture, scheme: str) -> Encoded:
 
 
 def reset_peak() -> int:
-    """Resident bytes now, which the peak is counted from."""
+    """Reset the peak; return the present resident bytes."""
     Path("/proc/self/clear_refs").write_text("5")
     return peak()
 
 
 def peak() -> int:
-    """Most resident bytes since `reset_peak`."""
+    """Return the peak of resident bytes since `reset_peak`."""
     for line in Path("/proc/self/status").read_text().splitlines():
         if line.startswith("VmHWM"):
             return int(line.split()[1]) * 1024
-    raise OSError("this system does not tell the peak of resident memory")
+    raise OSError("this system does not report the peak of resident memory")
 
 
 def table(rows: list[dict[str, Any]]) -> list[str]:
-    """A row a scheme: CPU seconds, what is ours as shares of the coder's own, memory in pictures."""
+    """Return a table of CPU seconds, our share of them, and memory in pictures, one row per scheme."""
     lines = [
         "| scheme | bpp | dB | encoder, s | ours, of that | decoder, s | ours, of encoder | ours, of decoder "
         "| peak encoding | peak decoding |",

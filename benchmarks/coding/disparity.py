@@ -2,8 +2,8 @@
 
     python -m benchmarks run disparity [--scale 2] [--scenes apples,cuboid]
 
-From the depth map alone: a point at distance z' from the lenses moves δP·z'/(Λ·δL) pixels from one sub-image to
-the next; it has no partner there if it leaves the picture or something nearer covers it. Numbers go to
+The results follow from the depth map: a point at distance z' from the lenses moves by δP·z'/(Λ·δL) pixels from one
+sub-image to the next. It has no partner there if it leaves the picture or is occluded. Numbers go to
 ``benchmarks/results/disparity.jsonl``.
 """
 
@@ -24,7 +24,7 @@ MOTION_RANGE = 16  # pixels, the coders' default
 
 
 def main() -> None:
-    """Print a table and keep it."""
+    """Print and record a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--scenes", default="apples,cuboid")
@@ -38,7 +38,7 @@ def main() -> None:
 
 
 def analyse(name: str, scale: int) -> dict[str, float]:
-    """Disparities and partners between horizontal neighbours among the sub-images of the middle row."""
+    """Return disparities and partners between horizontal neighbours in the middle row of sub-images."""
     camera = preset("setup1", scale=scale)
     shot = render(load_scene(name), camera, support=("depth",))
     assert shot.depth is not None
@@ -58,14 +58,14 @@ def analyse(name: str, scale: int) -> dict[str, float]:
 
 
 def disparity(camera: IICamera, depth: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Pixels that a point at this z moves to the right from SI_u to SI_u+1."""
+    """Return the shift of a point at z to the right from SI_u to SI_u+1, in pixels."""
     return (
         camera.pixel_pitch_mm * (depth.astype(np.float64) - camera.gap_mm) / (camera.gap_mm * camera.lens_pitch_mm[0])
     )
 
 
 def has_partner(depth: NDArray[np.float32], moved: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether the next sub-image shows the same point: the same depth, within 3 %, where the point should be."""
+    """Return whether the next sub-image shows the same point: equal depth within 3 % at its position."""
     steps, rows, columns = moved.shape
     hit = np.isfinite(moved)
     there = np.rint(np.arange(columns) + np.where(hit, moved, 0)).astype(int)

@@ -2,12 +2,12 @@
 
     python -m benchmarks run fuzz [--mutations 4000] [--workers 2] [--schemes si-h264,...] [--seed 0]
 
-Every scheme's payload of a small picture is damaged past any checksum (bits flipped, bytes cut, repeated, replaced,
-put in from another scheme's stream, told to be of another size), and whole files likewise. Each must end in a picture
-of the right shape or a ValueError, in a second, in bounded memory. Workers are processes of their own with a limit on
-their memory, so that a crash is seen; what a worker died of, or took too long for, is kept with its number, from
-which ``--scheme S --only NUMBER`` makes it again. Counts and findings are rows of
-``benchmarks/results/fuzz.jsonl``, one a scheme; a run that was stopped goes on with the schemes that have none.
+Payloads of a small picture and whole files are damaged: bits flipped, bytes cut, repeated, replaced or inserted from
+another scheme, sizes changed; checksums are corrected. Every decoding must end in a picture of the right shape or a
+ValueError, within a second of CPU time and in bounded memory. Workers are processes with a memory limit, so that
+crashes are counted. A crash or timeout is recorded with its number; ``--scheme S --only NUMBER`` repeats it. Counts
+and findings are rows of ``benchmarks/results/fuzz.jsonl``, one per scheme; an interrupted run continues with missing
+schemes.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ from ii_core.parallel import for_each
 RECORDS = Records("fuzz", ("benchmarks.coding.fuzz",))
 LENSES, EI = (16, 8), (4, 4)
 ENDS = {"picture": "a picture of the right shape", "refused": "a ValueError"}
-SLOW = 1.0  # seconds of CPU time that a refusal may take
-STUCK = 300  # seconds after which a worker is taken for stuck, however loaded the machine
-HEADROOM = 1 << 30  # bytes of address space beyond what a worker has after its first decoding
+SLOW = 1.0  # largest CPU seconds of a refusal
+STUCK = 300  # seconds without output after which a worker is killed
+HEADROOM = 1 << 30  # bytes of address space beyond those after the first decoding
 
 
 def main() -> None:
-    """Damage, count, keep."""
+    """Damage, count and record."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--mutations", type=int, default=4000, help="of each scheme")
     parser.add_argument("--workers", type=int, default=2)
@@ -88,7 +88,7 @@ def tables() -> Tables:
 
 
 def watched(scheme: str, seed: int, count: int) -> dict[str, Any]:
-    """All mutations of one scheme, in a process that is started again where it dies."""
+    """Return the counts of all mutations of one scheme; a worker that dies is started again."""
     counts: Counter[str] = Counter()
     findings: list[dict[str, Any]] = []
     longest, first = 0.0, 0
@@ -121,14 +121,14 @@ def watched(scheme: str, seed: int, count: int) -> dict[str, Any]:
 
 
 class Watchdog:
-    """Kills a worker that has not been heard of for too long."""
+    """Kill a worker without output for too long."""
 
     def __init__(self, worker: subprocess.Popen[str]) -> None:
         self.worker, self.fired, self._last = worker, False, time.monotonic()
         self._pool = ThreadPoolExecutor(1)
 
     def seen(self) -> None:
-        """It lives."""
+        """Restart the timeout."""
         self._last = time.monotonic()
 
     def __enter__(self) -> Watchdog:
@@ -148,10 +148,10 @@ class Watchdog:
 
 
 def work(scheme: str, seed: int, first: int, last: int, *, limit: bool = True) -> None:
-    """Decode mutations by number, a line of JSON for each."""
+    """Decode mutations by number; print a line of JSON for each."""
     coded = sample(scheme)
     strangers = [sample(name).payload for name in ("si-h264", "jpeg2000")]
-    decode(coded)  # whatever a first decoding takes is no mutation's
+    decode(coded)  # memory and time of the first decoding count for no mutation
     room = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + HEADROOM
     if limit:
         resource.setrlimit(resource.RLIMIT_AS, (room, room))
@@ -164,13 +164,13 @@ def work(scheme: str, seed: int, first: int, last: int, *, limit: bool = True) -
 
 
 def cpu_seconds() -> float:
-    """Of this process and of the decoders it ran as processes of their own."""
+    """Return CPU seconds of this process and of its decoder processes."""
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     return time.process_time() + children.ru_utime + children.ru_stime
 
 
 def sample(scheme: str) -> Encoded:
-    """A small picture with detail, coded in the middle of the scheme's range."""
+    """Return a small detailed picture, coded in the middle of the scheme's range."""
     coder = find(scheme)
     (k, l), (u, v) = LENSES, EI
     y, x = np.mgrid[: l * v, : k * u]
@@ -190,7 +190,7 @@ def sample(scheme: str) -> Encoded:
 
 
 def attempt(coded: Encoded, strangers: list[bytes], rng: np.random.Generator, path: Path) -> str:
-    """What becomes of one mutation."""
+    """Return the ending of one mutation."""
     try:
         if rng.random() < 0.8:
             mutant = replace(coded, payload=damaged(coded.payload, strangers, rng))
@@ -214,7 +214,7 @@ def attempt(coded: Encoded, strangers: list[bytes], rng: np.random.Generator, pa
 
 
 def damaged(data: bytes, strangers: list[bytes], rng: np.random.Generator) -> bytes:
-    """Bytes after one to three accidents."""
+    """Return bytes after one to three mutations."""
     mutant = bytearray(data)
     for _ in range(rng.integers(1, 4)):
         if not mutant:
@@ -245,7 +245,7 @@ def damaged(data: bytes, strangers: list[bytes], rng: np.random.Generator) -> by
 
 
 def other_structure(coded: Encoded, rng: np.random.Generator) -> dict[str, Any]:
-    """The structure with other counts: from off by one to beyond all memory."""
+    """Return the structure with other counts, from off by one to more than memory."""
     changed = {**coded.structure, "camera": None}
     for key in ("lenses", "ei_pixels"):
         factors = [1, 1, 1, 2, 3, 100, 1 << 10, 1 << 20]

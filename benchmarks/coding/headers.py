@@ -2,11 +2,11 @@
 
     python -m benchmarks run headers [--scale 4] [--scene apples] [--schemes si-hevc,...] [--sides 16,64]
 
-The pictures of ``setup2`` with fewer lenses, elementary images of 16² to 256² pixels. For every scheme and structure:
-a black picture and the scene at the coarsest quantiser, and where the stream can be taken apart the bits of its
-parameter sets and slice headers. For H.264 besides: PSNR of sub-, elementary and ray-space images at the same rates,
-beside what (5.14) and (5.15) predict. Every scheme with every structure is a row of
-``benchmarks/results/headers.jsonl``; tables go into ``docs/structure.md``.
+The pictures are those of ``setup2`` with fewer lenses and elementary images of 16² to 256² pixels. For every scheme
+and structure, a black picture and the scene are coded at the coarsest quantiser. For streams that are parsed, the
+bits of parameter sets and slice headers are counted. For H.264, PSNR of sub-images, elementary images and ray-space
+images at equal rates is compared with the predictions (5.14) and (5.15). Every scheme with every structure is a row
+of ``benchmarks/results/headers.jsonl``; tables go into ``docs/structure.md``.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def main() -> None:
 
 
 def lowest(scheme: str, picture: IIPicture) -> dict[str, Any]:
-    """The least a scheme can do with a structure: black, and with this picture."""
+    """Return the least rates of a scheme for a structure: of a black picture, and of this picture."""
     found: dict[str, Any] = {}
     try:
         black = floor(scheme, picture.lenses, picture.ei_pixels)
@@ -81,7 +81,7 @@ def lowest(scheme: str, picture: IIPicture) -> dict[str, Any]:
 
 
 def duel(picture: IIPicture) -> dict[str, Any]:
-    """PSNR of the three kinds at the same rates, H.264 with the defaults; what was not reached is left out."""
+    """Return PSNR of the three kinds at equal rates, H.264 with defaults, without missed rates."""
     psnr: dict[str, dict[float, float]] = {}
     for kind in KINDS:
         psnr[kind] = {}
@@ -119,7 +119,7 @@ def tables() -> Tables:
 
 
 def floor_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Black / scene at the coarsest, bpp, a column a structure."""
+    """Return rates of black / scene at the coarsest quantiser, bpp, one column per structure."""
     lines = ["| scheme | " + " | ".join(f"{side}²" for side in SIDES) + " |", "|---|" + "---|" * len(SIDES)]
     commits = []
     for scheme in dict.fromkeys(row["scheme"] for row in rows):
@@ -131,7 +131,7 @@ def floor_table(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def floor_cell(row: dict[str, Any]) -> str:
-    """Black / scene, and its PSNR."""
+    """Return rates of black / scene, and the PSNR of the scene."""
     if "refused" in row:
         return "–"
     quality = "lossless" if row["floor_db"] is None else f"{row['floor_db']:.1f}"
@@ -139,15 +139,15 @@ def floor_cell(row: dict[str, Any]) -> str:
 
 
 def part_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Bits per frame of a black picture."""
+    """Return the bits per frame of a black picture by purpose."""
     lines = [
-        "| scheme | EI | frames | start codes, lengths | parameter sets | slice headers | the rest | bits a frame |",
+        "| scheme | EI | frames | start codes, lengths | parameter sets | slice headers | data | bits per frame |",
         "|---|---|---|---|---|---|---|---|",
     ]
     shown = [row for row in rows if "parts" in row and row["side"] in (16, 64, 256)]
     for row in shown:
         p, j = row["parts"], row["frames"]
-        headers = "(in the rest)" if p["headers"] is None else f"{p['headers'] / j:.1f}"
+        headers = "(in data)" if p["headers"] is None else f"{p['headers'] / j:.1f}"
         total = sum(p[name] or 0 for name in ("framing", "parameters", "messages", "headers", "data"))
         lines.append(
             f"| `{row['scheme']}` | {row['side']}² | {j} | {p['framing'] / j:.1f} | {p['parameters'] / j:.1f} | "
@@ -157,7 +157,7 @@ def part_table(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def duel_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Prediction and outcome, SI against EI and RI."""
+    """Return predictions and results of SI against EI and RI."""
     lines = [
         "| EI | SI before EI by (5.14) | fewer bits black | mean gain | lowest rate SI, EI | SI before RI by (5.15) "
         "| fewer bits black | mean gain | lowest rate RI |",
@@ -173,12 +173,12 @@ def duel_table(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def yes(value: bool) -> str:
-    """A word for a table."""
+    """Return yes or no for a table."""
     return "yes" if value else "no"
 
 
 def gain(row: dict[str, Any]) -> str:
-    """dB over so many rates."""
+    """Return a gain in dB with the number of rates."""
     return "–" if row["gain_db"] is None else f"{row['gain_db']:+.1f} dB ({len(row['rates_both'])} rates)"
 
 

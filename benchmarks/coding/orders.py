@@ -2,8 +2,8 @@
 
     python -m benchmarks run orders [--scale 2] [--scenes apples,twins,car,cuboid]
 
-Correlation of consecutive frames, its spread, and residual energy, (5.3)–(5.7). Numbers go to
-``benchmarks/results/orders.jsonl``, the table into ``docs/structure.md``.
+Results are mean and standard deviation of the correlation of consecutive frames, and residual energy, (5.3)–(5.7).
+Numbers go to ``benchmarks/results/orders.jsonl``, the table into ``docs/structure.md``.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SCALE = 2  # of the page
 
 
 def main() -> None:
-    """Measure, print, keep and fill the table."""
+    """Measure, print, record and fill the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, default=SCALE)
     parser.add_argument("--scenes", default="apples,twins,car,cuboid")
@@ -37,13 +37,13 @@ def main() -> None:
 
 
 def analysed(scene: str, scale: int) -> dict[str, Any]:
-    """All orders of all kinds of component images of one scene."""
+    """Return results of all orders of all kinds of component images of one scene."""
     shot = render(load_scene(scene), preset("setup1", scale=scale), support=(), noise=1.0)
     return {"orders": [analysis.to_json() for analysis in analyse_orders(shot.picture)]}
 
 
 def measured(scale: int) -> list[dict[str, Any]]:
-    """A row an order, of the newest records of a scale."""
+    """Return one row per order from the newest records of a scale."""
     return [
         {"scene": row["scene"], "commit": row["commit"], **one}
         for row in RECORDS.rows(scale=scale)
@@ -57,7 +57,7 @@ def tables() -> Tables:
 
 
 def table(rows: list[dict[str, Any]]) -> list[str]:
-    """A row a scene and kind; a column an order: mean correlation, its spread, energy a sample."""
+    """Return a table of scenes and kinds by orders: mean correlation ± deviation, energy per sample."""
     lines = ["| scene | images | " + " | ".join(ORDERS) + " |", "|---|---|" + "---|" * len(ORDERS)]
     commits = []
     for scene, kind in dict.fromkeys((row["scene"], row["kind"]) for row in rows):

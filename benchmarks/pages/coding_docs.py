@@ -11,7 +11,7 @@ from benchmarks.pages.pictures import IMAGES
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import origin
 
-SCALE = 4  # of the larger study; the smaller one is at full size
+SCALE = 4  # of the large study; the small study is at full size
 
 
 def main() -> None:
@@ -29,7 +29,7 @@ def tables() -> Tables:
     best = ", ".join(f"`{row['scheme']}`" for row in front(others))
     page = "docs/coding.md"
     return {
-        (page, "coders"): [*size(SCALE, others), "", *table(others), "", f"Nothing quicker is better than: {best}."],
+        (page, "coders"): [*size(SCALE, others), "", *table(others), "", f"Pareto front of rate and time: {best}."],
         (page, "full"): [*size(1, full), "", *table(full)],
         (page, "trials"): [*size(SCALE, trials), "", *table(trials)],
         (page, "bframes"): bframes.table(),
@@ -38,19 +38,19 @@ def tables() -> Tables:
 
 
 def front_table(rows: list[dict[str, Any]]) -> list[str]:
-    """What nothing quicker beats, the recommended setting in bold."""
-    lines = ["| take | rate at equal PSNR | CPU s of a run | CPU s to decode |", "|---|---|---|---|"]
+    """Return the Pareto front as a table, the recommended setting in bold."""
+    lines = ["| scheme | rate at equal PSNR | encoder, CPU s | decoder, CPU s |", "|---|---|---|---|"]
     pick = recommended(rows)["scheme"]
     for row in front([row for row in rows if row["scheme"] not in TRIALS]):
         points = [point for one in rows if one["scheme"] == row["scheme"] for point in one["points"]]
         decode = statistics.mean(point["decode_seconds"] for point in points)
         name = f"**`{row['scheme']}`**" if row["scheme"] == pick else f"`{row['scheme']}`"
         lines.append(f"| {name} | {1 + row['mean'] / 100:.2f} × | {row['seconds']:.2f} | {decode:.2f} |")
-    return [*lines, "", f"In bold the quickest whose rate is within {NEAR:.0%} of the least."]
+    return [*lines, "", f"Bold: the fastest scheme whose rate is within {100 * NEAR:.0f} % of the least."]
 
 
 def size(scale: int, rows: list[dict[str, Any]]) -> list[str]:
-    """Return what was coded, what the seconds are and who measured."""
+    """Return conditions of the table: pictures, times, commits."""
     conditions = f"Pictures of `setup1` at scale {scale}; CPU seconds of one run, mean over qualities and scenes."
     return [conditions, origin(rows)]
 

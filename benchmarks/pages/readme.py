@@ -1,8 +1,7 @@
 """Measured pictures and figures of the README: ``python -m benchmarks run readme``.
 
-Takes the studies of ``make demo`` (out/demo) and of ``python examples/demo.py --scale 1 -o out/full``, keeps their
-numbers in ``benchmarks/results`` and fills the tables between the marks of README and docs/study.md from what is
-kept there.
+Copies the numbers of ``make demo`` (out/demo) and of ``python examples/demo.py --scale 1 -o out/full`` to
+``benchmarks/results``, and fills the tables of README and docs/study.md from there.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ SHOWN = ("apples_detail.png", "apples_view_front.png")
 
 
 def main() -> None:
-    """Copy what was measured and fill the tables."""
+    """Copy measured numbers and pictures, and fill the tables."""
     IMAGES.mkdir(parents=True, exist_ok=True)
     for run in SIZES:
         for study in sorted((ROOT / "out" / run).glob("*_rd.json")):
@@ -34,13 +33,13 @@ def main() -> None:
 
 
 def tables() -> Tables:
-    """Return the tables of the README, one of which the page of the study shows too."""
+    """Return the tables of the README; one is also on the page of the study."""
     made = {("README.md", "gain"): gain_table(), ("docs/study.md", "gain"): gain_table()}
     return {**made, ("README.md", "disparity"): disparity_table(), ("README.md", "speed"): speed_table()}
 
 
 def gain_table() -> list[str]:
-    """Gain of the pseudo video sequences over JPEG 2000, by scene and size."""
+    """Return the gain of pseudo video sequences over JPEG 2000 by scene and size."""
     lines = ["| scene | picture | SI-PVS | RI-PVS | EI-PVS |", "|---|---|---|---|---|"]
     commits = []
     for path in sorted(RESULTS.glob("*_*_rd.json")):
@@ -55,9 +54,10 @@ def gain_table() -> list[str]:
 
 
 def disparity_table() -> list[str]:
-    """What moves and what vanishes between neighbouring sub-images."""
+    """Return disparity and occlusion between neighbouring sub-images."""
     head = (
-        "| scene | lenses | median disparity | 90 % below | beyond motion range | no partner | step between pixels |"
+        "| scene | lenses | median disparity | 90th percentile | beyond motion range | occluded "
+        "| step between pixels |"
     )
     rows = disparity.RECORDS.rows()
     lines = [head, "|---|---|---|---|---|---|---|"] + [
@@ -70,7 +70,7 @@ def disparity_table() -> list[str]:
 
 
 def speed_table() -> list[str]:
-    """The ratios of `benchmarks.speed.ratios` beside their targets."""
+    """Return the ratios of `benchmarks.speed.ratios` beside their targets."""
     rows = ratios.measured()
     lines = ["| | target | median | from … to |", "|---|---|---|---|"] + [
         f"| {row['what']} | {row['target']} | {row['median']:.2f} | {min(row['all']):.2f} … {max(row['all']):.2f} |"

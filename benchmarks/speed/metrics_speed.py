@@ -2,10 +2,9 @@
 
     python -m benchmarks run metrics_speed
 
-Times are CPU seconds of the process, so that others on the machine count as little as can be; what runs on two
-cores takes half as long by the clock if both are free. Memory is what numpy allocates at most during a call, over
-the two pictures; that of Q_depth the growth of the process. Numbers go to ``benchmarks/results/metrics_speed.jsonl``,
-the chart drawn from them to ``docs/images/depth_cost.png``.
+Times are CPU seconds of the process, which depend little on other processes. Memory is the peak of numpy's
+allocations during a call, beyond the two pictures; for Q_depth it is the growth of the process. Numbers go to
+``benchmarks/results/metrics_speed.jsonl``, the chart to ``docs/images/depth_cost.png``.
 """
 
 from __future__ import annotations
@@ -36,10 +35,10 @@ from raytrace_ii import Shot, load_scene, render
 
 RECORDS = Records("metrics_speed", ("benchmarks.speed.metrics_speed",))
 CHART, FRONT = ROOT / "docs/images/depth_cost.png", ROOT / "docs/images/depth_pareto.png"
-NEAR = 0.05  # of the depths right: what the recommended setting may have fewer than the best
+NEAR = 0.05  # share of correct depths that the recommended setting may lose against the best
 REPEATS = 7
 SCENES, SCALE, BPP = ("apples", "twins"), 4, 0.35  # of the accuracy chart
-FARTHEST = 250  # layers of z = d·f, whatever their number
+FARTHEST = 250  # largest d of layers z = d·f
 
 
 def main() -> None:
@@ -104,7 +103,7 @@ def data() -> dict[str, list[dict[str, Any]]]:
 
 
 def tables() -> Tables:
-    """Return the tables of what is kept."""
+    """Return the tables of the records."""
     kept = data()
     lines = [f"| {row['what']} | {row['target']} | {row['value']:.3g} |" for row in kept["rows"]]
     cost = with_commits(
@@ -127,17 +126,17 @@ def full_size() -> tuple[IIPicture, IIPicture]:
 
 
 def against_numpy(metric: Callable[[IIPicture, IIPicture], object], a: IIPicture, b: IIPicture) -> float:
-    """CPU time of a measure over that of numpy's subtraction and square of bytes."""
+    """Return the CPU time of a measure over that of numpy's subtraction and square of bytes."""
 
     def plain() -> None:
-        difference = np.subtract(a.pixels, b.pixels)  # of bytes, wrong as it wraps: the least that numpy can do
+        difference = np.subtract(a.pixels, b.pixels)  # of bytes, with wraparound: a lower bound of numpy's time
         np.square(difference, out=difference)
 
     return statistics.median([_cpu(lambda: metric(a, b)) / _cpu(plain) for _ in range(REPEATS)])
 
 
 def view_seconds(a: IIPicture, b: IIPicture) -> float:
-    """CPU time of q_view less that of scikit-image's SSIM on the same five pairs of views."""
+    """Return the CPU time of q_view minus that of scikit-image's SSIM on the same five pairs of views."""
     pairs = []
     for viewpoint in five_viewpoints(a.camera).values():  # type: ignore[arg-type]
         x, y, _ = view_pair(a, b, viewpoint)
@@ -153,7 +152,7 @@ def view_seconds(a: IIPicture, b: IIPicture) -> float:
 
 
 def q_depth_at_full_size(method: str) -> tuple[float, float]:
-    """CPU seconds, and GiB by which a process grows, of the second q_depth: the first one compiles."""
+    """Return CPU seconds and memory growth in GiB of the second q_depth; the first one compiles."""
     script = f"""
 import time
 from benchmarks.speed.metrics_speed import full_size
@@ -175,7 +174,7 @@ print(time.process_time() - started, (most() - before) / 2**20)
 
 
 def accuracy(name: str) -> list[dict[str, Any]]:
-    """Error of depth and of Q_depth against CPU time, for numbers of layers and of EIs and sizes of filter."""
+    """Measure errors of depth and Q_depth and CPU time over numbers of layers, numbers of EIs and filter sizes."""
     shot = render(load_scene(name), preset("setup1", scale=SCALE), noise=1.0, support=("depth",))
     picture = shot.picture
     decoded = decode(encode(picture, "jpeg2000", bpp=BPP))
@@ -212,7 +211,7 @@ def accuracy(name: str) -> list[dict[str, Any]]:
 
 
 def compared(shot: Shot, decoded: IIPicture, found: Any, measured: Any) -> dict[str, float]:
-    """Share of depths right within 10 %, and how far Q_depth is off with the same layers, per pixel of a layer."""
+    """Return the share of depths correct within 10 %, and the error of Q_depth weighted by pixels of layers."""
     camera = shot.picture.camera
     assert camera is not None and shot.depth is not None
     z = shot.depth[virtual_camera_pixels(camera)]
@@ -225,7 +224,7 @@ def compared(shot: Shot, decoded: IIPicture, found: Any, measured: Any) -> dict[
 
 
 def draw(data: dict[str, Any]) -> Any:
-    """Accuracy against time, a row a parameter."""
+    """Draw accuracy against time, one row per parameter."""
     points = data["accuracy"]
     kinds = list(dict.fromkeys(point["what"] for point in points))
     titles = {"layers": "number of layers", "EIs": "number of EIs, B + R", "filter": "side of the filter h"}
@@ -242,8 +241,8 @@ def draw(data: dict[str, Any]) -> Any:
                     axes.annotate(point["number"], at, xytext=(3, 4), textcoords="offset points", fontsize=9)
         for axes in row:
             axes.set_title(titles[what], loc="left", fontsize=11)
-        row[0].set_ylabel("depths right within 10 % [share]")
-        row[1].set_ylabel(r"$Q_\mathrm{depth}$ off that with true depth [dB]")
+        row[0].set_ylabel("depths correct within 10 % [share]")
+        row[1].set_ylabel(r"$Q_\mathrm{depth}$ error against true depth [dB]")
     for axes in panels[-1]:
         axes.set_xlabel("CPU time [s]")
     for axes in panels.flat:
@@ -257,7 +256,7 @@ def draw(data: dict[str, Any]) -> Any:
 
 
 def fronts(points: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
-    """Scene by scene the settings that none beats in time and depths right, by time."""
+    """Return the Pareto front of time and correct depths of each scene, by time."""
     found: dict[str, list[dict[str, Any]]] = {point["scene"]: [] for point in points}
     for point in sorted(points, key=lambda p: (p["cpu_seconds"], -p["right"])):
         best = found[point["scene"]]
@@ -267,20 +266,20 @@ def fronts(points: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
 
 
 def recommended(best: list[dict[str, Any]]) -> dict[str, Any]:
-    """Of a front, the quickest with nearly as many depths right as the best."""
+    """Return the fastest setting of a front whose correct depths are near to the best."""
     return next(point for point in best if point["right"] >= best[-1]["right"] - NEAR)
 
 
 def setting(point: dict[str, Any]) -> str:
-    """In words: what was changed, the rest as by default."""
+    """Return the description of a setting by its changes from the default."""
     number = point["number"]
     changed = f"filter of {number}×{number}" if point["what"] == "filter" else f"{number} {point['what']}"
     return f"{point['method']}, {changed}"
 
 
 def front_table(data: dict[str, Any]) -> list[str]:
-    """The fronts, the recommended setting in bold."""
-    lines = ["| scene | take | depths right | Q_depth off | CPU time |", "|---|---|---|---|---|"]
+    """Return the fronts as a table, the recommended setting in bold."""
+    lines = ["| scene | setting | correct depths | error of Q_depth | CPU time |", "|---|---|---|---|---|"]
     commits = []
     for scene, best in fronts(data["accuracy"]).items():
         pick = recommended(best)
@@ -295,12 +294,12 @@ def front_table(data: dict[str, Any]) -> list[str]:
         "",
         *with_commits(lines, commits),
         "",
-        f"In bold the quickest within {100 * NEAR:.0f} of a hundred depths of the best.",
+        f"Bold: the fastest setting within {100 * NEAR:.0f} percentage points of the best.",
     ]
 
 
 def draw_front(points: list[dict[str, Any]]) -> Any:
-    """All settings of depth from focus, a panel a scene, with the front and the recommended one."""
+    """Draw all settings of depth from focus, one panel per scene, with the front and the recommended setting."""
     figure = new_figure(8.5, 5)
     best = fronts(points)
     kinds = list(dict.fromkeys((p["what"], p["method"]) for p in points))
@@ -321,7 +320,7 @@ def draw_front(points: list[dict[str, Any]]) -> Any:
         axes.plot(
             pick["cpu_seconds"], pick["right"], "*", color="black", markersize=18, zorder=2, label="recommended"
         )
-        axes.set(title=scene, xscale="log", xlabel="CPU time [s]", ylabel="depths right within 10 % [share]")
+        axes.set(title=scene, xscale="log", xlabel="CPU time [s]", ylabel="depths correct within 10 % [share]")
         axes.set_xticks([0.1, 0.2, 0.5, 1, 2], ["0.1", "0.2", "0.5", "1", "2"])
         axes.minorticks_off()
         axes.grid(True, color="0.92", linewidth=0.8)
@@ -339,7 +338,7 @@ def _cpu(call: Callable[[], object]) -> float:
 
 
 def _peak(call: Callable[[], object]) -> float:
-    """MiB that Python and numpy allocate at most during a call."""
+    """Return the peak MiB allocated by Python and numpy during a call."""
     tracemalloc.start()
     try:
         call()

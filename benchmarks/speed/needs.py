@@ -2,13 +2,12 @@
 
     python -m benchmarks run needs [--scale 16] [--scenes apples,car] [--rounds 5]
 
-Every picture is held against the full one, of the same samples, in 16 bits. *Not to be told apart* is what differs
-from it by no more than the reference set's own 8-bit picture does, with its sensor noise of one step: in PSNR, in the
-SSIM of the worst of five views, and in the error that one pixel in a thousand exceeds. The last is there for what is
-small and far off, which means hide. Of the things that a scene can do without, those that save most are left out
-first, as long as all that is left out together is not to be told apart. CPU time is the median over rounds in which
-every model is rendered once. Numbers go to ``benchmarks/results/needs.jsonl``, tables and chart to
-``docs/speed_accuracy.md``.
+Every picture is compared with the full picture of the same samples in 16 bits. A picture is *indistinguishable* if it
+differs no more than the 8-bit picture of the reference set with sensor noise of one step. The criteria are PSNR, SSIM
+of the worst of five views, and the 99.9th percentile of the error; the last detects small distant details, which
+means hide. Features are left out in the order of the time that they save, as long as the result is indistinguishable.
+CPU time is the median over rounds in which every model is rendered once. Numbers go to
+``benchmarks/results/needs.jsonl``, tables and chart to ``docs/speed_accuracy.md``.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ from raytrace_ii.tracing.packing import packed
 RECORDS = Records("needs", ("benchmarks.speed.needs", "benchmarks.speed.pareto"))
 CHART = ROOT / "docs/images/needs.png"
 PAGE, SCALE, ROUNDS = "docs/speed_accuracy.md", 16, 5
-RARE = 0.999  # share of pixels whose error is no greater than "one in a thousand exceeds"
+RARE = 0.999  # quantile of the error
 SHADOWS, FILTER = "shadows", "texture filtering"
 DEPTH, CUT = "bounces beyond {}", "triangles, × {:g}"
 CUTS = (0.25, 0.5)
@@ -73,7 +72,7 @@ def measured() -> dict[str, Any]:
 
 
 def study(name: str, scale: int, rounds: int) -> dict[str, Any]:
-    """One scene: what it uses, what each thing is worth, and the least model."""
+    """Measure one scene: its features, their effects, and the cheapest model."""
     camera, parts = preset("setup1", scale=scale), has(name)
     models = [build(name, without) for without in ((), *((part,) for part in parts))]
     full, *others = (shoot(model, camera) for model in models)
@@ -95,7 +94,7 @@ def study(name: str, scale: int, rounds: int) -> dict[str, Any]:
 
 
 def has(name: str) -> list[str]:
-    """What could be left out of a scene, one by one."""
+    """Return the features of a scene that can be left out."""
     scene = build(name, ())
     bounces = packed(scene).mirrors or packed(scene).transmits
     return [
@@ -107,7 +106,7 @@ def has(name: str) -> list[str]:
 
 
 def uses(scene: Scene) -> dict[str, int]:
-    """How many bodies have what."""
+    """Return the number of bodies by feature."""
     materials = [body.material for body in scene.bodies]
     return {
         "textures": sum(m.texture is not None for m in materials),
@@ -124,7 +123,7 @@ def uses(scene: Scene) -> dict[str, int]:
 
 
 def build(name: str, without: Sequence[str]) -> Scene:
-    """A reference scene without these things, in the one order that lets them go together."""
+    """Return a reference scene without some features, removed in the order that permits all combinations."""
     cut = min([cut for cut in CUTS if CUT.format(cut) in without], default=1.0)
     scene = loaded(name, cut)
     for part, leave_out in WITHOUT.items():
@@ -138,7 +137,7 @@ loaded = lru_cache(maxsize=len(CUTS) + 1)(cut_scene)
 
 
 def unshadowed(scene: Scene) -> Scene:
-    """As if nothing cast a shadow: no shadow ray is traced."""
+    """Return the scene without shadows: no shadow ray is traced."""
     free = replace(scene)  # with a tree of its own
     none = np.empty(0, np.float32)
 
@@ -147,7 +146,7 @@ def unshadowed(scene: Scene) -> Scene:
 
     vars(packed(free).intersector)["blocked"] = lambda o, d, reach: (np.full(len(o), -1, np.int32), 0.0)
     if packed(scene).lets_through:
-        found = packed(free).intersector.nearest_clear  # the camera's rays still ask what they start in
+        found = packed(free).intersector.nearest_clear  # camera rays still need the body in which they start
         vars(packed(free).intersector)["nearest_clear"] = lambda o, d, reach=None: (
             found(o, d) if reach is None else clear(o)
         )
@@ -155,7 +154,7 @@ def unshadowed(scene: Scene) -> Scene:
 
 
 def _bodies(change: Callable[[Body], Body]) -> Callable[[Scene], Scene]:
-    """A change of every body as one of the scene: the scene itself if nothing changes."""
+    """Return the scene with a change of every body; the same scene if nothing changes."""
 
     def changed(scene: Scene) -> Scene:
         bodies = [change(body) for body in scene.bodies]
@@ -169,7 +168,7 @@ def _bodies(change: Callable[[Body], Body]) -> Callable[[Scene], Scene]:
 
 
 def _plain(body: Body) -> Body:
-    """The mean colour of its texture all over."""
+    """Return a body with the mean colour of its texture."""
     texture = body.material.texture
     if texture is None:
         return body
@@ -178,7 +177,7 @@ def _plain(body: Body) -> Body:
 
 
 def mean_colour(texture: Any, coordinates: Any) -> NDArray[np.float64]:
-    """Linear: of an image's pixels, of two colours, or of the vertices."""
+    """Return the linear mean of an image, of two colours, or of vertex colours."""
     if isinstance(texture, Image):
         return texture.pixels.mean(axis=(0, 1), dtype=np.float64)
     if isinstance(texture, VertexColours):
@@ -188,7 +187,7 @@ def mean_colour(texture: Any, coordinates: Any) -> NDArray[np.float64]:
 
 
 def _unfiltered(body: Body) -> Body:
-    """Texels repeated 8 × 8: bilinear interpolation is left on an eighth of their width alone."""
+    """Repeat texels 8 × 8: bilinear interpolation remains on an eighth of their width."""
     texture = body.material.texture
     if not isinstance(texture, Image):
         return body
@@ -220,7 +219,7 @@ def shoot(scene: Scene, camera: IICamera) -> Shot:
 
 
 def seconds(scenes: Sequence[Scene], camera: IICamera, rounds: int) -> list[float]:
-    """Median CPU seconds of each, taken in turn so that a busy neighbour meets all."""
+    """Return the median CPU seconds of each model, interleaved so that other load affects all alike."""
     for scene in scenes:
         packed(scene)  # trees are built once and not counted
     spent = [[shoot(scene, camera).stats.cpu_seconds for scene in scenes] for _ in range(rounds)]
@@ -228,13 +227,13 @@ def seconds(scenes: Sequence[Scene], camera: IICamera, rounds: int) -> list[floa
 
 
 def noisy(picture: IIPicture) -> IIPicture:
-    """A 16-bit picture as the reference set has it: rounded to 8 bits, with sensor noise of one step."""
+    """Return a 16-bit picture as in the reference set: rounded to 8 bits, with sensor noise of one step."""
     coded = picture.with_pixels(np.rint(picture.pixels / 257).astype(np.uint8))
     return picture.with_pixels(add_sensor_noise(coded, 1.0, seed=1).pixels.astype(np.uint16) * np.uint16(257))
 
 
 def compared(full: IIPicture, other: IIPicture) -> dict[str, float]:
-    """PSNR, mean and worst SSIM of five views, and the error in steps of 8 bits that one pixel in 1000 exceeds."""
+    """Return PSNR, mean and worst SSIM of five views, and the 99.9th percentile of the error in 8-bit steps."""
     views = q_view(full, other)
     error = np.abs(full.pixels.astype(np.int32) - other.pixels).max(axis=2) / 257
     rare = float(np.quantile(error, RARE))
@@ -242,7 +241,7 @@ def compared(full: IIPicture, other: IIPicture) -> dict[str, float]:
 
 
 def alike(found: dict[str, float], limit: dict[str, float]) -> bool:
-    """Whether a picture is not to be told apart from the full one."""
+    """Return whether a picture is indistinguishable from the full one."""
     good = found["psnr"] >= limit["psnr"] and found["worst"] >= limit["worst"]
     return bool(good and found["rare"] <= limit["rare"])
 
@@ -250,7 +249,7 @@ def alike(found: dict[str, float], limit: dict[str, float]) -> bool:
 def least_model(
     name: str, camera: IICamera, full: IIPicture, left_out: Sequence[dict[str, Any]], limit: dict[str, float]
 ) -> dict[str, Any]:
-    """What can be left out together, those that save most first, with what is then left."""
+    """Return the features that can be left out together, greatest saving first, and the result."""
     without: list[str] = []
     found = compared(full, full)
     tried = [row for row in left_out if row["time"] is not None and alike(row, limit)]
@@ -263,14 +262,14 @@ def least_model(
 
 
 def _strongest(without: Sequence[str]) -> list[str]:
-    """Without what something else already says: fewer bounces are in the fewest, a coarser cut in the coarsest."""
+    """Return features without implied ones: fewest bounces imply fewer, the coarsest cut a coarser one."""
     depths = [DEPTH.format(depth) for depth in range(99) if DEPTH.format(depth) in without]
     cuts = [CUT.format(cut) for cut in sorted(CUTS) if CUT.format(cut) in without]
     return [part for part in without if part not in depths[1:] and part not in cuts[1:]]
 
 
 def fewer(scene: Scene, scale: int, full: IIPicture, rounds: int) -> list[dict[str, Any]]:
-    """Half the lenses, or half the pixels of an elementary image, each way, brought back to all of them."""
+    """Return pictures with half the lenses, or half the pixels of an elementary image, scaled back."""
     camera, lenses = preset("setup1", scale=scale), preset("setup1", scale=2 * scale)
     pixels = replace(camera, pixels=tuple(n // 2 for n in camera.pixels), pixel_pitch_mm=2 * camera.pixel_pitch_mm)
     rows = []
@@ -285,7 +284,7 @@ def fewer(scene: Scene, scale: int, full: IIPicture, rounds: int) -> list[dict[s
 
 
 def enlarged(picture: IIPicture, axes: tuple[int, int], *, linear: bool) -> NDArray[Any]:
-    """The pixels of a picture with twice the lenses (axes 0, 2 of [l, v, k, u]) or pixels a lens (1, 3) each way."""
+    """Return pixels with twice the lenses (axes 0, 2 of [l, v, k, u]) or pixels per lens (axes 1, 3) per axis."""
     field = light_field(picture.pixels, picture.lenses, picture.ei_pixels)
     if linear:
         factors = [2 if axis in axes else 1 for axis in range(5)]
@@ -298,10 +297,10 @@ def enlarged(picture: IIPicture, axes: tuple[int, int], *, linear: bool) -> NDAr
 
 
 def tables() -> Tables:
-    """Return the tables of what is kept."""
+    """Return the tables of the records."""
     scenes, camera = measured(), preset("setup1", scale=SCALE)
     (k, l), (m, n) = camera.lenses, camera.pixels
-    size = f"`setup1` at `scale={SCALE}`: {m}×{n} pixels, {k}×{l} lenses, {BASE} samples a pixel."
+    size = f"`setup1` at `scale={SCALE}`: {m}×{n} pixels, {k}×{l} lenses, {BASE} samples per pixel."
     return {
         (PAGE, "needs-size"): [size, by_scene(scenes)],
         (PAGE, "uses"): uses_table(scenes),
@@ -312,7 +311,7 @@ def tables() -> Tables:
 
 
 def uses_table(scenes: dict[str, Any]) -> list[str]:
-    """Rays a camera ray by kind, and how many bodies have what."""
+    """Return the rays per camera ray by kind, and the numbers of bodies by feature."""
     kinds = ("shadow", "reflection", "refraction", "passed")
     what = [key for key in next(iter(scenes.values()))["uses"] if key not in ("bodies", "lights")]
     lines = [f"| scene | {' | '.join(kinds)} | lights | {' | '.join(what)} |", "|---" * (len(what) + 6) + "|"]
@@ -324,9 +323,9 @@ def uses_table(scenes: dict[str, Any]) -> list[str]:
 
 
 def least_table(scenes: dict[str, Any]) -> list[str]:
-    """The limit and the least model of every scene."""
+    """Return the limits and the cheapest model of every scene."""
     lines = [
-        "| scene | can do without | PSNR | SSIM, worst view | one pixel in 1000 off by | CPU time |",
+        "| scene | features left out | PSNR | SSIM, worst view | error of the 99.9th percentile | CPU time |",
         "|---" * 6 + "|",
     ]
     for name, one in scenes.items():
@@ -341,7 +340,7 @@ def least_table(scenes: dict[str, Any]) -> list[str]:
 
 
 def needs_table(scenes: dict[str, Any]) -> list[str]:
-    """A row a thing left out, a column a scene: PSNR, SSIM, time; in bold what is not to be told apart."""
+    """Return a table of features by scenes: PSNR, SSIM, time; indistinguishable ones in bold."""
     parts = [row["what"] for one in scenes.values() for row in one["left_out"]]
     lines = [f"| without | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]
     for part in sorted(dict.fromkeys(parts), key=_place):
@@ -369,7 +368,7 @@ def percent(share: float) -> str:
 
 
 def fewer_table(scenes: dict[str, Any]) -> list[str]:
-    """Half the lenses and half the pixels."""
+    """Return the table of half the lenses and half the pixels."""
     rows = [(row["what"], row["by"]) for row in next(iter(scenes.values()))["fewer"]]
     lines = [f"| half the | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]
     for i, (what, by) in enumerate(rows):
@@ -379,12 +378,12 @@ def fewer_table(scenes: dict[str, Any]) -> list[str]:
 
 
 def draw(scenes: dict[str, Any]) -> Any:
-    """A panel a scene: how far the picture is off without each thing, and what that saves."""
+    """Draw one panel per scene: error without each feature against the saved time."""
     figure = new_figure(8.5, 13)
     for axes, (name, one) in zip(figure.subplots(4, 2).flat, scenes.items(), strict=True):
         rows = sorted(one["left_out"], key=lambda row: _place(row["what"]), reverse=True)
         limit = one["limit"]["psnr"]
-        top = limit + 25  # the same picture has no PSNR: it stands at the edge
+        top = limit + 25  # identical pictures have infinite PSNR: they stand at the edge
         x = [top if row["psnr"] is None else min(row["psnr"], top) for row in rows]
         good = [row["psnr"] is None or alike(row, one["limit"]) for row in rows]
         for y, (at, fine, row) in enumerate(zip(x, good, rows, strict=True)):
@@ -400,7 +399,7 @@ def draw(scenes: dict[str, Any]) -> Any:
         axes.spines[["top", "right"]].set_visible(False)
     for axes in figure.axes[6:]:
         axes.set_xlabel("PSNR against the full picture [dB]")
-    for fine, label in ((2, "not to be told apart"), (1, "seen to be missing")):
+    for fine, label in ((2, "indistinguishable"), (1, "visible")):
         figure.axes[0].plot([], [], "o", color=COLOURS[fine], label=label)
     figure.axes[0].plot([], [], color="0.4", linestyle=":", label="the sensor's noise")
     handles, names = figure.axes[0].get_legend_handles_labels()

@@ -2,11 +2,11 @@
 
     python -m benchmarks run pareto [--scale 32] [--scenes apples,car]
 
-The error is PSNR in 16-bit sRGB against a reference of 64 samples a pixel, 12 bounces and, where the scene's file
-says how finely its shapes are cut, triangles half as large; time is CPU seconds of `render` without support images,
-the least of two or three. Samples a pixel, adaptive sampling to an error, recursion depth and tessellation are swept;
-settings that nothing beats in both are the Pareto front. Numbers and chart go to ``benchmarks/results/pareto.jsonl``
-and tables to ``docs/speed_accuracy.md``, the chart to ``docs/images/pareto.png``.
+The error is PSNR in 16-bit sRGB against a reference of 64 samples per pixel and 12 bounces, with triangles half as
+large where the scene file sets the tessellation. Time is CPU seconds of `render` without support images, the least of
+two or three. Samples per pixel, adaptive sampling, recursion depth and tessellation are varied. Numbers and chart go
+to ``benchmarks/results/pareto.jsonl`` and tables to ``docs/speed_accuracy.md``, the chart to
+``docs/images/pareto.png``.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ AT_DEPTHS = (1, 4, 16)  # samples at which other depths are tried
 DEPTHS = (0, 1, 2, 3, 4, 6, 8)
 ERRORS = (8.0, 4.0, 2.0, 1.0, 0.5)  # of adaptive sampling between LEAST and MOST, steps of 8 bits
 LEAST, MOST = 4, 16
-FINER = 2.0  # how much finer the reference's shapes are cut
+FINER = 2.0  # tessellation of the reference
 CUTS = (0.25, 0.5, 1.0, FINER)
 TRUE = {"samples": 64, "depth": 12}
 SENSOR_DB = 47.5  # PSNR of the sensor's own noise of one 8-bit step
@@ -121,7 +121,7 @@ def study(name: str, camera: IICamera) -> dict[str, Any]:
 def shoot(
     scene: Scene, camera: IICamera, samples: int | tuple[int, int], error: float = 0.5, seed: int = 0
 ) -> tuple[IIPicture, float]:
-    """The picture and its CPU seconds: the least of two, of three if it is quick, any if it is only to be true."""
+    """Return the picture and its CPU seconds: the least of two, or of three for fast renders; one for references."""
     most = samples if isinstance(samples, int) else samples[1]
     timed = most <= max(SAMPLES)
     shots = [
@@ -141,7 +141,7 @@ def shoot(
 
 
 def at_depth(scene: Scene, depth: int) -> Scene:
-    """The scene with another recursion depth and the same tree, which does not depend on it."""
+    """Return the scene with another recursion depth and the same acceleration structure."""
     other = scene.with_depth(depth)
     share(scene, other)
     return other
@@ -152,12 +152,12 @@ def scene_text(name: str) -> str:
 
 
 def sizes(text: str) -> list[str]:
-    """The objects of a scene file that say, or may say, how finely they are cut."""
+    """Return the objects of a scene file with a tessellation."""
     return [block for block in re.split(r"(?m)^(?=\[\[object\]\])", text) if _cut(block, 2.0) != block]
 
 
 def _cut(block: str, factor: float) -> str:
-    """One object, ``factor`` times as finely cut."""
+    """Return an object with ``factor`` times the tessellation."""
     if re.search(r'(?m)^shape = "(sphere|cylinder|revolve)"', block):
         if not re.search(r"(?m)^segments", block):
             block = re.sub(r"(?m)^shape = .*$", r"\g<0>\nsegments = 96", block, count=1)
@@ -170,7 +170,7 @@ def _cut(block: str, factor: float) -> str:
 
 
 def cut_scene(name: str, factor: float) -> Scene:
-    """A reference scene with its shapes cut ``factor`` times as finely, where its file says how."""
+    """Return a reference scene with ``factor`` times the tessellation, where its file sets one."""
     if factor == 1:
         return load_scene(name)
     blocks = re.split(r"(?m)^(?=\[\[object\]\])", scene_text(name))
@@ -183,7 +183,7 @@ def cut_scene(name: str, factor: float) -> Scene:
 
 
 def front(rows: Sequence[dict[str, Any]]) -> list[int]:
-    """Rows that no other beats in time and error, by time."""
+    """Return the Pareto front of time and error, by time."""
     best: list[int] = []
     for i in sorted(range(len(rows)), key=lambda i: (rows[i]["seconds"], -rows[i]["psnr"])):
         if not best or rows[i]["psnr"] > rows[best[-1]]["psnr"]:
@@ -192,7 +192,7 @@ def front(rows: Sequence[dict[str, Any]]) -> list[int]:
 
 
 def recommended(best: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Of a front, the cheapest setting below the sensor's noise; if there is none, within 1 dB of the best."""
+    """Return the fastest setting of a front below sensor noise, else within 1 dB of the best."""
     good = [row for row in best if row["psnr"] >= SENSOR_DB]
     near = [row for row in best if row["psnr"] >= best[-1]["psnr"] - 1]
     pick, rule = (good[0], "below the sensor's noise") if good else (near[0], "within 1 dB of the best")
@@ -200,7 +200,7 @@ def recommended(best: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def setting(row: dict[str, Any]) -> str:
-    """In words."""
+    """Return the description of a setting."""
     how = f"{LEAST} to {MOST} samples, error {row['error']:g}" if row["error"] else f"{row['samples']} samples"
     how = how.replace("1 samples", "1 sample") if row["samples"] == 1 else how
     return how + (f", depth {row['depth']}" if row["depth"] else "") + (f", cut ×{row['cut']:g}" * (row["cut"] != 1))
@@ -214,7 +214,7 @@ NAMES = {
 
 
 def chart(data: dict[str, Any], target: Path) -> None:
-    """A panel a scene."""
+    """Draw one panel per scene."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -260,8 +260,8 @@ def chart(data: dict[str, Any], target: Path) -> None:
 
 
 def recommended_table(data: dict[str, Any]) -> list[str]:
-    """The pick of every scene, beside one sample."""
-    lines = ["| scene | take | PSNR | CPU time | by | one sample |", "|---|---|---|---|---|---|"]
+    """Return the recommended setting of every scene beside one sample per pixel."""
+    lines = ["| scene | setting | PSNR | CPU time | criterion | one sample |", "|---|---|---|---|---|---|"]
     for name, one in data.items():
         pick = one["recommended"]
         (first,) = [r for r in one["rows"] if r["sweep"] == "samples" and r["samples"] == 1]
@@ -273,7 +273,7 @@ def recommended_table(data: dict[str, Any]) -> list[str]:
 
 
 def samples_table(data: dict[str, Any]) -> list[str]:
-    """PSNR over samples, and the nearest adaptive setting to the most of them."""
+    """Return PSNR over samples, and the adaptive setting nearest to the largest number."""
     heads = " | ".join(f"{s}" for s in SAMPLES)
     head = f"| scene | {heads} | adaptive to ½ step | its time / {MOST} samples |"
     lines = [head, "|---" * (len(SAMPLES) + 3) + "|"]
@@ -286,7 +286,7 @@ def samples_table(data: dict[str, Any]) -> list[str]:
 
 
 def depth_table(data: dict[str, Any]) -> list[str]:
-    """Recursion depth at BASE samples: PSNR and time."""
+    """Return PSNR and time over recursion depth, at BASE samples."""
     lines = [
         "| scene | " + " | ".join(map(str, DEPTHS)) + " | the scene's |",
         "|---" * (len(DEPTHS) + 2) + "|",
@@ -302,7 +302,7 @@ def depth_table(data: dict[str, Any]) -> list[str]:
 
 
 def cut_table(data: dict[str, Any]) -> list[str]:
-    """Tessellation at BASE samples."""
+    """Return PSNR and time over tessellation, at BASE samples."""
     lines = ["| scene | " + " | ".join(f"×{cut:g}" for cut in CUTS) + " |", "|---" * (len(CUTS) + 1) + "|"]
     for name, one in data.items():
         if len(one["faces"]) == 1:
@@ -317,8 +317,8 @@ def cut_table(data: dict[str, Any]) -> list[str]:
 
 
 def maps_table(rows: list[dict[str, Any]]) -> list[str]:
-    """What `benchmarks.accuracy.map_precision` found for setup1."""
-    lines = ["| stored as | bytes a ray | largest angle off | apples | cuboid |", "|---|---|---|---|---|"]
+    """Return the results of `benchmarks.accuracy.map_precision` for setup1."""
+    lines = ["| stored as | bytes per ray | largest angular error | apples | cuboid |", "|---|---|---|---|---|"]
     for row in rows:
         psnr = [
             "exact" if p is None or not np.isfinite(p) else f"{p:.1f} dB"

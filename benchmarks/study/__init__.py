@@ -2,9 +2,9 @@
 
     python -m benchmarks run study [--scale N] [--only NAME,...] [--out DIR] [--force] [--list] [--publish]
 
-Each experiment is a few named steps, which can be run alone (``--only rates-apples``, ``--only 'views-*'``). What a
-step found is one line of ``DIR/NAME.jsonl``, with commit, machine, versions and parameters; lines are only added. A
-step that the same code has done with the same parameters and library versions is skipped; ``--force`` does it again
-and says whether pictures and numbers, times aside, came out the same to the bit. ``--publish`` copies what is there
-into ``benchmarks/results/study`` and ``docs/images/study`` and fills ``docs/study.md`` from it.
+An experiment is a few named steps, which can be run alone (``--only rates-apples``, ``--only 'views-*'``). The result
+of a step is one line of ``DIR/NAME.jsonl`` with commit, machine, versions and parameters; lines are only appended. A
+step is skipped if it has a result of the same code, parameters and library versions. ``--force`` repeats it and
+reports whether pictures and numbers other than times are bitwise equal. ``--publish`` copies results to
+``benchmarks/results/study`` and ``docs/images/study`` and fills ``docs/study.md``.
 """

@@ -15,16 +15,16 @@ from .steps import all_steps
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Choose steps, do them, publish them."""
+    """Run and publish the chosen steps."""
     parser = argparse.ArgumentParser(
         prog="benchmarks.study", description=about, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--scale", type=int, default=1, help="divides the lenses of all setups; 16 for a look")
-    parser.add_argument("--only", default="*", help="steps, * for anything: rates-apples,views-*")
-    parser.add_argument("--out", type=Path, default=None, help="where records and pictures go; out/study/scale-N")
-    parser.add_argument("--force", action="store_true", help="do again what is done, and compare")
-    parser.add_argument("--list", action="store_true", help="name the steps and do nothing")
-    parser.add_argument("--publish", action="store_true", help="fill docs/study.md from what is there afterwards")
+    parser.add_argument("--scale", type=int, default=1, help="divides the lenses of all setups; 16 for a quick look")
+    parser.add_argument("--only", default="*", help="steps, with *: rates-apples,views-*")
+    parser.add_argument("--out", type=Path, default=None, help="folder of records and pictures; out/study/scale-N")
+    parser.add_argument("--force", action="store_true", help="repeat finished steps and compare")
+    parser.add_argument("--list", action="store_true", help="list the steps only")
+    parser.add_argument("--publish", action="store_true", help="fill docs/study.md from the results")
     asked = parser.parse_args(arguments)
     try:
         steps = all_steps(asked.scale)

@@ -39,7 +39,7 @@ AXIS = {
 
 
 def draw_all(results: Results, folder: Path) -> list[Path]:
-    """Every chart that the results allow, into a folder."""
+    """Draw every chart that the results allow into a folder."""
     made: list[Path] = []
     for name, draw in CHARTS.items():
         figure = draw(results)
@@ -53,7 +53,7 @@ def draw_all(results: Results, folder: Path) -> list[Path]:
 
 
 def over_rate(step: str, schemes: Sequence[str], quality: str = "q_global") -> Callable[[Results], Any]:
-    """A chart with a panel a scene: quality over rate, hollow where a scheme cannot go lower."""
+    """Draw quality over rate, one panel per scene; hollow markers are least rates."""
 
     def draw(results: Results) -> Any:
         made = of_scenes(results, step)
@@ -70,12 +70,12 @@ def over_rate(step: str, schemes: Sequence[str], quality: str = "q_global") -> C
 
 
 def label_of(scheme: str) -> str:
-    """What charts call a scheme."""
+    """Return the label of a scheme."""
     return LABELS.get(scheme, scheme.removeprefix(f"{SI},").removeprefix("order="))
 
 
 def scene_panels(made: Mapping[str, Any]) -> tuple[Any, list[Any]]:
-    """A figure with a panel for each scene, two in a row."""
+    """Return a figure with one panel per scene, two in a row."""
     columns = min(2, len(made))
     rows = -(-len(made) // columns)
     figure = new_figure(4.6 * columns, 3.1 * rows + 0.5)
@@ -89,7 +89,7 @@ def scene_panels(made: Mapping[str, Any]) -> tuple[Any, list[Any]]:
 
 
 def curve(axes: Any, points: Sequence[Mapping[str, Any]], i: int, quality: str, label: str) -> None:
-    """One scheme's points, joined."""
+    """Draw the curve of a scheme."""
     points = sorted(points, key=lambda p: p["bpp"])
     style = {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)], "markersize": 4}
     style |= {"linestyle": LINES[i // len(COLOURS) % len(LINES)], "linewidth": 1.4}
@@ -100,7 +100,7 @@ def curve(axes: Any, points: Sequence[Mapping[str, Any]], i: int, quality: str, 
 
 
 def finished(figure: Any, panels: Sequence[Any], axis: str) -> Any:
-    """With a legend below and the quality's name at the left."""
+    """Add a legend below and the label of the quality."""
     for axes in panels:
         if axes.get_subplotspec().is_first_col():
             axes.set_ylabel(axis)
@@ -112,7 +112,7 @@ def finished(figure: Any, panels: Sequence[Any], axis: str) -> Any:
 
 
 def depth_study(scene: str, result: Mapping[str, Any]) -> dict[str, Any]:
-    """The schemes of Figure 5.22 and the other two of Figure 5.21, as `depth_rate_chart` takes them."""
+    """Return a study of the schemes of Figures 5.21 and 5.22 for `depth_rate_chart`."""
     points = []
     for scheme in (SI, "ei-h264:chroma=420", VOLUME, REFERENCE):
         for p in result["points"]:
@@ -126,7 +126,7 @@ def depth_study(scene: str, result: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def layers(results: Results) -> Any:
-    """Figure 5.21: Q_depth of every layer at equal Q_global."""
+    """Draw Figure 5.21: Q_depth of every layer at equal Q_global."""
     made = of_scenes(results, "equal")
     if not made:
         return None
@@ -145,7 +145,7 @@ def layers(results: Results) -> Any:
 
 
 def angles(results: Results) -> Any:
-    """Figure 4.6: PSNR of the middle row of sub-images at equal Q_global."""
+    """Draw Figure 4.6: PSNR of the middle row of sub-images at equal Q_global."""
     made = of_scenes(results, "equal")
     if not made:
         return None
@@ -162,7 +162,7 @@ def angles(results: Results) -> Any:
 
 
 def structures(results: Results) -> Any:
-    """Figure 5.12: SI less EI over rate, for every size of elementary image."""
+    """Draw Figure 5.12: SI minus EI over rate, for every size of elementary image."""
     made = {scene: results[f"plane-{scene}-1"] for scene in ("apples", "car") if f"plane-{scene}-1" in results}
     if not made:
         return None
@@ -183,7 +183,7 @@ def structures(results: Results) -> Any:
 
 
 def plane(results: Results) -> Any:
-    """Which component image has the best quality, over sizes of elementary image and picture; and theory."""
+    """Draw the best kind of component image over sizes of elementary image and picture, with theory."""
     duels = [d for name, result in results.items() if name.startswith("plane-apples-") for d in result["duels"]]
     if not duels:
         return None
@@ -224,7 +224,7 @@ def plane(results: Results) -> Any:
 
 
 def best_of(duel: Mapping[str, Any], rate: float) -> tuple[str | None, str]:
-    """The kind with the best quality at a rate, and by how many dB before the next; alone if no other gets there."""
+    """Return the best kind at a rate and its lead in dB; the kind alone if no other reaches the rate."""
     there = {kind: points[f"{rate:g}"] for kind, points in duel["psnr"].items() if f"{rate:g}" in points}
     if not there:
         return None, ""

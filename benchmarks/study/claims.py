@@ -27,12 +27,12 @@ NAMES = {
     "ei-h264:chroma=420": "EI",
     "ri-h264:chroma=420": "RI",
 }
-EVEN_VIEW = 0.02  # of MSSIM: what the dissertation's chart shows as one point
+EVEN_VIEW = 0.02  # of MSSIM: one point in the chart of the dissertation
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One finding of the dissertation and ours."""
+    """One result of the dissertation and ours."""
 
     figure: str
     what: str
@@ -42,7 +42,7 @@ class Claim:
 
 
 def claims(results: Results) -> list[Claim]:
-    """Everything that the results at hand allow to compare, in the order of the dissertation."""
+    """Return all comparisons that the results allow, in the order of the dissertation."""
     coding = (gains, models, floors, factors, orders, duels, picture_types, ranges, controls, times)
     found: list[Claim] = []
     for part in (*coding, views, depths):
@@ -51,19 +51,19 @@ def claims(results: Results) -> list[Claim]:
 
 
 def of_scenes(results: Results, step: str) -> dict[str, Mapping[str, Any]]:
-    """Scene to result of a step that there is for several."""
+    """Return the results of a step by scene."""
     return {scene: results[f"{step}-{scene}"] for scene in SCENES if f"{step}-{scene}" in results}
 
 
 def gain(points: Points, scheme: str, other: str, quality: str = "q_global") -> float | None:
-    """Mean difference in quality over the target rates that both reach; None if there are none."""
+    """Return the mean difference in quality over target rates that both meet; None without any."""
     mine, its = (at_targets(points, name, quality) for name in (scheme, other))
     both = mine.keys() & its.keys()
     return fmean(mine[rate] - its[rate] for rate in sorted(both)) if both else None
 
 
 def at_targets(points: Points, scheme: str, quality: str = "q_global") -> dict[float, float]:
-    """Target rate to quality, where the target was met."""
+    """Return the quality by target rate, for met targets."""
     return {p["target_bpp"]: number(p[quality]) for p in points if p["scheme"] == scheme and p["reached"]}
 
 
@@ -92,7 +92,7 @@ def models(results: Results) -> Iterator[Claim]:
 
 
 def lead(points: Points, scheme: str, others: Points, other: str) -> float | None:
-    """Mean difference in quality at the rates of the other, which misses its targets, within those of the scheme."""
+    """Return the mean difference in quality at the rates of the other scheme, within the range of this one."""
     rates, quality = zip(*((math.log(p["bpp"]), number(p["q_global"])) for p in by_rate(points, scheme)), strict=True)
     found = [
         float(np.interp(math.log(p["bpp"]), rates, quality)) - number(p["q_global"])
@@ -103,25 +103,25 @@ def lead(points: Points, scheme: str, others: Points, other: str) -> float | Non
 
 
 def by_rate(points: Points, scheme: str) -> list[Mapping[str, Any]]:
-    """A scheme's points, the lowest rate first."""
+    """Return the points of a scheme by rate."""
     return sorted((p for p in points if p["scheme"] == scheme), key=lambda p: p["bpp"])
 
 
 def claim(
     figure: str, what: str, numbers: Mapping[str, float], ours: Mapping[str, float | None], form: str, **rules: Any
 ) -> Claim:
-    """A row from numbers under names; only those that ours has are compared."""
+    """Return the comparison of numbers by name, for the names of ours."""
     numbers = {name: value for name, value in numbers.items() if name in ours}
     return Claim(figure, what, listed(numbers, form), listed(ours, form), compare(numbers, ours, **rules))
 
 
 def listed(numbers: Mapping[str, float | None], form: str) -> str:
-    """Names and numbers in a cell."""
+    """Return names and numbers as text of a cell."""
     return " · ".join(f"{name} {shown(value, form)}" for name, value in numbers.items())
 
 
 def shown(value: float | None, form: str) -> str:
-    """A number, or a dash where there is none, with a true minus."""
+    """Return a number with a minus sign, or a dash if it is missing."""
     return "–" if value is None or math.isnan(value) else format(value, form).replace("-", "−")
 
 
@@ -133,7 +133,7 @@ def floors(results: Results) -> Iterator[Claim]:
 
 
 def factors(results: Results) -> Iterator[Claim]:
-    """How many times the rate of SI-PVS others need for the same quality."""
+    """Compare the ratios of rate to SI-PVS at equal quality."""
     made = of_scenes(results, "rates")
     ours = {s: rate_ratio(made[s]["points"], SI, REFERENCE, None) for s in theirs.RATE_JPEG2000 if s in made}
     if ours:
@@ -145,10 +145,10 @@ def factors(results: Results) -> Iterator[Claim]:
 
 
 def rate_ratio(points: Points, scheme: str, other: str, quality: float | None) -> float | None:
-    """Rate of another over that of a scheme at one quality: the one given, or the other's at 1 bpp.
+    """Return the ratio of rates of another scheme and of a scheme at one quality, by default the other's at 1 bpp.
 
-    The scheme's own lowest point stands for it where it is better than that already: the ratio is then a bound from
-    below. None where either curve ends before.
+    If the scheme's lowest point is better already, its rate is used and the ratio is a lower bound. None if a curve
+    does not reach the quality.
     """
     mine, its = (rising([p for p in points if p["scheme"] == name]) for name in (scheme, other))
     if len(mine) < 2 or len(its) < 2:
@@ -162,7 +162,7 @@ def rate_ratio(points: Points, scheme: str, other: str, quality: float | None) -
 
 
 def rising(points: Points) -> list[tuple[float, float]]:
-    """(rate, quality) by rate, without those that more bits made no better."""
+    """Return (rate, quality) by rate, without points whose additional bits do not raise quality."""
     kept: list[tuple[float, float]] = []
     for rate, quality in sorted({(p["bpp"], number(p["q_global"])) for p in points}):
         if not kept or quality > kept[-1][1]:
@@ -171,7 +171,7 @@ def rising(points: Points) -> list[tuple[float, float]]:
 
 
 def log_rate_at(curve: Sequence[tuple[float, float]], quality: float) -> float | None:
-    """Logarithm of the rate at a quality; None beyond the curve's ends."""
+    """Return the logarithm of the rate at a quality; None beyond the ends of the curve."""
     if not curve[0][1] <= quality <= curve[-1][1]:
         return None
     return float(np.interp(quality, [q for _, q in curve], [math.log(r) for r, _ in curve]))
@@ -189,7 +189,7 @@ def orders(results: Results) -> Iterator[Claim]:
 
 
 def duels(results: Results) -> Iterator[Claim]:
-    """Figure 5.12: who wins, by size of elementary image."""
+    """Compare Figure 5.12: the better kind by size of elementary image."""
     for scene in ("apples", "car"):
         if f"plane-{scene}-1" not in results:
             continue
@@ -207,7 +207,7 @@ def duels(results: Results) -> Iterator[Claim]:
 
 
 def advantage(duel: Mapping[str, Any], other: str = "ei") -> float | None:
-    """Mean gain of SI in dB; where there is no rate that both reach, the sign of who reaches the lower one."""
+    """Return the mean gain of SI in dB; without a common rate, ±: the sign of the kind with the lower rate."""
     if duel[other]["gain_db"] is not None:
         return float(duel[other]["gain_db"])
     lowest = duel[other]["lowest"]
@@ -216,7 +216,7 @@ def advantage(duel: Mapping[str, Any], other: str = "ei") -> float | None:
 
 
 def words(duel: Mapping[str, Any]) -> str:
-    """The gain, or who alone is there."""
+    """Return the gain, or the only kind."""
     if duel["ei"]["gain_db"] is not None:
         return shown(duel["ei"]["gain_db"], "+.1f")
     value = advantage(duel)
@@ -263,7 +263,7 @@ def ranges(results: Results) -> Iterator[Claim]:
 
 
 def seconds(points: Points, scheme: str, what: str = "encode_seconds") -> float:
-    """Mean CPU seconds over the rates met, or over all if it is not said which were."""
+    """Return the mean CPU seconds over met rates, or over all if unknown."""
     own = [p[what] for p in points if p["scheme"] == scheme and p.get("reached", True)]
     return fmean(own) if own else math.nan
 
@@ -363,19 +363,19 @@ def depths(results: Results) -> Iterator[Claim]:
 
 
 def pooled(values: np.ndarray, pixels: np.ndarray) -> float:
-    """PSNR of the errors of several layers together; layers without pixels are none."""
+    """Return the PSNR of the pooled errors of several layers, without empty ones."""
     held = (pixels > 0) & np.isfinite(values)
     return float(-10 * np.log10(np.sum(pixels[held] * 10 ** (-values[held] / 10)) / pixels[held].sum()))
 
 
 def decline(values: np.ndarray, pixels: np.ndarray) -> float:
-    """PSNR of the nearer half of the pixels less that of the farther half."""
+    """Return the PSNR of the nearer half of the pixels minus that of the farther half."""
     near = np.cumsum(pixels) <= pixels.sum() / 2
     return pooled(values, np.where(near, pixels, 0)) - pooled(values, np.where(near, 0, pixels))
 
 
 def by_detail(row: Sequence[Any], depth_mm: Sequence[float], detail: Mapping[str, Any]) -> tuple[float, float, float]:
-    """Fluctuation of Q_depth, its correlation with the detail of the layers, and what a line on that leaves."""
+    """Return the fluctuation of Q_depth, its correlation with the detail of layers, and the residual."""
     value = dict(zip(depth_mm, (number(v) for v in row), strict=True))
     pairs = [(-10 * np.log10(1 + d), value[z]) for z, d in zip(detail["depth_mm"], detail["detail"], strict=True)]
     x, y = np.array([pair for pair in pairs if np.isfinite(pair[1])]).T
@@ -384,5 +384,5 @@ def by_detail(row: Sequence[Any], depth_mm: Sequence[float], detail: Mapping[str
 
 
 def fluctuation(values: np.ndarray, pixels: np.ndarray) -> float:
-    """Standard deviation over the layers that have pixels, each of which counts the same."""
+    """Return the standard deviation over layers with pixels."""
     return float(np.std(values[(pixels > 0) & np.isfinite(values)]))

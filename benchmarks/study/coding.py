@@ -16,11 +16,11 @@ from raytrace_ii import Shot, load_scene, render
 SCENES = ("apples", "twins", "car", "cuboid")
 RATES = (0.015, 0.03, 0.06, 0.15, 0.3, 0.63, 1.0, 1.5)  # bit per pixel, the range of Olsson 2008, §5.7.3
 BY_QUANTISER = ("si-hevc", "ei-hevc", "si-av1", "ei-av1", "si-vp9")
-# Modules that every coded point comes from, for `Step.uses`.
+# Modules behind every coded point, for `Step.uses`.
 CODED = ("benchmarks.study.coding", "benchmarks.coding.coders", "benchmarks.coding.rd")
-# Missed by as much, a rate lies below what the scheme can reach; by less it only fell between two quantisers.
+# A larger miss means a rate below the range of the scheme; a smaller one falls between two quantisers.
 FLOOR = 1.1
-# Setup 3 has 64×64 lenses; with fewer than 16×16 its views are too small for the window of MSSIM.
+# Setup 3 has 64×64 lenses; with fewer than 16×16, views are too small for the window of MSSIM.
 COARSEST_SETUP3 = 4
 
 Measure = Callable[[IIPicture], Mapping[str, Any]]
@@ -28,17 +28,17 @@ Measure = Callable[[IIPicture], Mapping[str, Any]]
 
 @lru_cache(maxsize=2)
 def shot(scene: str, camera: str, scale: int) -> Shot:
-    """A scene through a coding setup, with the sensor's noise and true depth."""
+    """Return a scene through a coding setup, with sensor noise and true depth."""
     return render(load_scene(scene), preset(camera, scale=scale), noise=1.0, support=("depth",))
 
 
 def setup3_scale(scale: int) -> int:
-    """How much of a scale setup 3 bears."""
+    """Return the scale of setup 3 for a scale of the study."""
     return min(scale, COARSEST_SETUP3)
 
 
 def point(picture: IIPicture, scheme: str, goal: Mapping[str, Any], measure: Measure | None = None) -> dict[str, Any]:
-    """One operating point: rate, quality, and CPU seconds of one run inside encoder and decoder."""
+    """Return an operating point: rate, quality, CPU seconds of one run inside encoder and decoder."""
     made = rd_point(picture, scheme, **goal)
     return {
         "scheme": scheme,
@@ -56,7 +56,7 @@ def point(picture: IIPicture, scheme: str, goal: Mapping[str, Any], measure: Mea
 def curve(
     picture: IIPicture, scheme: str, goals: Sequence[Mapping[str, Any]], measure: Measure | None = None
 ) -> list[dict[str, Any]]:
-    """Points from the highest rate down to the first that the scheme cannot go down to, in the order of rates."""
+    """Return points by rate, from the highest rate down to the first below the range of the scheme."""
     points: list[dict[str, Any]] = []
     for goal in reversed(goals):
         points.insert(0, point(picture, scheme, goal, measure))
@@ -66,7 +66,7 @@ def curve(
 
 
 def goals_of(scheme: str) -> list[dict[str, Any]]:
-    """What a scheme is asked for: the dissertation's rates, or quantisers if it would search long for rates."""
+    """Return the goals of a scheme: the dissertation's rates, or quantisers for schemes with a long search."""
     if scheme.startswith(BY_QUANTISER):
         return sorted(qualities(scheme), key=lambda goal: -goal["qp"])
     return [{"bpp": rate} for rate in RATES]
@@ -75,7 +75,7 @@ def goals_of(scheme: str) -> list[dict[str, Any]]:
 def curves(
     picture: IIPicture, schemes: Sequence[str], measure: Measure | None = None, workers: int | None = None
 ) -> list[dict[str, Any]]:
-    """The curves of all schemes one after another, coded ``workers`` at a time, as many as cores if not given."""
+    """Return the curves of all schemes, coded in ``workers`` threads, by default one per core."""
     with ThreadPoolExecutor(workers or cores()) as pool:
         found = pool.map(lambda scheme: curve(picture, scheme, goals_of(scheme), measure), schemes)
         return [point for points in found for point in points]

@@ -28,7 +28,7 @@ from .volume_model import APART, MODEL
 PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
 CODERS_SCALE = 4
 OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
-# Which part of the page shows which figures.
+# Figures by part of the page.
 SECTIONS = {
     "rates": ("5.10",),
     "orders": ("5.11",),
@@ -42,7 +42,7 @@ SECTIONS = {
 
 
 def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Path = KEPT) -> None:
-    """Keep the records of a folder with those kept before, copy its pictures, draw the charts and fill the page."""
+    """Add the records of a folder to the kept ones, copy its pictures, draw the charts and fill the page."""
     for place in (images, kept):
         place.mkdir(parents=True, exist_ok=True)
     for path in sorted(folder.glob("*.jsonl")):
@@ -60,7 +60,7 @@ def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Pat
 
 
 def tables(kept: Path = KEPT) -> Tables:
-    """Return all tables of the page, from the records that are kept."""
+    """Return all tables of the page from the kept records."""
     everything = {path.stem: records(kept, path.stem) for path in sorted(kept.glob("*.jsonl"))}
     best = {name: largest(some) for name, some in everything.items()}
     results = {name: record["result"] for name, record in best.items()}
@@ -74,7 +74,7 @@ def tables(kept: Path = KEPT) -> Tables:
 
 
 def copy_pictures(folder: Path, images: Path, best: Mapping[str, Mapping[str, Any]]) -> None:
-    """Pictures of the records that are shown, as far as they are in this folder."""
+    """Copy the pictures of the shown records that are in this folder."""
     for record in best.values():
         for name, digest in record["pictures"].items():
             if (folder / name).exists() and digest_of(folder / name) == digest:
@@ -82,7 +82,7 @@ def copy_pictures(folder: Path, images: Path, best: Mapping[str, Mapping[str, An
 
 
 def keep(new: Path, old: Path) -> None:
-    """Add the lines of one file that another does not have yet."""
+    """Append the lines of one file that another lacks."""
     there = old.read_text(encoding="utf-8").splitlines() if old.exists() else []
     lines = [line for line in new.read_text(encoding="utf-8").splitlines() if line not in there]
     with atomic_path(old) as temporary:
@@ -90,13 +90,13 @@ def keep(new: Path, old: Path) -> None:
 
 
 def largest(some: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Of all records of a step the last one of the largest pictures: a small study does not replace a large one."""
+    """Return the last record of a step with the largest pictures."""
     scales = [record["parameters"].get("scale", 1) for record in some]
     return [record for record, scale in zip(some, scales, strict=True) if scale == min(scales)][-1]
 
 
 def sizes(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
-    """Gain of SI-PVS over JPEG 2000 by number of lenses, from all sizes that were ever measured."""
+    """Return a table of the gain of SI-PVS over JPEG 2000 by number of lenses, from all measured sizes."""
     found: dict[tuple[str, int], str] = {}
     for scene in SCENES:
         for record in everything.get(f"rates-{scene}", ()):
@@ -112,7 +112,7 @@ def sizes(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
 
 
 def views_by_size(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
-    """Q_view at 0.15 bpp of sub- and elementary images by number of lenses of setup 3."""
+    """Return a table of Q_view at 0.15 bpp of sub-images and elementary images by number of lenses of setup 3."""
     found: dict[tuple[str, int], str] = {}
     for scene in SCENES:
         for record in everything.get(f"artefacts-{scene}", ()):
@@ -128,7 +128,7 @@ def views_by_size(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list
 
 
 def smaller(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Which steps have not been done at full size."""
+    """Return a sentence with the steps that have no result at full size."""
     found: dict[int, list[str]] = {}
     for name, record in best.items():
         scale = record["parameters"].get("scale", 1)
@@ -144,7 +144,7 @@ def smaller(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
 
 def shown_tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
-    """Lines for each mark of the page."""
+    """Return the lines of each mark of the page."""
     made = claims(results)
     parts = {
         f"claims-{name}": claim_table(claim for claim in made if claim.figure in figures)
@@ -169,7 +169,7 @@ def shown_tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dic
 
 
 def claim_table(made: Iterable[Claim]) -> list[str]:
-    """A row a claim."""
+    """Return a table with one row per claim."""
     lines = ["| Olsson 2008 | what | theirs | ours | sign | order | size |", "|---|---|---|---|---|---|---|"]
     return lines + [
         f"| {called(c.figure)} | {c.what} | {c.theirs} | {c.ours} | " + " | ".join(c.verdict.cells()) + " |"
@@ -178,12 +178,12 @@ def claim_table(made: Iterable[Claim]) -> list[str]:
 
 
 def called(figure: str) -> str:
-    """Fig. 5.10, or a table by its own name."""
+    """Return the name of a figure or table."""
     return figure if figure.startswith("Table") else f"Fig. {figure}"
 
 
 def summary(made: Sequence[Claim]) -> list[str]:
-    """A row a figure: how much of it agrees."""
+    """Return a table of agreement, one row per figure."""
     lines = ["| Olsson 2008 | sign | order | size |", "|---|---|---|---|"]
     for figure in dict.fromkeys(claim.figure for claim in made):
         own = [claim.verdict for claim in made if claim.figure == figure]
@@ -196,7 +196,7 @@ def summary(made: Sequence[Claim]) -> list[str]:
 
 
 def types_beside(results: Results) -> list[str]:
-    """Table 5.5, theirs and ours."""
+    """Return Table 5.5, theirs and ours."""
     if "types-apples" not in results:
         return []
     head = "| GOP | " + " | ".join(f"I{'B' * count}P" for count in BFRAMES) + " |"
@@ -229,7 +229,7 @@ def volume_table(results: Results) -> list[str]:
 
 
 def framing_table(results: Results) -> list[str]:
-    """Lowest rate of EI-PVS by what the stream is kept in."""
+    """Return a table of the least rate of EI-PVS by container."""
     if "framing" not in results:
         return []
     lines = ["| file | bytes a frame | bpp | with delimiters | bpp |", "|---|---|---|---|---|"]
@@ -242,7 +242,7 @@ def framing_table(results: Results) -> list[str]:
 
 
 def search_table(results: Results) -> list[str]:
-    """Time and rate against a range of 16, for both ways to search."""
+    """Return a table of time and rate against a range of 16, for both searches."""
     lines = ["| | search | " + " | ".join(str(r) for r in RANGES) + " |", "|---" * (len(RANGES) + 2) + "|"]
     for scene in SCENES:
         rows = results.get(f"search-{scene}", {}).get("rows", [])
@@ -257,7 +257,7 @@ def search_table(results: Results) -> list[str]:
 
 
 def table_2008(results: Results) -> list[str]:
-    """What B pictures bring with x264 as it is and as it was, by size of the picture."""
+    """Return a table of the gain of B pictures with x264 of today and of 2008, by size of the picture."""
     there = [results[name] for name in OLDER if name in results]
     lines = ["| x264 set as | | " + " | ".join("{}×{} lenses".format(*one["lenses"]) for one in there) + " |"]
     lines.append("|---" * (2 + len(there)) + "|")
@@ -268,7 +268,7 @@ def table_2008(results: Results) -> list[str]:
 
 
 def time_table(results: Results) -> list[str]:
-    """CPU seconds by rate of SI-PVS and JPEG 2000: encoding, decoding."""
+    """Return a table of CPU seconds of SI-PVS and JPEG 2000 by rate: encoding, decoding."""
     made = of_scenes(results, "rates")
     if not made:
         return []
@@ -285,7 +285,7 @@ def time_table(results: Results) -> list[str]:
 
 
 def frame_table(results: Results) -> list[str]:
-    """What an elementary image takes to code, by how many there are."""
+    """Return a table of the time per elementary image by their number."""
     rows = results.get("frames", {}).get("rows", [])
     counts = sorted({row["frames"] for row in rows})
     lines = ["| frames | " + " | ".join(map(str, counts)) + " |", "|---" * (len(counts) + 1) + "|"]
@@ -296,7 +296,7 @@ def frame_table(results: Results) -> list[str]:
 
 
 def detail_table(results: Results) -> list[str]:
-    """How far Q_depth follows the detail of the layers."""
+    """Return a table of the dependence of Q_depth on the detail of layers."""
     judged, detail = of_scenes(results, "equal"), of_scenes(results, "detail")
     scenes = [scene for scene in judged if scene in detail]
     if not scenes:
@@ -312,7 +312,7 @@ def detail_table(results: Results) -> list[str]:
 
 
 def artefact_table(results: Results) -> list[str]:
-    """Rate and quality of the pictures of Figures 5.13 to 5.18."""
+    """Return a table of rate and quality of the pictures of Figures 5.13 to 5.18."""
     steps = {"setup 1, apples": "artefacts-setup1", **{f"setup 3, {s}": f"artefacts-{s}" for s in SCENES}}
     there = {what: results[step] for what, step in steps.items() if step in results}
     if not there:
@@ -326,7 +326,7 @@ def artefact_table(results: Results) -> list[str]:
 
 
 def gains_modern(results: Results) -> list[str]:
-    """Bjøntegaard rate of what the study itself coded, against the dissertation's SI-PVS and JPEG 2000."""
+    """Return a table of Bjøntegaard rates of the study's schemes to SI-PVS and JPEG 2000."""
     made = of_scenes(results, "rates")
     schemes = (SI, *PVS[1:], *MODERN, VOLUME, REFERENCE)
     curves = {
@@ -345,7 +345,7 @@ def gains_modern(results: Results) -> list[str]:
 
 
 def bjontegaard(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """All schemes of `coders`: rate against the dissertation's SI-PVS and JPEG 2000, and gain in dB."""
+    """Return a table of all schemes of `coders`: rate to SI-PVS and JPEG 2000, and gain in dB."""
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     curves = {(row["scene"], row["scheme"]): pairs(row["points"]) for row in rows}
     lines, commits = ["| scheme | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"], []
@@ -365,13 +365,13 @@ def bjontegaard(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def pairs(points: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
-    """(rate, PSNR) of a rising curve; of points by either of their names for quality."""
+    """Return (rate, PSNR) of a rising curve, from either form of points."""
     same = [{"bpp": p["bpp"], "psnr": p["psnr"] if "psnr" in p else float(p["q_global"])} for p in points]
     return [(p["bpp"], p["psnr"]) for p in climbing(same)]
 
 
 def rate_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float, float]]) -> str:
-    """Bjøntegaard rate, or a dash where there is none."""
+    """Return the Bjøntegaard rate, or a dash if it is undefined."""
     try:
         return f"{bd_rate(*zip(*anchor, strict=True), *zip(*curve, strict=True)):+.0f} %".replace("-", "−")
     except (UndefinedDifference, TypeError):
@@ -379,7 +379,7 @@ def rate_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float
 
 
 def gain_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float, float]]) -> str:
-    """Bjøntegaard gain in dB, or a dash."""
+    """Return the Bjøntegaard gain in dB, or a dash if it is undefined."""
     try:
         return f"{bd_psnr(*zip(*anchor, strict=True), *zip(*curve, strict=True)):+.1f} dB".replace("-", "−")
     except (UndefinedDifference, TypeError):
@@ -387,7 +387,7 @@ def gain_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float
 
 
 def record_table(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Where the numbers come from: step, scale, commit, time."""
+    """Return a table of provenance: step, scale, commit, time."""
     lines = ["| step | shows | scale | commit | CPU s | again |", "|---|---|---|---|---|---|"]
     for name, record in best.items():
         git = record["git"] or {"commit": "none", "dirty": False}

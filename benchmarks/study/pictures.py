@@ -31,8 +31,8 @@ CLOSE = 8  # lenses across a detail of Figure 3.8
 
 
 def steps(scale: int) -> list[Step]:
-    """All of them."""
-    coarse = {"scale": max(scale, 4)}  # finer ones are not seen at this size
+    """Return all steps."""
+    coarse = {"scale": max(scale, 4)}  # finer ones are not visible at this size
     return [
         Step(name="component-images", shows="Figure 2.25", run=components, parameters=coarse, uses=USES),
         Step(name="other-cameras", shows="Figure 3.8", run=cameras, parameters={"scale": max(scale, 8)}, uses=USES),
@@ -53,7 +53,7 @@ CAMERA_LABELS = [name + part for name in _CAMERAS for part in ("", ", detail")]
 
 
 def components(folder: Path, *, scale: int) -> dict[str, Any]:
-    """*Twins* as elementary, sub- and ray-space images: all of them, and the middlemost 4×4."""
+    """Draw *Twins* as elementary, sub- and ray-space images: all of them, and the central 4×4."""
     picture = shot("twins", "setup1", scale).picture
     stacks = {
         "ei": elementary_images(picture),
@@ -71,21 +71,21 @@ def components(folder: Path, *, scale: int) -> dict[str, Any]:
 
 
 def laid_out(stack: NDArray[np.uint8], gap: int = 0) -> NDArray[np.uint8]:
-    """Component images beside and below one another, with white lines between them."""
+    """Return component images on a grid with white lines."""
     stack = np.pad(stack, ((0, 0), (0, 0), (0, gap), (0, gap), (0, 0)), constant_values=255)
     rows, columns, height, width, _ = stack.shape
     return np.ascontiguousarray(stack.transpose(0, 2, 1, 3, 4)).reshape(rows * height, columns * width, 3)
 
 
 def fitted(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Stretched over a panel; mean colours where pixels are smaller than its own."""
+    """Return an image scaled to a panel, averaged where it is reduced."""
     down = pixels.shape[0] > PANEL[1] or pixels.shape[1] > PANEL[0]
     image = Image.fromarray(pixels).resize(PANEL, Image.Resampling.BOX if down else Image.Resampling.NEAREST)
     return np.asarray(image)
 
 
 def cameras(folder: Path, *, scale: int) -> dict[str, Any]:
-    """*Objects* and *Hairdo* through lenticulars (HPO) and gradient-index lenses (GRIN): the picture and a detail."""
+    """Draw *Objects* and *Hairdo* through lenticular (HPO) and GRIN lenses: picture and detail."""
     panels = []
     for scene in ("objects", "hairdo"):
         loaded = load_scene(scene)
@@ -97,7 +97,7 @@ def cameras(folder: Path, *, scale: int) -> dict[str, Any]:
 
 
 def detail(picture: IIPicture) -> NDArray[np.uint8]:
-    """Some lenses in the middle."""
+    """Return some lenses in the middle."""
     (u, v), (k, l) = picture.ei_pixels, picture.lenses
     across, down = min(CLOSE, k), max(1, min(CLOSE * u // 2 // v, l))
     left, top = (k - across) // 2 * u, (l - down) // 2 * v
@@ -105,7 +105,7 @@ def detail(picture: IIPicture) -> NDArray[np.uint8]:
 
 
 def five_views(folder: Path, *, scale: int) -> dict[str, Any]:
-    """*Twins* from above, the left, the front, the right and below, as in a cross."""
+    """Draw *Twins* from the five viewpoints, arranged as a cross."""
     picture = shot("twins", "setup3", scale).picture
     assert picture.camera is not None
     views = {

@@ -11,7 +11,7 @@ from codec.order import ORDERS
 from .coding import CODED, SCENES, curves, shot
 from .runner import Step
 
-# The dissertation coded 4:2:0, as every H.264 encoder of its time; 4:4:4 shows what that decides.
+# The dissertation coded 4:2:0, as all H.264 encoders of its time; 4:4:4 shows the effect.
 PVS = tuple(f"{kind}-h264{chroma}" for chroma in (":chroma=420", "") for kind in ("si", "ei", "ri"))
 VOLUME = "si-jp3d:wavelet=53"  # CDF 5/3, as the dissertation's
 REFERENCE = "jpeg2000"
@@ -24,7 +24,7 @@ CONTROLS = ("cbr", "cq", "2pass", "crf")
 
 
 def steps(scale: int) -> list[Step]:
-    """All of them at this scale of setup 1."""
+    """Return all steps at a scale of setup 1."""
     each = [
         Step(
             name=f"{name}-{scene}",
@@ -48,7 +48,7 @@ def steps(scale: int) -> list[Step]:
 
 
 def types(*more: str) -> tuple[str, ...]:
-    """Schemes of Table 5.5, row by row."""
+    """Return the schemes of Table 5.5, row by row."""
     return tuple(
         ",".join([SI, f"gop={gop}", f"bframes={count}", *(more if count else ())])
         for gop in GOPS
@@ -59,12 +59,12 @@ def types(*more: str) -> tuple[str, ...]:
 def code(
     _folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...], workers: int | None = None
 ) -> dict[str, Any]:
-    """Curves of Q_global."""
+    """Return curves of Q_global."""
     return {"points": curves(shot(scene, "setup1", scale).picture, schemes, workers=workers)}
 
 
 def floors(_folder: Path, *, scale: int) -> dict[str, Any]:
-    """The lowest rate of every kind of pseudo video sequence: a black picture at the coarsest quantiser."""
+    """Return the least rates of pseudo video sequences: a black picture at the coarsest quantiser."""
     picture = shot("apples", "setup1", scale).picture
     kinds = [scheme for scheme in PVS if "chroma=420" in scheme]
     return {"bpp": {scheme: floor(scheme, picture.lenses, picture.ei_pixels).bpp for scheme in kinds}}

@@ -30,13 +30,13 @@ from .runner import Step
 FRAMES = 4096
 SIDE = 16  # pixels of an elementary image of setup 1
 CONTAINERS = ("h264", "mkv", "mp4", "avi")
-SEARCHES = ("umh", "esa")  # x264's uneven hexagons, ours; exhaustive
+SEARCHES = ("umh", "esa")  # x264's uneven multi-hexagon search, our default; exhaustive search
 QUANTISER = 30
-SIZES = (1, 2, 4)  # pictures of so many times fewer lenses each way
+SIZES = (1, 2, 4)  # divisors of the number of lenses
 
 
 def steps(scale: int) -> list[Step]:
-    """All of them."""
+    """Return all steps."""
     searched = [
         Step(
             name=f"search-{scene}",
@@ -69,7 +69,7 @@ def steps(scale: int) -> list[Step]:
 
 
 class H264of2008(H264):
-    """x264 with what it could do, and did unasked, at the beginning of 2008."""
+    """x264 with features and defaults as of the beginning of 2008."""
 
     SET = "ref=1:subme=5:trellis=0:8x8dct=0:mixed-refs=0:aq-mode=0:weightb=0"
 
@@ -87,7 +87,7 @@ class PlainH264(H264of2008):
 
 
 def framing(_folder: Path) -> dict[str, Any]:
-    """Bytes a frame of black elementary images at the coarsest quantiser, in files of several kinds."""
+    """Return bytes per frame of black elementary images at the coarsest quantiser, by container."""
     rows = []
     for container in CONTAINERS:
         for delimiters in (0, 1):
@@ -97,7 +97,7 @@ def framing(_folder: Path) -> dict[str, Any]:
 
 
 def file_size(container: str, delimiters: int, frames: int = FRAMES) -> int:
-    """Bytes of a file of black frames by x264, with or without access unit delimiters."""
+    """Return the size of a file of black frames by x264, with or without access unit delimiters."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"black.{container}"
         with av.open(str(path), "w") as output:
@@ -116,7 +116,7 @@ def file_size(container: str, delimiters: int, frames: int = FRAMES) -> int:
 
 
 def searches(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
-    """Bytes and CPU seconds of SI-PVS at one quantiser, by motion range, for both kinds of search."""
+    """Return bytes and CPU seconds of SI-PVS at one quantiser by motion range, for both searches."""
     picture = shot(scene, "setup1", scale).picture
     rows = []
     for search in SEARCHES:
@@ -129,7 +129,7 @@ def searches(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
 
 
 def types_2008(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
-    """Bjøntegaard difference in dB of one, two and three B pictures to none, at constant quantisers."""
+    """Return Bjøntegaard differences in dB of one, two and three B pictures to none, at constant quantisers."""
     register_older("si")
     picture = shot(scene, "setup1", scale).picture
     goals = [{"qp": quantiser} for quantiser in QUANTISERS]
@@ -148,14 +148,14 @@ def types_2008(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
 
 
 def frames(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
-    """CPU seconds of EI-PVS by the number of elementary images: the upper rows of lenses of one picture."""
+    """Return CPU seconds of EI-PVS by number of elementary images: the upper lens rows of one picture."""
     register_older("ei")
     picture = shot(scene, "setup1", scale).picture
     columns, rows = picture.lenses
     parts = [part for part in (64, 16, 4, 1) if part <= rows]
     found = []
     for what, run in counted(picture):
-        run(rows // parts[0])  # pays for loading and compiling
+        run(rows // parts[0])  # loads and compiles
         for part in parts:
             started = time.thread_time()
             runs = run(rows // part)
@@ -165,7 +165,7 @@ def frames(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
 
 
 def counted(picture: IIPicture) -> Iterator[tuple[str, Callable[[int], int]]]:
-    """What may take a time that grows with the number of frames: each codes so many rows of lenses, and how often."""
+    """Return encoders of a number of lens rows, and their repetitions, for parts of the time per frame."""
 
     def coded(rows: int, scheme: str, goal: Mapping[str, Any]) -> int:
         upper = IIPicture(picture.pixels[: rows * picture.ei_pixels[1]], (picture.lenses[0], rows), picture.ei_pixels)
@@ -187,7 +187,7 @@ def counted(picture: IIPicture) -> Iterator[tuple[str, Callable[[int], int]]]:
 
 
 def register_older(kind: str) -> None:
-    """The encoders of 2008 as schemes."""
+    """Register the encoders of 2008 as schemes."""
     for encoder in (H264of2008(kind), PlainH264(kind)):
         if encoder.name not in schemes():
             register(encoder)

@@ -23,16 +23,16 @@ class Step:
     Parameters
     ----------
     name : str
-        What ``--only`` calls it, and its record is called.
+        Name for ``--only`` and of its record.
     shows : str
-        Which figures or tables it is for.
+        Figures or tables that it reproduces.
     run : callable
-        ``run(folder, **parameters)`` gives a dict of plain values and may leave pictures in the folder, called
-        NAME.png or NAME_more.png after the step. Values that are times have a name with ``seconds`` in it.
+        ``run(folder, **parameters)`` returns a dict of plain values and may write pictures NAME.png or NAME_more.png
+        into the folder, named after the step. Names of times contain ``seconds``.
     parameters : dict
         Plain values.
     uses : tuple of str
-        Modules of ``benchmarks`` that the result comes from besides the one that holds ``run``.
+        Further modules of ``benchmarks`` that the result depends on.
     """
 
     name: str
@@ -43,9 +43,9 @@ class Step:
 
 
 def perform(steps: Iterable[Step], folder: Path, *, force: bool = False) -> list[dict[str, Any]]:
-    """Do the steps that have not been done, one after the other, and say so; the records of those that were done now.
+    """Run the steps without a record, one after the other; return their records.
 
-    Interrupted, it leaves the records of all steps that had ended.
+    An interrupt keeps the records of finished steps.
     """
     folder.mkdir(parents=True, exist_ok=True)
     made = []
@@ -66,10 +66,10 @@ def perform(steps: Iterable[Step], folder: Path, *, force: bool = False) -> list
 
 
 def performed(step: Step, folder: Path) -> dict[str, Any]:
-    """Run a step; its record."""
+    """Run a step and return its record."""
     begin, started, cpu = stamp((step.run.__module__, *step.uses)), time.perf_counter(), cpu_seconds()
     for path in pictures_of(step, folder):
-        path.unlink()  # what an earlier version left is not this one's
+        path.unlink()  # remove pictures of an earlier version
     result = step.run(folder, **step.parameters)
     return {
         "format": FORMAT,
@@ -86,30 +86,30 @@ def performed(step: Step, folder: Path) -> dict[str, Any]:
 
 
 def pictures_of(step: Step, folder: Path) -> list[Path]:
-    """What it has left: NAME.png and NAME_more.png."""
+    """Return the pictures of a step: NAME.png and NAME_more.png."""
     return sorted({*folder.glob(f"{step.name}.png"), *folder.glob(f"{step.name}_*.png")})
 
 
 def digest_of(path: Path) -> str:
-    """SHA-256 of a file."""
+    """Return the SHA-256 of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def records(folder: Path, name: str) -> list[dict[str, Any]]:
-    """All records of a step, oldest first.
+    """Return all records of a step, oldest first.
 
     Raises
     ------
     ValueError
-        If a line is no record.
+        If a line is not a record.
     """
     return read_records(folder / f"{name}.jsonl", FORMAT, VERSION)
 
 
 def known(step: Step, folder: Path) -> dict[str, Any] | None:
-    """The last record of this step by the same code, with the same parameters and versions; None if there is none.
+    """Return the last record of a step by equal code, parameters and versions; None without one.
 
-    A record whose pictures are gone, or are others now, does not count.
+    Records with missing or changed pictures are ignored.
     """
     same = {"parameters": plain(step.parameters), "code": code_of(step), "versions": provenance()["versions"]}
     for record in reversed(records(folder, step.name)):
@@ -122,17 +122,17 @@ def known(step: Step, folder: Path) -> dict[str, Any] | None:
 
 
 def findings(record: Mapping[str, Any]) -> dict[str, Any]:
-    """What must be the same when a step is done again: pictures and numbers, but for times."""
+    """Return the reproducible part of a record: pictures, and numbers without times."""
     return {"pictures": record["pictures"], "result": timeless(record["result"])}
 
 
 def timeless(value: Any) -> Any:
-    """The value without anything named seconds."""
+    """Return a value without entries named seconds."""
     if isinstance(value, dict):
         return {key: timeless(item) for key, item in value.items() if "seconds" not in key}
     return [timeless(item) for item in value] if isinstance(value, list) else value
 
 
 def code_of(step: Step) -> str:
-    """A hash of all that a step's result comes from: the packages and the files of the step itself."""
+    """Return a hash of the code of a step: the packages and its modules."""
     return code_hash((step.run.__module__, *step.uses))

@@ -13,7 +13,7 @@ from benchmarks.registry import BENCHMARKS, entry
 from .runner import Step
 
 DEMO = "examples.demo"
-# Script, what it is for, arguments. In this order: `coding_docs` and `readme` put on pages what others found.
+# Script, purpose, arguments. The order matters: `coding_docs` and `readme` use results of others.
 SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("cameras", "Figures 3.6, 3.7, 5.9: every camera with its maps, all scenes", ()),
     ("concepts", "Figures 2.24, 5.4: component images, orders", ()),
@@ -43,7 +43,7 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 
 
 def steps(scale: int) -> list[Step]:
-    """All of them as part of the full study, none of a smaller one: they fill pages at the sizes given there."""
+    """Return all scripts for the full study, none for smaller ones: their pages have fixed sizes."""
     if scale != 1:
         return []
     names = [name for name, *_ in SCRIPTS]
@@ -60,7 +60,7 @@ def steps(scale: int) -> list[Step]:
 
 
 def script(_folder: Path, *, script: str, arguments: tuple[str, ...]) -> dict[str, Any]:
-    """Run it; what it found stands in its own file and on its own page."""
+    """Run a script, which has a record file and a page of its own."""
     program = ["examples/demo.py"] if script == "demo" else ["-m", "benchmarks", "run", script]
     command = [*program, *arguments]
     subprocess.run([sys.executable, *command], cwd=ROOT, check=True)

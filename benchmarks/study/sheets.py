@@ -14,12 +14,12 @@ LETTERS, STRIP = 15, 22  # pixels, of a label and of the strip it stands in
 
 
 def enlarged(image: NDArray[Any], times: int) -> NDArray[Any]:
-    """Every pixel as a square of ``times`` × ``times``."""
+    """Return an image with every pixel as a square of ``times`` × ``times``."""
     return image.repeat(times, axis=0).repeat(times, axis=1)
 
 
 def labelled(image: NDArray[np.uint8], text: str) -> NDArray[np.uint8]:
-    """An image below a strip that names it."""
+    """Return an image with a label above it."""
     strip = Image.new("RGB", (image.shape[1], STRIP), "white")
     font = ImageFont.load_default(LETTERS)
     ImageDraw.Draw(strip).text((2, STRIP // 2), text, "black", font, anchor="lm")
@@ -27,7 +27,7 @@ def labelled(image: NDArray[np.uint8], text: str) -> NDArray[np.uint8]:
 
 
 def sheet(images: Sequence[NDArray[np.uint8]], columns: int, labels: Sequence[str] = ()) -> NDArray[np.uint8]:
-    """Images of one size in rows, on white, each below its label if there are any."""
+    """Return a picture of images of one size in rows, on white, with labels if given."""
     if labels:
         images = [labelled(image, text) for image, text in zip(images, labels, strict=True)]
     height, width = images[0].shape[:2]

@@ -7,12 +7,12 @@ from .runner import Step
 
 
 def all_steps(scale: int) -> list[Step]:
-    """Every step at a scale of the coding setups.
+    """Return every step at a scale of the coding setups.
 
     Raises
     ------
     ValueError
-        If the scale divides no setup 1.
+        If the scale does not divide setup 1.
     """
     if scale not in (1, 2, 4, 8, 16):
         raise ValueError(f"scale is {scale}: 1, 2, 4, 8 or 16 is needed")

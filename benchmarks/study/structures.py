@@ -14,12 +14,12 @@ from raytrace_ii import load_scene, render
 from .runner import Step
 
 SCENES = ("apples", "car")  # those of Figure 5.12
-SMALLER = (1, 2, 4, 8)  # the plane's pictures: setup 2 with as many times fewer lenses each way
+SMALLER = (1, 2, 4, 8)  # divisors of the lenses of setup 2
 FEWEST = (4, 2)  # lenses
 
 
 def steps(scale: int) -> list[Step]:
-    """Figure 5.12 at this scale, and the smaller pictures of the plane."""
+    """Return the steps of Figure 5.12 at a scale, and of smaller pictures."""
     found = []
     for scene in SCENES:
         for smaller in SMALLER:
@@ -40,7 +40,7 @@ def steps(scale: int) -> list[Step]:
 
 
 def fits(side: int, scale: int) -> bool:
-    """Whether setup 2 has enough lenses left with elementary images of that size."""
+    """Return whether setup 2 has enough lenses with elementary images of a size."""
     try:
         camera = preset(f"setup2-{side}", scale=scale)
     except ValueError:
@@ -49,7 +49,7 @@ def fits(side: int, scale: int) -> bool:
 
 
 def duels(_folder: Path, *, scene: str, scale: int, sides: list[int]) -> dict[str, Any]:
-    """SI, EI and RI at the same rates, for every size of elementary image."""
+    """Return results of SI, EI and RI at equal rates, for every size of elementary image."""
     loaded = load_scene(scene)
 
     def one(side: int) -> dict[str, Any]:

@@ -60,36 +60,36 @@ TWICE = 2.0
 
 @dataclass(frozen=True)
 class Verdict:
-    """How many of how many agree, by sign, by order and by size; (0, 0) where there is nothing to compare."""
+    """Agreement by sign, order and size, each as (number that agrees, number compared)."""
 
     sign: tuple[int, int]
     order: tuple[int, int]
     size: tuple[int, int]
 
     def cells(self) -> list[str]:
-        """Three cells of a table."""
+        """Return three cells of a table."""
         return [said(*pair) for pair in (self.sign, self.order, self.size)]
 
 
 def compare(
     theirs: Mapping[str, float], ours: Mapping[str, float | None], *, only: str = "sign order size", even: float = 0.0
 ) -> Verdict:
-    """Sign, order and size of numbers under the same names.
+    """Compare sign, order and size of numbers by name.
 
     Parameters
     ----------
     theirs, ours : mapping of str to float
-        None or nothing where there is no number: that agrees with nothing.
+        None or missing where there is no number, which counts as disagreement.
     only : str
-        What can be compared: ranks have no sign and no size.
+        Restriction of the comparison: ranks have no sign and no size.
     even : float
-        Where theirs are equal ours may differ by so much, and where theirs differ ours must differ at all.
+        Tolerance for ours where theirs are equal.
 
     Returns
     -------
     Verdict
-        Sign: of those of theirs that are not 0. Order: pairs of which the same one is greater. Size: within a factor
-        of 2, of those that are not 0.
+        Sign: of theirs that are not 0. Order: pairs with the same greater number. Size: within a factor of 2, of
+        those that are not 0.
     """
     known = {name: value for name in theirs if (value := ours.get(name)) is not None and math.isfinite(value)}
     some = [name for name, value in theirs.items() if value]
@@ -115,7 +115,7 @@ def _alike(difference: float, known: Mapping[str, float], a: str, b: str, even: 
 
 
 def said(good: int, of: int) -> str:
-    """Yes, no, or how many of how many."""
+    """Return yes, no, or the number that agrees of all."""
     if not of:
         return ""
     return "yes" if good == of else "no" if not good else f"{good} of {of}"

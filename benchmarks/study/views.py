@@ -48,7 +48,7 @@ USES = (*CODED, "benchmarks.study.sheets")
 
 
 def steps(scale: int) -> list[Step]:
-    """All of them, setup 3 at as much of the scale as it bears."""
+    """Return all steps, with the scale of setup 3."""
     small = setup3_scale(scale)
     found = []
     for figure, scene in enumerate(SCENES, 15):
@@ -67,25 +67,25 @@ def steps(scale: int) -> list[Step]:
 
 
 def over_rate(_folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> dict[str, Any]:
-    """Q_view and Q_depth of all schemes over rate, with true depth."""
+    """Return Q_view and Q_depth of all schemes over rate, with true depth."""
     made = shot(scene, "setup3", scale)
     points = curves(made.picture, schemes, measure=measuring(made.picture, MEASURES, **truth(made)))
     depth_mm = points[0]["depth_mm"]
     for point in points:
-        del point["depth_mm"]  # the same for all
+        del point["depth_mm"]  # equal for all
         point["q_depth"] = rounded(point["q_depth"])
     return {"points": points, "depth_mm": rounded(depth_mm)}
 
 
 def truth(made: Shot) -> dict[str, Any]:
-    """True depth, on the dissertation's layers."""
+    """Return true depth on the dissertation's layers."""
     return {"depth": made.depth, "layers_mm": linear_layers(camera_of(made.picture))}
 
 
 def artefacts(folder: Path, *, scene: str, scale: int, camera: str, crop: int | None) -> dict[str, Any]:
-    """Front views coded at one rate, and how they differ from the uncoded one: white is no difference.
+    """Draw front views coded at one rate, and their difference from the uncoded view; white is no difference.
 
-    ``crop`` is the part of the view that is shown, one in so many each way around the middle.
+    ``crop`` is the divisor of the shown part around the middle.
     """
     picture = shot(scene, camera, scale).picture
     with ThreadPoolExecutor(cores()) as pool:
@@ -111,7 +111,7 @@ def artefacts(folder: Path, *, scene: str, scale: int, camera: str, crop: int | 
 
 
 def equal(folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> dict[str, Any]:
-    """All schemes at one Q_global: what rate they need, their views, Q_angle across and Q_depth."""
+    """Return results of all schemes at one Q_global: rate, views, horizontal Q_angle and Q_depth."""
     made = shot(scene, "setup3", scale)
     assert made.picture.camera is not None
     with ThreadPoolExecutor(cores()) as pool:
@@ -136,7 +136,7 @@ def equal(folder: Path, *, scene: str, scale: int, schemes: tuple[str, ...]) -> 
 
 
 def judged(made: Shot, focus: FocusDepth, decoded: IIPicture, coded: Any) -> dict[str, Any]:
-    """Every quality of one decoded picture; over depth by the renderer's and by what focus tells."""
+    """Return all qualities of a decoded picture, with true depth and with depth from focus."""
     angle = q_angle(made.picture, decoded).values
     layers = q_depth(made.picture, decoded, **truth(made))
     guessed = q_depth(made.picture, decoded, depth=focus)
@@ -151,7 +151,7 @@ def judged(made: Shot, focus: FocusDepth, decoded: IIPicture, coded: Any) -> dic
 
 
 def detail(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
-    """How much neighbouring pixels of the virtual camera's view differ, layer by layer: mean square, four ways."""
+    """Return the mean squared difference of neighbouring pixels of the virtual camera's view by layer."""
     made = shot(scene, "setup3", scale)
     assert made.picture.camera is not None
     layers = q_depth(made.picture, made.picture, **truth(made))
@@ -172,7 +172,7 @@ def detail(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
 
 
 def at_quality(picture: IIPicture, scheme: str, quality: float) -> tuple[Any, IIPicture]:
-    """The coding whose Q_global is nearest to what is asked, within 0.05 dB if a scheme can."""
+    """Return the coded picture nearest to a target Q_global, within 0.05 dB if possible."""
 
     def coding(rate: float) -> tuple[Any, IIPicture, float]:
         coded = encode(picture, scheme, bpp=rate)
@@ -194,7 +194,7 @@ def at_quality(picture: IIPicture, scheme: str, quality: float) -> tuple[Any, II
 
 
 def towards(points: list[tuple[float, float]], quality: float) -> float:
-    """The rate to try next, from rates and qualities so far: on a line over log rate, first 3 dB a doubling."""
+    """Return the next rate to try by linear interpolation over log rate; the first slope is 3 dB per doubling."""
     below = max((p for p in points if p[1] < quality), key=lambda p: p[1], default=None)
     above = min((p for p in points if p[1] >= quality), key=lambda p: p[1], default=None)
     if below is None or above is None:
@@ -205,19 +205,19 @@ def towards(points: list[tuple[float, float]], quality: float) -> float:
 
 
 def front(picture: IIPicture) -> NDArray[np.uint8]:
-    """What a viewer in front sees."""
+    """Return the front view."""
     assert picture.camera is not None
     return view_image(picture, five_viewpoints(picture.camera)["front"])[0]
 
 
 def psnr(a: NDArray[Any], b: NDArray[Any]) -> float:
-    """Of two images of 8 bits, dB."""
+    """Return the PSNR of two 8-bit images, dB."""
     error = float(np.square(a.astype(float) - b).mean())
     return 10 * math.log10(255**2 / error) if error else math.inf
 
 
 def middle(image: NDArray[Any], part: int | None) -> NDArray[Any]:
-    """A third, say, of an image each way, around its middle; all of it if there is no part."""
+    """Return 1/``part`` of an image along each axis around its middle; all of it without ``part``."""
     if part is None:
         return image
     (height, width) = (n // part for n in image.shape[:2])
@@ -226,10 +226,10 @@ def middle(image: NDArray[Any], part: int | None) -> NDArray[Any]:
 
 
 def large(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """As large as a panel of a sheet takes."""
+    """Return an image enlarged to a panel."""
     return enlarged(image, max(1, PANEL // image.shape[1]))
 
 
 def rounded(values: list[float]) -> list[float]:
-    """To a thousandth, which no chart shows and no eye sees."""
+    """Return numbers rounded to 0.001, below the resolution of charts."""
     return [round(value, 3) for value in values]

@@ -1,8 +1,8 @@
 """Volume coded by the verification model of JPEG 2000 Part 10, if installed (Olsson 2008, §5.7.3.2).
 
-It is part of OpenJPEG up to 2.4: ``cmake -DBUILD_JP3D=ON`` makes ``opj_jp3d_compress`` and
-``opj_jp3d_decompress``, which the steps look for on the path. It takes grey volumes and nothing else, so each colour
-is a volume of its own and has a third of the bits. What that alone costs, our own volume shows, given the same three.
+It is part of OpenJPEG up to 2.4: ``cmake -DBUILD_JP3D=ON`` builds ``opj_jp3d_compress`` and ``opj_jp3d_decompress``,
+which must be on the path. It codes grey volumes only, so each colour is a volume of its own with a third of the bits.
+Our volume coder, given the same three volumes, shows the cost of this restriction.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from .rates import VOLUME
 from .runner import Step
 
 ENCODER, DECODER = "opj_jp3d_compress", "opj_jp3d_decompress"
-# Five levels each way of CDF 5/3. Its other coder, of flat blocks, decodes nothing of what it coded, in 2.4 at least.
+# Five levels of CDF 5/3 along each axis. The coder of flat blocks of version 2.4 does not decode its own streams.
 SETTINGS = ("-n", "6,6,6", "-C", "3EB")
 HEADER = "Bpp\t8\nColor Map\t2\nDimensions\t{}\t{}\t{}\nResolution(mm)\t1\t1\t1\n"
 MODEL, APART = "verification model", f"{VOLUME}, colours apart"
-SHARE = 1 / 3  # of the bits, for each colour
+SHARE = 1 / 3  # of the bits for each colour
 COARSEST = 8  # smaller sub-images have too few pixels for five levels
 
 
 def steps(scale: int) -> list[Step]:
-    """All of them; none without the programs."""
+    """Return all steps; none without the programs."""
     if shutil.which(ENCODER) is None or shutil.which(DECODER) is None:
         return []
     return [
@@ -53,7 +53,7 @@ def steps(scale: int) -> list[Step]:
 
 
 def volumes(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
-    """Curves of Q_global: each colour coded alone by the verification model, and by our volume."""
+    """Return curves of Q_global with each colour coded alone, by the verification model and by our coder."""
     picture = shot(scene, "setup1", scale).picture
     points = []
     for scheme, coder in ((MODEL, by_model), (APART, by_ours)):
@@ -75,7 +75,7 @@ def volumes(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
 
 
 def by_model(picture: IIPicture, bpp: float) -> tuple[NDArray[np.uint8], int, float]:
-    """Pixels, bytes and CPU seconds of encoding."""
+    """Return pixels, bytes and CPU seconds of encoding."""
     images = component_images(picture, "si")
     rows, cols, height, width = images.shape[:4]
     order = selection_order("parallel", rows, cols)
@@ -91,7 +91,7 @@ def by_model(picture: IIPicture, bpp: float) -> tuple[NDArray[np.uint8], int, fl
 
 
 def there_and_back(volume: NDArray[np.uint8], bpp: float, folder: Path) -> tuple[NDArray[np.uint8], int, float]:
-    """A grey volume decoded again, bytes and CPU seconds of encoding.
+    """Return a coded and decoded grey volume, its bytes, and CPU seconds of encoding.
 
     Raises
     ------
@@ -110,11 +110,11 @@ def there_and_back(volume: NDArray[np.uint8], bpp: float, folder: Path) -> tuple
     if decoded.size != volume.size:
         raise OSError(f"{DECODER} left {decoded.size} voxels: {volume.size} are needed")
     size = (folder / "volume.jp3d").stat().st_size
-    return decoded.reshape(volume.shape), size, max(0.0, seconds)  # a difference of sums may round below zero
+    return decoded.reshape(volume.shape), size, max(0.0, seconds)  # rounding may make the difference negative
 
 
 def run(folder: Path, program: str, arguments: str, *more: str) -> None:
-    """One of the programs in a folder."""
+    """Run a program in a folder."""
     done = subprocess.run(
         [program, *arguments.split(), *more], cwd=folder, capture_output=True, text=True, check=False
     )
@@ -123,7 +123,7 @@ def run(folder: Path, program: str, arguments: str, *more: str) -> None:
 
 
 def by_ours(picture: IIPicture, bpp: float) -> tuple[NDArray[np.uint8], int, float]:
-    """The same by our own volume."""
+    """Return the same results by our coder."""
     decoded = np.empty_like(picture.pixels)
     total, seconds = 0, 0.0
     for colour in range(3):

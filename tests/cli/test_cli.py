@@ -137,7 +137,7 @@ def test_a_killed_study_continues_where_it_was(run, picture, tmp_path, monkeypat
     coded = []
     monkeypatch.setattr(codec, "encode", lambda *a, **o: (coded.append(a), encode(*a, **o))[1])
     code, out, _ = run(*arguments)
-    assert code == 0 and f"{len(kept)} points are there" in out
+    assert code == 0 and f"{len(kept)} points are kept" in out
     assert len(coded) == 8 - len(kept) and not log.exists()
     points = json.loads(numbers.read_text())["points"]
     whole = json.loads(json.dumps(points))
