@@ -152,6 +152,7 @@ BENCHMARKS = {
             fills=("docs/coding.md", "docs/speed_accuracy.md"),
             writes=(f"{IMAGES}/coders*",),
         ),
+        Benchmark("coding.takes", records=OWN, fills=("docs/video.md",), writes=(f"{IMAGES}/takes.*",)),
         Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),

@@ -20,6 +20,7 @@ from .inspect.random_access import decode_component, decode_frame
 from .search import Axis, CodingResult, Run, meet_size
 from .takes.api import EncodedTake, encode_take, open_take
 from .takes.container import DamagedTake, is_take
+from .takes.header import TakeFloor, take_floor
 from .takes.order import AccessCost, Plan, component_cost, view_cost
 
 for _kind in ("ei", "si", "ri"):
@@ -46,6 +47,7 @@ __all__ = [
     "Option",
     "Plan",
     "Run",
+    "TakeFloor",
     "analyse_orders",
     "component_cost",
     "decode",
@@ -61,6 +63,7 @@ __all__ = [
     "parse_scheme",
     "register",
     "schemes",
+    "take_floor",
     "timed_decode",
     "view_cost",
 ]

@@ -11,12 +11,14 @@ from .depth.q_depth import q_depth
 from .differences import differences, mean_differences
 from .global_angle import angle_axes, mean_q_angle, q_angle, q_global
 from .measure import Measure, Needs, known_measures, register_measure
+from .over_time import TakeQuality, measure_take
 from .pair import PicturePair
 from .plots.angle_depth import plot_depth
 from .plots.depth_chart import depth_over_rate, depth_rate_chart
 from .plots.error_maps import plot_error_layers
 from .plots.rd_chart import rd_chart
 from .plots.tables import summary_table, write_csv, write_latex
+from .plots.time_chart import time_chart
 from .point_log import PointLog
 from .quality import AngleQuality, DepthQuality, ViewQuality
 from .quality_report import Report, quality_rows, report
@@ -36,6 +38,7 @@ __all__ = [
     "PicturePair",
     "PointLog",
     "Report",
+    "TakeQuality",
     "ViewQuality",
     "angle_axes",
     "bd_psnr",
@@ -52,6 +55,7 @@ __all__ = [
     "logarithmic_layers",
     "mean_differences",
     "mean_q_angle",
+    "measure_take",
     "measuring",
     "plot_all",
     "plot_angle",
@@ -74,6 +78,7 @@ __all__ = [
     "register_measure",
     "report",
     "summary_table",
+    "time_chart",
     "write_csv",
     "write_latex",
     "write_study",

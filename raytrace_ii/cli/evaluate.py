@@ -42,7 +42,7 @@ def measures(plugin: Plugins = None) -> None:
 
 @app.command()
 def measure(
-    reference: Annotated[Path, typer.Argument(help="The II-picture as it was.")],
+    reference: Annotated[Path, typer.Argument(help="The II-picture as it was, or a folder of frames.")],
     decoded: Annotated[
         Path, typer.Argument(help="The decoded II-picture, a plain picture of the same size, or a coded file.")
     ],
@@ -59,7 +59,7 @@ def measure(
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
-    """Compare two II-pictures of the same structure."""
+    """Compare two II-pictures of the same structure, or two takes over time."""
     from ii_core import IIPicture
     from ii_core.files import read_depth, read_image, write_json
     from metrics import report
@@ -67,6 +67,13 @@ def measure(
     load_plugins(plugin)
     files = [json] if json else []
     check_outputs(files, force)
+    if reference.is_dir():
+        from .take import measure_frames
+
+        if depth or focus or layers or ssim or mask:
+            raise ValueError("--depth, --focus, --layers, --ssim and --mask are of single pictures")
+        measure_frames(reference, decoded, json, plots, force)
+        return
     if plots:
         from metrics import PLOTS, plot_all
 

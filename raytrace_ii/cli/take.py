@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from .common import check_folder, check_outputs, image_file, picture_files, progress_bar, spinner
+from .common import check_folder, check_outputs, columns, image_file, picture_files, progress_bar, spinner
 from .words import say
 
 
@@ -96,3 +96,35 @@ def decode_frames(
             video[frame].save(output)
         else:
             write_image(output, video.component(frame, stream.scheme.partition("-")[0], place))
+
+
+def measure_frames(reference: Path, decoded: Path, json: Path | None, plots: Path | None, force: bool) -> None:
+    """Compare two takes over time."""
+    from ii_core.display.look import viewpoints_around
+    from ii_core.files import write_json
+    from metrics import measure_take, time_chart
+
+    from .video import opened
+
+    chart = plots / "time.png" if plots else None
+    check_outputs([*([json] if json else []), *([chart] if chart else [])], force, make_folder=True)
+    a, b = opened(reference), opened(decoded)
+    path = viewpoints_around(a.structure, b.frames) if a.camera is not None and min(a.structure.lenses) > 10 else None
+    with progress_bar(f"measure {decoded.name}") as report:
+        quality = measure_take(a, b, viewpoints_mm=path, progress=lambda done, total: report(done, total, ""))
+    if chart:
+        time_chart({decoded.stem: quality}, chart)
+    numbers = quality.to_json()
+    if json:
+        write_json(json, {"reference": str(reference), "decoded": str(decoded), **numbers})
+    rows = {
+        "frames": f"{numbers['frames']}, {quality.fps:g} a second",
+        "Q_global": f"{quality.pooled_psnr:.2f} dB of the pooled error, {quality.mean_psnr:.2f} dB mean of frames, "
+        f"{quality.worst_psnr:.2f} dB worst frame",
+        "flicker": f"{quality.mean_flicker:.3f} 8-bit steps, mean of frames, where the original is still",
+    }
+    if quality.view_ssim is not None and quality.view_psnr is not None:
+        rows["moving viewer"] = (
+            f"MSSIM {quality.view_ssim.mean():.4f}, {quality.view_psnr.mean():.2f} dB, means of frames"
+        )
+    columns(rows)

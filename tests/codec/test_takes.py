@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from codec import DamagedTake, EncodedTake, Plan, component_cost, encode_take, open_take, view_cost
+from codec import DamagedTake, EncodedTake, Plan, component_cost, encode_take, open_take, take_floor, view_cost
 from codec.coders import groups
 from codec.coders.pseudo_video import PseudoVideo
 from codec.contract import find, schemes
@@ -341,3 +341,32 @@ def test_the_command_codes_and_decodes_takes(run, tmp_path):
     for words, named in ((("--frame", 9), "frames 0..4"), (("--component", "0,0"), "needs its --frame")):
         code, _, err = run("decode", tmp_path / "t.ii", *words, "-o", tmp_path / "x.png")
         assert code == 2 and named in err
+
+
+# Header portion
+
+
+def test_headers_of_a_take_follow_from_its_numbers_of_pictures():
+    """N_I·h_I + N_P·h_P: two cases give h_I and h_P, others must follow."""
+    views, lenses, ei = 12, (32, 32), (4, 3)
+
+    def bits(frames, **plan):
+        return take_floor("si-h264", lenses, ei, frames=frames, plan=Plan(**plan)).bits
+
+    # one I picture and 11 others a segment of one instant; 6 instants in groups of 6 views: 2 I pictures
+    one, two = bits(1, span=1), bits(1, span=1, group=6)
+    intra = two - one  # h_I − h_P
+    other = (one - intra) / views  # h_P
+    for frames, plan in (
+        (6, {"span": 1}),
+        (6, {"span": 6}),
+        (6, {"span": 3, "group": 4}),
+        (8, {"span": 4, "group": 1}),
+    ):
+        segments = frames // plan["span"]
+        count = segments * views // plan.get("group", views)
+        expected = count * intra + frames * views * other
+        for walk in WALKS:
+            assert bits(frames, walk=walk, **plan) == pytest.approx(expected, rel=0.03), (plan, walk)
+    floor = take_floor("si-h264", lenses, ei, frames=6, plan=Plan(span=6))
+    assert floor.portion(floor.bpp) == 1 and floor.portion(2 * floor.bpp) == 0.5

@@ -1,0 +1,224 @@
+"""Takes coded in every order over view and time: rate against stills, random access, and speed against disparity.
+
+    python -m benchmarks run takes [--scale 8] [--takes apples,car,cuboid]
+
+Takes are rendered once into ``out/takes``. Numbers go to ``benchmarks/results/takes.jsonl``, the tables into
+``docs/video.md``, the chart into ``docs/images/takes.png``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import ROOT, Records, add_again, origin, with_commits
+from codec import Plan, component_cost, encode_take, open_take
+from ii_core import IIVideo, open_video, preset, sub_images, video_of
+from ii_core.display.figure import COLOURS, MARKERS, new_figure, save
+from metrics import bd_rate, measure_take
+from metrics.rd import UndefinedDifference
+from raytrace_ii import load_take, render_take
+
+RECORDS = Records("takes", ("benchmarks.coding.takes",))
+SCALE = 8  # of the page
+TAKES = ("apples", "car", "cuboid")
+SCHEME = "si-h264:rate=cq,refs=8"
+QPS = (22, 27, 32, 37)
+FRAMES, STEPS, INSTANTS = 16, (1, 2, 4), 8  # of the orders; of the speeds: frames left out, and frames that are kept
+SPAN = 8
+PLANS = {
+    "stills": Plan(span=1),
+    "stills, groups of 16 views": Plan(span=1, group=16),
+    "view-first": Plan(walk="view-first", span=SPAN),
+    "time-first": Plan(walk="time-first", span=SPAN),
+    "time-first, groups of 1 view": Plan(walk="time-first", span=SPAN, group=1),
+    "interleaved": Plan(walk="interleaved", span=SPAN, strip=4),
+    "interleaved, groups of 16 views": Plan(walk="interleaved", span=SPAN, group=16, strip=4),
+}
+ONE_WAY = ("view-first", "time-first")
+
+
+def main() -> None:
+    """Measure, print, keep, and fill tables and chart."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scale", type=int, default=SCALE)
+    parser.add_argument("--takes", default=",".join(TAKES))
+    add_again(parser)
+    asked = parser.parse_args()
+    takes = asked.takes.split(",")
+    keys = [{"take": take, "scale": asked.scale, "plan": plan} for plan in PLANS for take in takes]
+    keys += [{"take": take, "scale": asked.scale, "step": step} for step in STEPS for take in takes]
+    for key in RECORDS.todo(keys, asked.again):
+        video = rendered(key["take"], asked.scale)
+        RECORDS.measure(key, lambda key=key, video=video: coded(video, **key))
+        print(key, flush=True)
+    print("\n".join(line for lines in tables().values() for line in lines))
+    publish(tables())
+    if asked.scale == SCALE and RECORDS.newest(scale=SCALE):
+        chart()
+
+
+def rendered(take: str, scale: int) -> IIVideo:
+    """A take's frames that are used, rendered unless they are there."""
+    folder = ROOT / "out" / "takes" / f"{take}_{scale}"
+    frames = sorted({*range(FRAMES), *(step * i for step in STEPS for i in range(INSTANTS))})
+    render_take(load_take(take), folder, preset("setup1", scale=scale), frames=range(frames[-1] + 1))
+    return open_video(folder)
+
+
+def coded(video: IIVideo, take: str, scale: int, plan: str = "", step: int = 0) -> dict[str, Any]:
+    """Points of one plan; or, of every step-th frame, points of both one-way orders and correlations."""
+    if plan:
+        return {"points": points(video_of([video[i] for i in range(FRAMES)], fps=video.fps), PLANS[plan])}
+    some = video_of([video[step * i] for i in range(INSTANTS)], fps=video.fps / step)
+    curves = {name: points(some, PLANS[name]) for name in ONE_WAY}
+    return {"curves": curves, **correlations(some)}
+
+
+def points(video: IIVideo, plan: Plan) -> list[dict[str, float]]:
+    """Rate and quality at every quantiser."""
+    found = []
+    for qp in QPS:
+        coded = encode_take(video, SCHEME, qp=qp, plan=plan)
+        quality = measure_take(video, open_take(coded))
+        found.append(
+            {
+                "qp": qp,
+                "bpp": coded.bpp,
+                "mbit_per_second": coded.mbit_per_second,
+                "psnr_of_pooled_mse": quality.pooled_psnr,
+                "psnr_worst_frame": quality.worst_psnr,
+                "flicker": quality.mean_flicker,
+            }
+        )
+    return found
+
+
+def correlations(video: IIVideo) -> dict[str, float]:
+    """Mean correlation (5.3) of sub-images that follow one another in view, along rows, and in time."""
+    view: list[float] = []
+    time: list[float] = []
+    last = None
+    for picture in video:
+        images = sub_images(picture).astype(np.float64)
+        images = images.reshape(*images.shape[:2], -1)
+        images = images - images.mean(axis=2, keepdims=True)
+        images /= np.maximum(np.linalg.norm(images, axis=2, keepdims=True), 1e-12)
+        view.append(float((images[:, 1:] * images[:, :-1]).sum(axis=2).mean()))
+        if last is not None:
+            time.append(float((images * last).sum(axis=2).mean()))
+        last = images
+    return {"view_correlation": float(np.mean(view)), "time_correlation": float(np.mean(time))}
+
+
+def difference(anchor: Sequence[Mapping[str, Any]], test: Sequence[Mapping[str, Any]]) -> float | None:
+    """Bjøntegaard rate of a curve against another, percent; None where curves have none."""
+    a, b = ([[p[name] for p in curve] for name in ("bpp", "psnr_of_pooled_mse")] for curve in (anchor, test))
+    try:
+        return bd_rate(*a, *b)
+    except UndefinedDifference:
+        return None
+
+
+def by_plan(scale: int = SCALE) -> dict[str, dict[str, Any]]:
+    """Rows by take and plan."""
+    found: dict[str, dict[str, Any]] = {}
+    for row in RECORDS.rows(scale=scale):
+        if "plan" in row:
+            found.setdefault(row["take"], {})[row["plan"]] = row
+    return found
+
+
+def tables() -> Tables:
+    """Return the tables of the page of videos."""
+    return {("docs/video.md", "takes"): plan_table(), ("docs/video.md", "takes-speed"): speed_table()}
+
+
+def plan_table() -> list[str]:
+    """A row a plan: random access, Bjøntegaard rate of each take against its stills."""
+    rows = by_plan()
+    if not rows:
+        return ["Not measured yet."]
+    lines = ["| plan | frames for one SI, mean | " + " | ".join(rows) + " |", "|---|---|" + "---|" * len(rows)]
+    commits = []
+    for plan in PLANS:
+        cost = component_cost(PLANS[plan], 256, FRAMES)
+        cells = []
+        for take in rows.values():
+            if plan not in take or "stills" not in take:
+                cells.append("–")
+                continue
+            off = difference(take["stills"]["points"], take[plan]["points"])
+            cells.append("anchor" if plan == "stills" else "–" if off is None else f"{off:+.1f} %")
+        lines.append(f"| {plan} | {cost.mean:g} | " + " | ".join(cells) + " |")
+        commits.append([take[plan]["commit"] for take in rows.values() if plan in take])
+    every = [row for take in rows.values() for row in take.values()]
+    return [origin(every), "", *with_commits(lines, commits)]
+
+
+def speed_table() -> list[str]:
+    """A row a take and speed: correlations, and rate of time-first against view-first."""
+    rows = [row for row in RECORDS.rows(scale=SCALE) if "step" in row]
+    if not rows:
+        return ["Not measured yet."]
+    lines = [
+        "| take | speed | 1 − c in time | 1 − c in view | time-first against view-first |",
+        "|---|---|---|---|---|",
+    ]
+    for row in sorted(rows, key=lambda row: (TAKES.index(row["take"]), row["step"])):
+        off = difference(*(row["curves"][name] for name in ONE_WAY))
+        lines.append(
+            f"| {row['take']} | ×{row['step']} | {1 - row['time_correlation']:.4f} | "
+            f"{1 - row['view_correlation']:.4f} | {'–' if off is None else f'{off:+.1f} %'} |"
+        )
+    return [origin(rows), "", *lines]
+
+
+def chart() -> None:
+    """Draw rate over random access, and time-first against view-first over the ratio of decorrelations."""
+    figure = new_figure(11, 4.6)
+    left, right = figure.subplots(1, 2)
+    for i, plans in enumerate(by_plan().values()):
+        for j, plan in enumerate(PLANS):
+            off = None if plan not in plans else difference(plans["stills"]["points"], plans[plan]["points"])
+            if off is not None:
+                cost = component_cost(PLANS[plan], 256, FRAMES).mean
+                left.plot(cost, off, marker=MARKERS[j], color=COLOURS[i], linestyle="none", markersize=8)
+    for j, plan in enumerate(PLANS):
+        left.plot([], [], marker=MARKERS[j], color="0.3", linestyle="none", label=plan)
+    left.axhline(0, color="0.5", linewidth=0.8)
+    left.set_xscale("log")
+    left.set_xlabel("frames decoded for one SI at one instant, mean")
+    left.set_ylabel("rate against stills at equal quality [%]")
+    left.set_title("use this when: rate against random access", loc="left", fontsize=10)
+    rows = [row for row in RECORDS.rows(scale=SCALE) if "step" in row]
+    for i, take in enumerate(TAKES):
+        pairs = []
+        for row in rows:
+            off = difference(*(row["curves"][name] for name in ONE_WAY)) if row["take"] == take else None
+            if off is not None:
+                pairs.append(((1 - row["time_correlation"]) / (1 - row["view_correlation"]), off))
+        right.plot(*np.array(sorted(pairs) or np.empty((0, 2))).T, marker="o", color=COLOURS[i], label=take)
+    right.axhline(0, color="0.5", linewidth=0.8)
+    right.axvline(1, color="0.5", linewidth=0.8, linestyle=":")
+    right.set_xscale("log")
+    right.set_xlabel("(1 − c in time) / (1 − c in view)")
+    right.set_ylabel("rate of time-first against view-first [%]")
+    right.set_title("use time-first when c in time is the higher", loc="left", fontsize=10)
+    for axes in (left, right):
+        axes.grid(True, color="0.9", linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.legend(loc="outside lower left", ncols=5, frameon=False, fontsize=8)
+    path = ROOT / "out" / "takes.png"
+    path.parent.mkdir(exist_ok=True)
+    write_picture(IMAGES / "takes.png", save(figure, path, dpi=130))
+
+
+if __name__ == "__main__":
+    main()
