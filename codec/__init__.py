@@ -2,6 +2,7 @@
 
 from .api import Encoded, decode, encode, timed_decode
 from .coders.ffv1 import Ffv1
+from .coders.forman import Forman
 from .coders.jpeg2000 import Jpeg2000
 from .coders.lf.coder import LightField
 from .coders.libaom import Avif
@@ -16,6 +17,7 @@ from .coders.x265 import Hevc
 from .contract import Coder, Goal, Option, options, parse_scheme, register, schemes
 from .inspect.extract import extract
 from .inspect.order_analysis import analyse_orders
+from .inspect.progressive import DecodedView, Stage, decode_levels, decode_view
 from .inspect.random_access import decode_component, decode_frame
 from .search import Axis, CodingResult, Run, meet_size
 from .takes.api import EncodedTake, encode_take, open_take
@@ -34,6 +36,7 @@ register(Separate("si"))
 register(Sperr("si"))
 register(Avif("si"))
 register(LightField())
+register(Forman())
 
 __all__ = [
     "AccessCost",
@@ -41,18 +44,22 @@ __all__ = [
     "Coder",
     "CodingResult",
     "DamagedTake",
+    "DecodedView",
     "Encoded",
     "EncodedTake",
     "Goal",
     "Option",
     "Plan",
     "Run",
+    "Stage",
     "TakeFloor",
     "analyse_orders",
     "component_cost",
     "decode",
     "decode_component",
     "decode_frame",
+    "decode_levels",
+    "decode_view",
     "encode",
     "encode_take",
     "extract",

@@ -1,9 +1,12 @@
 """`si-lf`: structure, prediction and stream."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
-from codec import decode, decode_component, encode
+from codec import decode, decode_component, decode_levels, decode_view, encode
 from codec.coders.lf import coder as lf
 from codec.coders.lf import ranges, stream
 from codec.coders.lf.pyramid import pyramid
@@ -39,12 +42,17 @@ def test_the_pyramid_has_every_view_once_and_refers_to_decoded_ones(rows, cols):
             assert bool(node.references) == bool(done)
             assert len(node.references) <= 4 and len(node.sources) <= 6
             done.add((node.row, node.col))
+        # Views of one phase do not predict each other: they are coded at the same time.
+        phase_of = {(node.row, node.col): node.phase for node in nodes}
+        for node in nodes:
+            assert all(phase_of.get(place, -1) < node.phase for place in (*node.references, *node.sources))
     assert done == {(row, col) for row in range(rows) for col in range(cols)}
 
 
 def test_a_view_amid_four_is_predicted_by_them():
     nodes = {(node.row, node.col): node for level in pyramid(9, 9, 3, 4, 6) for node in level}
-    assert set(nodes[4, 4].references) == {(0, 0), (0, 8), (8, 0), (8, 8)}
+    assert not nodes[4, 4].references and nodes[4, 4].level == 0
+    assert set(nodes[2, 2].references) == {(0, 0), (0, 4), (4, 0), (4, 4)}
     assert set(nodes[1, 1].references) == {(0, 0), (0, 2), (2, 0), (2, 2)}
 
 
@@ -77,11 +85,21 @@ def test_decoding_repeats_the_encoder_to_the_bit():
     source = lf._Source(picture, options)
     payload, encoded = source.coded(30 * lf.FRACTIONS)
     header, levels = stream.unpack(payload, picture.pixels.size // 3)
-    field = lf.Field(header, source.grid, source.height, source.width)
-    for _ in lf.decoded_views(field, levels):
+    field = lf.Field(header, source.grid, source.height, source.width, np.uint8)
+    for _ in lf.decoded_batches(field, levels):
         pass
     np.testing.assert_array_equal(field.views, encoded.views)
     np.testing.assert_array_equal(field.disparities, encoded.disparities)
+
+
+@pytest.mark.parametrize("scheme", ["si-lf", "si-lf:lossless=1"])
+def test_threads_change_no_byte(scheme):
+    picture = shifted_plane((1, 1), grid=(5, 4))
+    goal = {} if "lossless" in scheme else {"qp": 30}
+    joint = "," if ":" in scheme else ":"
+    one, two = (encode(picture, f"{scheme}{joint}threads={threads}", **goal) for threads in (1, 2))
+    assert one.payload == two.payload
+    np.testing.assert_array_equal(decode(one).pixels, decode(two).pixels)
 
 
 @pytest.mark.parametrize("name", ["empty", "short", "long"])
@@ -100,21 +118,95 @@ def test_few_bytes_do_not_claim_a_large_picture():
         stream.unpack(payload, 1 << 31)
 
 
-@pytest.mark.parametrize("place", [(0, 0), (2, 1), (4, 3)])
-def test_one_view_alone_is_that_of_the_whole(place, monkeypatch):
+@pytest.mark.parametrize("place", [(0, 0), (2, 1), (4, 3), (2, 2)])
+def test_one_view_alone_is_that_of_the_whole(place):
     """And what is decoded for it are the levels above and a part of its own."""
     picture = shifted_plane((1, 1), grid=(4, 5))
     coded = encode(picture, "si-lf", qp=34)
-    decoded = []
-    original = lf.decode_view
-    monkeypatch.setattr(lf, "decode_view", lambda *given: decoded.append(1) or original(*given))
-    alone = decode_component(coded, place)
-    nodes = [(node.col, node.row) for level in pyramid(4, 5, 3, 4, 6) for node in level]
-    assert len(decoded) == nodes.index(place) + 1
-    np.testing.assert_array_equal(alone, sub_images(decode(coded))[place[1], place[0]])
+    alone = decode_view(coded, place)
+    levels = pyramid(4, 5, 3, 4, 4)
+    level = next(i for i, nodes in enumerate(levels) if place in [(node.col, node.row) for node in nodes])
+    above = sum(map(len, levels[:level]))
+    assert above < alone.views_decoded <= above + len(levels[level])
+    assert alone.bytes_read <= alone.payload_bytes == len(coded.payload)
+    np.testing.assert_array_equal(alone.pixels, sub_images(decode(coded))[place[1], place[0]])
+    np.testing.assert_array_equal(decode_component(coded, place), alone.pixels)
 
 
-@pytest.mark.parametrize("level", [0, 1, 2, 3])
+def test_the_middle_view_takes_few_bytes():
+    coded = encode(shifted_plane((1, 1), grid=(5, 5)), "si-lf", qp=20)
+    cost = decode_view(coded, (2, 2))
+    assert cost.views_decoded == 1
+    payload = coded.payload[: cost.bytes_read] + bytes(len(coded.payload) - cost.bytes_read)
+    damaged = replace(coded, payload=payload)
+    np.testing.assert_array_equal(decode_view(damaged, (2, 2)).pixels, cost.pixels)
+
+
+def test_a_view_beyond_the_grid_is_refused():
+    coded = encode(shifted_plane((1, 1), grid=(2, 2)), "si-lf:fast", qp=40)
+    with pytest.raises(ValueError, match=r"view \(2, 0\) is asked for: there are 2×2"):
+        decode_view(coded, (2, 0))
+
+
+@pytest.mark.parametrize("scheme", ["si-lf", "si-lf:lossless=1"])
+def test_levels_come_nearer_to_the_picture(scheme):
+    """And the last one is the decoded picture."""
+    picture = shifted_plane((1, 1), grid=(5, 5))
+    coded = encode(picture, scheme, **({} if "lossless" in scheme else {"qp": 24}))
+    stages = list(decode_levels(coded))
+    assert stages[0].decoded.sum() == 1 and stages[0].decoded[2, 2]
+    assert stages[-1].decoded.all()
+    np.testing.assert_array_equal(stages[-1].picture.pixels, decode(coded).pixels)
+    errors = [np.mean((stage.picture.pixels.astype(float) - picture.pixels) ** 2) for stage in stages]
+    assert all(later < earlier for earlier, later in pairwise(errors))
+    read = [stage.bytes_read for stage in stages]
+    assert read == sorted(read) and read[-1] <= len(coded.payload)
+    first = sub_images(stages[0].picture)
+    np.testing.assert_array_equal(first[0, 0], first[2, 2])
+
+
+def test_other_schemes_have_no_levels():
+    coded = encode(shifted_plane((1, 1), grid=(2, 2)), "jpegxl:lossless=1")
+    with pytest.raises(ValueError, match="scheme jpegxl codes no levels: only si-lf does"):
+        next(decode_levels(coded))
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("grid", [(1, 1), (3, 4)])
+def test_lossless_keeps_every_bit(dtype, grid):
+    """Noise, a plane and the extreme codes; sides that are no multiples of 4."""
+    rng = np.random.default_rng(6)
+    top = np.iinfo(dtype).max
+    pixels = shifted_plane((1, 1), grid=grid, height=13, width=18).pixels.astype(dtype) * (top // 255)
+    pixels[: 5 * grid[0]] = rng.integers(0, top + 1, pixels[: 5 * grid[0]].shape)
+    pixels[-2:] = rng.choice([0, top], pixels[-2:].shape)
+    picture = IIPicture(pixels, (18, 13), grid[::-1])
+    coded = encode(picture, "si-lf:lossless=1")
+    np.testing.assert_array_equal(decode(coded).pixels, pixels)
+    np.testing.assert_array_equal(decode_component(coded, (0, 0)), sub_images(picture)[0, 0])
+
+
+def test_lossless_takes_less_than_general_coders():
+    """Of a textured plane with noise of one code, of which no coder can spare the 2.05 bits a sample."""
+    picture = shifted_plane((1, 1), grid=(5, 5))
+    noise = np.random.default_rng(8).standard_normal(picture.pixels.shape)
+    pixels = np.clip(np.rint(picture.pixels * 0.8 + 20 + noise), 0, 255).astype(np.uint8)
+    noisy = picture.with_pixels(pixels)
+    ours = encode(noisy, "si-lf:lossless=1").bpp
+    assert 3 * 2.05 < ours
+    assert ours < 0.8 * min(encode(noisy, scheme).bpp for scheme in ("si-ffv1", "jpegxl:lossless=1"))
+
+
+@pytest.mark.parametrize("quality", [30, 41.5])
+def test_a_quality_is_met(quality):
+    picture = shifted_plane((1, 1), grid=(3, 3))
+    coded = encode(picture, "si-lf:fast", quality=quality)
+    error = np.mean((decode(coded).pixels.astype(float) - picture.pixels) ** 2)
+    # The quantisers' fractions are sixteenths, of 0.06 dB each.
+    assert 10 * np.log10(255**2 / error) == pytest.approx(quality, abs=0.1)
+
+
+@pytest.mark.parametrize("level", [0, 1, 2, 3, 4])
 def test_a_level_that_ends_early_is_named(level):
     picture = shifted_plane((1, 1), grid=(9, 9))
     payload = encode(picture, "si-lf:fast", qp=12).payload

@@ -32,6 +32,14 @@ RATES = np.stack(
 # Cost in bits of an event of probability i / 4096.
 COSTS = -np.log2(np.maximum(np.arange(4097), 0.5) / 4096).astype(np.float32)
 
+# Log odds in 2^-8 of probabilities in 2^-12, and probabilities in 2^-16 of log odds up to FARTHEST.
+FARTHEST = 1900
+MIXING_RATE = 3
+_P = np.maximum(np.arange(4096), 0.5) / 4096
+STRETCHED = np.rint(256 * np.log(_P / (1 - _P))).astype(np.int32)
+SQUASHED = np.rint(ONE / (1 + np.exp(-np.arange(-FARTHEST, FARTHEST + 1) / 256))).astype(np.int32)
+SQUASHED = np.clip(SQUASHED, LEAST, ONE - LEAST)
+
 
 class Arithmetic(NamedTuple):
     """State of a coder: contexts (C, 3), registers and bytes."""
@@ -140,11 +148,11 @@ def bit_cost(contexts, context, bit):
     return COSTS[p] if bit else COSTS[4096 - p]
 
 
-@lean
-def code_bit(coder, context, bit):
-    """Write or read a bit in a context, which learns it; return it."""
-    state, contexts = coder.state, coder.contexts
-    split = (state[RANGE] >> 16) * probability(contexts, context)
+@inner
+def _code_with(coder, p, bit):
+    """Write or read a bit that is one with probability p."""
+    state = coder.state
+    split = (state[RANGE] >> 16) * p
     if state[DECODING]:
         bit = 1 if state[CODE] < split else 0
         if not bit:
@@ -153,6 +161,11 @@ def code_bit(coder, context, bit):
         state[LOW] += split
     state[RANGE] = split if bit else state[RANGE] - split
     _normalise(coder)
+    return bit
+
+
+@inner
+def _learn(contexts, context, bit):
     seen = contexts[context, 2]
     target = ONE if bit else 0
     for rate in range(2):
@@ -160,6 +173,33 @@ def code_bit(coder, context, bit):
         contexts[context, rate] = p + (((target - p) * RATES[seen, rate]) >> 16)
     if seen < SEEN:
         contexts[context, 2] = seen + 1
+
+
+@lean
+def code_bit(coder, context, bit):
+    """Write or read a bit in a context, which learns it; return it."""
+    bit = _code_with(coder, probability(coder.contexts, context), bit)
+    _learn(coder.contexts, context, bit)
+    return bit
+
+
+@lean
+def code_mixed(coder, one, other, weights, bit):
+    """Write or read a bit by two contexts: their log odds are added by weights, which learn as well (Mahoney 2005).
+
+    ``contexts[weights, :2]`` are the weights in 2^-16.
+    """
+    contexts = coder.contexts
+    a = np.int64(STRETCHED[probability(contexts, one) >> 4])
+    b = np.int64(STRETCHED[probability(contexts, other) >> 4])
+    odds: Any = (np.int64(contexts[weights, 0]) * a + np.int64(contexts[weights, 1]) * b) >> 16
+    p = np.int64(SQUASHED[min(max(odds, -FARTHEST), FARTHEST) + FARTHEST])
+    bit = _code_with(coder, p, bit)
+    missed = (ONE if bit else 0) - p
+    contexts[weights, 0] += (a * missed * MIXING_RATE) >> 20
+    contexts[weights, 1] += (b * missed * MIXING_RATE) >> 20
+    _learn(contexts, one, bit)
+    _learn(contexts, other, bit)
     return bit
 
 

@@ -23,6 +23,8 @@ INTRA, EXPLICIT, SYNTHESIS = 0, 1, 2
 MOST_REFERENCES = 4
 LIMIT = 8191  # of a decoded sample's magnitude, in eighths of an 8-bit code
 MOST_INDEX = 1 << 14
+UNKNOWN = -32768  # disparity
+DIFFERENT = 205  # disparities that lead this far apart, in 2^-8 samples, are of different surfaces
 # What is known of each 4×4.
 KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, FIELDS = range(8)
 
@@ -34,6 +36,8 @@ class Job(NamedTuple):
     ----------
     views : ndarray of int16, (J, 3, H, W)
         Decoded views; sides are multiples of 4.
+    disparities : ndarray of int16, (J, H, W)
+        Of the decoded views, -32768 where none is known.
     at : int
         Which of them this is.
     references : ndarray of int64, (R, 3)
@@ -46,6 +50,8 @@ class Job(NamedTuple):
         The synthesised view, if ``synthesised``.
     disparity : ndarray of int16, (H, W)
         That of the synthesis, in 2^-8 samples between neighbouring views.
+    doubt : ndarray of int16, (H / 4, W / 4)
+        How far the sources of the synthesis differ, in eighths of an 8-bit code.
     synthesised : int
     step : int
         Of the quantiser, in 2^-7 of an 8-bit code.
@@ -55,6 +61,7 @@ class Job(NamedTuple):
     """
 
     views: Any
+    disparities: Any
     at: Any
     references: Any
     unit: Any
@@ -62,6 +69,7 @@ class Job(NamedTuple):
     high: Any
     made: Any
     disparity: Any
+    doubt: Any
     synthesised: Any
     step: Any
     blocks: Any
@@ -111,27 +119,46 @@ def neighbours(blocks, field, value, by, bx):
 
 
 @lean
-def split_context(blocks, by, bx, log):
-    """By how many of the blocks above and left are smaller."""
+def doubt_class(job, by, bx, log):
+    """0–3 by how far the synthesis' sources differ in the block, in steps of the quantiser; 0 without synthesis."""
+    if not job.synthesised:
+        return 0
+    height, width = job.doubt.shape
+    size = 1 << (log - 2)
+    total = np.int64(0)
+    for y in range(by, min(by + size, height)):
+        for x in range(bx, min(bx + size, width)):
+            total += job.doubt[y, x]
+    total <<= 8 - 2 * (log - 2)
+    # ``doubt`` is in 2^-3, the step in 2^-7.
+    return 0 if total < 2 * job.step else (1 if total < 5 * job.step else (2 if total < 12 * job.step else 3))
+
+
+@lean
+def split_context(job, by, bx, log):
+    """By how many of the blocks above and left are smaller, and doubt."""
+    blocks = job.blocks
     count = 0
     if by > 0 and blocks[LOG, by - 1, bx] < log:
         count += 1
     if bx > 0 and blocks[LOG, by, bx - 1] < log:
         count += 1
-    return at.SPLIT + (log - 3) * 3 + count
+    return at.SPLIT + ((log - 3) * 3 + count) * 4 + doubt_class(job, by, bx, log)
 
 
 @lean
-def synthesis_context(blocks, by, bx, log):
-    """By size, and how many of the blocks above and left are synthesised."""
-    return at.SYNTHESIS + (log - 2) * 3 + neighbours(blocks, np.int64(KIND), np.int64(SYNTHESIS), by, bx)
+def synthesis_context(job, by, bx, log):
+    """By size, how many of the blocks above and left are synthesised, and doubt."""
+    like = neighbours(job.blocks, np.int64(KIND), np.int64(SYNTHESIS), by, bx)
+    return at.SYNTHESIS + ((log - 2) * 3 + like) * 4 + doubt_class(job, by, bx, log)
 
 
 @lean
-def residual_context(blocks, by, bx, log, kind):
-    """By size, kind, and how many of the blocks above and left have a residual."""
+def residual_context(job, by, bx, log, kind):
+    """By size, kind, how many of the blocks above and left have a residual, and doubt."""
     other = 0 if kind == SYNTHESIS else 1
-    return at.RESIDUAL + ((log - 2) * 2 + other) * 3 + neighbours(blocks, np.int64(CODED), np.int64(1), by, bx)
+    like = neighbours(job.blocks, np.int64(CODED), np.int64(1), by, bx)
+    return at.RESIDUAL + (((log - 2) * 2 + other) * 3 + like) * 4 + doubt_class(job, by, bx, log)
 
 
 @lean
@@ -169,8 +196,34 @@ def from_where(job, by, bx, log, index):
 
 
 @lean
-def expected_mask(job, by, bx, where):
-    """The references of the block left or above, or all; and a context."""
+def seen_mask(job, by, bx, log, index):
+    """The references whose own disparity agrees at three of five places of the block, or is not known."""
+    height, width = job.disparities.shape[1:]
+    quarter = (1 << log) >> 2
+    seen = 0
+    for r in range(job.references.shape[0]):
+        view, across, down = job.references[r, 0], job.references[r, 1], job.references[r, 2]
+        d = index * job.unit
+        farthest = max(abs(across), abs(down))
+        against = 0
+        for place in range(5):
+            y = 4 * by + (2 * quarter if place == 4 else quarter + 2 * quarter * (place >> 1))
+            x = 4 * bx + (2 * quarter if place == 4 else quarter + 2 * quarter * (place & 1))
+            i, j = x + ((d * across + 128) >> 8), y + ((d * down + 128) >> 8)
+            if i < 0 or j < 0 or i >= width or j >= height:
+                against += 1
+            else:
+                other = np.int64(job.disparities[view, j, i])
+                if other != UNKNOWN and abs(other - d) * farthest > DIFFERENT:
+                    against += 1
+        if against < 3:
+            seen |= 1 << r
+    return seen
+
+
+@lean
+def expected_mask(job, by, bx, where, seen):
+    """The references of the block left or above, or those that see the block; and a context."""
     left = above = np.int64(0)
     if bx > 0 and job.blocks[KIND, by, bx - 1] == EXPLICIT:
         left = np.int64(job.blocks[MASK, by, bx - 1])
@@ -180,8 +233,10 @@ def expected_mask(job, by, bx, where):
     if left == 0 or (where == 3 and above):
         expected = above
     if expected == 0:
+        expected = seen
+    if expected == 0:
         expected = (1 << job.references.shape[0]) - 1
-    return expected, at.SAME_MASK + 2 * where + (1 if left == above else 0)
+    return expected, at.SAME_MASK + 2 * where + (1 if left == above else 0) + (8 if expected == seen else 0)
 
 
 @lean
@@ -209,7 +264,7 @@ def code_kind(coder, job, by, bx, log, kind, index, mask, direction):
     else:
         made = 0
         if job.synthesised:
-            made = code_bit(coder, synthesis_context(blocks, by, bx, log), 1 if kind == SYNTHESIS else 0)
+            made = code_bit(coder, synthesis_context(job, by, bx, log), 1 if kind == SYNTHESIS else 0)
         if made:
             kind = SYNTHESIS
         else:
@@ -230,7 +285,8 @@ def code_kind(coder, job, by, bx, log, kind, index, mask, direction):
     else:
         index = _code_index(coder, job, by, bx, log, index)
         where = from_where(job, by, bx, log, index)
-        mask = _code_mask(coder, job, by, bx, where, mask) if count > 1 else 1
+        seen = seen_mask(job, by, bx, log, index)
+        mask = _code_mask(coder, job, by, bx, where, seen, mask) if count > 1 else 1
     return kind, index, mask, direction
 
 
@@ -268,8 +324,8 @@ def _code_index(coder, job, by, bx, log, index):
 
 
 @lean
-def _code_mask(coder, job, by, bx, where, mask):
-    expected, context = expected_mask(job, by, bx, where)
+def _code_mask(coder, job, by, bx, where, seen, mask):
+    expected, context = expected_mask(job, by, bx, where, seen)
     if code_bit(coder, context, 1 if mask == expected else 0):
         return expected
     count = job.references.shape[0]
@@ -278,18 +334,18 @@ def _code_mask(coder, job, by, bx, where, mask):
         if i == count - 1 and found == 0:
             found = 1 << i
         else:
-            context = at.MASK + ((count - 1) * 4 + i) * 2 + (1 if found else 0)
+            context = at.MASK + (((count - 1) * 4 + i) * 2 + (1 if found else 0)) * 2 + ((seen >> i) & 1)
             found |= code_bit(coder, context, (mask >> i) & 1) << i
     return found
 
 
 @lean
 def kind_cost(contexts, job, by, bx, log, kind, index, mask, direction):
-    """Bits that `code_kind` would take."""
+    """Bits that `code_kind` would take; those of the references left out if the mask is 0."""
     blocks, count = job.blocks, job.references.shape[0]
     bits = np.float32(0)
     if count and job.synthesised:
-        bits += bit_cost(contexts, synthesis_context(blocks, by, bx, log), 1 if kind == SYNTHESIS else 0)
+        bits += bit_cost(contexts, synthesis_context(job, by, bx, log), 1 if kind == SYNTHESIS else 0)
     if count and kind != SYNTHESIS:
         context = at.INTRA + neighbours(blocks, np.int64(KIND), np.int64(INTRA), by, bx)
         bits += bit_cost(contexts, context, 1 if kind == INTRA else 0)
@@ -303,8 +359,9 @@ def kind_cost(contexts, job, by, bx, log, kind, index, mask, direction):
                 bits += np.float32(1) if direction <= SMOOTH else np.float32(5.1)
     elif kind == EXPLICIT:
         bits += _index_cost(contexts, job, by, bx, log, index)
-        if count > 1:
-            bits += mask_cost(contexts, job, by, bx, from_where(job, by, bx, log, index), mask)
+        if count > 1 and mask:
+            seen = seen_mask(job, by, bx, log, index)
+            bits += mask_cost(contexts, job, by, bx, from_where(job, by, bx, log, index), seen, mask)
     return bits
 
 
@@ -334,9 +391,9 @@ def _index_cost(contexts, job, by, bx, log, index):
 
 
 @lean
-def mask_cost(contexts, job, by, bx, where, mask):
+def mask_cost(contexts, job, by, bx, where, seen, mask):
     """Bits that a set of references would take."""
-    expected, context = expected_mask(job, by, bx, where)
+    expected, context = expected_mask(job, by, bx, where, seen)
     bits = bit_cost(contexts, context, 1 if mask == expected else 0)
     if mask == expected:
         return bits
@@ -345,7 +402,8 @@ def mask_cost(contexts, job, by, bx, where, mask):
     for i in range(count):
         bit = (mask >> i) & 1
         if i < count - 1 or found:
-            bits += bit_cost(contexts, at.MASK + ((count - 1) * 4 + i) * 2 + (1 if found else 0), bit)
+            context = at.MASK + (((count - 1) * 4 + i) * 2 + (1 if found else 0)) * 2 + ((seen >> i) & 1)
+            bits += bit_cost(contexts, context, bit)
         found |= bit
     return bits
 
@@ -470,7 +528,7 @@ def code_block(coder, job, work, y0, x0, log):
         else:
             for p in range(3):
                 predict_direction(job, work, p, y0, x0, n, direction)
-    coded = code_bit(coder, residual_context(blocks, by, bx, log, kind), np.int64(blocks[CODED, by, bx]))
+    coded = code_bit(coder, residual_context(job, by, bx, log, kind), np.int64(blocks[CODED, by, bx]))
     first = 0
     for p in range(3):
         some = 0
@@ -483,7 +541,7 @@ def code_block(coder, job, work, y0, x0, log):
             if some:
                 if decoding:
                     _clear(work.levels, n)
-                code_coefficients(coder, work.levels, p, log)
+                code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0)
         if decoding:
             if some:
                 rows, cols = dequantise(work.levels, log, job.step, work.coefficients)
@@ -504,7 +562,7 @@ def code_tree(coder, job, work, y0, x0, log):
         split = 1
     elif log > LOG_LEAST:
         smaller = 1 if job.blocks[LOG, by, bx] < log else 0
-        split = code_bit(coder, split_context(job.blocks, by, bx, log), smaller)
+        split = code_bit(coder, split_context(job, by, bx, log), smaller)
     else:
         split = 0
     if split:
@@ -521,8 +579,8 @@ def code_blend(coder, nearest):
     return code_bit(coder, np.int64(at.BLEND), nearest)
 
 
-def decode_view(coder: Arithmetic, job: Job, work: Work) -> None:
-    """Read all blocks of a view."""
+def code_view(coder: Arithmetic, job: Job, work: Work) -> None:
+    """Write all blocks of a view, which are marked, or read and decode them."""
     height, width = job.levels.shape[1:]
     size = 1 << LOG_LARGEST
     for y0 in range(0, height, size):

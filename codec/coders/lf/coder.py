@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numba
@@ -15,25 +16,33 @@ from ii_core import IIPicture
 
 from ... import clock
 from ...contract import Coder, Goal, Option, Options, Pixels
-from ...search import Axis, CodingResult, Run, meet_size
+from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
 from ..volume import principal_axes
 from . import arithmetic, planes, ranges, search, stream, synthesis
-from .blocks import code_blend, decode_view
+from .blocks import Job, code_blend, new_work
 from .contexts import starting_contexts
-from .field import Field
-from .pyramid import Node
+from .field import EIGHTH, Field
+from .pyramid import Node, Place
 from .search import Search
 from .stream import Header
+from .workers import Workers
 
 FINEST, COARSEST = 0, 63
 FRACTIONS = 16  # of a quantiser, between which a rate is searched
 OCTAVE = -6.0 * FRACTIONS  # quantisers that double a size, about
 START = 34 * FRACTIONS
-WEIGHT = 0.1  # squared error a bit is worth, in squared steps
-# Quantisers by which each level is finer than the next, for more is predicted from it, and the first finer still.
-FINER_A_LEVEL, FINER_FIRST = 2.4, 2.0
+COARSEST_DB, FINEST_DB = 10.0, 60.0
+QUALITY_RUNS, NEAR_DB, DB_A_STEP = 6, 0.05, 0.8  # PSNR falls so much from one quantiser to the next, about
+# Of the blocks that predict a view which is coded lossless; the better one is kept.
+EXACT_SETTINGS = 26 * FRACTIONS, 44 * FRACTIONS
+GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below which nothing else is tried
+WEIGHT = 0.12  # squared error a bit is worth, in squared steps
+# Quantisers by which each level is finer than the next, for more is predicted from it, and the first is finer than
+# the last.
+FINER_A_LEVEL, FINER_FIRST = 2.0, 12.0
 MOST_VIEWS = 1 << 14
-VIEW_BYTES = 24  # a sample's most
+VIEW_BYTES, EXACT_BYTES = 24, 96  # a sample's most
+FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
 
 
 class LightField(Coder):
@@ -45,16 +54,21 @@ class LightField(Coder):
     about = "Sub-images as a light field: a pyramid of views, disparity, synthesis at the decoder"
     dtypes: ClassVar[tuple[str, ...]] = ("uint8", "uint16")
     qp_range: ClassVar[tuple[int, int] | None] = (FINEST, COARSEST)
-    scale_about = "the step doubles every 6, and is one 8-bit code at 8"
+    quality_range: ClassVar[tuple[float, float] | None] = (COARSEST_DB, FINEST_DB)
+    scale_about = "of qp the step doubles every 6, and is one 8-bit code at 8; quality is PSNR in dB"
     options: ClassVar[Mapping[str, Option]] = {
         "stride": Option(about="binary logarithm of the first views' distance on the grid", default=3, low=0, high=6),
-        "sources": Option(about="views that a synthesis is made of, 0 for none", default=6, low=0, high=8),
+        "sources": Option(about="views that a synthesis is made of, 0 for none", default=4, low=0, high=8),
+        "lossless": Option(about="1 to code to the bit", default=0, low=0, high=1),
+        "threads": Option(
+            about="threads that share the views; the bytes do not depend on it", default=1, low=1, high=16
+        ),
         "effort": Option(about="of the search: 0, 1 or 2", default=1, low=0, high=2),
     }
     presets: ClassVar[Mapping[str, Options]] = {
-        "fast": {"effort": 0, "sources": 4},
+        "fast": {"effort": 0},
         "balanced": {"effort": 1},
-        "best": {"effort": 2, "sources": 8},
+        "best": {"effort": 2},
     }
 
     @property
@@ -67,70 +81,101 @@ class LightField(Coder):
         _check_views(picture)
 
     def encode(self, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
-        """Meet a rate by a search of the quantiser."""
+        """Meet a rate or a quality by a search of the quantiser."""
         source = _Source(picture, options)
+        if self.lossless(options):
+            runs = [source.run(setting) for setting in EXACT_SETTINGS]
+            return CodingResult(run=min(runs, key=lambda run: len(run.payload)), runs=len(runs))
         if goal.qp is not None:
             return CodingResult(run=source.run(goal.qp * FRACTIONS))
+        if goal.quality is not None:
+            return _meet_quality(source, goal.quality)
         assert goal.bpp is not None
-        axis = Axis(
-            low=FINEST * FRACTIONS,
-            high=COARSEST * FRACTIONS,
-            start=START + OCTAVE * math.log2(min(max(goal.bpp, 1e-3), 100) * 10),
-            octave=OCTAVE,
-            step=1,
-        )
+        start = START + OCTAVE * math.log2(min(max(goal.bpp, 1e-3), 100) * 10)
+        axis = Axis(low=FINEST * FRACTIONS, high=COARSEST * FRACTIONS, start=start, octave=OCTAVE, step=1)
         return meet_size(source.run, goal.bpp * source.count / 8, axis)
 
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
         """Level by level; a level that ends early is damage."""
         started = clock.cpu_seconds()
-        _check_views(blank)
-        header, levels = stream.unpack(payload, blank.pixels.size // 3)
-        height, width, grid = _shape(blank)
-        field = Field(header, grid, height, width)
-        for _ in decoded_views(field, levels):
+        field, levels = _opened(payload, blank)
+        for _ in decoded_batches(field, levels, _threads(options)):
             pass
+        rows, cols = field.grid
         pixels = np.empty(blank.pixels.shape, blank.pixels.dtype)
         for number in range(len(field.views)):
-            row, col = divmod(number, grid[1])
-            planes.scatter(field.views, number, grid, row, col, header.axes, pixels.itemsize == 2, pixels)
+            row, col = divmod(number, cols)
+            pixels[row::rows, col::cols] = field.view_pixels(number)
         return pixels, clock.cpu_seconds() - started
 
     def decode_component(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
-        """One sub-image, counted row by row, decoded with the levels above it and the views before it in its own.
+        """One sub-image, counted row by row; see `decode_view`."""
+        return self.decode_view(payload, blank, options, divmod(index, blank.ei_pixels[0]))[0]
+
+    def decode_view(
+        self, payload: bytes, blank: IIPicture, options: Options, place: Place
+    ) -> tuple[Pixels, int, int]:
+        """A view by row and column, bytes read, and views decoded: those of the levels above and some of its own.
 
         Raises
         ------
         ValueError
             If the payload is damaged so far as it is read.
         """
-        _check_views(blank)
-        header, levels = stream.unpack(payload, blank.pixels.size // 3)
-        height, width, grid = _shape(blank)
-        field = Field(header, grid, height, width)
-        wanted = divmod(index, grid[1])
-        for node in decoded_views(field, levels):
-            if (node.row, node.col) == wanted:
-                break
-        pixels = np.empty((height, width, 3), blank.pixels.dtype)
-        planes.scatter(field.views, field.number(wanted), (1, 1), 0, 0, header.axes, pixels.itemsize == 2, pixels)
-        return pixels
+        field, levels = _opened(payload, blank)
+        views = 0
+        for _, nodes, read in decoded_batches(field, levels, _threads(options)):
+            views += len(nodes)
+            if any((node.row, node.col) == place for node in nodes):
+                return field.view_pixels(field.number(place)).copy(), read, views
+        raise ValueError(f"there is no view in row {place[0]}, column {place[1]}")
+
+    def decode_levels(self, payload: bytes, blank: IIPicture, options: Options) -> Iterator[tuple[int, Field, int]]:
+        """Decode level by level; yield the level, all views decoded so far, and the bytes read."""
+        field, levels = _opened(payload, blank)
+        views = 0
+        for level, nodes, read in decoded_batches(field, levels, _threads(options)):
+            views += len(nodes)
+            if views == len(field.levels[level]):
+                views = 0
+                yield level, field, read
 
 
-def decoded_views(field: Field, levels: list[bytes]) -> Iterator[Node]:
-    """Decode one view after another, level by level."""
-    contexts = starting_contexts()
-    for number, (nodes, data) in enumerate(zip(field.levels, levels, strict=True)):
-        coder = arithmetic.reader(contexts, data)
-        for node in nodes:
-            job, made = field.job(node)
-            if job.synthesised:
-                synthesis.blend(made, code_blend(coder, 0))
-            decode_view(coder, job, field.work)
-            if arithmetic.overrun(coder):
-                raise ValueError(f"level {number} of its light field ends early")
-            field.finish(node, job, made)
-            yield node
+def _opened(payload: bytes, blank: IIPicture) -> tuple[Field, list[bytes]]:
+    _check_views(blank)
+    header, levels = stream.unpack(payload, blank.pixels.size // 3)
+    height, width, grid = _shape(blank)
+    return Field(header, grid, height, width, blank.pixels.dtype), levels
+
+
+def _threads(options: Options) -> int:
+    return int(options.get("threads", 1))
+
+
+def decoded_batches(field: Field, levels: list[bytes], threads: int = 1) -> Iterator[tuple[int, list[Node], int]]:
+    """Decode one batch of views after another; yield the level, the views, and the bytes read so far."""
+    contexts, work = starting_contexts(), new_work()
+    before = stream.head_bytes(len(levels))
+    with Workers(threads) as workers:
+        for level, data in enumerate(levels):
+            coder = arithmetic.reader(contexts, data)
+            for nodes in field.batches(level):
+                jobs, made = zip(*workers.map(field.job, nodes), strict=True)
+                blends = [code_blend(coder, 0) if job.synthesised else 0 for job in jobs]
+                workers.map(_blended, jobs, made, blends)
+                for job in jobs:
+                    field.code(coder, job, work)
+                    if arithmetic.overrun(coder):
+                        raise ValueError(f"level {level} of its light field ends early")
+                workers.map(field.refine, nodes, jobs, made)
+                field.finish(nodes)
+                yield level, nodes, before + min(int(coder.state[arithmetic.AT]), len(data))
+            before += len(data)
+
+
+def _blended(job: Job, made: synthesis.Synthesis, nearest: int) -> None:
+    if job.synthesised:
+        synthesis.blend(made, nearest)
 
 
 def _check_views(picture: IIPicture) -> None:
@@ -146,6 +191,30 @@ def _shape(picture: IIPicture) -> tuple[int, int, tuple[int, int]]:
     return l, k, (v, u)
 
 
+def _meet_quality(source: _Source, quality: float) -> CodingResult:
+    """Meet a PSNR in dB; the first quantiser is that of which half the uniform error is the one allowed."""
+
+    def try_at(setting: float) -> tuple[Run, float]:
+        started = clock.cpu_seconds()
+        payload, field = source.coded(setting)
+        return Run(payload, clock.cpu_seconds() - started), quality - source.psnr(field)
+
+    allowed = 255**2 / 10 ** (quality / 10)
+    axis = Axis(
+        low=FINEST * FRACTIONS,
+        high=COARSEST * FRACTIONS,
+        start=FRACTIONS * (8 + 3 * math.log2(24 * allowed)),
+        octave=FRACTIONS,
+        step=1,
+        overshoot=0.0,
+        runs=QUALITY_RUNS,
+    )
+    tried = list(
+        trials(try_at, lambda run: run[1] / DB_A_STEP, axis, enough=lambda miss: abs(miss) <= NEAR_DB / DB_A_STEP)
+    )
+    return CodingResult(run=nearest(tried).result[0], runs=len(tried))
+
+
 class _Source:
     """A picture to be coded at one quantiser after another."""
 
@@ -153,12 +222,13 @@ class _Source:
         self.pixels = np.ascontiguousarray(picture.pixels)
         self.count = self.pixels.size // 3
         self.height, self.width, self.grid = _shape(picture)
-        self.effort = int(options["effort"])
+        self.effort, self.threads = int(options["effort"]), int(options["threads"])
         self.axes = principal_axes(self.pixels)
         low, high, down = ranges.estimated(self.view, self.grid)
         self.header = Header(
             log_stride=int(options["stride"]),
             sources=int(options["sources"]),
+            exact=bool(options["lossless"]),
             down=down,
             low=low,
             high=high,
@@ -173,6 +243,17 @@ class _Source:
         planes.gather(self.pixels, self.grid, row, col, self.axes, sixteen, out)
         return out
 
+    def psnr(self, field: Field) -> float:
+        """PSNR in dB of what the decoder shows."""
+        rows, cols = self.grid
+        error = 0.0
+        for number in range(len(field.views)):
+            row, col = divmod(number, cols)
+            decoded = field.view_pixels(number).astype(np.float32)
+            error += float(np.square(decoded - self.pixels[row::rows, col::cols]).sum(dtype=np.float64))
+        top = np.iinfo(self.pixels.dtype).max
+        return 10 * math.log10(top**2 * self.pixels.size / max(error, 1e-9))
+
     def run(self, setting: float) -> Run:
         """The payload at a quantiser."""
         started = clock.cpu_seconds()
@@ -182,51 +263,73 @@ class _Source:
     def coded(self, setting: float) -> tuple[bytes, Field]:
         """The payload at a quantiser, and what the decoder will make of it."""
         last = self.header.log_stride
-        offsets = [FINER_A_LEVEL * (last - level) + (0 if level else FINER_FIRST) for level in range(last + 1)]
+        if self.header.exact:
+            offsets = [0.0] * (last + 2)
+        else:
+            offsets = [FINER_FIRST, *(FINER_A_LEVEL * (last - level) for level in range(last + 1))]
         steps = tuple(max(1, round(128 * 2 ** ((setting / FRACTIONS - 8 - less) / 6))) for less in offsets)
         header = replace(self.header, steps=steps)
-        field = Field(header, self.grid, self.height, self.width)
-        contexts, trial = starting_contexts(), search.new_trial()
+        field = Field(header, self.grid, self.height, self.width, self.pixels.dtype)
+        if self.header.exact:
+            rows, cols = self.grid
+            by_view = self.pixels.reshape(self.height, rows, self.width, cols, 3).transpose(1, 3, 0, 2, 4)
+            field.pixels[:] = by_view.reshape(field.pixels.shape)
+        contexts, work = starting_contexts(), new_work()
         levels = []
-        for nodes in field.levels:
-            room = VIEW_BYTES * field.shape[0] * field.shape[1] + 1024
-            coder = arithmetic.writer(contexts, room)
-            for node in nodes:
-                coder = arithmetic.enlarged(coder, room)
-                job, made = field.job(node)
-                original = self.view(node.row, node.col)
-                if job.synthesised:
-                    self._blend(coder, made, original)
-                search.encode_view(coder, job, self._search(job, original), field.work, trial)
-                field.finish(node, job, made)
-            levels.append(arithmetic.finish(coder))
+        with Workers(self.threads) as workers:
+            for number in range(len(field.levels)):
+                room = (EXACT_BYTES if header.exact else VIEW_BYTES) * field.shape[0] * field.shape[1] + 1024
+                coder = arithmetic.writer(contexts, room)
+                for nodes in field.batches(number):
+                    jobs, made, blends = zip(*workers.map(partial(self._found, field, contexts), nodes), strict=True)
+                    for job, nearest in zip(jobs, blends, strict=True):
+                        if job.synthesised:
+                            code_blend(coder, nearest)
+                    for job in jobs:
+                        coder = arithmetic.enlarged(coder, room)
+                        field.code(coder, job, work)
+                    workers.map(field.refine, nodes, jobs, made)
+                    field.finish(nodes)
+                levels.append(arithmetic.finish(coder))
         return stream.pack(header, levels, self.count), field
 
-    def _blend(self, coder: arithmetic.Arithmetic, made: synthesis.Synthesis, original: NDArray[np.int16]) -> None:
-        """In the way that comes nearer to the original."""
-        synthesis.blend(made, 0)
-        smooth, error = made.made.copy(), _error(made.made, original)
-        synthesis.blend(made, 1)
-        nearest = int(_error(made.made, original) < error)
-        code_blend(coder, nearest)
-        if not nearest:
-            made.made[:] = smooth
+    def _found(self, field: Field, contexts: NDArray[np.int32], node: Node) -> tuple[Job, synthesis.Synthesis, int]:
+        """A view's blocks, found and decoded; its synthesis, and in which way that is blended."""
+        job, made = field.job(node)
+        original = self.view(node.row, node.col)
+        nearest = _nearer_blend(made, original) if job.synthesised else 0
+        search.find_blocks(contexts, job, self._search(job, original))
+        return job, made, nearest
 
     def _search(self, job: Any, original: NDArray[np.int16]) -> Search:
         references = len(job.references)
-        indices = job.high - job.low + 1 if references else 1
+        every = 2 if job.unit <= EIGHTH // 2 or job.high - job.low > FEW else 1
+        indices = (job.high - job.low) // every + 1 if references else 1
         height, width = original.shape[1:]
         volume = np.zeros((indices, max(references, 1), height // 4, width // 4), np.float32)
         if references:
-            search.fill_volume(job, original, volume)
+            search.fill_volume(job, original, volume, every)
         return Search(
             original=original,
             volume=volume,
+            every=every,
             weight=np.float32(WEIGHT * (job.step / 16) ** 2),
             least=3 if self.effort == 0 else 2,
             intra_tries=(1, 2, 3)[self.effort] if not references else 1,
+            good=np.float32(GOOD[self.effort]),
             planes=1 if self.effort == 0 else 3,
         )
+
+
+def _nearer_blend(made: synthesis.Synthesis, original: NDArray[np.int16]) -> int:
+    """Synthesise in both ways, keep the one that comes nearer to the original, and return which it is."""
+    synthesis.blend(made, 0)
+    smooth, doubt, error = made.made.copy(), made.doubt.copy(), _error(made.made, original)
+    synthesis.blend(made, 1)
+    if _error(made.made, original) < error:
+        return 1
+    made.made[:], made.doubt[:] = smooth, doubt
+    return 0
 
 
 def _error(a: NDArray[np.int16], b: NDArray[np.int16]) -> float:

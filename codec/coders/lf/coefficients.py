@@ -6,8 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import bit_cost, code_bit, code_number, code_raw, number_cost
-from .contexts import ABOVE_ONE, ABOVE_TWO, LAST, REST, SIGNIFICANT
+from .arithmetic import bit_cost, code_bit, code_mixed, code_number, code_raw, number_cost
+from .contexts import (
+    ABOVE_ONE,
+    ABOVE_ONE_THERE,
+    ABOVE_TWO,
+    LAST,
+    REST,
+    SIGNIFICANT,
+    SIGNIFICANT_THERE,
+    WEIGHTS,
+)
 from .jit import inner, lean
 from .transform import LARGEST, SCANS
 
@@ -18,7 +27,7 @@ HOPE = np.float32(2.5)  # bits that a lone last coefficient costs besides its ow
 
 @inner
 def _neighbourhood(levels, y, x, n):
-    """Sum of the magnitudes of the five places before, in the order of coding, at most 5."""
+    """Class 0–7 by the sum of the magnitudes of the five places before, in the order of coding."""
     total = 0
     if x + 1 < n:
         total += abs(levels[y, x + 1])
@@ -30,7 +39,7 @@ def _neighbourhood(levels, y, x, n):
         total += abs(levels[y + 1, x])
         if y + 2 < n:
             total += abs(levels[y + 2, x])
-    return min(total, 5)
+    return total if total < 5 else (5 if total < 7 else (6 if total < 11 else 7))
 
 
 @inner
@@ -40,7 +49,7 @@ def _place(y, x):
 
 
 @lean
-def code_coefficients(coder, levels, plane, log):
+def code_coefficients(coder, levels, plane, log, intra):
     """Write or read levels[:n, :n], of which one at least is not zero; a reader finds only zeros there before."""
     n = 1 << log
     last = n * n - 1
@@ -53,12 +62,15 @@ def code_coefficients(coder, levels, plane, log):
         size = abs(value)
         near = _neighbourhood(levels, y, x, n)
         place = _place(y, x)
-        context = SIGNIFICANT + ((plane * 4 + log - 2) * 4 + place) * 6 + near
-        if k < last and not code_bit(coder, context, 1 if size else 0):
+        context = SIGNIFICANT + ((plane * 4 + log - 2) * 4 + place) * 8 + near
+        there = ((y << 2 >> log) * 4 + (x << 2 >> log)) * 2 + intra
+        other = SIGNIFICANT_THERE + (plane * 4 + log - 2) * 32 + there
+        if k < last and not code_mixed(coder, context, other, WEIGHTS + plane * 4 + log - 2, 1 if size else 0):
             continue
-        context = (plane * 6 + near) * 2 + (1 if place == 0 else 0)
+        context = (plane * 8 + near) * 2 + (1 if place == 0 else 0)
         found = 1
-        if code_bit(coder, ABOVE_ONE + context, 1 if size > 1 else 0):
+        other = ABOVE_ONE_THERE + plane * 32 + there
+        if code_mixed(coder, ABOVE_ONE + context, other, WEIGHTS + 12 + plane, 1 if size > 1 else 0):
             found = 2
             if code_bit(coder, ABOVE_TWO + context, 1 if size > 2 else 0):
                 found = 3 + min(
@@ -71,11 +83,11 @@ def code_coefficients(coder, levels, plane, log):
 def _level_cost(contexts, size, near, place, plane, log, last):
     bits = np.float32(0)
     if not last:
-        bits += bit_cost(contexts, SIGNIFICANT + ((plane * 4 + log - 2) * 4 + place) * 6 + near, 1 if size else 0)
+        bits += bit_cost(contexts, SIGNIFICANT + ((plane * 4 + log - 2) * 4 + place) * 8 + near, 1 if size else 0)
         if size == 0:
             return bits
     bits += np.float32(1)
-    context = (plane * 6 + near) * 2 + (1 if place == 0 else 0)
+    context = (plane * 8 + near) * 2 + (1 if place == 0 else 0)
     bits += bit_cost(contexts, ABOVE_ONE + context, 1 if size > 1 else 0)
     if size > 1:
         bits += bit_cost(contexts, ABOVE_TWO + context, 1 if size > 2 else 0)

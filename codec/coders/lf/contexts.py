@@ -5,36 +5,51 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-SPLIT = 0  # block size 3 × smaller neighbours 3
-SYNTHESIS = SPLIT + 9  # block size 4 × such neighbours 3
-INTRA = SYNTHESIS + 12  # such neighbours 3
+SPLIT = 0  # block size 3 × smaller neighbours 3 × doubt 4
+SYNTHESIS = SPLIT + 36  # block size 4 × such neighbours 3 × doubt 4
+INTRA = SYNTHESIS + 48  # such neighbours 3
 INTRA_MODE = INTRA + 3  # most probable, second, smooth
 MERGE = INTRA_MODE + 3  # block size 4 × (synthesis by left: none, same, other 3; left; above)
 DELTA = MERGE + 20  # 14 digits and 1 sign
-SAME_MASK = DELTA + 15  # where the index is from: coded, synthesis, left, above 4 × left and above alike 2
-MASK = SAME_MASK + 8  # references 4 × reference 4 × any set before 2
-RESIDUAL = MASK + 32  # block size 4 × (synthesis, else) 2 × such neighbours 3
-CODED = RESIDUAL + 24  # plane 3 × block size 4 × intra or not 2 × first plane coded 2
+# Where the index is from: coded, synthesis, left, above 4 × left and above alike 2 × as seen 2.
+SAME_MASK = DELTA + 15
+MASK = SAME_MASK + 16  # references 4 × reference 4 × any set before 2 × seen 2
+RESIDUAL = MASK + 64  # block size 4 × (synthesis, else) 2 × such neighbours 3 × doubt 4
+CODED = RESIDUAL + 96  # plane 3 × block size 4 × intra or not 2 × first plane coded 2
 LAST = CODED + 48  # plane 3 × block size 4 × 12 digits
-SIGNIFICANT = LAST + 144  # plane 3 × block size 4 × place 4 × neighbourhood 6
-ABOVE_ONE = SIGNIFICANT + 288  # plane 3 × neighbourhood 6 × at the mean 2
-ABOVE_TWO = ABOVE_ONE + 36
-REST = ABOVE_TWO + 36  # plane 3 × 16 digits
+SIGNIFICANT = LAST + 144  # plane 3 × block size 4 × place 4 × neighbourhood 8
+ABOVE_ONE = SIGNIFICANT + 384  # plane 3 × neighbourhood 8 × at the mean 2
+ABOVE_TWO = ABOVE_ONE + 48
+REST = ABOVE_TWO + 48  # plane 3 × 16 digits
 BLEND = REST + 48
-COUNT = BLEND + 1
+# Contexts that are mixed with those of SIGNIFICANT and ABOVE_ONE.
+SIGNIFICANT_THERE = BLEND + 1  # plane 3 × block size 4 × sixteenth of the block 16 × (intra, else) 2
+ABOVE_ONE_THERE = SIGNIFICANT_THERE + 384  # plane 3 × sixteenth of the block 16 × (intra, else) 2
+WEIGHTS = ABOVE_ONE_THERE + 96  # of SIGNIFICANT plane 3 × block size 4, of ABOVE_ONE plane 3
+EXACT = WEIGHTS + 15  # colour 3 × activity 16 × (zero 1, sign 3, prefix 12)
+EXACT_REST = EXACT + 768  # 16 digits
+COUNT = EXACT_REST + 16
 
 # Probabilities to begin with: log(p / (1 - p)) from -6.2 up in steps of 0.2, by its digit; * where none is known. The
 # mean over eight coded pictures: three scenes and a flower of a real light field camera, at two quantisers each.
 DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 STARTS = (
-    "TVWldal**KRT9NWCOZN**EPWMNGZcPeeYfQfgZeRihN****TDJOF*********WONSVQXSU********Z**P****Z*fV*O**X*ZUaV"
-    "*VXYlVZeHVjRaqbQ*ajg***I**o*s*t*t*s*n*****lUiceaWl*W*i****LKRWSRUf*Q*l****zurU0*******twyroT2*****qt"
-    "tttrrS8***************noiP1*******oroniL4*****nrrrpkjKE***************llfN4*******nronlM5*****jpplnm"
-    "pJB***************WWYYYcRVWXZbUYZZbc******RWYXYcOVWYZdQVWYYdQXXZZbOWUWUgITTVXaLQWYXbOVYYZb**********"
-    "**************VWWWYdOUVWZcPVXZac******TVVXYcQVUWYdNRTWXaLRUVYaOSUVagRSVWXdMSVWXcJPTUXb**************"
-    "**********VXWXYeOTUVWZOUUVZa******QWWWYfMSUVWaKQTVXaKRTUYXMTTXWgONRXXdNQUWYaKQUVWY******************"
-    "******RSOKRMROURVWKNGKKMNPOQSXHMDJGLKQPRTXRQQQPPRPSRTVLQLONPOQOSTWLRLPMQNQNTSYROLKLPMMQ*******RPMLNN"
-    "OQ********SPMNIUK*********E"
+    "TTTTVVVVWWWWllllddddaaaallll********KKKKRRRRTTTT9999NNNNWWWWCCCCOOOOZZZZNNNN********EPWMNGZcPeeYfQfg"
+    "ZeRihN****TDJOF*********WONSVQXSUONSVQXSU****************ZZ****PP********ZZ**ffVV**OO****XX**ZZUUaaV"
+    "V**VVXXXXYYYYllllVVVVZZZZeeeeHHHHVVVVjjjjRRRRaaaaqqqqbbbbQQQQ****aaaajjjjgggg************IIII*******"
+    "*o*s*t*t*s*n*****lUiceaWl*W*i****LKRWSRUf*Q*l****zurU0*******twyroT2*****qttttrrS8***************noi"
+    "P1*******oroniL4*****nrrrpkjKE***************llfN4*******nronlM5*****jpplnmpJB***************WWYYYcc"
+    "cRVWXZbbbUYZZbccc********RWYXYcccOVWYZdddQVWYYdddQXXZZbbbOWUWUgggITTVXaaaLQWYXbbbOVYYZbbb***********"
+    "*********************VWWWYdddOUVWZcccPVXZaccc********TVVXYcccQVUWYdddNRTWXaaaLRUVYaaaOSUVagggRSVWXdd"
+    "dMSVWXcccJPTUXbbb********************************VXWXYeeeOTUVWZZZOUUVZaaa********QWWWYfffMSUVWaaaKQT"
+    "VXaaaKRTUYXXXMTTXWgggONRXXdddNQUWYaaaKQUVWYYY********************************RSOKRMROURVWVWVWKNGKKMN"
+    "POQSXSXSXHMDJGLKQPRTXTXTXRQQQPPRPSRTVTVTVLQLONPOQOSTWTWTWLRLPMQNQNTSYSYSYROLKLPMMQ*******RPMLNNOQ***"
+    "*****SPMNIUK*********E******************************************************************************"
+    "****************************************************************************************************"
+    "****************************************************************************************************"
+    "****************************************************************************************************"
+    "****************************************************************************************************"
+    "**"
 )
 PROBABILITIES = (
     133,
@@ -109,4 +124,6 @@ def starting_contexts() -> NDArray[np.int32]:
     found = np.array(
         [(*(2 * [PROBABILITIES[DIGITS.index(d)]]), TRUSTED) if d != "*" else (1 << 15, 1 << 15, 0) for d in STARTS]
     )
-    return found.astype(np.int32)
+    weights = np.full((EXACT - WEIGHTS, 3), 1 << 15)
+    unknown = np.tile([1 << 15, 1 << 15, 0], (COUNT - EXACT, 1))
+    return np.concatenate([found, weights, unknown]).astype(np.int32)

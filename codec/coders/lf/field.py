@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import groupby
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from . import synthesis
-from .blocks import DONE, MOST_INDEX, MOST_REFERENCES, Job, Work, new_blocks, new_work
+from .arithmetic import Arithmetic
+from .blocks import DONE, MOST_INDEX, MOST_REFERENCES, UNKNOWN, Job, Work, code_view, new_blocks
+from .exact import code_exact, new_exact, prepare
+from .planes import gather, scatter
 from .pyramid import Node, Place, pyramid
 from .stream import Header
-from .synthesis import UNKNOWN, Synthesis, new_synthesis
+from .synthesis import Synthesis, new_synthesis
 
-QUARTER = 64  # of a sample, in units of disparity
-MOST_SEARCHED = 400  # disparities of one view
+EIGHTH = 32  # of a sample, in units of disparity
+MOST_SEARCHED = 800  # disparities of one view
+BATCH = 16  # views that are held in memory at once
+FIRST_AGAIN = 0, 2  # views of the second level after which the first view's disparity is found anew
 
 
 class Field:
@@ -24,16 +34,21 @@ class Field:
         Rows and columns of views.
     height, width : int
         Of a view.
+    dtype : numpy type
+        Of a pixel.
     """
 
-    def __init__(self, header: Header, grid: Place, height: int, width: int) -> None:
+    def __init__(self, header: Header, grid: Place, height: int, width: int, dtype: Any) -> None:
         self.header = header
         self.grid = grid
         self.levels = pyramid(*grid, header.log_stride, MOST_REFERENCES, header.sources)
         self.shape = -(-height // 4) * 4, -(-width // 4) * 4
         self.views = np.zeros((grid[0] * grid[1], 3, *self.shape), np.int16)
         self.disparities = np.zeros((len(self.views), *self.shape), np.int16)
-        self.work: Work = new_work()
+        # Pixels by view, if coding is lossless.
+        self.pixels = np.zeros((len(self.views) if header.exact else 0, height, width, 3), dtype)
+        self._exact = new_exact(height, width, dtype)
+        self.decoded = np.zeros(grid, bool)
         nodes = [node for level in self.levels for node in level]
         self.used = {place for node in nodes for place in (*node.references, *node.sources)}
 
@@ -47,9 +62,10 @@ class Field:
         references, sources = (self._offsets(node, places) for places in (node.references, node.sources))
         unit = self._unit(references)
         made = new_synthesis(self.views, self.disparities, sources)
-        known = len(sources) > 1 and synthesis.synthesise(made, max(self._unit(sources) // 2, 1))
+        known = len(sources) > 1 and synthesis.synthesise(made, self._unit(sources))
         job = Job(
             views=self.views,
+            disparities=self.disparities,
             at=self.number((node.row, node.col)),
             references=references,
             unit=unit,
@@ -57,6 +73,7 @@ class Field:
             high=-(-self.header.high // unit),
             made=made.made,
             disparity=made.disparity,
+            doubt=made.doubt,
             synthesised=int(known),
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),
@@ -64,24 +81,55 @@ class Field:
         )
         return job, made
 
-    def finish(self, node: Node, job: Job, made: Synthesis) -> None:
+    def code(self, coder: Arithmetic, job: Job, work: Work) -> None:
+        """Write or read a view's blocks, and its pixels if coding is lossless, which then predict the next views."""
+        code_view(coder, job, work)
+        if self.header.exact:
+            exact = self._exact
+            axes, sixteen = self.header.axes, exact.pixels.itemsize == 2
+            exact.pixels[:] = self.pixels[job.at]
+            prepare(exact, self.views, job.at, axes, sixteen)
+            code_exact(coder, exact)
+            self.pixels[job.at] = exact.pixels
+            gather(exact.pixels, (1, 1), 0, 0, axes, sixteen, self.views[job.at])
+
+    def view_pixels(self, number: int) -> NDArray[Any]:
+        """A decoded view, (H, W, 3)."""
+        if self.header.exact:
+            return self.pixels[number]
+        pixels = np.empty(self._exact.pixels.shape, self._exact.pixels.dtype)
+        scatter(self.views, number, (1, 1), 0, 0, self.header.axes, pixels.itemsize == 2, pixels)
+        return pixels
+
+    def refine(self, node: Node, job: Job, made: Synthesis) -> None:
         """Note the disparity of a decoded view, for those that follow."""
-        if not len(made.sources) or (node.row, node.col) not in self.used:
-            return
-        synthesis.start(made, job.at, job.blocks, job.unit, job.synthesised)
-        synthesis.refine(made, job.at, False)
-        synthesis.refine(made, job.at, True)
-        if node is self.levels[0][-1]:
+        if len(made.sources) and (node.row, node.col) in self.used:
+            synthesis.start(made, job.at, job.blocks, job.unit, job.synthesised)
+            synthesis.refine(made, job.at, False)
+            synthesis.refine(made, job.at, True)
+
+    def finish(self, nodes: list[Node]) -> None:
+        """Count a batch as decoded."""
+        for node in nodes:
+            self.decoded[node.row, node.col] = True
+        last = nodes[-1]
+        if last.level == 1 and (last.phase in FIRST_AGAIN or last is self.levels[1][-1]):
             self._first()
+
+    def batches(self, level: int) -> Iterator[list[Node]]:
+        """Views of a level that do not depend on each other, `BATCH` at most at a time."""
+        for _, nodes in groupby(self.levels[level], key=lambda node: node.phase):
+            phase = list(nodes)
+            for start in range(0, len(phase), BATCH):
+                yield phase[start : start + BATCH]
 
     def _first(self) -> None:
         """The first view had no other: its disparity comes from those after it."""
         node = self.levels[0][0]
-        others = [(other.row, other.col) for other in self.levels[0][1:]]
-        others.sort(key=lambda place: ((place[0] - node.row) ** 2 + (place[1] - node.col) ** 2, place))
+        others = [(other.row, other.col) for other in self.levels[1] if self.decoded[other.row, other.col]]
         made = new_synthesis(self.views, self.disparities, self._offsets(node, tuple(others[:4])))
         at = self.number((node.row, node.col))
-        if synthesis.synthesise(made, max(self._unit(made.sources) // 2, 1)):
+        if synthesis.synthesise(made, self._unit(made.sources)):
             self.disparities[at] = made.disparity
             synthesis.refine(made, at, False)
             synthesis.refine(made, at, True)
@@ -93,11 +141,11 @@ class Field:
         return np.array(rows, np.int64).reshape(-1, 3)
 
     def _unit(self, references: np.ndarray) -> int:
-        """A quarter of a sample in the farthest view, or more where the range is wide."""
+        """An eighth of a sample in the farthest view, or more where the range is wide."""
         if not len(references):
-            return QUARTER
+            return EIGHTH
         spread = self.header.high - self.header.low
-        return max(QUARTER // int(np.abs(references[:, 1:]).max()), -(-spread // MOST_SEARCHED), 1)
+        return max(EIGHTH // int(np.abs(references[:, 1:]).max()), -(-spread // MOST_SEARCHED), 1)
 
 
 assert MOST_INDEX > MOST_SEARCHED and DONE

@@ -1,8 +1,8 @@
 """How this folder's kernels are compiled: their disk cache is valid only while no file of the folder changes.
 
 numba compares the time stamp of a kernel's own file with that in its cache. The kernels here call each other across
-files, and the machine code of a callee is part of its caller's. The hash of all files with kernels stands in for the
-time stamp.
+files, and the machine code of a callee is part of its caller's. The hash of all files with kernels and that of the
+kernel's own file, which may be elsewhere, stand in for the time stamp.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ def _folder_stamp() -> str:
 def _stamped(dispatcher: Any) -> Any:
     index: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):
-        index._source_stamp = _folder_stamp()
+        own = Path(dispatcher.py_func.__code__.co_filename)
+        index._source_stamp = _folder_stamp() + hashlib.sha256(own.read_bytes()).hexdigest()
     return dispatcher
 
 

@@ -1,4 +1,7 @@
-"""In what order the views on a grid are coded, by levels of ever closer views, and which ones predict which."""
+"""In what order the views on a grid are coded, by levels of ever closer views, and which ones predict which.
+
+A level has *phases*: views of one phase do not predict each other, so that they may be coded at the same time.
+"""
 
 from __future__ import annotations
 
@@ -12,52 +15,61 @@ ALIKE = 81, 95  # hundredths of the squared cosine between two directions that a
 
 @dataclass(frozen=True)
 class Node:
-    """A view: its row and column on the grid, its level, and the decoded views near it, the nearest first."""
+    """A view: its row and column on the grid, level and phase, and the decoded views near it, the nearest first."""
 
     row: int
     col: int
     level: int
+    phase: int
     references: tuple[Place, ...]
     sources: tuple[Place, ...]
 
 
 @lru_cache(maxsize=16)
 def pyramid(rows: int, cols: int, log_stride: int, references: int, sources: int) -> tuple[tuple[Node, ...], ...]:
-    """Views by level. The first level has every 2^log_stride-th row and column, and the last ones of the grid.
+    """Views by level. The first level is the view in the middle; it predicts all others, directly or not.
 
-    Every further level halves the stride, the centres of squares first.
+    The second level has every 2^log_stride-th row and column, and the last ones of the grid. Its views are a phase
+    each. Every further level halves the stride; the centres of squares are its first phase, the other views its
+    second.
 
     Parameters
     ----------
     references, sources : int
         How many views predict a block, and a synthesised view, at most.
     """
-    levels: list[tuple[Node, ...]] = []
-    done: dict[Place, None] = {}
-    for level in range(log_stride + 1):
-        stride = 1 << (log_stride - level)
+    middle = (rows // 2, cols // 2)
+    levels: list[tuple[Node, ...]] = [(Node(*middle, 0, 0, (), ()),)]
+    done: dict[Place, None] = {middle: None}
+    for level in range(1, log_stride + 2):
+        stride = 1 << (log_stride + 1 - level)
         grid = [(row, col) for row in _stops(rows, stride) for col in _stops(cols, stride) if (row, col) not in done]
-        if level == 0:
-            middle = (_nearest_stop(rows, stride), _nearest_stop(cols, stride))
+        if level == 1:
             grid.sort(key=lambda place: (_apart(place, middle), place))
+            phases = [[place] for place in grid]
         else:
-            grid.sort(key=lambda place: (not (place[0] % (2 * stride) and place[1] % (2 * stride)), place))
+            phases = [
+                [place for place in grid if _amid(place, stride)],
+                [place for place in grid if not _amid(place, stride)],
+            ]
         nodes = []
-        for row, col in grid:
-            near = _near(done, (row, col), 2 * stride)
-            predicting = _spread(near, (row, col), references, ALIKE[0]), _spread(near, (row, col), sources, ALIKE[1])
-            nodes.append(Node(row, col, level, *predicting))
-            done[row, col] = None
+        for phase, places in enumerate(phases):
+            for place in places:
+                near = _near(done, place, 2 * stride)
+                predicting = _spread(near, place, references, ALIKE[0]), _spread(near, place, sources, ALIKE[1])
+                nodes.append(Node(*place, level, phase, *predicting))
+            done.update(dict.fromkeys(places))
         levels.append(tuple(nodes))
     return tuple(levels)
 
 
+def _amid(place: Place, stride: int) -> bool:
+    """Whether a view is in the middle of four of the levels above."""
+    return bool(place[0] % (2 * stride) and place[1] % (2 * stride))
+
+
 def _stops(count: int, stride: int) -> list[int]:
     return sorted({*range(0, count, stride), count - 1})
-
-
-def _nearest_stop(count: int, stride: int) -> int:
-    return min(_stops(count, stride), key=lambda stop: (abs(2 * stop - count + 1), stop))
 
 
 def _near(done: dict[Place, None], place: Place, reach: int) -> list[Place]:

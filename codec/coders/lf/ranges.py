@@ -52,6 +52,7 @@ def _matched(
     blank = np.zeros((1, 1, 1), np.int16)
     job = Job(
         views=views,
+        disparities=blank,
         at=0,
         references=references,
         unit=UNIT,
@@ -59,12 +60,13 @@ def _matched(
         high=reach,
         made=blank,
         disparity=blank[0],
+        doubt=blank[0],
         synthesised=0,
         step=1,
         blocks=blank,
         levels=blank,
     )
-    fill_volume(job, original, volume)
+    fill_volume(job, original, volume, 1)
     errors = volume.sum(axis=1)
     size = AGGREGATED
     rows, cols = -(-errors.shape[1] // size) * size, -(-errors.shape[2] // size) * size

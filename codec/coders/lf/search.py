@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .arithmetic import Arithmetic, bit_cost
+from .arithmetic import bit_cost
 from .blocks import (
     EXPLICIT,
     INTRA,
@@ -15,18 +16,18 @@ from .blocks import (
     LOG_LEAST,
     SYNTHESIS,
     Job,
-    Work,
-    code_tree,
     coded_context,
     from_where,
     guesses,
     kind_cost,
     mark,
     mask_cost,
+    new_work,
     predict_direction,
     predict_explicit,
     predict_synthesis,
     residual_context,
+    seen_mask,
     split_context,
 )
 from .coefficients import dequantise, quantise
@@ -37,9 +38,7 @@ from .warp import clamped, moved_block
 
 HUGE = np.float32(1e30)
 ZERO = 0
-MOST_GUESSES = 12
-# A block whose cost a sample is less, in units of the weight, is not split, and not tried in other ways.
-GOOD, GOOD_SPLIT = np.float32(0.15), np.float32(0.18)
+MOST_GUESSES = 16
 
 
 class Search(NamedTuple):
@@ -49,7 +48,8 @@ class Search(NamedTuple):
     ----------
     original : ndarray of int16, (3, H, W)
     volume : ndarray of float32, (indices, R, H / 4, W / 4)
-        Squared error of the first plane for each disparity and reference.
+        Squared error of the first plane for each reference and every ``every``-th index.
+    every : int
     weight : float32
         Squared error that a bit is worth.
     least : int
@@ -58,14 +58,18 @@ class Search(NamedTuple):
         Intra modes that are coded on trial.
     planes : int
         Planes that count in the choice of disparity and references.
+    good : float32
+        A block whose cost a sample is less, in units of the weight, is not split, and not tried in other ways.
     """
 
     original: Any
     volume: Any
+    every: Any
     weight: Any
     least: Any
     intra_tries: Any
     planes: Any
+    good: Any
 
 
 class Trial(NamedTuple):
@@ -90,12 +94,12 @@ def new_trial() -> Trial:
 
 
 @lean
-def fill_volume(job, original, volume):
-    """Squared error of each 4×4 of the first plane, for every index and reference, between samples bilinearly."""
+def fill_volume(job, original, volume, every):
+    """Squared error of each 4×4 of the first plane, for indices and references, between samples bilinearly."""
     height, width = original.shape[1:]
     views = job.views
     for k in range(volume.shape[0]):
-        d = (job.low + k) * job.unit
+        d = (job.low + k * every) * job.unit
         for r in range(volume.shape[1]):
             view = job.references[r, 0]
             dx, dy = d * job.references[r, 1], d * job.references[r, 2]
@@ -175,7 +179,7 @@ def try_residual(contexts, job, search, work, trial, y0, x0, log, kind):
                     trial.trial_levels[p, y, x] = 0
             bits += free
             error += least
-    context = residual_context(job.blocks, by, bx, log, kind)
+    context = residual_context(job, by, bx, log, kind)
     empty = bit_cost(contexts, context, np.int64(0))
     if coded:
         bits += bit_cost(contexts, context, 1)
@@ -225,17 +229,17 @@ def _best_disparities(job, search, y0, x0, log, found):
             elif error < second:
                 second = error
             if r == 0 and error < b0:
-                b0, k0 = error, job.low + k
+                b0, k0 = error, job.low + k * search.every
             elif r == 1 and error < b1:
-                b1, k1 = error, job.low + k
+                b1, k1 = error, job.low + k * search.every
             elif r == 2 and error < b2:
-                b2, k2 = error, job.low + k
+                b2, k2 = error, job.low + k * search.every
             elif r == 3 and error < b3:
-                b3, k3 = error, job.low + k
+                b3, k3 = error, job.low + k * search.every
         if total < best_all:
-            best_all, k_all = total, job.low + k
+            best_all, k_all = total, job.low + k * search.every
         if least + second < best_two:
-            best_two, k_two = least + second, job.low + k
+            best_two, k_two = least + second, job.low + k * search.every
     for k in (k_all, k_two, k0, k1, k2, k3):
         seen = k < job.low
         for i in range(number):
@@ -255,7 +259,8 @@ def _best_explicit(contexts, job, search, work, trial, y0, x0, log, tried):
     moved = trial.moved
     number = _best_disparities(job, search, y0, x0, log, tried)
     best, best_index, best_mask = HUGE, job.low, 1
-    for t in range(number):
+    t, between = 0, False
+    while t < number:
         index = tried[t]
         d = index * job.unit
         where = from_where(job, by, bx, log, index)
@@ -281,9 +286,8 @@ def _best_explicit(contexts, job, search, work, trial, y0, x0, log, tried):
                         moved[r, p, y, x] = search.original[p, y0 + y, x0 + x] - (
                             np.int32(work.predicted[p, y, x] + 2048) >> 12
                         )
-        index_bits = kind_cost(contexts, job, by, bx, log, np.int64(EXPLICIT), index, (1 << count) - 1, np.int64(0))
-        if count > 1:
-            index_bits -= mask_cost(contexts, job, by, bx, where, (1 << count) - 1)
+        index_bits = kind_cost(contexts, job, by, bx, log, np.int64(EXPLICIT), index, np.int64(0), np.int64(0))
+        seen = seen_mask(job, by, bx, log, index)
         products = _products(moved, count, n, search.planes)
         for mask in range(1, 1 << count):
             members = 0
@@ -297,9 +301,21 @@ def _best_explicit(contexts, job, search, work, trial, y0, x0, log, tried):
                 members += (mask >> r) & 1
             total = error / np.float32(members * members) + search.weight * index_bits
             if total < best and count > 1:
-                total += search.weight * mask_cost(contexts, job, by, bx, where, mask)
+                total += search.weight * mask_cost(contexts, job, by, bx, where, seen, mask)
             if total < best:
                 best, best_index, best_mask = total, index, mask
+        t += 1
+        if t == number and not between and search.every > 1:
+            # Then the two indices beside the best that the volume leaves out.
+            between = True
+            for index in (best_index - 1, best_index + 1):
+                fresh = job.low <= index <= job.high
+                for i in range(number):
+                    if tried[i] == index:
+                        fresh = False
+                if fresh:
+                    tried[number] = index
+                    number += 1
     return best_index, best_mask
 
 
@@ -356,7 +372,7 @@ def best_block(contexts, job, search, work, trial, y0, x0, log):
     """Try the ways to code a block and note the best; return its cost and whether it has a residual."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
     best, kind, index, mask, direction, coded = HUGE, INTRA, 0, 0, 0, 0
-    good = GOOD * search.weight * np.float32(n * n)
+    good = search.good * search.weight * np.float32(n * n)
     if job.synthesised:
         side = kind_cost(contexts, job, by, bx, log, np.int64(SYNTHESIS), np.int64(0), np.int64(0), np.int64(0))
         predict_synthesis(job, work, y0, x0, n)
@@ -406,9 +422,9 @@ def search_tree(contexts, job, search, work, trial, y0, x0, log):
         return total
     best, kind, index, mask, direction, coded = best_block(contexts, job, search, work, trial, y0, x0, log)
     if log > LOG_LEAST:
-        context = split_context(job.blocks, by, bx, log)
+        context = split_context(job, by, bx, log)
         best += search.weight * bit_cost(contexts, context, np.int64(0))
-        if log > search.least and (coded or best > GOOD_SPLIT * search.weight * np.float32(n * n)):
+        if log > search.least and (coded or best > search.good * search.weight * np.float32(n * n)):
             total = search.weight * bit_cost(contexts, context, 1)
             for part in range(4):
                 total += search_tree(
@@ -427,11 +443,11 @@ def search_tree(contexts, job, search, work, trial, y0, x0, log):
     return best
 
 
-def encode_view(coder: Arithmetic, job: Job, search: Search, work: Work, trial: Trial) -> None:
-    """Search and write all blocks of a view."""
+def find_blocks(contexts: NDArray[np.int32], job: Job, search: Search) -> None:
+    """Find, mark and decode all blocks of a view; contexts stay as they are."""
+    work, trial = new_work(), new_trial()
     height, width = job.levels.shape[1:]
     size = 1 << LOG_LARGEST
     for y0 in range(0, height, size):
         for x0 in range(0, width, size):
-            search_tree(coder.contexts, job, search, work, trial, y0, x0, LOG_LARGEST)
-            code_tree(coder, job, work, y0, x0, LOG_LARGEST)
+            search_tree(contexts, job, search, work, trial, y0, x0, LOG_LARGEST)

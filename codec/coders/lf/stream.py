@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-VERSION = 1
+VERSION = 2
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
 )
@@ -17,7 +17,7 @@ MOST_STEP = 1 << 18
 MOST_SOURCES = 8
 MOST_DISPARITY = 1 << 14
 
-_HEAD = struct.Struct("<BBBbhh9h")
+_HEAD = struct.Struct("<BBBBbhh9h")
 _LEVEL = struct.Struct("<II")
 
 
@@ -28,9 +28,11 @@ class Header:
     Parameters
     ----------
     log_stride : int
-        Binary logarithm of the distance between views of the first level.
+        Binary logarithm of the distance between views of the second level.
     sources : int
         How many views a synthesis is made of; 0 for none.
+    exact : bool
+        Whether coding is lossless.
     down : int
         1, or -1 where disparity has the other sign along columns than along rows.
     low, high : int
@@ -43,6 +45,7 @@ class Header:
 
     log_stride: int
     sources: int
+    exact: bool
     down: int
     low: int
     high: int
@@ -56,6 +59,7 @@ def pack(header: Header, levels: list[bytes], pixels: int) -> bytes:
         VERSION,
         header.log_stride,
         header.sources,
+        header.exact,
         header.down,
         header.low,
         header.high,
@@ -63,6 +67,11 @@ def pack(header: Header, levels: list[bytes], pixels: int) -> bytes:
     )
     index = b"".join(_LEVEL.pack(step, len(level)) for step, level in zip(header.steps, levels, strict=True))
     return (head + index + b"".join(levels)).ljust(least_bytes(pixels), b"\0")
+
+
+def head_bytes(levels: int) -> int:
+    """Length of header and index."""
+    return _HEAD.size + levels * _LEVEL.size
 
 
 def least_bytes(pixels: int) -> int:
@@ -80,14 +89,14 @@ def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
     """
     if len(payload) < max(_HEAD.size, least_bytes(pixels)):
         raise ValueError(f"its light field has {len(payload)} bytes, too few for {pixels} pixels")
-    version, log_stride, sources, down, low, high, *axes = _HEAD.unpack_from(payload)
+    version, log_stride, sources, exact, down, low, high, *axes = _HEAD.unpack_from(payload)
     if version != VERSION:
         raise ValueError(f"its light field is of version {version}: this decoder reads version {VERSION}")
-    sound = log_stride <= MOST_LOG_STRIDE and sources <= MOST_SOURCES and abs(down) == 1
+    sound = log_stride <= MOST_LOG_STRIDE and sources <= MOST_SOURCES and exact <= 1 and abs(down) == 1
     if not sound or not -MOST_DISPARITY <= low <= high <= MOST_DISPARITY:
         raise ValueError("its header holds values that no encoder writes")
-    count = log_stride + 1
-    start = _HEAD.size + count * _LEVEL.size
+    count = log_stride + 2
+    start = head_bytes(count)
     if len(payload) < start:
         raise ValueError(f"its light field has {len(payload)} bytes: header and index alone have {start}")
     index = [_LEVEL.unpack_from(payload, _HEAD.size + i * _LEVEL.size) for i in range(count)]
@@ -102,6 +111,7 @@ def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
     header = Header(
         log_stride=log_stride,
         sources=sources,
+        exact=bool(exact),
         down=down,
         low=low,
         high=high,

@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .blocks import EXPLICIT, INDEX, KIND
+from .blocks import DIFFERENT, EXPLICIT, INDEX, KIND, UNKNOWN
 from .jit import inner, kernel, lean
 from .warp import FILTERS, TAPS, clamped
 
-UNKNOWN = -32768
 CANDIDATES = 8
 MOST_SOURCES = 8
+REMEMBERED = 4  # disparities of a sample
 MATCHED = 4  # sources that take part in matching
 TRUNCATED = 40 * 8  # eighths of a code: a larger difference tells no more
 LONELY = 22 * 8  # cost of a sample that only one source sees
@@ -50,7 +50,11 @@ class Synthesis(NamedTuple):
     counts : ndarray of uint8, (H, W)
     made : ndarray of int16, (3, H, W)
     disparity : ndarray of int16, (H, W)
+    doubt : ndarray of int16, (H / 4, W / 4)
+        Mean difference of a source from the one most like the others.
     scratch : ndarray of int64, (8, MOST_SOURCES)
+    memory : ndarray of int16, (H, W, REMEMBERED, 2)
+        Disparities and how far the sources differ there.
     """
 
     views: Any
@@ -60,7 +64,9 @@ class Synthesis(NamedTuple):
     counts: Any
     made: Any
     disparity: Any
+    doubt: Any
     scratch: Any
+    memory: Any
 
 
 def new_synthesis(views: Any, disparities: Any, sources: Any) -> Synthesis:
@@ -74,7 +80,9 @@ def new_synthesis(views: Any, disparities: Any, sources: Any) -> Synthesis:
         counts=np.zeros((height, width), np.uint8),
         made=np.zeros((3, height, width), np.int16),
         disparity=np.zeros((height, width), np.int16),
+        doubt=np.zeros((height // 4, width // 4), np.int16),
         scratch=np.zeros((8, MOST_SOURCES), np.int64),
+        memory=np.full((height, width, REMEMBERED, 2), UNKNOWN, np.int16),
     )
 
 
@@ -109,44 +117,67 @@ def project(s, apart):
 
 
 @inner
-def _between(views, view, y, x, py, px):
-    """The first plane at (y, x), between samples bilinearly by sixteenths, times 256."""
+def _between(views, view, p, y, x, py, px):
+    """A plane at (y, x), between samples bilinearly by sixteenths, times 256."""
     height, width = views.shape[2:]
     x0, x1, y0, y1 = clamped(x, width), clamped(x + 1, width), clamped(y, height), clamped(y + 1, height)
-    upper = np.int64(views[view, 0, y0, x0]) * (16 - px) + np.int64(views[view, 0, y0, x1]) * px
-    lower = np.int64(views[view, 0, y1, x0]) * (16 - px) + np.int64(views[view, 0, y1, x1]) * px
+    upper = np.int64(views[view, p, y0, x0]) * (16 - px) + np.int64(views[view, p, y0, x1]) * px
+    lower = np.int64(views[view, p, y1, x0]) * (16 - px) + np.int64(views[view, p, y1, x1]) * px
     return upper * (16 - py) + lower * py
 
 
 @lean
-def _disagreement(s, y, x, d):
-    """How far the sources differ around a sample if it has that disparity, in eighths of a code."""
+def _difference(s, y, x, d):
+    """How far the sources differ at a sample if it has that disparity, in eighths of a code; see `_remembered`."""
     height, width = s.counts.shape
     count = min(s.sources.shape[0], MATCHED)
-    total = 0
-    for place in range(5):
+    seen = 0
+    for r in range(count):
+        at_x, at_y = 256 * x + d * s.sources[r, 1], 256 * y + d * s.sources[r, 2]
+        if -128 <= at_x <= 256 * width - 128 and -128 <= at_y <= 256 * height - 128:
+            part_y, part_x = (at_y >> 4) & 15, (at_x >> 4) & 15
+            value = _between(s.views, s.sources[r, 0], 0, at_y >> 8, at_x >> 8, part_y, part_x)
+            s.scratch[0, seen] = value >> 8
+            seen += 1
+    if seen < 2:
+        return np.int64(LONELY)
+    least = np.int64(1 << 40)
+    for a in range(seen):
+        differs = np.int64(0)
+        for b in range(seen):
+            differs += min(abs(s.scratch[0, a] - s.scratch[0, b]), TRUNCATED)
+        least = min(least, differs)
+    return least // (seen - 1) + (count - seen) * 16
+
+
+@inner
+def _remembered(s, y, x, d):
+    """`_difference`, from memory if it has been found for this sample lately: five samples ask for the same."""
+    height, width = s.counts.shape
+    if y < 0 or x < 0 or y >= height or x >= width:
+        return _difference(s, y, x, d)
+    slot = (d ^ (d >> 2) ^ (d >> 5)) & (REMEMBERED - 1)
+    if s.memory[y, x, slot, 0] != d:
+        s.memory[y, x, slot, 0] = d
+        s.memory[y, x, slot, 1] = _difference(s, y, x, d)
+    return np.int64(s.memory[y, x, slot, 1])
+
+
+@lean
+def _disagreement(s, y, x, d, enough):
+    """How far the sources differ around a sample if it has that disparity, in eighths of a code.
+
+    A sum that is known to reach ``enough`` is not finished.
+    """
+    total = 2 * _remembered(s, y, x, d)
+    for place in range(1, 5):
+        if total >= 6 * enough:
+            return enough
         j = y + (1 if place == 3 else (-1 if place == 4 else 0))
         i = x + (1 if place == 1 else (-1 if place == 2 else 0))
-        seen = 0
-        for r in range(count):
-            at_x, at_y = 256 * i + d * s.sources[r, 1], 256 * j + d * s.sources[r, 2]
-            if -128 <= at_x <= 256 * width - 128 and -128 <= at_y <= 256 * height - 128:
-                value = _between(s.views, s.sources[r, 0], at_y >> 8, at_x >> 8, (at_y >> 4) & 15, (at_x >> 4) & 15)
-                s.scratch[0, seen] = value >> 8
-                seen += 1
-        weight = 2 if place == 0 else 1
-        if seen < 2:
-            total += weight * LONELY
-            continue
-        least = 1 << 40
-        for a in range(seen):
-            differs = 0
-            for b in range(seen):
-                differs += min(abs(s.scratch[0, a] - s.scratch[0, b]), TRUNCATED)
-            least = min(least, differs)
-        total += weight * (least // (seen - 1) + (count - seen) * 16)
+        total += _remembered(s, j, i, d)
     agreeing = 0
-    for r in range(count):
+    for r in range(min(s.sources.shape[0], MATCHED)):
         if _agrees(s, r, y, x, d):
             agreeing += 1
     return total // 6 + (64 if agreeing == 0 else 32 // agreeing)
@@ -161,7 +192,7 @@ def _agrees(s, r, y, x, d):
     if i < 0 or j < 0 or i >= width or j >= height:
         return False
     other = np.int64(s.disparities[s.sources[r, 0], j, i])
-    return other != UNKNOWN and abs(other - d) * max(abs(across), abs(down)) < 205
+    return other != UNKNOWN and abs(other - d) * max(abs(across), abs(down)) < DIFFERENT
 
 
 @lean
@@ -183,13 +214,13 @@ def choose(s, apart):
                         if new and number < tried:
                             s.scratch[1 + (number >> 3), number & 7] = d
                             number += 1
-            best, least = np.int64(UNKNOWN), 1 << 40
+            best, least = np.int64(UNKNOWN), np.int64(1 << 40)
             if number == 1:
                 best = s.scratch[1, 0]
             else:
                 for k in range(number):
                     d = s.scratch[1 + (k >> 3), k & 7]
-                    cost = _disagreement(s, y, x, d)
+                    cost = _disagreement(s, y, x, d, least)
                     if cost < least:
                         least, best = cost, d
             s.disparity[y, x] = best
@@ -222,6 +253,9 @@ def blend(s, nearest):
     """
     height, width = s.counts.shape
     count = s.sources.shape[0]
+    for y in range(height >> 2):
+        for x in range(width >> 2):
+            s.doubt[y, x] = 0
     for y in range(height):
         for x in range(width):
             d = np.int64(s.disparity[y, x])
@@ -254,31 +288,44 @@ def blend(s, nearest):
                         closest = min(closest, s.scratch[5, r])
                 for r in range(count):
                     s.scratch[4, r] = s.scratch[4, r] * PHASE[max(s.scratch[5, r] - closest, 0)]
-            _weighted(s, y, x, count)
+            s.doubt[y >> 2, x >> 2] += (_weighted(s, y, x, count) + 8) >> 4
+
+
+@lean
+def _six_taps(views, view, p, iy, ix, py, px):
+    height, width = views.shape[2:]
+    total = np.int64(0)
+    inside = ix >= 2 and ix + 3 < width
+    for k in range(TAPS):
+        f = np.int64(FILTERS[py, k])
+        if f:
+            j = clamped(iy + k - 2, height)
+            row = np.int64(0)
+            if inside:
+                for m in range(TAPS):
+                    row += np.int64(FILTERS[px, m]) * np.int64(views[view, p, j, ix + m - 2])
+            else:
+                for m in range(TAPS):
+                    row += np.int64(FILTERS[px, m]) * np.int64(views[view, p, j, clamped(ix + m - 2, width)])
+            total += f * row
+    return (total + 2048) >> 12
 
 
 @inner
 def _interpolate(s, r, at_y, at_x):
     """s.scratch[1:4, r] = the three planes at a position."""
-    height, width = s.counts.shape
     view = s.sources[r, 0]
     iy, ix, py, px = at_y >> 8, at_x >> 8, (at_y >> 4) & 15, (at_x >> 4) & 15
     for p in range(3):
-        total = np.int64(0)
-        for k in range(TAPS):
-            f = np.int64(FILTERS[py, k])
-            if f:
-                j = clamped(iy + k - 2, height)
-                row = np.int64(0)
-                for m in range(TAPS):
-                    row += np.int64(FILTERS[px, m]) * np.int64(s.views[view, p, j, clamped(ix + m - 2, width)])
-                total += f * row
-        s.scratch[1 + p, r] = (total + 2048) >> 12
+        s.scratch[1 + p, r] = _six_taps(s.views, view, p, iy, ix, py, px)
 
 
 @inner
 def _weighted(s, y, x, count):
-    """The mean by weights, which fall with the distance from the source in best agreement with the others."""
+    """The mean by weights, which fall with the distance from the source in best agreement with the others.
+
+    Return the mean difference from that source.
+    """
     best, least = 0, 1 << 60
     for a in range(count):
         total = -160 * s.scratch[4, a]
@@ -288,23 +335,26 @@ def _weighted(s, y, x, count):
             total += min(differs, TRUNCATED) * s.scratch[4, b]
         if total < least:
             least, best = total, a
-    sum0 = sum1 = sum2 = sum_ = np.int64(0)
+    sum0 = sum1 = sum2 = sum_ = all_ = spread = np.int64(0)
     for b in range(count):
         differs = abs(s.scratch[1, best] - s.scratch[1, b])
         differs += abs(s.scratch[2, best] - s.scratch[2, b]) + abs(s.scratch[3, best] - s.scratch[3, b])
         weight = s.scratch[4, b] * OUTLYING[min(differs >> 4, 63)]
         sum_ += weight
+        all_ += s.scratch[4, b]
+        spread += min(differs, TRUNCATED) * s.scratch[4, b]
         sum0 += weight * s.scratch[1, b]
         sum1 += weight * s.scratch[2, b]
         sum2 += weight * s.scratch[3, b]
     if sum_ == 0:
         for p in range(3):
             s.made[p, y, x] = s.scratch[1 + p, best]
-        return
+        return np.int64(0)
     half = sum_ >> 1
     s.made[0, y, x] = (sum0 + half) // sum_
     s.made[1, y, x] = (sum1 + half) // sum_
     s.made[2, y, x] = (sum2 + half) // sum_
+    return spread // all_
 
 
 @lean
@@ -322,7 +372,7 @@ def _mismatch(s, at, y, x, d):
         else:
             for j in range(max(y - 1, 0), min(y + 2, height)):
                 for i in range(max(x - 1, 0), min(x + 2, width)):
-                    value = _between(s.views, s.sources[r, 0], j + iy, i + ix, py, px) >> 8
+                    value = _between(s.views, s.sources[r, 0], 0, j + iy, i + ix, py, px) >> 8
                     total += min(abs(value - np.int64(s.views[at, 0, j, i])), TRUNCATED)
         if total < least:
             least, second = total, least
