@@ -163,6 +163,7 @@ BENCHMARKS = {
         Benchmark(
             "accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",), writes=(f"{IMAGES}/depth_truth.*",)
         ),
+        Benchmark("accuracy.waves", records=OWN),
         Benchmark("accuracy.map_precision", records=OWN, writes=(f"{IMAGES}/map_precision.*",)),
         Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),
         Benchmark(
@@ -202,6 +203,7 @@ BENCHMARKS = {
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
         Benchmark("speed.before_after", needs="git history", records=OWN),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
+        Benchmark("pages.display_pictures", writes=(f"{IMAGES}/display_*",)),
         Benchmark("pages.hero", writes=(f"{IMAGES}/apples.webp",)),
         Benchmark("pages.gallery", needs=f"{BROWSER} for --stills", writes=("docs/gallery/*",)),
         Benchmark(

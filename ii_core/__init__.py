@@ -2,7 +2,10 @@
 
 from .camera import Camera, IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
+from .display.eye import Eye, EyeImage, eye_image
+from .display.model import DisplayModel
 from .display.notebook import EmbeddedViewer, embed_viewer
+from .display.zones import ViewingZone, converging_distance, crosstalk, viewing_zone
 from .formats.find import find_views, picture_of
 from .formats.hci import write_hci
 from .formats.mosaic import load_mosaic
@@ -19,18 +22,25 @@ from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stan
 
 __all__ = [
     "Camera",
+    "DisplayModel",
     "EmbeddedViewer",
+    "Eye",
+    "EyeImage",
     "IICamera",
     "IIPicture",
     "IIVideo",
     "MapCamera",
     "PanelDesign",
+    "ViewingZone",
     "add_sensor_noise",
     "camera_names",
     "camera_pose",
     "component_images",
+    "converging_distance",
+    "crosstalk",
     "elementary_images",
     "embed_viewer",
+    "eye_image",
     "find_views",
     "five_viewpoints",
     "from_smallest_rectangle",
@@ -52,6 +62,7 @@ __all__ = [
     "sub_images",
     "video_of",
     "view_image",
+    "viewing_zone",
     "write_hci",
     "write_maps",
     "write_quilt",

@@ -18,7 +18,7 @@ from ii_core.display.viewer import write_viewer
 from raytrace_ii import load_scene, render, scene_names
 
 GALLERY = ROOT / "docs" / "gallery"
-STILL = {"width": 1200, "height": 640}
+STILL = {"width": 900, "height": 500}
 # State of the page in each still: what a stranger should see first.
 STILLS = {"apples": "#a=3", "cuboid": "#x=0.5&y=0.3", "objects": "#stereo=anaglyph&eyes=0.15", "mountains": "#f=0"}
 QUALITY = 80
@@ -69,7 +69,7 @@ def draw_stills() -> None:
             page.goto(f"file://{page_of(name)}{STILLS.get(name, '')}")
             page.evaluate("async () => { await ii.ready }")
             page.wait_for_timeout(1000)
-            page.screenshot(path=GALLERY / f"{name}.jpg", type="jpeg", quality=85)
+            page.screenshot(path=GALLERY / f"{name}.jpg", type="jpeg", quality=80)
             size = page_of(name).stat().st_size / 2**20
             lines.append(f"## {name}\n\n{about}; a page of {size:.1f} MB.\n\n![{name}]({name}.jpg)\n")
     (GALLERY / "README.md").write_text("\n".join(lines), encoding="utf-8")

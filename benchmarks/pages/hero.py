@@ -15,8 +15,8 @@ from ii_core.display.look import focused_view, viewpoints_around
 from raytrace_ii import load_scene, render
 
 PATH = IMAGES / "apples.webp"
-SIZE, DEPTH_MM = (800, 400), 37.0  # the apples in front
-FRAMES, FPS = 24, 12
+SIZE, DEPTH_MM = (720, 360), 37.0  # the apples in front
+FRAMES, FPS = 20, 10
 
 
 def main() -> None:

@@ -1,0 +1,286 @@
+"""What an eye sees of an integral-imaging display: light of the panel through the lenses, averaged over the pupil."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import IICamera
+from ..checks import Pair, checked, finite, instance, positive, whole, whole_pair
+from ..colour import linear, srgb
+from ..jit import exact_kernel
+from ..optics import Lenslet, unit_disk
+from ..picture import IIPicture
+from .model import LAYOUTS, DisplayModel
+
+RAYS = 64  # of an eye with a pupil, for each point it sees
+MOST_RAYS = 1 << 16
+EYES_APART_MM = 63.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Eye:
+    """A viewer's eye.
+
+    Parameters
+    ----------
+    position_mm : (x, y, z)
+        Centre of the pupil in camera coordinates; a display's viewer stands at z < 0.
+    pupil_mm : float
+        Diameter of the pupil, which is parallel to the lens plane; 0 is a point.
+    focus_mm : float, optional
+        Distance along z from the eye to the plane in focus; the lens plane if not given.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range.
+    """
+
+    position_mm: tuple[float, float, float]
+    pupil_mm: float = 0.0
+    focus_mm: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position_mm", finite("position_mm", self.position_mm, 3))
+        if not finite("pupil_mm", (self.pupil_mm,), 1)[0] >= 0:
+            raise ValueError(f"pupil_mm is {self.pupil_mm}: a diameter in mm, 0 for a point, is needed")
+        if self.focus_mm is not None:
+            positive("focus_mm", self.focus_mm)
+
+    def pair(self, apart_mm: float = EYES_APART_MM) -> tuple[Eye, Eye]:
+        """Return the left and the right eye of a viewer whose nose is here."""
+        x, y, z = self.position_mm
+        half = positive("apart_mm", apart_mm) / 2
+        return replace(self, position_mm=(x - half, y, z)), replace(self, position_mm=(x + half, y, z))
+
+
+class EyeImage(NamedTuple):
+    """What an eye sees.
+
+    Attributes
+    ----------
+    light : ndarray of float32, (height, width, 3)
+        Linear light, 1 for white of brightness 1; red, green and blue of sRGB's primaries.
+    seen : ndarray of float32, (height, width)
+        Share of the rays that meet a lens and, through it, the panel.
+    """
+
+    light: NDArray[np.float32]
+    seen: NDArray[np.float32]
+
+    @property
+    def pixels(self) -> NDArray[np.uint8]:
+        """As 8-bit sRGB, light above white clipped."""
+        return np.rint(255 * srgb(np.clip(self.light.astype(np.float64), 0, 1))).astype(np.uint8)
+
+
+@checked(picture=instance(IIPicture), display=instance(DisplayModel), eye=instance(Eye), rays=whole)
+def eye_image(
+    picture: IIPicture, display: DisplayModel, eye: Eye, *, size: Pair | None = None, rays: int | None = None
+) -> EyeImage:
+    """What an eye sees of a display: the mean over its pupil of the light that the panel sends there.
+
+    A ray from a point of the pupil meets the lens plane under the lens of its cell. Through a lens with centre c it
+    ends on the panel at q = c + (c − e)·g/d, e being the point of the pupil and d its distance from the lens plane. A
+    thin lens adds (a − c)(1 + g/d − g/f), a being the place on the lens. The panel shows each elementary image turned
+    by 180° about the lens it is made for, c₀, so that its pixel is the one at 2c₀ − q of the picture. With pinholes,
+    a point pupil and matched arrays this is (4.1), and the result is `view_image`'s with ``"nearest"`` to the bit;
+    outside the viewing zone, too, lenses show the elementary images that `view_image` takes.
+
+    Parameters
+    ----------
+    picture : IIPicture
+        Of the structure of the display's camera. Integers are sRGB, floats linear light.
+    display : DisplayModel
+    eye : Eye
+    size : (width, height), optional
+        Points that are looked at, spread over the lens array; one a lens if not given.
+    rays : int, optional
+        For each point, from places all over the pupil to places all over the point's share of the lens plane. One
+        for a point pupil and `RAYS` for others if not given; one ray joins the centres.
+
+    Returns
+    -------
+    EyeImage
+        Light of rays that miss the lenses or the panel is 0.
+
+    Raises
+    ------
+    ValueError
+        If the structures differ, the eye is not before the lens plane, or a number is out of range.
+
+    Notes
+    -----
+    The picture is read in place: memory is that of the result.
+    """
+    picture.check_regular()
+    camera = display.camera
+    if (picture.lenses, picture.ei_pixels) != (camera.lenses, camera.ei_pixels):
+        raise ValueError(
+            f"picture has {picture.lenses} lenses of {picture.ei_pixels} pixels, the display {camera.lenses} of "
+            f"{camera.ei_pixels}: the same structure is needed"
+        )
+    count = (RAYS if eye.pupil_mm > 0 else 1) if rays is None else rays
+    if not 1 <= count <= MOST_RAYS:
+        raise ValueError(f"rays is {rays!r}: a whole number from 1 to {MOST_RAYS} is needed")
+    width, height = camera.lenses if size is None else whole_pair("size", size)
+    half = _half(display)
+    step = 2 * half / (width, height)
+    light, seen = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
+    place = _place(camera, eye)
+    see(
+        picture.pixels,
+        _table(picture.pixels.dtype),
+        (np.arange(width) + 0.5) * step[0] - half[0],
+        half[1] - (np.arange(height) + 0.5) * step[1],
+        _rays(count, eye.pupil_mm, step),
+        place,
+        np.array([*display.lens_pitch_mm, *half, *display.shift_mm, *display.axes]),
+        np.array([*camera.lens_pitch_mm, camera.size_mm[0] / 2, camera.size_mm[1] / 2, camera.pixel_pitch_mm]),
+        _lens(display, place[2], -1.0 if picture.erect else 1.0),
+        _emitters(display),
+        LAYOUTS.index(display.layout),
+        picture.lenses,
+        picture.ei_pixels,
+        light,
+        seen,
+    )
+    return EyeImage(light, seen)
+
+
+def _place(camera: IICamera, eye: Eye) -> NDArray[np.float64]:
+    """The eye from the camera's origin: x, y, distance from the lens plane; and its defocus there, 1 − d/F."""
+    x, y, z = (a - b for a, b in zip(eye.position_mm, camera.origin_mm, strict=True))
+    distance = camera.gap_mm - z
+    if not distance > 0:
+        raise ValueError(f"eye is at z {z:g} mm, not before the lens plane at {camera.gap_mm:g} mm: z < 0 is needed")
+    return np.array([x, y, distance, 0.0 if eye.focus_mm is None else 1 - distance / eye.focus_mm])
+
+
+def _half(display: DisplayModel) -> NDArray[np.float64]:
+    """Half the size of the lens array; that of the panel to the bit, as in `view_positions`, where pitches agree."""
+    camera = display.camera
+    own = zip(camera.size_mm, camera.lens_pitch_mm, display.lens_pitch_mm, camera.lenses, strict=True)
+    return np.array([(size if pitch == made else count * pitch) / 2 for size, made, pitch, count in own])
+
+
+def _lens(display: DisplayModel, distance: float, sign: float) -> NDArray[np.float64]:
+    """What a lens does to a ray: to the place on the panel, in pixels, and to its slope there; aperture, parallax."""
+    lens, gap, pitch = display.optics, display.gap_mm, display.camera.pixel_pitch_mm
+    spread, bend, radius = 0.0, 0.0, math.inf
+    if isinstance(lens, Lenslet):
+        spread = 1 + gap / distance - gap / float(lens.focal_mm)  # type: ignore[arg-type]  # one, by DisplayModel
+        bend = (spread - 1) / gap
+        radius = lens.aperture_mm / 2 if lens.aperture_mm else math.inf
+    vertical = float(lens.vertical_parallax)
+    return np.array([sign * gap / (distance * pitch), spread / pitch, 1 / distance, bend, radius, vertical])
+
+
+def _emitters(display: DisplayModel) -> NDArray[np.float64]:
+    """Half the side of what a sub-pixel lights, as a share of it; fill, lobe, brightness, black level, crosstalk."""
+    reach = math.sqrt(display.fill) / 2
+    return np.array([reach, display.fill, display.lobe, display.brightness, display.black, display.crosstalk])
+
+
+def _table(dtype: np.dtype[Any]) -> NDArray[np.float32]:
+    """Linear light of every code; none for floats, which are linear."""
+    if dtype.kind == "f":
+        return np.empty(0, np.float32)
+    top = np.iinfo(dtype).max
+    return linear(np.arange(top + 1) / top).astype(np.float32)
+
+
+def _rays(count: int, pupil_mm: float, step: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places on the pupil and on a point's share of the lens plane, mm from their centres, (count, 4)."""
+    if count == 1:
+        return np.zeros((1, 4))
+    # Roberts's sequence in four dimensions: the root of x⁵ = x + 1 and its powers
+    root = 1.1673039782614187
+    unit = (0.5 + np.arange(count)[:, None] * root ** -np.arange(1.0, 5.0)) % 1
+    on_pupil = np.stack(unit_disk(unit[:, :2]), axis=-1) * (pupil_mm / 2)
+    return np.concatenate([on_pupil, (unit[:, 2:] - 0.5) * step], axis=1)
+
+
+@exact_kernel
+def see(pixels, table, points_x, points_y, rays, eye, array, panel, lens, light, layout, lenses, ei, out, seen):
+    """Fill ``out`` and ``seen`` of `eye_image`: every point looked at, every ray to it."""
+    x, y, _, blur = eye
+    pitch_x, pitch_y, half_x, half_y, shift_x, shift_y, cos, sin = array
+    made_x, made_y, edge_x, edge_y, pixel = panel
+    to_pixels, spread, slope, bend, radius, vertical = lens
+    reach, fill, lobe, brightness, black, crosstalk = light
+    rows, columns = pixels.shape[0], pixels.shape[1]
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            red, green, blue, met = 0.0, 0.0, 0.0, 0
+            for r in range(len(rays)):
+                ex, ey = x + rays[r, 0], y + rays[r, 1]
+                # where the ray crosses the lens plane, and the lens over it
+                ax = points_x[j] + rays[r, 2] + rays[r, 0] * blur
+                ay = points_y[i] + rays[r, 3] + rays[r, 1] * blur
+                dx, dy = ax - shift_x, ay - shift_y
+                k = math.floor((dx * cos + dy * sin + half_x) / pitch_x)
+                l = math.floor((half_y - (dy * cos - dx * sin)) / pitch_y)
+                if k < 0 or l < 0 or k >= lenses[0] or l >= lenses[1]:
+                    continue
+                lx, ly = (k + 0.5) * pitch_x - half_x, half_y - (l + 0.5) * pitch_y
+                cx, cy = lx * cos - ly * sin + shift_x, lx * sin + ly * cos + shift_y
+                off_x, off_y = ax - cx, ay - cy
+                if off_x * off_x + off_y * off_y > radius * radius:
+                    continue
+                # how far that lens is from the one its elementary image is made for, in pixels
+                wrong_x = (cx - ((k + 0.5) * made_x - edge_x)) / pixel
+                wrong_y = (cy - (edge_y - (l + 0.5) * made_y)) / pixel
+                px = k * ei[0] + (ei[0] - 1) / 2 - (cx - ex) * to_pixels - off_x * spread - wrong_x
+                py = l * ei[1] + (ei[1] - 1) / 2 + ((cy - ey) * to_pixels + off_y * spread + wrong_y) * vertical
+                m, n = math.floor(px + 0.5), math.floor(py + 0.5)
+                if m < 0 or n < 0 or m >= columns or n >= rows:
+                    continue
+                met += 1
+                weight = brightness
+                if lobe > 0.0:
+                    tx, ty = (cx - ex) * slope + off_x * bend, (cy - ey) * slope + off_y * bend
+                    weight *= (1.0 + tx * tx + ty * ty) ** (-lobe / 2)
+                # the emitter of that place, and how much brighter it is than the panel's mean
+                first, last = 0, 3
+                across, down = px + 0.5 - m, py + 0.5 - n
+                if layout == 1:
+                    first = min(int(3 * across), 2)
+                    across, last = 3 * across - first, first + 1
+                    weight *= 3.0
+                elif layout == 2:
+                    right = across >= 0.5
+                    first = 1 if right else 2 * ((m + n) % 2)
+                    across, last = (2 * across - 1 if right else 2 * across), first + 1
+                    weight *= 2.0 if right else 4.0
+                if abs(across - 0.5) > reach or abs(down - 0.5) > reach:
+                    continue
+                weight /= fill
+                for c in range(first, last):
+                    value = signal(pixels, table, n, m, c)
+                    if crosstalk > 0.0:
+                        beside = signal(pixels, table, n, max(m - 1, 0), c)
+                        beside += signal(pixels, table, n, min(m + 1, columns - 1), c)
+                        beside += signal(pixels, table, max(n - 1, 0), m, c)
+                        beside += signal(pixels, table, min(n + 1, rows - 1), m, c)
+                        value = (1.0 - crosstalk) * value + crosstalk * beside / 4
+                    value = weight * (black + (1.0 - black) * value)
+                    if c == 0:
+                        red += value
+                    elif c == 1:
+                        green += value
+                    else:
+                        blue += value
+            out[i, j, 0], out[i, j, 1], out[i, j, 2] = red / len(rays), green / len(rays), blue / len(rays)
+            seen[i, j] = met / len(rays)
+
+
+@exact_kernel
+def signal(pixels, table, n, m, c):
+    """Linear light of one code."""
+    return table[int(pixels[n, m, c])] if len(table) else pixels[n, m, c]

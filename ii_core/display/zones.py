@@ -1,0 +1,113 @@
+"""Viewing zones of an integral-imaging display and what leaks across their borders, in closed form."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..checks import checked, finite, instance, number, positive
+from .model import DisplayModel
+
+
+class ViewingZone(NamedTuple):
+    """Where every lens shows its own elementary image, at one distance, across and up.
+
+    Attributes
+    ----------
+    centre_mm : (x, y)
+        Of the zone, from the display's axis.
+    size_mm : (width, height)
+        Negative where no such place is: some lenses then show their neighbours' images.
+    period_mm : (x, y)
+        From the zone to the side zones beside it, in which lenses show their neighbours' images.
+    """
+
+    centre_mm: tuple[float, float]
+    size_mm: tuple[float, float]
+    period_mm: tuple[float, float]
+
+
+@checked(display=instance(DisplayModel), distance_mm=number)
+def viewing_zone(display: DisplayModel, distance_mm: float) -> ViewingZone:
+    """Viewing zone at a distance from the lens plane.
+
+    A lens at c, whose elementary image of width P is made for a lens at c₀, shows it to an eye at x while
+    |c − c₀ + (c − x)·g/d| ≤ P/2: over c + (c − c₀)·d/g ± P·d/2g. The zone is what the lenses in the corners of the
+    array have in common.
+
+    Parameters
+    ----------
+    display : DisplayModel
+    distance_mm : float
+        d, from the eye to the lens plane.
+
+    Raises
+    ------
+    ValueError
+        If the distance is not positive.
+    """
+    far = positive("distance_mm", distance_mm) / display.gap_mm
+    cos, sin = display.axes
+    counts = np.array(display.camera.lenses) - 1
+    corners = np.array([[i, j] for i in (-0.5, 0.5) for j in (-0.5, 0.5)]) * counts
+    made, lens = corners * display.camera.lens_pitch_mm, corners * display.lens_pitch_mm
+    place = lens @ np.array([[cos, sin], [-sin, cos]]) + display.shift_mm
+    middle = place + (place - made) * far
+    period = np.array(display.ei_pitch_mm) * far
+    low, high = middle.max(axis=0) - period / 2, middle.min(axis=0) + period / 2
+    centre, size = (low + high) / 2, high - low
+    return ViewingZone(*((float(a[0]), float(a[1])) for a in (centre, size, period)))
+
+
+@checked(display=instance(DisplayModel))
+def converging_distance(display: DisplayModel) -> tuple[float, float]:
+    """Distance from the lens plane at which the zones of all lenses fall on one another, across and up, mm.
+
+    d = g·p/(P − p), P being the pitch of elementary images and p that of lenses: P = p(1 + g/d). Infinite if the
+    pitches are equal.
+
+    Raises
+    ------
+    ValueError
+        If elementary images are closer to each other than lenses: the zones then diverge.
+    """
+    found = []
+    for image, lens in zip(display.ei_pitch_mm, display.lens_pitch_mm, strict=True):
+        apart = image - lens
+        if apart < -1e-9 * image:
+            raise ValueError(
+                f"zones never converge: lens_pitch_mm is {lens:g}, elementary images are {image:g} mm wide, and no "
+                f"less than the lens pitch is needed"
+            )
+        found.append(display.gap_mm * lens / apart if apart > 1e-9 * image else math.inf)
+    return found[0], found[1]
+
+
+@checked(pupil_mm=number, border_mm=number)
+def crosstalk(pupil_mm: float, border_mm: float) -> float:
+    """Share of an eye's light that comes from beyond the straight border of a zone or view.
+
+    The light on either side of the border is even. Beyond lies the segment of the pupil's disk: with
+    t = 2b/D, (arccos t − t√(1 − t²))/π.
+
+    Parameters
+    ----------
+    pupil_mm : float
+        D, diameter of the pupil; 0 is a point.
+    border_mm : float
+        b, from the centre of the pupil to the border; negative if the centre is beyond it.
+
+    Raises
+    ------
+    ValueError
+        If the diameter is negative or a number is not finite.
+    """
+    pupil, border = finite("pupil_mm", (pupil_mm,), 1)[0], finite("border_mm", (border_mm,), 1)[0]
+    if pupil < 0:
+        raise ValueError(f"pupil_mm is {pupil:g}: a diameter in mm, 0 for a point, is needed")
+    if abs(2 * border) >= pupil:
+        return 0.5 if border == 0 else float(border < 0)
+    t = 2 * border / pupil
+    return (math.acos(t) - t * math.sqrt(1 - t * t)) / math.pi

@@ -1,0 +1,90 @@
+"""Command eye: what a viewer's eye sees of a display for II-pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .common import Force, app, check_outputs, image_file, pair, spinner
+from .words import say
+
+if TYPE_CHECKING:
+    from ii_core import DisplayModel, Eye
+
+
+@app.command()
+def eye(
+    picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar, which names its camera.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A picture; of two eyes NAME_left and NAME_right.")],
+    at: Annotated[str | None, typer.Option(help="Where the eye is, mm: x,y,z; in front if not given.")] = None,
+    pupil: Annotated[float, typer.Option(help="Diameter of the pupil, mm; 0 is a point.")] = 3.0,
+    focus: Annotated[
+        float | None, typer.Option(help="Distance in focus from the eye, mm; the lens plane if not given.")
+    ] = None,
+    rays: Annotated[int | None, typer.Option(help="For each point; 64 with a pupil if not given.")] = None,
+    both: Annotated[bool, typer.Option("--both", help="Two eyes, left and right of --at.")] = False,
+    apart: Annotated[float, typer.Option(help="Distance between the eyes, mm.")] = 63.0,
+    size: Annotated[str | None, typer.Option(help="Points looked at, as 800x400; one a lens if not given.")] = None,
+    layout: Annotated[str, typer.Option(help="Sub-pixels: square, rgb-stripe or pentile.")] = "square",
+    fill: Annotated[float, typer.Option(help="Share of a sub-pixel that emits.")] = 1.0,
+    lobe: Annotated[float, typer.Option(help="Power of the cosine of the angle to the panel's normal.")] = 0.0,
+    brightness: Annotated[float, typer.Option(help="Factor of all light.")] = 1.0,
+    black: Annotated[float, typer.Option(help="Light of black as a share of white's.")] = 0.0,
+    crosstalk: Annotated[float, typer.Option(help="Share of a pixel's light from its four neighbours.")] = 0.0,
+    lens_pitch: Annotated[float | None, typer.Option(help="Of the display's lens array, mm.")] = None,
+    gap: Annotated[float | None, typer.Option(help="From panel to lens plane, mm.")] = None,
+    shift: Annotated[str, typer.Option(help="Of the lens array against the panel, mm: x,y.")] = "0,0",
+    turn: Annotated[float, typer.Option(help="Of the lens array against the panel, degrees.")] = 0.0,
+    force: Force = False,
+) -> None:
+    """Show what an eye sees of a display: pupil, focus, sub-pixels, misaligned lenses.
+
+    A point pupil, square pixels and the camera's own lens array give the view image.
+    """
+    from ii_core import DisplayModel, Eye, IIPicture, eye_image, five_viewpoints
+    from ii_core.files import write_image
+    from ii_core.view import camera_of
+
+    sides = ("left", "right") if both else ("",)
+    paths = [output.with_stem(f"{output.stem}_{side}") if side else output for side in sides]
+    check_outputs([file for path in paths for file in image_file(path, "uint8")], force)
+    points = None if size is None else pair("size", size)
+    across, up = _numbers("shift", shift, 2)
+    shown = IIPicture.load(picture)
+    camera = camera_of(shown)
+    display = DisplayModel(
+        camera=camera, lens_pitch_mm=lens_pitch, gap_mm=gap, shift_mm=(across, up), turn_deg=turn,  # type: ignore[arg-type]
+        layout=layout, fill=fill, lobe=lobe, brightness=brightness, black=black, crosstalk=crosstalk,
+    )  # fmt: skip
+    place: tuple[float, ...] = _numbers("at", at, 3) if at else tuple(map(float, five_viewpoints(camera)["front"]))
+    viewer = Eye(position_mm=(place[0], place[1], place[2]), pupil_mm=pupil, focus_mm=focus)
+    for path, one in zip(paths, viewer.pair(apart) if both else (viewer,), strict=True):
+        with spinner(f"eye {picture.name}"):
+            seen = eye_image(shown, display, one, size=points, rays=rays)
+            write_image(path, seen.pixels)
+        say(f"{path}: {seen.seen.mean():.1%} of the rays meet the panel; {_zone(display, one)}")
+
+
+def _zone(display: DisplayModel, eye: Eye) -> str:
+    """Whether the eye is in the viewing zone."""
+    from ii_core import viewing_zone
+
+    x, y, z = (a - b for a, b in zip(eye.position_mm, display.camera.origin_mm, strict=True))
+    zone = viewing_zone(display, display.camera.gap_mm - z)
+    off = [abs(place - centre) for place, centre in zip((x, y), zone.centre_mm, strict=True)]
+    inside = all(2 * distance <= size for distance, size in zip(off, zone.size_mm, strict=True))
+    width, height = (max(0.0, size) for size in zone.size_mm)
+    return f"{'inside' if inside else 'outside'} the viewing zone of {width:.0f}×{height:.0f} mm"
+
+
+def _numbers(name: str, text: str, count: int) -> tuple[float, ...]:
+    """Numbers with commas between them."""
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count:
+        raise ValueError(f"{name} is {text!r}: {count} numbers with commas between them are needed")
+    return numbers
