@@ -21,7 +21,6 @@ from benchmarks.records import ROOT, origin
 from ii_core import (
     IICamera,
     IIPicture,
-    camera_names,
     five_viewpoints,
     orthoscopic,
     preset,
@@ -47,15 +46,36 @@ def main() -> None:
     scene = load_scene("apples")
     folder = DOCS / "images" / "cameras"
     folder.mkdir(parents=True, exist_ok=True)
-    text = [INTRODUCTION]
-    for name in (n for n in sorted(camera_names()) if not n.startswith("setup2")):
-        cameras = preset_cameras(name, scale=SCALES.get(name, 8))
-        write_picture(folder / f"{name}.png", strip(scene, cameras[0], name))
-        text.append(entry(name, preset_cameras(name), cameras[0]))
+    for name in (name for names in KINDS.values() for name in names):
+        write_picture(folder / f"{name}.png", strip(scene, shown(name), name))
         print(name, flush=True)
-    text += [precision(), in_scene()]
     write_picture(DOCS / "images" / "scenes.jpg", all_scenes())
-    (DOCS / "cameras.md").write_text("\n".join(text), encoding="utf-8")
+    (DOCS / "cameras.md").write_text(page(), encoding="utf-8")
+
+
+def page() -> str:
+    """Return the page: cameras by kind, and what their maps are good for."""
+    text = [INTRODUCTION]
+    for kind, names in KINDS.items():
+        text.append(f"\n## {kind}\n")
+        text += [entry(name, preset_cameras(name), shown(name)) for name in names]
+    return "\n".join([*text, precision(), in_scene()])
+
+
+def shown(name: str) -> IICamera:
+    """The camera of the pictures, the first of several."""
+    return preset_cameras(name, scale=SCALES.get(name, 8))[0]
+
+
+# All cameras but the family setup2, whose members differ in numbers alone.
+KINDS = {
+    "Setups of the dissertation": ("setup1", "setup3"),
+    "Other lenses": ("grin", "hpo", "depth-priority", "resolution-priority", "multi-focus", "spherical"),
+    "Other arrays": ("hexagonal", "plenoptic", "hdtv"),
+    "A lens in front of the array": ("depth-control", "grin-hexagonal-depth-control", "plenoptic1", "plenoptic2"),
+    "Several pixel arrays": ("moving-lenslets", "stacked-sensors", "multi-view"),
+    "One lens": ("pinhole2d",),
+}
 
 
 INTRODUCTION = """# Cameras
@@ -69,7 +89,8 @@ A camera is a location and a direction for every pixel. Each strip shows, from l
 
 `raytrace-ii camera NAME -o dir/` stores L and D as pictures. `raytrace-ii camera NAME --report`
 prints properties and limits of a camera. The pictures have an eighth of the lenses each way
-(`python -m benchmarks run cameras`). The [glossary](glossary.md) lists the terms.
+(`python -m benchmarks run cameras`). [Camera files](camera_files.md) lists all keys and elements, for
+a camera or a display of your own. The [glossary](glossary.md) lists the terms.
 """
 
 
@@ -89,7 +110,7 @@ def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
     about = sheet["about"][:1].upper() + sheet["about"][1:]
     picture = f"![L, D, detail and view of {name}](images/cameras/{name}.png)"
     text, facts = (fill(text, 100, break_on_hyphens=False) for text in (f"{about}. {sheet['notes']}", f"{facts}."))
-    return f"\n## {name}\n\n{text}\n\n{facts}\n\n{picture}\n"
+    return f"\n### {name}\n\n{text}\n\n{facts}\n\n{picture}\n"
 
 
 def all_scenes() -> NDArray[np.uint8]:

@@ -6,10 +6,10 @@ import statistics
 from typing import Any
 
 from benchmarks.coding import bframes
-from benchmarks.coding.coders import ANCHOR, NEAR, TRIALS, chart, front, recommended, studied, table
+from benchmarks.coding.coders import ANCHOR, NEAR, TRIALS, chart, front, recommended, studied, summary, table
 from benchmarks.pages.pictures import IMAGES
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import origin
+from benchmarks.records import origin, with_commits
 
 SCALE = 4  # of the large study; the small study is at full size
 
@@ -29,12 +29,35 @@ def tables() -> Tables:
     best = ", ".join(f"`{row['scheme']}`" for row in front(others))
     page = "docs/coding.md"
     return {
+        (page, "which"): [*size(SCALE, others), "", *which(others)],
         (page, "coders"): [*size(SCALE, others), "", *table(others), "", f"Pareto front of rate and time: {best}."],
         (page, "full"): [*size(1, full), "", *table(full)],
         (page, "trials"): [*size(SCALE, trials), "", *table(trials)],
         (page, "bframes"): bframes.table(),
         ("docs/speed_accuracy.md", "coding"): [*size(SCALE, others), "", *front_table(coders)],
     }
+
+
+# What a user wants, and the scheme for it; rates and times come from the records.
+CHOICES = {
+    "the smallest file, whatever it takes": "si-avif:best",
+    "a small file in seconds": "si-hevc:balanced",
+    "speed": "si-h264:fast",
+    "one codestream with every view on its own": "si-jpeg2000",
+    "numbers to compare with the dissertation's": ANCHOR,
+    "a plain picture, for comparison": "jpeg2000",
+}
+
+
+def which(rows: list[dict[str, Any]]) -> list[str]:
+    """Schemes by what a user wants."""
+    known = {row["scheme"]: row for row in summary(rows)}
+    lines = ["| you want | take | rate at equal PSNR | CPU s |", "|---|---|---|---|"]
+    for wish, scheme in CHOICES.items():
+        row = known[scheme]
+        rate = "curves share too little" if row["mean"] is None else f"{1 + row['mean'] / 100:.2f} ×"
+        lines.append(f"| {wish} | `{scheme}` | {rate} | {row['seconds']:.2f} |")
+    return with_commits(lines, [known[scheme]["commits"] for scheme in CHOICES.values()])
 
 
 def front_table(rows: list[dict[str, Any]]) -> list[str]:

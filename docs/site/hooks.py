@@ -41,9 +41,10 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
 def on_page_content(html: str, page: Any, config: Any, files: Files) -> None:
     """See that a page of the reference has all that its package's ``__all__`` names."""
     folder, _, package = page.file.src_uri.removesuffix(".md").rpartition("/")
-    if folder != "api":
+    source = ROOT / package / "__init__.py"
+    if folder != "api" or not source.is_file():  # a page of one module lists all of it
         return
-    for node in ast.parse((ROOT / package / "__init__.py").read_text(encoding="utf-8")).body:
+    for node in ast.parse(source.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
             shown = {anchor.rpartition(".")[2] for anchor in re.findall(r'<h\d id="([\w.]+)"', html)}
             if lost := set(ast.literal_eval(node.value)) - shown:
