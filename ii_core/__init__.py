@@ -1,5 +1,6 @@
 """Cameras, pictures, component images and view images of integral imaging."""
 
+from .calibration import Calibration, NoLenses, calibrate, calibrated_picture, centres_picture
 from .camera import Camera, IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
 from .display.eye import Eye, EyeImage, eye_image
@@ -21,6 +22,7 @@ from .video import IIVideo, open_video, video_of, write_view_folders
 from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stand_back, view_image
 
 __all__ = [
+    "Calibration",
     "Camera",
     "DisplayModel",
     "EmbeddedViewer",
@@ -30,11 +32,15 @@ __all__ = [
     "IIPicture",
     "IIVideo",
     "MapCamera",
+    "NoLenses",
     "PanelDesign",
     "ViewingZone",
     "add_sensor_noise",
+    "calibrate",
+    "calibrated_picture",
     "camera_names",
     "camera_pose",
+    "centres_picture",
     "component_images",
     "converging_distance",
     "crosstalk",

@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .checks import Pair, finite, number, one_of, positive, whole_pair
-from .lattice import LATTICES, Lattice
+from .lattice import LATTICES, Lattice, axes_of
 from .optics import Bundle, Element, FrontElement, LensModel, Under, chain, unit_disk
 
 LEAST_PITCH = 1e-6  # pixels from lens to lens: shorter ones are rounded to nothing
+MOST_TURN, MOST_SHEAR = 60.0, 0.25  # degrees; beyond, rows and columns should change their names
 MOST_ALONG, MOST_PIXELS = 1 << 20, 1 << 34  # of a camera; a hundred times the largest picture in use
 Floats = NDArray[np.float64]
 
@@ -70,6 +71,12 @@ class IICamera:
         The lens model, by default a pinhole, and the elements in front of the array; see `optics`.
     lens_offset_mm : (x, y)
         Shift of the lens array against the pixel array, for moving lenslets.
+    lens_turn_deg : float
+        Turn of the lens array against the pixel array about the array's own middle, anticlockwise as x is to the
+        right and y up; less than 60° either way.
+    lens_shear : float
+        Lean of the columns of lenses against the rows: how far a row stands further right than the one above, in
+        shares of the distance of rows; at most `MOST_SHEAR` either way.
     origin_mm : (x, y, z)
         Centre of the pixel array, for stacks of sensors and arrays of cameras.
     start_mm : float
@@ -100,6 +107,8 @@ class IICamera:
     lattice: str = "rectangular"
     optics: tuple[Element, ...] = ()
     lens_offset_mm: tuple[float, float] = (0.0, 0.0)
+    lens_turn_deg: float = 0.0
+    lens_shear: float = 0.0
     origin_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_mm: float = 0.0
     viewer_mm: float | None = None
@@ -137,6 +146,10 @@ class IICamera:
         one_of(*LATTICES)("lattice", self.lattice)
         for field, count in (("lens_offset_mm", 2), ("origin_mm", 3)):
             put(field, finite(field, getattr(self, field), count))
+        for field, most in (("lens_turn_deg", MOST_TURN), ("lens_shear", MOST_SHEAR)):
+            put(field, number(field, getattr(self, field)))
+            if not abs(getattr(self, field)) <= most:
+                raise ValueError(f"{field} is {getattr(self, field):g}: at most {most:g} either way is needed")
         if hasattr(model, "thickness"):
             model.thickness(self.lens_pitch_mm)  # raises ValueError if the sphere is too small for its cell
         behind = self.gap_mm
@@ -193,7 +206,8 @@ class IICamera:
         shift = [round(offset / self.pixel_pitch_mm, 9) for offset in self.lens_offset_mm]
         shift[1] *= -1  # rows run down
         origin = [(m - k * p) / 2 + s for m, k, p, s in zip(self.pixels, self.lenses, pitch, shift, strict=True)]
-        return Lattice(self.lenses, (pitch[0], pitch[1]), (origin[0], origin[1]), self.lattice == "hexagonal")
+        axes = axes_of(self.lens_turn_deg, self.lens_shear)
+        return Lattice(self.lenses, (pitch[0], pitch[1]), (origin[0], origin[1]), self.lattice == "hexagonal", axes)
 
     @property
     def regular(self) -> bool:
@@ -202,7 +216,7 @@ class IICamera:
         whole = all(
             p == round(p) and k * p == m for p, k, m in zip(lattice.pitch, self.lenses, self.pixels, strict=True)
         )
-        return whole and not lattice.hexagonal and lattice.origin == (0.0, 0.0)
+        return whole and not lattice.hexagonal and lattice.axes is None and lattice.origin == (0.0, 0.0)
 
     @property
     def ei_pixels(self) -> tuple[Any, Any]:
@@ -344,6 +358,7 @@ class IICamera:
             cx=cx,
             cy=cy,
             k=k, l=l, ax=ax, ay=ay, gap=self.gap_mm, cell=self.lens_pitch_mm, hexagonal=lattice.hexagonal,
+            axes=lattice.axes,
         )  # fmt: skip
         rays = self.lens_model.leave(under)
         if self.start_mm:
@@ -365,7 +380,8 @@ class IICamera:
         usual = IICamera(
             pixels=self.pixels, lenses=self.lenses, pixel_pitch_mm=self.pixel_pitch_mm, gap_mm=self.gap_mm
         )
-        for field in ("lens_pitch_mm", "lattice", "lens_offset_mm", "origin_mm", "start_mm", "viewer_mm"):
+        optional = ("lens_pitch_mm", "lattice", "lens_offset_mm", "lens_turn_deg", "lens_shear", "origin_mm")
+        for field in (*optional, "start_mm", "viewer_mm"):
             value = getattr(self, field)
             if value != getattr(usual, field):
                 data[field] = list(value) if isinstance(value, tuple) else value
@@ -390,6 +406,8 @@ class IICamera:
             "lattice",
             "optics",
             "lens_offset_mm",
+            "lens_turn_deg",
+            "lens_shear",
             "origin_mm",
             "start_mm",
             "viewer_mm",

@@ -17,28 +17,63 @@ from .jit import kernel
 
 LATTICES = ("rectangular", "hexagonal")
 TIE = 1e-6  # pixels
+Axes = tuple[float, float, float, float]
 
 
 class Lattice(NamedTuple):
-    """K×L lens centres at (k + ½)·pitch + origin; odd rows of a hexagonal array are shifted half a pitch right."""
+    """K×L lens centres at (k + ½)·pitch + origin; odd rows of a hexagonal array are shifted half a pitch right.
+
+    ``axes`` (xx, xy, yx, yy), None for a straight grid, turn and shear it about the middle of the array: what is
+    (dx, dy) off the middle of the straight grid is (xx·dx + xy·dy, yx·dx + yy·dy) off it on the pixels. Cells are
+    those of the straight grid, turned and sheared with it. ``axes`` have the determinant 1; see `axes_of`.
+    """
 
     lenses: tuple[int, int]
     pitch: tuple[float, float]
     origin: tuple[float, float]
     hexagonal: bool
+    axes: Axes | None = None
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Middle of the array, about which it is turned."""
+        (k, l), (p, q), (x, y) = self.lenses, self.pitch, self.origin
+        return x + k * p / 2, y + l * q / 2
 
     def centres(self, k: NDArray[Any], l: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return x and y of the centres of lenses (k, l) (3.16)."""
         x = (k + 0.5) * self.pitch[0] + self.origin[0]
         if self.hexagonal:
             x = x + 0.5 * self.pitch[0] * (l % 2)
-        return x, (l + 0.5) * self.pitch[1] + self.origin[1]
+        y = (l + 0.5) * self.pitch[1] + self.origin[1]
+        if self.axes is None:
+            return x, y
+        dx, dy = self.offsets(x - self.middle[0], y - self.middle[1])
+        return dx + self.middle[0], dy + self.middle[1]
+
+    def offsets(self, dx: Any, dy: Any) -> tuple[Any, Any]:
+        """Where an offset in the straight grid leads on the pixels."""
+        if self.axes is None:
+            return dx, dy
+        xx, xy, yx, yy = self.axes
+        return xx * dx + xy * dy, yx * dx + yy * dy
+
+    def straight(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """A place on the pixels in the straight grid; the inverse of the turn and the shear."""
+        if self.axes is None:
+            return x, y
+        xx, xy, yx, yy = self.axes
+        dx, dy = x - self.middle[0], y - self.middle[1]
+        return yy * dx - xy * dy + self.middle[0], xx * dy - yx * dx + self.middle[1]
 
     def nearest(self, m: NDArray[Any], n: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the lens (k, l) nearest to the centres of pixels (3.19); m and n broadcast, and so do k and l.
 
         A pixel halfway between two lenses belongs to the right one, or to the upper one if rows differ.
         """
+        if self.axes is not None:
+            x, y = self.straight(m + 0.5, n + 0.5)
+            m, n = x - 0.5, y - 0.5
         if not self.hexagonal:
             right = np.floor((m + 0.5 - self.origin[0] + TIE) / self.pitch[0])
             up = np.ceil((n + 0.5 - self.origin[1] - TIE) / self.pitch[1]) - 1
@@ -48,6 +83,17 @@ class Lattice(NamedTuple):
         k, l = np.empty(m.size, np.int64), np.empty(m.size, np.int64)
         nearest_hexagonal(m.ravel(), n.ravel(), self.lenses, self.pitch, self.origin, k, l)
         return k.reshape(m.shape), l.reshape(m.shape)
+
+
+def axes_of(turn_deg: float, shear: float) -> Axes | None:
+    """``axes`` of a `Lattice`: the angle by which rows rise to the right, and how far each is shifted there.
+
+    ``shear`` is that shift, of a row against the one above, in shares of their distance.
+    """
+    if turn_deg == 0 and shear == 0:
+        return None
+    cosine, sine = math.cos(math.radians(turn_deg)), math.sin(math.radians(turn_deg))
+    return cosine, sine + shear * cosine, -sine, cosine - shear * sine
 
 
 @kernel

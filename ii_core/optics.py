@@ -17,6 +17,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .lattice import Axes
+
 Array = NDArray[np.float64] | np.float64
 Focal = float | tuple[tuple[float, ...], ...]
 
@@ -51,10 +53,14 @@ class Under(NamedTuple):
     gap: float
     cell: tuple[float, float]
     hexagonal: bool = False
+    axes: Axes | None = None
 
     def owns(self, x: NDArray[Any], y: NDArray[Any]) -> NDArray[np.bool_]:
         """Return whether a position relative to the lens centre lies in the lens's cell, border included."""
         across, down = self.cell
+        if self.axes is not None:  # of a turned grid, whose y runs down
+            xx, xy, yx, yy = self.axes
+            x, y = yy * x + xy * y, xx * y + yx * x
         if not self.hexagonal:
             return (abs(x) <= across / 2) & (abs(y) <= down / 2)
         # bisectors to the lens beside, to the lens two rows away, and to the nearest lens of the next row

@@ -47,10 +47,11 @@ def smallest_rectangle(picture: IIPicture) -> tuple[IIPicture, Mask]:
     -------
     picture : IIPicture
         Lenses (K, L) of (U, V) pixels. Its camera has pixel pitch δP·p/U and gap Λ·p/U, where p is the lens pitch
-        across in pixels. These keep the directions of rays and the positions of lenses, with four exceptions. Lens
+        across in pixels. These keep the directions of rays and the positions of lenses, with five exceptions. Lens
         centres move to the centres of their rectangles, by less than a pixel along each axis (more at the edge of the
         sensor). Vertical positions of lenses are stretched by V·p_x/(U·p_y) about the middle, since pixels are
         square. Odd rows of a hexagonal array lie half a pitch too far left. Spherical lenslets become thin lenses.
+        Positions of a turned or sheared array are straightened, directions are not.
     owned : ndarray of bool, (L·V, K·U)
         False for pixels of neighbouring lenses, and for pixels beyond the sensor, which are black.
 
@@ -117,7 +118,8 @@ def from_smallest_rectangle(picture: IIPicture, camera: IICamera) -> tuple[IIPic
 def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: bool = False) -> tuple[IIPicture, Mask]:
     """Return a regular picture with every lens's cell resampled on a grid of U×V points centred on the lens.
 
-    The grid spans one pitch across and down. Interpolation is bilinear over those of the four surrounding pixels that
+    The grid spans one pitch across and down. It is turned and sheared as the array is, so that the regular picture's
+    frame is the array's own. Interpolation is bilinear over those of the four surrounding pixels that
     the lens owns. Its error is of second order if the lens owns all four, and of first order along the border of the
     cell. Pixels of neighbouring lenses have no influence.
 
@@ -156,6 +158,7 @@ def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: boo
     dx = (np.arange(u) - (u - 1) / 2) * (lattice.pitch[0] / u)
     dy = (np.arange(v) - (v - 1) / 2) * (lattice.pitch[1] / v)
     inside = _in_cell(lattice, dx, dy)
+    dx, dy = (np.broadcast_to(a, (v, u)) for a in lattice.offsets(dx[None, :], dy[:, None]))
     x, y = lattice.centres(np.arange(k)[None, :], np.arange(l)[:, None])
     x, y = np.broadcast_to(x, (l, k)), np.broadcast_to(y, (l, k))
     owner = owners(lattice, picture.size)
@@ -321,17 +324,17 @@ def put_back(source, owner, left, top, first, last, out):
 
 @kernel
 def resample_cells(source, owner, x, y, dx, dy, inside, whole, first, last, out, valid):
-    """out[l, v, k, u] = the value at the lens centre (x, y)[l, k] + (dx[u], dy[v]), for l from first to last."""
+    """out[l, v, k, u] = the value at the lens centre (x, y)[l, k] + (dx, dy)[v, u], for l from first to last."""
     height, width = owner.shape
     across = x.shape[1]
     for l in range(first, last):
-        for v in range(dy.size):
+        for v in range(dy.shape[0]):
             for k in range(across):
-                lens, py = l * across + k, y[l, k] + dy[v]
-                row = np.int64(np.floor(py - 0.5))
-                down = py - 0.5 - row
-                for u in range(dx.size):
-                    px = x[l, k] + dx[u]
+                lens = l * across + k
+                for u in range(dx.shape[1]):
+                    px, py = x[l, k] + dx[v, u], y[l, k] + dy[v, u]
+                    row = np.int64(np.floor(py - 0.5))
+                    down = py - 0.5 - row
                     if not (0 <= px <= width and 0 <= py <= height):
                         continue
                     column = np.int64(np.floor(px - 0.5))

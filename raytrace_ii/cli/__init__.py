@@ -12,12 +12,24 @@ from typing import Any
 
 import typer
 
-from . import synthesize, render, pictures, coding, evaluate, show, eye, video
+from . import synthesize, render, pictures, calibrating, coding, evaluate, show, eye, video
 from .common import app
 from .ending import ends_soon
 from .words import SPELT, one_line
 
-__all__ = ["app", "coding", "evaluate", "eye", "main", "pictures", "render", "show", "synthesize", "video"]
+__all__ = [
+    "app",
+    "calibrating",
+    "coding",
+    "evaluate",
+    "eye",
+    "main",
+    "pictures",
+    "render",
+    "show",
+    "synthesize",
+    "video",
+]
 
 INTERRUPTED = 130  # the exit code of a command that Ctrl-C ended
 

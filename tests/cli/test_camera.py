@@ -35,7 +35,7 @@ def test_a_set_of_arrays_gives_numbered_pictures(run, tmp_path):
     assert run(*arguments, "-o", tmp_path / "a.png")[0] == 0
     assert sorted(p.name for p in tmp_path.glob("*.png")) == ["a_0.png", "a_1.png", "a_2.png"]
     assert len(list(tmp_path.glob("d_*.exr"))) == 3
-    assert IIPicture.load(tmp_path / "a_2.png").camera.origin_mm[2] == pytest.approx(0.02 * 64)
+    assert IIPicture.load(tmp_path / "a_2.png").camera.origin_mm[2] == pytest.approx(0.00195583 * 64)
 
 
 def test_a_camera_file_of_the_users_own(run, refused, tmp_path):

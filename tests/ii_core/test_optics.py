@@ -410,8 +410,9 @@ def test_stacked_sensors_share_their_lens_plane():
         gaps = [camera.gap_mm for camera in cameras]
         assert len(set(gaps)) == 3
         # Each focuses elsewhere by (2.3), one lens array for all of them at full size.
+        # On b1dc540 two of the three lay behind it, at −3.4 and −1.5 mm, which their being different did not tell.
         images = [f * g / (g - f) for g, f in ((c.gap_mm, c.lens_model.focal_mm) for c in cameras)]
-        assert len({round(z, 3) for z in images}) == 3
+        np.testing.assert_allclose(np.array(images) + planes[0], np.array([15, 40, 120]) + 0.184088454, rtol=1e-5)
 
 
 def test_moving_lenslets_interleave_evenly():

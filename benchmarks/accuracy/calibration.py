@@ -1,0 +1,154 @@
+"""Calibration of lenslet pictures against cameras that are known: errors of pitch, turn and centres.
+
+    python -m benchmarks run calibration
+
+A white image is the share of light that every pixel gets through a camera with a main lens, whose rim makes the
+micro-images: the mean weight of its rays. Light falls off towards the corners, photons and the sensor make noise, and
+a given share of the lenses is dark or saturated. Each row holds the worst and typical errors of one kind of picture.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.records import Records, add_again
+from ii_core import IICamera, calibrate
+from ii_core.calibration import Calibration
+from ii_core.optics import Lens
+
+RECORDS = Records("calibration", ("benchmarks.accuracy.calibration",))
+CAMERAS = 50  # a row; four rows of small pictures
+PIXEL_MM = 0.005
+# Distance of the main lens, in gaps and sides of the picture: its rim's images shift by a sixth of a pixel towards
+# the border. In our camera a pixel sees through the lens over it alone: farther shifts would cut micro-images.
+FAR = 3.0
+ELECTRONS, READ_NOISE, OFFSET, FULL = 2000.0, 5.0, 30.0, 2300.0
+
+
+def random_camera(rng: np.random.Generator, size: tuple[int, int], pitch_px: float, hexagonal: bool) -> IICamera:
+    """A camera behind a main lens, whose turned and shifted lens array is larger than its sensor."""
+    across = pitch_px
+    down = across * rng.uniform(0.92, 1.08) * (math.sqrt(3) / 2 if hexagonal else 1)
+    reach = 2 * math.hypot(*size) / 2
+    lenses = int(reach / across) + 5, int(reach / down) // 2 * 2 + 6
+    gap, far = 4 * across * PIXEL_MM, FAR * max(size)
+    nearest = min(across, math.hypot(across / 2, down) if hexagonal else down)
+    rim = rng.uniform(0.88, 0.98) * nearest * PIXEL_MM * far
+    x, y = rng.uniform(-0.5, 0.5, 2) * PIXEL_MM * across
+    return IICamera(
+        pixels=size,
+        lenses=lenses,
+        pixel_pitch_mm=PIXEL_MM,
+        gap_mm=gap,
+        lens_pitch_mm=(across * PIXEL_MM, down * PIXEL_MM),
+        lattice="hexagonal" if hexagonal else "rectangular",
+        lens_offset_mm=(float(x), float(y)),
+        lens_turn_deg=float(rng.uniform(-3, 3)),
+        lens_shear=float(rng.uniform(-0.01, 0.01)),
+        optics=("pinhole", Lens(z_mm=gap * (1 + far), focal_mm=gap * far, diameter_mm=rim)),  # type: ignore[arg-type]
+    )
+
+
+def white_image(camera: IICamera, samples: int = 3) -> NDArray[np.float32]:
+    """Share of light of every pixel before an even scene, the mean over samples×samples points of it."""
+    width, height = camera.pixels
+    out = np.zeros((height, width), np.float32)
+    for top in range(0, height, 256):
+        rows = slice(top, min(top + 256, height))
+        for i in range(samples):
+            for j in range(samples):
+                weight = camera.weighted_rays(rows, sample=((j + 0.5) / samples, (i + 0.5) / samples))[2]
+                out[rows] += 1 if weight is None else weight
+    return out / samples**2
+
+
+def exposed(
+    share: NDArray[np.float32], camera: IICamera, rng: np.random.Generator, bad: float = 0.0
+) -> NDArray[np.uint16]:
+    """A white image as a sensor gives it: falling off by 40 % to the corners, noisy, ``bad`` of the lenses spoilt.
+
+    Half of the bad ones are dark, half get four times the light, which is beyond the sensor's scale.
+    """
+    height, width = share.shape
+    x, y = np.linspace(-1, 1, width), np.linspace(-1, 1, height)[:, None]
+    light = share * (1 - 0.2 * (x * x + y * y))
+    k, l = camera.lens_lattice.nearest(np.arange(width)[None], np.arange(height)[:, None])
+    state = rng.random(camera.lenses[::-1])
+    brightness = np.where(state < bad / 2, 0.02, np.where(state < bad, 4.0, 1.0))
+    electrons = rng.poisson(light * brightness[l, k] * ELECTRONS) + rng.normal(OFFSET, READ_NOISE, share.shape)
+    return np.rint(electrons).clip(0, FULL).astype(np.uint16)
+
+
+def micro_image_centres(camera: IICamera, k: NDArray[Any], l: NDArray[Any]) -> NDArray[np.float64]:
+    """Where the middle of the main lens is seen through lenses (k, l), pixels (…, 2)."""
+    grown = growth(camera)
+    places = camera.lens_lattice.centres(k, l)
+    return np.stack([(p - n / 2) * grown + n / 2 for p, n in zip(places, camera.pixels, strict=True)], axis=-1)
+
+
+def growth(camera: IICamera) -> float:
+    """How much wider than lenses the images of the main lens's rim lie, about the middle of the sensor."""
+    far = camera.front[0].z_mm - camera.gap_mm
+    return 1 + camera.gap_mm / far
+
+
+def errors(camera: IICamera, found: Calibration) -> dict[str, float]:
+    """Relative errors of pitch, that of the turn in degrees, and the rms distance of centres in pixels."""
+    true, lattice = camera.lens_lattice, found.grid.lattice
+    pitch = [a / (b * growth(camera)) - 1 for a, b in zip(lattice.pitch, true.pitch, strict=True)]
+    k, l = np.meshgrid(np.arange(lattice.lenses[0]), np.arange(lattice.lenses[1]))
+    centres = np.stack(lattice.centres(k, l), axis=-1)
+    at = np.floor(centres).astype(int)
+    nearest = true.nearest(at[..., 0], at[..., 1])
+    off = centres - micro_image_centres(camera, *nearest)
+    return {
+        "pitch": max(map(abs, pitch)),
+        "turn_deg": abs(found.grid.turn_deg - camera.lens_turn_deg),
+        "centres_px": float(np.sqrt((off**2).sum(axis=-1).mean())),
+    }
+
+
+def trial(seed: int, hexagonal: bool, bad: float, size: tuple[int, int] | None = None) -> dict[str, float]:
+    """Errors of one random camera: pictures of 300–700 px a side if no size is given, 20–60 lenses across."""
+    rng = np.random.default_rng((seed, hexagonal, round(100 * bad)))
+    pixels = size or (int(rng.integers(300, 701)), int(rng.integers(300, 701)))
+    pitch = rng.uniform(max(6, min(pixels) / 60), min(24, min(pixels) / 20)) if size is None else rng.uniform(10, 20)
+    camera = random_camera(rng, pixels, pitch, hexagonal)
+    image = exposed(white_image(camera, 3 if size is None else 2), camera, rng, bad)
+    return errors(camera, calibrate(image))
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add_again(parser)
+    asked = parser.parse_args()
+    small = [
+        {"lattice": lattice, "bad": bad, "pixels": "300-700", "cameras": CAMERAS}
+        for lattice in ("rectangular", "hexagonal")
+        for bad in (0.0, 0.3)
+    ]
+    large = [{"lattice": "hexagonal", "bad": 0.3, "pixels": "7728x5368", "cameras": 1}]
+    for key in RECORDS.todo([*small, *large], asked.again):
+
+        def row(key: dict[str, Any] = key) -> dict[str, Any]:
+            size = None if "-" in key["pixels"] else tuple(map(int, key["pixels"].split("x")))
+            found = [trial(i, key["lattice"] == "hexagonal", key["bad"], size) for i in range(key["cameras"])]  # type: ignore[arg-type]
+            result: dict[str, Any] = {}
+            for name in found[0]:
+                values = np.array([trial[name] for trial in found])
+                result |= {f"{name}_worst": float(values.max()), f"{name}_median": float(np.median(values))}
+            return result
+
+        RECORDS.measure(key, row)
+    for line in RECORDS.rows():
+        print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in line.items()))
+
+
+if __name__ == "__main__":
+    main()

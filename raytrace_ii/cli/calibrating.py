@@ -1,0 +1,66 @@
+"""Command that makes a camera of a raw lenslet picture: calibrate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .common import Force, app, check_outputs, spinner
+from .words import say
+
+
+@app.command()
+def calibrate(
+    raw: Annotated[Path, typer.Argument(help="A raw lenslet picture: an image file, .lfp or .lfr, or packed .raw.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A folder for the camera and the picture.")],
+    white: Annotated[Path | None, typer.Option(help="White image: the same camera before an even surface.")] = None,
+    dark: Annotated[Path | None, typer.Option(help="Dark frame: the same camera without light.")] = None,
+    metadata: Annotated[Path | None, typer.Option(help="JSON of packed .raw samples, if not RAW.json.")] = None,
+    mosaic: Annotated[str | None, typer.Option(help="Colours of the sensor: rggb, bggr, grbg or gbrg.")] = None,
+    lattice: Annotated[str | None, typer.Option(help="rectangular or hexagonal; found if not given.")] = None,
+    pixel_pitch_mm: Annotated[float | None, typer.Option(help="Of the sensor; no picture tells.")] = None,
+    gap_mm: Annotated[float | None, typer.Option(help="From sensor to lenses; no picture tells.")] = None,
+    curve: Annotated[
+        str | None, typer.Option(help="Of the values: linear or srgb. Of 8 bit srgb, else linear, if not given.")
+    ] = None,
+    full_scale: Annotated[float | None, typer.Option(help="Raw value above dark that becomes white.")] = None,
+    bits: Annotated[int, typer.Option(help="Of the picture: 8, which all coders take, or 16.")] = 8,
+    force: Force = False,
+) -> None:
+    """Find the camera of a raw lenslet picture: pitch, turn, offset and shear of its lens grid.
+
+    Writes picture.png, an II-picture with its camera and without vignetting, camera.json, report.json, and
+    centres.png, the centres over the picture. `raytrace-ii regular` brings the picture to a regular structure.
+    """
+    from ii_core import calibrate as find
+    from ii_core import calibrated_picture, centres_picture
+    from ii_core.files import write_image, write_json
+    from ii_core.formats.lfp import read_raw
+    from ii_core.picture import sidecar
+
+    picture_file = output / "picture.png"
+    files = {name: output / name for name in ("camera.json", "report.json", "centres.png")}
+    check_outputs([picture_file, sidecar(picture_file), *files.values()], force, make_folder=True)
+    source = read_raw(raw, metadata)
+    frames: dict[str, Any] = {
+        name: None if file is None else read_raw(file).samples for name, file in (("white", white), ("dark", dark))
+    }
+    mosaic = mosaic or source.mosaic
+    curve = curve or ("srgb" if source.samples.dtype.name == "uint8" else "linear")
+    with spinner(f"calibrate {raw.name}"):
+        found = find(
+            source.samples, **frames, mosaic=mosaic, lattice=lattice or source.lattice,
+            pixel_pitch_mm=pixel_pitch_mm or source.pixel_pitch_mm, gap_mm=gap_mm or source.gap_mm, name=raw.stem,
+        )  # fmt: skip
+        made = calibrated_picture(
+            found, source.samples, **frames, mosaic=mosaic, curve=curve,
+            full_scale=full_scale if full_scale is not None else source.full_scale, bits=bits,
+        )  # fmt: skip
+        made.save(picture_file)
+        write_json(files["camera.json"], found.camera.to_json())
+        write_json(files["report.json"], found.report())
+        write_image(files["centres.png"], centres_picture(found, made))
+    say(found.describe())
+    say(f"{picture_file}: values read as {curve}; run raytrace-ii regular {picture_file} -o … next")

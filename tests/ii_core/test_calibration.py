@@ -1,0 +1,285 @@
+"""Cameras found in pictures of cameras that are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import ndimage
+
+from benchmarks.accuracy.calibration import (
+    errors,
+    exposed,
+    growth,
+    micro_image_centres,
+    random_camera,
+    trial,
+    white_image,
+)
+from ii_core import (
+    IICamera,
+    IIPicture,
+    NoLenses,
+    calibrate,
+    calibrated_picture,
+    centres_picture,
+    preset,
+    resampled,
+    sub_images,
+)
+from ii_core.calibration.demosaic import MOSAICS, demosaiced, phases
+from ii_core.calibration.white import FLOOR, averaged, gain
+from ii_core.formats.mosaic import load_mosaic
+
+
+def shot(seed, hexagonal=False, bad=0.0, size=(330, 300), pitch=13.3):
+    """A known camera and its white image."""
+    rng = np.random.default_rng(seed)
+    camera = random_camera(rng, size, pitch, hexagonal)
+    return camera, exposed(white_image(camera), camera, rng, bad)
+
+
+@settings(max_examples=5)
+@given(seed=st.integers(0, 10**6), hexagonal=st.booleans(), bad=st.sampled_from((0.0, 0.3)))
+def test_a_random_camera_is_found(seed, hexagonal, bad):
+    """The figures of issue 21; `python -m benchmarks run calibration` has 200 cameras."""
+    found = trial(seed, hexagonal, bad)
+    assert found["pitch"] < 1e-4
+    assert found["turn_deg"] < 0.005
+    assert found["centres_px"] < 0.02
+
+
+def test_signs_of_turn_offset_and_shear():
+    """By hand: rows that rise to the right turn anticlockwise; y runs up in the offset; lower rows lean right."""
+    camera = IICamera(
+        pixels=(300, 300), lenses=(20, 20), pixel_pitch_mm=0.01, gap_mm=0.5, lens_pitch_mm=0.14,
+        lens_turn_deg=3.0, lens_shear=0.02, lens_offset_mm=(0.03, 0.05),
+    )  # fmt: skip
+    (x0, x1), (y0, y1) = camera.lens_lattice.centres(np.array([0, 19]), np.array([10, 10]))
+    assert x1 > x0 and y1 < y0  # up is less n
+    straight = replace(camera, lens_turn_deg=0.0)
+    xs, _ = straight.lens_lattice.centres(np.array([10, 10]), np.array([0, 19]))
+    assert xs[1] - xs[0] == pytest.approx(0.02 * 19 * 14)
+    assert camera.lens_lattice.middle == pytest.approx((150 + 3, 150 - 5))
+    L, _ = camera.rays(slice(145, 146), slice(153, 154))
+    assert abs(L[0, 0, 0] - 0.03) < 0.14 and abs(L[0, 0, 1] - 0.05) < 0.14
+
+
+def test_calibration_gives_back_turn_shear_and_place():
+    camera, image = shot(4)
+    found = calibrate(image).camera
+    assert found.lens_turn_deg == pytest.approx(camera.lens_turn_deg, abs=0.005)
+    assert found.lens_shear == pytest.approx(camera.lens_shear, abs=1e-4)
+    assert found.lattice == "rectangular" and found.pixels == camera.pixels
+    # Same rays but for the main lens: the lens under a pixel stands where the known camera has it.
+    m, n = np.array([40, 160, 290]), np.array([30, 200, 260])
+    k, l = camera.lens_lattice.nearest(m, n)
+    x, y = found.lens_lattice.centres(*found.lens_lattice.nearest(m, n))
+    np.testing.assert_allclose(np.stack([x, y], axis=1), micro_image_centres(camera, k, l), atol=0.03)
+
+
+@pytest.mark.parametrize("hexagonal", [False, True])
+def test_every_lens_of_the_camera_lies_in_the_picture(hexagonal):
+    camera = calibrate(shot(8, hexagonal)[1]).camera
+    k, l = np.meshgrid(np.arange(camera.lenses[0]), np.arange(camera.lenses[1]))
+    places = np.stack(camera.lens_lattice.centres(k, l), axis=-1)
+    half = 0.44 * np.array(camera.lens_lattice.pitch)
+    assert (places > half).all() and (places < np.array(camera.pixels) - half).all()
+    assert camera.lens_lattice.hexagonal == hexagonal
+    assert camera.lenses[0] * camera.lenses[1] > 0.75 * 330 * 300 / np.prod(camera.lens_lattice.pitch)
+
+
+def test_rows_that_run_down_turn_the_picture():
+    camera, image = shot(3, hexagonal=True)
+    found = calibrate(np.rot90(image, -1).copy())
+    assert found.turned
+    assert errors(camera, found)["centres_px"] < 0.02
+    made = calibrated_picture(found, np.rot90(image, -1).copy())
+    assert made.size == camera.pixels
+
+
+def test_dark_and_saturated_lenses_are_counted_and_left_out():
+    found = calibrate(shot(5, bad=0.3, size=(400, 400))[1])
+    report = found.report()
+    share = report["centres_used"] / report["centres"]
+    assert 0.55 < share < 0.8  # 0.7 but for chance
+    assert report["dark_lenses"] > 0.08 * report["centres"] < report["saturated_lenses"]
+
+
+def test_the_picture_itself_serves_in_place_of_a_white_image():
+    """Micro-images full of a scene, with dark borders: weaker, and the report says so."""
+    camera, _ = shot(6, size=(400, 400), pitch=16.0)
+    rng = np.random.default_rng(0)
+    scene = np.exp(0.2 * ndimage.zoom(rng.normal(size=(80, 80)), 5, order=1))
+    image = exposed(white_image(camera) * scene.astype(np.float32) / 2, camera, rng)
+    found = calibrate(image)
+    assert found.source == "picture itself"
+    assert any("a white image is surer" in note for note in found.not_told())
+    off = errors(camera, found)
+    assert off["centres_px"] < 0.5 and off["pitch"] < 2e-3
+
+
+@pytest.mark.parametrize("depth", [12, 40, 100])
+def test_micro_images_without_borders_are_refused_rather_than_misjudged(depth):
+    """Behind pinholes the content repeats from lens to lens by more than the pitch, and borders are edges alone."""
+    camera = preset("plenoptic", scale=8)
+    L, D = camera.rays()
+    at = L + (depth - L[..., 2:]) / D[..., 2:] * D
+    texture = ndimage.gaussian_filter(np.random.default_rng(5).random((400, 400)), 4, mode="wrap")
+    places = [at[..., 1] * 200 / depth, at[..., 0] * 200 / depth]
+    with pytest.raises(NoLenses):
+        calibrate(ndimage.map_coordinates(texture, places, order=1, mode="grid-wrap"))
+
+
+NOISE = np.random.default_rng(1).normal(size=(300, 300))
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [
+        np.ones((200, 200)),
+        NOISE,
+        ndimage.gaussian_filter(NOISE, 3),
+        np.add.outer(np.arange(300.0), np.arange(300.0)),
+        np.tile(np.sin(np.arange(300) / 2), (300, 1)) + 0.1 * NOISE,
+        np.ones((12, 300)),
+    ],
+    ids=["even", "noise", "clouds", "ramp", "stripes", "low"],
+)
+def test_a_picture_without_lenses_is_refused(picture):
+    with pytest.raises(NoLenses, match="lenses"):
+        calibrate(picture)
+
+
+def test_frames_of_other_sizes_are_refused():
+    with pytest.raises(ValueError, match=r"white is \(10, 10\): \(300, 300\)"):
+        calibrate(NOISE, white=NOISE[:10, :10])
+    with pytest.raises(ValueError, match="pixel_pitch_mm is 0"):
+        calibrate(NOISE, pixel_pitch_mm=0)
+
+
+def test_vignetting_is_divided_out_without_the_white_images_noise():
+    """A scene of even light: what is left of shading and of noise, in the inner half of the micro-images."""
+    camera, _ = shot(2, size=(300, 300), pitch=15.0)
+    share = white_image(camera)
+    rng = np.random.default_rng(9)
+    noisy_white, clean_raw = (
+        exposed(share, camera, rng),
+        share * (1 - 0.2 * np.add.outer(*[np.linspace(-1, 1, 300) ** 2] * 2)),
+    )
+    found = calibrate(noisy_white)
+    factors = gain(noisy_white - 30.0, found.grid.lattice)
+    even = clean_raw * factors
+    x, y = found.grid.lattice.centres(*np.meshgrid(*map(np.arange, found.grid.lattice.lenses)))
+    middles = even[np.floor(y).astype(int), np.floor(x).astype(int)]
+    before = clean_raw[np.floor(y).astype(int), np.floor(x).astype(int)]
+    assert before.std() / before.mean() > 0.08  # falls off to the corners
+    assert middles.std() / middles.mean() < 0.012  # division by the white pixel itself leaves its noise, 0.023
+    assert factors.max() <= (1 + FLOOR**2) / (2 * FLOOR) + 1e-3
+
+
+def test_averaging_keeps_the_profile_and_a_third_of_the_noise():
+    camera, _ = shot(2, size=(300, 300), pitch=15.0)
+    share = white_image(camera)
+    found = calibrate(exposed(share, camera, np.random.default_rng(0)))
+    noise = np.random.default_rng(1).normal(0, 0.02, share.shape).astype(np.float32)
+    quiet = averaged(share, found.grid.lattice)
+    left = (averaged(share + noise, found.grid.lattice) - quiet)[60:-60, 60:-60]
+    assert left.std() < 0.45 * noise.std()
+    assert np.abs(quiet - share)[60:-60, 60:-60][share[60:-60, 60:-60] == 1].mean() < 0.02
+
+
+@pytest.mark.parametrize("mosaic", MOSAICS)
+def test_demosaicing_is_exact_on_slopes(mosaic):
+    """Bilinear means are exact where every colour is linear."""
+    y, x = np.mgrid[:20, :22].astype(np.float32)
+    true = np.stack([10 + x, 5 + 2 * y, x + y], axis=-1)
+    raw = np.zeros((20, 22), np.float32)
+    for channel, places in enumerate(phases(mosaic).values()):
+        for row, col in places:
+            raw[row::2, col::2] = true[row::2, col::2, channel]
+    np.testing.assert_allclose(demosaiced(raw, mosaic)[1:-1, 1:-1], true[1:-1, 1:-1], atol=1e-4)
+
+
+def test_colours_do_not_leak_between_lenses():
+    raw = np.where(np.arange(16)[None] < 8, 100.0, 0.0).repeat(16, axis=0).astype(np.float32)
+    owner = np.where(np.arange(16)[None] < 8, 0, 1).repeat(16, axis=0)
+    assert set(np.unique(demosaiced(raw, "rggb", owner))) == {0.0, 100.0}
+    assert len(np.unique(demosaiced(raw, "rggb"))) > 2
+
+
+def test_a_calibrated_picture_shows_the_views_of_a_straight_camera():
+    """A turned hexagonal array before a scene, found and made regular: the same views as the straight array's own.
+
+    The scene lies on a plane, so that views are known in closed form: brightness is a wave over the plane.
+    """
+    rng = np.random.default_rng(11)
+    camera = random_camera(rng, (420, 400), 14.2, False)
+    grown = growth(camera)  # lenses stand where their micro-images are
+    pitch, offset = (tuple(x * grown for x in pair) for pair in (camera.lens_pitch_mm, camera.lens_offset_mm))
+    L, D = replace(camera, optics=("pinhole",), lens_pitch_mm=pitch, lens_offset_mm=offset).rays()
+    t = (5 - L[..., 2]) / D[..., 2]
+    wave = 0.5 + 0.4 * np.sin((L[..., 0] + t * D[..., 0]) * 4) * np.cos((L[..., 1] + t * D[..., 1]) * 5)
+    white = exposed(white_image(camera), camera, rng)
+    raw = (white - 30.0).clip(0) * wave
+    found = calibrate(raw, white=white - 30.0, pixel_pitch_mm=camera.pixel_pitch_mm, gap_mm=camera.gap_mm)
+    made = calibrated_picture(found, raw, white=white - 30.0, full_scale=2000.0, bits=16)
+    regular, valid = resampled(made)
+    assert valid.mean() > 0.99
+    from ii_core.colour import linear
+
+    (u, v), lattice = regular.ei_pixels, made.camera.lens_lattice
+    for place in ((u // 2, v // 2), (u // 2 + 2, v // 2 - 3)):
+        si = linear(sub_images(regular)[place[1], place[0], ..., 0] / 65535)
+        k, l = np.meshgrid(np.arange(regular.lenses[0]), np.arange(regular.lenses[1]))
+        x, y = lattice.centres(k, l)
+        off = lattice.offsets(
+            (place[0] - (u - 1) / 2) * lattice.pitch[0] / u, (place[1] - (v - 1) / 2) * lattice.pitch[1] / v
+        )
+        pixel = made.camera.pixel_pitch_mm
+        lx, ly = (x - 210) * pixel, (200 - y) * pixel
+        reach = (5 - camera.gap_mm) / camera.gap_mm
+        expected = 0.5 + 0.4 * np.sin((lx - off[0] * pixel * reach) * 4) * np.cos((ly + off[1] * pixel * reach) * 5)
+        assert np.corrcoef(si.ravel(), expected.ravel())[0, 1] > 0.99
+        assert np.abs(si - expected).mean() < 0.03  # of noise and interpolation
+
+
+def test_marks_stand_on_centres(tmp_path):
+    _, image = shot(7)
+    found = calibrate(image)
+    made = calibrated_picture(found, image)
+    marks = centres_picture(found, made)
+    assert marks.shape == (600, 660, 3)
+    place = np.floor(2 * found.grid.places[100]).astype(int)
+    assert tuple(marks[place[1], place[0]]) == (0, 255, 0)
+    made.save(tmp_path / "p.png")
+    back = IIPicture.load(tmp_path / "p.png")
+    assert back.camera == found.camera and not back.regular
+
+
+def test_lens_types_that_take_turns_are_told():
+    """A 2×2 pattern of sharp and blurred lenses, as of multi-focus arrays."""
+    camera, _ = shot(12, size=(500, 500), pitch=16.0)
+    rng = np.random.default_rng(3)
+    texture = rng.random((500, 500)).astype(np.float32)
+    k, l = camera.lens_lattice.nearest(np.arange(500)[None], np.arange(500)[:, None])
+    sharp = (k + l) % 2 == 0
+    scene = np.where(sharp, ndimage.gaussian_filter(texture, 0.7), ndimage.gaussian_filter(texture, 2.5))
+    image = exposed(white_image(camera) * (0.3 + 0.5 * scene), camera, rng)
+    white = exposed(white_image(camera), camera, rng)
+    assert calibrate(image, white=white).types.pattern == "2×2"
+    even = exposed(white_image(camera) * (0.3 + 0.5 * ndimage.gaussian_filter(texture, 1)), camera, rng)
+    assert calibrate(even, white=white).types.pattern == "one"
+
+
+def test_a_mosaic_that_does_not_divide_is_cut_with_a_warning(tmp_path):
+    """Also here that no picture of a calibrated size is cropped silently: the report counts pixels outside."""
+    _, image = shot(1)
+    outside = calibrate(image).report()["pixels_outside"]
+    assert set(outside) == {"left", "right", "top", "bottom"} and max(outside.values()) > 0
+    from ii_core.files import write_image
+
+    write_image(tmp_path / "m.png", image)
+    with pytest.warns(UserWarning, match="cut off"):
+        load_mosaic(tmp_path / "m.png", (13, 13))
