@@ -22,6 +22,7 @@ SKEW = 0.12  # of a pitch: how far rows may lean, or half a pitch may be missed
 REACH = 0.3  # of the pitch: a centre farther from its place is that of something else
 LOOSE, LOOSE_YET = 0.05, 0.13  # of the pitch, median miss of centres: more, in the end or before, is no grid
 BAD_SIGMAS = 3.5  # beyond this many robust standard deviations a centre is thrown out
+BORDER = 0.93  # of the light of the middle: borders of micro-images are darker
 DARK = 0.3  # of the light of the lenses around: less, and the lens is dark
 INSIDE = 0.45  # of the pitch, how far the picture must reach beyond a lens's centre for the lens to count
 Bools = NDArray[np.bool_]
@@ -144,6 +145,7 @@ def lens_grid(grey: NDArray[np.float32], lattice: str | None = None, clipped: Bo
         dark = heights < DARK * level.at(places)
         summits = Summits(grey / level.picture(), sigma)
     fit, found, used = _fitted(fit, summits, k, l, left_out=dark | saturated, loose=LOOSE)
+    _check_borders(fit, summits, k, l)
     places = fit.places(k, l)
     return _result(fit, (width, height), places=places, found=found, used=used, dark=dark, saturated=saturated)
 
@@ -218,6 +220,20 @@ def _fitted(
             f"{fit.pitch[1]:.1f} px, and {int(good.sum())} of {len(k)} are used"
         )
     return replace(fit, rows=rows), found, good
+
+
+def _check_borders(fit: _Affine, summits: Summits, k: Floats, l: Floats) -> None:
+    """Raise NoLenses unless micro-images are darker somewhere halfway to a neighbour than in the middle, by mean."""
+    places, (a, b) = fit.places(k, l), fit.rows[1:]
+    middle, between = (
+        float(np.mean(summits.at(places))),
+        min(float(np.mean(summits.at(places + step))) for step in (a / 2, b / 2, (a + b) / 2)),
+    )
+    if not between < BORDER * middle:
+        raise NoLenses(
+            f"no lenses are found: what repeats every {fit.pitch[0]:.1f}×{fit.pitch[1]:.1f} px has no dark borders, "
+            f"{between / middle:.2f} of the light of the middle: give a white image"
+        )
 
 
 def _pixels(places: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
