@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from ii_core.files import one_line
 
 from . import container, file_header
 from .checks import check_type, whole
-from .clock import cpu_seconds
+from .clock import cpu_seconds, interruptible
 from .contract import (
     MAX_DECODED_PIXELS,
     MAX_PIXELS,
@@ -206,7 +207,8 @@ def encode(
     )
     asked = _payload_goal(goal, coded)
     searched = asked.bpp is not None and not coder.rate_control
-    result = _at_rate(coder, picture, settings, asked) if searched else coder.encode(picture, settings, asked)
+    run = partial(_at_rate, coder) if searched else coder.encode
+    result = interruptible(lambda: run(picture, settings, asked))
     coded = replace(coded, payload=result.run.payload, runs=result.runs)
     return replace(
         coded,
@@ -294,14 +296,14 @@ def timed_decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = M
         path, coded = os.fspath(coded), Encoded.load(coded)
     name = path or "the coded picture"
     coder = find(coded.scheme)
-    blank = blank_picture(coded.structure, coded.dtype)
+    payload, settings, blank = coded.payload, coded.options, blank_picture(coded.structure, coded.dtype)
     width, height = blank.size
     if width * height > whole("max_pixels", max_pixels, 1, MAX_PIXELS):
         raise ValueError(
             f"{name} has {width}×{height} pixels: at most {max_pixels} are decoded, raise max_pixels (--max-pixels)"
         )
     try:
-        pixels, codec_seconds = coder.decode(coded.payload, blank, coded.options)
+        pixels, codec_seconds = interruptible(lambda: coder.decode(payload, blank, settings))
     except ValueError as error:
         raise ValueError(f"{name} is damaged: {one_line(error)}") from None
     picture = blank.with_pixels(pixels)

@@ -7,8 +7,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from typing import TypeVar
+
+from ii_core import interrupt
 
 TASKS = "/proc/self/task"
+Result = TypeVar("Result")
 
 _elsewhere = threading.local()
 _opening = threading.Lock()
@@ -22,6 +26,19 @@ def cpu_seconds() -> float:
 def spent_elsewhere(seconds: float) -> None:
     """Add CPU seconds of another thread or process to those of the calling thread."""
     _elsewhere.seconds = getattr(_elsewhere, "seconds", 0.0) + seconds
+
+
+def interruptible(call: Callable[[], Result]) -> Result:
+    """Call a function as `ii_core.interrupt.interruptible` does; its CPU time counts for the calling thread."""
+    caller = threading.get_ident()
+
+    def timed() -> tuple[Result, float]:
+        result = call()
+        return result, 0.0 if threading.get_ident() == caller else cpu_seconds()
+
+    result, seconds = interrupt.interruptible(timed)
+    spent_elsewhere(seconds)
+    return result
 
 
 class OwnThreads:

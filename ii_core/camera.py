@@ -15,9 +15,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import Pair, finite, number, one_of, positive, whole_pair
+from .checks import MOST_MM, Pair, length, number, one_of, place, whole_pair, within
 from .lattice import LATTICES, Lattice, axes_of
-from .optics import Bundle, Element, FrontElement, LensModel, Under, chain, unit_disk
+from .optics import Bundle, Element, FrontElement, LensModel, Pinhole, Under, chain, unit_disk
 
 LEAST_PITCH = 1e-6  # pixels from lens to lens: shorter ones are rounded to nothing
 MOST_TURN, MOST_SHEAR = 60.0, 0.25  # degrees; beyond, rows and columns should change their names
@@ -92,7 +92,7 @@ class IICamera:
     Raises
     ------
     ValueError
-        If a value is out of range.
+        If a value is out of range: lengths from 1e-9 to 1e9 mm, coordinates to 1e9 mm.
 
     References
     ----------
@@ -124,28 +124,26 @@ class IICamera:
                 raise ValueError(f"{field} are {across}×{down}: at most {MOST_ALONG} a side, {MOST_PIXELS} in all")
             put(field, (across, down))
         for field in ("pixel_pitch_mm", "gap_mm"):
-            put(field, positive(field, getattr(self, field)))
+            put(field, length(field, getattr(self, field)))
         model, front = chain(self.optics)
         put("optics", (model, *front))
         self._check_start()
-        put("viewer_mm", None if self.viewer_mm is None else positive("viewer_mm", self.viewer_mm))
+        put("viewer_mm", None if self.viewer_mm is None else length("viewer_mm", self.viewer_mm))
         if not self._ei_per_lens > 0:
             raise ValueError(f"viewer_mm is {self.viewer_mm:g}: more than gap_mm, {self.gap_mm:g}, is needed")
         if self.lens_pitch_mm is None:
-            even = (m * self.pixel_pitch_mm / k for m, k in zip(self.pixels, self.lenses, strict=True))
-            put("lens_pitch_mm", tuple(pitch / self._ei_per_lens for pitch in even))
-        else:
-            given = self.lens_pitch_mm
-            both = tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else (given,) * 2
-            if len(both) != 2:
-                raise ValueError(f"lens_pitch_mm is {given!r}: one length, or two, across and down, are needed")
-            put("lens_pitch_mm", tuple(positive("lens_pitch_mm", length) for length in both))
+            put("lens_pitch_mm", self._shared_pitch_mm)
+        given = self.lens_pitch_mm
+        both = tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else (given,) * 2
+        if len(both) != 2:
+            raise ValueError(f"lens_pitch_mm is {given!r}: one length, or two, across and down, are needed")
+        put("lens_pitch_mm", tuple(length("lens_pitch_mm", pitch) for pitch in both))
         if min(self.lens_pitch_mm) < LEAST_PITCH * self.pixel_pitch_mm:
             pitch = min(self.lens_pitch_mm)
             raise ValueError(f"lens_pitch_mm is {pitch:g}: at least {LEAST_PITCH:g} of pixel_pitch_mm is needed")
         one_of(*LATTICES)("lattice", self.lattice)
         for field, count in (("lens_offset_mm", 2), ("origin_mm", 3)):
-            put(field, finite(field, getattr(self, field), count))
+            put(field, place(field, getattr(self, field), count))
         for field, most in (("lens_turn_deg", MOST_TURN), ("lens_shear", MOST_SHEAR)):
             put(field, number(field, getattr(self, field)))
             if not abs(getattr(self, field)) <= most:
@@ -162,9 +160,7 @@ class IICamera:
             behind = element.z_mm
 
     def _check_start(self) -> None:
-        start = number("start_mm", self.start_mm)
-        if not 0 <= start < math.inf:
-            raise ValueError(f"start_mm is {start:g}: a distance in mm of at least 0 is needed")
+        start = within("start_mm", self.start_mm, 0, MOST_MM, "distance", " mm")
         if self.front and start:
             raise ValueError(f"start_mm is {start:g}: rays start at the lenses if a {self.front[0].kind} is in front")
         object.__setattr__(self, "start_mm", start)
@@ -181,6 +177,12 @@ class IICamera:
         """Pitch of the elementary images on the pixel array, across and down."""
         across, down = self.lens_pitch_mm
         return across * self._ei_per_lens, down * self._ei_per_lens
+
+    @property
+    def _shared_pitch_mm(self) -> tuple[float, ...]:
+        """Lens pitch that divides the pixel array evenly."""
+        even = (m * self.pixel_pitch_mm / k for m, k in zip(self.pixels, self.lenses, strict=True))
+        return tuple(pitch / self._ei_per_lens for pitch in even)
 
     @property
     def lens_model(self) -> LensModel:
@@ -377,15 +379,12 @@ class IICamera:
             "pixel_pitch_mm": self.pixel_pitch_mm,
             "gap_mm": self.gap_mm,
         }
-        usual = IICamera(
-            pixels=self.pixels, lenses=self.lenses, pixel_pitch_mm=self.pixel_pitch_mm, gap_mm=self.gap_mm
-        )
         optional = ("lens_pitch_mm", "lattice", "lens_offset_mm", "lens_turn_deg", "lens_shear", "origin_mm")
         for field in (*optional, "start_mm", "viewer_mm"):
             value = getattr(self, field)
-            if value != getattr(usual, field):
+            if value != (self._shared_pitch_mm if field == "lens_pitch_mm" else getattr(IICamera, field)):
                 data[field] = list(value) if isinstance(value, tuple) else value
-        if self.optics != usual.optics:
+        if self.optics != (Pinhole(),):
             data["optics"] = [e.to_json() for e in self.optics]
         return data
 

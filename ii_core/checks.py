@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
@@ -13,6 +12,7 @@ import numpy as np
 
 Pair = tuple[int, int]
 Rule = Callable[[str, Any], Any]  # raises TypeError or ValueError that names the argument
+LEAST_MM, MOST_MM = 1e-9, 1e9  # of a length: a hundredth of an atom, and a thousand kilometres
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -161,8 +161,8 @@ def callable_(name: str, value: Any) -> None:
         raise refuse(name, value, "a function")
 
 
-def positive(name: str, value: Any) -> float:
-    """Return a positive, finite length in mm.
+def within(name: str, value: Any, least: float, most: float, needed: str = "number", unit: str = "") -> float:
+    """Return a number within bounds.
 
     Raises
     ------
@@ -170,24 +170,30 @@ def positive(name: str, value: Any) -> float:
         If the value is none; the message names the argument.
     """
     given = number(name, value)
-    if not 0 < given < math.inf:
-        raise ValueError(f"{name} is {given:g}: a positive length in mm is needed")
+    if not least <= given <= most:
+        raise ValueError(f"{name} is {given:g}: a {needed} from {least:g} to {most:g}{unit} is needed")
     return given
 
 
-def finite(name: str, value: Any, count: int) -> tuple[Any, ...]:
-    """Return a tuple of ``count`` finite numbers.
+def length(name: str, value: Any) -> float:
+    """Return a length from `LEAST_MM` to `MOST_MM`; squares and quotients of lengths are finite and not zero."""
+    return within(name, value, LEAST_MM, MOST_MM, "length", " mm")
+
+
+def place(name: str, value: Any, count: int, most: float = MOST_MM) -> tuple[float, ...]:
+    """Return a tuple of ``count`` coordinates in mm, each at most ``most`` in size.
 
     Raises
     ------
     TypeError, ValueError
         If the value is none; the message names the argument.
     """
+    needed = f"{count} numbers from {-most:g} to {most:g} mm"
     if isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray):
-        raise refuse(name, value, f"{count} finite numbers")
+        raise refuse(name, value, needed)
     found = tuple(number(name, x) for x in value)
-    if len(found) != count or not all(map(math.isfinite, found)):
-        raise ValueError(f"{name} is {value}: {count} finite numbers are needed")
+    if len(found) != count or not all(-most <= x <= most for x in found):
+        raise ValueError(f"{name} is {_short(value)}: {needed} are needed")
     return found
 
 

@@ -10,7 +10,8 @@ import textwrap
 from typing import Any
 
 from .camera import IICamera
-from .properties import check_angle, check_lengths, properties, through_front_mm
+from .checks import number
+from .properties import check_angle, check_lengths, check_positive, properties, through_front_mm
 
 SAMPLING = ("lens_pitch_mm", "pixel_pitch_mm", "ei_pixels")
 SEEING = ("lens_pitch_mm", "gap_mm", "view_angle_deg")
@@ -43,16 +44,20 @@ def solve(
         lens_pitch_mm=lens_pitch_mm, gap_mm=gap_mm, pixel_pitch_mm=pixel_pitch_mm, ei_pixels=ei_pixels,
         view_angle_deg=view_angle_deg,
     )  # fmt: skip
-    known = {name: float(value) for name, value in values.items() if value is not None}
-    check_lengths(**{name: value for name, value in known.items() if name != "view_angle_deg"})
-    if "view_angle_deg" in known:
-        check_angle(known["view_angle_deg"])
+    known = {name: number(name, value) for name, value in values.items() if value is not None}
+    _check(known)
     _check_determined(known)
     while len(known) < len(values):
         known |= _consequences(known)
-    check_lengths(**{name: value for name, value in known.items() if name != "view_angle_deg"})  # no overflow
-    check_angle(known["view_angle_deg"])
+    _check(known)
     return {name: known[name] for name in values}
+
+
+def _check(known: dict[str, float]) -> None:
+    check_lengths(**{name: value for name, value in known.items() if name.endswith("_mm")})
+    check_positive(**{name: value for name, value in known.items() if name == "ei_pixels"})
+    if "view_angle_deg" in known:
+        check_angle(known["view_angle_deg"])
 
 
 def _consequences(known: dict[str, float]) -> dict[str, float]:

@@ -108,8 +108,11 @@ def crew(
     client = client_of(executor)
     if executor is None:
         width = cores() if workers is None else workers
-        with ThreadPoolExecutor(width) as pool:
+        pool = ThreadPoolExecutor(width)
+        try:
             yield lambda item: pool.submit(work, *item), width
+        finally:  # at the end no call is under way; Ctrl-C and errors wait for none
+            pool.shutdown(wait=False, cancel_futures=True)
     elif client is not None:
         check_workers(client, identity)
         shared, ours = _shared(client, work), identity()

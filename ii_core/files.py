@@ -55,22 +55,26 @@ PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 BAND = 64  # rows read at once to check a file
 MAX_TEXT = 16 << 20  # bytes of a JSON or configuration file; a sidecar has under ten thousand
 MAX_DIGITS = 20  # of whole numbers in JSON; 64 bits need 20
+MAX_DEPTH = 100  # of nested lists and objects; ours have 8
 MAX_MESSAGE = 600  # characters of an error that quotes a file
 NOT_WHOLE = "the file does not hold what was written to it, as if the disk were full"
 
 
 def check_file(path: str | os.PathLike[str]) -> None:
     """Raise OSError unless the path is a regular file: reading a pipe or a device may never end."""
+    named = one_line(os.fspath(path))
     try:
         mode = os.stat(path).st_mode
     except FileNotFoundError:
-        raise FileNotFoundError(f"{os.fspath(path)} does not exist") from None
+        raise FileNotFoundError(f"{named} does not exist") from None
+    except OSError as error:  # a name of 300 characters
+        raise type(error)(f"cannot read {named}: {error.strerror}") from None
     except ValueError as error:  # a NUL in the name
-        raise OSError(f"cannot read {os.fspath(path)!r}: {error}") from None
+        raise OSError(f"cannot read {named!r}: {error}") from None
     if stat.S_ISDIR(mode):
-        raise IsADirectoryError(f"{os.fspath(path)} is a folder: a file is needed")
+        raise IsADirectoryError(f"{named} is a folder: a file is needed")
     if not stat.S_ISREG(mode):
-        raise OSError(f"{os.fspath(path)} is a device, pipe or socket: a regular file is needed")
+        raise OSError(f"{named} is a device, pipe or socket: a regular file is needed")
 
 
 def check_name(path: str | os.PathLike[str]) -> None:
@@ -119,13 +123,30 @@ def read_json(path: str | os.PathLike[str]) -> Any:
     OSError
         If it is missing or not regular.
     """
-    text = read_text(path)
     try:
-        return json.loads(text, parse_int=_whole)
-    except RecursionError:
-        raise ValueError(f"{os.fspath(path)}: nested too deeply") from None
+        return parse_json(read_text(path))
     except ValueError as error:
-        raise ValueError(f"{os.fspath(path)}: {error}") from None
+        said = one_line(error)
+        raise ValueError(said if said.startswith(os.fspath(path)) else f"{os.fspath(path)}: {said}") from None
+
+
+def parse_json(text: str | bytes) -> Any:
+    """The value of a JSON text; ValueError as `read_json` has it."""
+    try:
+        value = json.loads(text, parse_int=_whole)
+        _check_depth(value, MAX_DEPTH)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    return value
+
+
+def _check_depth(value: Any, left: int) -> None:
+    """Raise RecursionError for deep nesting, before code that walks through the value meets it on a fuller stack."""
+    if isinstance(value, dict | list):
+        if left == 0:
+            raise RecursionError
+        for item in value.values() if isinstance(value, dict) else value:
+            _check_depth(item, left - 1)
 
 
 def _whole(digits: str) -> int:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .files import check_file
+from .files import check_file, parse_json
 
 try:
     import fcntl
@@ -48,11 +48,9 @@ def read_records(path: Path, format: str, version: int) -> list[dict[str, Any]]:
         if not line.endswith(b"\n"):
             break
         try:
-            record = json.loads(line)
+            record = parse_json(line)
         except ValueError as error:
             raise ValueError(f"{path}, line {number}: {error}") from None
-        except RecursionError:
-            raise ValueError(f"{path}, line {number}: nested too deeply") from None
         if not isinstance(record, dict) or (record.get("format"), record.get("version")) != (format, version):
             raise ValueError(f'{path}, line {number}: no record: needs "format": "{format}", "version": {version}')
         found.append(record)

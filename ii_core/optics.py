@@ -17,8 +17,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .checks import MOST_MM, length, number, within
 from .lattice import Axes
 
+MOST_IOR = 1000.0  # a material of 4.5 is a rarity
 Array = NDArray[np.float64] | np.float64
 Focal = float | tuple[tuple[float, ...], ...]
 
@@ -118,12 +120,12 @@ class Element:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if (value is None and field.default is None) or field.name in ("focal_mm", "z_mm"):
+            if (value is None and field.default is None) or field.name in ("focal_mm", "z_mm", "ior"):
                 continue
-            if field.name == "aperture_mm" and _number(value) and value == 0:  # a pinhole
+            name = f"{self.kind}: {field.name}"
+            if field.name == "aperture_mm" and number(name, value) == 0:  # a pinhole
                 continue
-            if not _number(value) or value <= 0:
-                raise ValueError(f"{self.kind}: {field.name} is {value!r}: a positive number is needed")
+            length(name, value)
 
     def to_json(self) -> dict[str, Any]:
         return {"kind": self.kind, **{k: v for k, v in asdict(self).items() if v is not None}}
@@ -213,8 +215,8 @@ class Lenslet(LensModel):
         rows = focal if isinstance(focal, list | tuple) else [[focal]]
         if not all(isinstance(row, list | tuple) and row and len(row) == len(rows[0]) for row in rows) or not rows:
             raise ValueError(f"lenslet: focal_mm is {focal!r}: one length, or rows of equally many, are needed")
-        if not all(_number(f) and f > 0 for row in rows for f in row):
-            raise ValueError(f"lenslet: focal_mm is {focal!r}: positive lengths are needed")
+        for f in (f for row in rows for f in row):
+            length("lenslet: focal_mm", f)
         if rows is focal:
             object.__setattr__(self, "focal_mm", tuple(tuple(float(f) for f in row) for row in rows))
 
@@ -249,7 +251,7 @@ class SphericalLenslet(LensModel):
     radius_mm : float
         R, radius of the sphere; at least half the diagonal of the lens's cell.
     ior : float
-        n, at least 1.
+        n, from 1 to 1000.
     aperture_mm : float, optional
         Diameter of the aperture on the flat face; without it, rays pass its centre.
     """
@@ -262,8 +264,7 @@ class SphericalLenslet(LensModel):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.ior >= 1:
-            raise ValueError(f"spherical-lenslet: ior is {self.ior}: at least 1 is needed")
+        within("spherical-lenslet: ior", self.ior, 1, MOST_IOR)
 
     def thickness(self, cell: tuple[float, float]) -> float:
         """Return the thickness of the glass on the axis, mm; the sphere meets the flat face at the cell's corners."""
@@ -343,10 +344,8 @@ class Lens(FrontElement):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not _number(self.z_mm) or not _number(self.focal_mm) or self.focal_mm == 0:
-            raise ValueError(
-                f"lens: z_mm is {self.z_mm!r}, focal_mm {self.focal_mm!r}: finite numbers, and f not 0, are needed"
-            )
+        within("lens: z_mm", self.z_mm, -MOST_MM, MOST_MM, unit=" mm")
+        length("lens: the size of focal_mm", abs(number("lens: focal_mm", self.focal_mm)))
 
     def pass_on(self, rays: Bundle) -> Bundle:
         lx, ly, lz, dx, dy, dz, weight = rays
@@ -390,7 +389,8 @@ def element(data: Any) -> Element:
     try:
         return cls(**parameters)
     except TypeError as error:
-        raise ValueError(f"{cls.kind}: {error}") from None
+        named = str(error).startswith(f"{cls.kind}: ")
+        raise ValueError(str(error) if named else f"{cls.kind}: {error}") from None
 
 
 def chain(elements: Sequence[Any]) -> tuple[LensModel, tuple[FrontElement, ...]]:
@@ -474,7 +474,3 @@ def unit_disk(place: NDArray[np.float64]) -> tuple[Array, Array]:
 
 def _like(value: float) -> Array:
     return np.float64(value)
-
-
-def _number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

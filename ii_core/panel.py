@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .camera import IICamera
-from .checks import Pair, finite, positive, whole_pair
+from .checks import Pair, length, place, whole_pair
 
 ANGLE_DEG = 30.0  # of a lens, if neither gap nor angle is given
 FAR_OFF = 0.25  # share by which whole pixels that divide the panel may miss the wanted pitch
@@ -68,7 +68,7 @@ def panel_display(
         If a value is out of range, gap and angle are both given, or a lens covers less than 2 pixels.
     """
     across, down = whole_pair("pixels", pixels)
-    wish, viewer = positive("lens_pitch_mm", lens_pitch_mm), positive("viewer_mm", viewer_mm)
+    wish, viewer = length("lens_pitch_mm", lens_pitch_mm), length("viewer_mm", viewer_mm)
     width, height = _panel(size_mm, (across, down))
     pixel = width / across
     notes = []
@@ -107,9 +107,9 @@ def panel_display(
 
 def _panel(size_mm: float | Sequence[float], pixels: Pair) -> tuple[float, float]:
     if isinstance(size_mm, Sequence):
-        width, height = finite("size_mm", size_mm, 2)
-        return positive("size_mm", width), positive("size_mm", height)
-    diagonal = positive("size_mm", size_mm)
+        width, height = place("size_mm", size_mm, 2)
+        return length("size_mm", width), length("size_mm", height)
+    diagonal = length("size_mm", size_mm)
     return diagonal * pixels[0] / math.hypot(*pixels), diagonal * pixels[1] / math.hypot(*pixels)
 
 
@@ -117,7 +117,7 @@ def _gap(pitch: float, gap_mm: float | None, view_angle_deg: float | None) -> fl
     if gap_mm is not None and view_angle_deg is not None:
         raise ValueError("gap_mm and view_angle_deg are both given: one follows from the other, leave one out")
     if gap_mm is not None:
-        return positive("gap_mm", gap_mm)
+        return length("gap_mm", gap_mm)
     angle = ANGLE_DEG if view_angle_deg is None else float(view_angle_deg)
     if not 0 < angle < 180:
         raise ValueError(f"view_angle_deg is {angle:g}: an angle between 0 and 180° is needed")

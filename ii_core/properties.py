@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from . import checks
 from .camera import IICamera
+from .checks import length, number, within
 from .optics import Lens, Lenslet, SphericalLenslet
 from .regular import owners
 
@@ -39,8 +41,8 @@ def image_plane_mm(*, focal_mm: float, gap_mm: float) -> float:
     lenses. It is −Λ for infinite f, which does not refract.
     """
     check_lengths(gap_mm=gap_mm)
-    if not focal_mm > 0:
-        raise ValueError(f"focal_mm is {focal_mm:g}: a positive length is needed")
+    if number("focal_mm", focal_mm) != math.inf:
+        check_positive(focal_mm=focal_mm)
     if focal_mm == gap_mm:
         return math.inf
     return gap_mm / (gap_mm / focal_mm - 1)
@@ -58,7 +60,7 @@ def image_pixel_mm(*, z_mm: float, gap_mm: float, pixel_pitch_mm: float, lens_pi
 
 def resolution_per_mm(*, image_pixel_mm: float) -> float:
     """Return R_I = 1 / δPI, image pixels per mm; its minimum is 1/δL, for Λ = f."""
-    check_lengths(image_pixel_mm=image_pixel_mm)
+    check_positive(image_pixel_mm=image_pixel_mm)
     return 1 / image_pixel_mm
 
 
@@ -79,7 +81,7 @@ def characteristic_per_mm(*, resolution_per_mm: float, depth_range_mm: float, vi
 
     Resolution, depth range and viewing angle trade off against each other. Only finer pixels improve all three.
     """
-    check_lengths(resolution_per_mm=resolution_per_mm, depth_range_mm=depth_range_mm)
+    check_positive(resolution_per_mm=resolution_per_mm, depth_range_mm=depth_range_mm)
     check_angle(view_angle_deg)
     return resolution_per_mm**2 * depth_range_mm * math.tan(math.radians(view_angle_deg) / 2)
 
@@ -105,6 +107,7 @@ def diffraction_spot_mm(*, lens_pitch_mm: float, gap_mm: float, wavelength_mm: f
     return wavelength_mm * gap_mm / lens_pitch_mm
 
 
+@checks.checked(camera=checks.instance(IICamera))
 def properties(camera: IICamera, *, wavelength_mm: float = WAVELENGTH_MM) -> dict[str, Any]:
     """Return all properties of a camera as plain values; pairs are across and down.
 
@@ -153,6 +156,7 @@ def properties(camera: IICamera, *, wavelength_mm: float = WAVELENGTH_MM) -> dic
     }
 
 
+@checks.checked(camera=checks.instance(IICamera))
 def image_planes(camera: IICamera) -> list[dict[str, float]]:
     """Return the image plane of each focal length with its resolution; none for a single pinhole.
 
@@ -303,16 +307,22 @@ def _diffraction(camera: IICamera, wavelength_mm: float) -> dict[str, Any] | Non
 
 
 def check_lengths(**values: float) -> None:
+    """Check parameters of a camera."""
     for name, value in values.items():
-        if not 0 < value < math.inf:
-            raise ValueError(f"{name} is {value:g}: a positive, finite number is needed")
+        length(name, value)
+
+
+def check_positive(**values: float) -> None:
+    """Check what follows from lengths: a camera of allowed lengths never leaves these bounds."""
+    for name, value in values.items():
+        within(name, value, 1e-100, 1e100)
 
 
 def _distance(z_mm: float) -> None:
-    if not abs(z_mm) > 0:
+    if not abs(number("z_mm", z_mm)) > 0:
         raise ValueError(f"z_mm is {z_mm:g}: a distance other than 0 is needed")
 
 
 def check_angle(view_angle_deg: float) -> None:
-    if not 0 < view_angle_deg < 180:
+    if not 0 < number("view_angle_deg", view_angle_deg) < 180:
         raise ValueError(f"view_angle_deg is {view_angle_deg:g}: an angle between 0 and 180° is needed")

@@ -13,6 +13,8 @@ from .camera import IICamera
 from .component import picture_pixels, sub_images
 from .picture import IIPicture
 
+FARTHEST_MM = 1e15  # of a viewpoint, far beyond every camera: all of its lines are parallel
+
 
 @checks.checked(picture=checks.instance(IIPicture), viewpoint_mm=checks.numbers, interpolation=checks.text)
 def view_image(
@@ -49,8 +51,9 @@ def view_image(
     if interpolation not in ("linear", "nearest"):
         raise ValueError(f"unknown interpolation {interpolation!r}: known are linear, nearest")
     picture.check_regular()
-    x, y = view_positions(camera_of(picture), viewpoint_mm, erect=picture.erect)
     (width, height), (u, v) = picture.size, picture.ei_pixels
+    x, y = view_positions(camera_of(picture), viewpoint_mm, erect=picture.erect)
+    x, y = x.clip(-1, width), y.clip(-1, height)  # pixels beyond the array are never read
     m, n = np.floor(x + 0.5).astype(np.int64), np.floor(y + 0.5).astype(np.int64)
     valid = ((n >= 0) & (n < height))[:, None] & ((m >= 0) & (m < width))[None, :]
     m, n = m.clip(0, width - 1), n.clip(0, height - 1)
@@ -80,9 +83,7 @@ def view_positions(
         Pixel column for each lens column, pixel row for each lens row; whole numbers are pixel centres. Beyond the
         border of an elementary image they continue into its neighbour: the side viewing zone.
     """
-    e = np.asarray(viewpoint_mm, dtype=np.float64)
-    if e.shape != (3,) or not np.isfinite(e).all():
-        raise ValueError(f"viewpoint_mm is {viewpoint_mm!r}: three finite coordinates in mm are needed")
+    e = np.array(checks.place("viewpoint_mm", viewpoint_mm, 3, FARTHEST_MM))
     plane = camera.origin_mm[2] + camera.gap_mm
     if not e[2] < plane:
         raise ValueError(
@@ -182,8 +183,7 @@ def projection_camera(camera: IICamera, across: int) -> tuple[IICamera, NDArray[
 @checks.checked(camera=checks.instance(IICamera), plane_mm=checks.number)
 def stand_back(camera: IICamera, plane_mm: float = 0.0) -> NDArray[np.float64]:
     """Return the pose in which the plane z = ``plane_mm`` exactly fills the picture of a camera of one lens."""
-    if not math.isfinite(plane_mm):
-        raise ValueError(f"plane_mm is {plane_mm}: a finite number is needed")
+    checks.within("plane_mm", plane_mm, -checks.MOST_MM, checks.MOST_MM, unit=" mm")
     pose = np.eye(4)
     pose[2, 3] = plane_mm - 2 * camera.gap_mm
     return pose
@@ -211,7 +211,7 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
     """
     camera = camera_of(picture)
     start = camera.gap_mm - camera.start_mm
-    if not start <= depth_mm < math.inf:
+    if not start <= checks.within("depth_mm", depth_mm, -checks.MOST_MM, checks.MOST_MM, "depth", " mm"):
         where = f"where rays start, {start:g} mm" if camera.start_mm else f"the lens plane at {start:g} mm"
         raise ValueError(f"depth_mm {depth_mm:g} is not beyond {where}")
     stack = sub_images(picture)

@@ -19,7 +19,7 @@ from scipy.ndimage import correlate1d
 from scipy.special import j1
 
 from .camera import IICamera
-from .checks import array, checked, instance, number, positive
+from .checks import array, checked, instance, length, number, within
 from .colour import linear, srgb
 from .picture import IIPicture
 
@@ -52,8 +52,8 @@ def angular_spectrum(
     ValueError
         If a length is not positive, or the field has no or more than two dimensions.
     """
-    step, wavelength = positive("step_mm", step_mm), positive("wavelength_mm", wavelength_mm)
-    distance = positive("distance_mm", distance_mm)
+    step, wavelength = length("step_mm", step_mm), length("wavelength_mm", wavelength_mm)
+    distance = length("distance_mm", distance_mm)
     field = np.asarray(field)
     if field.ndim not in (1, 2):
         raise ValueError(f"field has {field.ndim} dimensions: one or two are needed")
@@ -107,8 +107,8 @@ def lens_spread(
     ValueError
         If a length is not positive or the field would need more samples across than `MOST`.
     """
-    width, gap, wavelength = positive("width_mm", width_mm), positive("gap_mm", gap_mm), _mm(wavelength_nm)
-    focal = gap if focal_mm is None else positive("focal_mm", focal_mm)
+    width, gap, wavelength = length("width_mm", width_mm), length("gap_mm", gap_mm), _mm(wavelength_nm)
+    focal = gap if focal_mm is None else length("focal_mm", focal_mm)
     if not depth_mm > 0:
         raise ValueError(f"depth_mm is {depth_mm}: a positive distance, or infinity, is needed")
     if dimensions not in (1, 2):
@@ -148,7 +148,7 @@ def diffraction_limit(
     By the sine of the angle, v = π·δL·sin θ/λ: sin²v/v², or (2·J₁(v)/v)².
     """
     x = np.asarray(x, np.float64)
-    v = math.pi * positive("width_mm", width_mm) / _mm(wavelength_nm) * x / np.hypot(x, positive("gap_mm", gap_mm))
+    v = math.pi * length("width_mm", width_mm) / _mm(wavelength_nm) * x / np.hypot(x, length("gap_mm", gap_mm))
     safe = np.where(v == 0, 1.0, v)
     return np.where(v == 0, 1.0, (np.sin(safe) / safe if dimensions == 1 else 2 * j1(safe) / safe) ** 2)
 
@@ -194,7 +194,7 @@ def pixel_kernel(x: NDArray[Any], intensity: NDArray[Any], pixel_mm: float, reac
     ValueError
         If the pixel is not positive.
     """
-    positive("pixel_mm", pixel_mm)
+    length("pixel_mm", pixel_mm)
     offsets = np.arange(-reach, reach + 1) * pixel_mm
     triangles = np.clip(1 - abs(x - offsets[:, None]) / pixel_mm, 0, None)
     kernel = triangles @ intensity
@@ -268,4 +268,4 @@ def lens_blurred(
 
 
 def _mm(wavelength_nm: float) -> float:
-    return positive("wavelength_nm", wavelength_nm) * 1e-6
+    return within("wavelength_nm", wavelength_nm, 1e-3, 1e15) * 1e-6

@@ -143,8 +143,6 @@ def read_study(path: str | os.PathLike[str]) -> Study:
             raise ValueError("not a study: picture is to be an object, points a list")
         check_points(study["points"])
         study["points"] = [unspelt(point) for point in study["points"]]
-    except RecursionError:
-        raise ValueError(f"{path}: not a study: it is nested too deeply") from None
     except ValueError as error:
         raise ValueError(f"{path}: {one_line(error)}") from None
     return Study(study)

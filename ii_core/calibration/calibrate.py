@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .. import checks
 from ..camera import IICamera
-from ..checks import positive
+from ..checks import length
 from ..colour import linear, srgb
 from ..lattice import LATTICES
 from ..picture import IIPicture
@@ -190,7 +190,7 @@ def calibrate(
 
     for what, value in (("pixel_pitch_mm", pixel_pitch_mm), ("gap_mm", gap_mm)):
         if value is not None:
-            positive(what, value)
+            length(what, value)
     frames = {"raw": raw, "white": white, "dark": dark}
     for what, frame in frames.items():
         if frame is not None and (frame.ndim not in (2, 3) or frame.shape[:2] != raw.shape[:2]):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import IICamera
-from ..checks import Pair, checked, finite, instance, positive, whole, whole_pair
+from ..checks import MOST_MM, Pair, checked, instance, length, place, whole, whole_pair, within
 from ..colour import linear, srgb
 from ..jit import exact_kernel
 from ..optics import Lenslet, unit_disk
@@ -46,16 +46,16 @@ class Eye:
     focus_mm: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position_mm", finite("position_mm", self.position_mm, 3))
-        if not finite("pupil_mm", (self.pupil_mm,), 1)[0] >= 0:
+        object.__setattr__(self, "position_mm", place("position_mm", self.position_mm, 3))
+        if not within("pupil_mm", self.pupil_mm, -MOST_MM, MOST_MM) >= 0:
             raise ValueError(f"pupil_mm is {self.pupil_mm}: a diameter in mm, 0 for a point, is needed")
         if self.focus_mm is not None:
-            positive("focus_mm", self.focus_mm)
+            length("focus_mm", self.focus_mm)
 
     def pair(self, apart_mm: float = EYES_APART_MM) -> tuple[Eye, Eye]:
         """Return the left and the right eye of a viewer whose nose is here."""
         x, y, z = self.position_mm
-        half = positive("apart_mm", apart_mm) / 2
+        half = length("apart_mm", apart_mm) / 2
         return replace(self, position_mm=(x - half, y, z)), replace(self, position_mm=(x + half, y, z))
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Pair, positive, whole_pair
+from ..checks import Pair, whole_pair, within
 from ..picture import IIPicture
 from .look import display_views
+
+MOST = 1e9  # pixels
 
 
 def lenticular(
@@ -53,9 +53,9 @@ def lenticular(
         If a parameter is out of range.
     """
     width, height = whole_pair("size", size)
-    positive("pitch_px", pitch_px)
-    if not (math.isfinite(slope) and math.isfinite(centre_px)):
-        raise ValueError(f"slope {slope}, centre {centre_px}: finite numbers are needed")
+    within("pitch_px", pitch_px, 1e-3, MOST)
+    within("slope", slope, -MOST, MOST)
+    within("centre_px", centre_px, -MOST, MOST)
     y, x, channel = np.ogrid[:height, :width, :3]
     t = ((x + (channel - 1) / 3 + slope * y - centre_px) / pitch_px) % 1.0
     number = (

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..camera import IICamera
-from ..checks import finite, instance, one_of, positive
+from ..checks import MOST_MM, instance, length, one_of, place, within
 from ..optics import Grin, Lenslet, LensModel, Lenticular, Pinhole
 
 LAYOUTS = ("square", "rgb-stripe", "pentile")
@@ -72,16 +72,16 @@ class DisplayModel:
         both = tuple(given) if isinstance(given, tuple | list) else (given, given)
         if len(both) != 2:
             raise ValueError(f"lens_pitch_mm is {given!r}: one length, or two, across and down, are needed")
-        put("lens_pitch_mm", tuple(positive("lens_pitch_mm", pitch) for pitch in both))
-        put("gap_mm", positive("gap_mm", self.camera.gap_mm if self.gap_mm is None else self.gap_mm))
-        put("brightness", positive("brightness", self.brightness))
-        put("shift_mm", finite("shift_mm", self.shift_mm, 2))
-        put("turn_deg", finite("turn_deg", (self.turn_deg,), 1)[0])
+        put("lens_pitch_mm", tuple(length("lens_pitch_mm", pitch) for pitch in both))
+        put("gap_mm", length("gap_mm", self.camera.gap_mm if self.gap_mm is None else self.gap_mm))
+        put("brightness", within("brightness", self.brightness, 1e-9, 1e9))
+        put("shift_mm", place("shift_mm", self.shift_mm, 2))
+        put("turn_deg", within("turn_deg", self.turn_deg, -MOST_MM, MOST_MM))
         one_of(*LAYOUTS)("layout", self.layout)
         for field, low, high in (("lobe", 0.0, 1000.0), ("black", 0.0, 1.0), ("crosstalk", 0.0, 1.0)):
-            if not low <= finite(field, (getattr(self, field),), 1)[0] < high:
+            if not low <= within(field, getattr(self, field), -MOST_MM, MOST_MM) < high:
                 raise ValueError(f"{field} is {getattr(self, field)}: at least {low:g} and below {high:g} is needed")
-        if not 0 < finite("fill", (self.fill,), 1)[0] <= 1:
+        if not 0 < within("fill", self.fill, -MOST_MM, MOST_MM) <= 1:
             raise ValueError(f"fill is {self.fill}: a share above 0, up to 1, is needed")
         self._check_camera()
 

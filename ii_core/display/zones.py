@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..checks import checked, finite, instance, number, positive
+from ..checks import MOST_MM, checked, instance, length, number, within
 from .model import DisplayModel
 
 
@@ -48,7 +48,7 @@ def viewing_zone(display: DisplayModel, distance_mm: float) -> ViewingZone:
     ValueError
         If the distance is not positive.
     """
-    far = positive("distance_mm", distance_mm) / display.gap_mm
+    far = length("distance_mm", distance_mm) / display.gap_mm
     cos, sin = display.axes
     counts = np.array(display.camera.lenses) - 1
     corners = np.array([[i, j] for i in (-0.5, 0.5) for j in (-0.5, 0.5)]) * counts
@@ -104,7 +104,7 @@ def crosstalk(pupil_mm: float, border_mm: float) -> float:
     ValueError
         If the diameter is negative or a number is not finite.
     """
-    pupil, border = finite("pupil_mm", (pupil_mm,), 1)[0], finite("border_mm", (border_mm,), 1)[0]
+    pupil, border = within("pupil_mm", pupil_mm, -MOST_MM, MOST_MM), within("border_mm", border_mm, -MOST_MM, MOST_MM)
     if pupil < 0:
         raise ValueError(f"pupil_mm is {pupil:g}: a diameter in mm, 0 for a point, is needed")
     if abs(2 * border) >= pupil:

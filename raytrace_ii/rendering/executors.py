@@ -28,8 +28,9 @@ def run(
     """
     try:
         yield from in_order(job.tile, tiles, identity=identity, workers=workers, executor=executor)
-    except Exception as error:
-        if (reason := lost(error, executor)) is not None:
+    except BaseException as error:
+        job.stop()  # an error, Ctrl-C, or the rest is not wanted: threads leave their blocks
+        if isinstance(error, Exception) and (reason := lost(error, executor)) is not None:
             raise OSError(f"{reason} while it rendered: the picture is not finished") from error
         raise
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -69,6 +70,7 @@ class Job:
     support: tuple[str, ...]
     texture_filter: bool = True
     _local: threading.local = field(default_factory=threading.local, compare=False, repr=False)
+    _stopped: threading.Event = field(default_factory=threading.Event, compare=False, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (
@@ -79,6 +81,14 @@ class Job:
     def tiles(self) -> list[Tile]:
         """Blocks that cover the picture, in rows of blocks, the same whatever the workers."""
         return list(tiles(self.camera, TILE_RAYS, whole_lenses=isinstance(self.sampling, Adaptive)))
+
+    def stop(self) -> None:
+        """Make all threads of this process leave their blocks after the sample they trace."""
+        self._stopped.set()
+
+    def _check_stopped(self) -> None:
+        if self._stopped.is_set():
+            raise CancelledError("the picture is not wanted any more")
 
     def tile(self, rows: slice, cols: slice) -> Block:
         """Render one tile."""
@@ -148,6 +158,7 @@ class Job:
             if rays is not None and tracer.run_separable(rays, radiance, support, order.rows, order.columns, keys):
                 return radiance
         for sample in range(samples):
+            self._check_stopped()
             if isinstance(self.camera, MapCamera):
                 L, D, shares = self.camera.stored_rays(sample, rows, cols)
             else:
@@ -173,6 +184,7 @@ class Job:
         assert isinstance(self.camera, IICamera)
 
         def shoot(L: Any, D: Any, shares: Any, *, numbers: Any, first: slice | None) -> NDArray[np.float32]:
+            self._check_stopped()
             radiance = np.zeros((len(L), 3), np.float32)
             room = self._support_room(len(L)) if first is not None else None
             tracer.run(L, D, radiance, room, shares, self._keys(*numbers))

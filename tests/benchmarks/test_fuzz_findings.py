@@ -3,6 +3,7 @@
 import json
 import logging
 import os
+import re
 
 import numpy as np
 import pytest
@@ -13,12 +14,12 @@ from benchmarks.stability.fuzz_readers.containers import png_changed
 from codec import Encoded, decode, encode
 from codec.container import write
 from codec.file_header import values
-from ii_core import IIPicture
+from ii_core import IIPicture, preset
 from ii_core.display.look import MOST_FRAMES, viewpoints_around
 from ii_core.files import MAX_MESSAGE, one_line, read_image, write_image
 from ii_core.formats.find import find_views
 from ii_core.json_lines import read_records
-from ii_core.maps import read_maps
+from ii_core.maps import read_maps, write_maps
 from ii_core.presets import preset_cameras
 from metrics.point_log import read_points
 from metrics.study import read_study
@@ -73,11 +74,21 @@ def test_long_values_are_not_quoted_whole(value, tmp_path):
 
 def test_pixels_far_larger_than_lenses(tmp_path):
     """The pitch in pixels was rounded to zero, by which rays were divided."""
-    camera = {**seeds.camera_trees()["hexagonal"], "pixel_pitch_mm": 6.1e27}
+    camera = {**seeds.camera_trees()["hexagonal"], "pixel_pitch_mm": 6.1e7}
     (tmp_path / "camera.json").write_text(json.dumps(camera))
     assert "lens_pitch_mm is 0.0845241: at least 1e-06 of pixel_pitch_mm" in refusal(
         preset_cameras, tmp_path / "camera.json"
     )
+
+
+@pytest.mark.parametrize("name", ["a" * 300, "a\nb", "a" * 5000])
+def test_names_of_maps_are_said_in_one_short_line(name, tmp_path):
+    """20 000 cases found what 300 had not: "File name too long", with all of it, and line breaks in names."""
+    write_maps([preset("setup1", scale=256)], tmp_path)
+    sheet = json.loads((tmp_path / "camera.json").read_text())
+    sheet["arrays"][0]["samples"][0]["L"]["file"] = name
+    (tmp_path / "camera.json").write_text(json.dumps(sheet))
+    assert re.search("does not exist|File name too long", refusal(read_maps, tmp_path))
 
 
 def test_one_line_keeps_both_ends():
@@ -178,3 +189,15 @@ def test_cases_that_failed(tmp_path):
         ("camera", 0, 204),
     ):
         assert outcome(case(name, seed, number, tmp_path)) in ("object", "refused")
+
+
+@pytest.mark.parametrize("depth", [150, 900, 3000])
+def test_values_nested_deeply_are_refused_where_they_are_read(depth, tmp_path):
+    """20 000 cases of studies found what 300 had not: text that parses, and exhausts the stack of what walks it."""
+    nested = "[" * depth + "]" * depth
+    log = tmp_path / "points.jsonl"
+    log.write_text(json.dumps(seeds.POINT_LINE).replace('"q_depth": [', f'"q_depth": [{nested}, ', 1) + "\n")
+    assert "nested too deeply" in refusal(read_points, log)
+    study = tmp_path / "study.json"
+    study.write_text(json.dumps(seeds.STUDY).replace('"q_depth": [', f'"q_depth": [{nested}, ', 1))
+    assert "nested too deeply" in refusal(read_study, study)

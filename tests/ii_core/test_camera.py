@@ -1,12 +1,16 @@
 """II-cameras: rays, validation, JSON, presets."""
 
+import itertools
 import json
 import math
+import re
 
 import numpy as np
 import pytest
 
-from ii_core import IICamera, preset
+from ii_core import IICamera, five_viewpoints, preset, projection_camera
+from ii_core.design import report
+from ii_core.properties import properties
 
 CASES = [("setup1", 8), ("setup1", 64), ("setup2-32", 8), ("setup2-128", 4), ("setup3", 8)]
 
@@ -228,3 +232,54 @@ def test_separable_rays_are_the_rays_to_the_bit(name):
 @pytest.mark.parametrize("name", ["hexagonal", "spherical", "plenoptic1", "multi-focus"])
 def test_rays_that_mix_rows_and_columns_are_not_separable(name):
     assert preset(name).separable_rays(slice(3, 40), slice(5, 77)) is None
+
+
+LENGTHS = ("pixel_pitch_mm", "gap_mm", "lens_pitch_mm", "radius_mm", "aperture_mm", "focal_mm")
+
+
+@pytest.mark.parametrize("value", [0, -1, 1e-300, 9e-10, 1.1e9, 1e300, math.inf, math.nan])
+@pytest.mark.parametrize("name", LENGTHS)
+def test_lengths_have_bounds(name, value):
+    """On b1dc540 a camera of 1e-300 mm was one, and its views and properties divided by zero."""
+    optics = {
+        "radius_mm": {"kind": "spherical-lenslet", "radius_mm": value, "ior": 1.5},
+        "aperture_mm": {"kind": "lenslet", "focal_mm": 1, "aperture_mm": value},
+        "focal_mm": {"kind": "lens", "z_mm": 9, "focal_mm": value},
+    }
+    if (name, value) in {("aperture_mm", 0), ("focal_mm", -1)}:  # a pinhole, a diverging lens
+        return
+    change = {"optics": [optics[name]]} if name in optics else {name: value}
+    said = f"{name} is {abs(value) if name == 'focal_mm' else value:g}: a length from 1e-09 to 1e+09 mm is needed"
+    with pytest.raises(ValueError, match=re.escape(said)):
+        IICamera(**{**GOOD, **change})
+
+
+@pytest.mark.parametrize("name", ["lens_offset_mm", "origin_mm"])
+def test_places_have_bounds(name):
+    count = 2 if name == "lens_offset_mm" else 3
+    for value in (1.1e9, -1e300, math.nan):
+        with pytest.raises(ValueError, match=f"{name} is .*: {count} numbers from -1e.09 to 1e.09 mm are needed"):
+            IICamera(**{**GOOD, name: (value,) + (0,) * (count - 1)})
+
+
+@pytest.mark.parametrize("lenses", [(4, 3), (1, 1)])
+def test_lengths_within_their_bounds_give_finite_rays_and_reports(lenses):
+    """Quotients of extreme lengths are finite, or refused by name."""
+    lengths, made = (1e-9, 1.0, 1e9), 0
+    for pixel, gap, pitch in itertools.product(lengths, lengths, (None, *lengths)):
+        fields = dict(pixels=(8, 6), lenses=lenses, pixel_pitch_mm=pixel, gap_mm=gap, lens_pitch_mm=pitch)
+        try:
+            camera = IICamera(**fields)
+        except ValueError as error:
+            assert "lens_pitch_mm is" in str(error)
+            continue
+        made += 1
+        assert all(np.isfinite(part).all() for part in camera.rays())
+        assert np.isfinite([*five_viewpoints(camera).values()]).all()
+        camera.to_json()
+        for call in (properties, report, lambda camera: projection_camera(camera, 10)):
+            try:
+                call(camera)
+            except ValueError as error:
+                assert "_mm is" in str(error) or "view_angle_deg is 180" in str(error)
+    assert made > 20
