@@ -135,7 +135,7 @@ def _render_scene(
             more = {"pose": pose, "upright": array.lenses == (1, 1), "support": files, "dtype": dtype}
             _say_stats(_shoot(numbered(output), loaded, array, **more, **options, **means))
         if projection:
-            _save_projection(loaded, arrays[0], projection, means)
+            _save_projection(loaded, arrays[0], poses[0], projection, means)
 
 
 def _all_support(array: Any) -> list[str]:
@@ -228,7 +228,7 @@ def _shoot(path: Path, scene: Any, camera: Any, **options: Any) -> Stats:
         return render_to(path, scene, camera, progress=lambda done, total: report(done, total, ""), **options)
 
 
-def _save_projection(scene: Any, camera: Any, path: Path, means: dict[str, Any]) -> None:
+def _save_projection(scene: Any, camera: Any, pose: Any, path: Path, means: dict[str, Any]) -> None:
     """Write a plain picture without a sidecar."""
     from ii_core import orthoscopic, projection_camera
     from ii_core.files import write_image
@@ -237,7 +237,8 @@ def _save_projection(scene: Any, camera: Any, path: Path, means: dict[str, Any])
 
     if camera.model is None:
         raise ValueError("the maps have no camera parameters: a 2-D projection needs them")
-    pinhole, pose = projection_camera(camera.model, 1024)
+    pinhole, before = projection_camera(camera.model, 1024)
+    pose = before if pose is None else pose @ before
     with progress_bar(f"render {path.stem}") as report:
         view = shot_of(
             scene, pinhole, samples=4, pose=pose, support=(), progress=lambda done, total: report(done, total, ""),

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import urllib.request
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -61,6 +62,19 @@ def test_upright_elementary_images_look_the_other_way(show, shot, tmp_path):
     write_viewer(tmp_path / "v.html", picture, quality=None)
     shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=0.6, y=-0.4, f=0, a=1)
     assert np.abs(shown - view_image(picture, viewpoint)[0]).max() <= 1
+
+
+@pytest.mark.parametrize("optics", ["pinhole", "grin"])
+def test_viewing_zones_that_meet(show, shot, tmp_path, optics):
+    old = shot.picture.camera
+    camera = replace(old, viewer_mm=150 * old.gap_mm, optics=(optics,), lens_pitch_mm=None)
+    picture = replace(shot.picture, camera=camera, erect=camera.erect)
+    write_viewer(tmp_path / "v.html", picture, quality=None)
+    tab = show(tmp_path / "v.html")
+    for x, y, r in PLACES[:3]:
+        shown, viewpoint = snapshot(tab, x=x, y=y, r=r, f=0, a=1)
+        wanted, valid = view_image(picture, viewpoint)
+        assert np.abs(shown - wanted)[valid].max() <= 1
 
 
 @pytest.mark.parametrize(

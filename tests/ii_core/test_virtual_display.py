@@ -21,6 +21,7 @@ from ii_core import (
 )
 from ii_core.display.look import focused_view
 from ii_core.display.viewer.page import _Page
+from ii_core.files import read_image
 from ii_core.properties import viewing_zone
 from ii_core.view import view_positions
 from raytrace_ii import Scene, render
@@ -231,8 +232,10 @@ def test_the_command_turns_the_camera(run, refused, tmp_path):
     command = ["render", tmp_path / "s.toml", "--scale", 64, "--force", "-o", tmp_path / "p.png"]
     seen = {}
     for name, words in {"ahead": [], "right": ["--turn", "90"], "look": ["--look-at", "60,0,0"]}.items():
-        code, _, error = run(*command, *words)
+        code, _, error = run(*command, *words, "--projection", tmp_path / "flat.png")
         assert code == 0, error
+        flat = read_image(tmp_path / "flat.png").mean()  # on d5f6140 it saw ahead, however the camera stood
+        assert flat == 0 if name == "ahead" else flat > 100
         seen[name] = IIPicture.load(tmp_path / "p.png").pixels.mean()
     assert seen["ahead"] == 0 and seen["right"] == seen["look"] == 255
     refused(run(*command, "--turn", "1,2,3,4"), "turn is '1,2,3,4': one to three numbers as in 20,-5 are needed")
