@@ -1,24 +1,34 @@
 """Compilation of kernels: lazy, cached on disk, without the interpreter lock.
 
-numba's cache notices changes in a kernel's own file only. A kernel must therefore not call kernels of other files.
+A cached kernel is valid as long as no source file of its folder and of this package changes, so kernels may call
+kernels of their own folder. The cache of numba alone notices changes in a kernel's own file only.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 
 class Cache(FunctionCache):
     """Disk cache of numba: kernels are compiled again if it cannot be read, and not cached if it cannot be written.
 
-    A file may be truncated, may lie on a full disk, or may name modules that have been renamed since: its time stamp
-    is that of the source file, which renaming a folder does not change. Unpickling then raises errors of any type.
+    A file may be truncated, may lie on a full disk, or may name modules that have been renamed since: a renamed
+    folder has the same sources. Unpickling then raises errors of any type.
     """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._cache_file = IndexDataCacheFile(
+            self._cache_path, self._impl.filename_base, _sources(Path(function.__code__.co_filename).parent)
+        )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled kernel of a signature; None if none can be read."""
@@ -33,6 +43,16 @@ class Cache(FunctionCache):
         """Store a compiled kernel, if the disk can be written."""
         with contextlib.suppress(OSError):
             super().save_overload(sig, data)
+
+
+@cache
+def _sources(folder: Path) -> str:
+    """Hash of all sources of a folder of kernels, and of this package, whose tables they hold as constants."""
+    found = hashlib.sha256()
+    for place in (folder, Path(__file__).parent):
+        for file in sorted(place.glob("*.py")):
+            found.update(file.name.encode() + b"\0" + file.read_bytes())
+    return found.hexdigest()
 
 
 def kernel(function: Callable[..., Any], **options: Any) -> Any:

@@ -15,8 +15,8 @@ from ii_core import Camera, IICamera, MapCamera
 from ii_core.colour import srgb
 
 from ..scene.scene import Scene
-from ..tracing.kernels import shade as kernels
 from ..tracing.kernels.sampling import lobe_keys
+from ..tracing.kernels.srgb import encode_srgb
 from ..tracing.packing import packed
 from ..tracing.sampling import Adaptive, Sampling, adaptive_mean, fixed_places
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
@@ -41,7 +41,7 @@ def encoded(radiance: NDArray[np.float32], rows: NDArray[np.int32], divisor: int
     if curve is None:
         out[rows] = radiance / divisor
     else:
-        kernels.encode_srgb(radiance, rows, 1 / divisor, curve, out)
+        encode_srgb(radiance, rows, 1 / divisor, curve, out)
     return out
 
 

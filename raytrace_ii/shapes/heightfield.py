@@ -11,7 +11,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from ..scene.scene import unit_rows
 from ..scene.textures import Colour
-from ..tracing.kernels.shade import terrain
+from ..tracing.kernels.noise import terrain
 from .primitives import Mesh, NotNegative, Shape
 
 Array = NDArray[Any]

@@ -8,7 +8,6 @@ of opaque faces for shadow rays.
 from __future__ import annotations
 
 import time
-from typing import NamedTuple
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
@@ -16,19 +15,11 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from .embree import Tree, library, with_spare
+from .kernels.arrays import Hits
 from .kernels.packets import place_hits
 
 Floats = NDArray[np.float32]
 _NO_REACH = np.empty(0, np.float32)
-
-
-class Hits(NamedTuple):
-    """Nearest hit of each ray: row of the face, −1 on a miss; u, v; distance in lengths of the direction."""
-
-    faces: NDArray[np.int32]
-    u: Floats
-    v: Floats
-    distances: Floats
 
 
 class Intersector:

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from ..scene.scene import Body, Light, Material, Scene, Vector, unit_rows
 from ..scene.textures import Image
 from .intersect import Intersector
-from .kernels.shade import DIRECTIONAL, LEAST_WEIGHT, POINT, SPOT
+from .kernels import tables
+from .kernels.arrays import Surfaces, Surroundings
+from .kernels.tables import DIRECTIONAL, LEAST_WEIGHT, MATERIAL_COLUMNS, POINT, SPOT
 from .texture_table import TextureTable
 
 # Spawned rays start this share of the face's largest coordinate off the face: float32 places a hit to about
@@ -23,13 +25,6 @@ LIFT = 4e-6
 # Embree tells the sides of a face by the product of its normal, as long as twice its area, and the way from the ray's
 # start, in float32: a lift of fewer subnormal steps is rounded away. It is at most this share of the longest edge.
 LIFT_STEPS, MOST_LIFT = 8 * float(np.finfo(np.float32).smallest_subnormal), 1e-3
-
-# Columns of the material table.
-COLOUR, MIRROR, TRANSMISSION, ABSORPTION = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
-SPECULAR, SHININESS, PRIORITY, LOCAL, TEXTURE, LEAST_HALF = 12, 13, 14, 15, 16, 17
-EMISSION, IOR, CUTOFF, NORMAL_MAP, NORMAL_SCALE = slice(18, 21), slice(21, 24), 24, 25, 26
-ROUGHNESS, METALLIC, GLOSS_MAP, EMISSION_MAP, ALPHA_BLEND, IMAGES = 27, 28, 29, 30, 31, 32
-MATERIAL_COLUMNS = 33
 
 _SOME_FACES = 1 << 16
 MOST_NESTED = 8  # bodies whose bounds meet in one place that a ray keeps count of
@@ -113,6 +108,12 @@ class PackedScene:
         self.passes = self.nested > 1 or any(body.material.alpha_cutoff > 0 for body in bodies)
         self.intersector = Intersector(self.corners, self.opaque_faces)
         self.corners = self.intersector.corners
+        self.surfaces = Surfaces(
+            self.corners, self.faces, self.normals, self.coordinates, self.object_of_face, self.materials,
+            self.corners.reshape(-1), self.faces.reshape(-1), self.normals.reshape(-1),
+            self.textures.table, self.textures.texels, self.textures.alphas,
+        )  # fmt: skip
+        self.surroundings = Surroundings(self.lights, self.background, self.fog, self.ambient)
 
 
 def _lets_through(body: Body) -> bool:
@@ -121,17 +122,23 @@ def _lets_through(body: Body) -> bool:
 
 def _material_row(m: Material, textures: TextureTable) -> NDArray[np.float64]:
     row = np.zeros(MATERIAL_COLUMNS)
-    row[COLOUR], row[MIRROR], row[TRANSMISSION] = m.colour, m.mirror, m.transmission
-    row[ABSORPTION], row[EMISSION], row[IOR] = m.absorption_per_mm, m.emission, m.iors
-    row[SPECULAR], row[SHININESS], row[PRIORITY] = m.specular, m.shininess, m.priority
-    row[LOCAL] = max(0.0, 1 - max(m.mirror) - max(m.transmission))
+    for first, colour in (
+        (tables.COLOUR, m.colour), (tables.MIRROR_SHARE, m.mirror), (tables.TRANSMISSION, m.transmission),
+        (tables.ABSORPTION, m.absorption_per_mm), (tables.EMISSION, m.emission), (tables.IOR, m.iors),
+    ):  # fmt: skip
+        row[first : first + 3] = colour
+    row[tables.SPECULAR], row[tables.SHININESS], row[tables.PRIORITY] = m.specular, m.shininess, m.priority
+    row[tables.LOCAL] = max(0.0, 1 - max(m.mirror) - max(m.transmission))
     # below this cosine the highlight is too weak to see, and its power need not be taken
-    row[LEAST_HALF] = (LEAST_WEIGHT / max(m.specular, LEAST_WEIGHT)) ** (1 / m.shininess)
-    row[TEXTURE], row[NORMAL_MAP] = textures.index(m.texture), textures.index(m.normal_map)
-    row[NORMAL_SCALE], row[CUTOFF], row[ALPHA_BLEND] = m.normal_scale, m.alpha_cutoff, m.alpha_blend
-    row[IMAGES] = any(isinstance(image, Image) for image in m.textures)
-    row[ROUGHNESS], row[METALLIC] = m.roughness if m.reflects else 0.0, m.metallic
-    row[GLOSS_MAP], row[EMISSION_MAP] = textures.index(m.metallic_roughness_map), textures.index(m.emission_map)
+    row[tables.LEAST_HALF] = (LEAST_WEIGHT / max(m.specular, LEAST_WEIGHT)) ** (1 / m.shininess)
+    row[tables.TEXTURE], row[tables.NORMAL_MAP] = textures.index(m.texture), textures.index(m.normal_map)
+    row[tables.NORMAL_SCALE], row[tables.CUTOFF] = m.normal_scale, m.alpha_cutoff
+    row[tables.ALPHA_BLEND] = m.alpha_blend
+    row[tables.IMAGES] = any(isinstance(image, Image) for image in m.textures)
+    row[tables.ROUGHNESS], row[tables.METALLIC] = m.roughness if m.reflects else 0.0, m.metallic
+    row[tables.GLOSS_MAP] = textures.index(m.metallic_roughness_map)
+    row[tables.EMISSION_MAP] = textures.index(m.emission_map)
+    row[tables.EXTRAS] = bool(m.textures) or m.metallic > 0 or m.alpha_blend > 0 or m.transmissive
     return row
 
 

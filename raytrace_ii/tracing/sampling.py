@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IICamera
 
 from .kernels import sampling as sample_kernels
-from .kernels import shade as kernels
+from .kernels.start import jitter
 
 APERTURE_SEED = 1 << 40  # apart from all seeds a person gives
 MOST_SAMPLES = 1 << 16
@@ -81,7 +81,7 @@ def fixed_places(camera: IICamera, samples: int, seed: int, sample: int, rows: s
     places: list[ArrayLike] = []
     for aperture in (False, True):
         out = np.empty((rows.stop - rows.start, cols.stop - cols.start, 2))
-        kernels.jitter(
+        jitter(
             seed + APERTURE_SEED * aperture, sample, samples // down, down, aperture,
             camera.pixels[0], rows.start, cols.start, out,
         )  # fmt: skip

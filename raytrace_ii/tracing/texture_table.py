@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.textures import Checker, Image, Stripes, Texture, VertexColours
-from .kernels.shade import CHECKER, CLAMP, IMAGE, MIRROR, NOISE, REPEAT, STRIPES, VERTEX
+from .kernels.tables import CHECKER, CLAMP, IMAGE, MIRROR, NOISE, REPEAT, STRIPES, VERTEX
 
 COLUMNS = 12  # kind, then what the kind needs
 WRAPS = {"repeat": REPEAT, "mirror": MIRROR, "clamp": CLAMP}

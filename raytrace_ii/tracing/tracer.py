@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..scene.scene import Scene
 from .intersect import Hits
-from .kernels import shade as kernels
+from .kernels.arrays import Passage, Rays, Recorded, ShadowRays
+from .kernels.clear import pass_clear_face, pass_faces, start_inside, tell_inside
+from .kernels.lanes import work
+from .kernels.light import add_unblocked, keep_unblocked
 from .kernels.sampling import lobe_keys
+from .kernels.shade import shade
+from .kernels.start import start_rays, start_separable_rays
 from .packing import PackedScene, packed
 from .support_images import RECORDED
 
@@ -152,32 +157,26 @@ def rigid(pose: ArrayLike | None) -> NDArray[np.float64]:
     return matrix
 
 
-@dataclass(frozen=True)
-class _Rays:
-    """Room for one generation of rays."""
+def _room(n: int, nested: int, glossy: bool = False, widening: bool = False) -> Rays:
+    """Room for one generation of n rays."""
+    origins, directions, weights = (np.empty((n, 3), np.float32) for _ in range(3))
+    pixels, inside = np.empty(n, np.int32), np.empty((n, nested), np.int32)
+    keys, widths = np.empty(n * glossy, np.uint64), np.empty(n * widening, np.float32)
+    return Rays(origins, directions, weights, pixels, inside, keys, widths)
 
-    origins: NDArray[np.float32]
-    directions: NDArray[np.float32]
-    weights: NDArray[np.float32]
-    pixels: NDArray[np.int32]
-    inside: NDArray[np.int32]  # (n, nested)
-    keys: NDArray[np.uint64]  # of no rows where nothing is rough
-    widths: NDArray[np.float32]  # of no rows for camera rays, or where images are not filtered
 
-    @classmethod
-    def room(cls, n: int, nested: int, glossy: bool = False, widening: bool = False) -> _Rays:
-        def rows() -> NDArray[np.float32]:
-            return np.empty((n, 3), np.float32)
+def _shadow_room(n: int, nested: int) -> ShadowRays:
+    origins, directions, colours = (np.empty((n, 3), np.float32) for _ in range(3))
+    reach, pixels, inside = np.empty(n, np.float32), np.empty(n, np.int32), np.empty((n, nested), np.int32)
+    return ShadowRays(origins, directions, reach, colours, pixels, inside)
 
-        return cls(
-            rows(),
-            rows(),
-            rows(),
-            np.empty(n, np.int32),
-            np.empty((n, nested), np.int32),
-            np.empty(n * glossy, np.uint64),
-            np.empty(n * widening, np.float32),
-        )
+
+Batch = TypeVar("Batch", Rays, ShadowRays)
+
+
+def _rows(batch: Batch, some: slice) -> Batch:
+    arrays: list[Any] = [array[some] for array in batch]
+    return type(batch)(*arrays)
 
 
 class Tracer:
@@ -198,10 +197,11 @@ class Tracer:
         self.lobes = lobes
         self.footprint = footprint if self.scene.images else (0.0, 0.0)
         self.begin()
-        self._primary = _Rays.room(capacity, self.scene.nested, self.scene.glossy)
+        self._primary = _room(capacity, self.scene.nested, self.scene.glossy)
         # weights and pixels of rays that carry all light, one a pixel: read only
         self._whole = np.ones((capacity, 3), np.float32), np.arange(capacity, dtype=np.int32)
-        self._shadow = (_Rays.room(0, self.scene.nested), np.empty(0, np.float32))
+        self._shadow = _shadow_room(0, self.scene.nested)
+        self._work = work()
 
     def begin(self) -> None:
         """Count from 0."""
@@ -227,7 +227,7 @@ class Tracer:
         locations, directions = locations.reshape(-1, 3), directions.reshape(-1, 3)
         shares = np.empty(0) if shares is None else shares.reshape(-1)
         room = self._primary
-        n, bad = kernels.start_rays(
+        n, bad = start_rays(
             locations, directions, shares, order, self.pose[:3, :3], self.pose[:3, 3],
             room.origins, room.directions, room.weights, room.pixels, room.inside,
         )  # fmt: skip
@@ -257,19 +257,19 @@ class Tracer:
         ``rows`` and ``columns`` name the rays in the order in which they are traced.
         """
         room, n = self._primary, len(rows)
-        usable = kernels.start_separable_rays(
+        usable = start_separable_rays(
             *rays, rows, columns, self.pose[:3, :3], self.pose[:3, 3], room.origins, room.directions
         )
         if usable:
             room.inside.fill(-1)
             if keys is not None:
                 room.keys[:n] = keys
-            self._trace(replace(room, weights=self._whole[0], pixels=self._whole[1]), n, radiance, support)
+            self._trace(room._replace(weights=self._whole[0], pixels=self._whole[1]), n, radiance, support)
         return bool(usable)
 
-    def _trace(self, primary: _Rays, n: int, radiance: NDArray[np.float32], support: Support | None) -> None:
+    def _trace(self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None) -> None:
         """Trace the first n of the primary rays."""
-        rays = _Rays(*(array[:n] for array in vars(primary).values()))
+        rays = _rows(primary, slice(n))
         self.count.rays["primary"] += n
         if self.scene.transmits:
             self._start_inside(rays)
@@ -281,25 +281,23 @@ class Tracer:
                 break
 
     def _generation(
-        self, rays: _Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool, lobe_rays: int
-    ) -> _Rays:
+        self, rays: Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool, lobe_rays: int
+    ) -> Rays:
         """Trace and shade one generation; the next one comes back."""
         s, n = self.scene, len(rays.pixels)
-        primitives, u, v, distances = self._hits(rays)
+        hits = self._hits(rays)
         spawn = spawn and (s.mirrors or s.transmits or s.blends)
         most = (lobe_rays if s.glossy else 1) + s.transmits + 2 * s.disperses + s.blends
-        following = _Rays.room(most * n if spawn else 0, s.nested, s.glossy, any(self.footprint))
-        shadow, reach = self._shadow_room(n * len(s.lights))
+        following = _room(most * n if spawn else 0, s.nested, s.glossy, any(self.footprint))
+        if len(self._shadow.reach) < n * len(s.lights):
+            self._shadow = _shadow_room(n * len(s.lights), s.nested)
         counts, lit = np.zeros(6, np.int64), np.zeros(len(s.lights), np.int64)
-        spawned = kernels.shade(
-            primitives, u, v, distances, rays.origins, rays.directions, rays.weights, rays.pixels, rays.inside,
-            rays.keys, rays.widths, s.corners, s.faces, s.normals, s.coordinates, s.object_of_face, s.materials,
-            s.textures.table, s.textures.texels, s.textures.alphas, s.lights, s.background, s.fog, s.ambient, s.least,
-            lobe_rays, self.lobes[1], *self.footprint, radiance,
-            shadow.origins, shadow.directions, reach, shadow.weights, shadow.pixels, shadow.inside,
-            following.origins, following.directions, following.weights, following.pixels, following.inside,
-            following.keys, following.widths, counts, lit, spawn, self.pose[:3, 3], self.pose[:3, 2],
-            *(support or Support()).rows(),
+        passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint, spawn)
+        images: list[Any] = [*(support or Support()).rows(), self.pose[:3, 3], self.pose[:3, 2]]
+        recorded = Recorded(support is not None, *images)
+        spawned = shade(
+            hits, rays, s.surfaces, s.surroundings, passage, recorded, radiance, self._shadow, following, counts, lit,
+            self._work,
         )  # fmt: skip
         self.count.rays.update({"reflection": int(counts[0]), "refraction": int(counts[1])})
         self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[2:5]), strict=True)))
@@ -307,10 +305,10 @@ class Tracer:
             self.count.rays["passed"] += int(counts[5])
         for light in np.flatnonzero(lit):
             some = slice(light * n, light * n + lit[light])
-            self._light(_Rays(*(array[some] for array in vars(shadow).values())), reach[some], radiance)
-        return _Rays(*(array[:spawned] for array in vars(following).values()))
+            self._light(_rows(self._shadow, some), radiance)
+        return _rows(following, slice(spawned))
 
-    def _hits(self, rays: _Rays) -> Hits:
+    def _hits(self, rays: Rays) -> Hits:
         """Face, u, v and distance of the nearest face that is there: not cut out, not hidden in another body."""
         s = self.scene
         found = self._nearest(rays.origins, rays.directions)
@@ -324,7 +322,7 @@ class Tracer:
             np.empty(n, np.int32),
         )
         for _ in range(MOST_CLEAR_FACES):
-            count = kernels.pass_faces(
+            count = pass_faces(
                 *found, rows, *table, rays.directions, rays.inside,
                 s.corners, s.faces, s.coordinates, s.object_of_face, s.materials, s.textures.table, s.textures.alphas,
                 origins, directions, onward,
@@ -341,12 +339,12 @@ class Tracer:
         self.count.embree_seconds += seconds
         return hits
 
-    def _start_inside(self, rays: _Rays) -> None:
+    def _start_inside(self, rays: Rays) -> None:
         """Note the transmissive bodies that camera rays start in."""
         s = self.scene
         rows = np.empty(len(rays.pixels), np.int32)
         candidates = np.empty((len(rows), s.nested), np.int32)
-        count = kernels.start_inside(rays.origins, s.clear_bounds, s.first_clear, rows, candidates)
+        count = start_inside(rays.origins, s.clear_bounds, s.first_clear, rows, candidates)
         rows, candidates = rows[:count], candidates[:count]
         origins, directions = rays.origins[rows], rays.directions[rows]
         for _ in range(MOST_CLEAR_FACES):
@@ -355,34 +353,27 @@ class Tracer:
             self.count.rays["passed"] += count
             hits, seconds = s.intersector.nearest_clear(origins[:count], directions[:count])
             self.count.embree_seconds += seconds
-            count = kernels.tell_inside(
+            count = tell_inside(
                 hits.faces, hits.u, hits.v, rows, candidates, origins, directions, rays.inside,
                 s.corners, s.faces, s.object_of_face, s.opaque_faces,
             )  # fmt: skip
 
-    def _light(self, shadow: _Rays, reach: NDArray[np.float32], radiance: NDArray[np.float32]) -> None:
+    def _light(self, shadow: ShadowRays, radiance: NDArray[np.float32]) -> None:
         """Add the light of the shadow rays that nothing opaque stops, dimmed by what is clear."""
         s = self.scene
         self.count.rays["shadow"] += len(shadow.pixels)
-        found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, reach)
+        found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, shadow.reach)
         self.count.embree_seconds += seconds
         if not s.lets_through:
-            kernels.add_unblocked(found, shadow.weights, shadow.pixels, radiance)
+            add_unblocked(found, shadow.colours, shadow.pixels, radiance)
             return
-        rays: list[NDArray[Any]] = [
-            shadow.origins,
-            shadow.directions,
-            reach,
-            shadow.weights,
-            shadow.pixels,
-            shadow.inside,
-        ]
-        kept = kernels.keep_unblocked(found, *rays)
+        rays: list[NDArray[Any]] = list(shadow)
+        kept = keep_unblocked(found, *rays)
         for _ in range(MOST_CLEAR_FACES):
             origins, directions, reach, colours, pixels, inside = rays = [array[:kept] for array in rays]
             hits, seconds = s.intersector.nearest_clear(origins, directions, reach)
             self.count.embree_seconds += seconds
-            kept = kernels.pass_clear_face(
+            kept = pass_clear_face(
                 *hits, origins, directions, reach, colours, pixels, inside,
                 s.corners, s.faces, s.coordinates, s.object_of_face, s.materials,
                 s.textures.table, s.textures.alphas, s.opaque_faces, radiance,
@@ -390,8 +381,3 @@ class Tracer:
             if not kept:
                 return
             self.count.rays["shadow"] += kept
-
-    def _shadow_room(self, n: int) -> tuple[_Rays, NDArray[np.float32]]:
-        if len(self._shadow[1]) < n:
-            self._shadow = (_Rays.room(n, self.scene.nested), np.empty(n, np.float32))
-        return self._shadow

@@ -7,7 +7,7 @@ import numpy as np
 from raytrace_ii import Background, Body, Light, Material, Scene
 from raytrace_ii.scene.textures import Checker, Image, Noise
 from raytrace_ii.shapes.primitives import Box, Mesh, Plane, Sphere, rotation
-from raytrace_ii.tracing.kernels.shade import texture_colour
+from raytrace_ii.tracing.kernels.textures import texture_colour
 from raytrace_ii.tracing.texture_table import TextureTable
 
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)

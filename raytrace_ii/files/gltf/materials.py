@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...scene.scene import Material
 from ...scene.textures import Image, VertexColours, image_texture, metallic_roughness_map, normal_map
-from ...tracing.kernels.shade import highlight
+from ...tracing.kernels.glossy import highlight
 from .container import GltfFile
 from .tables import PbrMaterial, Sampler, TextureInfo, TextureSource
 

@@ -10,7 +10,8 @@ from ii_core.view import view_positions
 from raytrace_ii import Background, Scene, load_scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.rendering.tiles import ray_order, tiles
-from raytrace_ii.tracing.kernels import shade as kernels
+from raytrace_ii.tracing.kernels.srgb import encode_srgb
+from raytrace_ii.tracing.kernels.start import jitter
 from raytrace_ii.tracing.support_images import SUPPORT, SUPPORT_IMAGES
 from tests.support.trace_scenes import UNIFORM, WHITE, body, box, floor, hall, lamp, sphere, sun, wall
 
@@ -22,7 +23,7 @@ ONE_LENS = IICamera(pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2
 def encoded(radiance, dtype="uint8"):
     """Codes as `render` stores them."""
     out = np.empty(radiance.shape, dtype)
-    kernels.encode_srgb(radiance, np.arange(len(radiance)), 1.0, job.CURVES[dtype], out)
+    encode_srgb(radiance, np.arange(len(radiance)), 1.0, job.CURVES[dtype], out)
     return out
 
 
@@ -105,7 +106,7 @@ def test_support_images_are_those_of_the_first_sample_and_only_those_asked_for(h
     np.testing.assert_array_equal(none.picture.pixels, full.picture.pixels)
 
     place = np.empty((64, 128, 2))
-    kernels.jitter(1, 0, 3, 1, False, 128, 0, 0, place)
+    jitter(1, 0, 3, 1, False, 128, 0, 0, place)
     first = trace(hall_scene, *SMALL.rays(sample=place))
     np.testing.assert_array_equal(full.depth.ravel(), first.depth)
     np.testing.assert_array_equal(np.isnan(full.depth), full.object_id == -1)
@@ -246,8 +247,8 @@ def test_jitter_equals_its_python_source():
     compiled, plain = np.empty((3, 4, 2)), np.empty((3, 4, 2))
     with np.errstate(over="ignore"):  # 64-bit hashes wrap
         for seed, sample, shuffle in ((0, 0, False), (2**40 + 17, 5, True), (2**63 - 1, 1, True)):
-            kernels.jitter(seed, sample, 3, 2, shuffle, 9999, 10, 20, compiled)
-            kernels.jitter.py_func(seed, sample, 3, 2, shuffle, 9999, 10, 20, plain)
+            jitter(seed, sample, 3, 2, shuffle, 9999, 10, 20, compiled)
+            jitter.py_func(seed, sample, 3, 2, shuffle, 9999, 10, 20, plain)
             np.testing.assert_array_equal(compiled, plain)
 
 

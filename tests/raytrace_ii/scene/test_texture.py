@@ -12,7 +12,8 @@ from raytrace_ii import Scene, trace
 from raytrace_ii.rendering.job import CURVES
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, image_texture, linear, normal_map
 from raytrace_ii.shapes.primitives import rotation
-from raytrace_ii.tracing.kernels import shade as kernels
+from raytrace_ii.tracing.kernels.noise import fractal, gradient_noise
+from raytrace_ii.tracing.kernels.srgb import encode_srgb
 from raytrace_ii.tracing.packing import packed
 from raytrace_ii.tracing.texture_table import TextureTable
 from tests.support.trace_scenes import BLACK, WHITE, body, box, sphere, texture_at, wall
@@ -88,7 +89,7 @@ def test_a_solid_texture_turns_with_its_body():
 
 
 def noise(points, seed=0):
-    return np.array([kernels.gradient_noise(*map(float, p), seed) for p in points])
+    return np.array([gradient_noise(*map(float, p), seed) for p in points])
 
 
 def test_noise_is_nothing_on_the_lattice():
@@ -126,25 +127,25 @@ def test_noise_runs_on_over_the_borders_of_cells(border, axis, a, b, seed):
 @settings(max_examples=50)
 def test_noise_kernels_equal_their_python_source(x, y, z, seed):
     with np.errstate(over="ignore"):  # hashes wrap
-        plain = kernels.gradient_noise.py_func(x, y, z, seed)
-        octaves = kernels._fractal.py_func(x, y, z, 3 + 16 * seed)
+        plain = gradient_noise.py_func(x, y, z, seed)
+        octaves = fractal.py_func(x, y, z, 3 + 16 * seed)
     # the same sums; a compiler may only fuse them: an ulp of about 1
-    assert kernels.gradient_noise(x, y, z, seed) == pytest.approx(plain, abs=1e-13)
-    assert kernels._fractal(x, y, z, 3 + 16 * seed) == pytest.approx(octaves, abs=1e-13)
+    assert gradient_noise(x, y, z, seed) == pytest.approx(plain, abs=1e-13)
+    assert fractal(x, y, z, 3 + 16 * seed) == pytest.approx(octaves, abs=1e-13)
 
 
 def test_octaves_add_half_as_much_at_half_the_size():
     points = np.random.default_rng(1).uniform(-5, 5, (20, 3))
     expected = sum(0.5**k * noise(points * 2.03**k, 7 + k) for k in range(4))
-    fractal = [kernels._fractal(*map(float, p), 4 + 16 * 7) for p in points]
-    np.testing.assert_allclose(fractal, expected, atol=1e-12)
+    sums = [fractal(*map(float, p), 4 + 16 * 7) for p in points]
+    np.testing.assert_allclose(sums, expected, atol=1e-12)
 
 
 def test_noise_mixes_its_colours():
     a, b = np.array([0.2, 0.4, 0.9]), np.array([0.8, 0.5, 0.1])
     points = np.random.default_rng(2).uniform(-9, 9, (200, 3))
     texture = Noise((tuple(a), tuple(b)), (2.0, 3.0, 0.5), octaves=2, contrast=0.7, seed=5)
-    value = np.array([kernels._fractal(*map(float, p), 2 + 16 * 5) for p in points / [2.0, 3.0, 0.5]])
+    value = np.array([fractal(*map(float, p), 2 + 16 * 5) for p in points / [2.0, 3.0, 0.5]])
     share = np.clip(0.5 + 0.7 * value, 0, 1)[:, None]
     np.testing.assert_allclose(texture_at(texture, points), a + share * (b - a), atol=1e-12)
     strong = texture_at(Noise((tuple(a), tuple(b)), (1.0,) * 3, contrast=50.0), points)
@@ -230,7 +231,7 @@ def test_every_code_survives_texture_light_and_encoding(bits):
     texture = image_texture(np.broadcast_to(codes[None, :, None], (1, count, 3)))
     out = np.empty((count, 3), dtype)
     curve = CURVES[dtype]
-    kernels.encode_srgb(texture.pixels[0], np.arange(len(texture.pixels[0])), 1.0, curve, out)
+    encode_srgb(texture.pixels[0], np.arange(len(texture.pixels[0])), 1.0, curve, out)
     np.testing.assert_array_equal(out, codes[:, None].repeat(3, axis=1))
 
 
@@ -244,7 +245,7 @@ def test_every_code_survives_a_rendered_wall():
     start = np.stack([x, y, np.zeros_like(x)], axis=-1)
     radiance = trace(scene, start, np.broadcast_to([0.0, 0, 1], start.shape)).radiance
     out = np.empty(radiance.shape, np.uint8)
-    kernels.encode_srgb(radiance, np.arange(len(radiance)), 1.0, CURVES["uint8"], out)
+    encode_srgb(radiance, np.arange(len(radiance)), 1.0, CURVES["uint8"], out)
     # upright and unmirrored: row 0 on top, column 0 on the left
     np.testing.assert_array_equal(out.reshape(16, 16, 3)[..., 0], codes)
     np.testing.assert_array_equal(out.reshape(16, 16, 3)[..., 1], codes[::-1])
@@ -257,7 +258,7 @@ def test_encoding_is_the_standards_curve(dtype):
     peak = np.iinfo(dtype).max
     x = np.linspace(-0.1, 1.1, 100_001).astype(np.float32).reshape(-1, 1).repeat(3, axis=1)
     out = np.empty(x.shape, dtype)
-    kernels.encode_srgb(x, np.arange(len(x)), 1.0, CURVES[dtype], out)
+    encode_srgb(x, np.arange(len(x)), 1.0, CURVES[dtype], out)
     light = np.clip(x[:, 0].astype(float), 0, 1)
     exact = peak * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     assert np.abs(out[:, 0] - exact).max() <= 0.52

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 
 from raytrace_ii import load_scene
 from raytrace_ii.shapes.any_shape import AnyShape
-from raytrace_ii.tracing.kernels import shade as kernels
+from raytrace_ii.tracing.kernels.noise import terrain
 from tests.raytrace_ii.shapes.test_shapes import corners, face_normals, merged
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -174,9 +174,9 @@ def test_terrain_kernel_equals_its_python_source():
     x, z = generator.uniform(-9, 9, (2, 3, 4))
     for ridged in (False, True):
         compiled, plain = np.empty((3, 4)), np.empty((3, 4))
-        kernels.terrain(x, z, 7, 5, 0.5, ridged, compiled)
+        terrain(x, z, 7, 5, 0.5, ridged, compiled)
         with np.errstate(over="ignore"):  # hashes wrap
-            kernels.terrain.py_func(x, z, 7, 5, 0.5, ridged, plain)
+            terrain.py_func(x, z, 7, 5, 0.5, ridged, plain)
         np.testing.assert_allclose(compiled, plain, rtol=1e-12, atol=1e-13)
 
 

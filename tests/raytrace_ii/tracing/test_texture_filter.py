@@ -9,7 +9,8 @@ from ii_core import IICamera, preset
 from raytrace_ii import Background, Scene, render
 from raytrace_ii.rendering.job import footprint
 from raytrace_ii.scene.textures import Image
-from raytrace_ii.tracing.kernels.shade import _filter, _filtered, _footprint
+from raytrace_ii.tracing.kernels.textures import filter_taps, filtered
+from raytrace_ii.tracing.kernels.textures import footprint as face_footprint
 from raytrace_ii.tracing.texture_table import TextureTable, pyramid
 from tests.support.trace_scenes import BLACK, WHITE, body, sphere, sun, wall
 
@@ -38,14 +39,14 @@ def test_levels_of_a_pyramid_are_means_over_area(shape):
 
 def test_a_width_of_a_texel_or_less_reads_the_image_itself():
     packed = TextureTable([BOARD])
-    assert _filter(packed.table, 0, 1 / 64, 0.0, 0.0, 0.5 / 64)[:2] == (1, 0.0)
-    assert _filter(packed.table, 0, 0.0, 0.0, 0.0, 0.0)[:2] == (1, 0.0)
+    assert filter_taps(packed.table, 0, 1 / 64, 0.0, 0.0, 0.5 / 64)[:2] == (1, 0.0)
+    assert filter_taps(packed.table, 0, 0.0, 0.0, 0.0, 0.0)[:2] == (1, 0.0)
 
 
 def test_a_wide_ray_sees_the_mean():
     packed = TextureTable([BOARD])
     for width in (0.5, 1.0, 20.0):
-        colour = _filtered(packed.table, 0, packed.texels, 0.3, 0.6, width, 0.0, 0.0, width)
+        colour = filtered(packed.table, 0, packed.texels, 0.3, 0.6, width, 0.0, 0.0, width)
         np.testing.assert_allclose(colour, 0.5, atol=1e-6)
 
 
@@ -56,7 +57,7 @@ def test_a_long_ellipse_is_read_along_its_length():
     narrow, wide = 1 / 64, 16 / 64
     second = int(packed.table[0, 8]) + 1  # after the first's levels
     ellipse = (0.5, 1 - 4.5 / 64, wide, 0.0, 0.0, narrow)
-    along = [_filtered(packed.table, row, packed.texels, *ellipse)[0] for row in (0, second)]
+    along = [filtered(packed.table, row, packed.texels, *ellipse)[0] for row in (0, second)]
     assert along[0] > 0.99 and along[1] == pytest.approx(0.5, abs=0.07), along
 
 
@@ -68,7 +69,9 @@ def test_the_footprint_is_where_the_rays_beside_it_meet_the_face(slant):
     coordinates = np.zeros_like(corners)
     coordinates[..., :2] = mesh.uv[mesh.faces]
     ahead = np.array([math.sin(slant), 0.0, math.cos(slant)])
-    across_u, across_v, along_u, along_v = _footprint(corners, coordinates, 0, 0.2, *ahead, 0.0, 0.0, -1.0)
+    edges = (corners[0, 1:] - corners[0, 0]).astype(float).ravel()
+    grows = (coordinates[0, 1:, :2] - coordinates[0, 0, :2]).ravel()
+    across_u, across_v, along_u, along_v = face_footprint(*edges, *grows, 0.2, *ahead, 0.0, 0.0, -1.0)
     ways = {tuple(np.round(np.abs(way), 9)) for way in ((across_u, across_v), (along_u, along_v))}
     # the wall is 100 mm wide: u and v grow by 1/100 a mm
     truth = {(0.0, 0.002), (round(0.002 / math.cos(slant), 9), 0.0)}

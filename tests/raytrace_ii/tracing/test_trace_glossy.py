@@ -9,7 +9,7 @@ from ii_core import IICamera, preset
 from raytrace_ii import Background, Scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.scene.textures import Image
-from raytrace_ii.tracing.kernels.shade import glossy_direction
+from raytrace_ii.tracing.kernels.glossy import glossy_direction
 from raytrace_ii.tracing.packing import packed
 from tests.support.trace_scenes import BLACK, UNIFORM, WHITE, body, floor, lamp, sphere, sun, wall
 

@@ -8,7 +8,10 @@ import pytest
 from ii_core import preset
 from raytrace_ii import trace
 from raytrace_ii.scene.textures import Image
-from raytrace_ii.tracing.kernels import shade as kernels
+from raytrace_ii.tracing import tracer
+from raytrace_ii.tracing.kernels import shade as stages
+from raytrace_ii.tracing.kernels.light import keep_unblocked
+from raytrace_ii.tracing.kernels.start import start_rays, start_separable_rays
 from tests.support.trace_scenes import WHITE, body, hall, sphere, wall
 
 NAMES = (
@@ -19,6 +22,20 @@ NAMES = (
     "pass_clear_face",
     "start_inside",
     "tell_inside",
+)
+STAGES = (
+    "gather",
+    "place",
+    "smooth_normals",
+    "up_to_smooth",
+    "attenuate",
+    "look",
+    "towards_light",
+    "in_cone",
+    "cast",
+    "spawn_rays",
+    "_add_light",
+    "_record",
 )
 
 
@@ -58,8 +75,9 @@ def agree(scene, monkeypatch):
     camera = preset("setup1", scale=64)
     m, n = np.random.default_rng(0).integers(0, camera.pixels, (600, 2)).T
     compiled = trace(scene, *camera.rays_at(m, n))
-    for name in NAMES:
-        monkeypatch.setattr(kernels, name, getattr(kernels, name).py_func)
+    for module, names in ((tracer, NAMES), (stages, STAGES)):
+        for name in names:
+            monkeypatch.setattr(module, name, getattr(module, name).py_func)
     plain = trace(scene, *camera.rays_at(m, n))
     np.testing.assert_array_equal(compiled.object_id, plain.object_id)
     np.testing.assert_allclose(compiled.depth, plain.depth, rtol=1e-6)
@@ -79,7 +97,7 @@ def test_start_rays_name_the_first_bad_one():
     rows = [np.empty((6, 3), np.float32) for _ in range(3)]
     out = (*rows, np.empty(6, np.int32), np.empty((6, 2), np.int32))
     all_of_it, as_they_come = np.empty(0), np.empty(0, np.int32)
-    for function in (kernels.start_rays, kernels.start_rays.py_func):
+    for function in (start_rays, start_rays.py_func):
         assert function(locations, directions, all_of_it, as_they_come, np.eye(3), np.zeros(3), *out) == (6, 2)
         two = locations[:2], directions[:2]
         assert function(*two, all_of_it, as_they_come, np.eye(3), np.ones(3), *out) == (2, -1)
@@ -93,7 +111,7 @@ def test_rays_without_light_are_left_out():
     directions[1] = 0  # blocked: nobody asks where it goes
     rows = [np.empty((4, 3), np.float32) for _ in range(3)]
     pixels, inside = np.empty(4, np.int32), np.empty((4, 0), np.int32)
-    for function in (kernels.start_rays, kernels.start_rays.py_func):
+    for function in (start_rays, start_rays.py_func):
         shares = np.array([0.25, 0, 0, 1])
         for order, row, left in (([], [0, 3], [0, 3]), ([3, 1, 0, 2], [0, 2], [3, 0])):
             order = np.array(order, np.int32)
@@ -114,8 +132,8 @@ def test_rays_by_row_and_column_are_those_one_by_one():
     expected = [np.empty((15, 3), np.float32) for _ in range(3)]
     pixels, inside = np.empty(15, np.int32), np.empty((15, 0), np.int32)
     order = rng.permutation(15).astype(np.int32)
-    kernels.start_rays(*grid.reshape(2, 15, 3), np.empty(0), order, turn, np.arange(3.0), *expected, pixels, inside)
-    for function in (kernels.start_separable_rays, kernels.start_separable_rays.py_func):
+    start_rays(*grid.reshape(2, 15, 3), np.empty(0), order, turn, np.arange(3.0), *expected, pixels, inside)
+    for function in (start_separable_rays, start_separable_rays.py_func):
         found = [np.empty((15, 3), np.float32) for _ in range(2)]
         assert function(x, y, z, order // 5, order % 5, turn, np.arange(3.0), *found)
         np.testing.assert_array_equal(found, expected[:2])
@@ -130,9 +148,9 @@ def test_rows_and_columns_of_unusable_rays_are_told(wrong):
         flat[where] = wrong
         x, y, z = np.split(flat, np.cumsum(sizes)[:-1])
         rays = x.reshape(5, 2), y.reshape(3, 2), z
-        assert not kernels.start_separable_rays(*rays, *order, np.eye(3), np.zeros(3), *room)
+        assert not start_separable_rays(*rays, *order, np.eye(3), np.zeros(3), *room)
     nowhere = np.zeros((5, 2)), np.zeros((3, 2)), np.zeros(2)
-    assert not kernels.start_separable_rays(*nowhere, *order, np.eye(3), np.zeros(3), *room), "no direction"
+    assert not start_separable_rays(*nowhere, *order, np.eye(3), np.zeros(3), *room), "no direction"
 
 
 def test_shadow_rays_that_arrive_are_packed_to_the_front():
@@ -140,7 +158,7 @@ def test_shadow_rays_that_arrive_are_packed_to_the_front():
     blocked = rng.choice(np.array([0, -1], np.int32), 50)
     rows = [rng.normal(size=shape).astype(np.float32) for shape in ((50, 3), (50, 3), (50,), (50, 3))]
     rows += [rng.integers(0, 99, 50).astype(np.int32), rng.integers(-1, 9, (50, 2)).astype(np.int32)]
-    for function in (kernels.keep_unblocked, kernels.keep_unblocked.py_func):
+    for function in (keep_unblocked, keep_unblocked.py_func):
         packed = [row.copy() for row in rows]
         kept = function(blocked, *packed)
         assert kept == (blocked == -1).sum()

@@ -11,7 +11,10 @@ from hypothesis import strategies as st
 from raytrace_ii import Background, Material, Scene, trace
 from raytrace_ii.scene.textures import Checker
 from raytrace_ii.shapes.primitives import Mesh
-from raytrace_ii.tracing.kernels import shade as kernels
+from raytrace_ii.tracing.kernels.media import fresnel
+from raytrace_ii.tracing.kernels.sky import background_colour
+from raytrace_ii.tracing.kernels.srgb import encode_srgb
+from raytrace_ii.tracing.kernels.tables import LEAST_WEIGHT
 from raytrace_ii.tracing.packing import LIFT
 from tests.support.trace_scenes import (
     BLACK,
@@ -44,30 +47,30 @@ def looked(scene, origin, direction):
 @pytest.mark.parametrize("ior", [1.33, 1.5, 2.4])
 def test_fresnel_at_normal_incidence_and_at_brewsters_angle(ior):
     for ratio in (ior, 1 / ior):
-        assert kernels.fresnel(1.0, ratio)[0] == pytest.approx(((ior - 1) / (ior + 1)) ** 2, rel=1e-12)
+        assert fresnel(1.0, ratio)[0] == pytest.approx(((ior - 1) / (ior + 1)) ** 2, rel=1e-12)
         brewster = math.atan(1 / ratio)  # tan θ = n2/n1
         # no reflection of the p part: half of the s part is left, sin²(θi − θt) with θi + θt = 90°
         only_s = math.cos(2 * brewster) ** 2 / 2
-        assert kernels.fresnel(math.cos(brewster), ratio)[0] == pytest.approx(only_s, rel=1e-9)
+        assert fresnel(math.cos(brewster), ratio)[0] == pytest.approx(only_s, rel=1e-9)
 
 
 def test_fresnel_at_the_critical_angle():
     ratio = 1.5
     critical = math.asin(1 / ratio)
-    reflected, behind = kernels.fresnel(math.cos(critical + 1e-6), ratio)
+    reflected, behind = fresnel(math.cos(critical + 1e-6), ratio)
     assert (reflected, behind) == (1.0, 0.0)
-    reflected, behind = kernels.fresnel(math.cos(critical - 1e-6), ratio)
+    reflected, behind = fresnel(math.cos(critical - 1e-6), ratio)
     # Just before, sin θt = 1 − 1e-6·ratio·cos θc, so cos θt = √(2e-6·ratio·cos θc); 1e-3 for the next order
     assert behind == pytest.approx(math.sqrt(2e-6 * ratio * math.cos(critical)), rel=1e-3)
     assert 0.98 < reflected < 1
-    assert kernels.fresnel(0.0, 1 / 1.5)[0] == 1.0, "all is reflected at grazing incidence"
+    assert fresnel(0.0, 1 / 1.5)[0] == 1.0, "all is reflected at grazing incidence"
 
 
 @given(angle=st.floats(1e-3, math.pi / 2 - 1e-3), ratio=st.floats(0.3, 3.5).filter(lambda r: abs(r - 1) > 1e-2))
 def test_fresnel_keeps_energy_and_agrees_with_the_angle_formulas(angle, ratio):
     cosine = math.cos(angle)
-    reflected, behind = kernels.fresnel(cosine, ratio)
-    plain = kernels.fresnel.py_func(cosine, ratio)
+    reflected, behind = fresnel(cosine, ratio)
+    plain = fresnel.py_func(cosine, ratio)
     # sines of compiled and interpreted code are the same; sums may be contracted
     np.testing.assert_allclose((reflected, behind), plain, rtol=1e-12)
     if ratio * math.sin(angle) >= 1:
@@ -153,7 +156,7 @@ def test_absorption_and_inner_reflections_of_a_slab(max_depth):
     expected = np.full(3, r if max_depth else 0.0)
     for k in range(1, max_depth):
         term = (1 - r) ** 2 * r ** (k - 1) * a**k
-        if term.max() >= kernels.LEAST_WEIGHT:  # the seventh is not
+        if term.max() >= LEAST_WEIGHT:  # the seventh is not
             expected = expected + term
     # a ray starts 1e-4 mm behind its face (its coordinates reach 25): that times α of 0.3
     np.testing.assert_allclose(looked(scene, (0.3, 0.2, 0), (0, 0, 1)), expected, atol=3e-5)
@@ -244,8 +247,8 @@ def test_recursion_ends_when_a_weight_is_too_small_to_see():
     mirrors = [body(wall(z, 50), mirror=(0.5,) * 3, colour=WHITE) for z in (-5, 5)]
     seen = trace(Scene(bodies=mirrors, ambient=WHITE, max_depth=60), [(1, 2, 0)], [(0, 0, 1)])
     # 0.5^k ≥ 0.5/255/12.92 up to k = 12
-    assert seen.count.rays["reflection"] == math.floor(math.log2(1 / kernels.LEAST_WEIGHT)) == 12
-    assert abs(seen.radiance[0, 0] - 1) < kernels.LEAST_WEIGHT
+    assert seen.count.rays["reflection"] == math.floor(math.log2(1 / LEAST_WEIGHT)) == 12
+    assert abs(seen.radiance[0, 0] - 1) < LEAST_WEIGHT
 
 
 def test_no_depth_is_local_light_only():
@@ -280,7 +283,7 @@ def test_a_bent_normal_cannot_send_refracted_light_back():
     pane = body(bent(wall(5, 500), (0, 0.8, -0.6)), transmission=WHITE, ior=1.5)
     direction = np.array([0, 1 - 0.005, -0.1]) / np.linalg.norm([0, 1 - 0.005, -0.1])
     seen = trace(Scene(bodies=[pane], background=UNIFORM, max_depth=1), [(0, 0, 10)], [direction])
-    reflected, behind = kernels.fresnel(float(direction @ [0, 0.8, -0.6]), 1.5)
+    reflected, behind = fresnel(float(direction @ [0, 0.8, -0.6]), 1.5)
     assert behind > 0 and seen.count.rays["refraction"] == 0
     np.testing.assert_allclose(seen.radiance[0], reflected, rtol=1e-5)
 
@@ -468,11 +471,11 @@ def test_highlight_of_blinn_and_phong(shininess):
         half = (viewer + towards) / np.linalg.norm(viewer + towards)
         expected = 0.6 * half[1] ** shininess
         seen = looked(Scene(bodies=[ground], lights=[light]), viewer * 10, -viewer)
-        if expected > 2 * kernels.LEAST_WEIGHT:
+        if expected > 2 * LEAST_WEIGHT:
             # a power n magnifies the cosine's 1e-7 n times
             assert seen[0] == pytest.approx(expected, rel=1e-6 * max(shininess, 5))
         else:
-            assert seen[0] <= 2 * kernels.LEAST_WEIGHT
+            assert seen[0] <= 2 * LEAST_WEIGHT
     matt = body(floor(100), colour=(0.3,) * 3, specular=0.6, shininess=shininess)
     seen = looked(Scene(bodies=[matt], lights=[light]), mirrored * 10, -mirrored)
     assert seen[0] == pytest.approx(0.6 + 0.3 * towards[1], rel=1e-5)
@@ -508,14 +511,14 @@ def test_kernels_of_light_equal_their_python_source():
     generator = np.random.default_rng(0)
     background = np.array([*generator.random(9), 1.7])
     for dy in (-1.0, -0.3, 0.0, 0.2, 0.9):
-        assert kernels.background_colour(background, dy) == pytest.approx(
-            kernels.background_colour.py_func(background, dy), abs=1e-15
+        assert background_colour(background, dy) == pytest.approx(
+            background_colour.py_func(background, dy), abs=1e-15
         )
     radiance = generator.uniform(-0.2, 1.3, (200, 3)).astype(np.float32)
     curve, order = np.linspace(0, 255, 4097) ** 1.1 / 255**0.1, generator.permutation(200)
     a, b = np.empty((200, 3), np.uint8), np.empty((200, 3), np.uint8)
-    kernels.encode_srgb(radiance, order, 0.5, curve, a)
-    kernels.encode_srgb.py_func(radiance, order, 0.5, curve, b)
+    encode_srgb(radiance, order, 0.5, curve, a)
+    encode_srgb.py_func(radiance, order, 0.5, curve, b)
     np.testing.assert_array_equal(a, b)
 
 

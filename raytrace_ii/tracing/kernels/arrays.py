@@ -1,0 +1,108 @@
+"""Arrays that kernels take and fill, by name."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Single = NDArray[np.float32]
+Double = NDArray[np.float64]
+Whole = NDArray[np.int32]
+
+
+class Hits(NamedTuple):
+    """Nearest hit of each ray: row of the face, −1 on a miss; u, v; distance in lengths of the direction."""
+
+    faces: Whole
+    u: Single
+    v: Single
+    distances: Single
+
+
+class Rays(NamedTuple):
+    """One generation of rays.
+
+    ``inside`` (n, nested) lists the transmissive bodies that a ray runs in, −1 after the last. ``keys`` are places in
+    the lobes of rough mirrors, as `sampling.lobe_keys` gives them, of no rows where nothing is rough; ``widths`` at
+    the origins, mm, of no rows for camera rays, or where images are not filtered.
+    """
+
+    origins: Single
+    directions: Single
+    weights: Single
+    pixels: Whole
+    inside: Whole
+    keys: NDArray[np.uint64]
+    widths: Single
+
+
+class ShadowRays(NamedTuple):
+    """Rays to lights, with the light that they would let through; as many rows for each light as rays are shaded."""
+
+    origins: Single
+    directions: Single
+    reach: Single
+    colours: Single
+    pixels: Whole
+    inside: Whole
+
+
+class Surfaces(NamedTuple):
+    """Faces, materials and textures of a scene, as `packing.PackedScene` describes them.
+
+    The ``flat_`` arrays are the same memory in one dimension.
+    """
+
+    corners: Single
+    faces: Single
+    normals: Single
+    coordinates: Single
+    object_of_face: Whole
+    materials: Double
+    flat_corners: Single
+    flat_faces: Single
+    flat_normals: Single
+    textures: Double
+    texels: tuple[Single, NDArray[np.uint8]]
+    alphas: Single
+
+
+class Surroundings(NamedTuple):
+    """Lights, sky, fog (colour and density, of no length if there is none) and ambient light."""
+
+    lights: Double
+    background: Double
+    fog: Double
+    ambient: Double
+
+
+class Passage(NamedTuple):
+    """How one generation is shaded.
+
+    ``least`` is the least weight of a spawned ray. Up to ``lobe_rays`` rays go over the lobe of a rough mirror, whose
+    places stand ``lobe_stride`` apart. A ray is ``first_width`` wide where it starts, if it has no width of its own,
+    and grows by ``spread`` a mm, from a negative width through 0: images are filtered over its width, not at all if
+    both are 0.
+    """
+
+    least: float
+    lobe_rays: int
+    lobe_stride: int
+    first_width: float
+    spread: float
+    spawn: bool
+
+
+class Recorded(NamedTuple):
+    """Support images by pixel, of no rows where not wanted; depth is from ``eye`` along the camera's ``axis``."""
+
+    wanted: bool
+    depth: Single
+    normal: Single
+    object_id: Whole
+    ray_length: Single
+    shading_normal: Single
+    eye: Double
+    axis: Double

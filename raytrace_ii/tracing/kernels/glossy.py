@@ -1,0 +1,73 @@
+"""Rough mirrors: directions over a lobe, and the highlight of one."""
+
+from __future__ import annotations
+
+import math
+
+from ii_core.jit import inline_kernel
+from ii_core.jit import lean_kernel as kernel
+
+
+@kernel
+def glossy_direction(alpha, across, around, dx, dy, dz, nx, ny, nz):
+    """Reflect a direction at a facet of a GGX surface, one of those seen from there, and how much of it gets away.
+
+    Facets are sampled in proportion to their visible area by spherical caps (Dupuy and Benyoub 2023); the share is
+    G2/G1 of Smith's height-correlated shadowing (Heitz 2014), 0 for a direction into the surface. Its mean is the
+    single-scattering albedo.
+
+    Parameters
+    ----------
+    alpha : float
+        GGX's width, above 0: the square of the roughness.
+    across, around : float
+        A place in [0, 1)².
+    """
+    cosine = -(dx * nx + dy * ny + dz * nz)
+    # the surface's frame: z its normal, x away from which the ray comes
+    tx, ty, tz = -dx - cosine * nx, -dy - cosine * ny, -dz - cosine * nz
+    sine = math.sqrt(tx * tx + ty * ty + tz * tz)
+    if sine < 1e-6:
+        if abs(nx) < 0.8:
+            tx, ty, tz = 1.0 - nx * nx, -nx * ny, -nx * nz
+        else:
+            tx, ty, tz = -ny * nx, 1.0 - ny * ny, -ny * nz
+        length = math.sqrt(tx * tx + ty * ty + tz * tz)
+        sine = 0.0
+    else:
+        length = sine
+    tx, ty, tz = tx / length, ty / length, tz / length
+    bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+    # stretched to a sphere: a cap of it, shifted, holds the facets that are seen
+    vx, vz = alpha * sine, cosine
+    length = math.sqrt(vx * vx + vz * vz)
+    vx, vz = vx / length, vz / length
+    hz = (1.0 - across) * (1.0 + vz) - vz
+    radius = math.sqrt(max(1.0 - hz * hz, 0.0))
+    angle = 2.0 * math.pi * around
+    hx, hy, hz = alpha * (radius * math.cos(angle) + vx), alpha * radius * math.sin(angle), hz + vz
+    length = math.sqrt(hx * hx + hy * hy + hz * hz)
+    hx, hy, hz = hx / length, hy / length, hz / length
+    twice = 2.0 * (sine * hx + cosine * hz)
+    rx, ry, rz = twice * hx - sine, twice * hy, twice * hz - cosine
+    if rz <= 0.0:
+        return nx, ny, nz, 0.0
+    seen = _smith(alpha, cosine)
+    share = (1.0 + seen) / (1.0 + seen + _smith(alpha, rz))
+    return rx * tx + ry * bx + rz * nx, rx * ty + ry * by + rz * ny, rx * tz + ry * bz + rz * nz, share
+
+
+@inline_kernel
+def _smith(alpha, cosine):
+    """Smith's Λ of a GGX surface."""
+    return 0.5 * (math.sqrt(1.0 + alpha * alpha * (1.0 / (cosine * cosine) - 1.0)) - 1.0)
+
+
+@kernel
+def highlight(f0, roughness):
+    """Strength and exponent of the Blinn–Phong highlight of a microfacet surface.
+
+    Its width is that of a lobe of α = roughness² (Karis 2013), its strength normalised D/4 seen head on, at most 1.
+    """
+    shininess = max(2.0 / max(roughness, 0.05) ** 4 - 2.0, 1.0)
+    return min(f0 * (1.0 - roughness) * (shininess + 2.0) / 8.0, 1.0), shininess

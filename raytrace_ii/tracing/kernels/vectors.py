@@ -1,0 +1,78 @@
+"""Places and directions: small helpers of all stages."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ii_core.jit import inline_kernel
+from ii_core.jit import lean_kernel as kernel
+
+from .lanes import BLOCK
+
+
+@inline_kernel
+def put(rows, i, x, y, z):
+    rows[i, 0], rows[i, 1], rows[i, 2] = x, y, z
+
+
+@inline_kernel
+def interpolate(values, f, u, v):
+    w = 1.0 - u - v
+    return (
+        w * values[f, 0, 0] + u * values[f, 1, 0] + v * values[f, 2, 0],
+        w * values[f, 0, 1] + u * values[f, 1, 1] + v * values[f, 2, 1],
+        w * values[f, 0, 2] + u * values[f, 1, 2] + v * values[f, 2, 2],
+    )
+
+
+@inline_kernel
+def start_point(corners, faces, f, u, v):
+    """The hit point drawn a hair towards the middle of its face, for rays to start from.
+
+    On an edge it would lie in the neighbouring face too, which a ray from there cannot meet: light would come in
+    at the corners of a closed room.
+    """
+    u, v, pull = float(u), float(v), float(faces[f, 4])
+    return interpolate(corners, f, u + pull * (1.0 / 3.0 - u), v + pull * (1.0 / 3.0 - v))
+
+
+@inline_kernel
+def edge(corners, f, k):
+    return (
+        np.float64(corners[f, k, 0]) - corners[f, 0, 0],
+        np.float64(corners[f, k, 1]) - corners[f, 0, 1],
+        np.float64(corners[f, k, 2]) - corners[f, 0, 2],
+    )
+
+
+@kernel
+def put_behind(out, i, corners, faces, f, u, v, entering):
+    """A place just behind a face, seen along a ray that enters or leaves by it."""
+    px, py, pz = start_point(corners, faces, f, u, v)
+    lift = -faces[f, 3] if entering else faces[f, 3]
+    put(out, i, px + lift * faces[f, 0], py + lift * faces[f, 1], pz + lift * faces[f, 2])
+
+
+@inline_kernel
+def mix_bits(h):
+    """splitmix64's finaliser (Steele, Lea, Flood 2014)."""
+    h = h + np.uint64(0x9E3779B97F4A7C15)
+    h = (h ^ (h >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    h = (h ^ (h >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return h ^ (h >> np.uint64(31))
+
+
+@inline_kernel
+def three(values, first, k):
+    """Three quantities of a lane that follow each other."""
+    return values[first + k], values[first + BLOCK + k], values[first + 2 * BLOCK + k]
+
+
+@inline_kernel
+def three_doubles(values, first, k):
+    """As `three`, of float32 to float64."""
+    return (
+        np.float64(values[first + k]),
+        np.float64(values[first + BLOCK + k]),
+        np.float64(values[first + 2 * BLOCK + k]),
+    )
