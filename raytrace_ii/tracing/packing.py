@@ -111,7 +111,7 @@ class PackedScene:
         self.surfaces = Surfaces(
             self.corners, self.faces, self.normals, self.coordinates, self.object_of_face, self.materials,
             self.corners.reshape(-1), self.faces.reshape(-1), self.normals.reshape(-1),
-            self.textures.table, self.textures.texels, self.textures.alphas,
+            self.materials.reshape(-1),             self.textures.table, self.textures.texels, self.textures.alphas,
         )  # fmt: skip
         self.surroundings = Surroundings(self.lights, self.background, self.fog, self.ambient)
 

@@ -18,9 +18,9 @@ WRAPS = {"repeat": REPEAT, "mirror": MIRROR, "clamp": CLAMP}
 class TextureTable:
     """Textures as a table (n, COLUMNS), and what their images hold.
 
-    ``texels`` are linear colours (n, 3) of some images and sRGB codes (m, 4) of the others, of which one texel never
-    lies in two cache lines; ``alphas`` those of images that have any. The rows of an image's coarser levels, each of
-    half its size, follow its own.
+    ``texels`` are linear colours, three numbers a texel, of some images, and sRGB codes, four a texel, of the others,
+    of which one texel never lies in two cache lines; ``alphas`` those of images that have any. The rows of an image's
+    coarser levels, each of half its size, follow its own.
     """
 
     def __init__(self, textures: Sequence[Texture | None]) -> None:
@@ -53,7 +53,7 @@ class TextureTable:
         self.table = np.zeros((len(rows), COLUMNS))
         for row, values in zip(self.table, rows, strict=True):
             row[: len(values)] = values
-        self.texels = np.concatenate(self._pixels), np.concatenate(self._codes)
+        self.texels = np.concatenate(self._pixels).reshape(-1), np.concatenate(self._codes).reshape(-1)
         self.alphas = np.concatenate(self._alphas)
         del self._pixels, self._codes, self._alphas
 

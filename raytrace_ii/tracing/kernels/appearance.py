@@ -12,31 +12,26 @@ from ii_core.jit import lean_kernel as kernel
 from . import lanes as at
 from .glossy import highlight
 from .lanes import BLOCK
-from .media import enter, medium_of
+from .media import clearness, enter, medium_of
 from .noise import fractal_lanes
 from .tables import (
     ABSORPTION,
     ALPHA_BLEND,
-    EMISSION,
     EMISSION_MAP,
     EXTRAS,
     GLOSS_MAP,
     IMAGE,
-    LEAST_HALF,
-    LOCAL,
-    METALLIC,
-    MIRROR_SHARE,
+    LANED,
+    MATERIAL_COLUMNS,
     NOISE,
     NORMAL_MAP,
     NORMAL_SCALE,
-    ROUGHNESS,
-    SHININESS,
-    SPECULAR,
     TEXTURE,
-    TRANSMISSION,
-)  # fmt: skip
+)
 from .textures import filtered, noise_colour, share_there, texture_colour
 from .vectors import edge, interpolate, three
+
+_COLUMNS, _EXTRAS = np.uint64(MATERIAL_COLUMNS), np.uint64(EXTRAS)
 
 
 @inner_kernel
@@ -52,7 +47,7 @@ def attenuate(lanes, rays, surfaces, fog, work):
         i, body, t = whole[at.ROW + k], whole[at.BODY + k], np.float64(work.single[at.DISTANCE + k])
         medium = -1
         if rays.inside.shape[1] > 0:
-            if materials[body, EXTRAS] > 0.0 and double[at.ENTERING + k] < 0.0 and _clear(materials, body) > 0.0:
+            if materials[body, EXTRAS] > 0.0 and double[at.ENTERING + k] < 0.0 and clearness(materials, body) > 0.0:
                 enter(rays.inside, i, body)
             medium = medium_of(rays.inside, i, materials, -1)
         if fog.shape[0] > 0:
@@ -72,65 +67,59 @@ def attenuate(lanes, rays, surfaces, fog, work):
 
 
 @inner_kernel
-def _clear(materials, body):
-    return max(materials[body, TRANSMISSION], materials[body, TRANSMISSION + 1], materials[body, TRANSMISSION + 2])
-
-
-@inner_kernel
 def look(lanes, surfaces, surroundings, passage, filtering, work):
     """Shares of scattered, mirrored and transmitted light, highlights, and light given off, of all lanes.
 
     Bodies without anything of ``EXTRAS`` need their row of the table alone.
     """
-    double, whole, materials = work.double, work.whole, surfaces.materials
-    textured, noisy = False, 0
+    double, whole, materials = work.double, work.whole, surfaces.flat_materials
+    textured, noisy, same = False, 0, True
     for k in range(lanes):
-        body = whole[at.BODY + k]
-        local = materials[body, LOCAL]
-        double[at.GLOSS + k], double[at.EXPONENT + k] = materials[body, SPECULAR], materials[body, SHININESS]
-        double[at.HALF_FROM + k] = materials[body, LEAST_HALF]
-        for c in range(3):
-            double[at.E0 + c * BLOCK + k] = double[at.W0 + c * BLOCK + k] * materials[body, EMISSION + c]
-            double[at.K0 + c * BLOCK + k] = materials[body, MIRROR_SHARE + c]
-            double[at.T0 + c * BLOCK + k] = 1.0
-        double[at.METAL + k], double[at.ROUGH + k] = materials[body, METALLIC], materials[body, ROUGHNESS]
-        double[at.CLEAR + k] = 0.0
-        if materials[body, EXTRAS] > 0.0:
-            textured = True
-            local, noise = _look_closely(k, surfaces, passage, filtering, work, noisy)
-            noisy += noise
-        double[at.SCATTERS + k] = 1.0 if local > 0.0 or double[at.GLOSS + k] > 0.0 else 0.0
-        for c in range(3):
-            double[at.R0 + c * BLOCK + k] = local * materials[body, c]
+        same &= whole[at.BODY + k] == whole[at.BODY]
+    if same:
+        row = np.uint64(whole[at.BODY]) * _COLUMNS
+        for c in range(LANED):
+            value = materials[row + np.uint64(c)]
+            for k in range(BLOCK):
+                double[at.R0 + c * BLOCK + k] = value
+    else:
+        for k in range(lanes):
+            row = np.uint64(whole[at.BODY + k]) * _COLUMNS
+            for c in range(LANED):
+                double[at.R0 + c * BLOCK + k] = materials[row + np.uint64(c)]
+    for k in range(lanes):
+        if materials[np.uint64(whole[at.BODY + k]) * _COLUMNS + _EXTRAS] > 0.0:
+            if not textured:
+                textured = True
+                for j in range(3 * BLOCK):
+                    double[at.T0 + j] = 1.0
+            noisy += _look_closely(k, surfaces, passage, filtering, work, noisy)
     if noisy > 0:
         _colour_by_noise(noisy, surfaces, work)
+    for k in range(BLOCK):
+        local = double[at.SCATTERED + k]
+        r, g, b = local * double[at.R0 + k], local * double[at.R1 + k], local * double[at.R2 + k]
+        double[at.R0 + k], double[at.R1 + k], double[at.R2 + k] = r, g, b
     if textured:
-        for k in range(BLOCK):
+        for k in range(3 * BLOCK):
             double[at.R0 + k] *= double[at.T0 + k]
-            double[at.R1 + k] *= double[at.T1 + k]
-            double[at.R2 + k] *= double[at.T2 + k]
     a0, a1, a2 = surroundings.ambient[0], surroundings.ambient[1], surroundings.ambient[2]
     for k in range(BLOCK):
-        r, g, b = (
-            double[at.W0 + k] * double[at.R0 + k],
-            double[at.W1 + k] * double[at.R1 + k],
-            double[at.W2 + k] * double[at.R2 + k],
-        )
+        w0, w1, w2 = double[at.W0 + k], double[at.W1 + k], double[at.W2 + k]
+        r, g, b = w0 * double[at.R0 + k], w1 * double[at.R1 + k], w2 * double[at.R2 + k]
         double[at.R0 + k], double[at.R1 + k], double[at.R2 + k] = r, g, b
-        double[at.E0 + k], double[at.E1 + k], double[at.E2 + k] = (
-            double[at.E0 + k] + r * a0, double[at.E1 + k] + g * a1, double[at.E2 + k] + b * a2,
-        )  # fmt: skip
+        double[at.E0 + k] = w0 * double[at.E0 + k] + r * a0
+        double[at.E1 + k] = w1 * double[at.E1 + k] + g * a1
+        double[at.E2 + k] = w2 * double[at.E2 + k] + b * a2
 
 
-@kernel
+@inner_kernel
 def _look_closely(k, surfaces, passage, filtering, work, noisy):
     """One lane of a body that has maps, a texture, metal, or parts that are seen through.
 
     Returns
     -------
-    local : float
-        Share of the light that is scattered, not yet of the body's colour.
-    noise : int
+    int
         1 if the lane's colour is that of a noise yet to come, else 0.
     """
     single, double, whole, materials = work.single, work.double, work.whole, surfaces.materials
@@ -139,7 +128,7 @@ def _look_closely(k, surfaces, passage, filtering, work, noisy):
     au, av, bu, bv = 0.0, 0.0, 0.0, 0.0
     if filtering:
         au, av, bu, bv = double[at.AU + k], double[at.AV + k], double[at.BU + k], double[at.BV + k]
-    clear = _clear(materials, body)
+    clear = clearness(materials, body)
     double[at.B0 + k], double[at.B1 + k], double[at.B2 + k] = 0.0, 0.0, 0.0
     if passage.spawn and materials[body, ALPHA_BLEND] > 0.0:
         # seen through to the share that is not there; the last generation takes it as there
@@ -147,18 +136,15 @@ def _look_closely(k, surfaces, passage, filtering, work, noisy):
         for c in range(3):
             double[at.B0 + c * BLOCK + k] = (1.0 - there) * double[at.W0 + c * BLOCK + k]
             double[at.W0 + c * BLOCK + k] *= there
-            double[at.E0 + c * BLOCK + k] = double[at.W0 + c * BLOCK + k] * materials[body, EMISSION + c]
     if materials[body, NORMAL_MAP] >= 0:
         _map_normal(k, surfaces, work, au, av, bu, bv)
     if materials[body, EMISSION_MAP] >= 0:
         s0, s1, _ = interpolate(coordinates, f, u, v)
         t0, t1, t2 = filtered(textures, int(materials[body, EMISSION_MAP]), texels, s0, s1, au, av, bu, bv)
-        double[at.E0 + k], double[at.E1 + k], double[at.E2 + k] = (
-            double[at.E0 + k] * t0,
-            double[at.E1 + k] * t1,
-            double[at.E2 + k] * t2,
-        )
-    local, metallic, rough = materials[body, LOCAL], materials[body, METALLIC], materials[body, ROUGHNESS]
+        double[at.E0 + k] *= t0
+        double[at.E1 + k] *= t1
+        double[at.E2 + k] *= t2
+    local, metallic, rough = double[at.SCATTERED + k], double[at.METAL + k], double[at.ROUGH + k]
     t0, t1, t2, noise = 1.0, 1.0, 1.0, 0
     if materials[body, TEXTURE] >= 0 and (local > 0.0 or metallic > 0.0):
         s0, s1, s2 = interpolate(coordinates, f, u, v)
@@ -191,8 +177,9 @@ def _look_closely(k, surfaces, passage, filtering, work, noisy):
             strength, double[at.EXPONENT + k] = highlight((k0 + k1 + k2) / 3.0, rough)
             double[at.GLOSS + k] *= strength
             double[at.HALF_FROM + k] = 0.0
-    double[at.METAL + k], double[at.ROUGH + k], double[at.CLEAR + k] = metallic, rough, clear
-    return local, noise
+        double[at.SCATTERED + k], double[at.METAL + k], double[at.ROUGH + k] = local, metallic, rough
+    double[at.CLEAR + k] = clear
+    return noise
 
 
 @inner_kernel

@@ -64,6 +64,7 @@ class Surfaces(NamedTuple):
     flat_corners: Single
     flat_faces: Single
     flat_normals: Single
+    flat_materials: Double
     textures: Double
     texels: tuple[Single, NDArray[np.uint8]]
     alphas: Single

@@ -31,13 +31,15 @@ def gather(first, hits, rays, surfaces, work):
     last = min(first + BLOCK, hits.faces.shape[0])
     smooth = normals.shape[0] > 0
     lanes = 0
-    for i in range(first, last):
+    for k in range(last - first):
+        i = np.uint64(first + k)
         face = hits.faces[i]
-        whole[at.LANE + i - first] = lanes if face >= 0 else -1
+        whole[at.LANE + k] = lanes if face >= 0 else -1
         if face < 0:
             continue
         f = np.uint64(face)  # unsigned indices into one dimension: numba need not look for negative ones
-        whole[at.ROW + lanes], whole[at.FACE + lanes], whole[at.BODY + lanes] = i, face, surfaces.object_of_face[f]
+        whole[at.ROW + lanes], whole[at.FACE + lanes] = first + k, face
+        whole[at.BODY + lanes] = surfaces.object_of_face[f]
         single[at.U + lanes], single[at.V + lanes], single[at.DISTANCE + lanes] = (
             hits.u[i],
             hits.v[i],
@@ -48,11 +50,11 @@ def gather(first, hits, rays, surfaces, work):
             single[at.WEIGHT + c * BLOCK + lanes] = rays.weights[i, c]
         for c in range(5):
             single[at.FACE_NORMAL + c * BLOCK + lanes] = faces[f * _5 + np.uint64(c)]
-        for k in range(9):
-            single[at.CORNER + k * BLOCK + lanes] = corners[f * _9 + np.uint64(k)]
+        for c in range(9):
+            single[at.CORNER + c * BLOCK + lanes] = corners[f * _9 + np.uint64(c)]
         if smooth:
-            for k in range(9):
-                single[at.NORMAL + k * BLOCK + lanes] = normals[f * _9 + np.uint64(k)]
+            for c in range(9):
+                single[at.NORMAL + c * BLOCK + lanes] = normals[f * _9 + np.uint64(c)]
         lanes += 1
     return lanes
 

@@ -54,14 +54,13 @@ W0, W1, W2 = _offsets(3)  # weights, after fog, media and blending
 F0, F1, F2 = _offsets(3)  # light of the fog before the hit
 B0, B1, B2 = _offsets(3)  # weights of what is seen through a blended surface
 AU, AV, BU, BV = _offsets(4)  # footprint over (u, v)
-R0, R1, R2 = _offsets(3)  # share of each channel that is scattered
+# Columns of the material as they stand in its table: colours scattered, mirrored and given off, share scattered,
+# strength and exponent of the highlight, least cosine at which it is seen, roughness, share of metal.
+R0, R1, R2, K0, K1, K2, E0, E1, E2, SCATTERED, GLOSS, EXPONENT, HALF_FROM, ROUGH, METAL = _offsets(15)
+CLEAR = next(_offset)  # share let through
 T0, T1, T2 = _offsets(3)  # colour of the texture
-E0, E1, E2 = _offsets(3)  # light given off
-K0, K1, K2, CLEAR, ROUGH, METAL = _offsets(6)  # shares mirrored and let through, roughness, share of metal
-SCATTERS, GLOSS, EXPONENT, HALF_FROM = _offsets(
-    4
-)  # whether light counts; highlight: strength, exponent, least cosine
-LX, LY, LZ, COSINE, HALF, CONE = _offsets(6)  # of the light at hand
+LX, LY, LZ, COSINE, HALF, SHINE, CONE = _offsets(7)  # of the light at hand
+C0, C1, C2, STRONGEST = _offsets(4)  # what its shadow rays would let through
 SX, SY, SZ, TOTAL, STRENGTH = _offsets(5)  # noise: place, sum, strength of the octave
 _DOUBLES = next(_offset)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ii_core.jit import inner_kernel
 from ii_core.jit import lean_kernel as kernel
 
@@ -20,7 +22,9 @@ from .tables import (
     SPOT,
     WEAK_SHADOW,
 )  # fmt: skip
-from .vectors import put, three
+from .vectors import three
+
+_TO_LAMP, _ONE = np.float32(0.9999), np.uint64(1)  # how far a shadow ray reaches towards a lamp, in its own lengths
 
 
 @inner_kernel
@@ -41,7 +45,11 @@ def towards_light(lights, light, single, double):
         nx, ny, nz = three(double, at.NX, k)
         cosine = (nx * lx + ny * ly + nz * lz) * norm
         above = double[at.GX + k] * lx + double[at.GY + k] * ly + double[at.GZ + k] * lz > 0.0
-        lit = (cosine > 0.0) & (above | (double[at.SMOOTH + k] > 0.0)) & (double[at.SCATTERS + k] > 0.0)
+        lit = (
+            (cosine > 0.0)
+            & (above | (double[at.SMOOTH + k] > 0.0))
+            & ((double[at.SCATTERED + k] > 0.0) | (double[at.GLOSS + k] > 0.0))
+        )
         double[at.COSINE + k] = cosine if lit else 0.0
         hx, hy, hz = lx * norm - single[at.DX + k], ly * norm - single[at.DY + k], lz * norm - single[at.DZ + k]
         half, square = nx * hx + ny * hy + nz * hz, hx * hx + hy * hy + hz * hz
@@ -73,37 +81,41 @@ def cast(lanes, lights, light, rays, shadows, first, work, counts):
     """
     double, whole = work.double, work.whole
     far = lights[light, 0] == DIRECTIONAL
-    l0, l1, l2 = lights[light, LIGHT_COLOUR], lights[light, LIGHT_COLOUR + 1], lights[light, LIGHT_COLOUR + 2]
-    row = first
     for k in range(lanes):
-        cosine = double[at.COSINE + k]
-        if cosine == 0.0:
-            continue
-        shine, cone = 0.0, double[at.CONE + k]
-        if double[at.HALF + k] > 0.0:
-            shine = double[at.GLOSS + k] * double[at.HALF + k] ** double[at.EXPONENT + k]
+        if double[at.HALF + k] > 0.0 and double[at.COSINE + k] > 0.0:
+            double[at.SHINE + k] = double[at.GLOSS + k] * double[at.HALF + k] ** double[at.EXPONENT + k]
+        else:
+            double[at.SHINE + k] = 0.0
+    l0, l1, l2 = lights[light, LIGHT_COLOUR], lights[light, LIGHT_COLOUR + 1], lights[light, LIGHT_COLOUR + 2]
+    for k in range(BLOCK):
+        cosine, shine, cone = double[at.COSINE + k], double[at.SHINE + k], double[at.CONE + k]
         c0 = (double[at.R0 + k] * cosine + double[at.W0 + k] * shine) * cone * l0
         c1 = (double[at.R1 + k] * cosine + double[at.W1 + k] * shine) * cone * l1
         c2 = (double[at.R2 + k] * cosine + double[at.W2 + k] * shine) * cone * l2
-        if max(c0, c1, c2) < LEAST_WEIGHT:
+        double[at.C0 + k], double[at.C1 + k], double[at.C2 + k] = c0, c1, c2
+        double[at.STRONGEST + k] = max(c0, max(c1, c2))
+    if not far:
+        for k in range(3 * BLOCK):
+            double[at.LX + k] -= double[at.AX + k]
+    reach = FAR if far else _TO_LAMP
+    row = np.uint64(first)
+    for k in range(lanes):
+        if double[at.COSINE + k] == 0.0:
+            continue
+        if double[at.STRONGEST + k] < LEAST_WEIGHT:
             counts[WEAK_SHADOW] += 1
             continue
-        i = whole[at.ROW + k]
-        ax, ay, az = three(double, at.AX, k)
-        lx, ly, lz = three(double, at.LX, k)
-        put(shadows.origins, row, double[at.OX + k] + ax, double[at.OY + k] + ay, double[at.OZ + k] + az)
-        if far:
-            put(shadows.directions, row, lx, ly, lz)
-            shadows.reach[row] = FAR
-        else:
-            put(shadows.directions, row, lx - ax, ly - ay, lz - az)
-            shadows.reach[row] = 0.9999
-        put(shadows.colours, row, c0, c1, c2)
+        i = np.uint64(whole[at.ROW + k])
+        for c in range(3):
+            shadows.origins[row, c] = double[at.OX + c * BLOCK + k] + double[at.AX + c * BLOCK + k]
+            shadows.directions[row, c] = double[at.LX + c * BLOCK + k]
+            shadows.colours[row, c] = double[at.C0 + c * BLOCK + k]
+        shadows.reach[row] = reach
         shadows.pixels[row] = rays.pixels[i]
         for j in range(rays.inside.shape[1]):
             shadows.inside[row, j] = rays.inside[i, j]
-        row += 1
-    return row - first
+        row += _ONE
+    return np.int64(row) - first
 
 
 @kernel

@@ -89,6 +89,12 @@ def disperses(materials, body):
 
 
 @inline_kernel
+def clearness(materials, body):
+    """The largest share of a colour that a body lets through."""
+    return max(materials[body, TRANSMISSION], materials[body, TRANSMISSION + 1], materials[body, TRANSMISSION + 2])
+
+
+@inline_kernel
 def transmits(materials, body):
     return (
         max(materials[body, TRANSMISSION], materials[body, TRANSMISSION + 1], materials[body, TRANSMISSION + 2]) > 0.0

@@ -19,6 +19,7 @@ from numba.extending import intrinsic
 
 from ii_core.jit import exact_kernel as kernel
 from ii_core.jit import inline_kernel
+from ii_core.jit import kernel as lean_kernel
 
 # Rows of a packet.
 _NEAR, _DIRECTION, _TIME, _FAR, _MASK, _FLAGS, _U, _V, _FACE, _GEOMETRY, _INSTANCE = (
@@ -71,6 +72,11 @@ def _pointers_call(typing: Any, address: Any, a: Any, b: Any, c: Any, d: Any) ->
 
 
 _call: Any = intrinsic(_pointers_call)
+
+
+def _reduce(function: Any) -> Any:
+    """A kernel's inner function whose minima may be taken in any order, and so in vectors: packets have no NaN."""
+    return lean_kernel(function, forceinline=True, _nrt=False, error_model="numpy", fastmath={"nnan", "nsz"})
 
 
 @inline_kernel
@@ -131,7 +137,7 @@ def _fill(packet, numbers, width, lane, o, d, i, far):
     numbers[_GEOMETRY * width + lane] = -1
 
 
-@inline_kernel
+@_reduce
 def _spread(packet, first, width):
     """Sum of the sides of the box around a quantity of three rows."""
     total = np.float32(0)

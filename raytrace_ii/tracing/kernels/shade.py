@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ii_core.jit import inner_kernel
 from ii_core.jit import lean_kernel as kernel
 
@@ -65,8 +67,9 @@ def _add_light(first, n, rays, surfaces, surroundings, passage, radiance, work):
     """Add light of the sky, of fog, and that given off or scattered from all around, in the order of the rays."""
     double, whole = work.double, work.whole
     foggy = surroundings.fog.shape[0] > 0
-    for i in range(first, min(first + BLOCK, n)):
-        k, pixel = whole[at.LANE + i - first], rays.pixels[i]
+    for j in range(min(BLOCK, n - first)):
+        i, k = np.uint64(first + j), whole[at.LANE + j]
+        pixel = np.uint64(rays.pixels[i])
         if k < 0:
             b0, b1, b2 = sky_colour(
                 surroundings.background, surfaces.textures, surfaces.texels, float(rays.directions[i, 0]),

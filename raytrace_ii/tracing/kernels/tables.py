@@ -13,11 +13,12 @@ IMAGE, CHECKER, NOISE, VERTEX, STRIPES = 0, 1, 2, 3, 4  # kinds of texture
 REPEAT, MIRROR, CLAMP = 0, 1, 2  # how an image goes on beyond its border
 POINT, DIRECTIONAL, SPOT = 0, 1, 2  # kinds of light
 
-# Columns of the table of materials, a row a body; colours have three.
-COLOUR, MIRROR_SHARE, TRANSMISSION, ABSORPTION = 0, 3, 6, 9
-SPECULAR, SHININESS, PRIORITY, LOCAL, TEXTURE, LEAST_HALF = 12, 13, 14, 15, 16, 17
-EMISSION, IOR, CUTOFF, NORMAL_MAP, NORMAL_SCALE = 18, 21, 24, 25, 26
-ROUGHNESS, METALLIC, GLOSS_MAP, EMISSION_MAP, ALPHA_BLEND, IMAGES, EXTRAS = 27, 28, 29, 30, 31, 32, 33
+# Columns of the table of materials, a row a body; colours have three. The first `LANED` are brought to lanes as they
+# stand, see lanes.py.
+COLOUR, MIRROR_SHARE, EMISSION, LOCAL, SPECULAR, SHININESS, LEAST_HALF = 0, 3, 6, 9, 10, 11, 12
+ROUGHNESS, METALLIC, LANED = 13, 14, 15
+TRANSMISSION, ABSORPTION, IOR, PRIORITY, TEXTURE, CUTOFF, NORMAL_MAP, NORMAL_SCALE = 15, 18, 21, 24, 25, 26, 27, 28
+GLOSS_MAP, EMISSION_MAP, ALPHA_BLEND, IMAGES, EXTRAS = 29, 30, 31, 32, 33
 MATERIAL_COLUMNS = 34
 # Of the table of lights: kind, place or direction, then
 LIGHT_COLOUR, CONE_AXIS, CONE_SCALE, CONE_OFFSET = 4, 7, 10, 11

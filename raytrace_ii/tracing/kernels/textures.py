@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ii_core.colour import LINEAR
 from ii_core.jit import inline_kernel, inner_kernel
 from ii_core.jit import lean_kernel as kernel
@@ -14,6 +16,7 @@ from .vectors import interpolate
 
 MOST_TAPS = 8  # along the longer axis of a filtered ellipse
 SHARPER = 0.5  # levels finer than the filter's width: bilinear reading of a level widens it again
+_1, _2, _3, _4 = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
 
 
 @inner_kernel
@@ -68,16 +71,18 @@ def _image(table, row, texels, u, v):
     w00, w10, w01, w11 = (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy
     pixels, codes = texels
     if table[row, 5] != 0.0:
-        k, m, n, o = codes[a, 0], codes[b, 0], codes[c, 0], codes[d, 0]
+        a, b, c, d = a * _4, b * _4, c * _4, d * _4
+        k, m, n, o = codes[a], codes[b], codes[c], codes[d]
         red = w00 * LINEAR[k] + w10 * LINEAR[m] + w01 * LINEAR[n] + w11 * LINEAR[o]
-        k, m, n, o = codes[a, 1], codes[b, 1], codes[c, 1], codes[d, 1]
+        k, m, n, o = codes[a + _1], codes[b + _1], codes[c + _1], codes[d + _1]
         green = w00 * LINEAR[k] + w10 * LINEAR[m] + w01 * LINEAR[n] + w11 * LINEAR[o]
-        k, m, n, o = codes[a, 2], codes[b, 2], codes[c, 2], codes[d, 2]
+        k, m, n, o = codes[a + _2], codes[b + _2], codes[c + _2], codes[d + _2]
         blue = w00 * LINEAR[k] + w10 * LINEAR[m] + w01 * LINEAR[n] + w11 * LINEAR[o]
     else:
-        red = w00 * pixels[a, 0] + w10 * pixels[b, 0] + w01 * pixels[c, 0] + w11 * pixels[d, 0]
-        green = w00 * pixels[a, 1] + w10 * pixels[b, 1] + w01 * pixels[c, 1] + w11 * pixels[d, 1]
-        blue = w00 * pixels[a, 2] + w10 * pixels[b, 2] + w01 * pixels[c, 2] + w11 * pixels[d, 2]
+        a, b, c, d = a * _3, b * _3, c * _3, d * _3
+        red = w00 * pixels[a] + w10 * pixels[b] + w01 * pixels[c] + w11 * pixels[d]
+        green = w00 * pixels[a + _1] + w10 * pixels[b + _1] + w01 * pixels[c + _1] + w11 * pixels[d + _1]
+        blue = w00 * pixels[a + _2] + w10 * pixels[b + _2] + w01 * pixels[c + _2] + w11 * pixels[d + _2]
     return red, green, blue
 
 
@@ -163,7 +168,7 @@ def _texels_at(table, row, u, v):
     i0, i1 = _wrap(int(i), width, across)
     j0, j1 = _wrap(int(j), height, down)
     a, b = first + j0 * width, first + j1 * width
-    return a + i0, a + i1, b + i0, b + i1, x - i, y - j
+    return np.uint64(a + i0), np.uint64(a + i1), np.uint64(b + i0), np.uint64(b + i1), x - i, y - j
 
 
 @inline_kernel
@@ -216,7 +221,7 @@ def share_there(coordinates, textures, alphas, materials, body, f, u, v, au, av,
 def _alpha(textures, row, alphas, x, y):
     """Alpha of an image at (u, v), bilinear."""
     a, b, c, d, fx, fy = _texels_at(textures, row, x, y)
-    first = int(textures[row, 4]) - int(textures[row, 1])
+    first = np.uint64(int(textures[row, 4]) - int(textures[row, 1]))  # wraps round as an index does
     upper = (1 - fx) * alphas[first + a] + fx * alphas[first + b]
     lower = (1 - fx) * alphas[first + c] + fx * alphas[first + d]
     return (1 - fy) * upper + fy * lower
