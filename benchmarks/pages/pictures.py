@@ -46,7 +46,7 @@ def write_picture(path: str | os.PathLike[str], source: NDArray[np.uint8] | str 
     if ending == "png":
         (with_palette(picture) if chart else picture).save(data, "PNG", optimize=True)
     elif ending == "jpg":
-        picture.save(data, "JPEG", quality=QUALITY, subsampling=0, optimize=True)
+        picture.save(data, "JPEG", quality=QUALITY, subsampling=0, optimize=True, progressive=True)
     else:
         raise ValueError(f"a picture of a page is a .png or .jpg, not {os.fspath(path)}")
     with atomic_path(path) as temporary:

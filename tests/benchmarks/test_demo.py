@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from benchmarks.coding import disparity
 from examples import demo
@@ -15,6 +16,7 @@ from ii_core.files import read_image
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.slow
 def test_the_demo_leaves_everything_it_promises(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["demo", "--scale", "16", "--scenes", "apples", "-o", str(tmp_path)])
     demo.main()

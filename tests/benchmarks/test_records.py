@@ -176,6 +176,7 @@ def test_a_measured_row_replaces_an_unsure_one_wherever_it_stands():
     assert [row["value"] for row in TOY.rows()] == [1]
 
 
+@pytest.mark.slow
 def test_coders_continue_and_take_subsets(monkeypatch, capsys):
     def run(*arguments):
         monkeypatch.setattr("sys.argv", ["coders", "--scale", "64", *arguments])
@@ -215,6 +216,7 @@ def spend(seconds):
         pass
 
 
+@pytest.mark.slow
 def test_fuzz_keeps_a_row_a_scheme_and_continues(monkeypatch):
     monkeypatch.setattr(fuzz, "publish", lambda tables: None)
     for schemes in ("jpeg", "jpeg,si-h264"):

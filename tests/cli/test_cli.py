@@ -118,6 +118,7 @@ def test_several_pictures_an_anchor_and_rates_that_are_found(run, refused, pictu
     refused(run("study", picture, "-o", tmp_path / "t", "--dask", "x:1", "--plugin", "my.py"), "--plugin is for this")
 
 
+@pytest.mark.slow
 def test_a_killed_study_continues_where_it_was(run, picture, tmp_path, monkeypatch):
     """On b1dc540 all points of a killed study were lost."""
     arguments = ["study", picture, "--schemes", "si-h264,si-hevc", "--rates", "0.3,0.6,1,2", "-o", tmp_path / "s"]

@@ -283,6 +283,7 @@ def wait_for(condition, seconds=120):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_a_run_within_two_seconds(tmp_path, number, code):
     """A block of 65536 pixels with 4096 samples takes minutes, and the main thread waits for its end."""

@@ -47,6 +47,7 @@ def command(package, *arguments, ok=True):
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_the_coder_of_the_page_is_a_scheme_of_every_command(package):
     assert "deflate" in command(package, "schemes")
     command(package, "encode", "noise.png", "--scheme", "deflate", "--qp", 3, "-o", "noise.ii")
@@ -76,6 +77,7 @@ def file(package):
     return package
 
 
+@pytest.mark.slow
 def test_the_file_of_the_page_is_known_to_every_command_that_it_is_given_to(file):
     assert "unknown scheme 'deflate'" in command(
         file, "encode", "noise.png", "--scheme", "deflate", "-o", "a.ii", ok=False

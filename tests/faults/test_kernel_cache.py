@@ -48,6 +48,7 @@ def package(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", ["nbi", "nbc"])
 @pytest.mark.parametrize("cut", [0, 1, 30, 0.5, 0.95])
 def test_a_file_cut_short_is_made_again(package, end, cut):
@@ -58,6 +59,7 @@ def test_a_file_cut_short_is_made_again(package, end, cut):
     assert call(package, "old.kernels") == ["42", "1"]
 
 
+@pytest.mark.slow
 def test_a_renamed_folder(package):
     """Its cache names modules that are gone; the source file's time, by which numba goes, is the same."""
     (package / "old").rename(package / "new")

@@ -90,6 +90,7 @@ else:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["save", "render_to"])
 @pytest.mark.parametrize("bound", [True, False])
 def test_a_kill_between_the_two_never_leaves_a_pair_that_loads_wrongly(tmp_path, how, bound):
@@ -160,6 +161,7 @@ with atomic_path(sys.argv[1]) as temporary:
 NEXT = "import sys; from ii_core.files import write_json; write_json(sys.argv[1], 1)"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /proc to tell the dead from the living")
 def test_remains_of_dead_runs_are_removed_and_those_of_the_living_are_not(tmp_path):
     mine = tmp_path / ".mine.ii-tmp-notes.txt"
@@ -202,6 +204,7 @@ def test_a_link_stays_a_link(tmp_path):
     assert (tmp_path / "link.json").is_symlink() and read_json(tmp_path / "real.json") == 5
 
 
+@pytest.mark.slow
 def test_threads_at_once_give_what_they_give_alone():
     camera = preset("setup1", scale=128)
     names = ("objects", "cuboid", "apples", "objects")

@@ -214,6 +214,7 @@ def test_what_a_picture_does_not_allow_is_said_before_any_coding():
     assert set(measuring(bare, ["q_ycbcr", "q_global"])(bare)) == {"q_ycbcr", "q_global"}
 
 
+@pytest.mark.slow
 def test_the_command_charts_all_measures(run, refused, tmp_path):
     a = picture((16, 16))
     a.save(tmp_path / "a.png")

@@ -76,6 +76,7 @@ def _opened():
     return len(calls._opened)
 
 
+@pytest.mark.slow
 def test_a_cluster_of_processes_loses_nothing_when_one_is_killed(scene, whole, run, tmp_path):
     distributed = pytest.importorskip("distributed")
     with (
