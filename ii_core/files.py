@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -57,6 +58,8 @@ MAX_TEXT = 16 << 20  # bytes of a JSON or configuration file; a sidecar has unde
 MAX_DIGITS = 20  # of whole numbers in JSON; 64 bits need 20
 MAX_DEPTH = 100  # of nested lists and objects; ours have 8
 MAX_MESSAGE = 600  # characters of an error that quotes a file
+# A list of numbers that starts with a line break, which no JSON text has inside a string.
+NUMBERS = re.compile(r"\[\n\s*((?:(?:-?\d[\d.eE+-]*|null),\s*)*(?:-?\d[\d.eE+-]*|null))\s*\]")
 NOT_WHOLE = "the file does not hold what was written to it, as if the disk were full"
 
 
@@ -156,8 +159,9 @@ def _whole(digits: str) -> int:
 
 
 def json_text(data: Any) -> str:
-    """Return the JSON text of a value; NaN and infinity become null, which strict readers accept."""
-    return json.dumps(_finite(data), indent=2, ensure_ascii=False) + "\n"
+    """Return the JSON text of a value, lists of numbers on one line; NaN and infinity become null."""
+    text = json.dumps(_finite(data), indent=2, ensure_ascii=False)
+    return NUMBERS.sub(lambda match: f"[{' '.join(match[1].split())}]", text) + "\n"
 
 
 def write_json(path: str | os.PathLike[str], data: Any) -> Path:

@@ -9,7 +9,7 @@ import OpenImageIO as oiio
 import pytest
 
 from ii_core import IICamera, IIPicture, add_sensor_noise
-from ii_core.files import read_image, write_image, write_json
+from ii_core.files import json_text, read_image, write_image, write_json
 
 PEAKS = {"uint8": 255, "uint16": 65535, "float32": 1.0}
 HELD = [
@@ -297,3 +297,10 @@ def test_an_array_of_two_axes_comes_back_as_one_channel(tmp_path, suffix):
     depth[:100] = np.nan
     write_image(tmp_path / f"depth{suffix}", depth)
     np.testing.assert_array_equal(read_image(tmp_path / f"depth{suffix}")[..., 0], depth)
+
+
+def test_json_holds_lists_of_numbers_on_one_line():
+    data = {"a": [1, -2.5, 3e-9, None], "b": [[1, 2], [3]], "c": "[\n 1 ]", "d": [], "e": [*range(2000), "text"]}
+    text = json_text(data)
+    assert json.loads(text) == data
+    assert '"a": [1, -2.5, 3e-09, null]' in text and "[1, 2],\n" in text
