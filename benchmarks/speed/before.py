@@ -10,14 +10,17 @@ As a script, ``python before.py SCENE BAND …``, it is one of these processes: 
 
 from __future__ import annotations
 
+import atexit
 import importlib
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -33,22 +36,26 @@ def nanoseconds(scene: str, repeats: int) -> dict[str, list[float]]:
     bands = BANDS.get(scene, USUAL_BANDS)
     pixels = 8192 * BAND * len(bands)
     found: dict[str, list[float]] = {"now": [], "before": [], "bare": []}
-    with _worktree() as earlier, _process(ROOT, scene, bands) as now, _process(earlier, scene, bands) as before:
+    with _process(ROOT, scene, bands) as now, _process(_worktree(), scene, bands) as before:
         for _ in range(repeats):
             for name, measure in (("now", now), ("before", before), ("bare", before)):
                 found[name].append(measure("bare" if name == "bare" else "render") / pixels * 1e9)
     return found
 
 
-@contextmanager
-def _worktree() -> Iterator[Path]:
-    with tempfile.TemporaryDirectory() as folder:
-        tree = Path(folder) / COMMIT
-        subprocess.run(["git", "-C", str(ROOT), "worktree", "add", "-q", "--detach", str(tree), COMMIT], check=True)
-        try:
-            yield tree
-        finally:
-            subprocess.run(["git", "-C", str(ROOT), "worktree", "remove", "--force", str(tree)], check=True)
+@cache
+def _worktree() -> Path:
+    """A work tree of the earlier code, kept until this process ends: its kernels are compiled once for all scenes."""
+    folder = tempfile.mkdtemp()
+    tree = Path(folder) / COMMIT
+    subprocess.run(["git", "-C", str(ROOT), "worktree", "add", "-q", "--detach", str(tree), COMMIT], check=True)
+
+    def remove() -> None:
+        subprocess.run(["git", "-C", str(ROOT), "worktree", "remove", "--force", str(tree)], check=True)
+        shutil.rmtree(folder)
+
+    atexit.register(remove)
+    return tree
 
 
 @contextmanager
