@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from . import checks
 from .camera import IICamera
 from .checks import Pair, length, place, whole_pair
 
@@ -31,6 +32,7 @@ def panel_display(
     view_angle_deg: float | None = None,
     start_mm: float | None = None,
     lenses: Pair | None = None,
+    enlarge: float = 1.0,
     name: str = "panel",
 ) -> PanelDesign:
     """Design the camera whose picture a panel behind lenses has to show.
@@ -56,6 +58,8 @@ def panel_display(
         How far before the display the scene may reach; half of d if not given.
     lenses : (K, L), optional
         Lenses of a sheet that is there: its pitch is kept, and elementary images need not have whole pixels.
+    enlarge : float
+        How many times as large the display shows the scene: lengths of the camera are those of the display over it.
     name : str
 
     Returns
@@ -68,6 +72,8 @@ def panel_display(
         If a value is out of range, gap and angle are both given, or a lens covers less than 2 pixels.
     """
     across, down = whole_pair("pixels", pixels)
+    if not 0 < checks.number("enlarge", enlarge) < math.inf:
+        raise ValueError(f"enlarge is {enlarge:g}: a positive factor is needed")
     wish, viewer = length("lens_pitch_mm", lens_pitch_mm), length("viewer_mm", viewer_mm)
     width, height = _panel(size_mm, (across, down))
     pixel = width / across
@@ -95,13 +101,18 @@ def panel_display(
         if used != (across, down):
             notes.append(f"the picture has {used[0]}×{used[1]} of the panel's pixels: show it in the middle")
     camera = IICamera(
-        pixels=used, lenses=lenses, pixel_pitch_mm=pixel, gap_mm=gap, lens_pitch_mm=(pitch, pitch), optics=("grin",),  # type: ignore[arg-type]
-        start_mm=viewer / 2 if start_mm is None else start_mm, viewer_mm=viewer, name=name,
+        pixels=used, lenses=lenses, pixel_pitch_mm=pixel / enlarge, gap_mm=gap / enlarge, optics=("grin",),  # type: ignore[arg-type]
+        lens_pitch_mm=(pitch / enlarge, pitch / enlarge), viewer_mm=viewer / enlarge,
+        start_mm=(viewer / 2 if start_mm is None else start_mm) / enlarge, name=name,
     )  # fmt: skip
-    zone = camera.ei_pitch_mm[0] * viewer / gap
+    zone = camera.ei_pitch_mm[0] * enlarge * viewer / gap
     notes.append(
         f"at {viewer:g} mm the viewing zone is {zone:.4g} mm wide, its views {zone / camera.ei_pixels[0]:.3g} mm"
     )
+    if enlarge != 1:
+        notes.append(
+            f"the scene is shown {enlarge:g} times as large: the camera is the display, {enlarge:g} times smaller"
+        )
     return PanelDesign(camera, tuple(notes))
 
 

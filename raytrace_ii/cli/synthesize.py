@@ -40,7 +40,8 @@ def camera(
     design: Annotated[
         str | None,
         typer.Option(
-            help="A display: panel=15.6in,pixels=3840x2160,pitch=1mm,distance=600mm; also gap, angle, start, lenses."
+            help="A display: panel=15.6in,pixels=3840x2160,pitch=1mm,distance=600mm; also gap, angle, start, lenses, "
+            "enlarge."
         ),
     ] = None,
     solve: Annotated[
@@ -95,6 +96,7 @@ def _print_solution(text: str) -> None:
 
 
 LENGTHS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, '"': 25.4}
+NUMBERS = {"angle": "view_angle_deg", "enlarge": "enlarge"}
 WISHES = {"pitch": "lens_pitch_mm", "distance": "viewer_mm", "gap": "gap_mm", "start": "start_mm"}
 
 
@@ -113,10 +115,10 @@ def _design(text: str, output: Path | None, force: bool) -> None:
             wishes["size_mm"] = _sides(value)
         elif key in ("pixels", "lenses"):
             wishes[key] = pair(key, value)
-        elif key == "angle":
-            wishes["view_angle_deg"] = _number(key, value)
+        elif key in NUMBERS:
+            wishes[NUMBERS[key]] = _number(key, value)
         else:
-            known = ", ".join(["panel", "pixels", *WISHES, "angle", "lenses"])
+            known = ", ".join(["panel", "pixels", *WISHES, *NUMBERS, "lenses"])
             raise ValueError(f"{item!r} is no wish for a design: known are {known}")
     needed = {"size_mm": "panel", "pixels": "pixels", "lens_pitch_mm": "pitch", "viewer_mm": "distance"}
     if missing := [key for name, key in needed.items() if name not in wishes]:

@@ -262,6 +262,16 @@ def test_a_display_for_a_panel_in_closed_form():
     np.testing.assert_allclose(L - D * ((600 - 300) / camera.gap_mm), [0, 0, camera.gap_mm - 600], atol=1e-9)
 
 
+def test_an_enlarged_scene_is_seen_through_a_smaller_display():
+    large, camera = panel_display(**PANEL, enlarge=7).camera, panel_display(**PANEL).camera
+    (a, b), (c, d) = large.rays_at(5, 700), camera.rays_at(5, 700)
+    np.testing.assert_allclose(a * 7, c)
+    np.testing.assert_allclose(b * 7, d)
+    assert large.viewer_mm * 7 == pytest.approx(600) and large.pixels == camera.pixels and large.regular
+    with pytest.raises(ValueError, match="enlarge is 0: a positive factor"):
+        panel_display(**PANEL, enlarge=0)
+
+
 def test_a_sheet_that_is_there_keeps_its_pitch_and_lenses_off_the_panel_are_said():
     made = panel_display(**PANEL, lenses=(345, 190), gap_mm=2.5)
     assert made.camera.lens_pitch_mm == (1.0, 1.0) and not made.camera.regular
