@@ -3,6 +3,7 @@
 from .calibration import Calibration, NoLenses, calibrate, calibrated_picture, centres_picture
 from .camera import Camera, IICamera
 from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
+from .disparity import depth_of_disparity, disparity_of_depth
 from .display.eye import Eye, EyeImage, eye_image
 from .display.model import DisplayModel
 from .display.notebook import EmbeddedViewer, embed_viewer
@@ -11,6 +12,7 @@ from .formats.find import find_views, picture_of
 from .formats.hci import write_hci
 from .formats.mosaic import load_mosaic
 from .formats.quilt import write_quilt
+from .formats.rig import Rig
 from .formats.views import write_views
 from .maps import MapCamera, read_maps, write_maps
 from .panel import PanelDesign, panel_display
@@ -34,6 +36,7 @@ __all__ = [
     "MapCamera",
     "NoLenses",
     "PanelDesign",
+    "Rig",
     "ViewingZone",
     "add_sensor_noise",
     "calibrate",
@@ -44,6 +47,8 @@ __all__ = [
     "component_images",
     "converging_distance",
     "crosstalk",
+    "depth_of_disparity",
+    "disparity_of_depth",
     "elementary_images",
     "embed_viewer",
     "eye_image",

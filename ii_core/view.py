@@ -210,15 +210,15 @@ def refocus(picture: IIPicture, depth_mm: float) -> NDArray[np.float32]:
         In code values. A pixel is the mean over the sub-images that cover it.
     """
     camera = camera_of(picture)
-    start = camera.gap_mm - camera.start_mm
+    start = camera.origin_mm[2] + camera.gap_mm - camera.start_mm
     if not start <= checks.within("depth_mm", depth_mm, -checks.MOST_MM, checks.MOST_MM, "depth", " mm"):
         where = f"where rays start, {start:g} mm" if camera.start_mm else f"the lens plane at {start:g} mm"
         raise ValueError(f"depth_mm {depth_mm:g} is not beyond {where}")
     stack = sub_images(picture)
     v_count, u_count, rows, cols, _ = stack.shape
     sign = -1.0 if picture.erect else 1.0
-    per_step = sign * camera.pixel_pitch_mm * (depth_mm - camera.gap_mm) / camera.gap_mm
-    per_step /= widening(camera, depth_mm - camera.gap_mm)
+    beyond = depth_mm - camera.origin_mm[2] - camera.gap_mm
+    per_step = sign * camera.pixel_pitch_mm * beyond / camera.gap_mm / widening(camera, beyond)
     total, weight = np.zeros((rows, cols, 3)), np.zeros((rows, cols, 1))
     for v in range(v_count):
         i0, i1, di, in_y = _shifted(rows, (v - (v_count - 1) / 2) * per_step / camera.lens_pitch_mm[1])

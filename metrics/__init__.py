@@ -6,7 +6,7 @@ from .angle import q_angle_ssim, q_angle_ycbcr
 from .batch import measuring
 from .builtin_measures import MEASURES
 from .depth.focus import FocusDepth, depth_from_focus
-from .depth.layers import covering_layers, linear_layers, logarithmic_layers
+from .depth.layers import covering_layers, disparity_layers, linear_layers, logarithmic_layers
 from .depth.q_depth import q_depth
 from .differences import differences, mean_differences
 from .global_angle import angle_axes, mean_q_angle, q_angle, q_global
@@ -49,6 +49,7 @@ __all__ = [
     "depth_over_rate",
     "depth_rate_chart",
     "differences",
+    "disparity_layers",
     "error_map",
     "known_measures",
     "linear_layers",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +72,13 @@ def picture_of(
     for a, b in np.ndindex(*views.shape):
         row, col = order.place(a, b, views.shape)
         pixels[row::rows, col::cols] = views.read(a, b)
-    picture = IIPicture(pixels, (width, height), (cols, rows))
+    camera = None
+    if views.structure is None and views.rig is not None:
+        if cols == rows:
+            camera = views.rig.camera((cols, rows), (width, height))
+        else:
+            warnings.warn(f"{cols}×{rows} views get no camera: as many down as across are needed", stacklevel=2)
+    picture = IIPicture(pixels, (width, height), (cols, rows), camera)
     if views.structure is None:
         return picture, order
     known = IIPicture.from_structure_json(pixels, views.structure)

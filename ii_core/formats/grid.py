@@ -15,6 +15,7 @@ from ..camera import Pair
 from ..files import read_image
 from ..picture import IIPicture
 from .order import Read
+from .rig import Rig
 
 WHOLE_ORDER = frozenset(("transposed", "flip_down", "flip_across"))
 
@@ -33,12 +34,15 @@ class Views:
         Parts of an `Arrangement` that the layout fixes at their defaults.
     structure : dict, optional
         Structure of the original picture, if `write_views` stored it.
+    rig : Rig, optional
+        Measures of the cameras, if the layout holds them.
     """
 
     shape: tuple[int, int]
     read: Read
     known: frozenset[str] = frozenset()
     structure: dict[str, Any] | None = None
+    rig: Rig | None = None
 
 
 def listed(files: list[Path], grid: Pair, known: frozenset[str]) -> Views:

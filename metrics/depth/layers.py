@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IICamera, checks
+from ii_core import IICamera, checks, depth_of_disparity
 
 LAYERS = 250
 ALIKE = 1e-6  # relative tolerance of equal depths: rounding of a float32 map
@@ -26,8 +26,12 @@ def linear_layers(camera: IICamera, count: int = LAYERS) -> Floats:
 
 
 def virtual_viewpoint(camera: IICamera) -> Floats:
-    """Return V = (0, 0, Λ − K·Λ), in front of the middle of the array, in camera coordinates."""
-    return np.array([0.0, 0.0, camera.gap_mm * (1 - camera.lenses[0])]) + camera.origin_mm
+    """Return V = (0, 0, Λ − K·Λ), in front of the middle of the array, in camera coordinates.
+
+    If viewing zones meet at a distance d, V = (0, 0, Λ − d), where every lens shows its own elementary image.
+    """
+    distance = camera.viewer_mm or camera.gap_mm * camera.lenses[0]
+    return np.array([0.0, 0.0, camera.gap_mm - distance]) + camera.origin_mm
 
 
 @checks.checked(near_mm=checks.number, far_mm=checks.number, count=checks.whole)
@@ -53,18 +57,45 @@ def covering_layers(camera: IICamera, depth_mm: ArrayLike | None = None, count: 
         1)Λ. At 3Λ the disparity between neighbouring lenses is half an elementary image; nearer points are in no
         other elementary image. At (M + 1)Λ the disparity is one pixel over all lenses of an array of M pixels.
     count : int
-        Number of layers. Distances from the pixel array grow by one ratio from layer to layer.
+        Number of layers. Distances from the pixel array, or from where rays start if the camera has a ``start_mm``,
+        grow by one ratio from layer to layer.
 
     Returns
     -------
     ndarray of float64, (count,) or (1,)
     """
-    z = np.asarray([] if depth_mm is None else depth_mm, np.float64) - camera.origin_mm[2]
+    start = camera.gap_mm - camera.start_mm if camera.start_mm else 0.0
+    base = camera.origin_mm[2] + start
+    z = np.asarray([] if depth_mm is None else depth_mm, np.float64) - base
     z = z[np.isfinite(z) & (z > 0)]
     near, far = (z.min(), z.max()) if z.size else (3 * camera.gap_mm, (camera.pixels[0] + 1) * camera.gap_mm)
     if not far > near * (1 + ALIKE):
-        return np.array([near + camera.origin_mm[2]])
-    return logarithmic_layers(near, far, count) + camera.origin_mm[2]
+        return np.array([near + base])
+    return logarithmic_layers(near, far, count) + base
+
+
+@checks.checked(camera=checks.instance(IICamera), low=checks.number, high=checks.number, count=checks.whole)
+def disparity_layers(camera: IICamera, low: float, high: float, count: int = LAYERS) -> Floats:
+    """Return layers of equal steps in disparity, mm: of both signs if the camera sees both sides of its lens plane.
+
+    Parameters
+    ----------
+    camera : IICamera
+    low, high : float
+        Disparities of the farthest and the nearest layer, view pixels a step between views.
+    count : int
+
+    Raises
+    ------
+    ValueError
+        If ``low`` is not below ``high``, or no depth before the camera has one of the disparities.
+    """
+    if not low < high or count < 2:
+        raise ValueError(f"low is {low}, high {high}, count {count}: low < high and at least 2 layers are needed")
+    layers = depth_of_disparity(camera, np.linspace(high, low, count))
+    if not (np.isfinite(layers).all() and layers[0] > 0 and (np.diff(layers) > 0).all()):
+        raise ValueError(f"no depth before the camera has a disparity from {low:g} to {high:g} px")
+    return layers
 
 
 def logarithmic(layers_mm: Floats) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +21,9 @@ from .common import (
 )
 from .plugins import Plugins, load_plugins
 from .words import say
+
+if TYPE_CHECKING:
+    from ii_core import Rig
 
 
 @app.command()
@@ -82,30 +85,64 @@ def import_(
     flip_across: Annotated[
         bool | None, typer.Option("--flip-across/--no-flip-across", help="Views are numbered from right to left.")
     ] = None,
+    camera: Annotated[str | None, typer.Option(help="Camera of the II-picture: a .json file or a name.")] = None,
+    baseline_mm: Annotated[float | None, typer.Option(help="From camera to camera of an array of cameras.")] = None,
+    focal_mm: Annotated[float | None, typer.Option(help="Focal length of each.")] = None,
+    sensor_mm: Annotated[float | None, typer.Option(help="Longer side of the sensor of each.")] = None,
+    focus_mm: Annotated[
+        float | None, typer.Option(help="From the cameras to where views agree; infinity by default.")
+    ] = None,
     force: Force = False,
 ) -> None:
     """Import a light field of other programs as an II-picture.
 
-    The arrangement of views is estimated from the pictures and printed.
+    The arrangement of views is estimated from the pictures and printed. The camera is read from the parameters.cfg of
+    an HCI folder, or given: --camera, or --baseline-mm, --focal-mm and --sensor-mm.
     """
-    from ii_core import find_views, load_mosaic, picture_of
+    from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset
     from ii_core.files import check_type, image_types
     from ii_core.picture import sidecar
 
     image_types(output)
     check_outputs([output, sidecar(output)], force)
+    rig = _rig(camera, baseline_mm, focal_mm, sensor_mm, focus_mm)
+    known = None if camera is None else preset(camera)
     if ei_pixels is not None:
         made, order = load_mosaic(source, pair("ei-pixels", ei_pixels)), None
     else:
         views = find_views(source, grid=None if grid is None else pair("grid", grid))
         with spinner(f"import {source.name}"):
             made, order = picture_of(views, transposed=transposed, flip_down=flip_down, flip_across=flip_across)
+    if rig is not None:
+        known = rig.camera(made.ei_pixels, made.lenses)
+    if known is not None:
+        made = IIPicture(made.pixels, known.lenses, known.ei_pixels, known, known.erect)
     check_type(output, made.pixels.dtype.name)
     made.save(output)
     (k, l), (u, v) = made.lenses, made.ei_pixels
     say(f"{output}: {k}×{l} lenses of {u}×{v} px, {made.pixels.dtype}")
     if order is not None:
         say(order.describe())
+    if made.camera is None:
+        say("no camera is known: measures of views and of depth need one")
+
+
+def _rig(
+    camera: str | None, baseline_mm: float | None, focal_mm: float | None, sensor_mm: float | None,
+    focus_mm: float | None,
+) -> Rig | None:  # fmt: skip
+    """The array of cameras of the options; ValueError if some of it is missing."""
+    from ii_core import Rig
+
+    needed = {"baseline-mm": baseline_mm, "focal-mm": focal_mm, "sensor-mm": sensor_mm}
+    missing = [name for name, value in needed.items() if value is None]
+    if len(missing) == len(needed) and focus_mm is None:
+        return None
+    if missing or camera is not None:
+        what = f"{missing[0]} is missing" if missing else "camera is given, too"
+        raise ValueError(f"{what}: an array of cameras needs baseline-mm, focal-mm and sensor-mm, or camera instead")
+    assert baseline_mm is not None and focal_mm is not None and sensor_mm is not None
+    return Rig(baseline_mm=baseline_mm, focal_mm=focal_mm, sensor_mm=sensor_mm, focus_mm=focus_mm)
 
 
 @app.command()

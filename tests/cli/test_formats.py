@@ -83,3 +83,24 @@ def test_refused(run, refused, shot, tmp_path):
     (tmp_path / "full" / "x").touch()
     refused(run("components", shot, "-o", tmp_path / "full"), "is not empty: --force")
     assert not out.exists()
+
+
+def test_imported_views_get_a_camera(run, refused, shot, tmp_path):
+    """By the measures of an array of cameras, or from a file; what is incomplete is refused before any work."""
+    views, out = tmp_path / "v", tmp_path / "p.png"
+    assert run("export", shot, "--to", "views", "-o", views)[0] == 0
+    (views / "structure.json").unlink()
+    rig = ("--baseline-mm", 5, "--focal-mm", 50)
+    refused(run("import", views, "-o", out, *rig), "sensor-mm is missing")
+    refused(run("import", views, "-o", out, *rig, "--sensor-mm", 35, "--camera", "setup1"), "camera is given, too")
+    assert "no camera is known" in run("import", views, "-o", out)[1]
+    code, said, _ = run("import", views, "-o", out, *rig, "--sensor-mm", 35, "--focus-mm", 800, "--force")
+    assert code == 0 and "no camera" not in said
+    camera = IIPicture.load(out).camera
+    assert camera.viewer_mm == 800 and camera.start_mm == 800
+    import json
+
+    (tmp_path / "c.json").write_text(json.dumps(preset("setup1", scale=16).to_json()))
+    assert run("import", views, "-o", out, "--camera", tmp_path / "c.json", "--force")[0] == 0
+    assert IIPicture.load(out).camera.lens_pitch_mm == preset("setup1", scale=16).lens_pitch_mm
+    refused(run("import", views, "-o", out, "--camera", "setup3", "--force"), "64×64 lenses of 64×64 px need")
