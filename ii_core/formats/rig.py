@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..camera import IICamera, Pair
-from ..checks import positive, whole_pair
+from ..checks import length, whole_pair
 
 FAR_DISPARITY = 1e-4  # pixels a view: with this the plane of zero disparity stands for infinity
 
@@ -44,9 +44,9 @@ class Rig:
 
     def __post_init__(self) -> None:
         for name in ("baseline_mm", "focal_mm", "sensor_mm"):
-            object.__setattr__(self, name, positive(name, getattr(self, name)))
+            object.__setattr__(self, name, length(name, getattr(self, name)))
         if self.focus_mm is not None:
-            object.__setattr__(self, "focus_mm", positive("focus_mm", self.focus_mm))
+            object.__setattr__(self, "focus_mm", length("focus_mm", self.focus_mm))
 
     def camera(self, views: Pair, size: Pair, *, name: str = "views") -> IICamera:
         """Return the II-camera whose sub-images are the views.
