@@ -154,6 +154,7 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/coders*",),
         ),
         Benchmark("coding.takes", records=OWN, fills=("docs/video.md",), writes=(f"{IMAGES}/takes.*",)),
+        Benchmark("pages.video", writes=(f"{IMAGES}/takes_*",)),
         Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),

@@ -19,7 +19,7 @@ from ..scene.keyframes import Track, looking_pose, turned_pose
 from ..scene.scene import Scene
 from ..shapes.primitives import rotation
 from .load import GLTF_TYPES, MeshFiles, SceneLoader, built, is_mesh, mesh_scene, scene_path, warn_of, working_place
-from .toml_schema import TrackTable, checked_tables
+from .toml_schema import ObjectTable, TrackTable, check_shape, checked_tables
 
 DEFAULT_FPS = 24.0
 CAMERA_KEYS = {"position_mm": 3, "look_at_mm": 3, "rotate_deg": 3}
@@ -156,7 +156,9 @@ class Take:
 
     def _check_frame(self, frame: float) -> None:
         try:
-            checked_tables(self._data_at(frame / self.fps))
+            file = checked_tables(self._data_at(frame / self.fps))
+            for i, value in enumerate(file.object):
+                _check_object(i, value)
         except ValueError as error:
             raise ValueError(f"frame {frame:g}: {error}") from None
 
@@ -204,6 +206,13 @@ def load_take(name: str | os.PathLike[str], *, clip: str | None = None, fps: flo
         As `load_scene`; or if nothing moves, or a keyframe names what is not there.
     """
     return Take(scene_path(name), clip=clip, fps=fps)
+
+
+def _check_object(i: int, value: ObjectTable) -> None:
+    try:
+        check_shape(value.model_extra or {})
+    except ValueError as error:
+        raise ValueError(f"object.{i} ({value.name}): {error}") from None
 
 
 def _rate(fps: float) -> float:

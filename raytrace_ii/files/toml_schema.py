@@ -279,6 +279,17 @@ def parse_mesh(parameters: dict[str, Any]) -> MeshFile:
         raise ValueError(_first(error)) from None
 
 
+def check_shape(parameters: dict[str, Any]) -> None:
+    """Raise ValueError unless these are the parameters of a shape or a mesh file; nothing is modelled or read."""
+    try:
+        if "mesh" in parameters:
+            _checked(MeshFile, parameters)
+        else:
+            _checked(_ShapeHolder, {"value": parameters})
+    except ValidationError as error:
+        raise ValueError(_first(error)) from None
+
+
 def parse_shape(parameters: dict[str, Any]) -> tuple[Mesh, str]:
     """The mesh that an object's own parameters describe, and the shape's name."""
     try:

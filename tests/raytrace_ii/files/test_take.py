@@ -135,6 +135,11 @@ values = [[-10, 0, 40], [10, 0, 40]]
         ('key = "scale"', 'key = "sclae"', "sclae"),
         ("values = [1, 3]", "values = [1, -3]", "frame 5: object.1.scale"),
         ("values = [1, 3]", "values = [1]", "a value for each"),
+        (
+            'key = "scale"\nframes = [0, 10]\nvalues = [1, 3]',
+            'key = "radius_mm"\nframes = [0, 8]\nvalues = [1, -3]',
+            r"frame 5: object.1 \(ball a\): radius_mm",
+        ),
         ('of = ["object.ball a"]\nkey = "scale"', 'of = ["object.ball a"]\nkey = "position_mm"', "by another track"),
         ("values = [[0, 0, 0], [0, 4, 0]]", "values = [0, 1]", "3 numbers"),
         ("frames = 11", "frames = 0", "frames: 0"),

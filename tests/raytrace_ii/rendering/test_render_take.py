@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -43,6 +44,14 @@ def test_frames_are_the_stills_of_their_instant(take, tmp_path):
         assert shown.camera == CAMERA
         assert (tmp_path / "out" / f"frame_{number:04}_s.exr").is_file()
         np.testing.assert_allclose(manifest["frames"][str(number)]["pose"], take.pose_at(t))
+
+
+def test_other_executors_give_the_same_files(take, tmp_path):
+    render_take(take, tmp_path / "a", CAMERA, frames=[2], workers=1)
+    with ThreadPoolExecutor(2) as pool:
+        render_take(take, tmp_path / "b", CAMERA, frames=[2], executor=pool)
+    files = [(tmp_path / name / "frame_0002.png").read_bytes() for name in "ab"]
+    assert files[0] == files[1]
 
 
 def test_only_what_a_keyframe_changes_is_made_again(take, tmp_path):
