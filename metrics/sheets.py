@@ -42,12 +42,7 @@ def plot_angle(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike
     reference, decoded : IIPicture
         As for `q_angle`; with a camera the axes are degrees, else pixels of the elementary image.
     path : path
-        .png, .pdf or .svg; replaced whole.
-
-    Returns
-    -------
-    Path
-        The file.
+        .png, .pdf or .svg; replaced whole, and returned.
 
     Raises
     ------
@@ -70,12 +65,7 @@ def plot_error_views(reference: IIPicture, decoded: IIPicture, path: str | os.Pa
     reference, decoded : IIPicture
         Of the same structure and type; the reference has a camera.
     path : path
-        .png, .pdf or .svg; replaced whole.
-
-    Returns
-    -------
-    Path
-        The file.
+        .png, .pdf or .svg; replaced whole, and returned.
 
     Raises
     ------

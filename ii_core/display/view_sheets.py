@@ -30,12 +30,7 @@ def plot_views(reference: IIPicture, decoded: IIPicture, path: str | os.PathLike
     reference, decoded : IIPicture
         Of the same structure and type; the reference has a camera.
     path : path
-        .png, .pdf or .svg; replaced whole.
-
-    Returns
-    -------
-    Path
-        The file.
+        .png, .pdf or .svg; replaced whole, and returned.
 
     Raises
     ------
@@ -86,12 +81,7 @@ def plot_pair(picture: IIPicture, path: str | os.PathLike[str]) -> Path:
     picture : IIPicture
         Regular, with its camera.
     path : path
-        .png, .pdf or .svg; replaced whole.
-
-    Returns
-    -------
-    Path
-        The file.
+        .png, .pdf or .svg; replaced whole, and returned.
 
     Raises
     ------

@@ -66,12 +66,7 @@ def plot_depth(quality: DepthQuality, path: str | os.PathLike[str]) -> Path:
     quality : DepthQuality
         From `q_depth`.
     path : path
-        .png, .pdf or .svg; replaced whole.
-
-    Returns
-    -------
-    Path
-        The file.
+        .png, .pdf or .svg; replaced whole, and returned.
 
     Raises
     ------

@@ -74,12 +74,7 @@ def depth_rate_chart(study: Mapping[str, Any], path: str | os.PathLike[str]) -> 
     study : dict
         From `read_study`, measured with q_depth_min, q_depth_mean and q_depth_max.
     path : path
-        .png, .pdf or .svg; replaced whole.
-
-    Returns
-    -------
-    Path
-        The file.
+        .png, .pdf or .svg; replaced whole, and returned.
 
     Raises
     ------

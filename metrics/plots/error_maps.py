@@ -50,12 +50,7 @@ def plot_error_layers(reference: IIPicture, quality: DepthQuality, path: str | o
     quality : DepthQuality
         Of that picture, from `q_depth`.
     path : path
-        .png, .pdf or .svg; replaced whole.
-
-    Returns
-    -------
-    Path
-        The file.
+        .png, .pdf or .svg; replaced whole, and returned.
 
     Raises
     ------

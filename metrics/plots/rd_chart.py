@@ -31,14 +31,9 @@ def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str], *, measure:
     study : dict
         From `read_study`.
     path : path
-        .png, .pdf or .svg; replaced whole.
+        .png, .pdf or .svg; replaced whole, and returned.
     measure : str
         Name of a measure that the study holds.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------

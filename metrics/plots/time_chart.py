@@ -24,12 +24,7 @@ def time_chart(takes: Mapping[str, TakeQuality], path: str | os.PathLike[str]) -
     takes : mapping of str to TakeQuality
         By what the legend calls them.
     path : path
-        .png, .pdf or .svg; replaced whole.
-
-    Returns
-    -------
-    Path
-        The file.
+        .png, .pdf or .svg; replaced whole, and returned.
 
     Raises
     ------
