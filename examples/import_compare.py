@@ -1,4 +1,4 @@
-"""A light field from elsewhere: import its views, code them by several schemes, compare.
+"""Import of a light field from other programs, and comparison of several schemes on it.
 
 python examples/import_compare.py FOLDER [--bpp 0.5] [--schemes si-hevc,si-av1,jpeg2000] [-o compared.html]
 FOLDER holds one picture a view, with two numbers in each name, row and column.

@@ -1,4 +1,4 @@
-"""A film of quilts for a Looking Glass display: the camera goes round the scene.
+"""Film of quilts for a Looking Glass display, with a camera around the scene.
 
 python examples/quilt_film.py [--scene apples] [--scale 4] [--frames 24] [--tiles 8x6] [-o film_qs8x6a1.5.mp4]
 """

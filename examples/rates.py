@@ -1,4 +1,4 @@
-"""Quality of a scheme over rate, as a table: a loop over rates.
+"""Table of the quality of a scheme over rate.
 
 python examples/rates.py [--scene apples] [--scale 8] [--scheme si-hevc] [--rates 0.1,0.2,0.4]
 """

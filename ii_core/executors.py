@@ -1,4 +1,4 @@
-"""Where calls run: threads, the processes of an executor, the workers of a dask cluster.
+"""Execution of calls by threads, processes of an executor, or workers of a dask cluster.
 
 The work, a callable with its data, goes once to each process. Threads share it; a dask cluster gets it as a task of
 its own, which its workers hand on among themselves and do again if the one that had it dies; the processes of any

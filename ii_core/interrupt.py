@@ -1,4 +1,4 @@
-"""Ctrl-C while compiled code runs: Python handles signals in the main thread, between its own instructions only."""
+"""Ctrl-C during compiled code: control returns to Python within two seconds."""
 
 from __future__ import annotations
 

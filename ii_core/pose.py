@@ -1,4 +1,4 @@
-"""Pose of a camera: where it stands in the scene, where it looks and how it is turned."""
+"""Pose of a camera: position, direction of view and rotation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Progress of long work, as one line of text."""
+"""Progress of long computations as one line of text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Light as a wave through one lenslet, and point-spread functions of pixels.
+"""Wave optics of one lenslet, and point-spread functions of pixels.
 
 Scalar fields in one or two dimensions; a field in one dimension is that of a slit with a cylinder lens, which is also
 each axis of a square lens near the axis. Lengths in mm, intensities of sum 1.

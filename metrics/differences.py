@@ -1,4 +1,4 @@
-"""Differences of the schemes of a study to one of them, the anchor: gain, BD-rate and difference at equal rate."""
+"""Differences between the schemes of a study and an anchor: gain, BD-rate, difference at equal rate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Calibration of lenslet pictures against cameras that are known: errors of pitch, turn and centres.
+"""Calibration of lenslet pictures of known cameras: errors of pitch, rotation and centres.
 
     python -m benchmarks run calibration
 

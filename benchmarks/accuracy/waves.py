@@ -1,4 +1,4 @@
-"""Rays against waves: error of pictures by rays and by a point-spread model, over pitch, gap, wavelength and depth.
+"""Ray optics against wave optics: error of pictures by rays and by a point-spread model.
 
     python -m benchmarks run waves
 

@@ -1,4 +1,4 @@
-"""Takes coded in every order over view and time: rate against stills, random access, and speed against disparity.
+"""Coding of takes in every order over view and time: rate against stills, random access, CPU time.
 
     python -m benchmarks run takes [--scale 8] [--takes apples,car,cuboid]
 

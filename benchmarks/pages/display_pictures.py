@@ -1,4 +1,4 @@
-"""Pictures of docs/display.md: what an eye sees of displays with one fault each, and where zones end.
+"""Pictures of docs/display.md: an eye's views of displays with one fault each, and viewing zones.
 
     python -m benchmarks run display_pictures
 

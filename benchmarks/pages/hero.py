@@ -1,4 +1,4 @@
-"""Moving picture at the head of the README: ``python -m benchmarks run hero``.
+"""Animation at the head of the README: ``python -m benchmarks run hero``.
 
 *Apples* through full *setup1* with 16 samples a pixel, seen along an ellipse in the viewing zone, as `raytrace-ii
 display` makes it. Rendering takes three minutes of CPU time.

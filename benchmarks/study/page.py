@@ -27,6 +27,7 @@ from .volume_model import APART, MODEL
 
 PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
 CODERS_SCALE = 4
+PHOTOGRAPHS = ("component-images", "other-cameras")
 OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
 # Figures by part of the page.
 SECTIONS = {
@@ -78,7 +79,12 @@ def copy_pictures(folder: Path, images: Path, best: Mapping[str, Mapping[str, An
     for record in best.values():
         for name, digest in record["pictures"].items():
             if (folder / name).exists() and digest_of(folder / name) == digest:
-                write_picture(images / name, folder / name)
+                write_picture(images / page_name(name), folder / name)
+
+
+def page_name(name: str) -> str:
+    """Return the name of a picture on the page: JPEG for photographs, except those that show coding artefacts."""
+    return name.replace(".png", ".jpg") if name.startswith(PHOTOGRAPHS) else name
 
 
 def keep(new: Path, old: Path) -> None:

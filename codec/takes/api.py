@@ -1,4 +1,4 @@
-"""Coding of II-video: takes as segments of pseudo video sequences, and the take's ``.ii`` file."""
+"""Coding of II-video: takes as segments of pseudo video sequences, and their ``.ii`` file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ``.ii`` file of a take: a header, and segments that are whole or not one by one.
+"""Container format of the ``.ii`` file of a take: a header, and segments with checksums of their own.
 
 ==============  =======  =============================================================================
 part            bytes    meaning

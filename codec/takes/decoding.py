@@ -1,4 +1,4 @@
-"""Frames and component images of a coded take, decoded when they are used."""
+"""Lazy decoding of frames and component images of a coded take."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Γ over view and time: the order in which the component images of a take become frames.
+"""Order Γ of the component images of a take over view and time.
 
 A component image of a take has a view, its place j in the order Γ of a still (5.2), and an instant τ. A *segment* of
 ``span`` instants is a stream of its own. Within it, ``group`` views × ``span`` instants are a group of pictures that

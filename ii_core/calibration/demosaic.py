@@ -1,4 +1,4 @@
-"""Colours of a raw picture behind a Bayer mosaic, and its grey."""
+"""Demosaicing of raw pictures with a Bayer pattern."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lens grid of a picture: centres of all micro-images and the straight, turned or sheared lattice that fits them.
+"""Lens grid of a picture: centres of micro-images, and the straight, turned or sheared lattice fitted to them.
 
 In the fit, lens (k, l) has its centre at c + (k + ½·(l mod 2))·a + l·b, the half only in a hexagonal lattice, with
 a along the rows and b from row to row; six numbers in all.

@@ -1,4 +1,4 @@
-"""Lenses of several types that take turns, such as those of multi-focus cameras: told by the detail under them."""
+"""Types of lenses in multi-focus arrays, from the detail under each lens."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Periods and centres of micro-images, found in a grey picture; all positions in pixels from its top left corner.
+"""Periods and centres of micro-images in a grey picture, in pixels from its top left corner.
 
 A micro-image is bright in the middle and darker at its border, as the rim of a main lens makes it.
 """

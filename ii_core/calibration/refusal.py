@@ -1,4 +1,4 @@
-"""What calibration raises where there is nothing to calibrate."""
+"""Errors of calibration for pictures without a lens grid."""
 
 
 class NoLenses(ValueError):

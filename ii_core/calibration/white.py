@@ -1,4 +1,4 @@
-"""Vignetting divided out by a white image, without its noise and without raising that of dark borders.
+"""Correction of vignetting by a white image, without its noise and without amplified dark borders.
 
 A white image shows how much light every pixel gets of an even scene. Two noises must not enter the picture with it:
 

@@ -1,4 +1,4 @@
-"""What an eye sees of an integral-imaging display: light of the panel through the lenses, averaged over the pupil."""
+"""Model of an eye in front of an integral-imaging display: light of the panel, averaged over the pupil."""
 
 from __future__ import annotations
 

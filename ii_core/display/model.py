@@ -1,4 +1,4 @@
-"""Integral-imaging display: a panel of emitters behind a lens array, with the faults of real ones."""
+"""Model of an integral-imaging display: a panel of emitters behind a lens array, with faults of real ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Viewing zones of an integral-imaging display and what leaks across their borders, in closed form."""
+"""Viewing zones of an integral-imaging display and cross-talk across their borders, in closed form."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Raw lenslet pictures of Lytro cameras: LFP and LFR containers, and 10 or 12-bit packed samples with a JSON beside.
+"""Raw lenslet pictures of Lytro cameras: LFP and LFR containers, packed samples of 10 or 12 bits.
 
 A container starts with an LFP section, followed by an LFM section, its table of contents as JSON, and LFC sections,
 everything else. A section is::

@@ -1,4 +1,4 @@
-"""Command that makes a camera of a raw lenslet picture: calibrate."""
+"""Command calibrate: a camera from a raw lenslet picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The option ``--dask``: work on a cluster."""
+"""Option ``--dask``: rendering on a cluster."""
 
 from __future__ import annotations
 

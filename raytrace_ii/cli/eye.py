@@ -1,4 +1,4 @@
-"""Command eye: what a viewer's eye sees of a display for II-pictures."""
+"""Command eye: the view of an eye in front of a display."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The option ``--plugin``: Python files that register coders and measures."""
+"""Option ``--plugin``: Python files that register coders and measures."""
 
 from __future__ import annotations
 

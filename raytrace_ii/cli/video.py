@@ -1,4 +1,4 @@
-"""The command video: II-video in other forms."""
+"""Command video: conversion of II-video."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Takes: scenes that move, from the ``[animation]`` of a scene file or a clip of a glTF file."""
+"""Takes: animated scenes, from ``[animation]`` of a scene file or from a glTF clip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Products of a manifest: files that are made together, what they are made of, and whether they are still there."""
+"""Products of a manifest: files of one render with hashes of inputs and content."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Takes rendered into a folder: a picture and its support images a frame, and a manifest.
+"""Rendering of takes into a folder: pictures and support images per frame, and a manifest.
 
 The manifest says of every file what it was made of, as a hash of that frame's scene, pose, camera and options, and
 what it is, as another. Frames that are there already, made of the same, are not made again: a take that was

@@ -1,4 +1,4 @@
-"""Keyframes: a value over time, and the pose of a camera that moves and looks."""
+"""Keyframes: values over time, and poses of moving cameras."""
 
 from __future__ import annotations
 

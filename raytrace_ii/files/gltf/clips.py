@@ -1,4 +1,4 @@
-"""glTF animations: clips by name, and the keys of nodes at an instant."""
+"""Animations of glTF: clips by name, values of nodes at an instant."""
 
 from __future__ import annotations
 
