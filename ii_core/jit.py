@@ -1,7 +1,7 @@
 """Compilation of kernels: lazy, cached on disk, without the interpreter lock.
 
-A cached kernel is valid as long as no source file of its folder and of this package changes, so kernels may call
-kernels of their own folder. The cache of numba alone notices changes in a kernel's own file only.
+A cached kernel is valid as long as no source file of its folder changes, nor this file and the table of sRGB: kernels
+may call kernels of their own folder. The cache of numba alone notices changes in a kernel's own file only.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ class Cache(FunctionCache):
 
 @cache
 def _sources(folder: Path) -> str:
-    """Hash of all sources of a folder of kernels, and of this package, whose tables they hold as constants."""
+    """Hash of all sources of a folder of kernels, of this file and of the table of sRGB, a constant of kernels."""
+    here = Path(__file__)
     found = hashlib.sha256()
-    for place in (folder, Path(__file__).parent):
-        for file in sorted(place.glob("*.py")):
-            found.update(file.name.encode() + b"\0" + file.read_bytes())
+    for file in (*sorted(folder.glob("*.py")), here, here.with_name("colour.py")):
+        found.update(file.name.encode() + b"\0" + file.read_bytes())
     return found.hexdigest()
 
 

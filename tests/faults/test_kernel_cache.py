@@ -77,3 +77,16 @@ def test_a_cache_that_takes_nothing(package):
     limited = package / "limited.py"
     limited.write_text("import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n" + KERNEL)
     assert call(package, "limited") == ["42", "0"]
+
+
+def test_an_edit_of_a_file_beside_it(package):
+    """A kernel may call one of another file of its folder; the cache of numba alone would keep the old copy of it."""
+    (package / "old" / "twice.py").write_text(KERNEL.replace("doubled", "twice"))
+    (package / "old" / "kernels.py").write_text(
+        "from ii_core.jit import kernel\nfrom .twice import twice\n\n@kernel\ndef doubled(x):\n    return twice(x)\n"
+    )
+    assert call(package, "old.kernels") == ["42", "0"]
+    assert call(package, "old.kernels") == ["42", "1"]
+    (package / "old" / "twice.py").write_text(KERNEL.replace("doubled", "twice").replace("2 * x", "3 * x"))
+    assert call(package, "old.kernels") == ["63", "0"]
+    assert call(package, "old.kernels") == ["63", "1"]
