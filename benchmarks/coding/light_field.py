@@ -1,10 +1,11 @@
 """`si-lf` against the other schemes: rate at equal PSNR, gain of each tool, CPU time.
 
-    python -m benchmarks run light_field [--pictures car,car-9x9] [--again missing]
+    python -m benchmarks run light_field [--pictures car,car-9x9] [--schemes si-lf] [--flower FOLDER]
 
 Pictures are four scenes through `setup1` at scale 8, and two fields of 9×9 views of 120×56 pixels with disparity of
 both signs, made from four samples a pixel: the camera's gap is 32/3 of that of `setup1`, and each view is cut one
-column or row further on than its neighbour. Every scheme is run at five quantisers. Numbers go to
+column or row further on than its neighbour. ``--flower`` adds 96×64 pixels in the middle of the 10×10 views of a
+light field camera that lie in a folder. Every scheme is run at five quantisers, and lossless. Numbers go to
 ``benchmarks/results/light_field.jsonl``, tables to ``docs/lf.md``.
 """
 
@@ -12,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, add_again, origin
 from codec import encode, timed_decode
 from ii_core import IIPicture, preset
+from ii_core.formats.find import find_views, picture_of
 from metrics import bd_rate, q_global
 from metrics.rd import UndefinedDifference
 from raytrace_ii import load_scene, render
@@ -28,13 +30,15 @@ from raytrace_ii import load_scene, render
 RECORDS = Records("light_field", ("benchmarks.coding.light_field",))
 SCENES = ("apples", "twins", "car", "cuboid")
 FIELDS = ("car-9x9", "apples-9x9")
+IMPORTED = "flower"
 OURS = ("si-lf", "si-lf:sources=0")
 QUANTISERS = {
-    "si-lf": (18, 25, 32, 39, 46),
+    "si-lf": (22, 30, 38, 44, 50),
     "si-avif:best": (18, 28, 38, 48, 58),
     "si-hevc:best": (14, 20, 26, 32, 38),
 }
 OTHERS = ("si-avif:best", "si-hevc:best")
+LOSSLESS = ("si-lf:lossless=1", "si-ffv1", "jpegxl:lossless=1")
 VIEWS, GAP = 9, 6  # views a side; the field's disparity is that of the scene through this much more gap
 
 
@@ -42,19 +46,28 @@ def main() -> None:
     """Measure, print, keep and fill the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pictures", default=",".join(SCENES + FIELDS))
+    parser.add_argument("--schemes", default=",".join((*OTHERS, *OURS, *LOSSLESS)))
+    parser.add_argument("--flower", help="folder of the views of a light field camera")
     add_again(parser)
     asked = parser.parse_args()
-    names = asked.pictures.split(",")
-    keys = [{"picture": name, "scheme": scheme} for name in names for scheme in (*OTHERS, *OURS)]
+    names = [*asked.pictures.split(","), *([IMPORTED] if asked.flower else [])]
+    keys = [{"picture": name, "scheme": scheme} for scheme in asked.schemes.split(",") for name in names]
     for key in RECORDS.todo(keys, asked.again):
-        RECORDS.measure(key, lambda key=key: curve(picture(key["picture"]), key["scheme"]))
+        original = picture(key["picture"], asked.flower)
+        RECORDS.measure(key, partial(measured, original, key["scheme"]))
         print(key, flush=True)
     publish(tables())
 
 
 @cache
-def picture(name: str) -> IIPicture:
+def picture(name: str, flower: str | None = None) -> IIPicture:
     """A picture of this benchmark."""
+    if name == IMPORTED:
+        whole, _ = picture_of(find_views(str(flower)))
+        (width, height), (cols, rows) = whole.lenses, whole.ei_pixels
+        left, top = (width - 96) // 2, (height - 64) // 2
+        cut = whole.pixels[top * rows : (top + 64) * rows, left * cols : (left + 96) * cols]
+        return IIPicture(np.ascontiguousarray(cut), (96, 64), (cols, rows))
     if name in SCENES:
         return render(load_scene(name), preset("setup1", scale=8)).picture
     camera = preset("setup1", scale=4)
@@ -74,6 +87,19 @@ def picture(name: str) -> IIPicture:
         for u in range(VIEWS):
             cut[:, v, :, u] = field[v : v + rows, v, u : u + cols, u]
     return IIPicture(cut.reshape(rows * VIEWS, cols * VIEWS, 3), (cols, rows), (VIEWS, VIEWS))
+
+
+def measured(original: IIPicture, scheme: str) -> dict[str, Any]:
+    """A curve, or the rate of a lossless scheme."""
+    if scheme not in LOSSLESS:
+        return curve(original, scheme)
+    coded = encode(original, scheme)
+    decoding = timed_decode(coded)
+    if not np.array_equal(decoding.picture.pixels, original.pixels):
+        raise RuntimeError(f"{scheme} is not lossless")
+    pixels = original.pixels.size / 3
+    seconds = {"encode_us": 1e6 * (coded.encode_seconds or 0) / pixels, "decode_us": 1e6 * decoding.seconds / pixels}
+    return {"bpp": coded.bpp, **seconds}
 
 
 def curve(original: IIPicture, scheme: str) -> dict[str, Any]:
@@ -98,10 +124,12 @@ def curve(original: IIPicture, scheme: str) -> dict[str, Any]:
 def tables() -> Tables:
     """The tables of docs/lf.md."""
     rows = RECORDS.rows()
-    curves = {(row["picture"], row["scheme"]): row["points"] for row in rows}
-    names = [name for name in SCENES + FIELDS if (name, "si-lf") in curves]
+    curves = {(row["picture"], row["scheme"]): row["points"] for row in rows if "points" in row}
+    exact = {(row["picture"], row["scheme"]): row["bpp"] for row in rows if "bpp" in row}
+    names = [name for name in (*SCENES, *FIELDS, IMPORTED) if (name, "si-lf") in curves]
+    marks = ("lf-against", "lf-tools", "lf-lossless")
     if not names:
-        return {("docs/lf.md", mark): ["Not measured yet."] for mark in ("lf-against", "lf-tools")}
+        return {("docs/lf.md", mark): ["Not measured yet."] for mark in marks}
     against = ["| picture | " + " | ".join(f"`{other}`" for other in OTHERS) + " | encode µs | decode µs |"]
     against.append("|---|" + "---|" * (len(OTHERS) + 2))
     tools = ["| picture | synthesis off |", "|---|---|"]
@@ -111,8 +139,16 @@ def tables() -> Tables:
         times = [f"{np.median([point[key] for point in ours]):.1f}" for key in ("encode_us", "decode_us")]
         against.append(f"| {name} | {' | '.join(cells + times)} |")
         tools.append(f"| {name} | {_difference(ours, curves.get((name, OURS[1])))} |")
+    lossless = ["| picture | " + " | ".join(f"`{scheme}`" for scheme in LOSSLESS) + " |"]
+    lossless.append("|---|" + "---|" * len(LOSSLESS))
+    for name in names:
+        rates = [exact.get((name, scheme)) for scheme in LOSSLESS]
+        lossless.append(f"| {name} | " + " | ".join("–" if rate is None else f"{rate:.2f}" for rate in rates) + " |")
     said = [origin(rows)]
-    return {("docs/lf.md", "lf-against"): [*against, "", *said], ("docs/lf.md", "lf-tools"): [*tools, "", *said]}
+    return {
+        ("docs/lf.md", mark): [*lines, "", *said]
+        for mark, lines in zip(marks, (against, tools, lossless), strict=True)
+    }
 
 
 def _difference(anchor: Any, tested: Any) -> str:
