@@ -39,7 +39,7 @@ GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below whic
 WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 # Quantisers by which each level is finer than the next, for more is predicted from it, and the first is finer than
 # the last.
-FINER_A_LEVEL, FINER_FIRST = 2.0, 12.0
+FINER_A_LEVEL, FINER_FIRST = 1.5, 14.0
 MOST_VIEWS = 1 << 14
 VIEW_BYTES, EXACT_BYTES = 24, 96  # a sample's most
 FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
