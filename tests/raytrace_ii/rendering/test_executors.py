@@ -241,7 +241,7 @@ def test_a_cluster_that_is_not_there_is_one_line(run, refused, tmp_path, monkeyp
     pytest.importorskip("distributed")
     command = ("render", "objects", "--scale", 128, "-o", tmp_path / "p.png", "--dask")
     refused(run(*command, "127.0.0.1:1"), "no dask scheduler answers at 127.0.0.1:1")
-    refused(run(*command, "127.0.0.1:1", "--workers", 2), "--workers are threads of this machine")
+    refused(run(*command, "127.0.0.1:1", "--workers", 2), "--workers is for threads of this machine")
     monkeypatch.setitem(sys.modules, "distributed", None)
     refused(
         run(*command, "127.0.0.1:1"), "--dask needs dask, which is not installed: pip install 'raytrace-ii[dask]'"
