@@ -2,13 +2,13 @@
 
 from ii_core.display.view_sheets import plot_pair, plot_views
 
+from .against_anchor import differences, mean_differences
 from .angle import q_angle_ssim, q_angle_ycbcr
 from .batch import measuring
 from .builtin_measures import MEASURES
 from .depth.focus import FocusDepth, depth_from_focus
 from .depth.layers import covering_layers, disparity_layers, linear_layers, logarithmic_layers
 from .depth.q_depth import q_depth
-from .differences import differences, mean_differences
 from .global_angle import angle_axes, mean_q_angle, q_angle, q_global
 from .measure import Measure, Needs, known_measures, register_measure
 from .over_time import TakeQuality, measure_take

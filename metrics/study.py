@@ -17,7 +17,7 @@ from ii_core import IIPicture, checks
 from ii_core.files import one_line, read_json, write_json
 from ii_core.identity import library_versions
 
-from .differences import differences
+from .against_anchor import differences
 from .points import check_points, measures_of, spelt, unspelt
 
 FORMAT, VERSION = "ii-rd-study", 1

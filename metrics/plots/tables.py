@@ -12,7 +12,7 @@ from typing import Any
 from ii_core import checks
 from ii_core.files import atomic_path
 
-from ..differences import anchor_of, differences
+from ..against_anchor import anchor_of, differences
 from ..measure import Measure, measure_of
 from ..points import FIELDS, check_measured, check_points, is_study, measures_of
 
