@@ -165,7 +165,7 @@ BENCHMARKS = {
         Benchmark(
             "accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",), writes=(f"{IMAGES}/depth_truth.*",)
         ),
-        Benchmark("accuracy.waves", records=OWN),
+        Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
         Benchmark("accuracy.map_precision", records=OWN, writes=(f"{IMAGES}/map_precision.*",)),
         Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),
         Benchmark(

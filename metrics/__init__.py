@@ -25,6 +25,17 @@ from .quality_report import Report, quality_rows, report
 from .rd import bd_psnr, bd_rate, default_rates, rate_distortion
 from .sheets import PLOTS, plot_all, plot_angle, plot_error_views
 from .study import provenance, read_study, write_study
+from .subjective import (
+    OpinionScores,
+    PairScale,
+    Prediction,
+    opinion_scores,
+    pair_scale,
+    predicted_scores,
+    screened_observers,
+    simulated_scores,
+    simulated_wins,
+)
 from .view import error_map, q_view
 
 __all__ = [
@@ -35,8 +46,11 @@ __all__ = [
     "FocusDepth",
     "Measure",
     "Needs",
+    "OpinionScores",
+    "PairScale",
     "PicturePair",
     "PointLog",
+    "Prediction",
     "Report",
     "TakeQuality",
     "ViewQuality",
@@ -58,6 +72,8 @@ __all__ = [
     "mean_q_angle",
     "measure_take",
     "measuring",
+    "opinion_scores",
+    "pair_scale",
     "plot_all",
     "plot_angle",
     "plot_depth",
@@ -65,6 +81,7 @@ __all__ = [
     "plot_error_views",
     "plot_pair",
     "plot_views",
+    "predicted_scores",
     "provenance",
     "q_angle",
     "q_angle_ssim",
@@ -78,6 +95,9 @@ __all__ = [
     "read_study",
     "register_measure",
     "report",
+    "screened_observers",
+    "simulated_scores",
+    "simulated_wins",
     "summary_table",
     "time_chart",
     "write_csv",
