@@ -70,8 +70,7 @@ def draw_stills() -> None:
             page.evaluate("async () => { await ii.ready }")
             page.wait_for_timeout(1000)
             page.screenshot(path=GALLERY / f"{name}.jpg", type="jpeg", quality=80)
-            size = page_of(name).stat().st_size / 2**20
-            lines.append(f"## {name}\n\n{about}; a page of {size:.1f} MB.\n\n![{name}]({name}.jpg)\n")
+            lines.append(f"## {name}\n\n{about}.\n\n![{name}]({name}.jpg)\n")
     (GALLERY / "README.md").write_text("\n".join(lines), encoding="utf-8")
 
 
