@@ -15,7 +15,7 @@ from ii_core.files import atomic_path
 
 IMAGES = ROOT / "docs" / "images"
 WIDEST = 1500  # pixels: twice the column of a page
-QUALITY = 88  # of JPEG
+QUALITY = 80  # of JPEG
 MANY = 16384  # colours: a chart with more holds photographs, which a palette would band
 
 
@@ -25,7 +25,7 @@ def write_picture(path: str | os.PathLike[str], source: NDArray[np.uint8] | str 
     Parameters
     ----------
     path : path
-        ``.png``, or ``.jpg`` for JPEG of quality 88 without subsampled colour; replaced, whole.
+        ``.png``, or ``.jpg`` for JPEG of quality 80 without subsampled colour; replaced, whole.
     source : (H, W, 3) uint8 or path
         Anything wider than 1500 pixels is reduced to that. A PNG keeps its colours, but a chart, which is a file
         with an alpha channel, gets a palette of 256.
