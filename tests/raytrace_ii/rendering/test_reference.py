@@ -167,7 +167,7 @@ def test_wrong_input_is_one_line(run, refused, tmp_path):
     refused(call("--set", "all", *out), "unknown set 'all': known are reference")
     refused(call("apples", "--set", "reference", *out), "a scene, or --set, is needed")
     refused(call(*out), "a scene, or --set, is needed")
-    refused(call("--set", "reference", "--depth", tmp_path / "d.exr", *out), "a set has all its support images")
+    refused(call("--set", "reference", "--depth", tmp_path / "d.exr", *out), "a set includes all support images")
     refused(call("--set", "reference", "--samples", "0", "--scale", "64", *out), "samples is 0")
     refused(call("--set", "reference", "--scale", "7", *out), "scale 7 does not divide")
     (tmp_path / "set" / "manifest.json").write_text("{}")
