@@ -160,6 +160,7 @@ BENCHMARKS = {
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
         Benchmark("pages.make_textures", writes=("assets/textures/*",)),
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
+        Benchmark("stability.wrong_calls", records=OWN, fills=("docs/stability.md",)),
         Benchmark("pages.focus_patterns", writes=(f"{IMAGES}/focus_patterns.*",)),
         Benchmark("pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)),
         Benchmark(

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ii_core import IIPicture
+from ii_core import IIPicture, checks
 from ii_core.camera import whole_pair
 from ii_core.files import one_line
 
@@ -121,7 +121,7 @@ class Encoded:
         OSError
             If the file cannot be written.
         """
-        check_type("path", path, (str, os.PathLike), "a path")
+        checks.path("path", path)
         return container.write(path, file_header.values(self), self.payload)
 
     @classmethod

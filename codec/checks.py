@@ -45,7 +45,7 @@ def whole_pair(name: str, value: Any) -> tuple[int, int]:
 
 def texts(name: str, values: Any) -> list[str]:
     """Return a list of texts, or raise TypeError."""
-    if isinstance(values, str) or not isinstance(values, Iterable):
+    if isinstance(values, str) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0:
         raise TypeError(f"{name} is {_said(values)}: a list of names is needed")
     found = list(values)
     for value in found:

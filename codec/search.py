@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from ii_core.checks import callable_, checked, instance, number
+
 TOLERANCE = 0.02  # of the target
 # No guess reaches further than so many doublings of the size, or closer than this part of a bracket to its ends. The
 # measured slope counts between 1/REACH and REACH of the one expected.
@@ -161,6 +163,7 @@ def bracket(tried: Sequence[Trial[Result]], axis: Axis) -> tuple[Trial[Result], 
     return None if under is None or over is None else (under, over)
 
 
+@checked(encode_at=callable_, target=number, axis=lambda name, value: instance(Axis)(name, value), finest=callable_)
 def meet_size(
     encode_at: Callable[[float], Run], target: float, axis: Axis, *, finest: Callable[[], Run] | None = None
 ) -> CodingResult:

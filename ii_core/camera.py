@@ -15,7 +15,22 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import MOST_MM, Pair, length, number, one_of, place, whole_pair, within
+from .checks import (
+    MOST_MM,
+    Pair,
+    block,
+    check_fields,
+    checked,
+    length,
+    number,
+    numbers,
+    one_of,
+    place,
+    sequence,
+    text,
+    whole_pair,
+    within,
+)
 from .lattice import LATTICES, Lattice, axes_of
 from .optics import Bundle, Element, FrontElement, LensModel, Pinhole, Under, chain, unit_disk
 
@@ -118,6 +133,7 @@ class IICamera:
         def put(field: str, value: Any) -> None:
             object.__setattr__(self, field, value)
 
+        check_fields(self, optics=sequence, name=text)
         for field in ("pixels", "lenses"):
             across, down = whole_pair(field, getattr(self, field))
             if max(across, down) > MOST_ALONG or across * down > MOST_PIXELS:
@@ -251,6 +267,7 @@ class IICamera:
         """α, the full horizontal angle of view of one lens (2.1)."""
         return math.degrees(2 * math.atan(self.lens_pitch_mm[0] / (2 * self.gap_mm)))
 
+    @checked(rows=block, cols=block, sample=numbers, place=numbers)
     def rays(
         self,
         rows: slice = slice(None),
@@ -282,6 +299,7 @@ class IICamera:
         """
         return self.rays_at(*self._block(rows, cols), sample, place)
 
+    @checked(m=numbers, n=numbers, sample=numbers, place=numbers)
     def rays_at(
         self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), place: ArrayLike = (0.5, 0.5)
     ) -> tuple[Floats, Floats]:
@@ -297,6 +315,7 @@ class IICamera:
             D[weight == 0] = 0
         return L, D
 
+    @checked(rows=block, cols=block, sample=numbers, place=numbers)
     def weighted_rays(
         self,
         rows: slice = slice(None),
@@ -307,6 +326,7 @@ class IICamera:
         """Return L and D as `rays` does, and the transmitted share of light (h, w); None if all is transmitted."""
         return self.weighted_rays_at(*self._block(rows, cols), sample, place)
 
+    @checked(m=numbers, n=numbers, sample=numbers, place=numbers)
     def weighted_rays_at(
         self, m: ArrayLike, n: ArrayLike, sample: ArrayLike = (0.5, 0.5), place: ArrayLike = (0.5, 0.5)
     ) -> tuple[Floats, Floats, Floats | None]:
@@ -321,6 +341,7 @@ class IICamera:
             D[..., axis] = towards
         return L, D, None if rays.weight is None else np.broadcast_to(rays.weight, shape).copy()
 
+    @checked(rows=block, cols=block)
     def separable_rays(self, rows: slice = slice(None), cols: slice = slice(None)) -> tuple[Floats, ...] | None:
         """Return rays of pixel centres as coordinates; None unless x depends on the column and y on the row alone.
 

@@ -149,6 +149,27 @@ def list_of(*kinds: type) -> Rule:
     return rule
 
 
+def flag(name: str, value: Any) -> None:
+    """Rule: true or false."""
+    if not isinstance(value, bool | np.bool_ | int):
+        raise refuse(name, value, "true or false")
+
+
+def block(name: str, value: Any) -> None:
+    """Rule: a slice of rows or columns."""
+    parts = (value.start, value.stop, value.step) if isinstance(value, slice) else ("",)
+    if not all(part is None or isinstance(part, int | np.integer) for part in parts):
+        raise refuse(name, value, "a slice of whole numbers")
+
+
+def check_fields(owner: Any, **rules: Rule) -> None:
+    """Check fields of an object by their rules; None is not checked, where it is the default."""
+    for name, rule in rules.items():
+        value = getattr(owner, name)
+        if value is not None or getattr(type(owner), name, 0) is not None:
+            rule(name, value)
+
+
 def mapping(name: str, value: Any) -> None:
     """Rule: a dict."""
     if not isinstance(value, Mapping):
@@ -189,7 +210,11 @@ def place(name: str, value: Any, count: int, most: float = MOST_MM) -> tuple[flo
         If the value is none; the message names the argument.
     """
     needed = f"{count} numbers from {-most:g} to {most:g} mm"
-    if isinstance(value, str | bytes) or not isinstance(value, Sequence | np.ndarray):
+    if (
+        isinstance(value, str | bytes)
+        or not isinstance(value, Sequence | np.ndarray)
+        or getattr(value, "ndim", 1) == 0
+    ):
         raise refuse(name, value, needed)
     found = tuple(number(name, x) for x in value)
     if len(found) != count or not all(-most <= x <= most for x in found):

@@ -40,7 +40,13 @@ Box = list[list[float]]
 Rays = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]
 
 
-@checks.checked(folder=checks.path, cameras=checks.list_of(IICamera), format=checks.text)
+@checks.checked(
+    folder=checks.path,
+    cameras=checks.list_of(IICamera),
+    format=checks.text,
+    samples=checks.sequence,
+    progress=checks.callable_,
+)
 def write_maps(
     cameras: Sequence[IICamera],
     folder: str | os.PathLike[str],
@@ -82,6 +88,11 @@ def write_maps(
     if not cameras:
         raise ValueError("cameras is empty: at least one is needed")
     check_format(format)
+    for pair in samples:
+        if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
+            raise checks.refuse("samples", samples, "a list of pairs of positions")
+        for positions in pair:
+            checks.numbers("samples", positions)
     first = cameras[0]
     if any((c.pixels, c.lenses) != (first.pixels, first.lenses) for c in cameras):
         raise ValueError("the cameras differ in pixels or lenses: one folder holds arrays of one structure")
@@ -237,13 +248,17 @@ class MapCamera:
         """Rays per pixel."""
         return len(self.maps)
 
+    @checks.checked(rows=checks.block, cols=checks.block)
     def rays(self, rows: slice = slice(None), cols: slice = slice(None)) -> tuple[Floats, Floats]:
         """Return L and D, (h, w, 3), of the first sample of a block of pixels."""
         L, D, _ = self.stored_rays(0, rows, cols)
         return L, D
 
+    @checks.checked(sample=checks.whole, rows=checks.block, cols=checks.block)
     def stored_rays(self, sample: int, rows: slice = slice(None), cols: slice = slice(None)) -> Rays:
         """Return L, D and the transmitted share of light (None for all) of one sample of a block of pixels."""
+        if not 0 <= sample < len(self.maps):
+            raise ValueError(f"sample is {sample}: there are {len(self.maps)}, from 0")
         maps = self.maps[sample]
         L, D = maps["L"].block(rows, cols), maps["D"].block(rows, cols)
         if "W" in maps:

@@ -6,9 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from . import checks
-from .camera import IICamera
-from .checks import Pair, length, place, whole_pair
+from .camera import MOST_ALONG, IICamera
+from .checks import Pair, length, number, place, whole_pair
 
 ANGLE_DEG = 30.0  # of a lens, if neither gap nor angle is given
 FAR_OFF = 0.25  # share by which whole pixels that divide the panel may miss the wanted pitch
@@ -72,7 +71,9 @@ def panel_display(
         If a value is out of range, gap and angle are both given, or a lens covers less than 2 pixels.
     """
     across, down = whole_pair("pixels", pixels)
-    if not 0 < checks.number("enlarge", enlarge) < math.inf:
+    if max(across, down) > MOST_ALONG:
+        raise ValueError(f"pixels are {across}×{down}: at most {MOST_ALONG} a side are needed")
+    if not 0 < number("enlarge", enlarge) < math.inf:
         raise ValueError(f"enlarge is {enlarge:g}: a positive factor is needed")
     wish, viewer = length("lens_pitch_mm", lens_pitch_mm), length("viewer_mm", viewer_mm)
     width, height = _panel(size_mm, (across, down))
@@ -129,7 +130,7 @@ def _gap(pitch: float, gap_mm: float | None, view_angle_deg: float | None) -> fl
         raise ValueError("gap_mm and view_angle_deg are both given: one follows from the other, leave one out")
     if gap_mm is not None:
         return length("gap_mm", gap_mm)
-    angle = ANGLE_DEG if view_angle_deg is None else float(view_angle_deg)
+    angle = ANGLE_DEG if view_angle_deg is None else number("view_angle_deg", view_angle_deg)
     if not 0 < angle < 180:
         raise ValueError(f"view_angle_deg is {angle:g}: an angle between 0 and 180° is needed")
     return pitch / (2 * math.tan(math.radians(angle) / 2))

@@ -168,6 +168,7 @@ class IIPicture:
         """Return a picture of other pixels with the same structure and camera."""
         return replace(self, pixels=pixels)
 
+    @checks.checked(other=lambda name, value: checks.instance(IIPicture)(name, value))
     def check_same_structure(self, other: IIPicture) -> None:
         """Raise ValueError unless the other picture has the same lenses, elementary images and pixel type."""
         for what in ("lenses", "ei_pixels", "erect"):
@@ -177,6 +178,7 @@ class IIPicture:
         if self.pixels.dtype != other.pixels.dtype:
             raise ValueError(f"pictures of different type: {self.pixels.dtype} against {other.pixels.dtype}")
 
+    @checks.checked(path=checks.path)
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the picture and, beside it, ``<path>.json`` with its structure and camera.
 
@@ -237,6 +239,7 @@ class IIPicture:
         )
 
     @classmethod
+    @checks.checked(path=checks.path)
     def load(
         cls, path: str | os.PathLike[str], *, lenses: Pair | None = None, ei_pixels: Pair | None = None
     ) -> IIPicture:

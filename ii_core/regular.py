@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import checks
-from .camera import IICamera, Pair, whole_pair
+from .camera import MOST_PIXELS, IICamera, Pair, whole_pair
 from .component import light_field
 from .jit import kernel
 from .lattice import Lattice
@@ -114,7 +114,7 @@ def from_smallest_rectangle(picture: IIPicture, camera: IICamera) -> tuple[IIPic
     return IIPicture(pixels, (k, l), camera.ei_pixels, camera, picture.erect), owner >= 0
 
 
-@checks.checked(picture=checks.instance(IIPicture), ei_pixels=checks.whole_pair)
+@checks.checked(picture=checks.instance(IIPicture), ei_pixels=checks.whole_pair, deshift=checks.flag)
 def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: bool = False) -> tuple[IIPicture, Mask]:
     """Return a regular picture with every lens's cell resampled on a grid of U×V points centred on the lens.
 
@@ -155,6 +155,8 @@ def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: boo
     if picture.regular and (u, v) == picture.ei_pixels:
         return picture, np.ones(picture.pixels.shape[:2], np.bool_)
     (k, l), source = picture.lenses, np.ascontiguousarray(picture.pixels)
+    if k * u * l * v > MOST_PIXELS:
+        raise ValueError(f"ei_pixels is {u}×{v}, a picture of {k * u}×{l * v} pixels: at most {MOST_PIXELS} are made")
     dx = (np.arange(u) - (u - 1) / 2) * (lattice.pitch[0] / u)
     dy = (np.arange(v) - (v - 1) / 2) * (lattice.pitch[1] / v)
     inside = _in_cell(lattice, dx, dy)

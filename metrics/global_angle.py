@@ -112,7 +112,7 @@ def angle_quality(values: NDArray[np.float64], picture: IIPicture) -> AngleQuali
     return AngleQuality(values, *axes)
 
 
-@checks.checked(camera=checks.instance(IICamera))
+@checks.checked(camera=checks.instance(IICamera), erect=checks.flag)
 def angle_axes(camera: IICamera, *, erect: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the directions of the rays of each column u and row v of an elementary image.
 

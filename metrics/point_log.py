@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ii_core import IIPicture
+from ii_core import IIPicture, checks
 from ii_core.identity import library_versions, source_hash
 from ii_core.json_lines import append_record, read_records
 
@@ -39,6 +39,8 @@ class PointLog:
     """
 
     def __init__(self, path: str | os.PathLike[str], picture: IIPicture, **conditions: Any) -> None:
+        checks.path("path", path)
+        checks.instance(IIPicture)("picture", picture)
         self.path = Path(path)
         same = {
             "picture": picture_json("", picture),

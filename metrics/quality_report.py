@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ii_core import IIPicture
+from ii_core import IIPicture, checks
 
 from .measure import Measure, known_measures, measure_of
 from .pair import Compared, PicturePair, Structure, picture_pair
@@ -66,6 +66,7 @@ class Row:
     more: tuple[str, str, Describe] | None = None
 
 
+@checks.checked(ssim=checks.flag, over_depth=checks.flag, method=checks.text)
 def report(
     reference: Compared,
     decoded: Compared,

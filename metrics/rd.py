@@ -175,6 +175,10 @@ def _check_overlap(
     encode=checks.callable_,
     decode=checks.callable_,
     workers=checks.whole,
+    progress=checks.callable_,
+    measure=checks.callable_,
+    known=checks.mapping,
+    keep=checks.callable_,
 )
 def rate_distortion(
     picture: IIPicture,

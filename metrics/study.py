@@ -53,6 +53,7 @@ class Study(dict[str, Any]):
     records=checks.sequence,
     picture=checks.instance(IIPicture),
     anchor=checks.text,
+    extra=checks.mapping,
 )
 def write_study(
     path: str | os.PathLike[str],

@@ -20,7 +20,7 @@ from ii_core.camera import whole_pair
 from ..api import Encoded, encode
 from ..bitstream.obu import units
 from ..checks import check_type
-from ..contract import find
+from ..contract import MAX_PIXELS, find
 
 Pair = tuple[int, int]
 
@@ -125,6 +125,8 @@ def floor(scheme: str, lenses: Pair, ei_pixels: Pair) -> Floor:
     Olsson 2008, §5.5.3.
     """
     (k, l), (u, v) = whole_pair("lenses", lenses), whole_pair("ei_pixels", ei_pixels)
+    if k * u * l * v > MAX_PIXELS:
+        raise ValueError(f"lenses and ei_pixels make {k * u}×{l * v} pixels: at most {MAX_PIXELS} are allowed")
     black = IIPicture(np.zeros((l * v, k * u, 3), np.uint8), lenses, ei_pixels)
     return Floor(scheme=scheme, lenses=black.lenses, ei_pixels=black.ei_pixels, coded=coarsest(black, scheme))
 

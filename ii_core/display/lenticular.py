@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Pair, whole_pair, within
+from ..checks import Pair, checked, instance, number, whole, whole_pair, within
 from ..picture import IIPicture
 from .look import display_views
 
-MOST = 1e9  # pixels
+MOST, MOST_ALONG = 1e9, 1 << 16  # pixels
 
 
+@checked(picture=instance(IIPicture), size=whole_pair, views=whole, depth_mm=number, cone=number)
 def lenticular(
     picture: IIPicture,
     *,
@@ -53,6 +54,8 @@ def lenticular(
         If a parameter is out of range.
     """
     width, height = whole_pair("size", size)
+    if max(width, height) > MOST_ALONG:
+        raise ValueError(f"size is {width}×{height}: at most {MOST_ALONG} a side is needed")
     within("pitch_px", pitch_px, 1e-3, MOST)
     within("slope", slope, -MOST, MOST)
     within("centre_px", centre_px, -MOST, MOST)

@@ -43,7 +43,7 @@ def find_views(source: str | os.PathLike[str], *, grid: Pair | None = None) -> V
     return quilt_views(path, grid)
 
 
-@checks.checked(views=checks.instance(Views))
+@checks.checked(views=checks.instance(Views), transposed=checks.flag, flip_down=checks.flag, flip_across=checks.flag)
 def picture_of(
     views: Views, *, transposed: bool | None = None, flip_down: bool | None = None, flip_across: bool | None = None
 ) -> tuple[IIPicture, Arrangement]:

@@ -90,7 +90,7 @@ def _written(folder: Path, shape: tuple[int, int]) -> dict[str, Any]:
     except (ValueError, TypeError, KeyError) as error:
         raise ValueError(f"{path} is no structure of an II-picture: {one_line(repr(error))}") from None
     if (v, u) != shape:
-        raise ValueError(f"{path} says {v}×{u} views, {shape[0]}×{shape[1]} are there")
+        raise ValueError(one_line(f"{path} says {v}×{u} views, {shape[0]}×{shape[1]} are there"))
     return {"structure": structure, "known": WHOLE_ORDER}
 
 

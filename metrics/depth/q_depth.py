@@ -129,6 +129,7 @@ def depth_quality(pair: PicturePair) -> DepthQuality:
 
 
 def _true_depth(depth: ArrayLike, picture: IIPicture) -> NDArray[Any]:
+    checks.numbers("depth", depth)
     z = np.asarray(depth)
     if z.shape != picture.pixels.shape[:2] or z.dtype.kind not in "fiu":
         raise ValueError(

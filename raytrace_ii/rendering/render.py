@@ -14,7 +14,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise
+from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise, checks
 from ii_core.display.notebook import captioned
 from ii_core.files import RowWriter, atomic_paths, check_type, image_rows
 from ii_core.picture import NOISE_ROWS, noisy_rows, picture_rows, sidecar
@@ -200,6 +200,7 @@ def render_to(
     files = {name: _paths(value) for name, value in (support or {}).items()}
     wanted = _options(scene, camera, options, progress)
     job = _job(scene, camera, wanted, tuple(files))
+    checks.flag("upright", upright)
     if upright and camera.lenses != (1, 1):
         raise ValueError(f"only the picture of one lens is turned upright: this camera has {camera.lenses} lenses")
     strips = _strips(job.tiles())

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core import checks
+
 from .textures import Image, Texture, VertexColours
 
 Vector = tuple[float, float, float]
@@ -18,6 +20,7 @@ Vector = tuple[float, float, float]
 
 def _numbers(what: str, value: Any, count: int = 3, least: float = -math.inf) -> None:
     """Raise ValueError unless a value is ``count`` finite numbers of at least ``least``."""
+    checks.numbers(what, value)
     numbers = np.asarray(value, np.float64) if np.ndim(value) == 1 else np.empty(0)
     if numbers.shape != (count,) or not (np.isfinite(numbers).all() and (numbers >= least).all()):
         floor = f" of at least {least:g}" if least > -math.inf else ""
@@ -26,10 +29,17 @@ def _numbers(what: str, value: Any, count: int = 3, least: float = -math.inf) ->
 
 def _number(what: str, value: float, least: float, *, above: bool = False) -> None:
     """Raise ValueError unless a number is finite and at least ``least``; with ``above``, greater."""
+    value = checks.number(what, value)
     if not (least < value < math.inf or (value == least and not above)):
         raise ValueError(
             f"{what} is {value}: a finite number {'above' if above else 'of at least'} {least:g} is needed"
         )
+
+
+def texture_rule(name: str, value: Any) -> None:
+    """Rule: a texture."""
+    if not hasattr(value, "on_surface"):
+        raise checks.refuse(name, value, "a texture")
 
 
 def unit_rows(vectors: Any) -> NDArray[np.float64]:
@@ -113,6 +123,7 @@ class Material:
     priority: int = 0
 
     def __post_init__(self) -> None:
+        checks.check_fields(self, texture=texture_rule, ior=checks.numbers)
         for what in ("colour", "mirror", "transmission", "absorption_per_mm", "emission"):
             _numbers(what, getattr(self, what), least=0)
         _number("specular", self.specular, 0)
@@ -126,8 +137,7 @@ class Material:
             )
         _number("normal_scale", self.normal_scale, 0)
         for what in ("roughness", "metallic", "alpha_cutoff", "alpha_blend"):
-            if not 0 <= getattr(self, what) <= 1:
-                raise ValueError(f"{what} is {getattr(self, what)}: a number from 0 to 1 is needed")
+            checks.within(what, getattr(self, what), 0, 1)
         if self.metallic > 0 and max(self.colour) > 1:
             raise ValueError(f"colour is {self.colour}: at most 1 is needed of a metal, which mirrors it")
         if self.alpha_cutoff > 0 and (not isinstance(self.texture, Image) or self.texture.alpha is None):
@@ -213,8 +223,8 @@ class Light:
     cone_deg: tuple[float, float] = (0.0, 45.0)
 
     def __post_init__(self) -> None:
-        if self.kind not in LIGHTS:
-            raise ValueError(f"unknown light {self.kind!r}: known are {', '.join(LIGHTS)}")
+        if not isinstance(self.kind, str) or self.kind not in LIGHTS:
+            raise ValueError(f"kind: unknown light {self.kind!r}: known are {', '.join(LIGHTS)}")
         _numbers(f"vector of a {self.kind} light", self.vector)
         _numbers(f"colour of a {self.kind} light", self.colour, least=0)
         _numbers(f"direction of a {self.kind} light", self.direction)
@@ -260,9 +270,9 @@ class Background:
     def __post_init__(self) -> None:
         for what in ("horizon", "zenith", "nadir"):
             _numbers(f"{what} of the background", getattr(self, what), least=0)
-        if not 0 < self.spread_deg <= 90:
+        if not 0 < checks.number("spread_deg", self.spread_deg) <= 90:
             raise ValueError(f"spread_deg of the background is {self.spread_deg}: above 0, at most 90 is needed")
-        if not math.isfinite(self.turn_deg):
+        if not math.isfinite(checks.number("turn_deg", self.turn_deg)):
             raise ValueError(f"turn_deg of the background is {self.turn_deg}: a finite number is needed")
         _number("intensity of the background", self.intensity, 0)
 
@@ -280,8 +290,8 @@ class Fog:
 
     def __post_init__(self) -> None:
         _numbers("colour of the fog", self.colour, least=0)
-        if not 0 < self.density_per_mm < math.inf:
-            raise ValueError(f"fog has a density of {self.density_per_mm} per mm: more than 0 is needed")
+        if not 0 < checks.number("density_per_mm", self.density_per_mm) < math.inf:
+            raise ValueError(f"density_per_mm of the fog is {self.density_per_mm}: more than 0 is needed")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -313,6 +323,11 @@ class Body:
     texture_coordinates: NDArray[Any] | None = None
 
     def __post_init__(self) -> None:
+        numbers, owner = checks.numbers, checks.instance(Material)
+        checks.check_fields(
+            self, name=checks.text, vertices=numbers, faces=numbers, material=owner, normals=numbers,
+            texture_coordinates=numbers,
+        )  # fmt: skip
         vertices, faces = np.asarray(self.vertices), np.asarray(self.faces)
         if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
             raise ValueError(f"object {self.name!r} has no geometry: triangles are needed")
@@ -364,9 +379,12 @@ class Scene:
     name: str = ""
 
     def __post_init__(self) -> None:
+        for what, kind in (("bodies", Body), ("lights", Light)):
+            checks.list_of(kind)(what, getattr(self, what))
+        checks.check_fields(self, background=checks.instance(Background), fog=checks.instance(Fog), name=checks.text)
         if not self.bodies:
             raise ValueError(f"scene {self.name!r} has no geometry: at least one object is needed")
-        if not self.max_depth >= 0:
+        if not checks.whole("max_depth", self.max_depth) >= 0:
             raise ValueError(f"max_depth is {self.max_depth}: at least 0 is needed")
         _numbers("ambient", self.ambient, least=0)
         # Order: opaque bodies, bodies with holes, transmissive bodies. Shadow rays are tested against the opaque

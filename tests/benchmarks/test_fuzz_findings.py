@@ -201,3 +201,22 @@ def test_values_nested_deeply_are_refused_where_they_are_read(depth, tmp_path):
     study = tmp_path / "study.json"
     study.write_text(json.dumps(seeds.STUDY).replace('"q_depth": [', f'"q_depth": [{nested}, ', 1))
     assert "nested too deeply" in refusal(read_study, study)
+
+
+@pytest.mark.parametrize("kind", [5120, 5122, 5126])
+def test_sparse_rows_are_unsigned(kind, tmp_path):
+    """Floats as indices were an IndexError, case 18 826; negative ones counted from the end."""
+    tree, chunk = seeds.gltf()
+    sparse = {"count": 1, "indices": {"bufferView": 0, "componentType": kind}, "values": {"bufferView": 0}}
+    tree = json.loads(json.dumps(tree))
+    tree["accessors"][0]["sparse"] = sparse
+    whole = {**tree, "buffers": [{"byteLength": len(chunk), "uri": seeds.embedded(chunk)}]}
+    (tmp_path / "a.gltf").write_text(json.dumps(whole))
+    assert "sparse indices are" in refusal(read_model, tmp_path / "a.gltf")
+
+
+def test_the_number_of_views_is_said_in_one_line(tmp_path):
+    for i in range(4):
+        write_image(tmp_path / f"view_{i // 2}_{i % 2}.png", seeds.pixels())
+    (tmp_path / "structure.json").write_text(json.dumps({"ei_pixels": ["a\nb", "c" * 5000]}))
+    assert "2×2 are there" in refusal(find_views, tmp_path)

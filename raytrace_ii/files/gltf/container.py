@@ -82,12 +82,15 @@ class GltfFile:
             values = self._rows(a.bufferView, where, a.byteOffset, a.count, kind, width)
         if a.sparse:
             s = a.sparse
+            kind_of_rows = _component(s.indices.componentType, where)
+            if kind_of_rows.kind != "u":
+                raise ValueError(f"{where}: sparse indices are {kind_of_rows}: unsigned integers are needed")
             rows = self._rows(
                 s.indices.bufferView,
                 where,
                 s.indices.byteOffset,
                 s.count,
-                _component(s.indices.componentType, where),
+                kind_of_rows,
                 1,
             )[:, 0]
             if len(rows) and rows.max() >= a.count:
