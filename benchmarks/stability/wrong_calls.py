@@ -74,6 +74,7 @@ PIXELS = np.random.default_rng(0).integers(0, 256, (48, 48, 3), np.uint8)
 PICTURE = IIPicture(PIXELS, (12, 12), (4, 4), CAMERA)
 DEPTH = np.full((48, 48), 15.0)
 MASK = np.ones((48, 48), bool)
+LOW, HIGH = sorted(map(float, ii_core.disparity_of_depth(CAMERA, [10.0, 100.0])))
 FRONT = (0.0, 0.0, -150.0)
 CURVE = [1.0, 2.0, 3.0, 4.0]
 BLOCK = {"rows": slice(0, 2), "cols": slice(0, 2)}
@@ -133,6 +134,8 @@ def _core(folder: Path) -> dict[str, Call]:
         "resampled": (ii_core.resampled, {"picture": PICTURE, "ei_pixels": (4, 4), "deshift": False}),
         "camera_pose": (ii_core.camera_pose, {"at_mm": (0, 0, -9), "look_at_mm": (0, 0, 0), "turn_deg": (0, 0, 0),
             "up": (0, 1, 0)}),
+        "disparity_of_depth": (ii_core.disparity_of_depth, {"camera": CAMERA, "z_mm": 10.0}),
+        "depth_of_disparity": (ii_core.depth_of_disparity, {"camera": CAMERA, "disparity": 0.5}),
         "panel_display": (ii_core.panel_display, {"size_mm": (300.0, 200.0), "pixels": (3000, 2000),
             "lens_pitch_mm": 1.0, "viewer_mm": 600.0, "view_angle_deg": 20.0, "gap_mm": None, "lenses": None,
             "start_mm": 0.0, "name": "a", "enlarge": 1.0}),
@@ -214,6 +217,7 @@ def _metrics(folder: Path) -> dict[str, Call]:
         "depth_from_focus": (m.depth_from_focus, {"picture": PICTURE, "layers_mm": [10.0, 20.0], "method": "robust",
             "base": [[0, 0]], "reference": [[0, 0]], "weights": [[1.0]], "interpolation": "linear", "workers": 1}),
         "angle_axes": (m.angle_axes, {"camera": CAMERA, "erect": False}),
+        "disparity_layers": (m.disparity_layers, {"camera": CAMERA, "low": LOW, "high": HIGH, "count": 3}),
         "linear_layers": (m.linear_layers, {"camera": CAMERA, "count": 3}),
         "logarithmic_layers": (m.logarithmic_layers, {"near_mm": 1.0, "far_mm": 2.0, "count": 3}),
         "covering_layers": (m.covering_layers, {"camera": CAMERA, "depth_mm": DEPTH, "count": 3}),
@@ -294,7 +298,7 @@ SAID = {
     "source": "source|text|name|holds one view", "bodies": "bodies|object", "size_mm": "size_mm|lens of",
     "lenses": "lenses|lens",
     "name": "name|camera|scene", "kind": "kind|component image", "viewpoints": "viewpoint", "names": "names|measure",
-    "kinds": "kinds|component image", "orders": "orders?", "data": "data|camera|picture|structure|lenses|ei_pixels",
+    "low": "low|disparity", "high": "high|disparity", "kinds": "kinds|component image", "orders": "orders?", "data": "data|camera|picture|structure|lenses|ei_pixels",
     "dtype": "dtype|pixel type", "index": "index|frame", "place": "place|component image",
     "vertices": "vertices|vertex|object", "faces": "faces|face|object", "count": "count|viewpoints",
     "depth_mm": "depth_mm|depth", "views": "views|viewpoints", "cone": "cone|zone", "directions": "directions?|ray",
