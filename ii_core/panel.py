@@ -73,8 +73,9 @@ def panel_display(
     across, down = whole_pair("pixels", pixels)
     if max(across, down) > MOST_ALONG:
         raise ValueError(f"pixels are {across}×{down}: at most {MOST_ALONG} a side are needed")
-    number("start_mm", start_mm)
-    if not 0 < number("enlarge", enlarge) < math.inf:
+    if start_mm is not None:
+        number("start_mm", start_mm)
+    if not 0 < number("enlarge", enlarge) <= 1e4:
         raise ValueError(f"enlarge is {enlarge:g}: a positive factor is needed")
     wish, viewer = length("lens_pitch_mm", lens_pitch_mm), length("viewer_mm", viewer_mm)
     width, height = _panel(size_mm, (across, down))
