@@ -1,20 +1,33 @@
-"""Pictures of the page of videos: frames of the reference takes, and a chart over time.
+"""Pictures of the page of videos: frames of the reference takes, charts of rate over random access and over time.
 
-    python -m benchmarks run video
+    python -m benchmarks run video [--only access]
 
 Views are the middle sub-images of frames that `benchmarks.coding.takes` renders.
 """
 
 from __future__ import annotations
 
+import argparse
+
 import numpy as np
 from PIL import Image
 
-from benchmarks.coding.takes import INSTANTS, SCALE, SCHEME, TAKES, rendered
+from benchmarks.coding.takes import (  # fmt: skip
+    FRAMES,
+    INSTANTS,
+    PLANS,
+    SCALE,
+    SCHEME,
+    TAKES,
+    by_plan,
+    difference,
+    rendered,
+)
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.records import ROOT
-from codec import Plan, encode_take, open_take
+from codec import Plan, component_cost, encode_take, open_take
 from ii_core import video_of
+from ii_core.display.figure import COLOURS, MARKERS, new_figure, save
 from ii_core.display.look import viewpoints_around
 from metrics import measure_take, time_chart
 
@@ -24,6 +37,40 @@ HEIGHT = 180
 
 def main() -> None:
     """Write the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", choices=("access",), help="the chart that is drawn from records alone")
+    access_chart()
+    if parser.parse_args().only is None:
+        taken()
+
+
+def access_chart() -> None:
+    """Draw the rate of every plan against stills over its random-access cost."""
+    figure = new_figure(8, 4.8)
+    axes = figure.subplots()
+    for i, (take, plans) in enumerate(by_plan().items()):
+        axes.plot([], [], color=COLOURS[i], linewidth=5, label=take)
+        for j, plan in enumerate(PLANS):
+            if plan in plans and (off := difference(plans["stills"]["points"], plans[plan]["points"])) is not None:
+                cost = component_cost(PLANS[plan], 256, FRAMES).mean
+                axes.plot(cost, off, marker=MARKERS[j], color=COLOURS[i], linestyle="none", markersize=8)
+    for j, plan in enumerate(PLANS):
+        axes.plot([], [], marker=MARKERS[j], color="0.3", linestyle="none", label=plan)
+    axes.axhline(0, color="0.5", linewidth=0.8)
+    axes.set_xscale("log")
+    axes.set_xlabel("frames decoded for one SI at one instant, mean")
+    axes.set_ylabel("rate against stills at equal quality [%]")
+    axes.grid(True, color="0.9", linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.legend(loc="outside lower left", ncols=3, frameon=False, fontsize=8)
+    out = ROOT / "out" / "takes_access.png"
+    out.parent.mkdir(exist_ok=True)
+    write_picture(IMAGES / "takes_access.png", save(figure, out, dpi=130))
+
+
+def taken() -> None:
+    """Write frames of the takes, and the chart over time."""
     rows = []
     for take in TAKES:
         video = rendered(take, SCALE)
