@@ -45,8 +45,9 @@ def lattice_vectors(grey: NDArray[np.float32]) -> Vectors:
     longest = min(rows, cols) / FEWEST
     frequency = np.hypot(np.fft.fftfreq(rows)[:, None], np.fft.rfftfreq(cols)[None])
     spectrum[frequency < 0.9 / longest] = 0
-    # Peaks of a pixel's width would lose half their height between samples.
-    spectrum *= np.exp(-2 * (np.pi * frequency) ** 2)
+    # Peaks of a pixel's width would lose half their height between samples. As wide as a lens, the middle one hides
+    # those of the neighbours if a few lenses are very bright: the power of slopes is narrower.
+    spectrum *= frequency**2 * np.exp(-2 * (np.pi * frequency) ** 2)
     correlation = np.fft.irfft2(spectrum, s=(rows, cols))
     if not correlation[0, 0] > 0:
         raise NoLenses("no lenses are found: the picture is even")
