@@ -19,11 +19,12 @@ FEW = [
     slice("a", None),
     object(),
 ]
-# Functions without a call of their own: they need takes, raw pictures or displays.
+# Functions without a call of their own: they need takes, raw pictures, displays or scores.
 WITHOUT = {
     "calibrate", "calibrated_picture", "centres_picture", "component_cost", "converging_distance", "crosstalk",
     "decode_levels", "decode_view", "embed_viewer", "encode_take", "eye_image", "is_take", "load_take",
-    "measure_take", "open_take", "open_video", "render_take", "take_floor", "time_chart", "video_of", "view_cost",
+    "measure_take", "open_take", "opinion_scores", "pair_scale", "open_video", "predicted_scores", "render_take",
+    "screened_observers", "simulated_scores", "simulated_wins", "take_floor", "time_chart", "video_of", "view_cost",
     "viewing_zone", "write_view_folders",
 }  # fmt: skip
 

@@ -1,6 +1,5 @@
 """Wrong arguments of the public functions of ii_core and metrics: errors that name the argument."""
 
-import inspect
 import re
 from types import SimpleNamespace
 
@@ -122,16 +121,6 @@ SAID = {
 
 def function(name):
     return getattr(ii_core if hasattr(ii_core, name) else metrics, name)
-
-
-def test_every_public_function_is_tried():
-    public = {
-        name
-        for package in (ii_core, metrics)
-        for name in package.__all__
-        if inspect.isfunction(getattr(package, name)) and inspect.signature(getattr(package, name)).parameters
-    }
-    assert public <= set(CALLS)
 
 
 def takes_long(call, name, value):
