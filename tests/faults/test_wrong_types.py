@@ -45,7 +45,7 @@ TAKEN = {
     "workers": [7, None, True],
     "executor": [None],
     "pose": [None],
-    "progress": [None, Odd],
+    "progress": [None, True, Odd],  # True prints a line
     "support": [[], {}, (), None],
     "picture": ["text", None],
 }
