@@ -89,3 +89,23 @@ def inner_kernel(function: Callable[..., Any]) -> Any:
     It may have several returns. `inline_kernel` may not: numba inlines its source before types are inferred.
     """
     return lean_kernel(function, forceinline=True)
+
+
+def part_kernel(function: Callable[..., Any], **options: Any) -> Any:
+    """Compile a lean kernel that other kernels call; Python runs its source.
+
+    Without the code that takes Python's arguments apart, which takes longer to compile than most parts themselves:
+    tables of surfaces and rays are some sixty arrays.
+    """
+    compiled = lean_kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
+
+    def keep(result: Any) -> None:  # numba's own add_overload also has calls from Python go to the wrapper
+        compiled.overloads[tuple(result.signature.args)] = result
+
+    compiled.add_overload, compiled._compile_for_args = keep, lambda *_, **__: function
+    return compiled
+
+
+def stage_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a part whose machine code is inlined into its callers, as that of `inner_kernel` is."""
+    return part_kernel(function, forceinline=True)

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inner_kernel
-from ii_core.jit import lean_kernel as kernel
+from ii_core.jit import part_kernel, stage_kernel
 
 from . import lanes as at
 from .glossy import highlight
@@ -34,7 +33,7 @@ from .vectors import edge, interpolate, three
 _COLUMNS, _EXTRAS = np.uint64(MATERIAL_COLUMNS), np.uint64(EXTRAS)
 
 
-@inner_kernel
+@stage_kernel
 def attenuate(lanes, rays, surfaces, fog, work):
     """Dim rays on their way through bodies (Beer–Lambert), or through fog outside of them, which adds its light.
 
@@ -66,14 +65,14 @@ def attenuate(lanes, rays, surfaces, fog, work):
             double[at.W2 + k] *= through
 
 
-@inner_kernel
+@stage_kernel
 def look(lanes, surfaces, surroundings, passage, filtering, work):
     """Shares of scattered, mirrored and transmitted light, highlights, and light given off, of all lanes.
 
     Bodies without anything of ``EXTRAS`` need their row of the table alone.
     """
     double, whole, materials = work.double, work.whole, surfaces.flat_materials
-    textured, noisy, same = False, 0, True
+    textured, noisy, same = False, np.int64(0), True  # no literal: another signature
     for k in range(lanes):
         same &= whole[at.BODY + k] == whole[at.BODY]
     if same:
@@ -113,7 +112,7 @@ def look(lanes, surfaces, surroundings, passage, filtering, work):
         double[at.E2 + k] = w2 * double[at.E2 + k] + b * a2
 
 
-@inner_kernel
+@stage_kernel
 def _look_closely(k, surfaces, passage, filtering, work, noisy):
     """One lane of a body that has maps, a texture, metal, or parts that are seen through.
 
@@ -182,7 +181,7 @@ def _look_closely(k, surfaces, passage, filtering, work, noisy):
     return noise
 
 
-@inner_kernel
+@stage_kernel
 def _colour_by_noise(many, surfaces, work):
     """Colours of the lanes whose texture is noise."""
     double, whole = work.double, work.whole
@@ -197,7 +196,7 @@ def _colour_by_noise(many, surfaces, work):
         )
 
 
-@kernel
+@part_kernel
 def _map_normal(k, surfaces, work, au, av, bu, bv):
     """Tilt a shading normal by a normal map; leave it where that would turn it away from the viewer.
 
@@ -233,7 +232,7 @@ def _map_normal(k, surfaces, work, au, av, bu, bv):
     double[at.NX + k], double[at.NY + k], double[at.NZ + k] = mx / length, my / length, mz / length
 
 
-@kernel
+@part_kernel
 def _square(x, y, z, nx, ny, nz):
     """The part of a vector square to a unit vector, as a unit vector; zero if there is none."""
     along = x * nx + y * ny + z * nz

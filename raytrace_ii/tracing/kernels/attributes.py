@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inner_kernel
+from ii_core.jit import stage_kernel
 
 from . import lanes as at
 from .lanes import BLOCK
@@ -17,7 +17,7 @@ from .vectors import three, three_doubles
 _5, _9 = np.uint64(5), np.uint64(9)
 
 
-@inner_kernel
+@stage_kernel
 def gather(first, hits, rays, surfaces, work):
     """Bring the hits of a block of rays to lanes.
 
@@ -59,7 +59,7 @@ def gather(first, hits, rays, surfaces, work):
     return lanes
 
 
-@inner_kernel
+@stage_kernel
 def place(single, double):
     """Hit points, normals on the ray's side, places to start from, and weights."""
     for k in range(BLOCK):
@@ -85,7 +85,7 @@ def place(single, double):
         double[at.W2 + k] = single[at.WEIGHT + 2 * BLOCK + k]
 
 
-@inner_kernel
+@stage_kernel
 def flat_normals(double):
     """Shade by the normals of the faces."""
     for k in range(BLOCK):
@@ -98,7 +98,7 @@ def flat_normals(double):
         double[at.AX + k], double[at.AY + k], double[at.AZ + k] = 0.0, 0.0, 0.0
 
 
-@inner_kernel
+@stage_kernel
 def smooth_normals(single, double):
     """Interpolated vertex normals on the ray's side, or the face's own where there is none or it faces away."""
     for k in range(BLOCK):
@@ -121,7 +121,7 @@ def smooth_normals(single, double):
         double[at.SMOOTH + k] = 1.0 if smooth else 0.0
 
 
-@inner_kernel
+@stage_kernel
 def up_to_smooth(single, double):
     """The way from a place in a face up to the smooth surface that the face stands for (Hanika 2021).
 
@@ -147,7 +147,7 @@ def up_to_smooth(single, double):
         )  # fmt: skip
 
 
-@inner_kernel
+@stage_kernel
 def footprints(lanes, rays, surfaces, passage, work):
     """How far a ray's width reaches over the (u, v) of the images of its body."""
     single, double, whole = work.single, work.double, work.whole

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ii_core.jit import lean_kernel as kernel
+from ii_core.jit import part_kernel
 
 from .media import cross, enter, fresnel, leave, media_at, medium_of, refractive_index, transmits
 from .tables import ABSORPTION, ALPHA_BLEND, FAR, LEAST_WEIGHT, TRANSMISSION
@@ -130,7 +131,7 @@ def pass_clear_face(
     return kept
 
 
-@kernel
+@part_kernel
 def _straight_reflectance(materials, before, after, c, faces, f, dx, dy, dz, length):
     """Fresnel's share at a face between two media for light that goes straight on at its angle in air."""
     cosine = (faces[f, 0] * dx + faces[f, 1] * dy + faces[f, 2] * dz) / length

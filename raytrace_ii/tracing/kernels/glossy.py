@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from ii_core.jit import inline_kernel
+from ii_core.jit import inline_kernel, part_kernel
 from ii_core.jit import lean_kernel as kernel
 
 
-@kernel
+@part_kernel
 def glossy_direction(alpha, across, around, dx, dy, dz, nx, ny, nz):
     """Reflect a direction at a facet of a GGX surface, one of those seen from there, and how much of it gets away.
 

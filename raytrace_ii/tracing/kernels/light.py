@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inner_kernel
 from ii_core.jit import lean_kernel as kernel
+from ii_core.jit import stage_kernel
 
 from . import lanes as at
 from .lanes import BLOCK
@@ -27,7 +27,7 @@ from .vectors import three
 _TO_LAMP, _ONE = np.float32(0.9999), np.uint64(1)  # how far a shadow ray reaches towards a lamp, in its own lengths
 
 
-@inner_kernel
+@stage_kernel
 def towards_light(lights, light, single, double):
     """Directions to one light, cosines to it, 0 where it is behind the surface, and of the half-way vectors."""
     far = lights[light, 0] == DIRECTIONAL
@@ -59,7 +59,7 @@ def towards_light(lights, light, single, double):
         double[at.CONE + k] = norm
 
 
-@inner_kernel
+@stage_kernel
 def in_cone(lights, light, double):
     """Share of a spot light in each direction: 1 in its inner cone, 0 outside the outer one; of other lights 1."""
     spot = lights[light, 0] == SPOT
@@ -70,7 +70,7 @@ def in_cone(lights, light, double):
         double[at.CONE + k] = share * share if spot else 1.0
 
 
-@inner_kernel
+@stage_kernel
 def cast(lanes, lights, light, rays, shadows, first, work, counts):
     """Write the shadow rays of a block to one light, from row ``first`` on; none too weak to be seen.
 

@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel
-from ii_core.jit import lean_kernel as kernel
+from ii_core.jit import inline_kernel, part_kernel
 
 from .tables import IOR, PRIORITY, TRANSMISSION
 
 
-@kernel
+@part_kernel
 def medium_of(inside, i, materials, without):
     """The body of highest priority that a ray is in, of equal ones the first entered; −1 for none.
 
@@ -30,7 +29,7 @@ def medium_of(inside, i, materials, without):
     return best
 
 
-@kernel
+@part_kernel
 def media_at(inside, i, materials, body, entering):
     """What is before and behind a face of a body; the same if another body hides the face (Schmidt, Budge 2002)."""
     if entering:
@@ -46,7 +45,7 @@ def media_at(inside, i, materials, body, entering):
     return body if after < 0 or materials[body, PRIORITY] > materials[after, PRIORITY] else after, after
 
 
-@kernel
+@part_kernel
 def enter(inside, i, body):
     """Note that a ray is in a body, if it is not noted yet; a full list forgets."""
     for k in range(inside.shape[1]):
@@ -57,7 +56,7 @@ def enter(inside, i, body):
             return
 
 
-@kernel
+@part_kernel
 def leave(inside, i, body):
     """Take a body out of a list, once."""
     last, found = inside.shape[1] - 1, False
@@ -67,7 +66,7 @@ def leave(inside, i, body):
             inside[i, k] = inside[i, k + 1] if k < last else -1
 
 
-@kernel
+@part_kernel
 def cross(inside, i, body, entering):
     if entering:
         enter(inside, i, body)
@@ -101,7 +100,7 @@ def transmits(materials, body):
     )
 
 
-@kernel
+@part_kernel
 def fresnel(cosine, ratio):
     """Unpolarised reflectance of a dielectric face, and the cosine behind it.
 

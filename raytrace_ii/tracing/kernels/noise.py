@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel, inner_kernel
+from ii_core.jit import inline_kernel, inner_kernel, stage_kernel
 from ii_core.jit import lean_kernel as kernel
 
 from . import lanes as at
@@ -49,7 +49,7 @@ def fractal(x, y, z, packed):
     return total
 
 
-@inner_kernel
+@stage_kernel
 def fractal_lanes(many, whole, double):
     """`fractal` for many places at once, an octave of all in turn, in vectors; sums go to ``TOTAL``."""
     most = 0

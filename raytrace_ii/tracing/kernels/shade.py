@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inner_kernel
 from ii_core.jit import lean_kernel as kernel
+from ii_core.jit import part_kernel, stage_kernel
 
 from . import lanes as at
 from .appearance import attenuate, look
@@ -34,7 +34,7 @@ def shade(
     spawned : int
         How many rows of ``following`` were filled; ``lit`` is how many of each light's shadow rays.
     """
-    n, spawned = hits.faces.shape[0], 0
+    n, spawned = hits.faces.shape[0], np.int64(0)  # a literal would be another signature of all that takes it
     lights, single, double = surroundings.lights, work.single, work.double
     filtering = passage.first_width != 0.0 or passage.spread != 0.0
     for first in range(0, n, BLOCK):
@@ -62,7 +62,7 @@ def shade(
     return spawned
 
 
-@inner_kernel
+@stage_kernel
 def _add_light(first, n, rays, surfaces, surroundings, passage, radiance, work):
     """Add light of the sky, of fog, and that given off or scattered from all around, in the order of the rays."""
     double, whole = work.double, work.whole
@@ -85,7 +85,7 @@ def _add_light(first, n, rays, surfaces, surroundings, passage, radiance, work):
             radiance[pixel, c] += double[at.E0 + c * BLOCK + k]
 
 
-@kernel
+@part_kernel
 def _record(first, n, hits, rays, surfaces, recorded, work):
     """Note of each ray what support images want."""
     double, whole, eye, axis = work.double, work.whole, recorded.eye, recorded.axis

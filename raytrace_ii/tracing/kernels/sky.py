@@ -6,14 +6,13 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel
-from ii_core.jit import lean_kernel as kernel
+from ii_core.jit import inline_kernel, part_kernel
 
 from .tables import SKY_IMAGE, SKY_INTENSITY, SKY_TURN
 from .textures import filtered
 
 
-@kernel
+@part_kernel
 def background_colour(background, dy):
     """Colour of the sky for a unit direction with the upward component ``dy``."""
     t = min(abs(dy) * background[9], 1.0)
@@ -33,7 +32,7 @@ def sky_colour(background, textures, texels, dx, dy, dz, spread):
     return background_colour(background, dy)
 
 
-@kernel
+@part_kernel
 def _sky_image(background, textures, texels, dx, dy, dz, spread):
     row = int(background[SKY_IMAGE])
     half = 0.5 / textures[row, 3]  # of a texel: the top row does not run into the bottom one

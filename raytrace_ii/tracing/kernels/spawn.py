@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel, inner_kernel
-from ii_core.jit import lean_kernel as kernel
+from ii_core.jit import inline_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
 from .glossy import glossy_direction
@@ -28,7 +27,7 @@ from .vectors import mix_bits, put, put_behind, three
 _LOW, _R2_ACROSS, _R2_AROUND = np.uint64(0xFFFFFFFF), np.uint64(3242174889), np.uint64(2447445414)
 
 
-@inner_kernel
+@stage_kernel
 def spawn_rays(lanes, rays, surfaces, passage, following, spawned, work, counts):
     """Write the rays that the hits of a block send on, from row ``spawned`` of ``following`` on.
 
@@ -62,7 +61,7 @@ def spawn_rays(lanes, rays, surfaces, passage, following, spawned, work, counts)
     return spawned
 
 
-@kernel
+@part_kernel
 def _pass_through(k, rays, surfaces, passage, following, spawned, work, counts):
     """The ray that sees through a blended surface."""
     single, double = work.single, work.double
@@ -79,7 +78,7 @@ def _pass_through(k, rays, surfaces, passage, following, spawned, work, counts):
     return spawned + 1
 
 
-@kernel
+@part_kernel
 def _refract(k, m0, m1, m2, rays, surfaces, passage, following, spawned, work, counts):
     """The rays through a face of glass, one a channel where it disperses, by Fresnel's formulas.
 
@@ -137,7 +136,7 @@ def _refract(k, m0, m1, m2, rays, surfaces, passage, following, spawned, work, c
     return spawned, m0, m1, m2
 
 
-@kernel
+@part_kernel
 def _reflect_over_lobe(k, m0, m1, m2, rays, passage, following, spawned, work, counts):
     """The rays over the lobe of a rough mirror."""
     single, double = work.single, work.double
@@ -167,7 +166,7 @@ def _reflect_over_lobe(k, m0, m1, m2, rays, passage, following, spawned, work, c
     return spawned
 
 
-@inner_kernel
+@stage_kernel
 def _reflect(k, m0, m1, m2, rays, following, spawned, work, counts):
     """The ray over a smooth mirror."""
     double = work.double
@@ -191,7 +190,7 @@ def _reflect(k, m0, m1, m2, rays, following, spawned, work, counts):
     return spawned + 1
 
 
-@inner_kernel
+@stage_kernel
 def _hand_on(following, spawned, rays, work, k):
     """Give a spawned ray its pixel, the bodies that it runs in, its place in lobes and its width."""
     i = work.whole[at.ROW + k]

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ii_core.jit import lean_kernel as kernel
+from ii_core.jit import part_kernel
 
 from .vectors import mix_bits
 
@@ -111,7 +112,7 @@ def jitter(seed, sample, across, down, shuffle, columns, first_row, first_column
             out[i, j, 1] = y
 
 
-@kernel
+@part_kernel
 def _common_divisor(a, b):
     while b:
         a, b = b, a % b

@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from ii_core.colour import LINEAR
-from ii_core.jit import inline_kernel, inner_kernel
-from ii_core.jit import lean_kernel as kernel
+from ii_core.jit import inline_kernel, inner_kernel, part_kernel, stage_kernel
 
 from .noise import fractal
 from .tables import ALPHA_BLEND, CHECKER, CUTOFF, IMAGE, LEVELS, MIRROR, REPEAT, STRIPES, TEXTURE, VERTEX
@@ -49,7 +48,7 @@ def texture_colour(table, row, texels, x, y, z):
     return _between(table, row, t)
 
 
-@inner_kernel
+@stage_kernel
 def noise_colour(table, row, total):
     """Linear colour of a texture of noise from the sum of its octaves."""
     return _between(table, row, min(max(0.5 + table[row, 11] * total, 0.0), 1.0))
@@ -64,7 +63,7 @@ def _between(table, row, t):
     )
 
 
-@inner_kernel
+@stage_kernel
 def _image(table, row, texels, u, v):
     """Colour of an image at (u, v), bilinear."""
     a, b, c, d, fx, fy = _texels_at(table, row, u, v)
@@ -86,7 +85,7 @@ def _image(table, row, texels, u, v):
     return red, green, blue
 
 
-@inner_kernel
+@stage_kernel
 def footprint(ax, ay, az, bx, by, bz, u1, v1, u2, v2, width, dx, dy, dz, gx, gy, gz):
     """How far a ray's cross-section of some width reaches over (u, v): across the plane of incidence, and in it.
 
@@ -116,7 +115,7 @@ def footprint(ax, ay, az, bx, by, bz, u1, v1, u2, v2, width, dx, dy, dz, gx, gy,
     return i * u1 + j * u2, i * v1 + j * v2, k * u1 + l * u2, k * v1 + l * v2
 
 
-@kernel
+@part_kernel
 def filter_taps(table, row, au, av, bu, bv):
     """Number of taps, level of each, and the way over (u, v) that they lie along: the longer of two diameters.
 
@@ -139,7 +138,7 @@ def _levels(row, level):
     return row + near, row + near + 1, level - near
 
 
-@kernel
+@part_kernel
 def filtered(table, row, texels, u, v, au, av, bu, bv):
     """Colour of an image over an ellipse about (u, v) of two diameters: means of its pyramid (Williams 1983)."""
     taps, level, bu, bv = filter_taps(table, row, au, av, bu, bv)
@@ -157,7 +156,7 @@ def filtered(table, row, texels, u, v, au, av, bu, bv):
     return red / taps, green / taps, blue / taps
 
 
-@inner_kernel
+@stage_kernel
 def _texels_at(table, row, u, v):
     """The four texels about (u, v): left and right above, left and right below, and how far to right and down."""
     first, width, height = int(table[row, 1]), int(table[row, 2]), int(table[row, 3])
@@ -189,7 +188,7 @@ def _folded(t, wrap):
     return min(max(t, 0.0), 1.0)
 
 
-@kernel
+@part_kernel
 def is_cut_out(coordinates, textures, alphas, materials, body, f, u, v):
     """Whether the texture's alpha leaves no surface at a place of a face."""
     if materials[body, CUTOFF] == 0.0:
@@ -198,7 +197,7 @@ def is_cut_out(coordinates, textures, alphas, materials, body, f, u, v):
     return _alpha(textures, int(materials[body, TEXTURE]), alphas, x, y) < materials[body, CUTOFF]
 
 
-@kernel
+@part_kernel
 def share_there(coordinates, textures, alphas, materials, body, f, u, v, au, av, bu, bv):
     """The share of a blended surface that is there: its factor times the texture's alpha, where it has one."""
     share, row = materials[body, ALPHA_BLEND], int(materials[body, TEXTURE])
@@ -217,7 +216,7 @@ def share_there(coordinates, textures, alphas, materials, body, f, u, v, au, av,
     return share
 
 
-@kernel
+@part_kernel
 def _alpha(textures, row, alphas, x, y):
     """Alpha of an image at (u, v), bilinear."""
     a, b, c, d, fx, fy = _texels_at(textures, row, x, y)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.jit import inline_kernel
-from ii_core.jit import lean_kernel as kernel
+from ii_core.jit import inline_kernel, part_kernel
 
 from .lanes import BLOCK
 
@@ -45,7 +44,7 @@ def edge(corners, f, k):
     )
 
 
-@kernel
+@part_kernel
 def put_behind(out, i, corners, faces, f, u, v, entering):
     """A place just behind a face, seen along a ray that enters or leaves by it."""
     px, py, pz = start_point(corners, faces, f, u, v)

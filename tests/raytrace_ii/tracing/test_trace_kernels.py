@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numba
 import numpy as np
 import pytest
 
@@ -11,6 +12,7 @@ from raytrace_ii.scene.textures import Image
 from raytrace_ii.tracing import tracer
 from raytrace_ii.tracing.kernels import shade as stages
 from raytrace_ii.tracing.kernels.light import keep_unblocked
+from raytrace_ii.tracing.kernels.media import fresnel
 from raytrace_ii.tracing.kernels.start import start_rays, start_separable_rays
 from tests.support.trace_scenes import WHITE, body, hall, sphere, wall
 
@@ -164,3 +166,10 @@ def test_shadow_rays_that_arrive_are_packed_to_the_front():
         assert kept == (blocked == -1).sum()
         for row, array in zip(rows, packed, strict=True):
             np.testing.assert_array_equal(array[:kept], row[blocked == -1])
+
+
+def test_a_part_of_a_kernel_runs_as_python_when_called_from_python():
+    # It has no code that takes Python's arguments apart: compiled code called like that would end the process.
+    assert fresnel(1.0, 1.5) == pytest.approx((0.04, 1.0), rel=1e-14)
+    fresnel.compile((numba.float64, numba.float64))  # as a kernel that calls it does
+    assert fresnel(1.0, 1.5) == pytest.approx((0.04, 1.0), rel=1e-14)
