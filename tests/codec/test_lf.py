@@ -64,7 +64,18 @@ def test_the_range_of_disparity_is_found(disparity, down):
     low, high, found = ranges.estimated(source.view, source.grid)
     assert found == down
     assert low <= -256 * disparity[1] <= high
-    assert high - low <= 2 * ranges.MARGIN
+    # From the disparity to zero, which is always within the range.
+    assert high - low <= 256 * abs(disparity[1]) + 2 * ranges.MARGIN
+
+
+def test_small_things_before_a_far_ground_are_within_the_range():
+    """A ground that moves by nine samples a view, and a sticker of 6×6 that does not move."""
+    ground = shifted_plane((9, 9), grid=(3, 3), height=48, width=48)
+    pixels = ground.pixels.copy().reshape(48, 3, 48, 3, 3)
+    pixels[20:26, :, 20:26] = np.random.default_rng(5).integers(0, 256, (6, 1, 6, 1, 3))
+    source = lf._Source(ground.with_pixels(pixels.reshape(144, 144, 3)), checked_options(lf.LightField(), {}))
+    low, high, _ = ranges.estimated(source.view, source.grid)
+    assert low <= -9 * 256 <= 0 <= high
 
 
 def test_a_moved_plane_costs_little_more_than_one_view():

@@ -79,5 +79,6 @@ def _matched(
     distinct = best[least < DISTINCT * np.median(cells, axis=0)]
     if not len(distinct):
         return float(least.sum()), -UNIT, UNIT
-    low, high = (int(distinct.min()) - reach) * UNIT, (int(distinct.max()) - reach) * UNIT
+    # Things near the plane of the display may be smaller than a cell: zero is always within the range.
+    low, high = min(int(distinct.min()) - reach, 0) * UNIT, max(int(distinct.max()) - reach, 0) * UNIT
     return float(least.sum()), low - MARGIN, high + MARGIN
