@@ -47,7 +47,7 @@ def main() -> None:
     folder = DOCS / "images" / "cameras"
     folder.mkdir(parents=True, exist_ok=True)
     for name in (name for names in KINDS.values() for name in names):
-        write_picture(folder / f"{name}.png", strip(scene, shown(name), name))
+        write_picture(folder / f"{name}.webp", strip(scene, shown(name), name))
         print(name, flush=True)
     write_picture(DOCS / "images" / "scenes.jpg", all_scenes())
     (DOCS / "cameras.md").write_text(page(), encoding="utf-8")
@@ -108,7 +108,7 @@ def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
     )
     sheet = json.loads((CAMERAS / f"{name}.json").read_text(encoding="utf-8"))
     about = sheet["about"][:1].upper() + sheet["about"][1:]
-    picture = f"![L, D, detail and view of {name}](images/cameras/{name}.png)"
+    picture = f"![L, D, detail and view of {name}](images/cameras/{name}.webp)"
     text, facts = (fill(text, 100, break_on_hyphens=False) for text in (f"{about}. {sheet['notes']}", f"{facts}."))
     return f"\n### {name}\n\n{text}\n\n{facts}\n\n{picture}\n"
 

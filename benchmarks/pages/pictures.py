@@ -1,4 +1,4 @@
-"""Pictures of README and docs: width of a page, palette for charts, PNG or JPEG for photographs."""
+"""Pictures of README and docs: width of a page, palette for charts, WebP or JPEG for photographs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ def write_picture(path: str | os.PathLike[str], source: NDArray[np.uint8] | str 
     Parameters
     ----------
     path : path
-        ``.png``, or ``.jpg`` for JPEG of quality 80 without subsampled colour; replaced, whole.
+        ``.png``, ``.webp`` without loss for photographs whose pixels matter (a quarter smaller), or ``.jpg`` for
+        JPEG of quality 80 without subsampled colour; replaced, whole.
     source : (H, W, 3) uint8 or path
         Anything wider than 1500 pixels is reduced to that. A PNG keeps its colours, but a chart, which is a file
         with an alpha channel, gets a palette of 256.
@@ -45,10 +46,12 @@ def write_picture(path: str | os.PathLike[str], source: NDArray[np.uint8] | str 
     ending, data = os.fspath(path).rpartition(".")[2], io.BytesIO()
     if ending == "png":
         (with_palette(picture) if chart else picture).save(data, "PNG", optimize=True)
+    elif ending == "webp":
+        picture.save(data, "WEBP", lossless=True, quality=100, method=6)
     elif ending == "jpg":
         picture.save(data, "JPEG", quality=QUALITY, subsampling=0, optimize=True, progressive=True)
     else:
-        raise ValueError(f"a picture of a page is a .png or .jpg, not {os.fspath(path)}")
+        raise ValueError(f"a picture of a page is a .png, .webp or .jpg, not {os.fspath(path)}")
     with atomic_path(path) as temporary:
         temporary.write_bytes(data.getvalue())
 

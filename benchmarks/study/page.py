@@ -27,7 +27,7 @@ from .volume_model import APART, MODEL
 
 PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
 CODERS_SCALE = 4
-PHOTOGRAPHS = ("component-images", "other-cameras")
+PHOTOGRAPHS = {"component-images": ".jpg", "other-cameras": ".jpg", "artefacts-": ".webp", "equal-": ".webp"}
 OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
 # Figures by part of the page.
 SECTIONS = {
@@ -83,8 +83,8 @@ def copy_pictures(folder: Path, images: Path, best: Mapping[str, Mapping[str, An
 
 
 def page_name(name: str) -> str:
-    """Return the name of a picture on the page: JPEG for photographs, except those that show coding artefacts."""
-    return name.replace(".png", ".jpg") if name.startswith(PHOTOGRAPHS) else name
+    """Return the name of a picture on the page: photographs are JPEG, those of coding artefacts WebP without loss."""
+    return next((name.replace(".png", end) for kind, end in PHOTOGRAPHS.items() if name.startswith(kind)), name)
 
 
 def keep(new: Path, old: Path) -> None:

@@ -96,7 +96,7 @@ def test_a_small_study_resumes_repeats_and_fills_the_page(tmp_path, capsys):
         publish(tmp_path / "out", page=page, images=tmp_path / "images", kept=tmp_path / "kept")
         lines = (tmp_path / "kept" / "floors.jsonl").read_text().splitlines()
         assert [json.loads(line).get("repeats") for line in lines] == [None, True]
-    assert (tmp_path / "images" / "artefacts-setup1_views.png").exists()
+    assert (tmp_path / "images" / "artefacts-setup1_views.webp").exists()
     assert (
         "| Fig. 5.10 | lowest rate of a black picture, bpp | EI-PVS 0.63 | EI-PVS 0.31 |  |  | no |"
         in page.read_text()

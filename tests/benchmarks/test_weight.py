@@ -53,7 +53,7 @@ def test_no_picture_is_there_twice_and_none_is_wider_than_shown():
     """On b1dc540 ten charts stood in benchmarks/results and in docs/images."""
     seen = {}
     for path in tracked():
-        if path.startswith(("docs/", "benchmarks/")) and path.endswith((".png", ".jpg")):
+        if path.startswith(("docs/", "benchmarks/")) and path.endswith((".png", ".webp", ".jpg")):
             data = (ROOT / path).read_bytes()
             if path.startswith("docs/images/cameras/"):  # cameras that differ in time or kind alone look alike
                 data += path.encode()
@@ -74,7 +74,9 @@ def test_charts_get_a_palette_and_photographs_keep_their_colours(tmp_path):
     noise = np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8)
     write_picture(tmp_path / "photo.png", noise)
     assert np.array_equal(np.asarray(Image.open(tmp_path / "photo.png")), noise)
+    write_picture(tmp_path / "photo.webp", noise)
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "photo.webp")), noise)
     write_picture(tmp_path / "photo.jpg", np.repeat(np.repeat(noise[:4, :4], 16, 0), 16, 1))
     assert Image.open(tmp_path / "photo.jpg").format == "JPEG"
-    with pytest.raises(ValueError, match=r"\.png or \.jpg, not .*photo\.gif"):
+    with pytest.raises(ValueError, match=r"\.png, \.webp or \.jpg, not .*photo\.gif"):
         write_picture(tmp_path / "photo.gif", noise)
