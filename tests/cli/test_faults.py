@@ -17,6 +17,7 @@ from ii_core import IICamera, IIPicture
 from ii_core.camera import MOST_ALONG
 from ii_core.files import MAX_TEXT, write_image
 from ii_core.picture import sidecar
+from tests.support.interrupts import hear_interrupts
 
 SMALL = ("render", "objects", "--scale", 128)
 COMMAND = [sys.executable, "-m", "raytrace_ii.cli"]
@@ -122,6 +123,7 @@ def bomb(path, width, height):
 LIMITED = """
 import resource, sys
 from raytrace_ii import cli
+from tests.support.interrupts import hear_interrupts
 import numba, codec, metrics, ii_core.picture  # what they need is there before the limit is set
 used = int(next(line for line in open("/proc/self/status") if line.startswith("VmData")).split()[1]) * 1024
 resource.setrlimit(resource.RLIMIT_DATA, (used + (1 << 29),) * 2)
@@ -288,14 +290,19 @@ def wait_for(condition, seconds=120):
 def test_a_signal_ends_a_run_within_two_seconds(tmp_path, number, code):
     """A block of 65536 pixels with 4096 samples takes minutes, and the main thread waits for its end."""
     command = ("render", "apples", "--scale", "8", "--samples", "4096", "-o", "p.png")
-    with subprocess.Popen([*COMMAND, *command], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
-        wait_for(lambda: list(tmp_path.glob(".p*")))
-        time.sleep(5)  # the scene is loaded, and threads trace
-        started = time.monotonic()
-        running.send_signal(number)
-        said = running.stderr.read()
-        assert running.wait(60) == code
-        seconds = time.monotonic() - started
+    with subprocess.Popen(
+        [*COMMAND, *command], cwd=tmp_path, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts
+    ) as running:
+        try:
+            wait_for(lambda: list(tmp_path.glob(".p*")))
+            time.sleep(5)  # the scene is loaded, and threads trace
+            started = time.monotonic()
+            running.send_signal(number)
+            assert running.wait(60) == code
+            seconds = time.monotonic() - started
+            said = running.stderr.read()
+        finally:
+            running.kill()
     assert seconds < 2.5, "1.5 s of grace, and what a loaded machine adds"
     assert "interrupted" in said and "Traceback" not in said
     assert list(tmp_path.iterdir()) == []

@@ -15,6 +15,7 @@ from codec import encode
 from ii_core import IIPicture, preset
 from raytrace_ii import load_scene, render
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's & makes ignored
 scene, camera = load_scene("cuboid"), preset("setup1", scale=8)
 picture = IIPicture(np.random.default_rng(0).integers(0, 256, (1024, 1024, 3), np.uint8), (64, 64), (16, 16))
 small = IIPicture(picture.pixels[:64, :64].copy(), (4, 4), (16, 16))

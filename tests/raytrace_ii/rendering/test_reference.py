@@ -17,6 +17,7 @@ from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.rendering import render_sets as reference
 from raytrace_ii.scene.hashing import content_hash
 from raytrace_ii.tracing.packing import packed
+from tests.support.interrupts import hear_interrupts
 from tests.support.trace_scenes import body, hall, sphere, wall
 
 CAMERA = preset("setup1", scale=64)
@@ -134,7 +135,7 @@ def test_an_interrupt_from_outside(tmp_path):
     """The command on the real scenes: after Ctrl-C what is finished is in the manifest, and nothing is half made."""
     out = tmp_path / "set"
     command = [sys.executable, "-m", "raytrace_ii.cli", "render", "--set", "reference", "--scale", "128", "-o", out]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts)
     try:
         deadline = time.monotonic() + 60
         while not (out / "apples_flat.png").exists() and time.monotonic() < deadline:
