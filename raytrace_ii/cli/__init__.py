@@ -32,6 +32,7 @@ __all__ = [
 ]
 
 INTERRUPTED = 130  # the exit code of a command that Ctrl-C ended
+TERMINATED = 143  # and of one that SIGTERM ended
 
 
 def main() -> None:
@@ -52,6 +53,10 @@ def _run() -> None:
         sys.exit(code if isinstance(code, int) else 0)
     except (ValueError, OSError, MemoryError, ArithmeticError) as error:
         _fail(str(error) or type(error).__name__)
+    except SystemExit as end:
+        if end.code == TERMINATED:
+            print("interrupted", file=sys.stderr)
+        raise
     except RecursionError:
         _fail("the input nests too deeply")
     except (KeyboardInterrupt, typer.Abort):

@@ -14,6 +14,7 @@ from typing import Any
 GRACE_SECONDS = 1.5  # for the cleanup, also if compiled code runs longer
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
 SHOW_CURSOR = b"\x1b[?25h"  # a progress bar hides it
+_watched: list[socket.socket] = []  # of interrupted commands: closed with the process
 
 
 @contextmanager
@@ -27,23 +28,32 @@ def ends_soon() -> Iterator[None]:
         yield
         return
     heard, told = socket.socketpair()
+    left = threading.Event()
     told.setblocking(False)
     before = signal.signal(signal.SIGTERM, _terminate)
     wakeup = signal.set_wakeup_fd(told.fileno(), warn_on_full_buffer=False)
-    threading.Thread(target=_watch, args=(heard,), daemon=True).start()
+    threading.Thread(target=_watch, args=(heard, left), daemon=True).start()
+    ended = True
     try:
         yield
+    except BaseException as end:
+        ended = not isinstance(end, KeyboardInterrupt) and getattr(end, "code", None) not in CODES.values()
+        raise
     finally:
+        left.set()
         signal.set_wakeup_fd(wakeup)
         signal.signal(signal.SIGTERM, before)
-        told.close()  # ends the thread
+        if ended:
+            told.close()  # ends the thread
+        else:  # Python waits for the threads of pools when it exits: the watch goes on
+            _watched.append(told)
 
 
 def _terminate(number: int, frame: Any) -> None:
     sys.exit(CODES[signal.SIGTERM])
 
 
-def _watch(heard: socket.socket) -> None:
+def _watch(heard: socket.socket, left: threading.Event) -> None:
     with heard:
         while (data := heard.recv(1)) and data[0] not in CODES:
             pass
@@ -54,15 +64,16 @@ def _watch(heard: socket.socket) -> None:
             while heard.recv(64):  # further signals have no effect; the end of the command closes the socket
                 pass
         except TimeoutError:
-            _stop(CODES[signal.Signals(data[0])])
+            _stop(CODES[signal.Signals(data[0])], said=left.is_set())
 
 
-def _stop(code: int) -> None:
-    """End the process without waiting for threads; remove its unfinished files."""
+def _stop(code: int, *, said: bool) -> None:
+    """End the process without waiting for threads; remove its unfinished files; say so unless the command has."""
     from ii_core.atomic import remove_temporaries
 
     remove_temporaries()
     if sys.stderr.isatty():
         os.write(2, SHOW_CURSOR)
-    os.write(2, b"interrupted\n")
+    if not said:
+        os.write(2, b"interrupted\n")
     os._exit(code)
