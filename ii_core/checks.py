@@ -182,6 +182,12 @@ def callable_(name: str, value: Any) -> None:
         raise refuse(name, value, "a function")
 
 
+def progress(name: str, value: Any) -> None:
+    """Rule: a function, or True for a printed line and False for none."""
+    if not callable(value) and not isinstance(value, bool):
+        raise refuse(name, value, "a function, True or False")
+
+
 def within(name: str, value: Any, least: float, most: float, needed: str = "number", unit: str = "") -> float:
     """Return a number within bounds.
 

@@ -175,7 +175,7 @@ def _check_overlap(
     encode=checks.callable_,
     decode=checks.callable_,
     workers=checks.whole,
-    progress=checks.callable_,
+    progress=checks.progress,
     measure=checks.callable_,
     known=checks.mapping,
     keep=checks.callable_,

@@ -40,7 +40,7 @@ class Hevc(Video):
             choices=("crf", "cq", "2pass"),
         ),
         "preset": Option(about="x265's preset, the effort", default="slow", choices=SPEEDS),
-        "refs": Option(about="reference pictures, 0 for the preset's", default=0, low=0, high=16),
+        "refs": Option(about="reference pictures, 0 for the preset's", default=0, low=0, high=8),  # x265 refuses 12
         "chroma": chroma("444"),
         "depth": DEPTH,
         "threads": THREADS,

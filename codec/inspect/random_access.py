@@ -66,7 +66,7 @@ def decode_frame(coded: Encoded, index: int) -> Pixels:
     check_type("index", index, (int, np.integer), "a whole number")
     coder, grid = _grid(coded)
     if isinstance(index, bool) or not 0 <= index < grid.frames:
-        raise ValueError(f"frame {index} does not exist: there are {grid.frames}, from 0")
+        raise ValueError(f"the frame of index {index} does not exist: there are {grid.frames}, from 0")
     return _decoded(coder, coded, int(coder.frame_order(grid.rows, grid.cols, coded.options)[index]))
 
 
