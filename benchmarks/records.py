@@ -103,24 +103,28 @@ class Records:
 
         return [dict(key) for key in keys if wanted(key)]
 
-    def newest(self, **only: Any) -> list[Record]:
+    def newest(self, *, unsure: bool | None = None, **only: Any) -> list[Record]:
         """Return the newest record of each key, in the order in which keys first appear.
 
         Parameters
         ----------
+        unsure : bool, optional
+            Only records of unknown commit, or only those of a known one.
         only
             Values that the keys must have.
         """
         found: dict[str, Record] = {}
         for record in read_records(self.path, FORMAT, VERSION):
             name = _name(record["key"])
+            if unsure is not None and ("unsure" in record) is not unsure:
+                continue
             if "unsure" not in record or "unsure" in found.get(name, record):
                 found[name] = record
         return [record for record in found.values() if only.items() <= record["key"].items()]
 
-    def rows(self, **only: Any) -> list[dict[str, Any]]:
+    def rows(self, *, unsure: bool | None = None, **only: Any) -> list[dict[str, Any]]:
         """Return key and result of the newest records as one dict each, with ``commit`` as `commit_of` gives it."""
-        return [{**r["key"], **r["result"], "commit": commit_of(r)} for r in self.newest(**only)]
+        return [{**r["key"], **r["result"], "commit": commit_of(r)} for r in self.newest(unsure=unsure, **only)]
 
 
 def cpu_seconds() -> float:
