@@ -1,8 +1,8 @@
 """Rays against triangles, by Embree: in packets where its library can be called directly, else one by one by embreex.
 
 What Embree leaves to its caller is settled here: float32 C-order arrays, finite vertices, one geometry whose
-primitive number is the row of the face, places of hits that are the same for every kind of call, and a second tree
-of opaque faces for shadow rays.
+primitive number is the row of the face, places of hits that are the same for every kind of call, one winner of faces
+in the same place, and a second tree of opaque faces for shadow rays.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .embree import Tree, library, with_spare
 from .kernels.arrays import Hits
 from .kernels.packets import place_hits
+from .same_faces import first_of_same
 
 Floats = NDArray[np.float32]
 _NO_REACH = np.empty(0, np.float32)
@@ -46,15 +47,17 @@ class Intersector:
         else:
             self._opaque = tree(corners[:opaque]) if opaque else None
             self._clear = tree(corners[opaque:])
+        self._first = first_of_same(corners)
+        self._first_clear = first_of_same(corners[opaque:]) if self._clear is not None else None
 
     def nearest(self, origins: Floats, directions: Floats) -> tuple[Hits, float]:
         """Nearest hit of every ray, and CPU seconds inside Embree."""
-        return _nearest(self._all, origins, directions, _NO_REACH)
+        return _nearest(self._all, self._first, origins, directions, _NO_REACH)
 
     def nearest_clear(self, origins: Floats, directions: Floats, reach: Floats = _NO_REACH) -> tuple[Hits, float]:
         """Nearest hit within ``reach`` with a face that lets light through; faces count from their first."""
         assert self._clear is not None
-        return _nearest(self._clear, origins, directions, reach)
+        return _nearest(self._clear, self._first_clear, origins, directions, reach)
 
     def blocked(self, origins: Floats, directions: Floats, reach: Floats) -> tuple[NDArray[np.int32], float]:
         """0 where an opaque face lies within ``reach`` lengths of the direction, −1 where not; and CPU seconds."""
@@ -85,9 +88,14 @@ class SingleRays:
         out[:] = self._scene.run(origins, directions, dists=reach.copy(), query="OCCLUDED")
 
 
-def _nearest(tree: Tree | SingleRays, origins: Floats, directions: Floats, reach: Floats) -> tuple[Hits, float]:
+def _nearest(
+    tree: Tree | SingleRays, first: NDArray[np.int32] | None, origins: Floats, directions: Floats, reach: Floats
+) -> tuple[Hits, float]:
     n = len(origins)
     hits = Hits(np.empty(n, np.int32), *(np.empty(n, np.float32) for _ in range(3)))
     start = time.thread_time()
     tree.nearest(origins, directions, reach, hits)
+    if first is not None:
+        hits.faces[:] = np.where(hits.faces >= 0, first[hits.faces], -1)
+        place_hits(origins, directions, tree.corners, *hits)
     return hits, time.thread_time() - start

@@ -219,6 +219,7 @@ def test_tilting_turns_by_the_same_angle(phone):
     tab.evaluate(tilt, [40, 0])
     assert state(tab)["x"] == 0  # until it is switched on
     tab.locator("#tilt").click()
+    tab.wait_for_selector("#tilt[aria-pressed=true]")  # a browser may ask for permission first, and answers later
     tab.evaluate(tilt, [40, 0])
     tab.evaluate(tilt, [37, 2])
     phi, theta = tab.evaluate("[ii.viewer.meta.camera.phi, ii.viewer.meta.camera.theta]")
