@@ -31,7 +31,6 @@ FORMAT, VERSION = "ii-record", 1
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 STAMP = ("code", "git", "machine", "versions", "when")
-LEAST_SECONDS = 0.01  # of a row whose times are compared with those of others
 FIELDS = ("key", *STAMP, "seconds", "result")
 # Sources of every number, besides the modules of the benchmark itself; pages and charts may change freely.
 PACKAGES = ("ii_core", "raytrace_ii", "codec", "metrics", "assets")
@@ -240,13 +239,12 @@ def check(path: Path) -> list[str]:
     """Return what is wrong with a file of records, a line each.
 
     Every record has all fields and a commit that exists, as far as this checkout has a history. No two have the same
-    measured seconds under different commits; times in all below `LEAST_SECONDS` may be equal by chance, as they are
-    rounded to milliseconds. No committed line was changed or removed, unless its commit is unknown.
-    Records converted from a file
-    of an earlier form have no code hash and no date. Records marked ``unsure`` have no commit either: several commits
-    measured them, and the file of that time named one for all.
+    measured seconds under different commits, unless the seconds of their whole measurements differ too: short times
+    are equal by chance, as they are rounded to milliseconds. No committed line was changed or removed, unless its
+    commit is unknown. Records converted from a file of an earlier form have no code hash and no date. Records marked
+    ``unsure`` have no commit either: several commits measured them, and the file of that time named one for all.
     """
-    wrong, seen = [], dict[tuple[float, ...], str]()
+    wrong, seen = [], dict[tuple[float, ...], Record]()
     for number, record in enumerate(read_records(path, FORMAT, VERSION), 1):
         where = f"{path.name}, line {number}"
         if missing := [name for name in FIELDS if name not in record]:
@@ -260,11 +258,18 @@ def check(path: Path) -> list[str]:
         if git is not None and not exists(git["commit"]):
             wrong.append(f"{where}: commit {git['commit']} is not in this history")
         seconds = tuple(seconds_in(record["result"]))
-        if sum(seconds) >= LEAST_SECONDS and seen.setdefault(seconds, commit_of(record)) != commit_of(record):
-            wrong.append(f"{where}: seconds identical to a row of {seen[seconds]}, stamped {commit_of(record)}")
+        if any(seconds) and _copied(seen.setdefault(seconds, record), record):
+            first = commit_of(seen[seconds])
+            wrong.append(f"{where}: seconds identical to a row of {first}, stamped {commit_of(record)}")
     lines = set(path.read_text(encoding="utf-8").splitlines())
     lost = [line for line in committed(path) if line not in lines and _counts(line)]
     return wrong + [f"{path.name}: a committed row was changed or removed"] * bool(lost)
+
+
+def _copied(first: Record, second: Record) -> bool:
+    """Whether of two records with equal times in their results one is a copy of the other under another commit."""
+    whole = (first["seconds"], second["seconds"])
+    return commit_of(first) != commit_of(second) and (None in whole or whole[0] == whole[1])
 
 
 def committed(path: Path) -> list[str]:

@@ -44,7 +44,7 @@ def main() -> None:
         with spinner(f"write the pictures of {name}"):
             write_pictures(scene, shot, name, arguments.output)
         rays = {"rays": shot.stats.rays, "render_seconds": shot.stats.seconds, "sensor_noise_sigma": 1.0, "seed": 0}
-        run_study(shot.picture, name, SCHEMES, RATES, arguments.output, extra=rays)
+        run_study(shot.picture, name, SCHEMES, RATES, arguments.output, extra=rays, anchor="jpeg2000")
     print(f"{time.perf_counter() - started:.0f} s; pictures, charts (.png) and numbers (.json): {arguments.output}/")
 
 
