@@ -190,7 +190,12 @@ BENCHMARKS = {
             fills=("docs/speed_accuracy.md",),
             writes=(f"{IMAGES}/pareto.*",),
         ),
-        Benchmark("speed.needs", records=OWN, fills=("docs/speed_accuracy.md",), writes=(f"{IMAGES}/needs.*",)),
+        Benchmark(
+            "speed.feature_ablation",
+            records=OWN,
+            fills=("docs/speed_accuracy.md",),
+            writes=(f"{IMAGES}/feature_ablation.*",),
+        ),
         Benchmark(
             "speed.texture_filter",
             records=OWN,

@@ -34,7 +34,7 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("convergence", "how meshes approach the truth", ()),
     ("stability", "where methods fail", ()),
     ("pareto", "speed against accuracy of rendering", ()),
-    ("needs", "what each scene needs", ()),
+    ("feature_ablation", "what each scene needs", ()),
     ("texture_filter", "what filtered textures cost and bring", ()),
     ("metrics_speed", "what metrics cost", ()),
     ("ratios", "ratios to bare libraries", ()),

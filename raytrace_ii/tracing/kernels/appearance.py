@@ -1,4 +1,4 @@
-"""What a surface looks like at a hit: attenuation on the way, blending, maps, textures, and shares of its light."""
+"""Appearance of a surface at a hit: attenuation on the path, blending, normal maps, textures, material shares."""
 
 from __future__ import annotations
 

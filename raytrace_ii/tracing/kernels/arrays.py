@@ -1,4 +1,4 @@
-"""Arrays that kernels take and fill, by name."""
+"""Named tuples of the arrays that kernels read and write."""
 
 from __future__ import annotations
 

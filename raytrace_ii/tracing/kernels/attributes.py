@@ -1,4 +1,4 @@
-"""Where rays hit, in vectors: hits are gathered to lanes, then places and normals reckoned for all lanes at once."""
+"""Attributes of hits, computed for all lanes of a block: position, flat and smooth normal, footprint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rays through faces that are clear, hidden or cut out."""
+"""Passage of rays through transparent, hidden and cut-out faces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from ii_core.jit import lean_kernel as kernel
 from ii_core.jit import part_kernel
 
-from .media import cross, enter, fresnel, leave, media_at, medium_of, refractive_index, transmits
+from .fresnel import fresnel
+from .media import cross, enter, leave, media_at, medium_of, refractive_index, transmits
 from .tables import ABSORPTION, ALPHA_BLEND, FAR, LEAST_WEIGHT, TRANSMISSION
 from .textures import is_cut_out, share_there
 from .vectors import put, put_behind
@@ -133,7 +134,7 @@ def pass_clear_face(
 
 @part_kernel
 def _straight_reflectance(materials, before, after, c, faces, f, dx, dy, dz, length):
-    """Fresnel's share at a face between two media for light that goes straight on at its angle in air."""
+    """Return the Fresnel reflectance of a face for light that passes unrefracted, at its angle in air."""
     cosine = (faces[f, 0] * dx + faces[f, 1] * dy + faces[f, 2] * dz) / length
     n1, n2 = refractive_index(materials, before, c), refractive_index(materials, after, c)
     within = 1.0 - (1.0 - cosine * cosine) / (n1 * n1)

@@ -1,4 +1,4 @@
-"""Rough mirrors: directions over a lobe, and the highlight of one."""
+"""Glossy reflection by a GGX surface: sampled directions and the highlight."""
 
 from __future__ import annotations
 

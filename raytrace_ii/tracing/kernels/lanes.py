@@ -1,4 +1,4 @@
-"""The room that the stages of one block of rays share: quantities by name, a lane for each hit."""
+"""Work memory of one block of rays: quantities by name, one lane per hit."""
 
 from __future__ import annotations
 

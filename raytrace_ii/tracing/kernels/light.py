@@ -1,4 +1,4 @@
-"""Light of lamps: what would arrive, shadow rays, and what does arrive."""
+"""Direct light of lamps: unshadowed radiance, shadow rays, and the unblocked share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gradient noise and the terrain made of it."""
+"""Gradient noise, and terrain made of it."""
 
 from __future__ import annotations
 

@@ -1,10 +1,11 @@
-"""Numba kernels that hand rays to Embree in packets and take their hits back.
+"""Ray packets of Embree: filled with rays, intersected, and read back as hits.
 
-The addresses of Embree's functions are arguments, so that nothing of one process is kept in numba's cache. A packet
-is a matrix of 32-bit numbers: a row a quantity of `RTCRayN` and `RTCHitN`, a column a ray (`rtcore_ray.h`, Embree 4).
+The addresses of Embree's functions are arguments, because an address is valid in one process only and numba's cache
+outlives it. A packet is a matrix of 32-bit numbers: rows are the quantities of `RTCRayN` and `RTCHitN`, columns are
+rays (`rtcore_ray.h`, Embree 4).
 
-Where in its face a ray hits is reckoned again in float64: Embree's u and v differ between instruction sets by up to
-4e-4; from ray and face alone they are the same whatever found the face, a packet, a single ray or another CPU.
+The position of a hit in its face is computed again in float64. Embree's u and v differ between instruction sets by up
+to 4e-4; values from ray and face alone are equal for packets, single rays and all CPUs.
 """
 
 from __future__ import annotations

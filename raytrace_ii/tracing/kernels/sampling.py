@@ -1,4 +1,4 @@
-"""Numba kernels of adaptive supersampling: where samples lie, what they add up to, how sure their mean is."""
+"""Adaptive supersampling: sample positions, sums and standard errors."""
 
 from __future__ import annotations
 

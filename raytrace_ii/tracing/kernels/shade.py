@@ -1,4 +1,4 @@
-"""Shading of one generation of rays, in blocks that go through all stages."""
+"""Shading of one generation of rays, stage by stage over blocks."""
 
 from __future__ import annotations
 

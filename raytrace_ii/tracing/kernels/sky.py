@@ -1,4 +1,4 @@
-"""Light from where nothing is hit."""
+"""Background colour of rays without a hit."""
 
 from __future__ import annotations
 

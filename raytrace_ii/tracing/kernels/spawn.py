@@ -1,4 +1,4 @@
-"""Rays that a surface sends on: behind it where it is not there, through glass, and over mirrors."""
+"""Secondary rays: passed, refracted and reflected."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 from ii_core.jit import inline_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
+from .fresnel import fresnel
 from .glossy import glossy_direction
-from .media import cross, disperses, fresnel, media_at, refractive_index
+from .media import cross, disperses, media_at, refractive_index
 from .tables import (
     ALPHA_BLEND,
     EXTRAS,

@@ -1,4 +1,4 @@
-"""Rays of the camera: where they start and where in a pixel."""
+"""Camera rays: origins, directions and sample positions within a pixel."""
 
 from __future__ import annotations
 

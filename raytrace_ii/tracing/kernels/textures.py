@@ -1,4 +1,4 @@
-"""Textures: patterns, and images read at a point or over the width of a ray."""
+"""Textures: patterns, and images read at a point or filtered over a footprint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Places and directions: small helpers of all stages."""
+"""Vector helpers of all stages."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ from raytrace_ii import trace
 from raytrace_ii.scene.textures import Image
 from raytrace_ii.tracing import tracer
 from raytrace_ii.tracing.kernels import shade as stages
+from raytrace_ii.tracing.kernels.fresnel import fresnel
 from raytrace_ii.tracing.kernels.light import keep_unblocked
-from raytrace_ii.tracing.kernels.media import fresnel
 from raytrace_ii.tracing.kernels.start import start_rays, start_separable_rays
 from tests.support.trace_scenes import WHITE, body, hall, sphere, wall
 

@@ -1,13 +1,13 @@
-"""Scene requirements: loss in quality and gain in time of leaving out each feature; cheapest adequate settings.
+"""Ablation of scene features: loss of quality and saved time without each feature, and the cheapest adequate model.
 
-    python -m benchmarks run needs [--scale 16] [--scenes apples,car] [--rounds 5]
+    python -m benchmarks run feature_ablation [--scale 16] [--scenes apples,car] [--rounds 5]
 
 Every picture is compared with the full picture of the same samples in 16 bits. A picture is *indistinguishable* if it
 differs no more than the 8-bit picture of the reference set with sensor noise of one step. The criteria are PSNR, SSIM
 of the worst of five views, and the 99.9th percentile of the error; the last detects small distant details, which
-means hide. Features are left out in the order of the time that they save, as long as the result is indistinguishable.
-CPU time is the median over rounds in which every model is rendered once. Numbers go to
-``benchmarks/results/needs.jsonl``, tables and chart to ``docs/speed_accuracy.md``.
+averages hide. Features are left out in the order of the time that they save, as long as the picture stays
+indistinguishable. CPU time is the median over rounds in which every model is rendered once. Numbers go to
+``benchmarks/results/feature_ablation.jsonl``, tables and chart to ``docs/speed_accuracy.md``.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, VertexCol
 from raytrace_ii.tracing.intersect import Hits
 from raytrace_ii.tracing.packing import packed
 
-RECORDS = Records("needs", ("benchmarks.speed.needs", "benchmarks.speed.pareto"))
-CHART = ROOT / "docs/images/needs.png"
+RECORDS = Records("feature_ablation", ("benchmarks.speed.feature_ablation", "benchmarks.speed.pareto"))
+CHART = ROOT / "docs/images/feature_ablation.png"
 PAGE, SCALE, ROUNDS = "docs/speed_accuracy.md", 16, 5
 RARE = 0.999  # quantile of the error
 SHADOWS, FILTER = "shadows", "texture filtering"
@@ -302,10 +302,10 @@ def tables() -> Tables:
     (k, l), (m, n) = camera.lenses, camera.pixels
     size = f"`setup1` at `scale={SCALE}`: {m}×{n} pixels, {k}×{l} lenses, {BASE} samples per pixel."
     return {
-        (PAGE, "needs-size"): [size, by_scene(scenes)],
+        (PAGE, "ablation-size"): [size, by_scene(scenes)],
         (PAGE, "uses"): uses_table(scenes),
         (PAGE, "least"): least_table(scenes),
-        (PAGE, "needs"): needs_table(scenes),
+        (PAGE, "ablation"): ablation_table(scenes),
         (PAGE, "fewer"): fewer_table(scenes),
     }
 
@@ -339,7 +339,7 @@ def least_table(scenes: dict[str, Any]) -> list[str]:
     return lines
 
 
-def needs_table(scenes: dict[str, Any]) -> list[str]:
+def ablation_table(scenes: dict[str, Any]) -> list[str]:
     """Return a table of features by scenes: PSNR, SSIM, time; indistinguishable ones in bold."""
     parts = [row["what"] for one in scenes.values() for row in one["left_out"]]
     lines = [f"| without | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]

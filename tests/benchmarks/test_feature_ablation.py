@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.speed import needs
+from benchmarks.speed import feature_ablation as ablation
 from ii_core import IIPicture, preset
 from raytrace_ii import Scene, trace
 from raytrace_ii.scene.textures import Checker, Image, VertexColours
@@ -14,7 +14,7 @@ CAMERA = preset("setup1", scale=16)
 
 @pytest.fixture(scope="module")
 def full():
-    return needs.shoot(needs.build("objects", ()), CAMERA).picture
+    return ablation.shoot(ablation.build("objects", ()), CAMERA).picture
 
 
 def test_without_shadows_all_is_lit_and_the_scene_itself_stays_shaded():
@@ -22,11 +22,11 @@ def test_without_shadows_all_is_lit_and_the_scene_itself_stays_shaded():
     down = [(0, 0.5, 5)], [(0, -1.0, 0)]
     for scene in (Scene(bodies=[ball, ground], lights=[sun((0, 1, 0))]), hall()):
         shaded = trace(scene, *down)
-        free = trace(needs.unshadowed(scene), *down)
+        free = trace(ablation.unshadowed(scene), *down)
         assert (free.radiance >= shaded.radiance).all()
         np.testing.assert_array_equal(trace(scene, *down).radiance, shaded.radiance)
     plain = Scene(bodies=[ball, ground], lights=[sun((0, 1, 0))])
-    assert trace(needs.unshadowed(plain), *down).radiance[0] == pytest.approx([1, 1, 1])
+    assert trace(ablation.unshadowed(plain), *down).radiance[0] == pytest.approx([1, 1, 1])
 
 
 def test_a_camera_in_glass_still_knows_it_without_shadows():
@@ -35,68 +35,68 @@ def test_a_camera_in_glass_still_knows_it_without_shadows():
         bodies=[body(sphere(5), transmission=WHITE, absorption_per_mm=(0.2, 0, 0))], background=hall().background
     )
     rays = [(0, 0, 0)] * 2, [(0, 0, 1.0), (0.1, 0.2, 1)]
-    np.testing.assert_array_equal(trace(needs.unshadowed(scene), *rays).radiance, trace(scene, *rays).radiance)
+    np.testing.assert_array_equal(trace(ablation.unshadowed(scene), *rays).radiance, trace(scene, *rays).radiance)
 
 
 def test_what_a_scene_has_is_found_and_left_out():
-    parts = needs.has("objects")
+    parts = ablation.has("objects")
     assert {"shadows", "highlights", "smooth normals", "bounces beyond 5", "triangles, × 0.5"} <= set(parts)
     assert not {"fog", "textures", "texture filtering", "normal maps", "bounces beyond 6"} & set(parts)
-    assert {"textures", "texture filtering"} <= set(needs.has("cuboid"))
-    bare = needs.build("objects", parts)
-    whole = needs.build("objects", ())
+    assert {"textures", "texture filtering"} <= set(ablation.has("cuboid"))
+    bare = ablation.build("objects", parts)
+    whole = ablation.build("objects", ())
     assert bare.max_depth == 0 and all(b.normals is None and b.material.specular == 0 for b in bare.bodies)
     assert sum(len(b.faces) for b in bare.bodies) < sum(len(b.faces) for b in whole.bodies) / 10
-    shot = needs.shoot(bare, CAMERA)
+    shot = ablation.shoot(bare, CAMERA)
     assert shot.stats.rays["reflection"] == shot.stats.rays["refraction"] == 0
 
 
 def test_plain_colours_are_the_mean_of_the_texture():
     image = Image(np.random.default_rng(0).random((5, 7, 3), np.float32))
-    np.testing.assert_allclose(needs.mean_colour(image, None), image.pixels.reshape(-1, 3).mean(axis=0), rtol=1e-6)
-    np.testing.assert_array_equal(needs.mean_colour(Checker((WHITE, (0, 0, 0)), (1, 1, 1)), None), [0.5] * 3)
-    np.testing.assert_array_equal(needs.mean_colour(VertexColours(), [[0, 1, 2], [2, 1, 0]]), [1, 1, 1])
+    np.testing.assert_allclose(ablation.mean_colour(image, None), image.pixels.reshape(-1, 3).mean(axis=0), rtol=1e-6)
+    np.testing.assert_array_equal(ablation.mean_colour(Checker((WHITE, (0, 0, 0)), (1, 1, 1)), None), [0.5] * 3)
+    np.testing.assert_array_equal(ablation.mean_colour(VertexColours(), [[0, 1, 2], [2, 1, 0]]), [1, 1, 1])
 
 
 def test_the_limit_is_the_noise_of_the_reference_set(full):
     """Rounding to 8 bits, noise of one step, rounding again: 1 + 2/12 squared steps, 47.46 dB."""
-    limit = needs.compared(full, needs.noisy(full))
+    limit = ablation.compared(full, ablation.noisy(full))
     assert limit["psnr"] == pytest.approx(10 * np.log10(255**2 / (1 + 2 / 12)), abs=0.05)
     assert 3 < limit["rare"] < 4 and 0.98 < limit["worst"] < 1
-    assert needs.alike(needs.compared(full, full), limit)
+    assert ablation.alike(ablation.compared(full, full), limit)
 
 
 def test_what_is_small_and_far_off_is_seen(full):
     """A spot in two of a thousand pixels: 53 dB, better than the noise, and yet told apart."""
-    limit = needs.compared(full, needs.noisy(full))
+    limit = ablation.compared(full, ablation.noisy(full))
     pixels = full.pixels.copy()
     rows, cols = np.unravel_index(np.arange(0, pixels.shape[0] * pixels.shape[1], 500), pixels.shape[:2])
     pixels[rows, cols] ^= 12 * 257
-    found = needs.compared(full, full.with_pixels(pixels))
-    assert found["psnr"] > limit["psnr"] and not needs.alike(found, limit)
+    found = ablation.compared(full, full.with_pixels(pixels))
+    assert found["psnr"] > limit["psnr"] and not ablation.alike(found, limit)
 
 
 def test_the_least_model_keeps_what_can_be_seen(full):
-    limit = needs.compared(full, needs.noisy(full))
+    limit = ablation.compared(full, ablation.noisy(full))
     rows = [{"what": f"bounces beyond {depth}", "time": -0.1 * depth} for depth in (0, 5)]
     for row in rows:
-        row |= needs.compared(full, needs.shoot(needs.build("objects", (row["what"],)), CAMERA).picture)
-    least = needs.least_model("objects", CAMERA, full, rows, limit)
-    assert least["without"] == ["bounces beyond 5"] and needs.alike(least, limit)
+        row |= ablation.compared(full, ablation.shoot(ablation.build("objects", (row["what"],)), CAMERA).picture)
+    least = ablation.least_model("objects", CAMERA, full, rows, limit)
+    assert least["without"] == ["bounces beyond 5"] and ablation.alike(least, limit)
 
 
 def test_pictures_are_enlarged_lens_by_lens_or_pixel_by_pixel():
     rng = np.random.default_rng(0)
     small = IIPicture(rng.integers(0, 65536, (4 * 3, 6 * 2, 3)).astype(np.uint16), (6, 4), (2, 3))
-    same = needs.enlarged(small, (1, 3), linear=False)
+    same = ablation.enlarged(small, (1, 3), linear=False)
     np.testing.assert_array_equal(same[::2, ::2], small.pixels)
     np.testing.assert_array_equal(same, small.pixels.repeat(2, axis=0).repeat(2, axis=1))
-    lenses = needs.enlarged(small, (0, 2), linear=False)
+    lenses = ablation.enlarged(small, (0, 2), linear=False)
     np.testing.assert_array_equal(lenses[:3, :2], lenses[3:6, 2:4])
     for axes in ((0, 2), (1, 3)):
         flat = small.with_pixels(np.full_like(small.pixels, 999))
-        assert (needs.enlarged(flat, axes, linear=True) == 999).all()
+        assert (ablation.enlarged(flat, axes, linear=True) == 999).all()
     ramp = np.broadcast_to((np.arange(8) * 100.0)[None, :, None], (8, 8, 3)).astype(np.uint16)
     np.testing.assert_array_equal(
-        needs.enlarged(IIPicture(ramp, (1, 1), (8, 8)), (1, 3), linear=True)[0, 1:-1, 0], 25 + 50 * np.arange(14)
+        ablation.enlarged(IIPicture(ramp, (1, 1), (8, 8)), (1, 3), linear=True)[0, 1:-1, 0], 25 + 50 * np.arange(14)
     )
