@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import checks
+from .checks import MOST_MM
 
 
 @checks.checked(at_mm=checks.numbers, look_at_mm=checks.numbers, up=checks.numbers, turn_deg=checks.numbers)
@@ -38,7 +39,8 @@ def camera_pose(
     Raises
     ------
     ValueError
-        If a value is not three finite numbers, the camera looks at its own place, or along ``up``.
+        If a value is not three finite numbers, a coordinate is beyond 10⁹ mm, the camera looks at its own place, or
+        along ``up``.
     """
     given = {"at_mm": at_mm, "up": up, "turn_deg": turn_deg}
     given |= {} if look_at_mm is None else {"look_at_mm": look_at_mm}
@@ -46,6 +48,8 @@ def camera_pose(
     for name, vector in vectors.items():
         if vector.shape != (3,) or not np.isfinite(vector).all():
             raise ValueError(f"{name} is {given[name]!r}: three finite numbers are needed")
+        if name in ("at_mm", "look_at_mm") and np.abs(vector).max() > MOST_MM:
+            raise ValueError(f"{name} is {vector.tolist()}: coordinates up to {MOST_MM:g} mm are needed")
     ahead = vectors["look_at_mm"] - vectors["at_mm"] if "look_at_mm" in vectors else np.array([0.0, 0.0, 1.0])
     pose = np.eye(4)
     pose[:3, :3] = _facing(ahead, vectors["up"]) @ _turned(*np.radians(vectors["turn_deg"]))

@@ -15,6 +15,7 @@ import typer
 from . import synthesize, render, pictures, calibrating, coding, evaluate, show, eye, video
 from .common import app
 from .ending import ends_soon
+from .folders import no_empty_folders
 from .words import SPELT, one_line
 
 __all__ = [
@@ -47,7 +48,8 @@ def main() -> None:
 
 def _run() -> None:
     try:
-        code = app(standalone_mode=False)
+        with no_empty_folders():
+            code = app(standalone_mode=False)
         if code == INTERRUPTED:  # what typer makes of Ctrl-C
             print("interrupted", file=sys.stderr)
         sys.exit(code if isinstance(code, int) else 0)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .folders import create_folder
 from .words import one_line, say
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = Fal
     force : bool
         Replace existing files; folders, devices and pipes are never replaced.
     make_folder : bool
-        Create missing folders.
+        Create missing folders; a command that fails removes those that are still empty.
     """
     from ii_core.files import check_name
 
@@ -94,7 +95,7 @@ def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = Fal
             raise ValueError(f"{path} is to be written twice: every output needs a name of its own")
         seen.add(real)
     for path in files if make_folder else ():
-        path.parent.mkdir(parents=True, exist_ok=True)
+        create_folder(path.parent)
 
 
 def _check_place(folder: Path, path: Path, make_folder: bool) -> None:
@@ -109,7 +110,7 @@ def _check_place(folder: Path, path: Path, make_folder: bool) -> None:
 
 def check_folder(folder: Path, force: bool) -> None:
     """Create an output folder; raise an error if it is not empty."""
-    folder.mkdir(parents=True, exist_ok=True)
+    create_folder(folder)
     if any(folder.iterdir()) and not force:
         raise FileExistsError(f"{folder} is not empty: --force writes into it all the same")
 

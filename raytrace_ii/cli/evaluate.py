@@ -265,7 +265,9 @@ def run_study(
     log = PointLog(folder / f"{name}_rd.points.jsonl", picture, measures=sorted(measures), **over_depth)
     if log.known:
         print(f"{name}: {len(log.known)} points are kept from an interrupted run")
-    means: dict[str, Any] = {"workers": None if executor else workers or cores(), "executor": executor}
+    if workers is None and executor is None:
+        workers = cores()
+    means: dict[str, Any] = {"workers": workers, "executor": executor}
     means |= {"encode": encode, "decode": timed_decode, "measure": more, "keep": log.keep}
     if rates is None:
         with progress_bar(f"find the rates of {name}") as report:

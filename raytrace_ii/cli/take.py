@@ -40,7 +40,9 @@ def _frame_numbers(text: str, count: int) -> list[int]:
     except ValueError:
         raise ValueError(f"frames is {text!r}: one number, two like 0..47, or all is needed") from None
     if not numbers or numbers[0] < 0 or numbers[-1] >= count:
-        raise ValueError(f"frames is {text!r}: the take has frames 0..{count - 1}")
+        raise ValueError(
+            f"frames is {text!r}: FIRST..LAST with 0 <= FIRST <= LAST <= {count - 1}, the last frame, is needed"
+        )
     return list(numbers)
 
 

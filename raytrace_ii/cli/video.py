@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -76,17 +77,16 @@ def opened(source: Path, fps: float | None = None) -> IIVideo:
         from ii_core.files import check_file
 
         check_file(source)
-        coded = open_take(source)
-        coded.fps = coded.fps if fps is None else fps
-        return coded
-
+        return _at(open_take(source), fps)
     if source.suffix.lower() in (".mp4", ".mov", ".mkv", ".webm"):
         from ii_core.display.video import open_quilt_video
         from ii_core.files import check_file
 
         check_file(source)
-        found = open_quilt_video(source)
-        if fps is not None:
-            found.fps = fps
-        return found
+        return _at(open_quilt_video(source), fps)
     return open_video(source, fps=fps)
+
+
+def _at(video: IIVideo, fps: float | None) -> IIVideo:
+    """The same frames at another rate, which is checked."""
+    return video if fps is None else replace(video, fps=fps)

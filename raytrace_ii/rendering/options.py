@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ii_core.executors import check_executor
 
+from ..tracing.sampling import sampling
 from .job import CURVES
 
 MOST_WORKERS = 1024
@@ -38,7 +39,7 @@ class RenderKeywords(SetKeywords, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class RenderOptions:
-    """Options of rendering; ``samples``, ``error`` and ``pose`` are checked with the camera.
+    """Options of rendering; ``pose``, and ``samples`` of stored maps, are checked with the camera.
 
     Parameters
     ----------
@@ -88,6 +89,7 @@ class RenderOptions:
         for name in ("error", "noise"):
             if not isinstance(getattr(self, name), int | float | np.number):
                 raise TypeError(f"{name} is {getattr(self, name)!r}: a number is needed")
+        sampling(self.samples, self.error)
         if not 0 <= self.noise <= MOST_NOISE:
             raise ValueError(f"noise sigma is {_short(self.noise)}: a number from 0 to {MOST_NOISE} is needed")
         if not isinstance(self.dtype, str):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,19 @@ class Product:
     files: tuple[Path, ...]
     key: str
     make: Callable[..., Stats]
+
+
+@contextmanager
+def manifest_kept_if_used(manifest: Path) -> Iterator[None]:
+    """Remove a new manifest if the block fails before it has made any other file in the folder."""
+    before = {*manifest.parent.iterdir(), manifest}
+    new = not manifest.exists()
+    try:
+        yield
+    except BaseException:
+        if new and before.issuperset(manifest.parent.iterdir()):
+            manifest.unlink(missing_ok=True)
+        raise
 
 
 def record_of(product: Product, stats: Stats) -> dict[str, Any]:

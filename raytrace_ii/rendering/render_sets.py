@@ -26,7 +26,7 @@ from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES
 from .contact_sheet import contact_sheet
 from .job import check_disparity
 from .options import RenderOptions, SetKeywords, check_keywords
-from .products import Product, commit, fingerprint, is_done, is_same, record_of
+from .products import Product, commit, fingerprint, is_done, is_same, manifest_kept_if_used, record_of
 from .render import render_to
 
 SETS = {"reference": ("apples", "car", "cuboid", "dolphin", "hairdo", "mountains", "objects", "twins")}
@@ -95,20 +95,21 @@ def render_set(
     claims = _claims(folder, name, len(cameras), old, force)
     manifest = {**_header(name, cameras, of_pictures), "claims": claims, "scenes": {}, CONTACT: old.get(CONTACT)}
     means = {"workers": wanted.workers, "executor": wanted.executor}
-    _write_manifest(folder, manifest, old)
-    for title in SETS[name]:
-        scene = load_scene(title)
-        scene_hash = content_hash(scene)
-        entry: dict[str, Any] = {"hash": scene_hash, "products": {}}
-        known = old.get("scenes", {}).get(title, {}).get("products", {})
-        manifest["scenes"][title] = entry
-        for kind, product in _products(folder, title, scene, scene_hash, cameras, poses, of_pictures, means):
-            if not is_done(product, known.get(kind)):
-                report = _reporter(progress, product.files[0].name)
-                entry["products"][kind] = record_of(product, product.make(progress=report))
-            else:
-                entry["products"][kind] = known[kind]
-            _write_manifest(folder, manifest, old)
+    with manifest_kept_if_used(folder / MANIFEST):
+        _write_manifest(folder, manifest, old)
+        for title in SETS[name]:
+            scene = load_scene(title)
+            scene_hash = content_hash(scene)
+            entry: dict[str, Any] = {"hash": scene_hash, "products": {}}
+            known = old.get("scenes", {}).get(title, {}).get("products", {})
+            manifest["scenes"][title] = entry
+            for kind, product in _products(folder, title, scene, scene_hash, cameras, poses, of_pictures, means):
+                if not is_done(product, known.get(kind)):
+                    report = _reporter(progress, product.files[0].name)
+                    entry["products"][kind] = record_of(product, product.make(progress=report))
+                else:
+                    entry["products"][kind] = known[kind]
+                _write_manifest(folder, manifest, old)
     _draw_contact(folder, name, manifest)
     write_json(folder / MANIFEST, manifest)
     return manifest

@@ -25,7 +25,7 @@ from ..files.take import Take
 from ..scene.hashing import content_hash
 from ..scene.scene import Scene
 from .options import RenderOptions, SetKeywords, check_keywords
-from .products import Product, commit, is_done, record_of
+from .products import Product, commit, is_done, manifest_kept_if_used, record_of
 from .render import render_to
 
 FORMAT, VERSION, MANIFEST = "ii-take", 1, "manifest.json"
@@ -101,16 +101,19 @@ def render_take(
     base = np.eye(4) if pose is None else np.asarray(pose, np.float64)
     hashed: list[tuple[Scene, str]] = []
     manifest["claims"] = _claims(folder, numbers, support or {}, suffix, old, force)
-    write_json(folder / MANIFEST, manifest)
-    for number in numbers:
-        scene, stands = take.scene_at(number / take.fps), take.pose_at(number / take.fps) @ base
-        product = _product(folder, number, scene, stands, camera, support or {}, suffix, of_pictures, means, hashed)
-        if is_done(product, manifest["frames"].get(str(number))):
-            continue
-        report = partial(progress, number) if progress else None
-        made = record_of(product, product.make(progress=report))
-        manifest["frames"][str(number)] = {"pose": stands.tolist(), **made}
+    with manifest_kept_if_used(folder / MANIFEST):
         write_json(folder / MANIFEST, manifest)
+        for number in numbers:
+            scene, stands = take.scene_at(number / take.fps), take.pose_at(number / take.fps) @ base
+            product = _product(
+                folder, number, scene, stands, camera, support or {}, suffix, of_pictures, means, hashed
+            )
+            if is_done(product, manifest["frames"].get(str(number))):
+                continue
+            report = partial(progress, number) if progress else None
+            made = record_of(product, product.make(progress=report))
+            manifest["frames"][str(number)] = {"pose": stands.tolist(), **made}
+            write_json(folder / MANIFEST, manifest)
     return manifest
 
 

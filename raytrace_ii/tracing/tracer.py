@@ -10,6 +10,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ii_core.checks import MOST_MM
+
 from ..scene.scene import Scene
 from .intersect import Hits
 from .kernels.arrays import Passage, Rays, Recorded, ShadowRays
@@ -150,6 +152,8 @@ def rigid(pose: ArrayLike | None) -> NDArray[np.float64]:
     matrix = _numbers("pose", pose)
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
         raise ValueError("pose is not a finite 4×4 matrix")
+    if np.abs(matrix[:3, 3]).max() > MOST_MM:
+        raise ValueError(f"pose is {matrix[:3, 3].tolist()} mm off: coordinates up to {MOST_MM:g} mm are needed")
     turn = matrix[:3, :3]
     turns = np.allclose(turn @ turn.T, np.eye(3), atol=1e-9) and np.linalg.det(turn) > 0
     if not turns or not np.array_equal(matrix[3], [0, 0, 0, 1]):

@@ -171,6 +171,8 @@ def test_wrong_input_is_one_line(run, refused, tmp_path):
     refused(call("--set", "reference", "--depth", tmp_path / "d.exr", *out), "a set includes all support images")
     refused(call("--set", "reference", "--samples", "0", "--scale", "64", *out), "samples is 0")
     refused(call("--set", "reference", "--scale", "7", *out), "scale 7 does not divide")
+    assert not (tmp_path / "set").exists()
+    (tmp_path / "set").mkdir()
     (tmp_path / "set" / "manifest.json").write_text("{}")
     refused(call("--set", "reference", "--scale", "64", *out), "is not the manifest of the set 'reference'")
     (tmp_path / "set" / "manifest.json").write_text("{")
