@@ -1,6 +1,6 @@
 """Component images: lossless rearrangements of the II-picture.
 
-With the picture as a light field ``ii.reshape(L, V, K, U, 3)[l, v, k, u]``:
+With the pixels in picture order, ``pixels.reshape(L, V, K, U, 3)[l, v, k, u]``:
 
 - an elementary image EI_{k,l} is the pixels under one lens (2.12),
 - a sub-image SI_{u,v} is one pixel from under every lens: one direction (2.13),
@@ -19,13 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import checks
-from .camera import Pair
 from .jit import kernel
 from .parallel import over_rows
-from .picture import IIPicture
+from .picture import IIPicture, picture_order
 
 KINDS = ("ei", "si", "ri")
-_AXES = {"ei": (0, 2, 1, 3, 4), "si": (1, 3, 0, 2, 4), "ri": (1, 0, 2, 3, 4)}  # of the light field
+_AXES = {"ei": (0, 2, 1, 3, 4), "si": (1, 3, 0, 2, 4), "ri": (1, 0, 2, 3, 4)}  # of the picture order
 KIND = checks.instance(str)
 SMALL = 1 << 20  # bytes; below, threads cost more time than they save
 
@@ -59,7 +58,7 @@ def component_images(picture: IIPicture, kind: str) -> NDArray[Any]:
     """
     _check_kind(kind)
     picture.check_regular()
-    return _permute(light_field(picture.pixels, picture.lenses, picture.ei_pixels), kind, split=True)
+    return _permute(picture_order(picture.pixels, picture.lenses, picture.ei_pixels), kind, split=True)
 
 
 @checks.checked(stack=checks.array, kind=KIND)
@@ -79,19 +78,13 @@ def picture_pixels(stack: NDArray[Any], kind: str) -> NDArray[Any]:
     return field.reshape(l * v, k * u, 3)
 
 
-def light_field(pixels: NDArray[Any], lenses: Pair, ei_pixels: Pair) -> NDArray[Any]:
-    """Return pixels as ``[l, v, k, u]``, (L, V, K, U, 3): a view, or a copy if they are not contiguous."""
-    (k, l), (u, v) = lenses, ei_pixels
-    return np.ascontiguousarray(pixels).reshape(l, v, k, u, 3)
-
-
 def _check_kind(kind: str) -> None:
     if kind not in KINDS:
         raise ValueError(f"unknown component image {kind!r}: known are {', '.join(KINDS)}")
 
 
 def _permute(source: NDArray[Any], kind: str, *, split: bool) -> NDArray[Any]:
-    """Return a light field [l, v, k, u] as a stack of one kind, or the inverse, computed on all cores."""
+    """Return pixels in picture order [l, v, k, u] as a stack of one kind, or the inverse, computed on all cores."""
     source = np.ascontiguousarray(source)
     order = _AXES[kind] if split else np.argsort(_AXES[kind])
     target = np.empty([source.shape[axis] for axis in order], source.dtype)

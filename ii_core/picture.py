@@ -153,7 +153,9 @@ class IIPicture:
 
     @property
     def light_field(self) -> NDArray[Any]:
-        """Pixels by lens and position under it, (L, K, V, U, 3): a view, or a copy if pixels are not contiguous.
+        """Pixels ``[l, k, v, u]`` by lens and position under it, (L, K, V, U, 3).
+
+        A view, or a copy if the pixels are not contiguous.
 
         Raises
         ------
@@ -161,8 +163,7 @@ class IIPicture:
             If the structure is not regular.
         """
         self.check_regular()
-        (k, l), (u, v) = self.lenses, self.ei_pixels
-        return np.ascontiguousarray(self.pixels).reshape(l, v, k, u, 3).transpose(0, 2, 1, 3, 4)
+        return picture_order(self.pixels, self.lenses, self.ei_pixels).transpose(0, 2, 1, 3, 4)
 
     def with_pixels(self, pixels: NDArray[Any]) -> IIPicture:
         """Return a picture of other pixels with the same structure and camera."""
@@ -297,6 +298,15 @@ def picture_rows(
     with image_rows(file, structure.size, 3, structure.pixels.dtype.name, named=named) as write:
         yield write
     beside.write_text(json_text({**structure.structure_json(), BINDING: write.digest}), encoding="utf-8")
+
+
+def picture_order(pixels: NDArray[Any], lenses: Pair, ei_pixels: Pair) -> NDArray[Any]:
+    """Return pixels as ``[l, v, k, u]``, (L, V, K, U, 3), in their order in memory.
+
+    A view, or a copy if they are not contiguous. `IIPicture.light_field` has both lens axes first instead.
+    """
+    (k, l), (u, v) = lenses, ei_pixels
+    return np.ascontiguousarray(pixels).reshape(l, v, k, u, 3)
 
 
 def sidecar(path: str | os.PathLike[str]) -> Path:

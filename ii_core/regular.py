@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 
 from . import checks
 from .camera import MOST_PIXELS, IICamera, Pair, whole_pair
-from .component import light_field
 from .jit import kernel
 from .lattice import Lattice
 from .optics import FrontElement, Lens, Lenslet, LensModel, Pinhole, SphericalLenslet
 from .parallel import over_rows
-from .picture import IIPicture
+from .picture import IIPicture, picture_order
 
 Ints = NDArray[np.int32]
 Mask = NDArray[np.bool_]
@@ -108,7 +107,7 @@ def from_smallest_rectangle(picture: IIPicture, camera: IICamera) -> tuple[IIPic
             f"the camera's smallest rectangles are {k}×{l} of {u}×{v} px, the picture has "
             f"{picture.lenses[0]}×{picture.lenses[1]} of {picture.ei_pixels[0]}×{picture.ei_pixels[1]}"
         )
-    source = light_field(picture.pixels, picture.lenses, picture.ei_pixels)
+    source = picture_order(picture.pixels, picture.lenses, picture.ei_pixels)
     pixels = np.zeros((height, width, 3), source.dtype)
     over_rows(lambda first, last: put_back(source, owner, left, top, first, last, pixels), height)
     return IIPicture(pixels, (k, l), camera.ei_pixels, camera, picture.erect), owner >= 0

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IICamera, IIPicture, checks
-from ii_core.component import light_field
 from ii_core.jit import kernel
-from ii_core.picture import peak
+from ii_core.picture import peak, picture_order
 
 from .pair import Compared, PicturePair, Structure, picture_pair
 from .quality import AngleQuality
@@ -153,7 +152,7 @@ def _squared_errors(pair: PicturePair) -> tuple[NDArray[np.float64], NDArray[np.
     structure: Any = reference.lenses, reference.ei_pixels
     if not reference.regular:
         structure = reference.size, (1, 1)
-    a, b = light_field(reference.pixels, *structure), light_field(decoded.pixels, *structure)
+    a, b = picture_order(reference.pixels, *structure), picture_order(decoded.pixels, *structure)
     l, v, k, u, _ = a.shape
     total, count = np.zeros((v, u)), np.full((v, u), l * k)
     if pair.mask is None:

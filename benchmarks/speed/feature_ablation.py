@@ -28,7 +28,7 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, add_again, by_scene
 from benchmarks.speed.pareto import BASE, SCENES, at_depth, cut_scene, scene_text, sizes
 from ii_core import IICamera, IIPicture, add_sensor_noise, preset
-from ii_core.component import light_field
+from ii_core.component import picture_pixels
 from ii_core.display.figure import COLOURS, new_figure, save
 from metrics import q_global, q_view
 from raytrace_ii import Body, Scene, Shot, render
@@ -273,7 +273,7 @@ def fewer(scene: Scene, scale: int, full: IIPicture, rounds: int) -> list[dict[s
     camera, lenses = preset("setup1", scale=scale), preset("setup1", scale=2 * scale)
     pixels = replace(camera, pixels=tuple(n // 2 for n in camera.pixels), pixel_pitch_mm=2 * camera.pixel_pitch_mm)
     rows = []
-    for what, small, axes in (("lenses", lenses, (0, 2)), ("pixels a lens", pixels, (1, 3))):
+    for what, small, axes in (("lenses", lenses, (0, 1)), ("pixels a lens", pixels, (2, 3))):
         times = [[shoot(scene, one).stats.cpu_seconds for one in (small, camera)] for _ in range(rounds)]
         spent = median(a for a, _ in times) / median(b for _, b in times) - 1
         picture = shoot(scene, small).picture
@@ -284,16 +284,15 @@ def fewer(scene: Scene, scale: int, full: IIPicture, rounds: int) -> list[dict[s
 
 
 def enlarged(picture: IIPicture, axes: tuple[int, int], *, linear: bool) -> NDArray[Any]:
-    """Return pixels with twice the lenses (axes 0, 2 of [l, v, k, u]) or pixels per lens (axes 1, 3) per axis."""
-    field = light_field(picture.pixels, picture.lenses, picture.ei_pixels)
+    """Return pixels with twice the lenses (axes 0, 1 of the light field) or pixels per lens (axes 2, 3) per axis."""
+    field = picture.light_field
     if linear:
         factors = [2 if axis in axes else 1 for axis in range(5)]
         field = np.rint(zoom(field.astype(np.float32), factors, order=1, mode="nearest", grid_mode=True))
     else:
         for axis in axes:
             field = field.repeat(2, axis=axis)
-    l, v, k, u, _ = field.shape
-    return field.astype(picture.pixels.dtype).reshape(l * v, k * u, 3)
+    return picture_pixels(field.astype(picture.pixels.dtype), "ei")
 
 
 def tables() -> Tables:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from ii_core import IIPicture, component, component_images, elementary_images, picture_pixels, ray_space_images
 from ii_core import sub_images as sub_images_of
 from ii_core.component import join_si, split_si, swap_runs
+from ii_core.picture import picture_order
 
 KINDS = ("ei", "si", "ri")
 side = st.integers(1, 6)
@@ -90,6 +91,18 @@ def test_memory_order_does_not_matter():
         stack = component_images(shuffled, kind)
         np.testing.assert_array_equal(stack, component_images(source, kind))
         np.testing.assert_array_equal(picture_pixels(np.asfortranarray(stack), kind), source.pixels)
+
+
+def test_axes_of_the_light_field_and_of_the_picture_order():
+    """Pixel (v, u) under lens (k, l): row l·V + v, column k·U + u of the picture, whatever the order of axes."""
+    picture = make((5, 4), (3, 2))
+    field, order = picture.light_field, picture_order(picture.pixels, picture.lenses, picture.ei_pixels)
+    assert field.shape == (4, 5, 2, 3, 3) and order.shape == (4, 2, 5, 3, 3)
+    for l, k, v, u in np.ndindex(field.shape[:4]):
+        pixel = picture.pixels[l * 2 + v, k * 3 + u]
+        np.testing.assert_array_equal(field[l, k, v, u], pixel)
+        np.testing.assert_array_equal(order[l, v, k, u], pixel)
+    assert np.shares_memory(field, picture.pixels)
 
 
 def test_refusals():
