@@ -7,7 +7,6 @@ each key. `check` holds the files to this rule.
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import importlib.util
 import json
@@ -121,6 +120,11 @@ class Records:
                 found[name] = record
         return [record for record in found.values() if only.items() <= record["key"].items()]
 
+    def by(self, name: str, values: Iterable[str], **only: Any) -> dict[str, dict[str, Any]]:
+        """Return the row of each of these values of a key, in their order; values without one are left out."""
+        rows = {row[name]: row for row in self.rows(**only)}
+        return {value: rows[value] for value in values if value in rows}
+
     def rows(self, *, unsure: bool | None = None, **only: Any) -> list[dict[str, Any]]:
         """Return key and result of the newest records as one dict each, with ``commit`` as `commit_of` gives it."""
         return [{**r["key"], **r["result"], "commit": commit_of(r)} for r in self.newest(unsure=unsure, **only)]
@@ -129,16 +133,6 @@ class Records:
 def cpu_seconds() -> float:
     """Return the CPU seconds of this process and of the child processes it has waited for."""
     return sum(os.times()[:4])
-
-
-def add_again(parser: argparse.ArgumentParser) -> None:
-    """Add ``--again`` to a command line."""
-    parser.add_argument(
-        "--again",
-        choices=AGAIN,
-        default=CHANGED,
-        help="measure again: rows of other code or libraries (changed), nothing that has a row (missing), all",
-    )
 
 
 def stamp(modules: Sequence[str]) -> dict[str, Any]:

@@ -9,14 +9,14 @@ a given share of the lenses is dark or saturated. Each row holds the worst and t
 
 from __future__ import annotations
 
-import argparse
 import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.records import Records, add_again
+from benchmarks.arguments import command_line
+from benchmarks.records import Records
 from ii_core import IICamera, calibrate
 from ii_core.calibration import Calibration
 from ii_core.optics import Lens
@@ -125,9 +125,7 @@ def trial(seed: int, hexagonal: bool, bad: float, size: tuple[int, int] | None =
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    add_again(parser)
-    asked = parser.parse_args()
+    asked = command_line(__doc__).parse_args()
     small = [
         {"lattice": lattice, "bad": bad, "pixels": "300-700", "cameras": CAMERAS}
         for lattice in ("rectangular", "hexagonal")

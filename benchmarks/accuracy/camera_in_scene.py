@@ -10,7 +10,6 @@ never sees. Both are traced by the same renderer along the same samples. Numbers
 
 from __future__ import annotations
 
-import argparse
 import statistics
 import time
 from collections.abc import Sequence
@@ -20,8 +19,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
-from benchmarks.records import Records, add_again
+from benchmarks.records import Records
 from ii_core import IICamera, preset
 from ii_core.optics import Bundle, LensModel, SphericalLenslet, Under
 from metrics import q_global
@@ -219,10 +219,7 @@ def transmitted(camera: IICamera) -> tuple[float, float]:
 
 def main() -> None:
     """Compare, time and keep."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE)
-    add_again(parser)
-    asked = parser.parse_args()
+    asked = command_line(__doc__, scale=SCALE).parse_args()
     for key in RECORDS.todo([{"scale": asked.scale}], asked.again):
         RECORDS.measure(key, lambda: study(asked.scale))
 

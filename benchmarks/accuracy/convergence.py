@@ -12,7 +12,6 @@ Numbers and chart go to ``benchmarks/results/convergence.jsonl`` and
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,8 +21,9 @@ from numpy.typing import NDArray
 
 from benchmarks.accuracy.analytic import Array, Ball, World, still_life
 from benchmarks.accuracy.camera_in_scene import lens_bodies
+from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
-from benchmarks.records import Records, add_again
+from benchmarks.records import Records
 from ii_core import IICamera, preset
 from ii_core.display.figure import COLOURS
 from ii_core.optics import SphericalLenslet
@@ -49,9 +49,8 @@ ORDERS = {
 
 def main() -> None:
     """Measure, print, keep and draw."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--finest", type=int, default=FINEST, help="segments of the finest ball")
-    add_again(parser)
     asked = parser.parse_args()
     levels = [s for s in (COARSEST * 2**i for i in range(10)) if s <= asked.finest]
     parts: dict[str, Callable[[], list[dict[str, Any]]]] = {

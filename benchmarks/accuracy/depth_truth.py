@@ -12,7 +12,6 @@ of 8 bits); else ``textured``. Sensor noise is that of scale 8, where an array i
 
 from __future__ import annotations
 
-import argparse
 import time
 from typing import Any
 
@@ -20,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, add_again, origin, with_commits
+from benchmarks.records import ROOT, Records, origin, with_commits
 from codec import decode, encode
 from ii_core import IIPicture, add_sensor_noise, preset
 from ii_core.display.figure import COLOURS, new_figure, save
@@ -47,15 +47,9 @@ SHADES = {"dissertation": COLOURS[1], "robust": COLOURS[0], "true": "0.15"}
 
 def main() -> None:
     """Measure, keep, print and draw."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE, help="divides setup1's lenses")
-    parser.add_argument("--scenes", default=",".join(SCENES))
-    add_again(parser)
-    asked = parser.parse_args()
+    asked = command_line(__doc__, scale=SCALE, scenes=SCENES).parse_args()
     keys = [
-        {"scene": name, "scale": scale, "bpp": BPP}
-        for name in asked.scenes.split(",")
-        for scale in (NOISE_SCALE, asked.scale)
+        {"scene": name, "scale": scale, "bpp": BPP} for name in asked.scenes for scale in (NOISE_SCALE, asked.scale)
     ]
     for key in RECORDS.todo(keys, asked.again):
         RECORDS.measure(key, lambda key=key: study(key["scene"], key["scale"]))

@@ -9,15 +9,15 @@ to ``benchmarks/results/map_precision.jsonl`` and ``docs/images/map_precision.pn
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
-from benchmarks.records import Records, add_again, number
+from benchmarks.records import Records, number
 from ii_core import IICamera, preset, read_maps, write_maps
 from ii_core.maps import FORMATS
 from metrics import q_global
@@ -31,13 +31,9 @@ CAMERAS = ("setup1", "setup3", "spherical")
 
 def main() -> None:
     """Measure, print, keep and draw."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE)
-    parser.add_argument("--cameras", default=",".join(CAMERAS))
-    add_again(parser)
-    asked = parser.parse_args()
+    asked = command_line(__doc__, scale=SCALE, cameras=CAMERAS).parse_args()
     scenes = {name: load_scene(name) for name in SCENES}
-    for name in asked.cameras.split(","):
+    for name in asked.cameras:
         keys = RECORDS.todo(
             ({"scale": asked.scale, "camera": name, "format": format} for format in FORMATS), asked.again
         )

@@ -11,7 +11,6 @@ says so and ends. Numbers and pictures go to ``benchmarks/results/povray.jsonl``
 
 from __future__ import annotations
 
-import argparse
 import re
 import shutil
 import subprocess
@@ -25,9 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.accuracy.analytic import Array, Ball, Floor, World, still_life
+from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, add_again, origin, with_commits
+from benchmarks.records import ROOT, Records, origin, with_commits
 from ii_core import IICamera, preset
 from ii_core.colour import srgb
 from raytrace_ii import Light, Material, trace
@@ -41,10 +41,7 @@ SIDE = 1.0  # mm from corner to centroid of a triangle that stands for a ray; PO
 
 def main() -> None:
     """Render with all three, compare, keep."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE)
-    add_again(parser)
-    asked = parser.parse_args()
+    asked = command_line(__doc__, scale=SCALE).parse_args()
     if shutil.which("povray") is None:
         print("povray is not installed: nothing to compare with (Debian: apt-get install povray)")
         sys.exit(0)

@@ -10,7 +10,6 @@ as the lenses of full setup1 do, and code them.
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
 from itertools import pairwise
@@ -18,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, add_again, number, origin
+from benchmarks.records import Records, number, origin
 from codec import decode, encode
 from ii_core import preset
 from ii_core.wave import lens_blurred, lens_spread, model_spread, pixel_kernel
@@ -46,9 +46,7 @@ SWEEPS: dict[str, tuple[tuple[float, ...], str]] = {
 
 def main() -> None:
     """Measure, keep, draw, fill the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    add_again(parser)
-    asked = parser.parse_args()
+    asked = command_line(__doc__).parse_args()
     keys = [{"sweep": name, "wavelength_nm": wavelength} for name in SWEEPS for wavelength in WAVELENGTHS]
     for key in RECORDS.todo(keys, asked.again):
         RECORDS.measure(key, lambda key=key: {"points": sweep(key["sweep"], key["wavelength_nm"])})

@@ -7,12 +7,12 @@ pictures, one row per scene and condition in ``benchmarks/results/bframes.jsonl`
 
 from __future__ import annotations
 
-import argparse
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from benchmarks.arguments import command_line
 from benchmarks.coding.rd import climbing, rd_point
-from benchmarks.records import Records, add_again, origin, with_commits
+from benchmarks.records import Records, origin, with_commits
 from ii_core import IIPicture, preset
 from metrics import bd_psnr
 from metrics.rd import UndefinedDifference
@@ -44,14 +44,11 @@ CONDITIONS: list[tuple[str, str, list[dict[str, Any]]]] = [
 
 def main() -> None:
     """Measure, print and record."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE, help="divides the number of lenses of setup1")
-    parser.add_argument("--scenes", default="apples,twins,car,cuboid")
+    parser = command_line(__doc__, scale=SCALE, scenes=("apples", "twins", "car", "cuboid"))
     parser.add_argument("--workers", type=int, default=1)
-    add_again(parser)
     asked = parser.parse_args()
     conditions = {name: rest for name, *rest in CONDITIONS}
-    for scene in asked.scenes.split(","):
+    for scene in asked.scenes:
         keys = RECORDS.todo(
             ({"scene": scene, "scale": asked.scale, "condition": name} for name in conditions), asked.again
         )

@@ -10,7 +10,6 @@ dissertation's SI-PVS: H.264, one I picture and P pictures, 4:2:0, constant quan
 
 from __future__ import annotations
 
-import argparse
 import statistics
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -21,9 +20,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.arguments import command_line
 from benchmarks.coding.rd import climbing, rd_point
 from benchmarks.pages.pictures import write_picture
-from benchmarks.records import Records, add_again, origin, with_commits
+from benchmarks.records import Records, origin, with_commits
 from codec import parse_scheme, schemes
 from codec.contract import find
 from ii_core import IIPicture, preset
@@ -78,22 +78,19 @@ TRIALS = (
 
 def main() -> None:
     """Measure the chosen rows and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
-    parser.add_argument("--scenes", default=",".join(SCENES))
+    parser = command_line(__doc__, scale=4, scenes=SCENES)
     parser.add_argument(
         "--schemes",
         default="*",
         help="only these, with *, options separated by semicolons: si-av1*,si-h264:balanced;merange=64",
     )
     parser.add_argument("--workers", type=int, default=1)
-    add_again(parser)
     asked = parser.parse_args()
     chosen = [one.replace(";", ",") for one in asked.schemes.split(",")]
     names = [name for name in candidates() if name == ANCHOR or any(fnmatch(name, one) for one in chosen)]
     if unknown := [one for one in chosen if not any(fnmatch(name, one) for name in names)]:
         parser.error(f"no scheme {unknown[0]!r}: known are {', '.join(candidates())}")
-    for scene in asked.scenes.split(","):
+    for scene in asked.scenes:
         keys = RECORDS.todo(({"scene": scene, "scale": asked.scale, "scheme": name} for name in names), asked.again)
         print(f"{scene}: {len(keys)} of {len(names)} curves to measure", flush=True)
         if keys:

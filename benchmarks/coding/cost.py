@@ -19,9 +19,10 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from benchmarks.arguments import command_line
 from benchmarks.coding.fuzz import sample
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, add_again, origin, with_commits
+from benchmarks.records import Records, origin, with_commits
 from codec import Encoded, encode, schemes, timed_decode
 from codec.contract import find
 from ii_core import IIPicture, preset
@@ -35,19 +36,16 @@ PAGES = Path("/proc/self/statm")
 
 def main() -> None:
     """Measure, print, record and fill the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE)
+    parser = command_line(__doc__, scale=SCALE, schemes=schemes())
     parser.add_argument("--scene", default=SCENE)
-    parser.add_argument("--schemes", default=",".join(schemes()))
     parser.add_argument("--runs", type=int, default=RUNS)
-    add_again(parser)
     parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one:
         print(json.dumps(measured(arguments.one[0], IIPicture.load(arguments.one[1]), arguments.runs)))
         return
     picture_of = {"scene": arguments.scene, "scale": arguments.scale}
-    names = arguments.schemes.split(",")
+    names = arguments.schemes
     keys = RECORDS.todo(({**picture_of, "scheme": name, "runs": arguments.runs} for name in names), arguments.again)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "picture.png"

@@ -9,13 +9,13 @@ sub-image to the next. It has no partner there if it leaves the picture or is oc
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.records import Records, add_again
+from benchmarks.arguments import command_line
+from benchmarks.records import Records
 from ii_core import IICamera, preset, sub_images
 from raytrace_ii import load_scene, render
 
@@ -25,12 +25,10 @@ MOTION_RANGE = 16  # pixels, the coders' default
 
 def main() -> None:
     """Print and record a table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__, scenes=("apples", "cuboid"))
     parser.add_argument("--scale", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--scenes", default="apples,cuboid")
-    add_again(parser)
     asked = parser.parse_args()
-    keys = [{"scene": name, "scale": scale} for name in asked.scenes.split(",") for scale in asked.scale]
+    keys = [{"scene": name, "scale": scale} for name in asked.scenes for scale in asked.scale]
     for key in RECORDS.todo(keys, asked.again):
         RECORDS.measure(key, lambda key=key: analyse(key["scene"], key["scale"]))
     for row in RECORDS.rows():

@@ -16,53 +16,50 @@ import argparse
 import json
 import os
 import resource
-import subprocess
-import sys
 import tempfile
 import time
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, add_again, origin
+from benchmarks.records import Records, origin
+from benchmarks.workers import cases
 from codec import Encoded, decode, encode, schemes
 from codec.contract import find
 from ii_core import IIPicture
 from ii_core.parallel import for_each
 
-RECORDS = Records("fuzz", ("benchmarks.coding.fuzz",))
+RECORDS = Records("fuzz", ("benchmarks.coding.fuzz", "benchmarks.workers"))
 LENSES, EI = (16, 8), (4, 4)
 ENDS = {"picture": "a picture of the right shape", "refused": "a ValueError"}
 SLOW = 1.0  # largest CPU seconds of a refusal
-STUCK = 300  # seconds without output after which a worker is killed
+MOST_FINDINGS = 50  # of a scheme, after which no new worker is started
 HEADROOM = 1 << 30  # bytes of address space beyond those after the first decoding
 
 
 def main() -> None:
     """Damage, count and record."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__, schemes=schemes())
     parser.add_argument("--mutations", type=int, default=4000, help="of each scheme")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--schemes", default=",".join(schemes()))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--scheme", help=argparse.SUPPRESS)
     parser.add_argument("--range", type=int, nargs=2, help=argparse.SUPPRESS)
     parser.add_argument("--only", type=int, help=argparse.SUPPRESS)
-    add_again(parser)
     arguments = parser.parse_args()
     if arguments.scheme:
         first, last = arguments.range or (arguments.only, arguments.only + 1)
         work(arguments.scheme, arguments.seed, first, last)
         return
     seed, count = arguments.seed, arguments.mutations
-    if unknown := set(arguments.schemes.split(",")) - set(schemes()):
+    if unknown := set(arguments.schemes) - set(schemes()):
         parser.error(f"no scheme {min(unknown)!r}: known are {', '.join(schemes())}")
-    keys = [{"scheme": name, "seed": seed, "mutations": count} for name in arguments.schemes.split(",")]
+    keys = [{"scheme": name, "seed": seed, "mutations": count} for name in arguments.schemes]
 
     def row(key: dict[str, Any]) -> None:
         record = RECORDS.measure(key, lambda: watched(key["scheme"], seed, count))
@@ -91,60 +88,15 @@ def watched(scheme: str, seed: int, count: int) -> dict[str, Any]:
     """Return the counts of all mutations of one scheme; a worker that dies is started again."""
     counts: Counter[str] = Counter()
     findings: list[dict[str, Any]] = []
-    longest, first = 0.0, 0
-    while first < count:
-        command = [sys.executable, "-m", "benchmarks.coding.fuzz", "--scheme", scheme, "--seed", str(seed)]
-        with tempfile.TemporaryFile() as errors:
-            worker = subprocess.Popen(
-                [*command, "--range", str(first), str(count)], stdout=subprocess.PIPE, stderr=errors, text=True
-            )
-            assert worker.stdout is not None
-            with Watchdog(worker) as watchdog:
-                for line in worker.stdout:
-                    watchdog.seen()
-                    number, what, seconds = json.loads(line)
-                    counts[what.partition(":")[0]] += 1
-                    longest = max(longest, seconds)
-                    if what not in ("picture", "refused") or seconds > SLOW:
-                        findings.append({"number": number, "what": what, "seconds": seconds})
-                    first = number + 1
-            if first < count:
-                errors.seek(0)
-                last = errors.read().decode(errors="replace").strip().splitlines()[-1:]
-                what = "stuck" if watchdog.fired else f"died with {worker.wait()}"
-                counts[what] += 1
-                findings.append({"number": first, "what": what, "said": " ".join(last)[-300:]})
-                first += 1
-                if len(findings) > 50:
-                    break
+    longest = 0.0
+    for case in cases("benchmarks.coding.fuzz", ("--scheme", scheme, "--seed", str(seed)), count):
+        counts[case.what.partition(":")[0]] += 1
+        longest = max(longest, case.seconds)
+        if case.what not in ENDS or case.seconds > SLOW:
+            findings.append(case.finding)
+        if case.said is not None and len(findings) > MOST_FINDINGS:
+            break
     return {"counts": dict(counts), "longest_seconds": longest, "findings": findings}
-
-
-class Watchdog:
-    """Kill a worker without output for too long."""
-
-    def __init__(self, worker: subprocess.Popen[str]) -> None:
-        self.worker, self.fired, self._last = worker, False, time.monotonic()
-        self._pool = ThreadPoolExecutor(1)
-
-    def seen(self) -> None:
-        """Restart the timeout."""
-        self._last = time.monotonic()
-
-    def __enter__(self) -> Watchdog:
-        self._pool.submit(self._watch)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.worker.wait()
-        self._pool.shutdown()
-
-    def _watch(self) -> None:
-        while self.worker.poll() is None:
-            if time.monotonic() - self._last > STUCK:
-                self.fired = True
-                self.worker.kill()
-            time.sleep(0.2)
 
 
 def work(scheme: str, seed: int, first: int, last: int, *, limit: bool = True) -> None:

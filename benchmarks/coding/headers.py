@@ -11,14 +11,14 @@ of ``benchmarks/results/headers.jsonl``; tables go into ``docs/structure.md``.
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, add_again, origin, with_commits
+from benchmarks.records import Records, origin, with_commits
 from codec import decode, encode, schemes
 from codec.inspect.header import coarsest, floor, frames, parts, si_below_ei, si_below_ri
 from ii_core import IIPicture, preset
@@ -34,17 +34,14 @@ KINDS = ("si", "ei", "ri")
 
 def main() -> None:
     """Measure, print, keep and fill the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE)
+    parser = command_line(__doc__, scale=SCALE, schemes=schemes())
     parser.add_argument("--scene", default=SCENE)
-    parser.add_argument("--schemes", default=",".join(schemes()))
     parser.add_argument("--sides", default=",".join(map(str, SIDES)))
-    add_again(parser)
     asked = parser.parse_args()
     picture_of = {"scene": asked.scene, "scale": asked.scale}
     for side in map(int, asked.sides.split(",")):
         keys: list[dict[str, Any]] = [
-            {"part": "floor", **picture_of, "side": side, "scheme": scheme} for scheme in asked.schemes.split(",")
+            {"part": "floor", **picture_of, "side": side, "scheme": scheme} for scheme in asked.schemes
         ]
         if asked.schemes == parser.get_default("schemes"):
             keys.append({"part": "duel", **picture_of, "side": side})

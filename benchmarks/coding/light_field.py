@@ -11,15 +11,15 @@ light field camera that lie in a folder. Every scheme is run at five quantisers,
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, add_again, origin
+from benchmarks.records import Records, origin
 from codec import encode, timed_decode
 from ii_core import IIPicture, preset
 from ii_core.formats.find import find_views, picture_of
@@ -44,14 +44,11 @@ VIEWS, GAP = 9, 6  # views a side; the field's disparity is that of the scene th
 
 def main() -> None:
     """Measure, print, keep and fill the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pictures", default=",".join(SCENES + FIELDS))
-    parser.add_argument("--schemes", default=",".join((*OTHERS, *OURS, *LOSSLESS)))
+    parser = command_line(__doc__, pictures=SCENES + FIELDS, schemes=(*OTHERS, *OURS, *LOSSLESS))
     parser.add_argument("--flower", help="folder of the views of a light field camera")
-    add_again(parser)
     asked = parser.parse_args()
-    names = [*asked.pictures.split(","), *([IMPORTED] if asked.flower else [])]
-    keys = [{"picture": name, "scheme": scheme} for scheme in asked.schemes.split(",") for name in names]
+    names = [*asked.pictures, *([IMPORTED] if asked.flower else [])]
+    keys = [{"picture": name, "scheme": scheme} for scheme in asked.schemes for name in names]
     for key in RECORDS.todo(keys, asked.again):
         original = picture(key["picture"], asked.flower)
         RECORDS.measure(key, partial(measured, original, key["scheme"]))

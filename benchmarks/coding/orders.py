@@ -8,11 +8,11 @@ Numbers go to ``benchmarks/results/orders.jsonl``, the table into ``docs/structu
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, add_again, origin, with_commits
+from benchmarks.records import Records, origin, with_commits
 from codec.inspect.order_analysis import analyse_orders
 from codec.order import ORDERS
 from ii_core import preset
@@ -24,12 +24,8 @@ SCALE = 2  # of the page
 
 def main() -> None:
     """Measure, print, record and fill the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE)
-    parser.add_argument("--scenes", default="apples,twins,car,cuboid")
-    add_again(parser)
-    asked = parser.parse_args()
-    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes.split(",")]
+    asked = command_line(__doc__, scale=SCALE, scenes=("apples", "twins", "car", "cuboid")).parse_args()
+    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
         RECORDS.measure(key, lambda key=key: analysed(**key))
     print("\n".join(table(measured(asked.scale))))

@@ -8,15 +8,15 @@ Takes are rendered once into ``out/takes``. Numbers go to ``benchmarks/results/t
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, add_again, origin, with_commits
+from benchmarks.records import ROOT, Records, origin, with_commits
 from codec import Plan, component_cost, encode_take, open_take
 from ii_core import IIVideo, open_video, preset, sub_images, video_of
 from ii_core.display.figure import COLOURS, MARKERS, new_figure, save
@@ -45,12 +45,8 @@ ONE_WAY = ("view-first", "time-first")
 
 def main() -> None:
     """Measure, print, keep, and fill tables and chart."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE)
-    parser.add_argument("--takes", default=",".join(TAKES))
-    add_again(parser)
-    asked = parser.parse_args()
-    takes = asked.takes.split(",")
+    asked = command_line(__doc__, scale=SCALE, takes=TAKES).parse_args()
+    takes = asked.takes
     keys = [{"take": take, "scale": asked.scale, "plan": plan} for plan in PLANS for take in takes]
     keys += [{"take": take, "scale": asked.scale, "step": step} for step in STEPS for take in takes]
     for key in RECORDS.todo(keys, asked.again):

@@ -1,6 +1,6 @@
 """SI-PVI against sub-images coded alone, JPEG 2000 on the II-picture, and SI-PVS.
 
-    python -m benchmarks run volume [--scale 4] [--scenes apples cuboid]
+    python -m benchmarks run volume [--scale 4] [--scenes apples,cuboid]
 
 Rates against the dissertation's video setting (x264 IPPP, 4:2:0, constant quantiser, parallel order) are Bjøntegaard
 differences by RGB PSNR, over the qualities that both curves reach. Goes to ``benchmarks/results/volume.jsonl`` and
@@ -9,14 +9,14 @@ into the tables of ``docs/volume.md``.
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
 import numpy as np
 
+from benchmarks.arguments import command_line
 from benchmarks.coding.rd import rd_point
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, add_again, origin, with_commits
+from benchmarks.records import Records, origin, with_commits
 from codec import decode, encode
 from codec.bitstream.jpeg2000 import whole_codestream
 from codec.coders.planes import decode_planes, encode_planes
@@ -48,11 +48,7 @@ LOSSLESS = ("si-jp3d", "si-jp3d:levels=1", "ri-jp3d", "ei-jp3d", "si-jpeg2000", 
 
 def main() -> None:
     """Measure, print and keep."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE)
-    parser.add_argument("--scenes", nargs="+", default=["apples", "cuboid"])
-    add_again(parser)
-    asked = parser.parse_args()
+    asked = command_line(__doc__, scale=SCALE, scenes=("apples", "cuboid")).parse_args()
     keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
         RECORDS.measure(key, lambda key=key: study(**key))

@@ -9,7 +9,6 @@ appended to ``results/before_after.jsonl``.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -20,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.arguments import command_line
 from benchmarks.coding.rd import rd_point
-from benchmarks.records import ROOT, Records, add_again
+from benchmarks.records import ROOT, Records
 from ii_core import IIPicture
 from ii_core.files import read_image
 from metrics import bd_rate
@@ -34,13 +34,10 @@ VISIBLE = 8  # codes of 8 bits
 
 def main() -> None:
     """Render by both, compare, code, print and keep."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__, scale=4, scenes=("apples", "twins", "car", "cuboid"))
     parser.add_argument("commit", help="of the code before")
-    parser.add_argument("--scenes", default="apples,twins,car,cuboid")
-    parser.add_argument("--scale", type=int, default=4, help="divides the number of lenses of setup1")
-    add_again(parser)
     asked = parser.parse_args()
-    scenes = asked.scenes.split(",")
+    scenes = asked.scenes
     keys = RECORDS.todo(
         ({"before": asked.commit, "scene": scene, "scale": asked.scale} for scene in scenes), asked.again
     )

@@ -12,7 +12,6 @@ indistinguishable. CPU time is the median over rounds in which every model is re
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -23,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import zoom
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, add_again, by_scene
+from benchmarks.records import ROOT, Records, by_scene
 from benchmarks.speed.pareto import BASE, SCENES, at_depth, cut_scene, scene_text, sizes
 from ii_core import IICamera, IIPicture, add_sensor_noise, preset
 from ii_core.component import picture_pixels
@@ -47,13 +47,10 @@ CUTS = (0.25, 0.5)
 
 def main() -> None:
     """Measure, keep, and fill the page once all scenes are there."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE)
-    parser.add_argument("--scenes", default=",".join(SCENES))
+    parser = command_line(__doc__, scale=SCALE, scenes=SCENES)
     parser.add_argument("--rounds", type=int, default=ROUNDS)
-    add_again(parser)
     asked = parser.parse_args()
-    keys = [{"scene": name, "scale": asked.scale, "rounds": asked.rounds} for name in asked.scenes.split(",")]
+    keys = [{"scene": name, "scale": asked.scale, "rounds": asked.rounds} for name in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
         record = RECORDS.measure(key, lambda key=key: study(key["scene"], key["scale"], key["rounds"]))
         least = record["result"]["least"]
@@ -67,8 +64,7 @@ def main() -> None:
 
 def measured() -> dict[str, Any]:
     """Return the newest row of every scene at the page's scale, in the order of SCENES."""
-    rows = {row["scene"]: row for row in RECORDS.rows(scale=SCALE, rounds=ROUNDS)}
-    return {name: rows[name] for name in SCENES if name in rows}
+    return RECORDS.by("scene", SCENES, scale=SCALE, rounds=ROUNDS)
 
 
 def study(name: str, scale: int, rounds: int) -> dict[str, Any]:

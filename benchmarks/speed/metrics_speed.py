@@ -9,7 +9,6 @@ allocations during a call, beyond the two pictures; for Q_depth it is the growth
 
 from __future__ import annotations
 
-import argparse
 import statistics
 import subprocess
 import sys
@@ -22,9 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, add_again, origin, with_commits
+from benchmarks.records import ROOT, Records, origin, with_commits
 from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, preset
 from ii_core.display.figure import COLOURS, MARKERS, new_figure, save
@@ -43,15 +43,12 @@ FARTHEST = 250  # largest d of layers z = d·f
 
 def main() -> None:
     """Measure all, print, keep and draw."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", default=",".join(SCENES), help="of the accuracy chart")
-    add_again(parser)
-    asked = parser.parse_args()
+    asked = command_line(__doc__, scenes=SCENES).parse_args()
     for key in RECORDS.todo(({"what": what} for what in TARGETS), asked.again):
         RECORDS.measure(key, lambda what=key["what"]: {"value": value_of(what)})
     for row in data()["rows"]:
         print(f"{row['what']:<56} {row['target']:>5}  {row['value']:.3g}", flush=True)
-    keys = [{"accuracy": name, "scale": SCALE, "bpp": BPP} for name in asked.scenes.split(",")]
+    keys = [{"accuracy": name, "scale": SCALE, "bpp": BPP} for name in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
         RECORDS.measure(key, lambda name=key["accuracy"]: {"points": accuracy(name)})
     kept = data()

@@ -11,7 +11,6 @@ to ``benchmarks/results/pareto.jsonl`` and tables to ``docs/speed_accuracy.md``,
 
 from __future__ import annotations
 
-import argparse
 import re
 import shutil
 import tempfile
@@ -24,9 +23,10 @@ import numpy as np
 
 from benchmarks.accuracy.map_precision import RECORDS as MAPS
 from benchmarks.accuracy.map_precision import SCALE as MAPS_SCALE
+from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, add_again, by_scene, origin
+from benchmarks.records import Records, by_scene, origin
 from ii_core import IICamera, IIPicture, preset
 from ii_core.display.figure import COLOURS
 from metrics import q_global
@@ -49,13 +49,9 @@ BASE = 4  # samples at which depth and cut are compared
 
 def main() -> None:
     """Measure, print, keep, draw and fill the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE)
-    parser.add_argument("--scenes", default=",".join(SCENES))
-    add_again(parser)
-    asked = parser.parse_args()
+    asked = command_line(__doc__, scale=SCALE, scenes=SCENES).parse_args()
     camera = preset("setup1", scale=asked.scale)
-    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes.split(",")]
+    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
         record = RECORDS.measure(key, lambda key=key: study(key["scene"], camera))
         best = record["result"]["recommended"]
@@ -67,8 +63,7 @@ def main() -> None:
 
 def measured() -> dict[str, Any]:
     """Return the newest row of every scene at the page's scale, in the order of SCENES."""
-    rows = {row["scene"]: row for row in RECORDS.rows(scale=SCALE)}
-    return {name: rows[name] for name in SCENES if name in rows}
+    return RECORDS.by("scene", SCENES, scale=SCALE)
 
 
 def tables() -> Tables:

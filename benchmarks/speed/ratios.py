@@ -6,7 +6,6 @@ Everything is interleaved and the median taken, because machines drift. Numbers 
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
 import statistics
@@ -22,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.records import Records, add_again
+from benchmarks.arguments import command_line
+from benchmarks.records import Records
 from benchmarks.speed.bare import bare_encoder
 from benchmarks.speed.before import COMMIT, nanoseconds
 from codec import encode
@@ -36,9 +36,8 @@ LEAST_GAIN = {"apples": "≥ 2.8", "cuboid": "≥ 2.8"}
 
 def main() -> None:
     """Measure what is asked for, print and keep."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--only", default="*", help="ratios by name, * for anything: 'render*,peak*'")
-    add_again(parser)
     asked = parser.parse_args()
     wanted = {
         what: call for what, (_, call) in targets().items() if any(fnmatch(what, p) for p in asked.only.split(","))

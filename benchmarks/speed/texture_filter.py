@@ -9,14 +9,14 @@ The reference has 256 samples a pixel and textures at points. PSNR is in 16-bit 
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from functools import partial
 from statistics import median
 from typing import Any
 
+from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, add_again, by_scene
+from benchmarks.records import ROOT, Records, by_scene
 from ii_core import preset
 from ii_core.display.figure import COLOURS, new_figure, save
 from metrics import q_global
@@ -31,12 +31,8 @@ SETTINGS = {"points": False, "filtered": True}
 
 def main() -> None:
     """Measure, draw the chart and fill the page once all scenes are there."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scale", type=int, default=SCALE)
-    parser.add_argument("--scenes", default=",".join(SCENES))
-    add_again(parser)
-    asked = parser.parse_args()
-    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes.split(",")]
+    asked = command_line(__doc__, scale=SCALE, scenes=SCENES).parse_args()
+    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
         record = RECORDS.measure(key, partial(study, key["scene"], key["scale"]))
         print(f"{key['scene']}: {record['seconds']:.0f} s", flush=True)
@@ -47,8 +43,7 @@ def main() -> None:
 
 def measured() -> dict[str, Any]:
     """Return the newest row of every scene at the page's scale, in the order of SCENES."""
-    rows = {row["scene"]: row for row in RECORDS.rows(scale=SCALE)}
-    return {name: rows[name] for name in SCENES if name in rows}
+    return RECORDS.by("scene", SCENES, scale=SCALE)
 
 
 def study(name: str, scale: int) -> dict[str, Any]:

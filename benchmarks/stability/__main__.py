@@ -7,15 +7,15 @@ with those of ``benchmarks.accuracy.convergence``.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from benchmarks.accuracy import convergence
+from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, add_again, origin
+from benchmarks.records import Records, origin
 from benchmarks.stability import curves, depth, geometry, light, picture, pictures
 from benchmarks.stability.geometry import Row
 from ii_core.display.figure import COLOURS
@@ -47,9 +47,8 @@ PIVOTS = {
 
 def main() -> None:
     """Run every case or those asked for, keep, draw, fill the page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("cases", nargs="*", metavar="case", help=f"all, or some of: {', '.join(CASES)}")
-    add_again(parser)
     arguments = parser.parse_args()
     asked = arguments.cases or list(CASES)
     if unknown := set(asked) - set(CASES):
@@ -69,8 +68,7 @@ def main() -> None:
 
 def measured() -> dict[str, dict[str, Any]]:
     """Return the newest row of every case, in the order of CASES."""
-    rows = {row["case"]: row for row in RECORDS.rows()}
-    return {name: rows[name] for name in CASES if name in rows}
+    return RECORDS.by("case", CASES)
 
 
 def tables() -> Tables:

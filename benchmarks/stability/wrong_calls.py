@@ -9,7 +9,6 @@ appended to ``benchmarks/results/wrong_calls.jsonl``.
 
 from __future__ import annotations
 
-import argparse
 import inspect
 import os
 import re
@@ -27,8 +26,9 @@ import codec
 import ii_core
 import metrics
 import raytrace_ii
+from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, add_again, origin
+from benchmarks.records import Records, origin
 from codec.inspect.header import coarsest, floor, parts
 from ii_core import IICamera, IIPicture, design, properties
 from ii_core.display.lenticular import lenticular
@@ -373,9 +373,8 @@ def untried(named: Mapping[str, Call]) -> list[str]:
 
 def main() -> None:
     """Attack all, print accidental errors, append the row."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--only", help="one function, without a record")
-    add_again(parser)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)  # relative names write here

@@ -5,7 +5,9 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks import workers
 from benchmarks.coding import fuzz
+from benchmarks.stability.fuzz_readers import __main__ as readers
 
 
 def test_every_mutation_is_counted_and_the_same_again(capsys):
@@ -18,12 +20,30 @@ def test_every_mutation_is_counted_and_the_same_again(capsys):
     assert {what for _, what in first} <= {"picture", "refused"}
 
 
-def test_a_dead_worker_is_a_finding(monkeypatch):
-    """A worker that cannot even start dies at its first mutation, again and again, and that is kept."""
-    monkeypatch.setattr(fuzz.sys, "executable", "false")
-    outcome = fuzz.watched("si-h264", 0, 3)
+@pytest.mark.parametrize(("watched", "name"), [(fuzz.watched, "si-h264"), (readers.watched, "PLY")])
+def test_a_dead_worker_is_a_finding(watched, name, monkeypatch):
+    """A worker that cannot start dies at each of its cases; every death is a finding."""
+    monkeypatch.setattr("sys.executable", "false")
+    outcome = watched(name, 0, 3)
     assert [finding["number"] for finding in outcome["findings"]] == [0, 1, 2]
     assert outcome["counts"] == {"died with 1": 3}
+
+
+def test_cases_of_a_worker_that_dies_once(tmp_path, monkeypatch):
+    """The worker dies at case 2 of 4: that case is a finding with its last line, the next worker begins at 3."""
+    script = tmp_path / "worker.py"
+    script.write_text(
+        "import sys\n"
+        "first, last = map(int, sys.argv[-2:])\n"
+        "for number in range(first, last):\n"
+        "    if number == 2:\n"
+        "        sys.exit('no more')\n"
+        "    print(f'[{number}, \"object\", 0.5, 7.0]', flush=True)\n"
+    )
+    monkeypatch.setattr(workers, "ROOT", tmp_path)
+    dead = workers.Case(2, "died with 1", said="no more")
+    good = [workers.Case(number, "object", 0.5, 7.0) for number in range(4)]
+    assert list(workers.cases("worker", (), 4)) == [*good[:2], dead, good[3]]
 
 
 def test_damage_is_damage():

@@ -77,13 +77,6 @@ def test_outcomes(monkeypatch):
     assert fuzz.outcome(lambda: logging.getLogger("stranger").warning("look")).startswith("printed: stranger: look")
 
 
-def test_a_dead_worker_is_a_finding(monkeypatch):
-    monkeypatch.setattr(fuzz.sys, "executable", "false")
-    result = fuzz.watched("PLY", 0, 3)
-    assert [finding["number"] for finding in result["findings"]] == [0, 1, 2]
-    assert result["counts"] == {"died with 1": 3}
-
-
 def test_limits_of_time_and_memory_are_findings():
     """A case that takes too much memory is a MemoryError; the system kills one that takes too long."""
     script = """

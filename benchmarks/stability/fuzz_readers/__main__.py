@@ -15,8 +15,6 @@ import argparse
 import json
 import logging
 import resource
-import subprocess
-import sys
 import tempfile
 import traceback
 import warnings
@@ -28,23 +26,27 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.coding.fuzz import Watchdog, cpu_seconds
+from benchmarks.arguments import command_line
+from benchmarks.coding.fuzz import cpu_seconds
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, add_again, origin
+from benchmarks.records import ROOT, Records, origin
+from benchmarks.workers import cases
 
 from .readers import READERS, Read
 
-RECORDS = Records("fuzz_readers", ("benchmarks.stability.fuzz_readers", "benchmarks.coding.fuzz"))
+RECORDS = Records(
+    "fuzz_readers", ("benchmarks.stability.fuzz_readers", "benchmarks.coding.fuzz", "benchmarks.workers")
+)
 GOOD = "object", "refused"
 MOST_SECONDS = 10  # of CPU time a case
 MOST_BYTES = 2 << 30  # of memory a case
 MOST_TEXT = 1000  # characters of a message
-MOST_FINDINGS = 50  # of a reader that are kept
+MOST_FINDINGS = 50  # of a reader, after which no new worker is started
 
 
 def main() -> None:
     """Run all readers, or one case."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = command_line(__doc__)
     parser.add_argument("--cases", type=int, default=20000, help="of each reader")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--readers", help="names, separated by semicolons; all if not given")
@@ -53,7 +55,6 @@ def main() -> None:
     parser.add_argument("--range", type=int, nargs=2, help=argparse.SUPPRESS)
     parser.add_argument("--only", type=int, help="one case of --reader, with its traceback")
     parser.add_argument("--keep", type=Path, help="folder for the files of this case")
-    add_again(parser)
     arguments = parser.parse_args()
     if arguments.only is not None:
         with tempfile.TemporaryDirectory() as folder:
@@ -106,37 +107,16 @@ def tables() -> Tables:
 
 
 def watched(name: str, seed: int, count: int) -> dict[str, Any]:
-    """Run all cases of a reader, in a process that is started again where it dies."""
+    """Run all cases of a reader; a worker that dies is started again."""
     counts: Counter[str] = Counter()
     findings: list[dict[str, Any]] = []
-    longest, most, first = 0.0, 0.0, 0
-    while first < count:
-        command = [sys.executable, "-m", "benchmarks.stability.fuzz_readers", "--reader", name, "--seed", str(seed)]
-        with tempfile.TemporaryFile() as errors:
-            worker = subprocess.Popen(
-                [*command, "--range", str(first), str(count)],
-                stdout=subprocess.PIPE,
-                stderr=errors,
-                text=True,
-                cwd=ROOT,
-            )
-            assert worker.stdout is not None
-            with Watchdog(worker) as watchdog:
-                for line in worker.stdout:
-                    watchdog.seen()
-                    number, what, seconds, megabytes = json.loads(line)
-                    counts[what.partition(":")[0]] += 1
-                    longest, most, first = max(longest, seconds), max(most, megabytes), number + 1
-                    if what not in GOOD:
-                        findings.append({"number": number, "what": what})
-            if first < count:
-                errors.seek(0)
-                last = errors.read().decode(errors="replace").strip().splitlines()[-1:]
-                what = "stuck" if watchdog.fired else f"died with {worker.wait()}"
-                counts[what] += 1
-                findings.append({"number": first, "what": what, "said": " ".join(last)[-300:]})
-                first += 1
-        if len(findings) > MOST_FINDINGS:
+    longest, most = 0.0, 0.0
+    for end in cases("benchmarks.stability.fuzz_readers", ("--reader", name, "--seed", str(seed)), count):
+        counts[end.what.partition(":")[0]] += 1
+        longest, most = max(longest, end.seconds), max(most, end.megabytes)
+        if end.what not in GOOD:
+            findings.append(end.finding)
+        if end.said is not None and len(findings) > MOST_FINDINGS:
             break
     return {"counts": dict(counts), "longest_seconds": longest, "most_megabytes": most, "findings": findings}
 
