@@ -262,50 +262,48 @@ def parse(text: str) -> SceneFile:
 
 
 def checked_tables(data: dict[str, Any]) -> SceneFile:
-    """A scene file's tables, checked; errors as `parse`."""
+    """Return the checked tables of a scene file; errors as of `parse`."""
     try:
         return _checked(SceneFile, data)
-    except ValidationError as error:
-        raise ValueError(_first(error)) from None
     except RecursionError:
         raise ValueError("tables or lists are nested too deeply") from None
 
 
 def parse_mesh(parameters: dict[str, Any]) -> MeshFile:
-    """An object's own parameters, of a mesh file."""
-    try:
-        return _checked(MeshFile, parameters)
-    except ValidationError as error:
-        raise ValueError(_first(error)) from None
+    """Return the checked parameters of an object whose shape is a mesh file."""
+    return _checked(MeshFile, parameters)
 
 
 def check_shape(parameters: dict[str, Any]) -> None:
     """Raise ValueError unless these are the parameters of a shape or a mesh file; nothing is modelled or read."""
-    try:
-        if "mesh" in parameters:
-            _checked(MeshFile, parameters)
-        else:
-            _checked(_ShapeHolder, {"value": parameters})
-    except ValidationError as error:
-        raise ValueError(_first(error)) from None
+    if "mesh" in parameters:
+        _checked(MeshFile, parameters)
+    else:
+        _checked(_ShapeHolder, {"value": parameters})
 
 
 def parse_shape(parameters: dict[str, Any]) -> tuple[Mesh, str]:
-    """The mesh that an object's own parameters describe, and the shape's name."""
+    """Return the mesh of an object's own parameters, and the shape's name."""
+    shape = _checked(_ShapeHolder, {"value": parameters}).value
+    return shape.mesh(), shape.shape
+
+
+def _checked(model: Any, data: dict[str, Any]) -> Any:
+    """Return a model of the data, validated as JSON: strict about types, but lists serve as tuples.
+
+    Raises
+    ------
+    ValueError
+        With one line on the first error and its place.
+    """
     try:
-        shape = _checked(_ShapeHolder, {"value": parameters}).value
-        return shape.mesh(), shape.shape
+        return model.model_validate_json(json.dumps(data, default=str), strict=True)
     except ValidationError as error:
         raise ValueError(_first(error)) from None
 
 
-def _checked(model: Any, data: dict[str, Any]) -> Any:
-    """As JSON, in which pydantic is strict about types, "1" is no number, and yet takes lists for tuples."""
-    return model.model_validate_json(json.dumps(data, default=str), strict=True)
-
-
 def _first(error: ValidationError) -> str:
-    """The first complaint as one line, with the place in the file's own terms."""
+    """Return the first error as one line, with its place in the terms of the file."""
     first = error.errors()[0]
     place = list(first["loc"])
     if first["type"] == "extra_forbidden":
@@ -323,7 +321,7 @@ def _first(error: ValidationError) -> str:
 
 
 def _keys(title: str, place: list[Any]) -> list[str]:
-    """The keys that may stand where an unknown one was found."""
+    """Return the keys that are allowed at the place of an unknown one."""
     if title == SceneFile.__name__:
         if len(place) == 1:
             return list(SceneFile.model_fields)

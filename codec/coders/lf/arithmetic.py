@@ -149,10 +149,9 @@ def bit_cost(contexts, context, bit):
 
 
 @inner
-def _code_with(coder, p, bit):
-    """Write or read a bit that is one with probability p."""
+def _code_below(coder, split, bit):
+    """Write or read a bit: one takes the part of the range below the split, zero the rest."""
     state = coder.state
-    split = (state[RANGE] >> 16) * p
     if state[DECODING]:
         bit = 1 if state[CODE] < split else 0
         if not bit:
@@ -162,6 +161,12 @@ def _code_with(coder, p, bit):
     state[RANGE] = split if bit else state[RANGE] - split
     _normalise(coder)
     return bit
+
+
+@inner
+def _code_with(coder, p, bit):
+    """Write or read a bit that is one with probability p."""
+    return _code_below(coder, (coder.state[RANGE] >> 16) * p, bit)
 
 
 @inner
@@ -206,17 +211,7 @@ def code_mixed(coder, one, other, weights, bit):
 @lean
 def code_raw(coder, bit):
     """Write or read a bit of even odds."""
-    state = coder.state
-    half = state[RANGE] >> 1
-    if state[DECODING]:
-        bit = 1 if state[CODE] < half else 0
-        if not bit:
-            state[CODE] -= half
-    elif not bit:
-        state[LOW] += half
-    state[RANGE] = half if bit else state[RANGE] - half
-    _normalise(coder)
-    return bit
+    return _code_below(coder, coder.state[RANGE] >> 1, bit)
 
 
 MOST_DIGITS = 24
