@@ -31,8 +31,9 @@ from .checks import (
     whole_pair,
     within,
 )
+from .elements import Bundle, Element, FrontElement, LensModel, Under
 from .lattice import LATTICES, Lattice, axes_of
-from .optics import Bundle, Element, FrontElement, LensModel, Pinhole, Under, chain, unit_disk
+from .optics import Pinhole, chain, unit_disk
 
 LEAST_PITCH = 1e-6  # pixels from lens to lens: shorter ones are rounded to nothing
 MOST_TURN, MOST_SHEAR = 60.0, 0.25  # degrees; beyond, rows and columns should change their names
@@ -173,7 +174,7 @@ class IICamera:
                     f"{element.kind}: z_mm is {element.z_mm:g}: what stands behind it is at {behind:g}, "
                     "elements are needed in order, away from the pixels"
                 )
-            behind = element.z_mm
+            behind = element.end_mm
 
     def _check_start(self) -> None:
         start = within("start_mm", self.start_mm, 0, MOST_MM, "distance", " mm")

@@ -2,7 +2,7 @@
 
 The first element is the lens model of every lenslet. It maps a point of a pixel and a position on the aperture to a
 ray that leaves the lens plane. Further elements stand between the array and the scene and map rays to rays. Rays run
-from the pixel into the scene, against the light.
+from the pixel into the scene, against the light. `elements` has their contract, `surfaces` the lens of real glass.
 
 Lengths are in millimetres, in the frame of `camera`. The arrays of a bundle broadcast against each other.
 """
@@ -11,150 +11,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, ClassVar, NamedTuple
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .checks import MOST_MM, length, number, within
-from .lattice import Axes
+from .elements import Array, Bundle, Element, FrontElement, LensModel, Scaling, Under
+from .surfaces import Surfaces
 
 MOST_IOR = 1000.0  # a material of 4.5 is a rarity
-Array = NDArray[np.float64] | np.float64
 Focal = float | tuple[tuple[float, ...], ...]
-
-
-class Bundle(NamedTuple):
-    """Rays: location, direction of any length, and weight, the transmitted share of light (0 if blocked)."""
-
-    lx: Array
-    ly: Array
-    lz: Array
-    dx: Array
-    dy: Array
-    dz: Array
-    weight: Array | None = None
-
-
-class Under(NamedTuple):
-    """Input of a lens model: points of pixels, centres and numbers of their lenses, positions on the aperture.
-
-    ``ax`` and ``ay`` lie on the unit disk; 0 is the centre. ``cell`` is the lens pitch across and down. The cell of a
-    lens in a hexagonal array is the set of points nearer to its centre than to any other centre.
-    """
-
-    px: Array
-    py: Array
-    cx: Array
-    cy: Array
-    k: NDArray[np.int64]
-    l: NDArray[np.int64]
-    ax: Array
-    ay: Array
-    gap: float
-    cell: tuple[float, float]
-    hexagonal: bool = False
-    axes: Axes | None = None
-
-    def owns(self, x: NDArray[Any], y: NDArray[Any]) -> NDArray[np.bool_]:
-        """Return whether a position relative to the lens centre lies in the lens's cell, border included."""
-        across, down = self.cell
-        if self.axes is not None:  # of a turned grid, whose y runs down
-            xx, xy, yx, yy = self.axes
-            x, y = yy * x + xy * y, xx * y + yx * x
-        if not self.hexagonal:
-            return (abs(x) <= across / 2) & (abs(y) <= down / 2)
-        # bisectors to the lens beside, to the lens two rows away, and to the nearest lens of the next row
-        slanting = abs(x) * across / 2 + abs(y) * down <= (across * across / 4 + down * down) / 2
-        return (abs(x) <= across / 2) & (abs(y) <= down) & slanting
-
-
-class Scaling(NamedTuple):
-    """Change of a lens array by `presets.scaled`.
-
-    Attributes
-    ----------
-    factor : float
-        Growth of gap and lens pitch.
-    gap_mm, cell_mm : float, (float, float)
-        Gap and lens pitch before the change.
-    forward_mm : float
-        d, the shift of the lens plane towards the scene.
-    front_mm : float, optional
-        a, distance from the lens plane to the first lens in front of the array before the change; None without one.
-    """
-
-    factor: float
-    gap_mm: float
-    cell_mm: tuple[float, float]
-    forward_mm: float
-    front_mm: float | None
-
-    def refocused(self, vergence: Array) -> NDArray[np.float64]:
-        """Return the vergence 1/b, per mm, that keeps the imaged scene plane of a vergence; 0 is infinity.
-
-        Raises
-        ------
-        ValueError
-            If the lens plane reaches the scene plane.
-        """
-        w, d = np.asarray(vergence, np.float64), self.forward_mm
-        if self.front_mm is not None:
-            a = self.front_mm
-            return (a * a * w - d) / (a - d) ** 2
-        if (d * w >= 1).any():
-            raise ValueError(
-                f"lens plane moves by {d:g} mm, lenslets focus {1 / w.max():g} mm before it: "
-                "a smaller scale is needed"
-            )
-        return w / (1 - d * w)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Element:
-    """Optical element; its parameters are plain values."""
-
-    kind: ClassVar[str]
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if (value is None and field.default is None) or field.name in ("focal_mm", "z_mm", "ior"):
-                continue
-            name = f"{self.kind}: {field.name}"
-            if field.name == "aperture_mm" and number(name, value) == 0:  # a pinhole
-                continue
-            length(name, value)
-
-    def to_json(self) -> dict[str, Any]:
-        return {"kind": self.kind, **{k: v for k, v in asdict(self).items() if v is not None}}
-
-
-class LensModel(Element):
-    """Model of the lenslets."""
-
-    erect: ClassVar[bool] = False
-    samples_aperture: ClassVar[bool] = False
-    vertical_parallax: ClassVar[bool] = True
-
-    def leave(self, under: Under) -> Bundle:
-        """Return the rays that leave the lens plane."""
-        raise NotImplementedError
-
-    def scaled(self, scaling: Scaling) -> LensModel:
-        """Return the model of larger lenslets that image the same scene planes; see `presets.scaled`."""
-        return self
-
-
-class FrontElement(Element):
-    """Element between the lens array and the scene, at ``z_mm``."""
-
-    z_mm: float
-
-    def pass_on(self, rays: Bundle) -> Bundle:
-        """Return the rays on the scene side of rays on the pixel side."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -347,6 +215,17 @@ class Lens(FrontElement):
         within("lens: z_mm", self.z_mm, -MOST_MM, MOST_MM, unit=" mm")
         length("lens: the size of focal_mm", abs(number("lens: focal_mm", self.focal_mm)))
 
+    def moved(self, by_mm: float) -> Lens:
+        return replace(self, z_mm=self.z_mm + by_mm)
+
+    def image_mm(self, z_mm: float) -> float:
+        a = z_mm - self.z_mm
+        power = 1 / self.focal_mm + (1 / a if a else math.inf)  # 1/b = 1/f + 1/a
+        return self.z_mm + (1 / power if power else math.inf)
+
+    def pupil(self) -> tuple[float, float] | None:
+        return None if self.diameter_mm is None else (self.z_mm, self.diameter_mm)
+
     def pass_on(self, rays: Bundle) -> Bundle:
         lx, ly, lz, dx, dy, dz, weight = rays
         reaches = (dz > 0) & (lz <= self.z_mm)
@@ -363,7 +242,7 @@ class Lens(FrontElement):
 
 
 KINDS: dict[str, type[Element]] = {
-    cls.kind: cls for cls in (Pinhole, Grin, Lenticular, Lenslet, SphericalLenslet, Lens)
+    cls.kind: cls for cls in (Pinhole, Grin, Lenticular, Lenslet, SphericalLenslet, Lens, Surfaces)
 }
 
 
@@ -421,7 +300,7 @@ def scaled_chain(elements: Sequence[Element], scaling: Scaling, *, nearer_mm: fl
         If the lens plane reaches a lens in front, or no positive focal length keeps an imaged plane.
     """
     model, *front = elements
-    placed: list[Any] = [replace(e, z_mm=e.z_mm - nearer_mm) for e in front]  # type: ignore[call-arg,attr-defined]
+    placed: list[Any] = [e.moved(-nearer_mm) for e in front]  # type: ignore[attr-defined]
     if placed and isinstance(front[0], Lens):
         a, d = front[0].z_mm - scaling.gap_mm, scaling.forward_mm
         if not a > d:

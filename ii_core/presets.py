@@ -13,8 +13,11 @@ import assets
 
 from . import checks
 from .camera import IICamera
+from .elements import Scaling
 from .files import one_line, read_json
-from .optics import Scaling, scaled_chain
+from .optics import scaled_chain
+from .prescriptions import placed
+from .surfaces import surfaces_of
 
 ALIASES = {"setup2": "setup2-16"}
 
@@ -67,7 +70,8 @@ def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IIC
     data = _read(path)
     try:
         members = data["cameras"] if data.get("kind") == "set" else [data]
-        return tuple(scaled(IICamera.from_json({"name": path.stem, **member}), scale) for member in members)
+        members = [_with_lenses({"name": path.stem, **member}, path.parent) for member in members]
+        return tuple(scaled(IICamera.from_json(member), scale) for member in members)
     except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
         raise ValueError(f"{path if Path(name).suffix else name}: {one_line(error)}") from None
 
@@ -94,6 +98,9 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
         as much as the power of the lens. Solved for b: 1/b' = (a²/b − d)/(a − d)².
     Further lenses in front
         Position and focal length do not change.
+    Lens of surfaces in front
+        Its glass cannot change, so the lens plane keeps its place in the scene, d = 0, and the pixel array moves back
+        by (s − 1)Λ: ``origin_mm`` is negative. All planes and the field of view stay.
 
     Start of rays, meeting of viewing zones
         Their positions in the scene do not change.
@@ -120,9 +127,9 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
     pitch = camera.pixel_pitch_mm * scale
     if single:
         return replace(camera, pixels=pixels, pixel_pitch_mm=pitch)
-    # The depth of a sensor in a stack grows with the gap; the position of a camera in an array does not.
-    forward = camera.origin_mm[2] * (scale - 1)
     nearer = camera.gap_mm * (scale - 1)
+    # The depth of a sensor in a stack grows with the gap; the position of a camera in an array does not.
+    forward = -nearer if surfaces_of(camera.front) else camera.origin_mm[2] * (scale - 1)
     viewer = None if camera.viewer_mm is None else camera.viewer_mm + nearer
     start = camera.start_mm + nearer if camera.start_mm else 0.0
     scaling = Scaling(
@@ -149,6 +156,12 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
         origin_mm=(*camera.origin_mm[:2], camera.origin_mm[2] + forward),
         optics=optics,
     )
+
+
+def _with_lenses(camera: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+    """Return the values of a camera with the surfaces of its prescriptions."""
+    optics = camera.get("optics")
+    return {**camera, "optics": [placed(e, folder) for e in optics]} if isinstance(optics, list) else camera
 
 
 def _times(lengths: tuple[float, ...], scale: int) -> Any:

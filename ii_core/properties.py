@@ -14,7 +14,7 @@ import numpy as np
 from . import checks
 from .camera import IICamera
 from .checks import length, number, within
-from .optics import Lens, Lenslet, SphericalLenslet
+from .optics import Lenslet, SphericalLenslet
 from .regular import owners
 
 WAVELENGTH_MM = 0.00055  # green, the maximum of sensitivity of eyes and sensors
@@ -201,12 +201,9 @@ def image_planes(camera: IICamera) -> list[dict[str, float]]:
 
 
 def through_front_mm(camera: IICamera, z_mm: float) -> float:
-    """Return the image of a plane z by the lenses in front, mm from the pixel array; 1/b = 1/f + 1/a at each lens."""
+    """Return the paraxial image of a plane z by the elements in front, mm from the pixel array."""
     for element in camera.front:
-        if isinstance(element, Lens):
-            a = z_mm - element.z_mm
-            power = 1 / element.focal_mm + (1 / a if a else math.inf)
-            z_mm = element.z_mm + (1 / power if power else math.inf)
+        z_mm = element.image_mm(z_mm)
     return z_mm
 
 
@@ -254,8 +251,8 @@ def cells(camera: IICamera) -> dict[str, Any]:
         ``unowned``: share of pixels without an owner, see `regular`. ``shared``: share of pixels in the middle of the
         sensor that lie in two cells and mix two directions. ``pixels_per_lens``: least and most. ``aperture_share``:
         area of the aperture over that of the cell, None without an aperture. ``rim_image_mm``: width under a lens of
-        the image of the first rim in front, None without one. Elementary images overlap if it is wider than a cell
-        and have a dark border if it is narrower.
+        the image of the first rim or pupil in front, None without one. Elementary images overlap if it is wider than
+        a cell and have a dark border if it is narrower.
     """
     u, v = camera.ei_pixels
     model, pitch = camera.lens_model, camera.lens_pitch_mm
@@ -266,14 +263,14 @@ def cells(camera: IICamera) -> dict[str, Any]:
         counts = np.bincount(owner[owner >= 0], minlength=camera.lenses[0] * camera.lenses[1])
         least, most, shared = int(counts.min()), int(counts.max()), _shared(camera)
     aperture = getattr(model, "aperture_mm", None)
-    rims = [e for e in camera.front if isinstance(e, Lens) and e.diameter_mm is not None]
-    distance = rims[0].z_mm - camera.gap_mm if rims else 0.0
+    opening, width = next(filter(None, (e.pupil() for e in camera.front)), (camera.gap_mm, 0.0))
+    distance = opening - camera.gap_mm
     return {
         "unowned": unowned,
         "shared": shared,
         "pixels_per_lens": [least, most],
         "aperture_share": None if aperture is None else math.pi * aperture**2 / 4 / (pitch[0] * pitch[1]),
-        "rim_image_mm": rims[0].diameter_mm * camera.gap_mm / distance if distance > 0 else None,  # type: ignore[operator]
+        "rim_image_mm": width * camera.gap_mm / abs(distance) if distance else None,
     }
 
 

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from . import checks
 from .camera import MOST_PIXELS, IICamera, Pair, whole_pair
+from .elements import LensModel
 from .jit import kernel
 from .lattice import Lattice
-from .optics import FrontElement, Lens, Lenslet, LensModel, Pinhole, SphericalLenslet
+from .optics import Lenslet, Pinhole, SphericalLenslet
 from .parallel import over_rows
 from .picture import IIPicture, picture_order
 
@@ -257,7 +258,7 @@ def _regular_camera(camera: IICamera, ei_pixels: Pair, *, shrink: bool) -> IICam
         origin_mm=origin,  # type: ignore[arg-type]
         start_mm=camera.start_mm,
         viewer_mm=camera.viewer_mm,
-        optics=(_same_focus(camera, gap), *(_nearer(element, forward) for element in camera.front)),
+        optics=(_same_focus(camera, gap), *(element.moved(-forward) for element in camera.front)),
     )
 
 
@@ -275,10 +276,6 @@ def _same_focus(camera: IICamera, gap: float) -> LensModel:
         return Pinhole()
     rows = tuple(tuple(float(f) for f in row) for row in 1 / power)
     return replace(model, focal_mm=rows if isinstance(model.focal_mm, tuple) else rows[0][0])
-
-
-def _nearer(element: FrontElement, by_mm: float) -> FrontElement:
-    return replace(element, z_mm=element.z_mm - by_mm) if isinstance(element, Lens) else element
 
 
 @kernel

@@ -38,7 +38,11 @@ PANEL = (320, 160)  # pixels across and down
 GAP = 6
 SCALES = {"hdtv": 5}
 # Where the camera stands, mm before the usual place: its front lens needs room.
-BACK = {"depth-control": 70, "grin-hexagonal-depth-control": 70, "plenoptic1": 150, "plenoptic2": 150}
+BACK = {
+    "depth-control": 70, "grin-hexagonal-depth-control": 70, "plenoptic1": 150, "plenoptic2": 150,
+    "plenoptic1-double-gauss": 130, "plenoptic2-triplet": 150,
+}  # fmt: skip
+SMALL = ("plenoptic1-double-gauss", "plenoptic2-triplet")  # as JPEG, a third of the bytes without loss
 
 
 def main() -> None:
@@ -47,10 +51,15 @@ def main() -> None:
     folder = DOCS / "images" / "cameras"
     folder.mkdir(parents=True, exist_ok=True)
     for name in (name for names in KINDS.values() for name in names):
-        write_picture(folder / f"{name}.webp", strip(scene, shown(name), name))
+        write_picture(folder / file_name(name), strip(scene, shown(name), name))
         print(name, flush=True)
     write_picture(DOCS / "images" / "scenes.jpg", all_scenes())
     (DOCS / "cameras.md").write_text(page(), encoding="utf-8")
+
+
+def file_name(camera: str) -> str:
+    """Return the name of a camera's strip of pictures."""
+    return f"{camera}.{'jpg' if camera in SMALL else 'webp'}"
 
 
 def page() -> str:
@@ -73,6 +82,7 @@ KINDS = {
     "Other lenses": ("grin", "hpo", "depth-priority", "resolution-priority", "multi-focus", "spherical"),
     "Other arrays": ("hexagonal", "plenoptic", "hdtv"),
     "A lens in front of the array": ("depth-control", "grin-hexagonal-depth-control", "plenoptic1", "plenoptic2"),
+    "A lens of glass in front of the array": ("plenoptic1-double-gauss", "plenoptic2-triplet"),
     "Several pixel arrays": ("moving-lenslets", "stacked-sensors", "multi-view"),
     "One lens": ("pinhole2d",),
 }
@@ -89,8 +99,8 @@ A camera is a location and a direction for every pixel. Each strip shows, from l
 
 `raytrace-ii camera NAME -o dir/` stores L and D as pictures. `raytrace-ii camera NAME --report`
 prints properties and limits of a camera. The pictures have an eighth of the lenses each way
-(`python -m benchmarks run cameras`). [Camera files](camera_files.md) lists all keys and elements, for
-a camera or a display of your own. The [glossary](glossary.md) lists the terms.
+(`python -m benchmarks run cameras`). [Camera files](camera_files.md) lists all keys and elements,
+for a camera or a display of your own. The [glossary](glossary.md) lists the terms.
 """
 
 
@@ -108,7 +118,7 @@ def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
     )
     sheet = json.loads((CAMERAS / f"{name}.json").read_text(encoding="utf-8"))
     about = sheet["about"][:1].upper() + sheet["about"][1:]
-    picture = f"![L, D, detail and view of {name}](images/cameras/{name}.webp)"
+    picture = f"![L, D, detail and view of {name}](images/cameras/{file_name(name)})"
     text, facts = (fill(text, 100, break_on_hyphens=False) for text in (f"{about}. {sheet['notes']}", f"{facts}."))
     return f"\n### {name}\n\n{text}\n\n{facts}\n\n{picture}\n"
 

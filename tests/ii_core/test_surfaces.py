@@ -1,0 +1,503 @@
+"""Lenses of surfaces ray by ray: closed forms, surfaces without aberration, paraxial limit, another library."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks.accuracy.lens_rays import cases
+from ii_core import IICamera, preset
+from ii_core.elements import Bundle
+from ii_core.glass import CATALOGUE, LINE_C_NM, LINE_F_NM, Glass, glass
+from ii_core.prescriptions import lens, lens_names
+from ii_core.properties import image_planes, through_front_mm
+from ii_core.surfaces import Surface, Surfaces
+
+ROUNDING = 1e-12  # millimetres in float64, some hundred operations
+GOOD = {"radius_mm": 50.0, "thickness_mm": 5.0, "glass": "F2", "diameter_mm": 20.0, "stop": True}
+LAST = {"radius_mm": -50.0}
+
+
+def rays_at(x, y, z, dx, dy, dz):
+    return Bundle(*(np.asarray(a, np.float64) for a in (x, y, z, dx, dy, dz)))
+
+
+def fan(start_z, heights, target_z=None):
+    """Rays in the plane x = 0: parallel to the axis at some heights, or from an axis point to heights at a plane."""
+    zero, one = np.zeros_like(heights), np.ones_like(heights)
+    if target_z is None:
+        return rays_at(zero, heights, start_z * one, zero, zero, one)
+    return rays_at(zero, zero, start_z * one, zero, heights, (target_z - start_z) * one)
+
+
+def columns(bundle):
+    """L, unit D and weight."""
+    six = np.broadcast_arrays(*bundle[:6])
+    return np.stack(six[:3], axis=-1), np.stack(six[3:], axis=-1), bundle.weight
+
+
+def crossing(bundle):
+    """Where rays of the plane x = 0 cross the axis, z."""
+    L, D, _ = columns(bundle)
+    return L[:, 2] - L[:, 1] * D[:, 2] / D[:, 1]
+
+
+# -- closed forms
+
+
+@pytest.mark.parametrize("angle", [0.0, 10.0, 40.0, 70.0])
+def test_slab_shifts_a_ray_and_keeps_its_direction(angle):
+    n, thickness, theta = 1.5, 10.0, math.radians(angle)
+    slab = Surfaces(
+        z_mm=5.0,
+        surfaces=({"thickness_mm": thickness, "glass": {"ior": n}}, {"stop": True, "diameter_mm": 100.0}),
+    )
+    ray = rays_at(0, 0, 0, 0, math.tan(theta), 1)
+    L, D, weight = columns(slab.pass_on(ray))
+    inside = math.asin(math.sin(theta) / n)
+    assert weight == 1
+    np.testing.assert_allclose(D, [0, math.sin(theta), math.cos(theta)], atol=ROUNDING)
+    np.testing.assert_allclose(L, [0, 5 * math.tan(theta) + thickness * math.tan(inside), 15], atol=ROUNDING)
+
+
+def test_one_sphere_by_the_sines_of_its_angles():
+    # Flat side to the pixels: parallel rays meet the sphere alone, at sin I = h/R inside and n·h/R outside.
+    n, radius, thickness = 1.6, 50.0, 12.0
+    half = Surfaces(
+        z_mm=0.0,
+        surfaces=(
+            {"radius_mm": radius, "thickness_mm": thickness, "glass": n},
+            {"stop": True, "diameter_mm": 58.0},
+        ),
+    )
+    heights = np.linspace(1.0, 28.0, 28)
+    out = half.pass_on(fan(-1.0, heights))
+    before, after = np.arcsin(heights / radius), np.arcsin(n * heights / radius)
+    vertex = thickness
+    surface = vertex - (radius - radius * np.cos(before))
+    np.testing.assert_allclose(crossing(out), surface + heights / np.tan(after - before), rtol=ROUNDING)
+    L, _, weight = columns(out)
+    np.testing.assert_allclose(L[:, 2], surface, atol=ROUNDING)
+    assert (weight == 1).all()
+
+
+@pytest.mark.parametrize("n", [1.33, 1.5168, 1.9])
+def test_ellipsoid_of_eccentricity_one_over_n_has_no_aberration(n):
+    # Cartesian oval for a point at infinity: κ = −1/n² images to f = nR/(n − 1) in the glass. A sphere about that
+    # focus ends the glass and bends none of its rays.
+    radius, thickness = 40.0, 30.0
+    focus = n * radius / (n - 1)
+    oval = Surfaces(
+        z_mm=focus - thickness,
+        surfaces=(
+            {"radius_mm": radius, "conic": -1 / n**2, "thickness_mm": thickness, "glass": n},
+            {"radius_mm": focus - thickness, "stop": True, "diameter_mm": 24.0},
+        ),
+    )
+    heights = np.linspace(-10, 10, 41)
+    L, D, weight = columns(oval.pass_on(fan(0.0, heights, target_z=focus - thickness)))
+    assert (weight == 1).all() and abs(L[:, 1]).max() > 12  # far from paraxial
+    np.testing.assert_allclose(D, np.broadcast_to([0, 0, 1], D.shape), atol=ROUNDING)
+    # With a sphere in its place the same rays part: what is tested is the conic.
+    sphere = replace(oval, surfaces=(replace(oval.surfaces[0], conic=0.0), oval.surfaces[1]))
+    assert abs(columns(sphere.pass_on(fan(0.0, heights, target_z=focus - thickness)))[1][:, 1]).max() > 1e-3
+
+
+def test_hyperboloid_of_eccentricity_n_has_no_aberration():
+    n, radius = 1.5, 30.0
+    focus = radius / (n - 1)
+    cone = Surfaces(
+        z_mm=focus,
+        surfaces=(
+            {"thickness_mm": 15.0, "glass": n},
+            {"radius_mm": -radius, "conic": -(n**2), "stop": True, "diameter_mm": 60.0},
+        ),
+    )
+    _, D, weight = columns(cone.pass_on(fan(0.0, np.linspace(-18, 18, 37), target_z=focus)))
+    assert (weight == 1).sum() > 25
+    np.testing.assert_allclose(D[weight == 1], np.broadcast_to([0, 0, 1], D[weight == 1].shape), atol=ROUNDING)
+
+
+@pytest.mark.parametrize("name", ["triplet", "double-gauss"])
+def test_rays_near_the_axis_meet_at_the_paraxial_image(name):
+    lens_here = lens(name).at(60.0)
+    heights = np.array([0.4, 0.2, 0.1])
+    image = lens_here.image_mm(-20.0)
+    off = abs(crossing(lens_here.pass_on(fan(-20.0, heights, target_z=60.0))) - image)
+    assert off[2] < 1e-4 * image
+    np.testing.assert_allclose(off[:2] / off[1:], 4, rtol=0.02)  # third order: with the square of the height
+
+
+def test_published_focal_lengths():
+    for name, focal in (("triplet", 50.0), ("double-gauss", 100.0)):
+        made = lens(name)
+        placed = made.at(made.back_mm)
+        # The glasses of today differ from those of the prescriptions in the fourth digit.
+        assert placed.focal_mm == pytest.approx(focal, rel=1e-3)
+        # The image plane is that of infinity, for best focus: up to a half per cent of f from the paraxial one.
+        assert abs(1 / placed.image_mm(0.0)) < 5e-3 / focal
+        assert placed.enlarged(0.5).focal_mm == pytest.approx(placed.focal_mm / 2, rel=1e-12)
+    assert set(lens_names()) == {"triplet", "double-gauss"}
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    values=st.lists(
+        st.tuples(st.floats(8, 200), st.booleans(), st.floats(1.2, 1.9), st.floats(-2, 1), st.floats(2, 6)),
+        min_size=1,
+        max_size=4,
+    ),
+    y=st.floats(-2, 2),
+    slope=st.floats(-0.1, 0.1),
+)
+def test_light_takes_the_same_way_back(values, y, slope):
+    # Turned about, with radii of the other sign, a lens sends the reversed ray back to where it came from.
+    surfaces = []
+    for radius, hollow, n, conic, thickness in values:
+        r = -radius if hollow else radius
+        surfaces += [
+            Surface(radius_mm=r, conic=conic, thickness_mm=thickness, glass=Glass(ior=n)),
+            Surface(radius_mm=-2 * r, thickness_mm=thickness),
+        ]
+    surfaces[-1] = replace(surfaces[-1], thickness_mm=0.0, stop=True, diameter_mm=6.0)
+    there = Surfaces(z_mm=10.0, surfaces=tuple(surfaces))
+    order = there.surfaces[::-1]
+    gaps = [*(s.thickness_mm for s in order[1:]), 0.0]
+    glasses = [*(s.glass for s in order[1:]), None]
+    back = Surfaces(
+        z_mm=-there.end_mm,
+        surfaces=tuple(
+            replace(s, radius_mm=-s.radius_mm, thickness_mm=gap, glass=after)
+            for s, gap, after in zip(order, gaps, glasses, strict=True)
+        ),
+    )
+    L, D, weight = columns(there.pass_on(rays_at(0.3, y, 0.0, 0.02, slope, 1.0)))
+    if weight == 0:
+        return
+    # The mirror image of the scene: z becomes −z.
+    far = -(L[2] + 50 * D[2])
+    L2, D2, weight2 = columns(back.pass_on(rays_at(L[0] + 50 * D[0], L[1] + 50 * D[1], far, -D[0], -D[1], D[2])))
+    assert weight2 == 1
+    start = L2 + D2 * ((0.0 - L2[2]) / D2[2])
+    # Lengths to 60 mm through eight surfaces, the steepest of R = 8 mm: a few thousand roundings.
+    np.testing.assert_allclose(start[:2], [0.3, y], atol=1e-10)
+    np.testing.assert_allclose(D2[:2] / D2[2], [-0.02, -slope], atol=1e-10)
+
+
+# optiland 0.6.3 at 486.1327 nm with our indices: rays from 10 mm before the first vertex, x, y and direction cosines
+# there and in the image plane. `benchmarks/accuracy/lens_rays.py` compares thousands; the library with all it needs
+# weighs 1.3 GB, too much for every test run.
+STARTS = ((0.0, 3.0, 0.0, 0.05), (1.0, -2.0, 0.06, 0.0))
+IMAGES = {
+    "triplet": (
+        (0.0, 2.4981186659901153, 0.0, -0.0326202560729319),
+        (2.99849382612997, -0.0032324991899801425, 0.012858714582508007, 0.040006230184690156),
+    ),
+    "double-gauss": (
+        (0.0, 4.997270491138759, 0.0, -0.02054097742485521),
+        (6.00338712325771, 0.002916776000178034, 0.0012912793003971301, 0.01998934333379345),
+    ),
+    "conic singlet": (
+        (0.0, 1.894329739252099, 0.0, -0.060186585180287376),
+        (1.9289870244801757, -0.2663496783472954, 0.00747696796818903, 0.06117641564668418),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", IMAGES)
+def test_rays_of_another_library(name):
+    placed, back = cases()[name](486.1327)
+    for start, image in zip(STARTS, IMAGES[name], strict=True):
+        x, y, dx, dy = image
+        # Light runs along −z here, and our rays against it.
+        ray = rays_at(x, y, -back, -dx, -dy, math.sqrt(1 - dx * dx - dy * dy))
+        L, D, weight = columns(placed.pass_on(ray))
+        at_start = L + D * ((placed.end_mm + 10 - L[2]) / D[2])
+        assert weight == 1
+        np.testing.assert_allclose([*at_start[:2], *-D[:2]], start, atol=ROUNDING)
+
+
+# -- rims, stop, total reflection
+
+
+def test_rims_and_stop_block_rays():
+    made = lens("triplet").at(40.0)
+    heights = np.linspace(-12, 12, 481)
+    weight = made.pass_on(fan(-30.0, heights, target_z=40.0)).weight
+    # The stop's paraxial image towards the pixels bounds the cone from the axis point, up to aberration.
+    z, diameter = made.pupil()
+    cone = (heights / 70) * (z + 30)
+    assert (weight[abs(cone) < 0.97 * diameter / 2] == 1).all()
+    assert (weight[abs(cone) > 1.03 * diameter / 2] == 0).all()
+    assert np.isin(weight, (0, 1)).all()
+
+
+def test_weights_of_before_are_kept():
+    made = lens("triplet").at(40.0)
+    rays = fan(-30.0, np.array([0.0, 1.0, 30.0]), target_z=40.0)._replace(weight=np.array([0.5, 0.25, 1.0]))
+    np.testing.assert_array_equal(made.pass_on(rays).weight, [0.5, 0.25, 0.0])
+
+
+def test_total_reflection_weighs_nothing_and_numbers_stay_finite():
+    # A hemisphere's flat face: rays within it reflect totally from sin I > 1/n on.
+    n = 1.5
+    ball = Surfaces(
+        z_mm=10.0,
+        surfaces=(
+            {"thickness_mm": 25.0, "glass": n, "diameter_mm": 200.0},
+            {"radius_mm": -60.0, "stop": True, "diameter_mm": 90.0},
+        ),
+    )
+    # Towards the centre of the sphere, so that the first surface bends nothing: 60 mm ahead.
+    angle = np.radians([0.0, 20.0, 41.0, 42.5, 47.0])  # 41.81° is critical
+    centre = 10.0 + 60.0
+    rays = rays_at(
+        0 * angle, -100 * np.sin(angle), centre - 100 * np.cos(angle), 0 * angle, np.sin(angle), np.cos(angle)
+    )
+    L, D, weight = columns(ball.pass_on(rays))
+    np.testing.assert_array_equal(weight, [1, 1, 1, 0, 0])
+    np.testing.assert_allclose(D[:3, 1], n * np.sin(angle[:3]), atol=ROUNDING)
+    assert np.isfinite(L).all() and np.isfinite(D).all()
+
+
+def test_rays_that_miss_or_run_back_are_finite_and_blocked():
+    made = lens("double-gauss").at(60.0)
+    L, D, weight = columns(
+        made.pass_on(rays_at([0, 0, 500, 0], [0, 0, 0, 0], [0, 500, 0, 0], 0, [1, 0, 0, 0], [0, 1, 1, -1]))
+    )
+    np.testing.assert_array_equal(weight, [0, 0, 0, 0])
+    assert np.isfinite(L).all() and np.isfinite(D).all()
+
+
+# -- glass
+
+
+def test_glasses_have_their_catalogue_values():
+    # n_d and V_d as printed in the catalogue.
+    printed = {
+        "N-BK7": (1.51680, 64.17), "N-SK2": (1.60738, 56.65), "N-SK16": (1.62041, 60.32), "N-SSK2": (1.62229, 53.27),
+        "F2": (1.62004, 36.37), "F5": (1.60342, 38.03), "N-SF11": (1.78472, 25.68), "N-LAK9": (1.69100, 54.71),
+    }  # fmt: skip
+    assert printed.keys() == CATALOGUE.keys()
+    for name, (ior, abbe) in printed.items():
+        found = glass(name)
+        assert found.index(587.5618) == pytest.approx(ior, abs=6e-6), name
+        assert found.abbe_number == pytest.approx(abbe, abs=6e-3), name
+    assert glass("SK16") == CATALOGUE["N-SK16"]
+
+
+def test_index_and_abbe_number_are_what_they_say():
+    made = Glass(ior=1.62, abbe=36.4)
+    assert made.index(587.5618) == pytest.approx(1.62, abs=1e-15)
+    assert 0.62 / (made.index(LINE_F_NM) - made.index(LINE_C_NM)) == pytest.approx(36.4, rel=1e-12)
+    assert Glass(ior=1.62).abbe_number == math.inf
+    assert glass(made.to_json()) == made and glass("F2").to_json() == "F2"
+
+
+def test_wavelengths_focus_apart():
+    # The triplet is corrected for lines F and C: they focus nearer to each other than through one glass.
+    triplet = lens("triplet")
+    focus = [triplet.at(0.0, wavelength_nm=nm).image_mm(math.inf) for nm in (486.13, 587.56, 656.27)]
+    single = [
+        Surfaces(
+            z_mm=0.0, wavelength_nm=nm,
+            surfaces=({**GOOD, "radius_mm": 52.0, "thickness_mm": 2.5, "glass": "N-BK7"}, {"radius_mm": -52.0}),
+        ).image_mm(math.inf)
+        for nm in (486.13, 587.56, 656.27)
+    ]  # fmt: skip
+    assert single[0] < single[1] < single[2]  # blue bends more
+    assert abs(focus[2] - focus[0]) < 0.2 * abs(single[2] - single[0])
+
+
+# -- cameras
+
+
+@pytest.mark.parametrize("name", ["plenoptic1-double-gauss", "plenoptic2-triplet"])
+def test_scale_keeps_planes_and_field_of_lenses_that_cannot_change(name):
+    full = preset(name)
+    for scale in (2, 8, 32):
+        coarse = preset(name, scale=scale)
+        for plane in ("scene", "lenses"):
+            z = [
+                (image_planes(c)[0]["scene_z_mm"] if plane == "scene" else through_front_mm(c, c.gap_mm))
+                + c.origin_mm[2]
+                for c in (full, coarse)
+            ]
+            assert z[1] == pytest.approx(z[0], rel=1e-9)
+        assert coarse.front[-1].z_mm + coarse.origin_mm[2] == pytest.approx(full.front[-1].z_mm, rel=1e-12)
+        assert [s.radius_mm for s in coarse.front[-1].surfaces] == [s.radius_mm for s in full.front[-1].surfaces]
+    # Field: the outermost lens sees the scene in the same direction, half a lens apart.
+    ends = []
+    for c in (full, preset(name, scale=2)):
+        u, v = c.ei_pixels
+        _, D = c.rays_at(u // 2, c.pixels[1] // 2 + v // 2, sample=(0, 0))
+        x = -(c.pixels[0] - u) / 2 * c.pixel_pitch_mm
+        ends.append(D[0] / D[2] / x)
+    assert ends[1] == pytest.approx(ends[0], rel=5e-3)
+
+
+def test_camera_of_surfaces_survives_its_file(tmp_path):
+    camera = preset("plenoptic2-triplet", scale=16)
+    again = IICamera.from_json(json.loads(json.dumps(camera.to_json())))
+    assert again == camera
+    for one, two in zip(camera.rays(slice(0, 64)), again.rays(slice(0, 64)), strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+def test_presets_image_the_plane_that_they_say():
+    # Rays of one lens's pixels through the middle of the double Gauss meet in the plane of focus, 210 mm ahead.
+    camera = preset("plenoptic1-double-gauss")
+    assert through_front_mm(camera, camera.gap_mm) == pytest.approx(210, abs=2)
+    assert image_planes(preset("plenoptic2-triplet"))[0]["scene_z_mm"] == pytest.approx(235, abs=2)
+
+
+def test_prescription_beside_the_camera_file(tmp_path):
+    values = {
+        "pixels": [64, 32], "lenses": [8, 4], "pixel_pitch_mm": 0.01, "gap_mm": 0.2,
+        "optics": [{"kind": "surfaces", "prescription": "mine.json", "z_mm": 50, "enlarge": 2}],
+    }  # fmt: skip
+    (tmp_path / "camera.json").write_text(json.dumps(values))
+    one = {"surfaces": [{"radius_mm": 50, "thickness_mm": 5, "glass": "F2", "stop": True, "diameter_mm": 20}, {}]}
+    (tmp_path / "mine.json").write_text(json.dumps(one))
+    front = preset(tmp_path / "camera.json").front[0]
+    assert (front.surfaces[0].radius_mm, front.surfaces[0].diameter_mm, front.end_mm) == (100, 40, 60)
+
+
+# -- bad input
+
+
+@pytest.mark.parametrize(
+    ("surfaces", "message"),
+    [
+        ([], "there are 0: 1 to 200"),
+        ([{**GOOD, "stop": False}, LAST], "no surface is the stop"),
+        ([GOOD, {**LAST, "stop": True, "diameter_mm": 9}], "surfaces 1, 2 are the stop"),
+        ([{**GOOD, "diameter_mm": None}, LAST], "surface 1: the stop has no diameter_mm"),
+        ([{**GOOD, "thickness_mm": -2.0}, LAST], "surface 1: thickness_mm is -2: a distance from 0"),
+        ([{**GOOD, "thickness_mm": 0.0}, LAST], "surface 1 has glass and thickness_mm 0"),
+        ([LAST, GOOD], "surface 2, the last, has glass behind it"),
+        ([GOOD, {**LAST, "thickness_mm": 60.0}], "surface 2, the last, has thickness_mm 60: none is needed"),
+        ([{**GOOD, "thickness_mm": 1.0}, {**LAST, "radius_mm": -12.0}], "surfaces 1 and 2 cross: the gap"),
+        ([{**GOOD, "radius_mm": 8.0}, LAST], "surface 1: diameter_mm is 20: .* is at most 16 wide"),
+        ([{**GOOD, "radius_mm": 0.0}, LAST], "surface 1: the size of radius_mm is 0"),
+        ([{**GOOD, "radius_mm": "50"}, LAST], "surface 1: radius_mm is '50', a str"),
+        ([{**GOOD, "glass": "BK8"}, LAST], "surface 1: unknown glass 'BK8': known are N-BK7"),
+        ([{**GOOD, "glass": 0.5}, LAST], "surface 1: glass: ior is 0.5"),
+        ([{**GOOD, "glass": {"sellmeier": [1, 2]}}, LAST], "surface 1: .*six numbers"),
+        ([{**GOOD, "focal": 3}, LAST], "surface 1 has no focal: known are radius_mm"),
+        ([GOOD, 5], "surface 2 is 5: an object"),
+        # Almost a cone of glass, 55° steep: parallel light within it meets no point at less than the critical angle.
+        ([{"conic": -1.5, "radius_mm": 0.01, "thickness_mm": 20.0, "glass": 1.9, "diameter_mm": 18.0},
+          {"stop": True, "diameter_mm": 18.0}], "no ray beside the axis passes: surface 1 stops it"),
+    ],
+)  # fmt: skip
+def test_wrong_surfaces_are_one_clear_line(surfaces, message):
+    with pytest.raises(ValueError, match=f"^surfaces: .*{message}") as error:
+        Surfaces(z_mm=10.0, surfaces=surfaces)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("wavelength", [100.0, 5000.0, math.nan])
+def test_wavelengths_that_glass_does_not_have(wavelength):
+    with pytest.raises(ValueError, match=r"wavelength_nm is .*: a wavelength from 200 to 2500 nm"):
+        Surfaces(z_mm=10.0, surfaces=(GOOD, LAST), wavelength_nm=wavelength)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"z_mm": None}, "z_mm is missing"),
+        ({"prescription": "tessar"}, "unknown lens 'tessar': known are double-gauss, triplet"),
+        ({"kind": "lens"}, "an element with a prescription has"),
+        ({"focal_mm": 50}, "no focal_mm"),
+        ({"enlarge": -1}, "factor is -1"),
+    ],
+)
+def test_wrong_prescriptions_in_camera_files(tmp_path, change, message):
+    element = {"kind": "surfaces", "prescription": "triplet", "z_mm": 60, **change}
+    element = {key: value for key, value in element.items() if value is not None}
+    values = {"pixels": [64, 32], "lenses": [8, 4], "pixel_pitch_mm": 0.01, "gap_mm": 0.2, "optics": [element]}
+    (tmp_path / "camera.json").write_text(json.dumps(values))
+    with pytest.raises(ValueError, match=message):
+        preset(tmp_path / "camera.json")
+
+
+# -- Zemax files
+
+
+def zmx(prescription, *, extra="", glass_line="GLAS {} 0 0 1.6 50 0"):
+    """The text of a Zemax file of a prescription."""
+    lines = ["VERS 140124 258 36214", "MODE SEQ", "NAME a lens", "UNIT MM X W X CM MR CPMM", "PWAV 2"]
+    lines += ["WAVM 1 0.4861327 1", "WAVM 2 0.5875618 1", "WAVM 3 0.6562725 1"]
+    lines += ["SURF 0", "  TYPE STANDARD", "  CURV 0.0 0 0 0 0", "  DISZ INFINITY", "  DIAM 0 0 0 0 1"]
+    for i, s in enumerate(prescription.surfaces, 1):
+        last = i == len(prescription.surfaces)
+        lines += [f"SURF {i}", *(["  STOP"] if s.stop else []), "  TYPE STANDARD", f"  CURV {s.curvature!r} 0 0 0 0"]
+        lines += [f"  CONI {s.conic}"] if s.conic else []
+        lines += [f"  DISZ {prescription.back_mm if last else s.thickness_mm!r}"]
+        lines += [f"  {glass_line.format(s.glass.name)}"] if s.glass else []
+        lines += [f"  DIAM {s.diameter_mm / 2!r} 1 0 0 1"] if s.diameter_mm else []
+    lines += [
+        f"SURF {len(prescription.surfaces) + 1}",
+        "  TYPE STANDARD",
+        "  CURV 0.0",
+        "  DISZ 0",
+        "  DIAM 18 0 0 0 1",
+    ]
+    return "\n".join(lines) + "\n" + extra
+
+
+@pytest.mark.parametrize("coding", ["utf-8", "utf-16", "latin-1"])
+def test_zemax_files_are_the_same_lens(tmp_path, coding):
+    expected = lens("double-gauss")
+    path = tmp_path / "gauss.ZMX"
+    path.write_bytes(zmx(expected).encode(coding))
+    found = lens(path)
+    assert (found.back_mm, found.about, found.wavelength_nm) == (expected.back_mm, "a lens", pytest.approx(587.5618))
+    heights = np.linspace(-8, 8, 33)
+    one, two = (x.at(61.0, wavelength_nm=550.0).pass_on(fan(0.0, heights, target_z=61.0)) for x in (expected, found))
+    np.testing.assert_allclose(columns(two)[0], columns(one)[0], atol=ROUNDING)
+    np.testing.assert_array_equal(two.weight, one.weight)
+
+
+def test_zemax_glass_by_its_index_and_planes_of_air(tmp_path):
+    text = zmx(lens("triplet"), glass_line="GLAS ___BLANK 1 0 1.6 50 0 0 0 0 0 0")
+    dummy = "SURF 1\n  TYPE STANDARD\n  CURV 0\n  DISZ 3\n  DIAM 40 0 0 0 1\n"
+    (tmp_path / "a.zmx").write_text(text.replace("SURF 1\n", dummy + "SURF 1\n", 1))
+    found = lens(tmp_path / "a.zmx")
+    assert len(found.surfaces) == 6 and found.surfaces[0].glass == Glass(name="___BLANK", ior=1.6, abbe=50.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("TYPE STANDARD", "TYPE TOROIDAL"), "surface 0 is of type TOROIDAL"),
+        (("GLAS F2", "GLAS MIRROR"), "surface 3 is a mirror"),
+        (("GLAS F2 0 0 1.6 50", "GLAS KZFS99"), "surface 3: unknown glass 'KZFS99' without an index"),
+        (("UNIT MM", "UNIT FURLONG"), "unit 'FURLONG'"),
+        (("DISZ 4.75041", "DISZ -4.75041"), "surface 4: thickness is -4.75"),
+        (("DISZ 4.75041", "DISZ INFINITY"), "surface 4: thickness is inf"),
+        (("  STOP\n", ""), "no surface is the stop"),
+        (("CURV 0.0 0 0 0 0\n  DISZ INF", "CURV x\n  DISZ INF"), "surface 0: 'x' is no number"),
+        (("SURF", "FACE"), "no Zemax lens file"),
+    ],
+)
+def test_wrong_zemax_files_are_one_clear_line(tmp_path, change, message):
+    path = tmp_path / "bad.zmx"
+    path.write_text(zmx(lens("triplet")).replace(*change))
+    with pytest.raises(ValueError, match=message) as error:
+        lens(path)
+    assert str(path) in str(error.value) and "\n" not in str(error.value)
+
+
+def test_zemax_aspheric_terms_are_refused(tmp_path):
+    text = zmx(lens("triplet")).replace("TYPE STANDARD\n  CURV 0.0454", "TYPE EVENASPH\n  PARM 2 1e-6\n  CURV 0.0454")
+    (tmp_path / "asphere.zmx").write_text(text)
+    with pytest.raises(ValueError, match="surface 1 has aspheric terms"):
+        lens(tmp_path / "asphere.zmx")
+    (tmp_path / "sphere.zmx").write_text(text.replace("1e-6", "0"))
+    assert lens(tmp_path / "sphere.zmx").surfaces == lens("triplet").surfaces
