@@ -8,7 +8,7 @@ import pytest
 
 from codec import decode, decode_component, decode_levels, decode_view, encode
 from codec.coders.lf import coder as lf
-from codec.coders.lf import ranges, stream
+from codec.coders.lf import planes, ranges, stream
 from codec.coders.lf.pyramid import pyramid
 from codec.contract import checked_options
 from ii_core import IIPicture, sub_images
@@ -54,6 +54,24 @@ def test_a_view_amid_four_is_predicted_by_them():
     assert not nodes[4, 4].references and nodes[4, 4].level == 0
     assert set(nodes[2, 2].references) == {(0, 0), (0, 4), (4, 0), (4, 4)}
     assert set(nodes[1, 1].references) == {(0, 0), (0, 2), (2, 0), (2, 2)}
+
+
+def test_the_axes_are_those_of_detail_not_of_areas():
+    """Sky above ground differ in blue; all texture is along (2, 1, 1)."""
+    rng = np.random.default_rng(3)
+    light = rng.integers(-20, 20, (24, 3, 32, 3, 1))
+    area = np.where(np.arange(24)[:, None, None, None, None] < 12, [0, 0, 60], [0, 0, -60])
+    pixels = (128 + area + light * [2, 1, 1]).astype(np.uint8).reshape(72, 96, 3)
+    axes = planes.detail_axes(pixels, (3, 3)) / (1 << 14)
+    # One of 24 differences down is that of the areas: it turns the axis by less than 9 degrees.
+    assert axes[0] @ [2, 1, 1] / 6**0.5 > 0.988
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-4)
+
+
+def test_views_of_one_sample_have_axes():
+    """They have no neighbours to differ from."""
+    axes = planes.detail_axes(np.full((3, 4, 3), 7, np.uint8), (3, 4)) / (1 << 14)
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-4)
 
 
 @pytest.mark.parametrize(("disparity", "down"), [((3, 3), 1), ((-2, -2), 1), ((2, -2), -1)])

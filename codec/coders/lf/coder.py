@@ -17,7 +17,6 @@ from ii_core import IIPicture
 from ... import clock
 from ...contract import Coder, Goal, Option, Options, Pixels
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
-from ..volume import principal_axes
 from . import arithmetic, planes, ranges, search, stream, synthesis
 from .blocks import Job, code_blend, new_work
 from .contexts import starting_contexts
@@ -223,7 +222,7 @@ class _Source:
         self.count = self.pixels.size // 3
         self.height, self.width, self.grid = _shape(picture)
         self.effort, self.threads = int(options["effort"]), int(options["threads"])
-        self.axes = principal_axes(self.pixels)
+        self.axes = planes.detail_axes(self.pixels, self.grid)
         low, high, down = ranges.estimated(self.view, self.grid)
         self.header = Header(
             log_stride=int(options["stride"]),
