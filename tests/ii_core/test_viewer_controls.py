@@ -150,10 +150,9 @@ def test_nothing_is_cut_on_a_small_screen(tab):
 def test_full_screen_shows_the_picture_alone(tab):
     for leave in ("narrow", "Escape"):
         tab.locator("#wide").click()
-        tab.wait_for_timeout(300)
-        size = tab.evaluate("[innerWidth, innerHeight]")
-        box = tab.locator("#main").bounding_box()
-        assert [box["width"], box["height"]] == size and not tab.locator("aside").is_visible()
+        filled = "(box => box.width === innerWidth && box.height === innerHeight)"
+        tab.wait_for_function(f"{filled}(document.getElementById('main').getBoundingClientRect())")
+        assert not tab.locator("aside").is_visible()
         if leave == "narrow":
             tab.locator("#narrow").click()
         else:
