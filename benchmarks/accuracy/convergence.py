@@ -262,7 +262,7 @@ def _ring(height: Array, z: float) -> Array:
 
 
 def _spots(glass: Body, o: Array, d: Array, z: float) -> Array:
-    """Where rays end on a screen behind a lens, (n, 2) mm: its red grows with x, its green with y, blue is 1.
+    """Return positions of rays on a screen behind a lens, (n, 2) mm: its red grows with x, its green with y, blue is 1.
 
     Two texels each way make it, for a bilinear texture is exactly straight between their centres. Two bounces, in
     and out, keep what is reflected inside away; the share that gets through falls out of red / blue.
