@@ -262,10 +262,11 @@ def _ring(height: Array, z: float) -> Array:
 
 
 def _spots(glass: Body, o: Array, d: Array, z: float) -> Array:
-    """Return positions of rays on a screen behind a lens, (n, 2) mm: its red grows with x, its green with y, blue is 1.
+    """Return positions of rays on a screen behind a lens, (n, 2) mm.
 
-    Two texels each way make it, for a bilinear texture is exactly straight between their centres. Two bounces, in
-    and out, keep what is reflected inside away; the share that gets through falls out of red / blue.
+    Red grows with x, green with y, blue is 1. The screen is a texture of two texels each way, because bilinear
+    interpolation is exactly linear between their centres. Two bounces, in and out, exclude internal reflections. The
+    transmitted share cancels in red / blue and green / blue.
     """
     half = 12.0
     texels = np.array([[[0, 1, 1], [1, 1, 1]], [[0, 0, 1], [1, 0, 1]]], np.float32)
