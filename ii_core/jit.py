@@ -98,14 +98,33 @@ def part_kernel(function: Callable[..., Any], **options: Any) -> Any:
     tables of surfaces and rays are some sixty arrays.
     """
     compiled = lean_kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
-
-    def keep(result: Any) -> None:  # numba's own add_overload also has calls from Python go to the wrapper
-        compiled.overloads[tuple(result.signature.args)] = result
-
-    compiled.add_overload, compiled._compile_for_args = keep, lambda *_, **__: function
+    compiled.add_overload = lambda result: _keep(compiled, result)
+    compiled._compile_for_args = lambda *_, **__: function
     return compiled
 
 
 def stage_kernel(function: Callable[..., Any]) -> Any:
     """Compile a part whose machine code is inlined into its callers, as that of `inner_kernel` is."""
     return part_kernel(function, forceinline=True)
+
+
+def late_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a lean kernel that other kernels call by its `address`: only when something needs it.
+
+    Returns nothing, as C function. Its callers neither contain it nor optimise it a second time.
+    """
+    compiled = lean_kernel(function, no_cpython_wrapper=True)
+    compiled.add_overload = lambda result: _keep(compiled, result)
+    return compiled
+
+
+def address(compiled: Any, arguments: tuple[Any, ...]) -> int:
+    """Return the address of a late kernel for arguments of these numba types; compile it on first use."""
+    compiled.compile(arguments)
+    found = compiled.overloads[arguments]
+    return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
+
+
+def _keep(compiled: Any, result: Any) -> None:
+    """Keep a compiled kernel that Python cannot call: numba's own way would have calls go to its wrapper."""
+    compiled.overloads[tuple(result.signature.args)] = result

@@ -101,6 +101,7 @@ class PackedScene:
         self.mirrors = any(max(look.mirror) > 0 or look.metallic > 0 for look in looks)
         self.images = sky.image is not None or any(isinstance(t, Image) for look in looks for t in look.textures)
         self.glossy = any(look.roughness > 0 and look.reflects for look in looks)
+        self.close_looks = any(_looks_closely(look) for look in looks)
         self.blends = any(look.alpha_blend > 0 for look in looks)
         self.transmits = first_clear < len(bodies)
         self.disperses = any(len(set(body.material.iors)) > 1 for body in bodies[first_clear:])
@@ -118,6 +119,12 @@ class PackedScene:
 
 def _lets_through(body: Body) -> bool:
     return body.material.transmissive or body.material.has_holes
+
+
+def _looks_closely(m: Material) -> bool:
+    """Whether it has more than a pattern to look at."""
+    images = any(isinstance(image, Image) for image in m.textures)
+    return images or m.metallic > 0 or m.alpha_blend > 0 or m.transmissive
 
 
 def _material_row(m: Material, textures: TextureTable) -> NDArray[np.float64]:

@@ -14,13 +14,20 @@ from ii_core.checks import MOST_MM
 
 from ..scene.scene import Scene
 from .intersect import Hits
-from .kernels.arrays import Passage, Rays, Recorded, ShadowRays
+from .kernels.addresses import address
+from .kernels.appearance import attenuate, look_closely, paint
+from .kernels.arrays import Generation, Passage, Rays, Recorded, ShadowRays, Stages
+from .kernels.attributes import footprints
 from .kernels.clear import pass_clear_face, pass_faces, start_inside, tell_inside
 from .kernels.lanes import work
 from .kernels.light import add_unblocked, keep_unblocked
 from .kernels.sampling import lobe_keys
-from .kernels.shade import shade
+from .kernels.shade import record, shade
+from .kernels.sky import add_sky_image
+from .kernels.spawn import reflect
+from .kernels.spawn import spawn as spawn_rays
 from .kernels.start import start_rays, start_separable_rays
+from .kernels.tables import COUNTS, PASSED, REFLECTION, REFRACTION, SKY_IMAGE, SPAWNED, WEAK_SHADOW
 from .packing import PackedScene, packed
 from .support_images import RECORDED
 
@@ -206,6 +213,7 @@ class Tracer:
         self._whole = np.ones((capacity, 3), np.float32), np.arange(capacity, dtype=np.int32)
         self._shadow = _shadow_room(0, self.scene.nested)
         self._work = work()
+        self._addresses: dict[Any, int] = {}  # of stages: the types of their arguments stay the same
 
     def begin(self) -> None:
         """Count from 0."""
@@ -295,22 +303,39 @@ class Tracer:
         following = _room(most * n if spawn else 0, s.nested, s.glossy, any(self.footprint))
         if len(self._shadow.reach) < n * len(s.lights):
             self._shadow = _shadow_room(n * len(s.lights), s.nested)
-        counts, lit = np.zeros(6, np.int64), np.zeros(len(s.lights), np.int64)
-        passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint, spawn)
+        counts, lit = np.zeros(COUNTS, np.int64), np.zeros(len(s.lights), np.int64)
+        passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint)
         images: list[Any] = [*(support or Support()).rows(), self.pose[:3, 3], self.pose[:3, 2]]
-        recorded = Recorded(support is not None, *images)
-        spawned = shade(
-            hits, rays, s.surfaces, s.surroundings, passage, recorded, radiance, self._shadow, following, counts, lit,
-            self._work,
+        generation = Generation(
+            hits, rays, s.surfaces, s.surroundings, passage, Recorded(*images), radiance, self._shadow, following,
+            counts, lit, self._work,
         )  # fmt: skip
-        self.count.rays.update({"reflection": int(counts[0]), "refraction": int(counts[1])})
-        self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[2:5]), strict=True)))
+        shade(generation, self._stages(generation, support is not None, spawn))
+        self.count.rays.update({"reflection": int(counts[REFLECTION]), "refraction": int(counts[REFRACTION])})
+        self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[WEAK_SHADOW:PASSED]), strict=True)))
         if s.blends:
-            self.count.rays["passed"] += int(counts[5])
+            self.count.rays["passed"] += int(counts[PASSED])
         for light in np.flatnonzero(lit):
             some = slice(light * n, light * n + lit[light])
             self._light(_rows(self._shadow, some), radiance)
-        return _rows(following, slice(spawned))
+        return _rows(following, slice(int(counts[SPAWNED])))
+
+    def _stages(self, generation: Generation, recorded: bool, spawn: bool) -> Stages:
+        """Addresses of the stages that the generation needs, compiled here when the first scene needs them."""
+        s = self.scene
+        clear = s.glossy or s.transmits or s.blends
+        wanted = (
+            footprints if any(self.footprint) else None,
+            attenuate if s.nested or len(s.fog) else None,
+            look_closely if s.close_looks else paint,
+            add_sky_image if s.background[SKY_IMAGE] >= 0 else None,
+            record if recorded else None,
+            (spawn_rays if clear else reflect) if spawn else None,
+        )
+        for stage in wanted:
+            if stage is not None and stage not in self._addresses:
+                self._addresses[stage] = address(stage, generation)
+        return Stages(*(self._addresses[stage] if stage is not None else 0 for stage in wanted))
 
     def _hits(self, rays: Rays) -> Hits:
         """Face, u, v and distance of the nearest face that is there: not cut out, not hidden in another body."""

@@ -7,7 +7,10 @@ import numpy as np
 from raytrace_ii import Background, Body, Light, Material, Scene
 from raytrace_ii.scene.textures import Checker, Image, Noise
 from raytrace_ii.shapes.primitives import Box, Mesh, Plane, Sphere, rotation
-from raytrace_ii.tracing.kernels.textures import texture_colour
+from raytrace_ii.tracing.kernels import lanes
+from raytrace_ii.tracing.kernels.lanes import BLOCK, work
+from raytrace_ii.tracing.kernels.noise import fractal_lanes
+from raytrace_ii.tracing.kernels.textures import filtered, noise_colour, pattern_colour
 from raytrace_ii.tracing.texture_table import TextureTable
 
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
@@ -108,7 +111,28 @@ def hall(max_depth=5):
 def texture_at(texture, points):
     """Linear colours, (n, 3), of a texture at (n, 3) texture coordinates."""
     packed = TextureTable([texture])
-    return np.array([texture_colour(packed.table, 0, packed.texels, *map(float, p)) for p in points])
+    table, texels, points = packed.table, packed.texels, np.asarray(points, float)
+    if isinstance(texture, Image):
+        texels = (texels[0].astype(float), texels[1])  # in Python float32 would stay float32
+        return np.array([filtered(table, 0, texels, x, y, 0.0, 0.0, 0.0, 0.0) for x, y, _ in points])
+    if isinstance(texture, Noise):
+        sums = octaves(points / texture.size, texture.octaves, texture.seed)
+        return np.array([noise_colour(table, 0, total) for total in sums])
+    return np.array([pattern_colour(table, 0, *p) for p in points])
+
+
+def octaves(points, many, seed):
+    """Sums of octaves of gradient noise at (n, 3) places, (n,)."""
+    found = []
+    for some in np.split(points, range(BLOCK, len(points), BLOCK)):
+        rooms = work()
+        for first, values in ((lanes.SX, some[:, 0]), (lanes.SY, some[:, 1]), (lanes.SZ, some[:, 2])):
+            rooms.double[first : first + len(some)] = values
+        rooms.whole[lanes.OCTAVES : lanes.OCTAVES + len(some)] = many
+        rooms.whole[lanes.SEED : lanes.SEED + len(some)] = seed
+        fractal_lanes(len(some), rooms.whole, rooms.double)
+        found.append(rooms.double[lanes.TOTAL : lanes.TOTAL + len(some)])
+    return np.concatenate(found)
 
 
 def reflectance(cosine, ior):

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from ii_core.jit import part_kernel, stage_kernel
+from ii_core.jit import late_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
+from .addresses import value_at
 from .glossy import highlight
 from .lanes import BLOCK
 from .media import clearness, enter, medium_of
@@ -27,21 +28,21 @@ from .tables import (
     NORMAL_SCALE,
     TEXTURE,
 )
-from .textures import filtered, noise_colour, share_there, texture_colour
+from .textures import filtered, noise_colour, pattern_colour, share_there
 from .vectors import edge, interpolate, three
 
 _COLUMNS, _EXTRAS = np.uint64(MATERIAL_COLUMNS), np.uint64(EXTRAS)
 
 
-@stage_kernel
-def attenuate(lanes, rays, surfaces, fog, work):
+@late_kernel
+def attenuate(generation, first, lanes, _):
     """Dim rays on their way through bodies (Beer–Lambert), or through fog outside of them, which adds its light.
 
     A ray that meets an open body from behind has run inside: that is noted in ``inside``.
     """
-    double, whole, materials = work.double, work.whole, surfaces.materials
-    if rays.inside.shape[1] == 0 and fog.shape[0] == 0:
-        return
+    g = value_at(generation)
+    rays, fog, work, materials = g.rays, g.surroundings.fog, g.work, g.surfaces.materials
+    double, whole = work.double, work.whole
     for k in range(lanes):
         i, body, t = whole[at.ROW + k], whole[at.BODY + k], np.float64(work.single[at.DISTANCE + k])
         medium = -1
@@ -66,55 +67,84 @@ def attenuate(lanes, rays, surfaces, fog, work):
 
 
 @stage_kernel
-def look(lanes, surfaces, surroundings, passage, filtering, work):
-    """Shares of scattered, mirrored and transmitted light, highlights, and light given off, of all lanes.
+def take_materials(lanes, surfaces, work):
+    """Bring the materials of all lanes to them, without textures and whatever else is in ``EXTRAS``.
 
-    Bodies without anything of ``EXTRAS`` need their row of the table alone.
+    Returns
+    -------
+    bool
+        Whether a lane has any of it.
     """
     double, whole, materials = work.double, work.whole, surfaces.flat_materials
-    textured, noisy, same = False, np.int64(0), True  # no literal: another signature
+    same, extras = True, False
     for k in range(lanes):
         same &= whole[at.BODY + k] == whole[at.BODY]
-    if same:
-        row = np.uint64(whole[at.BODY]) * _COLUMNS
+    for k in range(1 if same else lanes):
+        row = np.uint64(whole[at.BODY + k]) * _COLUMNS
+        extras |= materials[row + _EXTRAS] > 0.0
         for c in range(LANED):
-            value = materials[row + np.uint64(c)]
-            for k in range(BLOCK):
-                double[at.R0 + c * BLOCK + k] = value
-    else:
-        for k in range(lanes):
-            row = np.uint64(whole[at.BODY + k]) * _COLUMNS
-            for c in range(LANED):
-                double[at.R0 + c * BLOCK + k] = materials[row + np.uint64(c)]
-    for k in range(lanes):
-        if materials[np.uint64(whole[at.BODY + k]) * _COLUMNS + _EXTRAS] > 0.0:
-            if not textured:
-                textured = True
-                for j in range(3 * BLOCK):
-                    double[at.T0 + j] = 1.0
-            noisy += _look_closely(k, surfaces, passage, filtering, work, noisy)
-    if noisy > 0:
-        _colour_by_noise(noisy, surfaces, work)
+            double[at.R0 + c * BLOCK + k] = materials[row + np.uint64(c)]
+    if same:
+        for c in range(LANED):
+            for k in range(1, BLOCK):
+                double[at.R0 + c * BLOCK + k] = double[at.R0 + c * BLOCK]
+    for k in range(3 * BLOCK):
+        double[at.T0 + k] = 1.0
+    return extras
+
+
+@stage_kernel
+def scatter(ambient, double):
+    """Colours of scattered light, as seen: weight times texture and material; and light given off."""
+    a0, a1, a2 = ambient[0], ambient[1], ambient[2]
     for k in range(BLOCK):
-        local = double[at.SCATTERED + k]
-        r, g, b = local * double[at.R0 + k], local * double[at.R1 + k], local * double[at.R2 + k]
-        double[at.R0 + k], double[at.R1 + k], double[at.R2 + k] = r, g, b
-    if textured:
-        for k in range(3 * BLOCK):
-            double[at.R0 + k] *= double[at.T0 + k]
-    a0, a1, a2 = surroundings.ambient[0], surroundings.ambient[1], surroundings.ambient[2]
-    for k in range(BLOCK):
-        w0, w1, w2 = double[at.W0 + k], double[at.W1 + k], double[at.W2 + k]
-        r, g, b = w0 * double[at.R0 + k], w1 * double[at.R1 + k], w2 * double[at.R2 + k]
+        local, w0, w1, w2 = double[at.SCATTERED + k], double[at.W0 + k], double[at.W1 + k], double[at.W2 + k]
+        r = w0 * (local * double[at.R0 + k] * double[at.T0 + k])
+        g = w1 * (local * double[at.R1 + k] * double[at.T1 + k])
+        b = w2 * (local * double[at.R2 + k] * double[at.T2 + k])
         double[at.R0 + k], double[at.R1 + k], double[at.R2 + k] = r, g, b
         double[at.E0 + k] = w0 * double[at.E0 + k] + r * a0
         double[at.E1 + k] = w1 * double[at.E1 + k] + g * a1
         double[at.E2 + k] = w2 * double[at.E2 + k] + b * a2
 
 
-@stage_kernel
-def _look_closely(k, surfaces, passage, filtering, work, noisy):
-    """One lane of a body that has maps, a texture, metal, or parts that are seen through.
+@late_kernel
+def paint(generation, first, lanes, _):
+    """Textures of bodies that have patterns, and nothing else of ``EXTRAS``."""
+    g = value_at(generation)
+    materials, noisy = g.surfaces.materials, np.int64(0)  # no literal: another signature
+    for k in range(lanes):
+        body = g.work.whole[at.BODY + k]
+        g.work.double[at.CLEAR + k] = 0.0
+        if materials[body, TEXTURE] >= 0 and g.work.double[at.SCATTERED + k] > 0.0:
+            noisy += _take_pattern(k, int(materials[body, TEXTURE]), g.surfaces, g.work, noisy)
+    if noisy > 0:
+        _colour_by_noise(noisy, g.surfaces, g.work)
+
+
+@late_kernel
+def look_closely(generation, first, lanes, _):
+    """Maps, textures, metal, and parts that are seen through."""
+    g = value_at(generation)
+    materials, noisy = g.surfaces.materials, np.int64(0)  # no literal: another signature
+    filtering = g.passage.first_width != 0.0 or g.passage.spread != 0.0
+    blending = g.following.pixels.shape[0] > 0  # the last generation takes what is blended as there
+    for k in range(lanes):
+        if materials[g.work.whole[at.BODY + k], EXTRAS] > 0.0:
+            noisy += _take_images(k, g.surfaces, filtering, blending, g.work, noisy)
+    if noisy > 0:
+        _colour_by_noise(noisy, g.surfaces, g.work)
+    for k in range(lanes):
+        body = g.work.whole[at.BODY + k]
+        if materials[body, EXTRAS] > 0.0:
+            g.work.double[at.CLEAR + k] = clearness(materials, body)
+            if g.work.double[at.METAL + k] > 0.0 or materials[body, GLOSS_MAP] >= 0:
+                _gild(k, g.surfaces, g.work)
+
+
+@part_kernel
+def _take_images(k, surfaces, filtering, blending, work, noisy):
+    """Read the images of one lane's body.
 
     Returns
     -------
@@ -124,13 +154,11 @@ def _look_closely(k, surfaces, passage, filtering, work, noisy):
     single, double, whole, materials = work.single, work.double, work.whole, surfaces.materials
     textures, texels, coordinates = surfaces.textures, surfaces.texels, surfaces.coordinates
     f, body, u, v = whole[at.FACE + k], whole[at.BODY + k], single[at.U + k], single[at.V + k]
-    au, av, bu, bv = 0.0, 0.0, 0.0, 0.0
-    if filtering:
-        au, av, bu, bv = double[at.AU + k], double[at.AV + k], double[at.BU + k], double[at.BV + k]
-    clear = clearness(materials, body)
+    if not filtering:
+        double[at.AU + k], double[at.AV + k], double[at.BU + k], double[at.BV + k] = 0.0, 0.0, 0.0, 0.0
+    au, av, bu, bv = double[at.AU + k], double[at.AV + k], double[at.BU + k], double[at.BV + k]
     double[at.B0 + k], double[at.B1 + k], double[at.B2 + k] = 0.0, 0.0, 0.0
-    if passage.spawn and materials[body, ALPHA_BLEND] > 0.0:
-        # seen through to the share that is not there; the last generation takes it as there
+    if blending and materials[body, ALPHA_BLEND] > 0.0:  # seen through to the share that is not there
         there = share_there(coordinates, textures, surfaces.alphas, materials, body, f, u, v, au, av, bu, bv)
         for c in range(3):
             double[at.B0 + c * BLOCK + k] = (1.0 - there) * double[at.W0 + c * BLOCK + k]
@@ -143,42 +171,58 @@ def _look_closely(k, surfaces, passage, filtering, work, noisy):
         double[at.E0 + k] *= t0
         double[at.E1 + k] *= t1
         double[at.E2 + k] *= t2
-    local, metallic, rough = double[at.SCATTERED + k], double[at.METAL + k], double[at.ROUGH + k]
-    t0, t1, t2, noise = 1.0, 1.0, 1.0, 0
-    if materials[body, TEXTURE] >= 0 and (local > 0.0 or metallic > 0.0):
-        s0, s1, s2 = interpolate(coordinates, f, u, v)
-        row = int(materials[body, TEXTURE])
-        if filtering and textures[row, 0] == IMAGE and double[at.WIDTH + k] > 0.0:
-            t0, t1, t2 = filtered(textures, row, texels, s0, s1, au, av, bu, bv)
-        elif textures[row, 0] == NOISE and metallic == 0.0:
-            noise = 1
-            whole[at.NOISY + noisy] = k
-            packed = int(textures[row, 10])
-            whole[at.OCTAVES + noisy], whole[at.SEED + noisy] = packed % 16, packed // 16
-            double[at.SX + noisy] = s0 * textures[row, 1]
-            double[at.SY + noisy] = s1 * textures[row, 2]
-            double[at.SZ + noisy] = s2 * textures[row, 3]
-        else:
-            t0, t1, t2 = texture_colour(textures, row, texels, s0, s1, s2)
+    row = int(materials[body, TEXTURE])
+    if row < 0 or not (double[at.SCATTERED + k] > 0.0 or double[at.METAL + k] > 0.0):
+        return 0
+    if textures[row, 0] != IMAGE:
+        return _take_pattern(k, row, surfaces, work, noisy)
+    s0, s1, _ = interpolate(coordinates, f, u, v)
+    t0, t1, t2 = filtered(textures, row, texels, s0, s1, au, av, bu, bv)
+    double[at.T0 + k], double[at.T1 + k], double[at.T2 + k] = t0, t1, t2
+    return 0
+
+
+@part_kernel
+def _take_pattern(k, row, surfaces, work, noisy):
+    """Colour one lane by a pattern, or note the place where its noise is wanted as number ``noisy``: 1 then."""
+    single, double, whole, table = work.single, work.double, work.whole, surfaces.textures
+    x, y, z = interpolate(surfaces.coordinates, whole[at.FACE + k], single[at.U + k], single[at.V + k])
+    if table[row, 0] != NOISE:
+        t0, t1, t2 = pattern_colour(table, row, x, y, z)
         double[at.T0 + k], double[at.T1 + k], double[at.T2 + k] = t0, t1, t2
-    if metallic > 0.0 or materials[body, GLOSS_MAP] >= 0:
-        if materials[body, GLOSS_MAP] >= 0:
-            s0, s1, _ = interpolate(coordinates, f, u, v)
-            row = int(materials[body, GLOSS_MAP])
-            _, s1, s2 = filtered(textures, row, texels, s0, s1, au, av, bu, bv)
-            rough, metallic = rough * s1, metallic * s2
-        local, clear = (1.0 - metallic) * local, (1.0 - metallic) * clear
-        k0 = (1.0 - metallic) * double[at.K0 + k] + metallic * materials[body, 0] * t0
-        k1 = (1.0 - metallic) * double[at.K1 + k] + metallic * materials[body, 1] * t1
-        k2 = (1.0 - metallic) * double[at.K2 + k] + metallic * materials[body, 2] * t2
-        double[at.K0 + k], double[at.K1 + k], double[at.K2 + k] = k0, k1, k2
-        if double[at.GLOSS + k] > 0.0 and materials[body, GLOSS_MAP] >= 0:
-            strength, double[at.EXPONENT + k] = highlight((k0 + k1 + k2) / 3.0, rough)
-            double[at.GLOSS + k] *= strength
-            double[at.HALF_FROM + k] = 0.0
-        double[at.SCATTERED + k], double[at.METAL + k], double[at.ROUGH + k] = local, metallic, rough
-    double[at.CLEAR + k] = clear
-    return noise
+        return 0
+    whole[at.NOISY + noisy] = k
+    packed = int(table[row, 10])
+    whole[at.OCTAVES + noisy], whole[at.SEED + noisy] = packed % 16, packed // 16
+    double[at.SX + noisy], double[at.SY + noisy], double[at.SZ + noisy] = (
+        x * table[row, 1], y * table[row, 2], z * table[row, 3],
+    )  # fmt: skip
+    return 1
+
+
+@part_kernel
+def _gild(k, surfaces, work):
+    """Shares of light of one lane's metal, and highlight and roughness by its map."""
+    double, f, body = work.double, work.whole[at.FACE + k], work.whole[at.BODY + k]
+    metallic, rough, row = double[at.METAL + k], double[at.ROUGH + k], int(surfaces.materials[body, GLOSS_MAP])
+    if row >= 0:
+        s0, s1, _ = interpolate(surfaces.coordinates, f, work.single[at.U + k], work.single[at.V + k])
+        _, by_rough, by_metal = filtered(
+            surfaces.textures, row, surfaces.texels, s0, s1,
+            double[at.AU + k], double[at.AV + k], double[at.BU + k], double[at.BV + k],
+        )  # fmt: skip
+        rough, metallic = rough * by_rough, metallic * by_metal
+    for c in range(3):
+        mirrored = metallic * surfaces.materials[body, c] * double[at.T0 + c * BLOCK + k]
+        double[at.K0 + c * BLOCK + k] = (1.0 - metallic) * double[at.K0 + c * BLOCK + k] + mirrored
+    if double[at.GLOSS + k] > 0.0 and row >= 0:
+        k0, k1, k2 = three(double, at.K0, k)
+        strength, double[at.EXPONENT + k] = highlight((k0 + k1 + k2) / 3.0, rough)
+        double[at.GLOSS + k] *= strength
+        double[at.HALF_FROM + k] = 0.0
+    double[at.SCATTERED + k] *= 1.0 - metallic
+    double[at.CLEAR + k] *= 1.0 - metallic
+    double[at.METAL + k], double[at.ROUGH + k] = metallic, rough
 
 
 @stage_kernel

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .lanes import Work
+
 Single = NDArray[np.float32]
 Double = NDArray[np.float64]
 Whole = NDArray[np.int32]
@@ -93,13 +95,11 @@ class Passage(NamedTuple):
     lobe_stride: int
     first_width: float
     spread: float
-    spawn: bool
 
 
 class Recorded(NamedTuple):
     """Support images by pixel, of no rows where not wanted; depth is from ``eye`` along the camera's ``axis``."""
 
-    wanted: bool
     depth: Single
     normal: Single
     object_id: Whole
@@ -107,3 +107,34 @@ class Recorded(NamedTuple):
     shading_normal: Single
     eye: Double
     axis: Double
+
+
+class Stages(NamedTuple):
+    """Addresses of the stages that not every scene needs, 0 where this one does not."""
+
+    footprints: int
+    attenuate: int
+    look_closely: int
+    sky_image: int
+    record: int
+    spawn: int
+
+
+class Generation(NamedTuple):
+    """One generation of rays with everything that its shading reads and fills.
+
+    Shadow rays take n rows for each light, of which ``lit`` are filled; ``counts`` are those of `tables`.
+    """
+
+    hits: Hits
+    rays: Rays
+    surfaces: Surfaces
+    surroundings: Surroundings
+    passage: Passage
+    recorded: Recorded
+    radiance: Single
+    shadows: ShadowRays
+    following: Rays
+    counts: NDArray[np.int64]
+    lit: NDArray[np.int64]
+    work: Work

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from ii_core.jit import stage_kernel
+from ii_core.jit import late_kernel, stage_kernel
 
 from . import lanes as at
+from .addresses import value_at
 from .lanes import BLOCK
 from .tables import IMAGES
 from .textures import footprint
@@ -147,10 +148,12 @@ def up_to_smooth(single, double):
         )  # fmt: skip
 
 
-@stage_kernel
-def footprints(lanes, rays, surfaces, passage, work):
+@late_kernel
+def footprints(generation, first, lanes, _):
     """How far a ray's width reaches over the (u, v) of the images of its body."""
-    single, double, whole = work.single, work.double, work.whole
+    g = value_at(generation)
+    rays, surfaces, passage = g.rays, g.surfaces, g.passage
+    single, double, whole = g.work.single, g.work.double, g.work.whole
     own = rays.widths.shape[0] > 0
     any_image = False
     for k in range(lanes):

@@ -38,20 +38,12 @@ def gradient_noise(x, y, z, seed):
     return _lerp(w, near, far)
 
 
-@inner_kernel
-def fractal(x, y, z, packed):
-    """Octaves of gradient noise, each of half the size and strength."""
-    octaves, seed = packed % 16, packed // 16
-    total, strength = 0.0, 1.0
-    for octave in range(octaves):
-        total += strength * gradient_noise(x, y, z, seed + octave)
-        x, y, z, strength = 2.03 * x, 2.03 * y, 2.03 * z, 0.5 * strength
-    return total
-
-
 @stage_kernel
 def fractal_lanes(many, whole, double):
-    """`fractal` for many places at once, an octave of all in turn, in vectors; sums go to ``TOTAL``."""
+    """Sums of octaves of gradient noise, each of half the size and strength, for many places: to ``TOTAL``.
+
+    An octave of all in turn, in vectors.
+    """
     most = 0
     for k in range(many):
         most = max(most, whole[at.OCTAVES + k])

@@ -14,13 +14,12 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
 from ii_core.jit import exact_kernel as kernel
 from ii_core.jit import inline_kernel
 from ii_core.jit import kernel as lean_kernel
+
+from .addresses import call
 
 # Rows of a packet.
 _NEAR, _DIRECTION, _TIME, _FAR, _MASK, _FLAGS, _U, _V, _FACE, _GEOMETRY, _INSTANCE = (
@@ -58,21 +57,6 @@ class Calls(NamedTuple):
     one: int
     near: np.float32
     narrow: np.float32
-
-
-def _pointers_call(typing: Any, address: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
-    """Call ``void f(a, b, c, d)``, four pointers, at an address; a function of three does not read the fourth."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        pointer = ir.IntType(8).as_pointer()
-        function = ir.FunctionType(ir.VoidType(), [pointer] * 4).as_pointer()
-        builder.call(builder.inttoptr(values[0], function), [builder.inttoptr(v, pointer) for v in values[1:]])
-        return context.get_dummy_value()
-
-    return types.void(*[types.intp] * 5), generate
-
-
-_call: Any = intrinsic(_pointers_call)
 
 
 def _reduce(function: Any) -> Any:
@@ -211,7 +195,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 far = reach[i] if reach.shape[0] > 0 else _NO_END
                 _fill(packet, numbers, width, lane, origins, directions, i, far)
             if _together(packet, calls, width):
-                _call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
+                call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
                 _place(packet, numbers, width, corners)
                 for lane in range(lanes):
                     _take(packet, numbers, width, lane, first + lane, primitives, u, v, distances)
@@ -219,7 +203,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 for i in range(first, first + lanes):
                     far = reach[i] if reach.shape[0] > 0 else _NO_END
                     _fill(one, one_number, 1, 0, origins, directions, i, far)
-                    _call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
+                    call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
                     _place(one, one_number, 1, corners)
                     _take(one, one_number, 1, 0, i, primitives, u, v, distances)
 
@@ -237,13 +221,13 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 active[lane] = -1 if lane < lanes else 0
                 _fill(packet, numbers, width, lane, origins, directions, i, reach[i])
             if _together(packet, calls, width):
-                _call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
+                call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
                 for lane in range(lanes):
                     found[first + lane] = 0 if packet[_FAR * width + lane] < 0 else -1
             else:
                 for i in range(first, first + lanes):
                     _fill(one, one_number, 1, 0, origins, directions, i, reach[i])
-                    _call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
+                    call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
                     found[i] = 0 if one[_FAR] < 0 else -1
 
     return nearest, occluded

@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel, part_kernel
+from ii_core.jit import late_kernel, part_kernel
 
+from .addresses import value_at
+from .lanes import BLOCK
 from .tables import SKY_IMAGE, SKY_INTENSITY, SKY_TURN
 from .textures import filtered
 
@@ -24,17 +26,25 @@ def background_colour(background, dy):
     )
 
 
-@inline_kernel
-def sky_colour(background, textures, texels, dx, dy, dz, spread):
-    """Colour of the surroundings for a unit direction: of the equirectangular image, or of the gradient."""
-    if background[SKY_IMAGE] >= 0.0:
-        return _sky_image(background, textures, texels, dx, dy, dz, spread)
-    return background_colour(background, dy)
+@late_kernel
+def add_sky_image(generation, first, lanes, _):
+    """Add the light of an equirectangular image around the scene, of all rays of a block that miss."""
+    g = value_at(generation)
+    rays, radiance = g.rays, g.radiance
+    for i in range(first, min(first + BLOCK, g.hits.faces.shape[0])):
+        if g.hits.faces[i] < 0:
+            dx, dy, dz = float(rays.directions[i, 0]), float(rays.directions[i, 1]), float(rays.directions[i, 2])
+            red, green, blue = _sky_image(g.surroundings.background, g.surfaces, dx, dy, dz, g.passage.spread)
+            pixel = rays.pixels[i]
+            radiance[pixel, 0] += float(rays.weights[i, 0]) * red
+            radiance[pixel, 1] += float(rays.weights[i, 1]) * green
+            radiance[pixel, 2] += float(rays.weights[i, 2]) * blue
 
 
 @part_kernel
-def _sky_image(background, textures, texels, dx, dy, dz, spread):
-    row = int(background[SKY_IMAGE])
+def _sky_image(background, surfaces, dx, dy, dz, spread):
+    """Colour for a unit direction."""
+    textures, texels, row = surfaces.textures, surfaces.texels, int(background[SKY_IMAGE])
     half = 0.5 / textures[row, 3]  # of a texel: the top row does not run into the bottom one
     u = 0.5 + math.atan2(np.float64(dx), np.float64(dz)) / (2.0 * math.pi) - background[SKY_TURN]
     v = 0.5 + math.asin(min(max(np.float64(dy), -1.0), 1.0)) / math.pi

@@ -7,10 +7,9 @@ import math
 import numpy as np
 
 from ii_core.colour import LINEAR
-from ii_core.jit import inline_kernel, inner_kernel, part_kernel, stage_kernel
+from ii_core.jit import inline_kernel, part_kernel, stage_kernel
 
-from .noise import fractal
-from .tables import ALPHA_BLEND, CHECKER, CUTOFF, IMAGE, LEVELS, MIRROR, REPEAT, STRIPES, TEXTURE, VERTEX
+from .tables import ALPHA_BLEND, CHECKER, CUTOFF, IMAGE, LEVELS, MIRROR, REPEAT, TEXTURE, VERTEX
 from .vectors import interpolate
 
 MOST_TAPS = 8  # along the longer axis of a filtered ellipse
@@ -18,12 +17,10 @@ SHARPER = 0.5  # levels finer than the filter's width: bilinear reading of a lev
 _1, _2, _3, _4 = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
 
 
-@inner_kernel
-def texture_colour(table, row, texels, x, y, z):
-    """Linear colour of a texture at a texture coordinate."""
+@part_kernel
+def pattern_colour(table, row, x, y, z):
+    """Linear colour of a texture that is neither image nor noise at a texture coordinate."""
     kind = table[row, 0]
-    if kind == IMAGE:
-        return _image(table, row, texels, x, y)
     if kind == VERTEX:
         return x, y, z
     if kind == CHECKER:
@@ -34,7 +31,7 @@ def texture_colour(table, row, texels, x, y, z):
             + math.floor(z * table[row, 3] + 1e-6)
         ) % 2
         t = 1.0 if odd else 0.0
-    elif kind == STRIPES:
+    else:
         s = x * table[row, 1] + y * table[row, 2] + z * table[row, 3]
         if table[row, 10] > 0.0:
             away = abs(s - 2.0 * math.floor(0.5 * s) - 0.5)  # from the middle of a stripe of the first colour
@@ -42,9 +39,6 @@ def texture_colour(table, row, texels, x, y, z):
             t = min(max(0.5 + inner / table[row, 10], 0.0), 1.0)
         else:
             t = 1.0 if math.floor(s + 1e-6) % 2 else 0.0
-    else:
-        total = fractal(x * table[row, 1], y * table[row, 2], z * table[row, 3], int(table[row, 10]))
-        return noise_colour(table, row, total)
     return _between(table, row, t)
 
 
@@ -122,8 +116,10 @@ def filter_taps(table, row, au, av, bu, bv):
     The level fits the shorter diameter, or the distance of the taps where there would be too many.
     """
     width, height = table[row, 2], table[row, 3]
-    a = math.sqrt((au * width) ** 2 + (av * height) ** 2)
-    b = math.sqrt((bu * width) ** 2 + (bv * height) ** 2)
+    a, b = (au * width) ** 2 + (av * height) ** 2, (bu * width) ** 2 + (bv * height) ** 2
+    if max(a, b) <= 1.0:
+        return 1, 0.0, bu, bv
+    a, b = math.sqrt(a), math.sqrt(b)
     if a > b:
         a, b, bu, bv = b, a, au, av
     taps = int(min(max(math.ceil(b / max(a, 1.0)), 1.0), MOST_TAPS))

@@ -45,11 +45,17 @@ def edge(corners, f, k):
 
 
 @part_kernel
-def put_behind(out, i, corners, faces, f, u, v, entering):
+def behind(corners, faces, f, u, v, entering):
     """A place just behind a face, seen along a ray that enters or leaves by it."""
     px, py, pz = start_point(corners, faces, f, u, v)
     lift = -faces[f, 3] if entering else faces[f, 3]
-    put(out, i, px + lift * faces[f, 0], py + lift * faces[f, 1], pz + lift * faces[f, 2])
+    return px + lift * faces[f, 0], py + lift * faces[f, 1], pz + lift * faces[f, 2]
+
+
+@inline_kernel
+def put_behind(out, i, corners, faces, f, u, v, entering):
+    x, y, z = behind(corners, faces, f, u, v, entering)
+    put(out, i, x, y, z)
 
 
 @inline_kernel

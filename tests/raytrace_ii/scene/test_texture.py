@@ -12,11 +12,11 @@ from raytrace_ii import Scene, trace
 from raytrace_ii.rendering.job import CURVES
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, image_texture, linear, normal_map
 from raytrace_ii.shapes.primitives import rotation
-from raytrace_ii.tracing.kernels.noise import fractal, gradient_noise
+from raytrace_ii.tracing.kernels.noise import gradient_noise
 from raytrace_ii.tracing.kernels.srgb import encode_srgb
 from raytrace_ii.tracing.packing import packed
 from raytrace_ii.tracing.texture_table import TextureTable
-from tests.support.trace_scenes import BLACK, WHITE, body, box, sphere, texture_at, wall
+from tests.support.trace_scenes import BLACK, WHITE, body, box, octaves, sphere, texture_at, wall
 
 BOARD = Checker((WHITE, BLACK), (2.0, 2.0, 2.0))
 CLOUD = Noise((BLACK, WHITE), (1.0, 1.0, 1.0), contrast=1.0)
@@ -123,31 +123,38 @@ def test_noise_runs_on_over_the_borders_of_cells(border, axis, a, b, seed):
     assert (after - just_after) / step == pytest.approx((just_before - before) / step, abs=1e-3)
 
 
+def seen_on_a_wall(texture, points):
+    """Colours of a wall at z = 10 behind (n, 3) points, in all-round light."""
+    mesh = wall(10, 40)
+    scene = Scene(bodies=[body(mesh, coordinates=mesh.vertices, texture=texture, colour=WHITE)], ambient=WHITE)
+    start = points * [1, 1, 0]
+    return trace(scene, start, np.broadcast_to([0.0, 0, 1], start.shape)).radiance
+
+
 @given(finite, finite, finite, st.integers(0, 1023))
 @settings(max_examples=50)
 def test_noise_kernels_equal_their_python_source(x, y, z, seed):
     with np.errstate(over="ignore"):  # hashes wrap
         plain = gradient_noise.py_func(x, y, z, seed)
-        octaves = fractal.py_func(x, y, z, 3 + 16 * seed)
     # the same sums; a compiler may only fuse them: an ulp of about 1
     assert gradient_noise(x, y, z, seed) == pytest.approx(plain, abs=1e-13)
-    assert fractal(x, y, z, 3 + 16 * seed) == pytest.approx(octaves, abs=1e-13)
 
 
 def test_octaves_add_half_as_much_at_half_the_size():
     points = np.random.default_rng(1).uniform(-5, 5, (20, 3))
     expected = sum(0.5**k * noise(points * 2.03**k, 7 + k) for k in range(4))
-    sums = [fractal(*map(float, p), 4 + 16 * 7) for p in points]
-    np.testing.assert_allclose(sums, expected, atol=1e-12)
+    np.testing.assert_allclose(octaves(points, 4, 7), expected, atol=1e-12)
 
 
 def test_noise_mixes_its_colours():
     a, b = np.array([0.2, 0.4, 0.9]), np.array([0.8, 0.5, 0.1])
     points = np.random.default_rng(2).uniform(-9, 9, (200, 3))
     texture = Noise((tuple(a), tuple(b)), (2.0, 3.0, 0.5), octaves=2, contrast=0.7, seed=5)
-    value = np.array([fractal(*map(float, p), 2 + 16 * 5) for p in points / [2.0, 3.0, 0.5]])
+    value = octaves(points / [2.0, 3.0, 0.5], 2, 5)
     share = np.clip(0.5 + 0.7 * value, 0, 1)[:, None]
     np.testing.assert_allclose(texture_at(texture, points), a + share * (b - a), atol=1e-12)
+    seen = seen_on_a_wall(texture, points)
+    np.testing.assert_allclose(seen, texture_at(texture, np.insert(points[:, :2], 2, 10, axis=1)), atol=2e-6)
     strong = texture_at(Noise((tuple(a), tuple(b)), (1.0,) * 3, contrast=50.0), points)
     assert (strong >= np.minimum(a, b) - 1e-12).all() and (strong <= np.maximum(a, b) + 1e-12).all()
 
