@@ -7,6 +7,7 @@ import pytest
 from hypothesis import settings
 
 from raytrace_ii import cli
+from tests.support.browser import browser, pytest_collection_modifyitems, show, show_once  # noqa: F401
 
 # The first call of a kernel compiles it, which no deadline foresees. On CI the examples are the same every time.
 settings.register_profile("here", deadline=None, derandomize="CI" in os.environ)

@@ -12,7 +12,7 @@ from typing import Any
 
 import typer
 
-from . import synthesize, render, pictures, calibrating, coding, evaluate, show, eye, video
+from . import synthesize, render, pictures, calibrating, coding, evaluate, show, eye, observers, video
 from .common import app
 from .ending import ends_soon
 from .folders import no_empty_folders
@@ -25,6 +25,7 @@ __all__ = [
     "evaluate",
     "eye",
     "main",
+    "observers",
     "pictures",
     "render",
     "show",

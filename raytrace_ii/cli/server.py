@@ -1,12 +1,19 @@
-"""Web server of ``raytrace-ii view --serve``: one folder, on the local host only."""
+"""Web server of --serve: one folder, on the local host only; results of observers."""
 
 from __future__ import annotations
 
+import json
+import re
 import sys
+from collections.abc import Callable
+from functools import partial
 from http import HTTPStatus
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
+
+if TYPE_CHECKING:
+    from metrics.observers.store import ResultFolder
 
 
 class PageServer(ThreadingHTTPServer):
@@ -26,15 +33,88 @@ class Pages(SimpleHTTPRequestHandler):
 
     def send_head(self) -> Any:
         """Refuse other hosts and invalid file names."""
-        assert isinstance(self.server, PageServer)
-        port = self.server.server_port
-        if self.headers.get("Host", "").lower() not in (f"127.0.0.1:{port}", f"localhost:{port}"):
-            self.send_error(HTTPStatus.MISDIRECTED_REQUEST)
+        if self.misdirected():
             return None
         if "\0" in unquote(self.path):
             self.send_error(HTTPStatus.BAD_REQUEST)
             return None
         return super().send_head()
 
+    def misdirected(self) -> bool:
+        """Refuse a request for a host name of another machine."""
+        assert isinstance(self.server, PageServer)
+        port = self.server.server_port
+        if self.headers.get("Host", "").lower() in (f"127.0.0.1:{port}", f"localhost:{port}"):
+            return False
+        self.send_error(HTTPStatus.MISDIRECTED_REQUEST)
+        return True
+
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing."""
+
+
+class Answers(Pages):
+    """Handler that also takes results of observers: POST results for a number, POST results/NUMBER with all lines.
+
+    Pages of other sites cannot send JSON here: the browser asks first, and this server does not answer that.
+    """
+
+    def __init__(self, *args: Any, kept: ResultFolder, **kwargs: Any) -> None:
+        self.kept = kept
+        super().__init__(*args, **kwargs)
+
+    @classmethod
+    def into(cls, kept: ResultFolder) -> Callable[..., Answers]:
+        """Return a maker of handlers that keep results in a folder."""
+        return partial(cls, kept=kept)
+
+    def do_POST(self) -> None:
+        """Give a number to a new observer, or keep an observer's lines."""
+        if self.misdirected():
+            return
+        found = re.fullmatch(r"/results(?:/(\d{1,9}))?", self.path)
+        if found is None:
+            self.send_error(HTTPStatus.NOT_FOUND)
+        elif self.headers.get_content_type() != "application/json":
+            self.send_error(HTTPStatus.UNSUPPORTED_MEDIA_TYPE)
+        elif found[1] is None:
+            self._reply({"observer": self.kept.new_observer()})
+        else:
+            self._keep(int(found[1]))
+
+    def _keep(self, number: int) -> None:
+        from metrics.observers.results import MOST_BYTES
+
+        size = self.headers.get("Content-Length", "")
+        if not (size.isdecimal() and int(size) <= MOST_BYTES):
+            self.send_error(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+            return
+        try:
+            self.kept.extend(number, self.rfile.read(int(size)))
+        except FileNotFoundError:
+            self.send_error(HTTPStatus.NOT_FOUND)
+        except ValueError:
+            self.send_error(HTTPStatus.CONFLICT)
+        except OSError:
+            self.send_error(HTTPStatus.INSUFFICIENT_STORAGE)
+        else:
+            self._reply({})
+
+    def _reply(self, value: dict[str, Any]) -> None:
+        body = json.dumps(value).encode()
+        self.send_response(HTTPStatus.OK)
+        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+
+def serve_folder(folder: str, port: int, handler: Callable[..., Pages] = Pages) -> None:
+    """Serve a folder on this machine only, until interrupted."""
+    try:
+        server = PageServer(("127.0.0.1", port), partial(handler, directory=folder))
+    except OSError as error:
+        raise OSError(f"port {port} cannot be served: {error.strerror}") from None
+    with server:
+        print(f"http://127.0.0.1:{server.server_port}/ shows the page; Ctrl-C ends the server", flush=True)
+        server.serve_forever()

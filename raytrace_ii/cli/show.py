@@ -59,10 +59,12 @@ def view(
             return
         import tempfile
 
+        from .server import serve_folder
+
         folder = tempfile.TemporaryDirectory(prefix="raytrace-ii-")
         write_viewer_folder(folder.name, original, decoded, **options)
     with folder:
-        _serve(folder.name, port)
+        serve_folder(folder.name, port)
 
 
 def _coding(path: Path) -> list[str]:
@@ -75,21 +77,6 @@ def _coding(path: Path) -> list[str]:
 
     coded = Encoded.load(path)
     return [coded.scheme, f"{coded.bpp:.3g} bpp"]
-
-
-def _serve(folder: str, port: int) -> None:
-    """Serve a folder on this machine only, until interrupted."""
-    from functools import partial
-
-    from .server import Pages, PageServer
-
-    try:
-        server = PageServer(("127.0.0.1", port), partial(Pages, directory=folder))
-    except OSError as error:
-        raise OSError(f"port {port} cannot be served: {error.strerror}") from None
-    with server:
-        print(f"http://127.0.0.1:{server.server_port}/ shows the page; Ctrl-C ends the server", flush=True)
-        server.serve_forever()
 
 
 @app.command()

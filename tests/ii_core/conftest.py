@@ -1,73 +1,9 @@
-"""A browser for tests of the viewer's page. Where none is installed they are skipped, and say so."""
-
-import shutil
+"""A picture for tests of the viewer's page."""
 
 import pytest
 
 from ii_core import preset
 from raytrace_ii import load_scene, render
-
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-# Its usual shared memory, /dev/shm, is 64 MB in many a container: too little for a large picture.
-FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]
-FLAGS += [f"--disable-{what}" for what in ("background-networking", "component-update", "sync", "quic")]
-READY = """() => Promise.race([
-    ii.ready,
-    new Promise((_, reject) => setTimeout(() => reject(new Error("the page does not get ready")), 60000))])"""
-
-
-def pytest_collection_modifyitems(items):
-    """Mark every test that drives a browser."""
-    for item in items:
-        if "browser" in getattr(item, "fixturenames", ()):
-            item.add_marker(pytest.mark.browser)
-
-
-@pytest.fixture(scope="session")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if path is None:
-        pytest.skip(f"no browser is installed: one of {', '.join(BROWSERS)} is needed")
-    with playwright.sync_playwright() as driver:
-        running = driver.chromium.launch(executable_path=path, args=FLAGS)
-        yield running
-        running.close()
-
-
-def pages(browser):
-    """Yield what opens a page file, without idle motion; whatever a page complains of fails the test."""
-    opened, complaints = [], []
-
-    def call(path, fragment="", wait=True, script=None, **options):
-        options = {"viewport": {"width": 1000, "height": 700}, "reduced_motion": "reduce", **options}
-        tab = browser.new_page(**options)
-        opened.append(tab)
-        if script:
-            tab.add_init_script(script)
-        tab.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
-        tab.on("pageerror", lambda error: complaints.append(str(error)))
-        tab.on("crash", lambda _: complaints.append("the page crashed"))
-        tab.goto(path if "://" in str(path) else f"file://{path}{fragment}")
-        if wait:
-            tab.evaluate(READY)
-        return tab
-
-    yield call
-    for tab in opened:
-        tab.close()
-    assert complaints == []
-
-
-@pytest.fixture
-def show(browser):
-    yield from pages(browser)
-
-
-@pytest.fixture(scope="module")
-def show_once(browser):
-    """As `show`, for a page that several tests share."""
-    yield from pages(browser)
 
 
 @pytest.fixture(scope="session")

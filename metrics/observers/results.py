@@ -1,0 +1,202 @@
+"""Results of observers: files of JSON lines as the page writes them, and checks that they are whole."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ii_core import checks
+from ii_core.files import check_file, parse_json
+
+from . import plan as plans
+
+FORMAT, VERSION = "ii-observer", 1
+MOST_BYTES = 16 << 20  # of a file: hundred times a long test
+SEAL = re.compile(r',"check":"([0-9a-f]{64})"}$')
+CHOICES = {"dsis": (1, 2, 3, 4, 5), "pairs": ("left", "same", "right")}
+
+
+class Observer(NamedTuple):
+    """What one observer answered.
+
+    Attributes
+    ----------
+    number : int
+    answers : list of ((int, int), answer)
+        The pair of stimuli shown and the grade, 1 to 5, or "left", "same" or "right"; without those of the training.
+    complete : bool
+        Whether the test came to its end.
+    colours : bool
+        Whether the plates of colours were read.
+    simulated : bool
+        Whether nobody has seen anything.
+    """
+
+    number: int
+    answers: list[tuple[tuple[int, int], Any]]
+    complete: bool
+    colours: bool
+    simulated: bool
+
+
+class Results(NamedTuple):
+    """Results of a test.
+
+    Attributes
+    ----------
+    plan : dict
+        Of the test: its ``method`` and ``stimuli``.
+    observers : list of Observer
+        Those whose files are whole, by number.
+    notes : list of str
+        A line for every file that is left out and every observer who stopped half way.
+    """
+
+    plan: dict[str, Any]
+    observers: list[Observer]
+    notes: list[str]
+
+
+@checks.checked(paths=checks.sequence)
+def read_results(paths: Sequence[str | os.PathLike[str]]) -> Results:
+    """Read the files of observers, with one clear line for each that cannot be used.
+
+    Left out are empty files, files of another test than the first, a second file of one observer, and files with a
+    line that was changed, removed or added by hand. The check finds accidents and careless changes; it is no
+    signature. Observers who stopped half way count by what they answered.
+
+    Parameters
+    ----------
+    paths : list of path
+
+    Raises
+    ------
+    ValueError
+        If no file can be used; the message has the line of the first.
+    OSError
+        If a file cannot be read.
+    """
+    notes: list[str] = []
+    found: dict[int, tuple[str, Observer]] = {}
+    text = ""
+    for path in map(Path, paths):
+        check_file(path)
+        try:
+            made, observer = read_observer(path)
+            text = text or made
+            if made != text:
+                raise ValueError(f"{path} is of another test than the files before it")
+            if observer.number in found:
+                raise ValueError(f"{path} is of observer {observer.number}, as {found[observer.number][0]} is")
+        except ValueError as error:
+            notes.append(f"{error}: left out")
+            continue
+        found[observer.number] = (str(path), observer)
+        if not observer.complete:
+            order = json.loads(text)["orders"][0]
+            notes.append(f"{path}: stopped after {len(observer.answers)} of {len(order)} answers, which count")
+    if not found:
+        raise ValueError(notes[0] if notes else "there are no files of observers: at least one is needed")
+    return Results(json.loads(text), [observer for _, (_, observer) in sorted(found.items())], notes)
+
+
+def read_observer(path: Path) -> tuple[str, Observer]:
+    """Return the text of the plan and the answers of one file.
+
+    Raises
+    ------
+    ValueError
+        If the file is empty, or a line is not what the page wrote; an incomplete last line is passed over.
+    """
+    if path.stat().st_size > MOST_BYTES:
+        raise ValueError(f"{path} has more than {MOST_BYTES >> 20} MB, no result of an observer")
+    records = checked_lines(path.read_bytes(), str(path))
+    if not records:
+        raise ValueError(f"{path} is empty: nobody answered")
+    first = records[0]
+    if (first.get("format"), first.get("version"), first.get("kind")) != (FORMAT, VERSION, "begin"):
+        raise ValueError(f'{path} is no result of an observer: its first line needs "format": "{FORMAT}"')
+    text, number = first.get("plan"), first.get("observer")
+    if not (isinstance(text, str) and isinstance(number, int) and number > 0):
+        raise ValueError(f"{path} has no plan or number in its first line")
+    plan = _plan(text, path)
+    order = [*plan["training"], *plan["orders"][(number - 1) % len(plan["orders"])]]
+    answers = [record for record in records if record.get("kind") == "answer"]
+    if len(answers) > len(order):
+        raise ValueError(f"{path} has {len(answers)} answers, its test {len(order)}")
+    counted = []
+    for place, (record, pair) in enumerate(zip(answers, order, strict=False)):
+        if record.get("place") != place or record.get("pair") != pair:
+            raise ValueError(f"{path}, answer {place + 1}: not what observer {number} was shown there")
+        answer = record.get("answer")
+        if isinstance(answer, bool) or answer not in CHOICES[plan["method"]]:
+            raise ValueError(f"{path}, answer {place + 1}: {answer!r} is no answer of this test")
+        if place >= len(plan["training"]):
+            counted.append(((pair[0], pair[1]), answer))
+    complete, colours = len(answers) == len(order), first.get("colour_vision") == "passed"
+    return text, Observer(number, counted, complete, colours, first.get("simulated") is True)
+
+
+def sealed(record: dict[str, Any], before: str = "") -> str:
+    """Return a record as a line, sealed after the line before it."""
+    text = json.dumps(record, ensure_ascii=False)
+    seal = SEAL.search(before.rstrip("\n"))
+    digest = hashlib.sha256(((seal[1] if seal else "") + text).encode()).hexdigest()
+    return f'{text[:-1]},"check":"{digest}"}}\n'
+
+
+def checked_lines(data: bytes, name: str) -> list[dict[str, Any]]:
+    """Return the records of whole lines whose seals continue one another.
+
+    Raises
+    ------
+    ValueError
+        If a line is no JSON object or its seal is wrong.
+    """
+    records, before, when = [], "", ""
+    for number, raw in enumerate(data.splitlines(keepends=True), 1):
+        if not raw.endswith(b"\n"):
+            break
+        line = raw.decode("utf-8", errors="replace").rstrip("\r\n")
+        found = SEAL.search(line)
+        if found is None:
+            raise ValueError(f"{name}, line {number} has no seal: not what the page wrote")
+        text = line[: found.start()] + "}"
+        if hashlib.sha256((before + text).encode()).hexdigest() != found[1]:
+            raise ValueError(f"{name}, line {number} was changed, or a line before it removed or added")
+        try:
+            record = parse_json(text)
+        except ValueError as error:
+            raise ValueError(f"{name}, line {number}: {error}") from None
+        at = record.get("at") if isinstance(record, dict) else None
+        if not isinstance(at, str):
+            raise ValueError(f"{name}, line {number} is no record with its time")
+        if record.get("kind") != "resume" and at < when:
+            raise ValueError(f"{name}, line {number} is of {at}, before the line above it, {when}")
+        before, when = found[1], at
+        records.append(record)
+    return records
+
+
+def _plan(text: str, path: Path) -> dict[str, Any]:
+    try:
+        plan = parse_json(text)
+        known = (plan["format"], plan["version"]) == (plans.FORMAT, plans.VERSION)
+        count = len(plan["stimuli"])
+        pairs = [pair for order in [plan["training"], *plan["orders"]] for pair in order]
+        whole = all(0 <= a < count and 0 <= b < count for a, b in pairs) and bool(plan["orders"])
+        named = all(isinstance(one[key], str) for one in plan["stimuli"] for key in ("scene", "name", "scheme"))
+        for one in plan["stimuli"]:
+            for name, value in one["measures"].items():
+                checks.number(name, value)
+    except (ValueError, TypeError, KeyError, AttributeError):
+        known = whole = named = False
+        plan = {}
+    if not (known and whole and named and plan.get("method") in plans.METHODS):
+        raise ValueError(f"{path} has no plan of a test that this version reads")
+    return dict(plan)

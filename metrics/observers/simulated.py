@@ -1,0 +1,69 @@
+"""Results of SIMULATED observers, for tests of an analysis: nobody has seen anything."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .results import FORMAT, VERSION, sealed
+
+AT = "2000-01-01T00:00:00.000Z"  # of everything simulated
+
+
+def write_simulated(
+    folder: str | os.PathLike[str],
+    plan: Mapping[str, Any],
+    quality: Sequence[float],
+    observers: int,
+    *,
+    bias: float = 0.5,
+    spread: float = 0.7,
+    seed: int = 0,
+) -> list[Path]:
+    """Write the files of SIMULATED observers, and return their paths.
+
+    A grade is the quality with the observer's bias and noise, rounded to 1 to 5. The better of two is drawn by the
+    quality with noise; nearer than a fifth of ``spread`` is "the same".
+
+    Parameters
+    ----------
+    folder : path
+        That exists.
+    plan : dict
+        From `write_test`.
+    quality : sequence of float
+        Of each stimulus, 1 to 5.
+    observers : int
+    bias, spread : float
+        Standard deviations, of an observer and of each answer.
+    seed : int
+    """
+    generator = np.random.default_rng(seed)
+    text, paths = json.dumps(plan, ensure_ascii=False), []
+    for number in range(1, observers + 1):
+        own = generator.normal(0, bias)
+        line = sealed({"kind": "begin", "at": AT, "format": FORMAT, "version": VERSION, "plan": text, **_who(number)})
+        lines = [line]
+        order = [*plan["training"], *plan["orders"][(number - 1) % len(plan["orders"])]]
+        for place, (a, b) in enumerate(order):
+            if plan["method"] == "dsis":
+                answer: Any = int(np.clip(np.rint(quality[b] + own + generator.normal(0, spread)), 1, 5))
+            else:
+                apart = quality[b] - quality[a] + generator.normal(0, spread)
+                answer = "same" if abs(apart) < spread / 5 else "right" if apart > 0 else "left"
+            record = {"kind": "answer", "at": AT, "place": place, "pair": [int(a), int(b)], "answer": answer}
+            lines.append(sealed(record, lines[-1]))
+        lines.append(sealed({"kind": "end", "at": AT}, lines[-1]))
+        path = Path(folder) / f"observer-{number:03d}.jsonl"
+        path.write_text("".join(lines), encoding="utf-8")
+        paths.append(path)
+    return paths
+
+
+def _who(number: int) -> dict[str, Any]:
+    return {"observer": number, "simulated": True, "colour_vision": "passed"}
