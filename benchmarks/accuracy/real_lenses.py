@@ -1,0 +1,215 @@
+"""Disparity errors of real main lenses over the field: ``python -m benchmarks run real_lenses``.
+
+A plenoptic 1.0 camera behind a real lens, and its ideal twin: a thin lens of the same magnification between the same
+planes. Points of the plane in focus have disparity 0 through the twin at every field. Through the real lens the rays
+of one lenslet spread over this plane: their slope against the pixel is a disparity error (field curvature), their
+bend is coma. The second part codes *Apples* through both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.arguments import command_line
+from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import Records, origin
+from codec import decode, encode
+from ii_core import IICamera, preset
+from ii_core.display.figure import new_figure, save
+from ii_core.elements import Bundle
+from ii_core.optics import Lens
+from ii_core.prescriptions import lens
+from ii_core.presets import scaled
+from ii_core.properties import through_front_mm
+from metrics import bd_rate, q_global
+from raytrace_ii import load_scene, render
+
+RECORDS = Records("real_lenses", ("benchmarks.accuracy.real_lenses",))
+LENSES = {"double-gauss": 0.5, "triplet": 1.0}  # enlarged to f = 50 mm
+SCALE = 8
+FIELDS = 25
+QPS = (22, 27, 32, 37)  # of SI-PVS
+RATES = (0.2, 0.4, 0.8, 1.6)  # bpp of JPEG 2000
+BACK_MM = 130.0  # *Apples* round the plane in focus
+CHART = IMAGES / "real_lenses.png"
+
+
+def real_camera(name: str) -> IICamera:
+    """Return the plenoptic 1.0 camera of a lens: image half as large as the scene, micro-images that just touch."""
+    base, placed = preset("plenoptic1-double-gauss"), lens(name).at(0.0, enlarge=LENSES[name])
+    matrix, pupil = placed.paraxial(), placed.pupil()
+    assert pupil is not None
+    z, diameter = pupil
+    behind = -matrix.d / matrix.c + placed.focal_mm / 2  # of the lens plane: back focus and f times magnification
+    gap = base.lens_pitch_mm[0] * (z + behind) / diameter
+    field = Lens(z_mm=gap + 0.2, focal_mm=z + behind)
+    return replace(base, gap_mm=gap, optics=(base.optics[0], field, placed.moved(gap + behind)), name=name)
+
+
+def ideal_twin(camera: IICamera) -> IICamera:
+    """Return the camera with a thin lens that images the same planes onto each other at the same magnification."""
+    gap, opening = camera.gap_mm, camera.front[1].pupil()
+    assert opening is not None
+    focus = through_front_mm(camera, gap)
+    ahead = (focus - gap) / (1 + magnification(camera))
+    behind = focus - gap - ahead
+    width = opening[1] / (opening[0] - gap) * ahead
+    main = Lens(z_mm=gap + ahead, focal_mm=ahead * behind / (ahead + behind), diameter_mm=width)
+    return replace(camera, optics=(camera.optics[0], Lens(z_mm=gap + 0.2, focal_mm=ahead), main))
+
+
+def magnification(camera: IICamera) -> float:
+    """Return the size of the plane in focus over that of its image on the lenses, near the axis."""
+    x, _ = spread(camera, 1e-3, 0)
+    return -float(x[len(x) // 2]) / 1e-3
+
+
+def spread(camera: IICamera, field_mm: float, axis: int, z_mm: float | None = None) -> tuple[Any, Any]:
+    """Return where rays of the lenslet at (field, 0) meet a plane, by default that in focus, and their weights.
+
+    The rays come from 33 points under the lenslet, in a row along an axis of the sensor.
+    """
+    offset = np.linspace(-0.5, 0.5, 33) * camera.lens_pitch_mm[0]
+    step = [np.zeros_like(offset), np.zeros_like(offset)]
+    step[axis] = -offset
+    zero = np.zeros_like(offset)
+    rays = Bundle(zero + field_mm, zero, zero + camera.gap_mm, step[0], step[1], zero + camera.gap_mm)
+    for element in camera.front:
+        rays = element.pass_on(rays)
+    z = through_front_mm(camera, camera.gap_mm) if z_mm is None else z_mm
+    along = (z - rays.lz) / rays.dz
+    place = (rays.lx + rays.dx * along, rays.ly + rays.dy * along)[axis]
+    return place, np.broadcast_to(1.0 if rays.weight is None else rays.weight, offset.shape) > 0
+
+
+def slope(camera: IICamera, field_mm: float, axis: int, z_mm: float | None = None) -> tuple[float, float, float]:
+    """Return the disparity in lens pitches a view step, the rms left by the line, and the share of rays that pass."""
+    place, on = spread(camera, field_mm, axis, z_mm)
+    if on.sum() < 4:
+        return np.nan, np.nan, float(on.mean())
+    pitch = camera.lens_pitch_mm[0]
+    views = np.linspace(-0.5, 0.5, on.size) * pitch / camera.pixel_pitch_mm
+    shown = place / (pitch * magnification(camera))
+    line = np.polyfit(views[on], shown[on], 1)
+    left = shown[on] - np.polyval(line, views[on])
+    return float(line[0]), float(np.sqrt((left**2).mean())), float(on.mean())
+
+
+def field_errors(name: str) -> dict[str, Any]:
+    """Return disparity error, bend and depth error over the field, of a real lens and its twin."""
+    camera = real_camera(name)
+    twin, fields = ideal_twin(camera), np.linspace(0, camera.size_mm[0] / 2, FIELDS)
+    focus = through_front_mm(twin, twin.gap_mm)
+    per_mm = (slope(twin, 0.0, 0, focus + 1)[0] - slope(twin, 0.0, 0, focus - 1)[0]) / 2
+    rows = []
+    for x in fields:
+        row: dict[str, Any] = {"field_mm": float(x)}
+        for axis, which in enumerate(("tangential", "sagittal")):
+            error, bend, share = slope(camera, float(x), axis)
+            row[which] = {"disparity": error, "bend": bend, "passing": share, "depth_mm": error / per_mm}
+        row["twin"] = max(abs(slope(twin, float(x), axis)[0]) for axis in (0, 1))
+        rows.append(row)
+    return {"focus_mm": focus, "disparity_per_mm": per_mm, "fields": rows}
+
+
+def coding(name: str) -> dict[str, Any]:
+    """Return the gain of SI-PVS over JPEG 2000 on *Apples* through a real lens and through its twin."""
+    full, scene, pose = real_camera(name), load_scene("apples"), np.eye(4)
+    pose[2, 3] = -BACK_MM
+    result: dict[str, Any] = {}
+    for which, camera in (("real", full), ("ideal", ideal_twin(full))):
+        picture = render(scene, scaled(camera, SCALE), samples=4, pose=pose, support=()).picture
+        curves = {
+            "si-h264": [encode(picture, "si-h264", qp=qp) for qp in QPS],
+            "jpeg2000": [encode(picture, "jpeg2000", bpp=bpp) for bpp in RATES],
+        }
+        points = {
+            scheme: [(coded.bpp, q_global(picture, decode(coded))) for coded in all_coded]
+            for scheme, all_coded in curves.items()
+        }
+        result[which] = {
+            "points": points,
+            "si_over_jpeg2000_percent": bd_rate(
+                *zip(*points["jpeg2000"], strict=True), *zip(*points["si-h264"], strict=True)
+            ),
+        }
+    real, ideal = (result[which]["points"]["si-h264"] for which in ("real", "ideal"))
+    result["real_over_ideal_percent"] = difference(ideal, real)
+    return result
+
+
+def difference(anchor: Sequence[tuple[float, float]], tested: Sequence[tuple[float, float]]) -> float:
+    """Return the Bjøntegaard difference in rate, %, of points (bpp, dB)."""
+    return bd_rate(*np.transpose(anchor), *np.transpose(tested))
+
+
+def main() -> None:
+    arguments = command_line(__doc__).parse_args()
+    keys = [{"part": part, "lens": name} for part in ("field", "coding") for name in LENSES]
+    for key in RECORDS.todo(keys, arguments.again):
+        work = field_errors if key["part"] == "field" else coding
+        RECORDS.measure(key, lambda work=work, key=key: work(key["lens"]))
+        print(key, flush=True)
+    draw()
+    publish(tables())
+
+
+def draw() -> None:
+    """Draw the chart from the records."""
+    figure = new_figure(11, 3.6)
+    panels = figure.subplots(1, 3)
+    for colour, row in zip(("C0", "C1"), RECORDS.rows(part="field"), strict=False):
+        fields = row["fields"]
+        x = [point["field_mm"] for point in fields]
+        for which, style in (("tangential", "-"), ("sagittal", "--")):
+            for panel, what in zip(panels, ("disparity", "depth_mm", "bend"), strict=True):
+                values = [np.nan if p[which][what] is None else p[which][what] for p in fields]
+                panel.plot(x, values, style, color=colour, label=f"{row['lens']}, {which}")
+    titles = (
+        ("field curvature as disparity", "disparity error [view pixels a view]"),
+        ("the same as depth", "depth error [mm]"),
+        ("coma and higher orders", "rms left by a line [view pixels]"),
+    )
+    for panel, (title, label) in zip(panels, titles, strict=True):
+        panel.set(title=title, xlabel="field on the lens array [mm]", ylabel=label)
+        panel.axhline(0, color="0.6", linewidth=0.8)
+        panel.grid(alpha=0.3)
+    panels[0].legend(fontsize=8)
+    save(figure, CHART)
+    write_picture(CHART, CHART)
+
+
+def tables() -> Tables:
+    """Return the table of errors at three fields, and that of coding."""
+    rows = RECORDS.rows(part="field")
+    lines = [
+        "| lens | field | light | disparity error, tangential · sagittal | depth error | bend |",
+        "|---" * 6 + "|",
+    ]
+    for row in rows:
+        for point in row["fields"][:: (FIELDS - 1) // 4][1:]:
+            t, s = point["tangential"], point["sagittal"]
+            lines.append(
+                f"| {row['lens']} | {point['field_mm']:.1f} mm | {t['passing']:.0%} | {t['disparity']:+.4f} · "
+                f"{s['disparity']:+.4f} | {t['depth_mm']:+.2f} · {s['depth_mm']:+.2f} mm | "
+                f"{t['bend']:.4f} · {s['bend']:.4f} |"
+            )
+    coded = RECORDS.rows(part="coding")
+    table = ["| lens | SI-PVS over JPEG 2000, real | ideal | SI-PVS: real over ideal |", "|---|---|---|---|"] + [
+        f"| {row['lens']} | {row['real']['si_over_jpeg2000_percent']:+.1f} % | "
+        f"{row['ideal']['si_over_jpeg2000_percent']:+.1f} % | {row['real_over_ideal_percent']:+.1f} % |"
+        for row in coded
+    ]
+    return {
+        ("docs/real_lenses.md", "field"): [*lines, "", origin(rows)],
+        ("docs/real_lenses.md", "coding"): [*table, "", origin(coded)],
+    }
+
+
+if __name__ == "__main__":
+    main()
