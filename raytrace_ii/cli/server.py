@@ -3,17 +3,40 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 from collections.abc import Callable
 from functools import partial
 from http import HTTPStatus
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 if TYPE_CHECKING:
     from metrics.observers.store import ResultFolder
+
+RANGE = re.compile(r"bytes=(\d{1,18})-(\d{1,18})?")  # one range from the front; other forms get the whole file
+
+
+class FilePart:
+    """Reader of the bytes ``first`` … ``end`` − 1 of a file."""
+
+    def __init__(self, path: str, first: int, end: int) -> None:
+        self.file = Path(path).open("rb")  # noqa: SIM115
+        self.left = end - first
+        self.file.seek(first)
+
+    def read(self, size: int) -> bytes:
+        """Return at most ``size`` of the bytes that are left."""
+        data = self.file.read(min(size, self.left))
+        self.left -= len(data)
+        return data
+
+    def close(self) -> None:
+        """Close the file."""
+        self.file.close()
 
 
 class PageServer(ThreadingHTTPServer):
@@ -32,13 +55,34 @@ class Pages(SimpleHTTPRequestHandler):
     """
 
     def send_head(self) -> Any:
-        """Refuse other hosts and invalid file names."""
+        """Refuse other hosts and invalid file names; send whole files or ranges of bytes."""
         if self.misdirected():
             return None
         if "\0" in unquote(self.path):
             self.send_error(HTTPStatus.BAD_REQUEST)
             return None
-        return super().send_head()
+        wanted = RANGE.fullmatch(self.headers.get("Range", ""))
+        path = self.translate_path(self.path)
+        if wanted is None or not os.path.isfile(path):
+            return super().send_head()
+        return self._send_part(path, int(wanted[1]), int(wanted[2]) if wanted[2] else None)
+
+    def _send_part(self, path: str, first: int, last: int | None) -> Any:
+        """Answer a request for the bytes ``first`` to ``last`` of a file, RFC 9110 §14."""
+        size = os.path.getsize(path)
+        end = size if last is None else min(last + 1, size)
+        if first >= end:
+            self.send_response(HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE)
+            self.send_header("Content-Range", f"bytes */{size}")
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+            return None
+        self.send_response(HTTPStatus.PARTIAL_CONTENT)
+        self.send_header("Content-Type", self.guess_type(path))
+        self.send_header("Content-Range", f"bytes {first}-{end - 1}/{size}")
+        self.send_header("Content-Length", str(end - first))
+        self.end_headers()
+        return FilePart(path, first, end)
 
     def misdirected(self) -> bool:
         """Refuse a request for a host name of another machine."""

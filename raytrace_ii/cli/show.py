@@ -4,20 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .common import Force, app, check_outputs, image_file, load_any, pair, progress_bar, spinner
 from .plugins import Plugins, load_plugins
+from .video import coding, compared_takes, is_take_source
 from .words import say
+
+if TYPE_CHECKING:
+    from ii_core import IIPicture
 
 
 @app.command()
 def view(
-    picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar.")],
+    picture: Annotated[
+        Path,
+        typer.Argument(
+            help="An II-picture with its sidecar; or a take: folder of frames, coded take or quilt video."
+        ),
+    ],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The page, .html.")] = None,
-    compare: Annotated[Path | None, typer.Option(help="A decoded II-picture, or a coded file, to compare.")] = None,
+    compare: Annotated[
+        Path | None, typer.Option(help="A decoded II-picture or take, or a coded file, to compare.")
+    ] = None,
     depth: Annotated[Path | None, typer.Option(help="Map of z in mm (.exr) for focusing by a click.")] = None,
     lossless: Annotated[bool, typer.Option("--lossless", help="Lossless pixels, in a larger page.")] = False,
     serve: Annotated[
@@ -27,8 +38,7 @@ def view(
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
-    """Write a viewer page of an II-picture for a browser: parallax, focus, comparison, stereo."""
-    from ii_core import IIPicture
+    """Write a viewer page for a browser: parallax, focus, comparison, stereo; takes play."""
     from ii_core.display.viewer import JPEG_QUALITY, write_viewer, write_viewer_folder
     from ii_core.files import read_depth
 
@@ -41,14 +51,12 @@ def view(
         check_outputs([output], force)
     if not 0 <= port < 1 << 16:
         raise ValueError(f"port is {port}: a number from 1 to 65535, or 0 for any that is free, is needed")
+    is_take = is_take_source(picture)
+    if depth is not None and is_take:
+        raise ValueError(f"--depth is the map of one picture, {picture} is a take: leave it out")
     options: dict[str, Any] = {"title": picture.stem, "quality": None if lossless else JPEG_QUALITY}
-    original = IIPicture.load(picture)
-    decoded = load_any(compare) if compare else None
-    if compare is not None and decoded is not None:
-        from metrics import quality_rows
-
-        rows = options["quality_rows"] = quality_rows(original, decoded)
-        options["labels"] = ("original", ", ".join([*_coding(compare), rows[0][1]]))
+    original, decoded, more = (compared_takes if is_take else _compared)(picture, compare)
+    options |= more
     if depth is not None:
         options["depth"] = read_depth(depth, size=original.size)
     with progress_bar(f"view {picture.name}") as report:
@@ -67,16 +75,18 @@ def view(
         serve_folder(folder.name, port)
 
 
-def _coding(path: Path) -> list[str]:
-    """Scheme and rate of a coded file, or the name of a decoded picture."""
-    from ii_core.files import IMAGE_TYPES
+def _compared(picture: Path, compare: Path | None) -> tuple[IIPicture, IIPicture | None, dict[str, Any]]:
+    """Both pictures, and table and labels of their comparison."""
+    from ii_core import IIPicture
+    from metrics import quality_rows
 
-    if path.suffix in IMAGE_TYPES:
-        return [path.stem]
-    from codec import Encoded
-
-    coded = Encoded.load(path)
-    return [coded.scheme, f"{coded.bpp:.3g} bpp"]
+    original = IIPicture.load(picture)
+    if compare is None:
+        return original, None, {}
+    decoded = load_any(compare)
+    rows = quality_rows(original, decoded)
+    label = ", ".join([*coding(compare), rows[0][1]])
+    return original, decoded, {"quality_rows": rows, "labels": ("original", label)}
 
 
 @app.command()

@@ -14,6 +14,7 @@ from .words import say
 if TYPE_CHECKING:
     from ii_core import IIVideo
 
+FILMS = (".mp4", ".mov", ".mkv", ".webm")
 TO = ("frames", "views", "quilt", "films", "parallax")
 
 
@@ -68,6 +69,50 @@ def video(
     say(f"{made}: {shown.frames} frames, {shown.fps:g} a second")
 
 
+def is_take_source(path: Path) -> bool:
+    """Whether a path is an II-video: a folder, a coded take or a film."""
+    if path.suffix == ".ii" and path.is_file():
+        from codec import is_take
+
+        return is_take(path)
+    return path.is_dir() or path.suffix.lower() in FILMS
+
+
+def compared_takes(source: Path, compare: Path | None) -> tuple[IIVideo, IIVideo | None, dict[str, Any]]:
+    """Both takes, and table and labels of their comparison in the viewer."""
+    original = opened(source)
+    if compare is None:
+        return original, None, {}
+    if not is_take_source(compare):
+        raise ValueError(f"{compare} is no take as {source} is: a folder of frames or a coded take is needed")
+    from metrics import measure_take
+
+    decoded = opened(compare)
+    if decoded.frames != original.frames:
+        raise ValueError(f"{compare} has {decoded.frames} frames, {source} {original.frames}: as many are needed")
+    with progress_bar(f"measure {compare.name}") as report:
+        quality = measure_take(original, decoded, progress=lambda done, total: report(done, total, ""))
+    rows = [
+        ("Q_global", f"{quality.pooled_psnr:.2f} dB"),
+        ("Q_global worst frame", f"{quality.worst_psnr:.2f} dB"),
+        ("flicker", f"{quality.mean_flicker:.3f} 8-bit steps"),
+    ]
+    label = ", ".join([*coding(compare), rows[0][1]])
+    return original, decoded, {"quality_rows": rows, "labels": ("original", label)}
+
+
+def coding(path: Path) -> list[str]:
+    """Scheme and rate of a coded picture or take, or the name of a picture or folder."""
+    from ii_core.files import IMAGE_TYPES
+
+    if path.is_dir() or path.suffix.lower() in (*IMAGE_TYPES, *FILMS):
+        return [path.stem]
+    from codec import Encoded, EncodedTake, is_take
+
+    coded = (EncodedTake if is_take(path) else Encoded).load(path)
+    return [coded.scheme, f"{coded.bpp:.3g} bpp"]
+
+
 def opened(source: Path, fps: float | None = None) -> IIVideo:
     """An II-video of a folder, a coded take or a quilt video."""
     from ii_core import open_video
@@ -78,7 +123,7 @@ def opened(source: Path, fps: float | None = None) -> IIVideo:
 
         check_file(source)
         return _at(open_take(source), fps)
-    if source.suffix.lower() in (".mp4", ".mov", ".mkv", ".webm"):
+    if source.suffix.lower() in FILMS:
         from ii_core.display.video import open_quilt_video
         from ii_core.files import check_file
 

@@ -73,6 +73,13 @@ def test_every_control_has_a_name(tab):
     assert tab.evaluate("document.querySelectorAll('input, select').length") == 11
 
 
+def test_a_still_has_no_clock(tab):
+    assert tab.locator("#play, [data-state=t]").count() == 0
+    tab.locator("#main").focus()
+    tab.keyboard.press(" ")
+    assert not tab.evaluate("ii.viewer.take.playing")
+
+
 def test_a_drag_on_the_split_line_turns_the_view(tab):
     """The line lies in the middle of the page as it opens, where the first drag begins: it used to take that drag."""
     box = tab.locator("#main").bounding_box()

@@ -8,8 +8,9 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 # Its usual shared memory, /dev/shm, is 64 MB in many a container: too little for a large picture.
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]
 FLAGS += [f"--disable-{what}" for what in ("background-networking", "component-update", "sync", "quic")]
+# A served page has no promise before all its files have come.
 READY = """() => Promise.race([
-    ii.ready,
+    (async () => { while (!ii.ready) await new Promise((later) => setTimeout(later, 20)); await ii.ready; })(),
     new Promise((_, reject) => setTimeout(() => reject(new Error("the page does not get ready")), 60000))])"""
 
 

@@ -159,8 +159,9 @@ class LightField {
   constructor(canvas, meta) {
     const gl = canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: false });
     if (!gl) throw new Error("This browser offers no WebGL2, which the viewer needs.");
-    Object.assign(this, { gl, canvas, meta, programs: {}, loaded: 0 });
-    this.pages = [this.array(), meta.compared ? this.array() : null];
+    // A slot holds one frame: a texture a picture. The views are of the frame in the slot `shown`.
+    Object.assign(this, { gl, canvas, meta, programs: {}, slots: [], shown: 0 });
+    this.slot(0);
     this.preview = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, this.preview);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array([30, 30, 34, 255]));
@@ -168,6 +169,10 @@ class LightField {
     for (const [name, source] of Object.entries({ view: VIEW, epi: EPI, raw: RAW, pick: PICK }))
       this.programs[name] = this.program(name, source);
     gl.bindVertexArray(gl.createVertexArray());
+  }
+
+  slot(number) {
+    return (this.slots[number] ??= this.meta.compared ? [this.array(), this.array()] : [this.array()]);
   }
 
   array() {
@@ -221,12 +226,11 @@ class LightField {
     });
   }
 
-  setPage(picture, layer, bytes) {
+  setPage(slot, picture, layer, bytes) {
     const { gl } = this;
     return this.put(bytes, (bitmap) => {
-      gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.pages[picture]);
+      gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.slot(slot)[picture]);
       gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, bitmap.width, bitmap.height, 1, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
-      this.loaded += 1;
     });
   }
 
@@ -245,8 +249,9 @@ class LightField {
     if (!(pane.width > 0 && pane.height > 0)) return;
     gl.viewport(pane.x, pane.y, pane.width, pane.height);
     gl.useProgram(program);
-    const textures = [["original", gl.TEXTURE_2D_ARRAY, this.pages[0]],
-      ["decoded", gl.TEXTURE_2D_ARRAY, this.pages[1] || this.pages[0]], ["preview", gl.TEXTURE_2D, this.preview]];
+    const [original, decoded = original] = this.slot(this.shown);
+    const textures = [["original", gl.TEXTURE_2D_ARRAY, original],
+      ["decoded", gl.TEXTURE_2D_ARRAY, decoded], ["preview", gl.TEXTURE_2D, this.preview]];
     textures.forEach(([uniform, kind, texture], unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(kind, texture);

@@ -1,7 +1,7 @@
-"""Viewer page of an II-picture: one self-contained HTML file, or a folder for a web server.
+"""Viewer page of an II-picture or II-video: one self-contained HTML file, or a folder for a web server.
 
-The page holds the mosaic of sub-images (2.13) cut into square pages, which become the layers of one texture; its
-shader looks through the lenses as `ii_core.view_image` does (4.1), and focuses by shifting and adding.
+The page holds the mosaic of sub-images (2.13) of each frame, cut into square pages. They become the layers of a
+texture; its shader looks through the lenses as `ii_core.view_image` does (4.1), and focuses by shifting and adding.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import json
 import math
 import os
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -24,6 +25,7 @@ from PIL import Image
 
 from ...files import atomic_path
 from ...picture import IIPicture, codes8
+from ...video import IIVideo, video_of
 from ...view import camera_of, five_viewpoints, lens_array_mm, view_image
 from ..look import ASSUMED_ANGLE_DEG, with_assumed_camera
 
@@ -31,9 +33,13 @@ PAGE_SIDE = 2048  # the largest texture every WebGL2 takes
 PREVIEW_SIDE = 512
 MOST_LAYERS = 256  # and the most layers
 MAX_EMBEDDED = 256 << 20  # bytes of a page; browsers read no more in reasonable time
+CARD_BYTES = 512 << 20  # of frames of a take on the graphics card; two frames are there in any case
 JPEG_QUALITY = 95
 FARTHEST = 250  # gaps to the farthest focus
+SCRIPTS = ("lightfield.js", "take.js", "viewer.js")
+TAKE_FILE = "take.pages"  # of a folder: the pages of all frames of a take, which browsers read in part
 Rows = Sequence[tuple[str, str]]
+Shown = IIPicture | IIVideo
 
 
 class ViewerOptions(TypedDict, total=False):
@@ -42,7 +48,8 @@ class ViewerOptions(TypedDict, total=False):
     Attributes
     ----------
     depth : ndarray, (N, M), optional
-        z in mm of every pixel, as `raytrace_ii.render` gives it: clicks focus by it instead of by the picture.
+        z in mm of every pixel, as `raytrace_ii.render` gives it: clicks focus by it instead of by the picture. Not of
+        an II-video.
     title : str
         The name shown.
     quality : int or None
@@ -62,8 +69,8 @@ class ViewerOptions(TypedDict, total=False):
 
 def write_viewer(
     path: str | os.PathLike[str],
-    picture: IIPicture,
-    decoded: IIPicture | None = None,
+    picture: Shown,
+    decoded: Shown | None = None,
     *,
     progress: Callable[[int, int], None] | None = None,
     **options: Unpack[ViewerOptions],
@@ -74,10 +81,10 @@ def write_viewer(
     ----------
     path : path
         The page; replaced whole.
-    picture : IIPicture
-        Of a regular structure. 16 bits and floats are shown as 8-bit sRGB.
-    decoded : IIPicture, optional
-        Of the same structure, to compare it with.
+    picture : IIPicture or IIVideo
+        Of a regular structure. 16 bits and floats are shown as 8-bit sRGB. Frames are read one at a time.
+    decoded : IIPicture or IIVideo, optional
+        Of the same structure and number of frames, to compare it with.
     progress : callable, optional
         Called with pages done and pages in all.
     **options : ViewerOptions
@@ -91,8 +98,8 @@ def write_viewer(
     Raises
     ------
     ValueError
-        If the structures do not match, the depth map has another size, or the page would be larger than
-        `MAX_EMBEDDED`.
+        If the structures or numbers of frames do not match, the depth map has another size, or the page would be
+        larger than `MAX_EMBEDDED`; of a video this is known by its first frame.
     OSError
         If the file cannot be written.
     """
@@ -103,10 +110,10 @@ def write_viewer(
         file.write(head)
         for kind, where, data in page.parts(progress):
             used += 4 * len(data) // 3
-            if used > MAX_EMBEDDED:
+            if used * (1 if where[2:] > (0,) else page.frames) > MAX_EMBEDDED:
                 raise ValueError(
                     f"{path} would be larger than {MAX_EMBEDDED >> 20} MB, the most a page can hold: --serve shows "
-                    f"the picture of {picture.size[0]}×{picture.size[1]} px without one"
+                    f"{page.what} of {picture.size[0]}×{picture.size[1]} px without one"
                 )
             arguments = "".join(f"{n}, " for n in where)
             file.write(f'<script>ii.{kind}({arguments}"{base64.b64encode(data).decode()}")</script>\n')
@@ -116,19 +123,28 @@ def write_viewer(
 
 def write_viewer_folder(
     folder: str | os.PathLike[str],
-    picture: IIPicture,
-    decoded: IIPicture | None = None,
+    picture: Shown,
+    decoded: Shown | None = None,
     *,
     progress: Callable[[int, int], None] | None = None,
     **options: Unpack[ViewerOptions],
 ) -> None:
-    """Write the page as index.html with its data in files beside it, for a web server; see `write_viewer`."""
+    """Write the page as index.html with its data in files beside it, for a web server; see `write_viewer`.
+
+    All pages of a video are in one file, of which the browser requests the bytes of a frame when it needs them. A
+    server without range requests sends the whole file each time.
+    """
     page = _Page(picture, decoded, **options)
     order: list[list[Any]] = []
-    for number, (kind, where, data) in enumerate(page.parts(progress)):
-        name = f"{number}.{kind}"
-        (Path(folder) / name).write_bytes(data)
-        order.append([kind, name, *where])
+    with (Path(folder) / TAKE_FILE).open("wb") if page.frames > 1 else nullcontext() as take:
+        for number, (kind, where, data) in enumerate(page.parts(progress)):
+            if take is not None and kind == "page":
+                order.append([kind, TAKE_FILE, *where, take.tell(), take.tell() + len(data)])
+                take.write(data)
+                continue
+            name = f"{number}.{kind}"
+            (Path(folder) / name).write_bytes(data)
+            order.append([kind, name, *where])
     text = page.html(f"<script>ii.fetch({json.dumps(order)})</script>")
     with atomic_path(Path(folder) / "index.html") as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -139,24 +155,33 @@ class _Page:
 
     def __init__(
         self,
-        picture: IIPicture,
-        decoded: IIPicture | None,
+        shown: Shown,
+        decoded: Shown | None,
         depth: NDArray[Any] | None = None,
         title: str = "",
         quality: int | None = JPEG_QUALITY,
         quality_rows: Rows = (),
         labels: tuple[str, str] = ("original", "decoded"),
     ) -> None:
+        self.videos = [
+            item if isinstance(item, IIVideo) else video_of([item]) for item in (shown, decoded) if item is not None
+        ]
+        self.frames = self.videos[0].frames
+        self.structure = picture = self.videos[0].structure
+        self.what = "the picture" if self.frames == 1 else f"the take of {self.frames} frames"
         picture.check_regular()
-        if decoded is not None:
-            picture.check_same_structure(decoded)
+        for video in self.videos[1:]:
+            picture.check_same_structure(video.structure)
+            if video.frames != self.frames:
+                raise ValueError(f"decoded has {video.frames} frames, {self.what}: as many are needed")
         if quality is not None and not 1 <= quality <= 100:
             raise ValueError(f"quality is {quality}: a whole number from 1 to 100 is needed")
+        if depth is not None and self.frames > 1:
+            raise ValueError("depth is the map of one picture: a take is shown without it")
         if depth is not None and depth.shape != picture.pixels.shape[:2]:
             raise ValueError(
                 f"depth is {depth.shape}, the picture {picture.pixels.shape[:2]}: the same size is needed"
             )
-        self.pictures = [picture] if decoded is None else [picture, decoded]
         self.depth = None if depth is None else depth_view(picture, depth)
         self.title, self.jpeg, self.quality_rows = title or "II-picture", quality, quality_rows
         self.labels = labels
@@ -173,15 +198,17 @@ class _Page:
         """The page around its data."""
         folder = files(__package__)
         text = {name: (folder / name).read_text(encoding="utf-8") for name in ("page.html", "style.css")}
-        script = "\n".join((folder / name).read_text(encoding="utf-8") for name in ("lightfield.js", "viewer.js"))
+        script = "\n".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)
         meta = json.dumps(self.meta()).replace("<", "\\u003c")
-        compared = len(self.pictures) > 1
+        compared, plays = len(self.videos) > 1, self.frames > 1
         return Template(text["page.html"]).substitute(
             title=html.escape(self.title),
             about=html.escape(self.about()),
             style=text["style.css"],
+            time=TIME if plays else "",
+            play=PLAY if plays else "",
             compare=COMPARE if compared else "",
-            keys=", M comparison" if compared else "",
+            keys=(", M comparison" if compared else "") + (", space plays, J L frame by frame" if plays else ""),
             quality=self.quality() if self.quality_rows else "",
             script=f"{script}\nii.start({meta});",
             data=data,
@@ -189,7 +216,7 @@ class _Page:
 
     def meta(self) -> dict[str, Any]:
         """What the script must know."""
-        picture = self.pictures[0]
+        picture = self.structure
         (u, _), assumed = picture.ei_pixels, picture.camera is None
         camera = camera_of(with_assumed_camera(picture))
         front, left, up = (five_viewpoints(camera)[name] for name in ("front", "left", "up"))
@@ -203,7 +230,10 @@ class _Page:
             "side": self.side,
             "across": self.grid[0],
             "pages": math.prod(self.grid),
-            "compared": len(self.pictures) > 1,
+            "compared": len(self.videos) > 1,
+            "frames": self.frames,
+            "fps": self.videos[0].fps,
+            "card_bytes": CARD_BYTES,
             "labels": list(self.labels),
             "focus": [-far if assumed else -far / 4, far] if u > 1 else [-1, 1],
             "camera": {
@@ -222,10 +252,11 @@ class _Page:
 
     def about(self) -> str:
         """One line on the picture."""
-        picture = self.pictures[0]
+        picture = self.structure
         (k, l), (u, v) = picture.lenses, picture.ei_pixels
         camera = f"camera {picture.camera.name}" if picture.camera else f"no camera: {ASSUMED_ANGLE_DEG:g}° assumed"
-        return f"{k} × {l} lenses of {u} × {v} px, {camera}"
+        frames = f", {self.frames} frames, {self.videos[0].fps:g} a second" if self.frames > 1 else ""
+        return f"{k} × {l} lenses of {u} × {v} px, {camera}{frames}"
 
     def quality(self) -> str:
         """The table of qualities, in HTML; what follows _ in a name's first word stands lower."""
@@ -242,8 +273,11 @@ class _Page:
         return f'<table aria-label="Quality of the decoded picture">{lines}</table>'
 
     def parts(self, progress: Callable[[int, int], None] | None) -> Iterator[tuple[str, tuple[int, ...], bytes]]:
-        """Kind, place and bytes of everything the page shows, what is seen first first."""
-        (u, v), (k, l) = self.pictures[0].ei_pixels, self.pictures[0].lenses
+        """Kind, place and bytes of everything the page shows, what is seen first first.
+
+        The place of a page is its picture (0, or 1 for the decoded one), layer and frame.
+        """
+        (u, v), (k, l) = self.structure.ei_pixels, self.structure.lenses
         yield "preview", (), self._preview()
         if self.depth is not None:
             yield "depth", (), self.depth.astype("<f4").tobytes()
@@ -252,11 +286,15 @@ class _Page:
         layers = sorted(
             range(across * down), key=lambda i: math.hypot(i % across - centre[0], i // across - centre[1])
         )
-        total = len(layers) * len(self.pictures)
-        for done, (layer, number) in enumerate(((i, n) for i in layers for n in range(len(self.pictures))), 1):
-            yield "page", (number, layer), self._encoded(self._layer(self.pictures[number], layer))
-            if progress:
-                progress(done, total)
+        total, done = self.frames * len(layers) * len(self.videos), 0
+        for frame in range(self.frames):
+            pictures = [video[frame] for video in self.videos]
+            for layer in layers:
+                for number, picture in enumerate(pictures):
+                    yield "page", (number, layer, frame), self._encoded(self._layer(picture, layer))
+                    done += 1
+                    if progress:
+                        progress(done, total)
 
     def _layer(self, picture: IIPicture, layer: int) -> NDArray[np.uint8]:
         (k, l), (u, v), side = picture.lenses, picture.ei_pixels, self.side
@@ -275,7 +313,7 @@ class _Page:
 
     def _preview(self) -> bytes:
         """What the viewer sees from the front, where the page starts."""
-        picture = with_assumed_camera(self.pictures[0])
+        picture = with_assumed_camera(self.videos[0][0])
         view, _ = view_image(picture, five_viewpoints(camera_of(picture))["front"])
         step = max(1, -(-max(picture.lenses) // PREVIEW_SIDE))
         out = io.BytesIO()
@@ -284,6 +322,8 @@ class _Page:
         return out.getvalue()
 
 
+TIME = """<label>Time <input type="range" data-state="t"><output></output></label>"""
+PLAY = """<button id="play" type="button" aria-pressed="false">Play</button>"""
 COMPARE = """<label>Show <select data-state="mode">
         <option>original<option>decoded<option>split<option>difference</select></label>
       <label>Split at <input type="range" data-state="split"><output></output></label>

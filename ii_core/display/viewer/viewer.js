@@ -1,7 +1,7 @@
 "use strict";
 // What the user sees and does: panes, the viewer's place, pointer, keyboard, and a link that keeps it all.
 
-const DEFAULTS = { x: 0, y: 0, r: 1, f: 0, a: 1.5, zoom: 1, cx: 0.5, cy: 0.5, mode: "original", split: 0.5, gain: 4,
+const DEFAULTS = { t: 0, x: 0, y: 0, r: 1, f: 0, a: 1.5, zoom: 1, cx: 0.5, cy: 0.5, mode: "original", split: 0.5, gain: 4,
   stereo: "off", eyes: 0.25 };
 // The opening focus moves a neighbouring pixel's lens by at most this share of the array.
 const OPENING_SHARE = 1 / 16;
@@ -16,7 +16,8 @@ class Viewer {
     this.meta = meta;
     this.canvas = document.getElementById("canvas");
     this.field = new LightField(this.canvas, meta);
-    this.limits = { x: [-2, 2], y: [-2, 2], r: [0.35, 10], f: meta.focus, a: [1, Math.max(1, Math.max(...meta.ei) / 2)],
+    this.take = new Take(meta, this.field, () => this.redraw(), (message) => this.say(message));
+    this.limits = { t: [0, meta.frames - 1], x: [-2, 2], y: [-2, 2], r: [0.35, 10], f: meta.focus, a: [1, Math.max(1, Math.max(...meta.ei) / 2)],
       zoom: [1, 40], cx: [0, 1], cy: [0, 1], split: [0, 1], gain: [1, 32], eyes: [0, 1] };
     // What the page opens with and Reset returns to; the focus comes once the picture is there.
     this.opening = { ...DEFAULTS, a: Math.min(DEFAULTS.a, this.limits.a[1]), zoom: this.openingZoom(),
@@ -26,7 +27,9 @@ class Viewer {
     this.cursor = [(meta.lenses[0] - 1) / 2, (meta.lenses[1] - 1) / 2];
     this.quick = false;
     this.work = [];
+    this.loaded = 0;
     this.fromLink();
+    this.focused = /[#&]f=/.test(location.hash);  // by the link or, while data still come, by the user
     this.bind();
     this.canvas.addEventListener("webglcontextlost", () =>
       ii.failed("The graphics card gave the picture up, perhaps for want of memory. Reload the page to try again."));
@@ -44,12 +47,15 @@ class Viewer {
     this.work.push(this.field.setPreview(data).then(() => this.redraw()));
   }
 
-  page(picture, layer, data) {
-    this.work.push(this.field.setPage(picture, layer, data).then(() => {
+  page(picture, layer, frame, source) {
+    const loading = this.take.add(frame, picture, layer, source)?.then(() => {
       const all = this.meta.pages * (this.meta.compared ? 2 : 1);
-      this.say(this.field.loaded < all ? `loading ${this.field.loaded} of ${all}` : "");
+      this.loaded += 1;
+      this.say(this.loaded < all ? `loading ${this.loaded} of ${all}` : "");
       this.redraw();
-    }));
+    });
+    if (loading) this.work.push(loading);
+    return loading;
   }
 
   depth(data) {
@@ -60,7 +66,9 @@ class Viewer {
     await Promise.all(this.work);
     this.say("");
     this.opening.f = this.start();
-    if (!/[#&]f=/.test(location.hash)) this.state.f = this.opening.f;
+    if (!this.focused) this.state.f = this.opening.f;
+    this.take.ready();
+    this.take.seek(this.state.t);
     this.redraw();
     if (!this.touched && !location.hash && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.sway();
   }
@@ -207,7 +215,7 @@ class Viewer {
 
   // While something moves, at most about 8 × 8 pixels under each lens are added up.
   stride() {
-    return this.quick ? Math.max(1, Math.round(this.state.a / 4)) : 1;
+    return this.quick || this.take.playing ? Math.max(1, Math.round(this.state.a / 4)) : 1;
   }
 
   // The present view with one pixel a lens, as `view_image` makes it: {width, height, data}.
@@ -271,10 +279,11 @@ class Viewer {
       this.swung = [0, 0];
     }
     this.touched = true;
+    this.focused ||= "f" in change;
     for (const [key, value] of Object.entries(change)) {
-      const limit = this.limits[key];
-      this.state[key] = limit ? Math.min(Math.max(Number(value), limit[0]), limit[1]) : value;
+      this.state[key] = this.limits[key] ? this.limited(key, value) : value;
     }
+    if ("t" in change) this.take.seek(this.state.t);
     if (quick) {
       this.quick = true;
       clearTimeout(this.rest);
@@ -284,6 +293,24 @@ class Viewer {
         this.redraw();
       }, 200);
     } else this.toLink();
+    this.redraw();
+  }
+
+  limited(key, value) {
+    const [low, high] = this.limits[key], inside = Math.min(Math.max(Number(value), low), high);
+    return key === "t" ? Math.round(inside) : inside;
+  }
+
+  // Play or pause. The viewer's place, focus and comparison stay free meanwhile.
+  play(on) {
+    if (on) this.take.play((frame) => {
+      this.state.t = frame;
+      this.redraw();
+    });
+    else {
+      this.take.pause();
+      this.toLink();
+    }
     this.redraw();
   }
 
@@ -298,7 +325,7 @@ class Viewer {
       if (key === "mode" && (!MODES.includes(value) || !this.meta.compared)) continue;
       if (key === "stereo" && !["off", "cross-eyed", "anaglyph"].includes(value)) continue;
       if (key in this.limits && Number.isFinite(Number(value)))
-        this.state[key] = Math.min(Math.max(Number(value), this.limits[key][0]), this.limits[key][1]);
+        this.state[key] = this.limited(key, value);
       else if (key === "mode" || key === "stereo") this.state[key] = value;
     }
   }
@@ -310,7 +337,9 @@ class Viewer {
   // Values as the page names them.
   shown() {
     const { state, meta: { camera: c } } = this, degrees = (angle) => `${(angle * 180 / Math.PI).toFixed(1)}°`;
+    const late = !this.take.playing && this.take.shown !== state.t;
     return {
+      t: late ? "loading" : `${(state.t / this.meta.fps).toFixed(2)} s`,
       x: degrees(state.x * c.phi), y: degrees(state.y * c.theta),
       r: c.assumed ? `${state.r.toFixed(2)} ×` : `${(state.r * c.distance_mm).toFixed(0)} mm`,
       f: c.assumed ? `${state.f.toFixed(2)} lens/px` : `z ${this.depthOf(state.f).toFixed(1)} mm`,
@@ -334,6 +363,11 @@ class Viewer {
       if (document.activeElement !== input || input.type === "range") input.value = state[key];
       input.disabled = !this.matters(key);
       if (key in texts) input.parentElement.querySelector("output").textContent = texts[key];
+    }
+    const play = document.getElementById("play"), playing = this.take.playing;
+    if (play && play.getAttribute("aria-pressed") !== String(playing)) {
+      play.setAttribute("aria-pressed", playing);
+      play.textContent = playing ? "Pause" : "Play";
     }
     document.getElementById("zone").hidden = Math.abs(state.x) <= 1 && Math.abs(state.y) <= 1;
     const line = document.getElementById("split"), percent = Math.round(100 * state.split);
@@ -386,18 +420,30 @@ class Viewer {
     main.addEventListener("keydown", (event) => this.key(event));
     for (const input of document.querySelectorAll("[data-state]")) {
       const limit = this.limits[input.dataset.state];
-      if (input.type === "range") Object.assign(input, { min: limit[0], max: limit[1], step: (limit[1] - limit[0]) / 1000 });
+      if (input.type === "range") Object.assign(input, { min: limit[0], max: limit[1], step: input.dataset.state === "t" ? 1 : (limit[1] - limit[0]) / 1000 });
       input.addEventListener("input", () => this.set({ [input.dataset.state]: input.value }, input.type === "range"));
     }
     document.getElementById("save").addEventListener("click", () => this.save());
     document.getElementById("reset").addEventListener("click", () => this.set({ ...this.opening }));
     this.bindGrip(main);
+    this.bindPlay();
     this.bindWide();
     this.bindTilt();
     window.addEventListener("hashchange", () => {
       this.state = { ...this.opening };
       this.fromLink();
+      this.take.seek(this.state.t);
       this.redraw();
+    });
+  }
+
+  // The space bar plays wherever it does not press a button.
+  bindPlay() {
+    document.getElementById("play")?.addEventListener("click", () => this.play(!this.take.playing));
+    document.addEventListener("keydown", (event) => {
+      if (event.key !== " " || event.target.closest("button, select") || this.meta.frames < 2) return;
+      event.preventDefault();
+      if (!event.repeat) this.play(!this.take.playing);
     });
   }
 
@@ -489,6 +535,12 @@ class Viewer {
     this.redraw();
   }
 
+  // Another frame, in a circle; the take rests there.
+  stepped(by) {
+    this.take.pause();
+    return { t: (this.state.t + by + this.meta.frames) % this.meta.frames };
+  }
+
   key(event) {
     const { state } = this, step = event.shiftKey ? 0.25 : 0.05, [near, far] = this.meta.focus;
     const moves = {
@@ -500,6 +552,7 @@ class Viewer {
       PageUp: () => ({ r: state.r * 1.1 }), PageDown: () => ({ r: state.r / 1.1 }),
       Enter: () => ({ f: this.pick(this.cursor) }), Home: () => ({ x: 0, y: 0, zoom: 1, cx: 0.5, cy: 0.5 }),
       m: () => (this.meta.compared ? { mode: MODES[(MODES.indexOf(state.mode) + 1) % 4] } : {}),
+      j: () => this.stepped(-1), l: () => this.stepped(1),
       f: () => (this.widen(!document.body.classList.contains("wide")), {}),
       s: () => ({ stereo: { off: "cross-eyed", "cross-eyed": "anaglyph", anaglyph: "off" }[state.stereo] }),
     };
@@ -532,17 +585,19 @@ const ii = {
     ii.still(`data:image/jpeg;base64,${text}`);
     ii.viewer?.preview(ii.viewer.bytes(text));
   },
-  page: (picture, layer, text) => ii.viewer?.page(picture, layer, ii.viewer.bytes(text)),
+  page: (picture, layer, frame, text) => ii.viewer?.page(picture, layer, frame, async () => ii.viewer.bytes(text)),
   depth: (text) => ii.viewer?.depth(ii.viewer.bytes(text)),
   // The same from files beside the page, for a picture too large to stand in it.
   async fetch(order) {
-    const load = async (name) => new Uint8Array(await (await fetch(name)).arrayBuffer());
     ii.still(order.find(([kind]) => kind === "preview")[1]);
     if (!ii.viewer) return;
     for (const [kind, name, ...where] of order) {
-      const data = await load(name);
-      if (kind === "page") ii.viewer.page(...where, data);
-      else ii.viewer[kind](data);
+      if (kind !== "page") {
+        ii.viewer[kind](await fileBytes(name));
+        continue;
+      }
+      const [picture, layer, frame, from, to] = where;
+      await ii.viewer.page(picture, layer, frame, () => fileBytes(name, from, to));
     }
     ii.done();
   },
