@@ -324,7 +324,7 @@ class Viewer {
     for (const [key, value] of new URLSearchParams(location.hash.slice(1))) {
       if (key === "mode" && (!MODES.includes(value) || !this.meta.compared)) continue;
       if (key === "stereo" && !["off", "cross-eyed", "anaglyph"].includes(value)) continue;
-      if (key in this.limits && Number.isFinite(Number(value)))
+      if (Object.hasOwn(this.limits, key) && Number.isFinite(Number(value)))
         this.state[key] = this.limited(key, value);
       else if (key === "mode" || key === "stereo") this.state[key] = value;
     }
