@@ -131,6 +131,36 @@ def test_threads_change_no_byte(scheme):
     np.testing.assert_array_equal(decode(one).pixels, decode(two).pixels)
 
 
+def coloured_noise(seed=2):
+    """Views without anything in common, in a colour for each quarter: their mean is no axis of any."""
+    rng = np.random.default_rng(seed)
+    light = rng.normal(0, 30, (32, 3, 48, 3, 1))
+    colours = np.array([[1, 1, 1], [1, 0.6, 0], [0, 0.6, 1], [0.8, 0, 0.6]])
+    quarter = 2 * (np.arange(32)[:, None] < 16) + (np.arange(48) < 24)
+    pixels = np.clip(128 + light * colours[quarter][:, None, :, None], 0, 255).astype(np.uint8)
+    return IIPicture(pixels.reshape(96, 144, 3), (48, 32), (3, 3))
+
+
+def test_colours_follow_from_the_first_plane():
+    """Colours that lie on a line in each block cost little: 6.6 kB where they are coded alone in 10.4."""
+    picture = coloured_noise()
+    crossed, plain = (encode(picture, f"si-lf:cross={cross}", qp=34) for cross in (1, 0))
+    errors = [np.mean((decode(coded).pixels.astype(float) - picture.pixels) ** 2) for coded in (crossed, plain)]
+    assert crossed.nbytes < 0.75 * plain.nbytes
+    assert errors[0] < errors[1]
+
+
+def test_streams_without_factors_are_of_the_second_version():
+    """The decoder reads both."""
+    picture = coloured_noise()
+    plain = encode(picture, "si-lf:fast,cross=0", qp=34)
+    assert plain.payload[0] == stream.UNCROSSED
+    assert encode(picture, "si-lf:fast", qp=34).payload[0] == stream.VERSION
+    # A decoder that looked for factors would lose its place in the bits at once.
+    error = np.mean((decode(plain).pixels.astype(float) - picture.pixels) ** 2)
+    assert 10 * np.log10(255**2 / error) > 30
+
+
 @pytest.mark.parametrize("name", ["empty", "short", "long"])
 def test_a_payload_of_another_length_is_refused(name):
     picture = shifted_plane((1, 1), grid=(2, 2))

@@ -12,10 +12,11 @@ import numpy as np
 
 from . import contexts as at
 from .arithmetic import DECODING, Arithmetic, bit_cost, code_bit, code_number, code_raw, number_cost
-from .coefficients import code_coefficients, dequantise
+from .coefficients import code_coefficients
+from .cross import code_cross, keep_first, rebuild
 from .intra import MODES, SMOOTH, fill_border, predict_intra
 from .jit import kernel, lean
-from .transform import LARGEST, inverse
+from .transform import LARGEST
 from .warp import moved_block
 
 LOG_LARGEST, LOG_LEAST = 5, 2
@@ -26,7 +27,7 @@ MOST_INDEX = 1 << 14
 UNKNOWN = -32768  # disparity
 DIFFERENT = 205  # disparities that lead this far apart, in 2^-8 samples, are of different surfaces
 # What is known of each 4×4.
-KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, FIELDS = range(8)
+KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, CROSS_1, CROSS_2, FIELDS = range(10)
 
 
 class Job(NamedTuple):
@@ -53,6 +54,8 @@ class Job(NamedTuple):
     doubt : ndarray of int16, (H / 4, W / 4)
         How far the sources of the synthesis differ, in eighths of an 8-bit code.
     synthesised : int
+    crossed : int
+        Whether the second and third plane's residuals may be predicted from the first's.
     step : int
         Of the quantiser, in 2^-7 of an 8-bit code.
     blocks : ndarray of int16, (FIELDS, H / 4, W / 4)
@@ -71,6 +74,7 @@ class Job(NamedTuple):
     disparity: Any
     doubt: Any
     synthesised: Any
+    crossed: Any
     step: Any
     blocks: Any
     levels: Any
@@ -84,6 +88,9 @@ class Work(NamedTuple):
     half: Any
     coefficients: Any
     levels: Any
+    first: Any  # the first plane's coefficients,
+    reach: Any  # and how many rows and columns of them
+    spare: Any
     border: Any
     rows: Any
 
@@ -97,6 +104,9 @@ def new_work() -> Work:
         half=np.zeros(square, np.int32),
         coefficients=np.zeros(square, np.int32),
         levels=np.zeros(square, np.int32),
+        first=np.zeros(square, np.int32),
+        reach=np.zeros(2, np.int64),
+        spare=np.zeros(square, np.int32),
         border=np.zeros((2, 2 * LARGEST + 1), np.int32),
         rows=np.zeros((LARGEST + 5, LARGEST), np.int32),
     )
@@ -531,8 +541,10 @@ def code_block(coder, job, work, y0, x0, log):
     coded = code_bit(coder, residual_context(job, by, bx, log, kind), np.int64(blocks[CODED, by, bx]))
     first = 0
     for p in range(3):
-        some = 0
+        some = cross = 0
         if coded:
+            if p and first and job.crossed:
+                cross = code_cross(coder, p, log, np.int64(blocks[CROSS_1 + p - 1, by, bx]))
             if not decoding:
                 some = _load_levels(job, work, p, y0, x0, n)
             some = code_bit(coder, coded_context(p, log, kind, first), some)
@@ -543,10 +555,11 @@ def code_block(coder, job, work, y0, x0, log):
                     _clear(work.levels, n)
                 code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0)
         if decoding:
-            if some:
-                rows, cols = dequantise(work.levels, log, job.step, work.coefficients)
-                inverse(work.coefficients, log, rows, cols, work.half, work.block)
-            store(job, work, p, y0, x0, n, some)
+            if some or cross:
+                rows, cols = rebuild(work, work.levels, log, job.step, some, cross)
+                if p == 0:
+                    keep_first(work, rows, cols)
+            store(job, work, p, y0, x0, n, some or cross)
     if decoding:
         mark(blocks, by, bx, log, kind, index, mask, direction, coded)
 

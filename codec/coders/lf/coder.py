@@ -58,6 +58,7 @@ class LightField(Coder):
     options: ClassVar[Mapping[str, Option]] = {
         "stride": Option(about="binary logarithm of the first views' distance on the grid", default=3, low=0, high=6),
         "sources": Option(about="views that a synthesis is made of, 0 for none", default=4, low=0, high=8),
+        "cross": Option(about="1 to predict colours of a residual from its first plane", default=1, low=0, high=1),
         "lossless": Option(about="1 to code to the bit", default=0, low=0, high=1),
         "threads": Option(
             about="threads that share the views; the bytes do not depend on it", default=1, low=1, high=16
@@ -232,6 +233,7 @@ class _Source:
             low=low,
             high=high,
             axes=self.axes,
+            crossed=bool(options["cross"]),
             steps=(),
         )
 

@@ -28,7 +28,8 @@ ABOVE_ONE_THERE = SIGNIFICANT_THERE + 384  # plane 3 × sixteenth of the block 1
 WEIGHTS = ABOVE_ONE_THERE + 96  # of SIGNIFICANT plane 3 × block size 4, of ABOVE_ONE plane 3
 EXACT = WEIGHTS + 15  # colour 3 × activity 16 × (zero 1, sign 3, prefix 12)
 EXACT_REST = EXACT + 768  # 16 digits
-COUNT = EXACT_REST + 16
+CROSS = EXACT_REST + 16  # plane 2 × (not zero by block size 4, sign, above 1, 2 and 3)
+COUNT = CROSS + 16
 
 # Probabilities to begin with: log(p / (1 - p)) from -6.2 up in steps of 0.2, by its digit; * where none is known. The
 # mean over eight coded pictures: three scenes and a flower of a real light field camera, at two quantisers each.

@@ -75,6 +75,7 @@ class Field:
             disparity=made.disparity,
             doubt=made.doubt,
             synthesised=int(known),
+            crossed=int(self.header.crossed),
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),
             levels=np.zeros((3, *self.shape), np.int16),

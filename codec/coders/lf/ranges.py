@@ -62,6 +62,7 @@ def _matched(
         disparity=blank[0],
         doubt=blank[0],
         synthesised=0,
+        crossed=0,
         step=1,
         blocks=blank,
         levels=blank,

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from .arithmetic import bit_cost
 from .blocks import (
+    CROSS_1,
+    CROSS_2,
     EXPLICIT,
     INTRA,
     LIMIT,
@@ -30,10 +32,11 @@ from .blocks import (
     seen_mask,
     split_context,
 )
-from .coefficients import dequantise, quantise
+from .coefficients import quantise
+from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
 from .intra import MODES
 from .jit import inner, kernel, lean
-from .transform import LARGEST, forward, inverse
+from .transform import LARGEST, forward
 from .warp import clamped, moved_block
 
 HUGE = np.float32(1e30)
@@ -79,6 +82,8 @@ class Trial(NamedTuple):
     levels: Any
     trial_decoded: Any  # (3, 32, 32) of the way tried
     trial_levels: Any
+    cross: Any  # (6, 2) factors of `cross`
+    trial_cross: Any
     moved: Any  # (4, 3, 32, 32)
 
 
@@ -89,6 +94,8 @@ def new_trial() -> Trial:
         levels=np.zeros((6, 3, LARGEST, LARGEST), np.int16),
         trial_decoded=np.zeros((3, LARGEST, LARGEST), np.int16),
         trial_levels=np.zeros((3, LARGEST, LARGEST), np.int16),
+        cross=np.zeros((6, 2), np.int64),
+        trial_cross=np.zeros(2, np.int64),
         moved=np.zeros((4, 3, LARGEST, LARGEST), np.int32),
     )
 
@@ -132,6 +139,34 @@ def fill_volume(job, original, volume, every):
 
 
 @lean
+def _try_plane(contexts, work, plane, log, step, weight, kind, first, crossed, error):
+    """Quantise work.block; return bits, whether there are levels, which array has them, and the factor of `cross`.
+
+    ``first`` says whether the first plane has a residual, ``error`` is the squared error without one.
+    """
+    context = coded_context(plane, log, kind, first)
+    free, full = bit_cost(contexts, context, np.int64(0)), bit_cost(contexts, context, np.int64(1))
+    predictable = plane > 0 and first and crossed
+    none = cross_cost(contexts, plane, log, np.int64(0)) if predictable else np.float32(0)
+    bits, some, cross = free + none, 0, np.int64(0)
+    if error <= np.float32(0.2) * step * step:
+        return bits, some, cross
+    forward(work.block, log, work.half, work.coefficients)
+    more, missed = quantise(contexts, work.coefficients, plane, log, step, weight, work.levels)
+    best = error + weight * bits
+    if more > 0 and missed + weight * (more + full + none) < best:
+        best, bits, some = missed + weight * (more + full + none), more + full + none, 1
+    factor = best_cross(work) if predictable else np.int64(0)
+    if factor:
+        subtract_cross(work, factor)
+        more, missed = quantise(contexts, work.coefficients, plane, log, step, weight, work.spare)
+        more += (full if more > 0 else free) + cross_cost(contexts, plane, log, factor)
+        if missed + weight * more < best:
+            bits, some, cross = more, 1, factor
+    return bits, some, cross
+
+
+@lean
 def try_residual(contexts, job, search, work, trial, y0, x0, log, kind):
     """Code the difference to work.predicted; return bits, error and whether there is a residual."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
@@ -146,38 +181,26 @@ def try_residual(contexts, job, search, work, trial, y0, x0, log, kind):
                 work.block[y, x] = difference
                 least += np.float32(difference * difference)
         without += least
-        context = coded_context(p, log, kind, first)
-        free = bit_cost(contexts, context, np.int64(0))
-        some = 0
-        if least > np.float32(0.2) * step * step:
-            forward(work.block, log, work.half, work.coefficients)
-            more, missed = quantise(contexts, work.coefficients, p, log, step, search.weight, work.levels)
-            if more > 0:
-                more += bit_cost(contexts, context, 1)
-                if missed + search.weight * more < least + search.weight * free:
-                    some = 1
+        more, some, cross = _try_plane(contexts, work, p, log, step, search.weight, kind, first, job.crossed, least)
+        bits += more
+        if p:
+            trial.trial_cross[p - 1] = cross
         if some:
-            rows, cols = dequantise(work.levels, log, job.step, work.coefficients)
-            inverse(work.coefficients, log, rows, cols, work.half, work.block)
-            real = np.float32(0)
+            levels = work.spare if cross else work.levels
+            rows, cols = rebuild(work, levels, log, job.step, 1, cross)
+            if p == 0:
+                keep_first(work, rows, cols)
+                first = 1
+            coded = 1
             for y in range(n):
                 for x in range(n):
                     value = min(max(np.int32(work.predicted[p, y, x] + work.block[y, x]), -LIMIT), LIMIT)
                     trial.trial_decoded[p, y, x] = value
-                    trial.trial_levels[p, y, x] = work.levels[y, x]
+                    trial.trial_levels[p, y, x] = levels[y, x]
                     difference = search.original[p, y0 + y, x0 + x] - value
-                    real += np.float32(difference * difference)
-            bits += more
-            error += real
-            coded = 1
-            if p == 0:
-                first = 1
+                    error += np.float32(difference * difference)
         else:
-            for y in range(n):
-                for x in range(n):
-                    trial.trial_decoded[p, y, x] = work.predicted[p, y, x]
-                    trial.trial_levels[p, y, x] = 0
-            bits += free
+            _leave(trial, work, p, n)
             error += least
     context = residual_context(job, by, bx, log, kind)
     empty = bit_cost(contexts, context, np.int64(0))
@@ -186,16 +209,23 @@ def try_residual(contexts, job, search, work, trial, y0, x0, log, kind):
         if error + search.weight * bits < without + search.weight * empty:
             return bits, error, 1
         for p in range(3):
-            for y in range(n):
-                for x in range(n):
-                    trial.trial_decoded[p, y, x] = work.predicted[p, y, x]
-                    trial.trial_levels[p, y, x] = 0
+            _leave(trial, work, p, n)
     return empty, without, 0
+
+
+@inner
+def _leave(trial, work, p, n):
+    """A plane without a residual."""
+    for y in range(n):
+        for x in range(n):
+            trial.trial_decoded[p, y, x] = work.predicted[p, y, x]
+            trial.trial_levels[p, y, x] = 0
 
 
 @inner
 def _keep(trial, log):
     n = 1 << log
+    trial.cross[log, 0], trial.cross[log, 1] = trial.trial_cross[0], trial.trial_cross[1]
     for p in range(3):
         for y in range(n):
             for x in range(n):
@@ -440,6 +470,7 @@ def search_tree(contexts, job, search, work, trial, y0, x0, log):
                 job.views[job.at, p, y0 + y, x0 + x] = trial.decoded[log, p, y, x]
                 job.levels[p, y0 + y, x0 + x] = trial.levels[log, p, y, x]
     mark(job.blocks, by, bx, log, kind, index, mask, direction, coded)
+    job.blocks[CROSS_1, by, bx], job.blocks[CROSS_2, by, bx] = trial.cross[log, 0], trial.cross[log, 1]
     return best
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-VERSION = 2
+VERSION, UNCROSSED = 3, 2  # the second version has no factors between planes
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
 )
@@ -39,6 +39,8 @@ class Header:
         Range of disparity between neighbouring views, in 2^-8 samples.
     axes : ndarray of int16, (3, 3)
         Colours, in units of 2^-14.
+    crossed : bool
+        Whether the residuals of the second and third plane may be predicted from the first's.
     steps : tuple of int
         The quantiser's step of each level, in 2^-7 of an 8-bit code.
     """
@@ -50,13 +52,14 @@ class Header:
     low: int
     high: int
     axes: NDArray[np.int16]
+    crossed: bool
     steps: tuple[int, ...]
 
 
 def pack(header: Header, levels: list[bytes], pixels: int) -> bytes:
     """The payload of a picture of so many pixels."""
     head = _HEAD.pack(
-        VERSION,
+        VERSION if header.crossed else UNCROSSED,
         header.log_stride,
         header.sources,
         header.exact,
@@ -90,8 +93,10 @@ def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
     if len(payload) < max(_HEAD.size, least_bytes(pixels)):
         raise ValueError(f"its light field has {len(payload)} bytes, too few for {pixels} pixels")
     version, log_stride, sources, exact, down, low, high, *axes = _HEAD.unpack_from(payload)
-    if version != VERSION:
-        raise ValueError(f"its light field is of version {version}: this decoder reads version {VERSION}")
+    if version not in (VERSION, UNCROSSED):
+        raise ValueError(
+            f"its light field is of version {version}: this decoder reads versions {UNCROSSED} and {VERSION}"
+        )
     sound = log_stride <= MOST_LOG_STRIDE and sources <= MOST_SOURCES and exact <= 1 and abs(down) == 1
     if not sound or not -MOST_DISPARITY <= low <= high <= MOST_DISPARITY:
         raise ValueError("its header holds values that no encoder writes")
@@ -116,6 +121,7 @@ def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
         low=low,
         high=high,
         axes=np.array(axes, np.int16).reshape(3, 3),
+        crossed=version == VERSION,
         steps=tuple(step for step, _ in index),
     )
     return header, levels
