@@ -8,6 +8,7 @@ import os
 import platform
 import subprocess
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -150,7 +151,11 @@ def read_study(path: str | os.PathLike[str]) -> Study:
 
 
 def provenance() -> dict[str, Any]:
-    """Return the provenance of a measurement: commit, machine and versions of libraries."""
+    """Return the provenance of a measurement: commit, machine and versions of libraries.
+
+    The commit is that of the first call in this process: modules are loaded by then, and the checkout may move on
+    while they measure. Call it before a long measurement.
+    """
     return {
         "git": _git(),
         "machine": {"platform": platform.platform(), "cpus": os.cpu_count()},
@@ -158,6 +163,7 @@ def provenance() -> dict[str, Any]:
     }
 
 
+@lru_cache(maxsize=1)
 def _git() -> dict[str, Any] | None:
     """Return the commit of this checkout and whether its code was changed; None outside a checkout.
 

@@ -259,8 +259,9 @@ def run_study(
     """
     from codec import encode, timed_decode
     from ii_core.parallel import cores
-    from metrics import PointLog, default_rates, measuring, rate_distortion, write_study
+    from metrics import PointLog, default_rates, measuring, provenance, rate_distortion, write_study
 
+    provenance()  # the commit that measures, also if the checkout moves on meanwhile
     more = measuring(picture, measures, **over_depth) if set(measures) - {"q_global"} else None
     log = PointLog(folder / f"{name}_rd.points.jsonl", picture, measures=sorted(measures), **over_depth)
     if log.known:

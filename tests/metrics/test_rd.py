@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import re
+import subprocess
 import threading
 import time
 import tomllib
@@ -190,6 +191,14 @@ def test_versions_are_those_of_all_that_results_depend_on():
     needed = {re.match(r"[\w-]+", line)[0] for line in project["dependencies"]}
     assert set(LIBRARIES) == needed - {"matplotlib", "pydantic", "typer", "rich"}
     assert set(LIBRARIES) <= set(library_versions()) and "python" in provenance()["versions"]
+
+
+def test_the_commit_is_that_of_the_start_though_the_checkout_moves_on(monkeypatch):
+    """A study of minutes named the commit of its end, to which another had moved the checkout meanwhile."""
+    before = provenance()["git"]
+    moved = subprocess.CompletedProcess([], 0, stdout="f" * 40)
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: moved)
+    assert provenance()["git"] == before
 
 
 def test_same_records_whatever_the_workers():
