@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ii_core import IIPicture, checks
 from ii_core.camera import whole_pair
 from ii_core.files import one_line
+from ii_core.progress import reporter
 
 from . import container, file_header
 from .checks import check_type, whole
@@ -31,7 +32,11 @@ from .contract import (
     fractions,
     parse_scheme,
 )
+from .progress import Report, reported
 from .search import Axis, CodingResult, Run, meet_size, within
+
+Result = TypeVar("Result")
+Progress = Callable[[int, int, str], None] | bool | None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -162,6 +167,7 @@ def encode(
     bpp: float | None = None,
     qp: int | None = None,
     quality: float | None = None,
+    progress: Progress = None,
     **options: Value,
 ) -> Encoded:
     """Code an II-picture at a rate, a quantiser or a quality, or lossless.
@@ -181,6 +187,8 @@ def encode(
         Quantiser, in the scheme's range and on its scale.
     quality : float
         Quality, in the scheme's range and on its scale.
+    progress : callable or bool, optional
+        ``progress(done, total, text)`` with the frames or encoder runs done, in any thread; True prints a line.
     **options
         Options of the scheme, as ``gop=32``. ``preset`` names a preset of the scheme, as ``preset="best"``; any other
         value of it is the encoder's own option ``preset``.
@@ -191,6 +199,7 @@ def encode(
         If an argument is unknown or out of range, or the scheme cannot take the picture; before any long work.
     """
     started = cpu_seconds()
+    report = _report(progress, "encode")
     coder, settings = parse_scheme(scheme, **options)
     goal = checked_goal(coder, settings, bpp, qp, quality)
     check_picture(coder, settings, picture)
@@ -208,7 +217,7 @@ def encode(
     asked = _payload_goal(goal, coded)
     searched = asked.bpp is not None and not coder.rate_control
     run = partial(_at_rate, coder) if searched else coder.encode
-    result = interruptible(lambda: run(picture, settings, asked))
+    result = interruptible(lambda: _reporting(report, lambda: run(picture, settings, asked)))
     coded = replace(coded, payload=result.run.payload, runs=result.runs)
     return replace(
         coded,
@@ -216,6 +225,17 @@ def encode(
         encode_seconds=cpu_seconds() - started,
         codec_seconds=result.run.codec_seconds,
     )
+
+
+def _report(progress: Progress, title: str) -> Report | None:
+    if progress is not None:
+        checks.progress("progress", progress)
+    return reporter(progress, title)
+
+
+def _reporting(report: Report | None, call: Callable[[], Result]) -> Result:
+    with reported(report):  # in the thread of the call
+        return call()
 
 
 # Doublings of the size over a coder's scale, as a first guess: 51 quantisers of H.264 are 8.5.
@@ -265,7 +285,9 @@ class Decoding:
     codec_seconds: float
 
 
-def decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = MAX_DECODED_PIXELS) -> IIPicture:
+def decode(
+    coded: Encoded | str | os.PathLike[str], *, max_pixels: int = MAX_DECODED_PIXELS, progress: Progress = None
+) -> IIPicture:
     """Decode a coded picture or an ``.ii`` file, with its structure and camera.
 
     Parameters
@@ -274,6 +296,8 @@ def decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = MAX_DEC
     max_pixels : int
         Largest number of pixels to decode, 2²⁷ by default, 2³¹ at most. It bounds the memory that a forged file can
         take: up to 10 bytes per pixel, with SPERR 22.
+    progress : callable or bool, optional
+        ``progress(done, total, text)`` with the frames done, in any thread; True prints a line.
 
     Raises
     ------
@@ -284,12 +308,15 @@ def decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = MAX_DEC
     OSError
         If the file cannot be read.
     """
-    return timed_decode(coded, max_pixels=max_pixels).picture
+    return timed_decode(coded, max_pixels=max_pixels, progress=progress).picture
 
 
-def timed_decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = MAX_DECODED_PIXELS) -> Decoding:
+def timed_decode(
+    coded: Encoded | str | os.PathLike[str], *, max_pixels: int = MAX_DECODED_PIXELS, progress: Progress = None
+) -> Decoding:
     """Decode as `decode` does, and measure CPU time."""
     started = cpu_seconds()
+    report = _report(progress, "decode")
     check_type("coded", coded, (Encoded, str, os.PathLike), "a coded picture or a path")
     path = None
     if not isinstance(coded, Encoded):
@@ -303,7 +330,9 @@ def timed_decode(coded: Encoded | str | os.PathLike[str], *, max_pixels: int = M
             f"{name} has {width}×{height} pixels: at most {max_pixels} are decoded, raise max_pixels (--max-pixels)"
         )
     try:
-        pixels, codec_seconds = interruptible(lambda: coder.decode(payload, blank, settings))
+        pixels, codec_seconds = interruptible(
+            lambda: _reporting(report, lambda: coder.decode(payload, blank, settings))
+        )
     except ValueError as error:
         raise ValueError(f"{name} is damaged: {one_line(error)}") from None
     picture = blank.with_pixels(pixels)

@@ -328,7 +328,8 @@ def checked_goal(coder: Coder, options: Options, bpp: Any, qp: Any, quality: Any
         raise ValueError(f"scheme {coder.name} takes no {', '.join(sorted(foreign))} here: {instead}")
     if len(given) != (1 if known else 0):
         exactly = known[0] if len(known) == 1 else f"exactly one of {' and '.join(known)}"
-        state = " and ".join(f"{name} is {given.get(name)}" for name in known)
+        several = " and ".join(f"{name} is {value}" for name, value in given.items())
+        state = several or f"no {' or '.join(known)} is given"
         raise ValueError(f"{state}: {exactly} is needed")
     if bpp is not None:
         if not is_number(bpp) or not 0 < bpp <= sys.float_info.max:

@@ -13,6 +13,8 @@ from typing import Generic, TypeVar
 
 from ii_core.checks import callable_, checked, instance, number
 
+from .progress import run_begins, runs_so_far
+
 TOLERANCE = 0.02  # of the target
 # No guess reaches further than so many doublings of the size, or closer than this part of a bracket to its ends. The
 # measured slope counts between 1/REACH and REACH of the one expected.
@@ -140,9 +142,11 @@ def trials(
     """
     tried = {trial.setting: trial for trial in known}
     setting = _next(tried, axis) if tried else axis.place(axis.start)
+    most = runs_so_far() + axis.runs
     for _ in range(axis.runs):
         if setting in tried:
             return
+        run_begins(most)
         result = try_at(setting)
         tried[setting] = trial = Trial(setting, miss_of(result), result)
         yield trial
@@ -183,6 +187,7 @@ def meet_size(
     best, runs = nearest(tried), len(tried)
     end = axis.high if axis.octave > 0 else axis.low
     if finest is not None and (last := next((t for t in tried if t.setting == end and t.miss < 0), None)):
+        run_begins()
         run = finest()
         runs += 1
         if len(run.payload) <= target or abs(size_miss(run, target)) < abs(last.miss):
@@ -224,6 +229,7 @@ def meet_rate(
         far = abs(trial.miss) >= math.log2(FAR) or (last is not None and _stuck(last, trial))
         if met(trial.miss) or not far or over in limits:
             continue
+        run_begins()
         limit = limits[over] = coarsest() if over else finest()
         if not over and len(limit.payload) <= target:
             return CodingResult(run=limit, runs=len(tried) + len(limits))  # a worse run would only take more bytes

@@ -140,6 +140,8 @@ def parse_json(text: str | bytes) -> Any:
         _check_depth(value, MAX_DEPTH)
     except RecursionError:
         raise ValueError("nested too deeply") from None
+    except json.JSONDecodeError as error:
+        raise ValueError(f"no JSON, line {error.lineno}, column {error.colno}: {error.msg}") from None
     return value
 
 

@@ -1,14 +1,15 @@
 """Gallery of reference scenes: a viewer page and a still of each.
 
-    python -m benchmarks run gallery [--missing] [--stills] [--scale 2]
+    python -m benchmarks run gallery [--scenes twins hairdo] [--missing] [--stills] [--scale 2]
 
 Pages go to ``docs/gallery``. Git does not keep them; ``make docs`` writes those that are missing. With ``--stills`` a
-browser draws the stills, which git keeps, and ``docs/gallery/README.md`` is written.
+browser draws the stills of the scenes, which git keeps, and ``docs/gallery/README.md`` is written.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.records import ROOT
@@ -36,17 +37,18 @@ that each lens sees them whole: no display of this kind can resolve them.
 def main() -> None:
     """Write the pages, and the stills if the command line says so."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", nargs="+", choices=list(scene_names()), default=list(scene_names()))
     parser.add_argument("--stills", action="store_true", help="draw the stills and write the README, in a browser")
     parser.add_argument("--scale", type=int, default=SCALE, help="divides the lenses of setup1")
     parser.add_argument("--missing", action="store_true", help="leave pages as they are that exist")
     asked = parser.parse_args()
-    for name in scene_names():
+    for name in asked.scenes:
         if asked.missing and page_of(name).exists():
             continue
         size = write_page(name, asked.scale)
         print(f"{page_of(name)}: {size / 2**20:.1f} MB", flush=True)
     if asked.stills:
-        draw_stills()
+        draw_stills(asked.scenes)
 
 
 def page_of(name: str) -> Path:
@@ -61,17 +63,16 @@ def write_page(name: str, scale: int = SCALE) -> int:
     return write_viewer(page_of(name), shot.picture, depth=shot.depth, title=name, quality=QUALITY)
 
 
-def draw_stills() -> None:
-    """Draw a still of each page in a browser, and write the README that shows them."""
-    lines = [INTRODUCTION]
+def draw_stills(names: Sequence[str]) -> None:
+    """Draw a still of each page in a browser, and write the README that shows those of all scenes."""
     with tab(STILL) as page:
-        for name, about in scene_names().items():
+        for name in names:
             page.goto(f"file://{page_of(name)}{STILLS.get(name, '')}")
             page.evaluate("async () => { await ii.ready }")
             page.wait_for_timeout(1000)
             page.screenshot(path=GALLERY / f"{name}.jpg", type="jpeg", quality=80)
-            lines.append(f"## {name}\n\n{about}.\n\n![{name}]({name}.jpg)\n")
-    (GALLERY / "README.md").write_text("\n".join(lines), encoding="utf-8")
+    lines = [f"## {name}\n\n{about}.\n\n![{name}]({name}.jpg)\n" for name, about in scene_names().items()]
+    (GALLERY / "README.md").write_text("\n".join([INTRODUCTION, *lines]), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from ..colour import Format, ycbcr
 from ..contract import Coder, Goal, Option, Options, Pixels
 from ..frames import Film, layout
 from ..order import BY, ORDERS, selection_order
+from ..progress import frames_done
 from ..search import Axis, CodingResult, Run, Trial, bracket, met, nearest, size_miss, trials
 from . import groups
 from .decoding import copy_plane, decoded_frames
@@ -293,6 +294,7 @@ def _decode(coder: PseudoVideo[Any], payload: bytes, film: Film, blank: NDArray[
                 copy_plane(plane, target[index])
         film.scatter(planes, origins[done : done + len(batch)], pixels)
         done += len(batch)
+        frames_done(done, film.frames)
     if done < film.frames:
         raise ValueError(f"its {coder.standard} stream has {done} frames, {film.frames} are needed")
     return pixels, seconds

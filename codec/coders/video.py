@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..clock import OwnThreads, cpu_seconds
 from ..contract import Option
 from ..frames import Film
+from ..progress import frames_done
 from ..search import Run
 from .pseudo_video import ORDER, Packets, PseudoVideo, Source
 
@@ -79,6 +80,7 @@ class Video(PseudoVideo[Settings]):
                 number += 1
                 packets.extend(map(bytes, context.encode(frame)))
             seconds += cpu_seconds() - started
+            frames_done(number, film.frames)
         started = cpu_seconds()
         packets.extend(map(bytes, context.encode(None)))
         threads.end()

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from .common import Force, app, check_outputs, spinner
+from .common import Force, app, check_outputs
+from .progress import spinner
 from .words import say
 
 

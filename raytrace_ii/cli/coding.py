@@ -7,9 +7,11 @@ from typing import Annotated
 
 import typer
 
-from .common import Force, app, check_outputs, columns, console, image_file, picture_files, spinner
+from .common import Force, app, check_outputs, columns, image_file, picture_files
 from .plugins import Plugins, load_plugins
-from .words import one_line, say
+from .progress import progress_bar, say_done, spinner
+from .tables import print_table
+from .words import say
 
 
 @app.command()
@@ -63,10 +65,11 @@ def encode(
         encode_frames(picture, output, scheme, plan, bpp=bpp, qp=qp, rate=rate)
         return
     original = IIPicture.load(picture)
-    with spinner(f"{scheme} codes {picture.name}"):
-        coded = encode(original, scheme, bpp=bpp, qp=qp, quality=quality)
+    with progress_bar(f"{scheme} codes {picture.name}", at_once=True) as report:
+        coded = encode(original, scheme, bpp=bpp, qp=qp, quality=quality, progress=report)
     coded.save(output)
-    say(f"{output}: {coded.nbytes} bytes, {coded.bpp:.4g} bpp in {coded.encode_seconds:.1f} s")
+    runs = f" after {coded.runs} encoder runs" if coded.runs and coded.runs > 1 else ""
+    say_done(f"{output}: {coded.nbytes} bytes, {coded.bpp:.4g} bpp{runs}")
     if not coded.reached:
         say(f"{scheme} cannot reach {bpp:g} bpp with this picture: the nearest rate is {coded.bpp:.4g} bpp")
 
@@ -107,11 +110,12 @@ def decode(
     stream = Encoded.load(coded)
     files = picture_files if component is None else image_file
     check_outputs(files(output, stream.dtype), force)
-    with spinner(f"decode {coded.name}"):
+    with progress_bar(f"decode {coded.name}", at_once=True) as report:
         if component is None:
-            decode(stream, **limit).save(output)
+            decode(stream, **limit, progress=report).save(output)
         else:
             write_image(output, decode_component(stream, _place(component)))
+    say_done(f"{output}: {stream.scheme} at {stream.bpp:.4g} bpp")
 
 
 @app.command()
@@ -133,7 +137,7 @@ def extract(
     stream = Encoded.load(coded)
     with spinner(f"extract {coded.name}"):
         shown = extract(stream, output)
-    say(f"{output}: {output.stat().st_size} bytes around {len(stream.payload)} of {stream.scheme}, {shown}")
+    say_done(f"{output}: {output.stat().st_size} bytes around {len(stream.payload)} of {stream.scheme}, {shown}")
 
 
 def _place(text: str) -> tuple[int, int]:
@@ -146,8 +150,6 @@ def _place(text: str) -> tuple[int, int]:
 
 def study_orders(path: Path, folder: Path, force: bool) -> None:
     """Write NAME_orders.json and print its table of correlation and residuals by order."""
-    from rich.table import Table
-
     from codec import analyse_orders
     from ii_core import IIPicture
     from ii_core.files import write_json
@@ -158,12 +160,13 @@ def study_orders(path: Path, folder: Path, force: bool) -> None:
     with spinner(f"analyse {path.name}"):
         rows = [analysis.to_json() for analysis in analyse_orders(IIPicture.load(path))]
     write_json(numbers, {**provenance(), "picture": path.name, "rows": rows})
-    table = Table(title=one_line(f"{path.stem}: consecutive frames; e is the mean energy of their difference"))
-    for column in ("images", "order", "frames", "mean c", "σ of c", "undefined", "e", "e a sample"):
-        table.add_column(column, justify="left" if column in ("images", "order") else "right")
-    for r in rows:
-        table.add_row(
-            r["kind"], r["order"], str(r["frames"]), f"{r['correlation_mean']:.4f}", f"{r['correlation_sigma']:.4f}",
-            str(r["undefined"]), f"{r['energy']:.4g}", f"{r['energy_per_sample']:.1f}",
-        )  # fmt: skip
-    console().print(table)
+    table = [
+        {
+            "images": row["kind"], "order": row["order"], "frames": str(row["frames"]),
+            "mean c": f"{row['correlation_mean']:.4f}", "σ of c": f"{row['correlation_sigma']:.4f}",
+            "undefined": str(row["undefined"]), "e": f"{row['energy']:.4g}",
+            "e a sample": f"{row['energy_per_sample']:.1f}",
+        }
+        for row in rows
+    ]  # fmt: skip
+    print_table(f"{path.stem}: consecutive frames; e is the mean energy of their difference", table, names=2)

@@ -1,30 +1,46 @@
-"""Common parts of commands: the app, checks of outputs, progress bars."""
+"""Common parts of commands: the app, checks of outputs, small parsers."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .folders import create_folder
-from .words import one_line, say
+from .progress import App
+from .words import say
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from ii_core import IIPicture
 
-app = typer.Typer(
-    help="Integral imaging: synthesize, code and evaluate 3-D pictures.",
-    no_args_is_help=True,
-    add_completion=False,
+app = App(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        say(f"raytrace-ii {version('raytrace-ii')}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _group(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Integral imaging: synthesize, code and evaluate 3-D pictures."""
+    if context.invoked_subcommand is None:
+        say(context.get_help())
+
 
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
 Workers = Annotated[int | None, typer.Option(help="Number of threads; the number of cores by default.")]
@@ -131,41 +147,3 @@ def columns(rows: dict[str, str]) -> None:
     width = max(map(len, rows), default=0)
     for name, text in rows.items():
         say(f"{name:<{width}}  {text}")
-
-
-def console(**options: Any) -> Console:
-    """Return a console without markup: brackets and colons are printed unchanged."""
-    from rich.console import Console
-
-    return Console(markup=False, emoji=False, highlight=False, **options)
-
-
-@contextmanager
-def progress_bar(title: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Show a progress bar on the error stream; yield a function of done, total and a text on the last step."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    named = TextColumn("{task.description}", markup=False)
-    columns = (named, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    bar = Progress(*columns, TextColumn("{task.fields[step]}", markup=False), console=console(stderr=True))
-    task = bar.add_task(one_line(title), total=None, step="")
-
-    def report(done: int, total: int, step: str) -> None:
-        bar.start()  # late start: a failure before the first step leaves no empty bar
-        bar.update(task, completed=done, total=total, step=one_line(step))
-
-    try:
-        yield report
-    finally:
-        if bar.live.is_started:
-            bar.stop()
-
-
-@contextmanager
-def spinner(title: str) -> Iterator[None]:
-    """Show a spinner on the error stream, for work without countable steps."""
-    from rich.text import Text
-
-    out = console(stderr=True)
-    with out.status(Text(one_line(title)), spinner="dots" if out.encoding.startswith("utf") else "line"):
-        yield

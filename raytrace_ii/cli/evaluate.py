@@ -10,9 +10,11 @@ import typer
 
 from .cluster import Dask, cluster
 from .coding import study_orders
-from .common import Force, Workers, app, check_outputs, columns, console, load_any, progress_bar, spinner
+from .common import Force, Workers, app, check_outputs, columns, load_any
 from .plugins import Plugins, load_plugins
-from .words import one_line, say
+from .progress import progress_bar, spinner
+from .tables import print_table
+from .words import say
 
 if TYPE_CHECKING:
     from ii_core import IIPicture
@@ -123,16 +125,17 @@ def _layers(text: str | None, picture: IIPicture) -> Any:
         return None
     if text == "dissertation":
         return linear_layers(camera_of(picture))
-    parts = text.split(":")
+    *span, count = text.split(":")
     try:
-        if len(parts) == 1:
-            return linear_layers(camera_of(picture), int(parts[0]))
-        near, far, count = parts
-        return logarithmic_layers(float(near), float(far), int(count))
+        ends, number = [float(end) for end in span], int(count)
+    except ValueError:
+        ends, number = [], 0
+    if len(ends) not in (0, 2) or not number:
+        raise ValueError(f"layers are {text!r}: dissertation, a number or NEAR:FAR:COUNT is needed")
+    try:
+        return logarithmic_layers(ends[0], ends[1], number) if ends else linear_layers(camera_of(picture), number)
     except ValueError as error:
-        raise ValueError(
-            f"layers are {text!r}: dissertation, a number or NEAR:FAR:COUNT is needed ({error})"
-        ) from None
+        raise ValueError(f"layers are {text!r}: {error}") from None
 
 
 @app.command()
@@ -176,6 +179,8 @@ def study(
 
     if dask and workers is not None:
         raise ValueError("--workers is for threads of this machine: leave it out with --dask")
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers is {workers}: at least 1 is needed")
     if dask and plugin:
         raise ValueError("--plugin is for this machine alone: with --dask, install it as a package on all workers")
     load_plugins(plugin)
@@ -347,14 +352,6 @@ def about(measure: str, anchor: str) -> str:
 
 def print_summary(name: str, study: dict[str, Any], measure: str = "q_global") -> None:
     """Print the study as a table in the terminal."""
-    from rich.table import Table
-
     from metrics import summary_table
 
-    rows = summary_table(study, measure=measure)
-    table = Table(title=one_line(f"{name}: {about(measure, study['anchor'])}"))
-    for column in rows[0]:
-        table.add_column(column, justify="left" if column == "scheme" else "right", no_wrap=True)
-    for row in rows:
-        table.add_row(*map(one_line, row.values()))
-    console(width=max(console().width, 150)).print(table)
+    print_table(f"{name}: {about(measure, study['anchor'])}", summary_table(study, measure=measure))

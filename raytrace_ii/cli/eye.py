@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .common import Force, app, check_outputs, image_file, pair, spinner
-from .words import say
+from .common import Force, app, check_outputs, image_file, pair
+from .progress import say_done, spinner
 
 if TYPE_CHECKING:
     from ii_core import DisplayModel, Eye
@@ -64,7 +64,7 @@ def eye(
         with spinner(f"eye {picture.name}"):
             seen = eye_image(shown, display, one, size=points, rays=rays)
             write_image(path, seen.pixels)
-        say(f"{path}: {seen.seen.mean():.1%} of the rays meet the panel; {_zone(display, one)}")
+        say_done(f"{path}: {seen.seen.mean():.1%} of the rays meet the panel; {_zone(display, one)}")
 
 
 def _zone(display: DisplayModel, eye: Eye) -> str:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, app, check_outputs, columns, pair, progress_bar
+from .common import Force, app, check_outputs, columns, pair
 from .plugins import Plugins, load_plugins
+from .progress import progress_bar
 from .words import say
 
 if TYPE_CHECKING:

@@ -7,19 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .common import (
-    Force,
-    app,
-    check_folder,
-    check_outputs,
-    image_file,
-    load_any,
-    pair,
-    picture_files,
-    progress_bar,
-    spinner,
-)
+from .common import Force, app, check_folder, check_outputs, image_file, load_any, pair, picture_files
 from .plugins import Plugins, load_plugins
+from .progress import progress_bar, say_done, spinner
 from .words import say
 
 if TYPE_CHECKING:
@@ -61,7 +51,7 @@ def regular(
         if mask:
             write_image(mask, owned.astype(np.uint8) * 255)
     (k, l), (u, v) = made.lenses, made.ei_pixels
-    say(f"{output}: {k}×{l} lenses of {u}×{v} px, {owned.mean():.1%} of the pixels owned by their lens")
+    say_done(f"{output}: {k}×{l} lenses of {u}×{v} px, {owned.mean():.1%} of the pixels owned by their lens")
 
 
 @app.command("import")
@@ -177,7 +167,7 @@ def export(
                 z = None if depth is None else read_depth(depth, size=original.size)
                 write_hci(original, output, depth=z)
         (k, l), (u, v) = original.lenses, original.ei_pixels
-        say(f"{output}: {u * v} views of {k}×{l} px")
+        say_done(f"{output}: {u * v} views of {k}×{l} px")
         return
     target = quilt_path(output, original) if to == "quilt" else output
     check_outputs(image_file(target, original.pixels.dtype.name), force)
@@ -185,7 +175,7 @@ def export(
         write_quilt(original, target, row=row)
     else:
         write_image(target, original.pixels)
-    say(target)
+    say_done(str(target))
 
 
 @app.command()
@@ -228,4 +218,4 @@ def components(
         lined = np.zeros((rows, height + 1, cols, width + 1, 3), stack.dtype)
         lined[:, :-1, :, :-1] = stack.transpose(0, 2, 1, 3, 4)
         write_image(sheet, lined.reshape(rows * (height + 1), cols * (width + 1), 3)[:-1, :-1])
-    say(f"{output}: {rows}×{cols} images of {width}×{height} px")
+    say_done(f"{output}: {rows}×{cols} images of {width}×{height} px")

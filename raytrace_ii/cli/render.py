@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .cluster import Dask, cluster
-from .common import Force, Workers, app, check_outputs, image_file, picture_files, progress_bar
-from .words import say
+from .common import Force, Workers, app, check_outputs, image_file, picture_files
+from .progress import progress_bar, say_done
 
 if TYPE_CHECKING:
     from ..rendering.render import Stats
@@ -133,7 +133,8 @@ def _render_scene(
             for name in _all_support(array) if support else ():
                 files.setdefault(name, []).append(numbered(support))  # type: ignore[arg-type]
             more = {"pose": pose, "upright": array.lenses == (1, 1), "support": files, "dtype": dtype}
-            _say_stats(_shoot(numbered(output), loaded, array, **more, **options, **means))
+            path = numbered(output)
+            say_done(f"{path}: {_told(_shoot(path, loaded, array, **more, **options, **means))}")
         if projection:
             _save_projection(loaded, arrays[0], poses[0], projection, means)
 
@@ -174,7 +175,8 @@ def _render_set(
         )  # fmt: skip
     products = [p for entry in manifest["scenes"].values() for p in entry["products"].values()]
     seconds, rays = sum(p["seconds"] for p in products), sum(sum(p["rays"].values()) for p in products)
-    say(f"{folder}: {len(manifest['scenes'])} scenes, {rays / 1e6:.1f} M rays, rendered in {seconds:.1f} s in all")
+    about = f"{rays / 1e6:.1f} M rays, all rendered in {seconds:.1f} s"
+    say_done(f"{folder}: {len(manifest['scenes'])} scenes, {about}")
 
 
 def _cameras(name: str, scale: int) -> Sequence[Any]:
@@ -247,11 +249,10 @@ def _save_projection(scene: Any, camera: Any, pose: Any, path: Path, means: dict
     write_image(path, orthoscopic(view.picture).pixels)
 
 
-def _say_stats(s: Stats) -> None:
+def _told(s: Stats) -> str:
+    """Numbers of rays, and the share of Embree in the time of tracing."""
     counts = ", ".join(f"{count / 1e6:.2f} M {kind}" for kind, count in s.rays.items() if count)
-    if sum(s.skipped.values()):
-        counts += f", {sum(s.skipped.values()) / 1e6:.2f} M too weak to trace,"
     spread = f" ({s.mean_samples:.1f} per pixel)" if len(s.samples) > 1 else ""
-    say(
-        f"{counts} rays{spread} in {s.seconds:.1f} s, {s.embree_seconds:.1f} s of {s.cpu_seconds:.1f} CPU s in Embree"
-    )
+    weak = sum(s.skipped.values()) / 1e6
+    left_out = f", {weak:.2f} M too weak to trace" if weak else ""
+    return f"{counts} rays{spread}{left_out}; {s.embree_seconds:.1f} of {s.cpu_seconds:.1f} CPU s in Embree"

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, app, check_outputs, image_file, load_any, pair, progress_bar, spinner
+from .common import Force, app, check_outputs, image_file, load_any, pair
 from .plugins import Plugins, load_plugins
+from .progress import progress_bar, say_done, spinner
 from .video import coding, compared_takes, is_take_source
 from .words import say
 
@@ -154,7 +155,7 @@ def display(
         else:
             made = display_simulation(original, _eye(original, at), size=pixels, fill=fill)
         write_image(output, made)
-    say(f"{output}: {made.shape[1]}×{made.shape[0]} px")
+    say_done(f"{output}: {made.shape[1]}×{made.shape[0]} px")
 
 
 def _film(
@@ -174,7 +175,7 @@ def _film(
                 report(done, count, "")
 
         write_animation(output, frames(), fps=fps)
-    say(f"{output}: {count} frames of {size[0]}×{size[1]} px")
+    say_done(f"{output}: {count} frames of {size[0]}×{size[1]} px")
 
 
 def _eye(picture: Any, at: str | None) -> Any:

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from .common import Force, app, check_outputs, columns, pair, progress_bar
+from .common import Force, app, check_outputs, columns, pair
+from .progress import progress_bar
 from .words import say
 
 
@@ -138,9 +139,9 @@ def _design(text: str, output: Path | None, force: bool) -> None:
 
 def _sides(text: str) -> float | list[float]:
     """A diagonal, as 15.6in, or two sides, as 345x194mm."""
-    first, times, second = text.lower().replace("×", "x").partition("x")
-    if not times:
-        return _length("panel", first)
+    first, _, second = text.lower().replace("×", "x").partition("x")
+    if not (first and second):  # "x" alone is no pair of sides
+        return _length("panel", text)
     unit = "".join(c for c in second if c not in "0123456789.")
     return [_length("panel", first if first.endswith(unit) else first + unit), _length("panel", second)]
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from .common import check_folder, check_outputs, columns, image_file, picture_files, progress_bar, spinner
+from .common import check_folder, check_outputs, columns, image_file, picture_files
+from .progress import progress_bar, say_done, spinner
 from .words import say
 
 
@@ -30,7 +31,8 @@ def render_frames(
         )
     made = [manifest["frames"][str(number)] for number in numbers]
     seconds, rays = sum(m["seconds"] for m in made), sum(sum(m["rays"].values()) for m in made)
-    say(f"{folder}: {len(made)} frames of {take.fps:g} a second, {rays / 1e6:.1f} M rays in {seconds:.1f} s in all")
+    about = f"{rays / 1e6:.1f} M rays, all rendered in {seconds:.1f} s"
+    say_done(f"{folder}: {len(made)} frames of {take.fps:g} a second, {about}")
 
 
 def _frame_numbers(text: str, count: int) -> list[int]:
@@ -64,9 +66,9 @@ def encode_frames(folder: Path, output: Path, scheme: str, plan: Any, **goal: An
         coded = encode_take(
             video, scheme, plan=plan, path=output, progress=lambda done, total: report(done, total, ""), **goal
         )
-    say(
+    say_done(
         f"{output}: {coded.frames} frames in {coded.nbytes} bytes, {coded.bpp:.4g} bpp, "
-        f"{coded.mbit_per_second:.4g} Mbit/s in {coded.encode_seconds:.1f} s"
+        f"{coded.mbit_per_second:.4g} Mbit/s"
     )
     if not coded.reached:
         say(f"{scheme} cannot reach {goal['bpp']:g} bpp with this take: {coded.bpp:.4g} is as near as it comes")
@@ -87,7 +89,7 @@ def decode_frames(
         check_folder(output, force)
         with progress_bar(f"decode {coded.name}") as report:
             video.save(output, lambda done, total: report(done, total, ""))
-        say(f"{output}: {video.frames} frames")
+        say_done(f"{output}: {video.frames} frames")
         return
     if not 0 <= frame < video.frames:
         raise ValueError(f"frame is {frame}: {coded} has frames 0..{video.frames - 1}")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, app, check_folder, check_outputs, pair, progress_bar
-from .words import say
+from .common import Force, app, check_folder, check_outputs, pair
+from .progress import progress_bar, say_done
 
 if TYPE_CHECKING:
     from ii_core import IIVideo
@@ -66,7 +66,7 @@ def video(
         else:
             places = viewpoints_around(with_assumed_camera(shown.structure), shown.frames, cone=cone)
             made = write_path_film(shown, output, places, size=pixels, depth_mm=depth, progress=told)
-    say(f"{made}: {shown.frames} frames, {shown.fps:g} a second")
+    say_done(f"{made}: {shown.frames} frames, {shown.fps:g} a second")
 
 
 def is_take_source(path: Path) -> bool:

@@ -263,7 +263,7 @@ BAD_CODINGS = {
     "bpp is 0": ["--bpp", 0],
     "bpp is -1": ["--bpp", -1],
     "bpp is nan": ["--bpp", "nan"],
-    "bpp is None and qp is None": [],
+    "no bpp or qp is given: exactly one of bpp and qp is needed": [],
     "qp is 99": ["--qp", 99],
 }
 
@@ -272,6 +272,20 @@ BAD_CODINGS = {
 def test_bad_encodings_are_one_line(run, refused, picture, tmp_path, said):
     refused(run("encode", picture, *BAD_CODINGS[said], "-o", tmp_path / "x.ii"), said)
     assert not list(tmp_path.iterdir())
+
+
+def test_wrong_input_is_named(run, refused, picture, tmp_path):
+    """On b1dc540 JSON errors had no reason of ours, and --workers 0 was taken for all cores."""
+    (tmp_path / "camera.json").write_text('{"pixels": [1,')
+    refused(run("camera", tmp_path / "camera.json"), "camera.json: no JSON, line 1, column 15: Expecting value")
+    bare = tmp_path / "bare.png"
+    bare.write_bytes(picture.read_bytes())
+    (tmp_path / "bare.png.json").write_text("{")
+    refused(run("measure", bare, bare), "bare.png.json: no JSON, line 1, column 2")
+    refused(run("study", picture, "--rates", 1, "--workers", 0, "-o", tmp_path / "s"), "workers is 0")
+    said = "layers are 'x': dissertation, a number or NEAR:FAR:COUNT is needed\n"
+    refused(run("measure", picture, picture, "--layers", "x"), said)
+    refused(run("camera", "--design", "panel=x,pixels=9x9,pitch=1,distance=9"), "panel is 'x'")
 
 
 def test_pictures_that_do_not_fit_their_structure(run, refused, picture, tmp_path):
