@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from collections import OrderedDict
@@ -270,8 +271,9 @@ def open_video(source: str | os.PathLike[str], *, fps: float | None = None) -> I
     if not found:
         raise ValueError(f"{folder} holds no frames: files frame_0000.png and on are needed")
     first, last = min(found), max(found)
-    if missing := [number for number in range(first, last + 1) if number not in found]:
-        raise ValueError(f"{folder} lacks frame {missing[0]} ({len(missing)} missing of {first}..{last})")
+    if missing := last - first + 1 - len(found):
+        lacking = next(number for number in itertools.count(first) if number not in found)
+        raise ValueError(f"{folder} lacks frame {lacking} ({missing} missing of {first}..{last})")
     paths = [found[number] for number in range(first, last + 1)]
     rate, poses = _index(folder, first, len(paths))
     files = FrameFiles(paths)

@@ -3,7 +3,7 @@
     python -m benchmarks run takes [--scale 8] [--takes apples,car,cuboid]
 
 Takes are rendered once into ``out/takes``. Numbers go to ``benchmarks/results/takes.jsonl``, the tables into
-``docs/video.md``, the chart into ``docs/images/takes.png``.
+``docs/video.md``; `benchmarks.pages.video` draws them.
 """
 
 from __future__ import annotations
@@ -14,12 +14,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, origin, with_commits
-from codec import Plan, component_cost, encode_take, open_take
+from codec import Plan, component_cost, decode, encode, encode_take, open_take
 from ii_core import IIVideo, open_video, preset, sub_images, video_of
-from ii_core.display.figure import COLOURS, MARKERS, new_figure, save
 from metrics import bd_rate, measure_take
 from metrics.rd import UndefinedDifference
 from raytrace_ii import load_take, render_take
@@ -41,22 +39,29 @@ PLANS = {
     "interleaved, groups of 16 views": Plan(walk="interleaved", span=SPAN, group=16, strip=4),
 }
 ONE_WAY = ("view-first", "time-first")
+# Scheme and quantisers by coder, of PSNRs that overlap. `si-lf` codes pictures alone; its frames are FRAMES_ALONE.
+CODERS = {
+    "H.264": (SCHEME, QPS),
+    "HEVC": ("si-hevc", QPS),
+    "AV1": ("si-av1", (20, 32, 44, 56)),
+    "si-lf": ("si-lf", (26, 32, 38, 44)),
+}
+FRAMES_ALONE = (0, 4)
 
 
 def main() -> None:
-    """Measure, print, keep, and fill tables and chart."""
+    """Measure, print, keep, and fill tables."""
     asked = command_line(__doc__, scale=SCALE, takes=TAKES).parse_args()
     takes = asked.takes
     keys = [{"take": take, "scale": asked.scale, "plan": plan} for plan in PLANS for take in takes]
     keys += [{"take": take, "scale": asked.scale, "step": step} for step in STEPS for take in takes]
+    keys += [{"take": take, "scale": asked.scale, "coder": coder} for coder in CODERS for take in takes]
     for key in RECORDS.todo(keys, asked.again):
         video = rendered(key["take"], asked.scale)
         RECORDS.measure(key, lambda key=key, video=video: coded(video, **key))
         print(key, flush=True)
     print("\n".join(line for lines in tables().values() for line in lines))
     publish(tables())
-    if asked.scale == SCALE and RECORDS.newest(scale=SCALE):
-        chart()
 
 
 def rendered(take: str, scale: int) -> IIVideo:
@@ -67,8 +72,10 @@ def rendered(take: str, scale: int) -> IIVideo:
     return open_video(folder)
 
 
-def coded(video: IIVideo, take: str, scale: int, plan: str = "", step: int = 0) -> dict[str, Any]:
-    """Points of one plan; or, of every step-th frame, points of both one-way orders and correlations."""
+def coded(video: IIVideo, take: str, scale: int, plan: str = "", step: int = 0, coder: str = "") -> dict[str, Any]:
+    """Points of one plan; of a coder; or, of every step-th frame, points of both one-way orders and correlations."""
+    if coder:
+        return {"curves": by_coder(video, *CODERS[coder])}
     if plan:
         return {"points": points(video_of([video[i] for i in range(FRAMES)], fps=video.fps), PLANS[plan])}
     some = video_of([video[step * i] for i in range(INSTANTS)], fps=video.fps / step)
@@ -76,11 +83,29 @@ def coded(video: IIVideo, take: str, scale: int, plan: str = "", step: int = 0) 
     return {"curves": curves, **correlations(some)}
 
 
-def points(video: IIVideo, plan: Plan) -> list[dict[str, float]]:
+def by_coder(video: IIVideo, scheme: str, quantisers: Sequence[int]) -> dict[str, list[dict[str, float]]]:
+    """Points of the first instants as stills and time-first; of a coder of pictures only as stills."""
+    if scheme == "si-lf":
+        return {"stills": [alone(video, scheme, qp) for qp in quantisers]}
+    some = video_of([video[i] for i in range(INSTANTS)], fps=video.fps)
+    return {name: points(some, PLANS[name], scheme, quantisers) for name in ("stills", "time-first")}
+
+
+def alone(video: IIVideo, scheme: str, qp: int) -> dict[str, float]:
+    """Rate and quality of frames that a coder of pictures codes one by one."""
+    original = video_of([video[i] for i in FRAMES_ALONE], fps=video.fps)
+    coded = [encode(picture, scheme, qp=qp) for picture in original]
+    quality = measure_take(original, video_of([decode(one) for one in coded], fps=video.fps))
+    return {"qp": qp, "bpp": sum(one.bpp for one in coded) / len(coded), "psnr_of_pooled_mse": quality.pooled_psnr}
+
+
+def points(
+    video: IIVideo, plan: Plan, scheme: str = SCHEME, quantisers: Sequence[int] = QPS
+) -> list[dict[str, float]]:
     """Rate and quality at every quantiser."""
     found = []
-    for qp in QPS:
-        coded = encode_take(video, SCHEME, qp=qp, plan=plan)
+    for qp in quantisers:
+        coded = encode_take(video, scheme, qp=qp, plan=plan)
         quality = measure_take(video, open_take(coded))
         found.append(
             {
@@ -132,7 +157,8 @@ def by_plan(scale: int = SCALE) -> dict[str, dict[str, Any]]:
 
 def tables() -> Tables:
     """Return the tables of the page of videos."""
-    return {("docs/video.md", "takes"): plan_table(), ("docs/video.md", "takes-speed"): speed_table()}
+    made = {"takes": plan_table(), "takes-coders": coder_table(), "takes-speed": speed_table()}
+    return {("docs/video.md", name): lines for name, lines in made.items()}
 
 
 def plan_table() -> list[str]:
@@ -157,6 +183,29 @@ def plan_table() -> list[str]:
     return [origin(every), "", *with_commits(lines, commits)]
 
 
+def coder_table() -> list[str]:
+    """A row a coder and order: Bjøntegaard rate against stills of H.264."""
+    rows = {(row["coder"], row["take"]): row for row in RECORDS.rows(scale=SCALE) if "coder" in row}
+    if not rows:
+        return ["Not measured yet."]
+    lines = ["| coder | order | " + " | ".join(TAKES) + " |", "|---|---|" + "---|" * len(TAKES)]
+    for coder in CODERS:
+        for order in ("stills", "time-first"):
+            cells = []
+            for take in TAKES:
+                anchor, test = (rows.get((name, take), {"curves": {}})["curves"] for name in ("H.264", coder))
+                off = difference(anchor["stills"], test[order]) if "stills" in anchor and order in test else None
+                cells.append("anchor" if (coder, order) == ("H.264", "stills") else rate_text(off))
+            if coder != "si-lf" or order == "stills":
+                lines.append(f"| {coder} | {order} | " + " | ".join(cells) + " |")
+    return [origin(rows.values()), "", *lines]
+
+
+def rate_text(off: float | None) -> str:
+    """A Bjøntegaard rate as a table shows it."""
+    return "–" if off is None else f"{off:+.1f} %"
+
+
 def speed_table() -> list[str]:
     """A row a take and speed: correlations, and rate of time-first against view-first."""
     rows = [row for row in RECORDS.rows(scale=SCALE) if "step" in row]
@@ -173,47 +222,6 @@ def speed_table() -> list[str]:
             f"{1 - row['view_correlation']:.4f} | {'–' if off is None else f'{off:+.1f} %'} |"
         )
     return [origin(rows), "", *lines]
-
-
-def chart() -> None:
-    """Draw rate over random access, and time-first against view-first over the ratio of decorrelations."""
-    figure = new_figure(11, 4.6)
-    left, right = figure.subplots(1, 2)
-    for i, plans in enumerate(by_plan().values()):
-        for j, plan in enumerate(PLANS):
-            off = None if plan not in plans else difference(plans["stills"]["points"], plans[plan]["points"])
-            if off is not None:
-                cost = component_cost(PLANS[plan], 256, FRAMES).mean
-                left.plot(cost, off, marker=MARKERS[j], color=COLOURS[i], linestyle="none", markersize=8)
-    for j, plan in enumerate(PLANS):
-        left.plot([], [], marker=MARKERS[j], color="0.3", linestyle="none", label=plan)
-    left.axhline(0, color="0.5", linewidth=0.8)
-    left.set_xscale("log")
-    left.set_xlabel("frames decoded for one SI at one instant, mean")
-    left.set_ylabel("rate against stills at equal quality [%]")
-    left.set_title("use this when: rate against random access", loc="left", fontsize=10)
-    rows = [row for row in RECORDS.rows(scale=SCALE) if "step" in row]
-    for i, take in enumerate(TAKES):
-        pairs = []
-        for row in rows:
-            off = difference(*(row["curves"][name] for name in ONE_WAY)) if row["take"] == take else None
-            if off is not None:
-                pairs.append(((1 - row["time_correlation"]) / (1 - row["view_correlation"]), off))
-        right.plot(*np.array(sorted(pairs) or np.empty((0, 2))).T, marker="o", color=COLOURS[i], label=take)
-    right.axhline(0, color="0.5", linewidth=0.8)
-    right.axvline(1, color="0.5", linewidth=0.8, linestyle=":")
-    right.set_xscale("log")
-    right.set_xlabel("(1 − c in time) / (1 − c in view)")
-    right.set_ylabel("rate of time-first against view-first [%]")
-    right.set_title("use time-first when c in time is the higher", loc="left", fontsize=10)
-    for axes in (left, right):
-        axes.grid(True, color="0.9", linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
-    figure.legend(loc="outside lower left", ncols=5, frameon=False, fontsize=8)
-    path = ROOT / "out" / "takes.png"
-    path.parent.mkdir(exist_ok=True)
-    write_picture(IMAGES / "takes.png", save(figure, path, dpi=130))
 
 
 if __name__ == "__main__":

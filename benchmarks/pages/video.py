@@ -1,6 +1,6 @@
-"""Pictures of the page of videos: frames of the reference takes, charts of rate over random access and over time.
+"""Pictures of the page of videos: frames of takes, and charts of random access, of crossing orders and over time.
 
-    python -m benchmarks run video [--only access]
+    python -m benchmarks run video [--only charts]
 
 Views are the middle sub-images of frames that `benchmarks.coding.takes` renders.
 """
@@ -10,12 +10,16 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
+from matplotlib.figure import Figure
 from PIL import Image
 
+from benchmarks.coding import crossing
 from benchmarks.coding.takes import (  # fmt: skip
     FRAMES,
     INSTANTS,
+    ONE_WAY,
     PLANS,
+    RECORDS,
     SCALE,
     SCHEME,
     TAKES,
@@ -38,8 +42,9 @@ HEIGHT = 180
 def main() -> None:
     """Write the pictures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", choices=("access",), help="the chart that is drawn from records alone")
+    parser.add_argument("--only", choices=("charts",), help="the charts that are drawn from records alone")
     access_chart()
+    crossing_chart()
     if parser.parse_args().only is None:
         taken()
 
@@ -60,13 +65,46 @@ def access_chart() -> None:
     axes.set_xscale("log")
     axes.set_xlabel("frames decoded for one SI at one instant, mean")
     axes.set_ylabel("rate against stills at equal quality [%]")
-    axes.grid(True, color="0.9", linewidth=0.8)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    figure.legend(loc="outside lower left", ncols=3, frameon=False, fontsize=8)
-    out = ROOT / "out" / "takes_access.png"
+    finished(figure, "takes_access.png", ncols=3)
+
+
+def crossing_chart() -> None:
+    """Draw time-first against view-first over the decorrelation in time over that in view, plain and compensated."""
+    figure = new_figure(9.5, 4.4)
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, kind in zip(panels, ("plain", "compensated"), strict=True):
+        for i, pitch in enumerate(crossing.PITCHES):
+            rows = [row for row in crossing.rows() if row["pitch_px"] == pitch and row["rate"] is not None]
+            places = sorted((crossing.ratios(row, kind)[0], row["rate"]) for row in rows)
+            axes.plot(*np.array(places or np.empty((0, 2))).T, marker=MARKERS[i], color="0.35", linewidth=0.8,
+                      label=f"apples, lens pitch {pitch} px, four speeds" if kind == "plain" else None)  # fmt: skip
+    for i, take in enumerate(TAKES):
+        rows = [row for row in RECORDS.rows(scale=SCALE) if "step" in row and row["take"] == take]
+        places = [((1 - row["time_correlation"]) / (1 - row["view_correlation"]),
+                   difference(*(row["curves"][name] for name in ONE_WAY))) for row in rows]  # fmt: skip
+        known = np.array(sorted(place for place in places if place[1] is not None) or np.empty((0, 2)))
+        panels[0].plot(*known.T, marker="o", color=COLOURS[i], label=f"take {take}, ×1, ×2, ×4")
+    titles = "sub-images as they are, (5.3)", "after motion compensation"
+    for axes, title in zip(panels, titles, strict=True):
+        axes.axhline(0, color="0.5", linewidth=0.8)
+        axes.axvline(1, color="0.5", linewidth=0.8, linestyle=":")
+        axes.set_xscale("log")
+        axes.set_xlabel("(1 − c in time) / (1 − c in view)")
+        axes.set_title(title, loc="left", fontsize=10)
+    panels[0].set_ylabel("rate of time-first against view-first [%]")
+    finished(figure, "takes_crossing.png", ncols=3)
+
+
+def finished(figure: Figure, name: str, *, ncols: int) -> None:
+    """Give a chart its grid and legend, and write it among the pictures of the pages."""
+    for axes in figure.axes:
+        axes.grid(True, color="0.9", linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.legend(loc="outside lower left", ncols=ncols, frameon=False, fontsize=8)
+    out = ROOT / "out" / name
     out.parent.mkdir(exist_ok=True)
-    write_picture(IMAGES / "takes_access.png", save(figure, out, dpi=130))
+    write_picture(IMAGES / name, save(figure, out, dpi=110))
 
 
 def taken() -> None:

@@ -134,6 +134,8 @@ def display(
     from ii_core.files import write_image
     from ii_core.formats.quilt import quilt_name
 
+    if is_take_source(picture):
+        raise ValueError(f"{picture} is a take: raytrace-ii video {picture} shows takes, as quilts and films")
     kinds = ("quilt", "lenticular", "simulation", "parallax")
     if kind not in kinds:
         raise ValueError(f"unknown kind {kind!r}: known are {', '.join(kinds)}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import math
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -19,7 +18,7 @@ from ..scene.keyframes import Track, looking_pose, turned_pose
 from ..scene.scene import Scene
 from ..shapes.primitives import rotation
 from .load import GLTF_TYPES, MeshFiles, SceneLoader, built, is_mesh, mesh_scene, scene_path, warn_of, working_place
-from .toml_schema import ObjectTable, TrackTable, check_shape, checked_tables
+from .toml_schema import ObjectTable, TrackTable, check_shape, checked_tables, raw_tables
 
 DEFAULT_FPS = 24.0
 CAMERA_KEYS = {"position_mm": 3, "look_at_mm": 3, "rotate_deg": 3}
@@ -103,7 +102,7 @@ class Take:
         return turned_pose(place, rotation((x, y, z)))
 
     def _begin_file(self, fps: float | None) -> None:
-        self._data = built(self._path, lambda: tomllib.loads(self._path.read_text(encoding="utf-8")))
+        self._data = built(self._path, lambda: raw_tables(self._path.read_text(encoding="utf-8")))
         tables = built(self._path, checked_tables, self._data)
         if self._clip is not None:
             raise ValueError(f"clip {self._clip!r}: a scene file names the clips of its objects itself")

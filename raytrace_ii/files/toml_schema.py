@@ -255,8 +255,13 @@ def parse(text: str) -> SceneFile:
     ValueError
         With one line on the first thing that is wrong, and where it stands.
     """
+    return checked_tables(raw_tables(text))
+
+
+def raw_tables(text: str) -> dict[str, Any]:
+    """Return the tables of a TOML text, unchecked; ValueError as of `parse`."""
     try:
-        return checked_tables(tomllib.loads(text))
+        return tomllib.loads(text)
     except RecursionError:
         raise ValueError("tables or lists are nested too deeply") from None
 

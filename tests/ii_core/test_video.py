@@ -97,6 +97,11 @@ def test_a_folder_that_is_no_video(tmp_path):
     with pytest.raises(ValueError, match="is no folder of frames"):
         open_video(tmp_path / "none")
     video_of(pictures(3)).save(tmp_path)
+    far = tmp_path / f"frame_{10**20}.png"
+    far.write_bytes((tmp_path / "frame_0001.png").read_bytes())
+    with pytest.raises(ValueError, match=rf"lacks frame 3 \({10**20 - 3} missing"):  # it counted to it one by one
+        open_video(tmp_path)
+    far.unlink()
     (tmp_path / "frame_0001.png").unlink()
     with pytest.raises(ValueError, match=r"lacks frame 1 \(1 missing of 0\.\.2\)"):
         open_video(tmp_path)

@@ -32,6 +32,7 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, origin
 from benchmarks.workers import cases
 
+from . import takes as takes  # registers its readers
 from .readers import READERS, Read
 
 RECORDS = Records(

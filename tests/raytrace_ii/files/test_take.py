@@ -299,3 +299,10 @@ def test_damaged_keyframes_are_refused(tmp_path):
         gltf.save(tmp_path / "arm.glb")
         with pytest.raises(ValueError, match=named):
             vertices(tmp_path, 0, "Go")
+
+
+def test_tables_nested_too_deeply(tmp_path):
+    """Of still scenes this was an error of one line; a take ended in a RecursionError."""
+    (tmp_path / "deep.toml").write_text(f"{BALLS}{MOVES}x = {'[' * 5000}\n")
+    with pytest.raises(ValueError, match="nested too deeply"):
+        load_take(tmp_path / "deep.toml")
