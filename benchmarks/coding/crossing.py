@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.arguments import command_line
-from benchmarks.coding.neighbours import Floats, neighbours
+from benchmarks.coding.neighbours import Floats, compensated, neighbours
 from benchmarks.coding.takes import ONE_WAY, SCHEME, difference, points
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
@@ -47,7 +47,8 @@ def measured(scale: int, pitch_px: int, mm_per_frame: float) -> dict[str, Any]:
     """Points of both one-way orders, and correlations."""
     video = moving(scale, pitch_px, mm_per_frame)
     curves = {name: points(video, Plan(walk=name, span=INSTANTS), SCHEME) for name in ONE_WAY}
-    now, last, predictions = neighbours(video)
+    now, last = neighbours(video)
+    predictions = {name: compensated(now, image, 0.0)[0] for name, image in last.items()}
     plain = {name: likeness(now, image) for name, image in last.items()}
     moved = {name: likeness(now, image) for name, image in predictions.items()}
     return {"curves": curves, "plain": plain, "compensated": moved}

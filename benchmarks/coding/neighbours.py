@@ -3,9 +3,10 @@
     python -m benchmarks run neighbours [--takes car,apples,cuboid] [--again missing]
 
 Each sub-image is predicted block by block, motion-compensated, from the last instant, from the last view, from the
-better of both and from their mean, original pixels. A block's rate is that of reverse water-filling, as `bits`. The
-same takes are coded by x264 with 1 to 16 references in orders whose references are both neighbours. The first numbers
-are what a second dimension can bring, the second what the encoder makes of it.
+better of both and from their mean, original pixels. The rate of a block is that of its residual by reverse
+water-filling, and that of its vectors. The same takes are coded by x264 with 1 to 16 references, in orders whose
+references hold both neighbours. The first numbers are what a second dimension can bring, the second what an encoder
+makes of it.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from ii_core import IIVideo, sub_images, video_of
 RECORDS = Records("neighbours", ("benchmarks.coding.neighbours", "benchmarks.coding.takes"))
 BLOCK, REACH, FINE = 8, 16, 4  # pixels of a block, of the search each way, and steps of a pixel
 QUANTISERS = (27, 32)  # of H.264; the distortion of a block is at most Δ²/12
+SAME = 0.5  # bits of a vector's number that is as in the last block; others are exponential Golomb codes
 Floats = NDArray[np.float32]
 
 
@@ -79,37 +81,43 @@ def luma_images(video: IIVideo) -> Floats:
     return np.stack([sub_images(picture).astype(np.float32) @ weights for picture in video])
 
 
-def neighbours(video: IIVideo) -> tuple[Floats, dict[str, Floats], dict[str, Floats]]:
-    """Sub-images from the second instant and column of views on, their neighbours, and predictions from these.
+def neighbours(video: IIVideo) -> tuple[Floats, dict[str, Floats]]:
+    """Sub-images from the second instant and column of views on, and their neighbours, all (count, L, K).
 
-    All are (count, L, K). Neighbours and predictions by name: ``time``, the last instant; ``view``, the last view.
+    Neighbours by name: ``time``, the last instant; ``view``, the last view.
     """
     images = luma_images(video)
     flat = (-1, *images.shape[-2:])
     now = images[1:, :, 1:].reshape(flat)
-    last = {"time": images[:-1, :, 1:].reshape(flat), "view": images[1:, :, :-1].reshape(flat)}
-    return now, last, {name: compensated(now, image) for name, image in last.items()}
+    return now, {"time": images[:-1, :, 1:].reshape(flat), "view": images[1:, :, :-1].reshape(flat)}
 
 
 def predicted(video: IIVideo) -> dict[str, Any]:
-    """Bits a pixel of each prediction at each quantiser, by reverse water-filling over blocks.
+    """Bits a pixel of each prediction at each quantiser; sub-images that have both neighbours count."""
+    now, last = neighbours(video)
+    found: dict[str, dict[str, float]] = {}
+    for qp in QUANTISERS:
+        by = {name: compensated(now, image, weight(qp)) for name, image in last.items()}
+        pixels = BLOCK * BLOCK
+        rates = {name: residual_bits(now, image, qp) + vectors for name, (image, vectors) in by.items()}
+        mean = (by["time"][0] + by["view"][0]) / 2
+        both = residual_bits(now, mean, qp) + by["time"][1] + by["view"][1]
+        rates["better"] = np.minimum(rates["time"], rates["view"]) + 1  # a bit says which
+        rates["mean"] = np.minimum(rates["better"], both) + 1
+        found[str(qp)] = {name: float(rate.mean()) / pixels for name, rate in rates.items()}
+    return {"bits_per_pixel": found}
 
-    Images that have both neighbours count.
-    """
-    now, _, by = neighbours(video)
-    errors = {name: squared_error(now, image) for name, image in by.items()}
-    errors["better"] = np.minimum(errors["time"], errors["view"])
-    errors["mean"] = np.minimum(errors["better"], squared_error(now, (by["time"] + by["view"]) / 2))
-    return {
-        "bits_per_pixel": {str(qp): {name: bits(error, qp) for name, error in errors.items()} for qp in QUANTISERS},
-        "share_of_blocks_by_view": float((errors["view"] < errors["time"]).mean()),
-    }
+
+def weight(qp: int) -> float:
+    """Squared error that is worth one bit: the λ of H.264's reference software."""
+    return float(0.85 * 2 ** ((qp - 12) / 3))
 
 
-def bits(squared: NDArray[np.float64], qp: int) -> float:
-    """Bits a pixel of blocks with these mean squared errors: ½ log₂(D/θ) where D > θ = Δ²/12, else none."""
+def residual_bits(images: Floats, predictions: Floats, qp: int) -> NDArray[np.float64]:
+    """Bits of each block's residual: ½ log₂(D/θ) a pixel where its mean squared error D > θ = Δ²/12, else none."""
     step = 2 ** ((qp - 4) / 6)
-    return float(np.maximum(0.0, 0.5 * np.log2(np.maximum(squared, 1e-12) / (step * step / 12))).mean())
+    error = np.maximum(squared_error(images, predictions), 1e-12)
+    return np.asarray(BLOCK * BLOCK * np.maximum(0.0, 0.5 * np.log2(error / (step * step / 12))))
 
 
 def squared_error(images: Floats, predictions: Floats) -> NDArray[np.float64]:
@@ -119,17 +127,39 @@ def squared_error(images: Floats, predictions: Floats) -> NDArray[np.float64]:
     return np.asarray(apart.reshape(count, height // BLOCK, BLOCK, width // BLOCK, BLOCK).mean(axis=(2, 4)))
 
 
-def compensated(images: Floats, references: Floats) -> Floats:
-    """Best prediction of each block of each image from its reference: whole pixels, then half and quarter."""
-    height, width = images.shape[1:]
+def compensated(images: Floats, references: Floats, weight: float) -> tuple[Floats, NDArray[np.float64]]:
+    """Predict each image from its reference, block by block: whole pixels, then half and quarter.
+
+    Parameters
+    ----------
+    weight : float
+        Squared error that is worth one bit of a vector.
+
+    Returns
+    -------
+    predictions : ndarray, (images, height, width)
+    bits : ndarray, (images, blocks down, blocks across)
+        Of the vectors.
+    """
+    count, height, width = images.shape
     if height % BLOCK or width % BLOCK:
         raise ValueError(f"images are {width}×{height} px: multiples of {BLOCK} are needed")
     sides = [((n - 1) * FINE + 1) / n for n in (height, width)]  # ends on ends: every FINE-th sample is a pixel
-    best = np.empty_like(images)
+    best, bits = np.empty_like(images), np.empty((count, height // BLOCK, width // BLOCK))
     for number, reference in enumerate(references):
         fine = ndimage.zoom(reference, sides, order=3, mode="nearest")
-        _predict(images[number], fine, best[number])
-    return best
+        _predict(images[number], fine, weight, best[number], bits[number])
+    return best, bits
+
+
+@njit(cache=True, nogil=True)
+def _vector_bits(down, across):  # type: ignore[no-untyped-def]
+    """Bits of a vector, as its difference from that of the last block."""
+    total = 0.0
+    for n in (down, across):
+        code = 2 * abs(n)
+        total += SAME if n == 0 else 2 * np.floor(np.log2(code + 1)) + 1
+    return total
 
 
 @njit(cache=True, nogil=True)
@@ -149,27 +179,29 @@ def _error(image, fine, top, left, down, across, least):  # type: ignore[no-unty
 
 
 @njit(cache=True, nogil=True)
-def _predict(image, fine, out):  # type: ignore[no-untyped-def]
-    """Fill ``out`` with the best prediction of each block."""
+def _predict(image, fine, weight, out, bits):  # type: ignore[no-untyped-def]
+    """Fill the best prediction of each block, and the bits of its vector."""
     rows, cols = fine.shape
+    last_down, last_across = 0, 0
     for top in range(0, image.shape[0], BLOCK):
         for left in range(0, image.shape[1], BLOCK):
-            down, across = 0, 0
-            least = _error(image, fine, top, left, 0, 0, np.inf)
-            for j in range(-REACH, REACH + 1):
-                for i in range(-REACH, REACH + 1):
-                    error = _error(image, fine, top, left, j * FINE, i * FINE, least)
-                    if error < least:
-                        least, down, across = error, j * FINE, i * FINE
-            step = FINE // 2
+            down, across, least = 0, 0, np.inf
+            step = FINE
+            reach = REACH
             while step:
                 middle_down, middle_across = down, across
-                for j in (-step, 0, step):
-                    for i in (-step, 0, step):
-                        error = _error(image, fine, top, left, middle_down + j, middle_across + i, least)
-                        if error < least:
-                            least, down, across = error, middle_down + j, middle_across + i
+                for j in range(-reach, reach + 1):
+                    for i in range(-reach, reach + 1):
+                        y, x = middle_down + j * step, middle_across + i * step
+                        cost = weight * _vector_bits(y - last_down, x - last_across)
+                        if cost < least:
+                            cost += _error(image, fine, top, left, y, x, least - cost)
+                            if cost < least:
+                                least, down, across = cost, y, x
                 step //= 2
+                reach = 1
+            bits[top // BLOCK, left // BLOCK] = _vector_bits(down - last_down, across - last_across)
+            last_down, last_across = down, across
             for y in range(BLOCK):
                 row = min(max((top + y) * FINE + down, 0), rows - 1)
                 for x in range(BLOCK):

@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from benchmarks.coding.crossing import likeness, moving
-from benchmarks.coding.neighbours import BLOCK, REACH, bits, compensated, neighbours, squared_error
+from benchmarks.coding.neighbours import (
+    BLOCK,
+    REACH,
+    SAME,
+    _vector_bits,
+    compensated,
+    neighbours,
+    residual_bits,
+    squared_error,
+)
 from ii_core import IIPicture, video_of
 
 
@@ -27,7 +36,7 @@ def smooth():
 
 @pytest.mark.parametrize("move", [(0, 0), (3, -2), (REACH, -REACH), (0.25, -1.25), (-1.75, 7.25)])
 def test_a_moved_image_is_predicted_by_its_blocks(smooth, move):
-    found = compensated(smooth(*move)[None], smooth(0, 0)[None])[0]
+    found = compensated(smooth(*move)[None], smooth(0, 0)[None], 0.0)[0][0]
     low, high = ([max(0, int(np.ceil(sign * n))) + 4 for n in move] for sign in (-1, 1))  # content of the reference
     blocks = np.s_[-(-low[0] // BLOCK) * BLOCK : (48 - high[0]) // BLOCK * BLOCK,
                    -(-low[1] // BLOCK) * BLOCK : (80 - high[1]) // BLOCK * BLOCK]  # fmt: skip
@@ -40,15 +49,27 @@ def test_blocks_move_apart():
     reference = rng.normal(0, 50, (1, 32, 32)).astype(np.float32)
     image = reference.copy()
     image[0, 8:16, 8:16] = reference[0, 11:19, 4:12]
-    assert squared_error(image, compensated(image, reference)).max() == pytest.approx(0, abs=1e-6)
+    assert squared_error(image, compensated(image, reference, 0.0)[0]).max() == pytest.approx(0, abs=1e-6)
     assert squared_error(image, reference)[0, 1, 1] > 1000
 
 
 def test_bits_by_hand():
     """Δ = 16 at quantiser 28: blocks of at most Δ²/12 cost nothing, a factor of 4 one bit a pixel."""
-    theta = 16**2 / 12
-    assert bits(np.array([0.0, theta / 2, theta]), 28) == pytest.approx(0, abs=1e-12)
-    assert bits(np.array([4 * theta, 16 * theta]), 28) == pytest.approx(1.5)
+    theta, blank = 16**2 / 12, np.zeros((1, 8, 8), np.float32)
+    found = [residual_bits(blank, blank + np.float32(np.sqrt(f * theta)), 28)[0, 0, 0] / 64 for f in (0, 0.5, 4, 16)]
+    assert found == pytest.approx([0, 0, 1, 2], abs=1e-6)
+
+
+def test_vectors_cost_bits_and_are_chosen_by_them(smooth):
+    """A move of (0.75, −1.25): numbers 3 and −5, codes 6 and 10, 5 and 7 bits; then twice the same."""
+    image, reference = smooth(0.75, -1.25)[None], smooth(0, 0)[None]
+    _, bits = compensated(image, reference, 0.0)
+    assert bits[0, 0, 3] == 2 * SAME and bits[0, 2:5].max() == 2 * SAME
+    assert compensated(image[:, 8:16, 8:16], reference[:, 8:16, 8:16], 0.0)[1].shape == (1, 1, 1)
+    still, none = compensated(image, reference, 1e9)  # nothing is worth a vector
+    np.testing.assert_allclose(still, reference, atol=1e-3)
+    assert (none == 2 * SAME).all()
+    assert _vector_bits.py_func(3, -5) == 12 and _vector_bits.py_func(0, 0) == 2 * SAME
 
 
 def test_neighbours_are_the_last_instant_and_the_last_view():
@@ -58,11 +79,10 @@ def test_neighbours_are_the_last_instant_and_the_last_view():
         field = np.empty((8, 2, 8, 3), np.uint8)  # (l, v, k, u)
         field[:] = (16 * t + 4 * np.arange(3) + np.arange(2)[:, None])[None, :, None, :]
         frames.append(IIPicture(np.repeat(field.reshape(16, 24, 1), 3, axis=2), (8, 8), (3, 2)))
-    now, last, predictions = neighbours(video_of(frames))
+    now, last = neighbours(video_of(frames))
     assert now.shape == (2 * 2 * 2, 8, 8)
     np.testing.assert_allclose(now - last["time"], 16, atol=1e-4)
     np.testing.assert_allclose(now - last["view"], 4, atol=1e-4)
-    np.testing.assert_allclose(predictions["view"], last["view"], atol=1e-3)
 
 
 def test_likeness_by_hand():
