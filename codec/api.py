@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -14,6 +15,7 @@ import numpy as np
 from ii_core import IIPicture, checks
 from ii_core.camera import whole_pair
 from ii_core.files import one_line
+from ii_core.foreign import ForeignError, foreign_errors
 from ii_core.progress import reporter
 
 from . import container, file_header
@@ -28,8 +30,10 @@ from .contract import (
     Value,
     check_picture,
     checked_goal,
+    checked_options,
     find,
     fractions,
+    is_number,
     parse_scheme,
 )
 from .progress import Report, reported
@@ -37,6 +41,30 @@ from .search import Axis, CodingResult, Run, meet_size, within
 
 Result = TypeVar("Result")
 Progress = Callable[[int, int, str], None] | bool | None
+
+
+def check_coded(coded: Any) -> None:
+    """Check the fields that coded pictures and coded takes share; fill in the options that are not given.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a field is of another type or out of range; the message names it.
+    """
+    coder = find(coded.scheme)
+    check_type("options", coded.options, Mapping, "a dict")
+    object.__setattr__(coded, "options", checked_options(coder, coded.options))
+    if not isinstance(coded.dtype, str) or coded.dtype not in coder.dtypes:
+        raise ValueError(f"dtype is {coded.dtype!r}: scheme {coder.name} takes {', '.join(coder.dtypes)}")
+    check_type("structure", coded.structure, Mapping, "a dict")
+    try:
+        blank_picture(coded.structure, coded.dtype)
+    except (TypeError, KeyError) as error:
+        raise ValueError(f"structure is no structure of a picture: {one_line(error)}") from None
+    for name in ("target_bpp", "qp", "quality", "runs", "encode_seconds", "codec_seconds"):
+        value = getattr(coded, name)
+        if value is not None:
+            checks.within(name, value, 0.0, sys.float_info.max)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -73,6 +101,11 @@ class Encoded:
         CPU time inside the encoder, for the run that was kept (5.16). None if read from a file.
     versions : mapping
         Versions of the libraries in use. Empty if read from a file.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a field is of another type or out of range; the message names it.
     """
 
     scheme: str
@@ -88,6 +121,12 @@ class Encoded:
     encode_seconds: float | None = None
     codec_seconds: float | None = None
     versions: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_coded(self)
+        check_type("payload", self.payload, bytes, "bytes")
+        check_type("reached", self.reached, (bool, np.bool_), "True or False")
+        check_type("versions", self.versions, Mapping, "a dict")
 
     def __repr__(self) -> str:
         missed = "" if self.reached else f", {self.target_bpp:g} bpp not reached"
@@ -202,22 +241,23 @@ def encode(
     report = _report(progress, "encode")
     coder, settings = parse_scheme(scheme, **options)
     goal = checked_goal(coder, settings, bpp, qp, quality)
-    check_picture(coder, settings, picture)
-    coded = Encoded(
-        scheme=coder.name,
-        options=settings,
-        payload=b"",
-        structure=picture.structure_json(),
-        dtype=picture.pixels.dtype.name,
-        target_bpp=goal.bpp,
-        qp=goal.qp,
-        quality=goal.quality,
-        versions=coder.versions,
-    )
-    asked = _payload_goal(goal, coded)
-    searched = asked.bpp is not None and not coder.rate_control
-    run = partial(_at_rate, coder) if searched else coder.encode
-    result = interruptible(lambda: _reporting(report, lambda: run(picture, settings, asked)))
+    with foreign_errors(f"scheme {coder.name} failed to encode", coder):
+        check_picture(coder, settings, picture)
+        coded = Encoded(
+            scheme=coder.name,
+            options=settings,
+            payload=b"",
+            structure=picture.structure_json(),
+            dtype=picture.pixels.dtype.name,
+            target_bpp=goal.bpp,
+            qp=goal.qp,
+            quality=goal.quality,
+            versions=coder.versions,
+        )
+        asked = _payload_goal(goal, coded)
+        searched = asked.bpp is not None and not coder.rate_control
+        run = partial(_at_rate, coder) if searched else partial(_run, coder)
+        result = interruptible(lambda: _reporting(report, lambda: run(picture, settings, asked)))
     coded = replace(coded, payload=result.run.payload, runs=result.runs)
     return replace(
         coded,
@@ -238,6 +278,33 @@ def _reporting(report: Report | None, call: Callable[[], Result]) -> Result:
         return call()
 
 
+def _run(coder: Coder, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
+    """Return what a coder makes of a picture, if it is a result with bytes."""
+    result = coder.encode(picture, options, goal)
+    if not isinstance(result, CodingResult) or not isinstance(result.run.payload, bytes):
+        raise ForeignError(f"scheme {coder.name} encoded to {_kind(result)}: a CodingResult with bytes is needed")
+    return result
+
+
+def _pixels(coder: Coder, answer: Any, blank: IIPicture) -> tuple[IIPicture, float]:
+    """Return the picture and the seconds that a decoder answers, if they are of the picture's shape and type."""
+    pixels: Any
+    seconds: Any
+    pixels, seconds = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)
+    wanted = blank.pixels
+    if not isinstance(pixels, np.ndarray) or pixels.shape != wanted.shape or pixels.dtype != wanted.dtype:
+        raise ForeignError(
+            f"scheme {coder.name} decoded to {_kind(pixels)}: pixels {wanted.shape} of {wanted.dtype} are needed"
+        )
+    if not is_number(seconds):
+        raise ForeignError(f"scheme {coder.name} decoded in {_kind(seconds)}: a number of CPU seconds is needed")
+    return blank.with_pixels(pixels), float(seconds)
+
+
+def _kind(value: Any) -> str:
+    return f"an array {value.shape} of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
+
+
 # Doublings of the size over a coder's scale, as a first guess: 51 quantisers of H.264 are 8.5.
 SCALE_OCTAVES = 8
 
@@ -251,7 +318,7 @@ def _at_rate(coder: Coder, picture: IIPicture, options: Options, goal: Goal) -> 
 
     def run(setting: float) -> Run:
         value = Goal(qp=int(setting)) if name == "qp" else Goal(quality=int(setting) if whole_numbers else setting)
-        return coder.encode(picture, options, value).run
+        return _run(coder, picture, options, value).run
 
     octave = (high - low) / SCALE_OCTAVES * (-1 if name == "qp" else 1)
     axis = Axis(low=low, high=high, start=(low + high) / 2, octave=octave, step=1 if whole_numbers else 0)
@@ -330,12 +397,11 @@ def timed_decode(
             f"{name} has {width}×{height} pixels: at most {max_pixels} are decoded, raise max_pixels (--max-pixels)"
         )
     try:
-        pixels, codec_seconds = interruptible(
-            lambda: _reporting(report, lambda: coder.decode(payload, blank, settings))
-        )
+        with foreign_errors(f"scheme {coder.name} failed to decode", coder):
+            answer = interruptible(lambda: _reporting(report, lambda: coder.decode(payload, blank, settings)))
     except ValueError as error:
         raise ValueError(f"{name} is damaged: {one_line(error)}") from None
-    picture = blank.with_pixels(pixels)
+    picture, codec_seconds = _pixels(coder, answer, blank)
     return Decoding(picture=picture, seconds=cpu_seconds() - started, codec_seconds=codec_seconds)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
+from ii_core.interrupt import STOPS
 
 from .checks import check_type
 from .search import CodingResult
@@ -210,7 +211,9 @@ def _load_plugins() -> None:
                 continue
             for coder in found if isinstance(found, list | tuple) else [found]:
                 register(coder() if isinstance(coder, type) else coder)
-        except Exception as error:
+        except STOPS:
+            raise
+        except BaseException as error:  # whatever a foreign package raises, SystemExit too, must not stop the others
             warnings.warn(f"coder plugin {entry.name} ({entry.value}) is not loaded: {error}", stacklevel=2)
 
 
@@ -309,7 +312,8 @@ def checked_options(coder: Coder, given: Mapping[str, Any]) -> dict[str, Value]:
     """Return all options of a coder: the given ones, checked, and defaults for the others."""
     if unknown := set(given) - set(coder.options):
         known = ", ".join(coder.options) or "none"
-        raise ValueError(f"scheme {coder.name} has no option {', '.join(sorted(unknown))}: known are {known}")
+        names = ", ".join(sorted(map(str, unknown)))
+        raise ValueError(f"scheme {coder.name} has no option {names}: known are {known}")
     return {
         key: option.parse(key, given[key]) if key in given else option.default
         for key, option in coder.options.items()

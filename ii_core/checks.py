@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import operator
 import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
@@ -39,7 +40,8 @@ def checked(**rules: Rule) -> Callable[[Function], Function]:
     return decorate
 
 
-def _short(value: Any) -> str:
+def shown(value: Any) -> str:
+    """Return a value for a message, at most 60 characters."""
     try:
         text = repr(value)
     except ValueError:  # an integer of more digits than Python prints
@@ -49,7 +51,7 @@ def _short(value: Any) -> str:
 
 def refuse(name: str, value: Any, needed: str) -> TypeError:
     """Return a TypeError with the name, value and type of an argument and the needed kind."""
-    return TypeError(f"{name} is {_short(value)}, a {type(value).__name__}: {needed} is needed")
+    return TypeError(f"{name} is {shown(value)}, a {type(value).__name__}: {needed} is needed")
 
 
 def instance(*kinds: type) -> Rule:
@@ -80,7 +82,7 @@ def one_of(*known: str) -> Rule:
 
     def rule(name: str, value: Any) -> None:
         if not isinstance(value, str) or value not in known:
-            raise ValueError(f"unknown {name} {_short(value)}: known are {', '.join(known)}")
+            raise ValueError(f"unknown {name} {shown(value)}: known are {', '.join(known)}")
 
     return rule
 
@@ -108,12 +110,48 @@ def whole(name: str, value: Any) -> int:
     return int(value)
 
 
+def whole_from(least: int, most: int) -> Rule:
+    """Rule: a whole number within bounds; a truth value is none."""
+
+    def rule(name: str, value: Any) -> None:
+        if isinstance(value, bool):
+            raise refuse(name, value, "a whole number")
+        if not least <= whole(name, value) <= most:
+            raise ValueError(f"{name} is {value}: a whole number from {least} to {most} is needed")
+
+    return rule
+
+
+def number_from(least: float, most: float) -> Rule:
+    """Rule: a number within bounds."""
+
+    def rule(name: str, value: Any) -> None:
+        within(name, value, least, most)
+
+    return rule
+
+
+def indices(name: str, value: Any) -> Pair:
+    """Rule: two whole numbers, counted from 0; return them.
+
+    Raises
+    ------
+    TypeError
+        If the value is none; the message names the argument.
+    """
+    try:
+        a, b = (operator.index(number) for number in value)
+    except (TypeError, ValueError):
+        raise refuse(name, value, "a pair of whole numbers") from None
+    return a, b
+
+
 def numbers(name: str, value: Any) -> None:
     """Rule: an array of real numbers, or values that numpy converts to one."""
     try:
         array = np.asarray(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise TypeError(f"{name} is {_short(value)}, no array of numbers: {error}") from None
+        raise TypeError(f"{name} is {shown(value)}, no array of numbers: {error}") from None
     if array.dtype.kind not in "bfiu":
         raise refuse(name, value, "an array of numbers")
 
@@ -224,7 +262,7 @@ def place(name: str, value: Any, count: int, most: float = MOST_MM) -> tuple[flo
         raise refuse(name, value, needed)
     found = tuple(number(name, x) for x in value)
     if len(found) != count or not all(-most <= x <= most for x in found):
-        raise ValueError(f"{name} is {_short(value)}: {needed} are needed")
+        raise ValueError(f"{name} is {shown(value)}: {needed} are needed")
     return found
 
 
@@ -240,7 +278,7 @@ def whole_pair(name: str, value: Any) -> Pair:
         a, b = value
         across, down = int(a), int(b)
     except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} is {_short(value)}: two whole numbers are needed") from None
+        raise ValueError(f"{name} is {shown(value)}: two whole numbers are needed") from None
     if (across, down) != (a, b) or across < 1 or down < 1:
         raise ValueError(f"{name} is {a}×{b}: two whole numbers of at least 1 are needed")
     return across, down

@@ -11,6 +11,14 @@ from typing import TypeVar
 Result = TypeVar("Result")
 
 
+class Terminated(SystemExit):
+    """SIGTERM has come; unlike SystemExit of a plugin it ends the process."""
+
+
+STOPS = (KeyboardInterrupt, Terminated)
+"""Exceptions that end the process and that no handler of a plugin's errors may keep."""
+
+
 def interruptible(call: Callable[[], Result]) -> Result:
     """Return what a function returns; Ctrl-C ends the wait for it at once, whatever it is doing.
 

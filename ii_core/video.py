@@ -75,8 +75,13 @@ class IIVideo:
     def __post_init__(self) -> None:
         if not isinstance(self.frames, int) or self.frames < 1:
             raise ValueError(f"frames is {self.frames!r}: at least 1 is needed")
-        if not isinstance(self.fps, int | float) or not 0 < self.fps < float("inf"):
+        if not 0 < checks.number("fps", self.fps) < float("inf"):
             raise ValueError(f"fps is {self.fps!r}: a finite number above 0 is needed")
+        checks.instance(IIPicture)("structure", self.structure)
+        if not callable(getattr(self.source, "picture", None)):
+            raise checks.refuse("source", self.source, "an object with picture(frame)")
+        if self.poses is not None:
+            checks.numbers("poses", self.poses)
         if self.poses is not None and np.shape(self.poses) != (self.frames, 4, 4):
             raise ValueError(f"poses are {np.shape(self.poses)}: {(self.frames, 4, 4)} is needed")
 
@@ -106,8 +111,8 @@ class IIVideo:
 
         Raises
         ------
-        IndexError
-            If there is no such frame.
+        TypeError, IndexError
+            If the frame is no whole number, or there is none of that number.
         ValueError
             If it is of another structure or type than the first.
         OSError
@@ -140,15 +145,15 @@ class IIVideo:
 
         Raises
         ------
-        ValueError, IndexError, OSError
+        TypeError, ValueError, IndexError, OSError
             If there is no such image or frame, or it cannot be read.
         """
         frame = self._checked(frame)
-        if kind not in KINDS:
+        if not isinstance(kind, str) or kind not in KINDS:
             raise ValueError(f"unknown component image {kind!r}: known are {', '.join(KINDS)}")
         (k, l), (u, v) = self.structure.lenses, self.structure.ei_pixels
         cols, rows = {"ei": (k, l), "si": (u, v), "ri": (v, l)}[kind]
-        a, b = place
+        a, b = checks.indices("place", place)
         if not (0 <= a < cols and 0 <= b < rows):
             raise ValueError(f"component image {tuple(place)}: there are {cols}×{rows}, from (0, 0)")
         alone = getattr(self.source, "component", None)
@@ -163,6 +168,7 @@ class IIVideo:
         """What a viewer at one point sees of one frame; see `view_image`."""
         return view_image(self[frame], viewpoint_mm, interpolation=interpolation)
 
+    @checks.checked(folder=checks.path, progress=checks.callable_)
     def save(self, folder: str | os.PathLike[str], progress: Callable[[int, int], None] | None = None) -> Path:
         """Write ``frame_0000.png`` … (``.exr`` of floats) with sidecars, and ``video.json``, last.
 
@@ -189,8 +195,10 @@ class IIVideo:
         )
 
     def _checked(self, frame: int) -> int:
-        if isinstance(frame, bool) or not isinstance(frame, int | np.integer) or not 0 <= frame < self.frames:
-            raise IndexError(f"frame {frame!r}: there are {self.frames}, from 0")
+        if isinstance(frame, bool) or not isinstance(frame, int | np.integer):
+            raise checks.refuse("frame", frame, "a whole number")
+        if not 0 <= frame < self.frames:
+            raise IndexError(f"frame {checks.shown(frame)}: there are {self.frames}, from 0")
         return int(frame)
 
 
@@ -217,13 +225,14 @@ class FrameFiles:
         return picture_of(find_views(path))[0] if path.is_dir() else IIPicture.load(path)
 
 
+@checks.checked(pictures=checks.list_of(IIPicture), fps=checks.number)
 def video_of(pictures: Sequence[IIPicture], *, fps: float = 24.0) -> IIVideo:
     """II-video of pictures in memory.
 
     Raises
     ------
     ValueError
-        If there are none, or they differ in structure or type.
+        If there are none, they differ in structure or type, or the rate is not positive.
     """
     pictures = list(pictures)
     if not pictures:
@@ -306,6 +315,7 @@ def _take_poses(entries: Any, first: int, count: int) -> list[Any] | None:
     return None if any(row is None for row in rows) else rows
 
 
+@checks.checked(video=checks.instance(IIVideo), folder=checks.path, progress=checks.callable_)
 def write_view_folders(
     video: IIVideo, folder: str | os.PathLike[str], progress: Callable[[int, int], None] | None = None
 ) -> Path:

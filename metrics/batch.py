@@ -74,8 +74,8 @@ class _Measuring:
         kept: dict[str, Any] = {}
         for measure in map(measure_of, self.names):
             if measure.compute not in results:
-                results[measure.compute] = measure.compute(compared)
-            kept[measure.name] = float(measure.value(results[measure.compute]))
+                results[measure.compute] = measure.result(compared)
+            kept[measure.name] = measure.number(results[measure.compute])
         for result in results.values():
             if isinstance(result, DepthQuality):
                 kept |= {"q_depth": result.values.tolist(), "depth_mm": result.depth_mm.tolist()}

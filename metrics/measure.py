@@ -11,6 +11,10 @@ from importlib.metadata import entry_points
 from types import ModuleType
 from typing import Any
 
+from ii_core.files import one_line
+from ii_core.foreign import ForeignError, foreign_errors
+from ii_core.interrupt import STOPS
+
 from .pair import PicturePair
 
 PLUGINS = "raytrace_ii.measures"  # entry points of installed packages
@@ -113,6 +117,25 @@ class Measure:
         """Value of a picture without error, for measures where it is infinite."""
         return math.inf if self.higher_is_better else -math.inf
 
+    def result(self, pair: PicturePair) -> Any:
+        """Return ``compute(pair)``.
+
+        Raises
+        ------
+        ForeignError
+            If a measure of another package fails.
+        """
+        with foreign_errors(f"measure {self.name} failed", self.compute):
+            return self.compute(pair)
+
+    def number(self, result: Any) -> float:
+        """Return ``value(result)`` as a float; `ForeignError` if it is no number."""
+        with foreign_errors(f"measure {self.name} failed", self.compute):
+            try:
+                return float(self.value(result))
+            except ValueError as error:
+                raise ForeignError(f"measure {self.name} failed: {one_line(error)}") from error
+
     def shown(self, value: float) -> str:
         """Return the text of a number in tables."""
         return f"{value:.{self.digits}f}"
@@ -168,7 +191,9 @@ def _load_plugins() -> None:
             found = point.load()
             if not isinstance(found, ModuleType):  # a module has registered its measures
                 register_measure(found)
-        except Exception as error:  # whatever a foreign package raises must not stop the others
+        except STOPS:
+            raise
+        except BaseException as error:  # whatever a foreign package raises, SystemExit too, must not stop the others
             warnings.warn(f"measure {point.name} ({point.value}) is left out: {error}", stacklevel=3)
 
 

@@ -87,7 +87,12 @@ class TakeQuality:
         }
 
 
-@checks.checked(reference=checks.instance(IIVideo), decoded=checks.instance(IIVideo))
+@checks.checked(
+    reference=checks.instance(IIVideo),
+    decoded=checks.instance(IIVideo),
+    viewpoints_mm=checks.numbers,
+    progress=checks.callable_,
+)
 def measure_take(
     reference: IIVideo,
     decoded: IIVideo,
@@ -117,8 +122,9 @@ def measure_take(
     """
     if decoded.frames > reference.frames:
         raise ValueError(f"decoded has {decoded.frames} frames, reference {reference.frames}: at most as many")
-    if viewpoints_mm is not None and not len(viewpoints_mm):
-        raise ValueError("there are no viewpoints: at least one is needed")
+    shape = None if viewpoints_mm is None else np.asarray(viewpoints_mm).shape
+    if shape is not None and (shape[1:] != (3,) or not shape[0]):
+        raise ValueError(f"viewpoints_mm is {shape}: (n, 3) with at least one viewpoint is needed")
     count = decoded.frames
     rows: list[tuple[float, Floats, float, float]] = []
     views: list[tuple[float, float]] = []

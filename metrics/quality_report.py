@@ -41,7 +41,7 @@ class Report:
             self.rows[row.label] = f"– {reason}"
             self.numbers.setdefault("missing", {})[row.name] = reason
             return
-        quality = measure.compute(pair)
+        quality = measure.result(pair)
         if isinstance(quality, DepthQuality):
             self.depth = quality
         self.rows[row.label], value = row.describe(quality)
@@ -139,7 +139,7 @@ def _plain_row(measure: Measure) -> Row:
     """A row of a measure from outside: its number and what it is."""
 
     def describe(quality: Any) -> tuple[str, Any]:
-        value = float(measure.value(quality))
+        value = measure.number(quality)
         unit = f" {measure.unit}" if measure.unit else ""
         lower = "" if measure.higher_is_better else ", lower is better"
         return f"{measure.shown(value)}{unit}, {measure.text}{lower}", value

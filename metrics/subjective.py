@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core.checks import checked, number, numbers, one_of, whole
+from ii_core.checks import checked, number, number_from, numbers, numbers_in_a_row, one_of, whole_from
 
 Floats = NDArray[np.float64]
 MODELS = ("bradley-terry", "thurstone")
@@ -218,6 +218,8 @@ def predicted_scores(measure: ArrayLike, mos: ArrayLike, half_width: ArrayLike |
         raise ValueError("measure or mos holds a value that is not finite: leave the stimulus out")
     if np.ptp(x) == 0 or np.ptp(y) == 0:
         raise ValueError("measure or mos is the same for all stimuli: nothing can be correlated")
+    if half_width is not None and np.shape(half_width) != x.shape:
+        raise ValueError(f"half_width has {np.shape(half_width)} values, mos {y.shape}: one for each is needed")
     fitted = _monotone(x, y)
     off = np.abs(fitted - y)
     widths = np.full(len(x), np.nan) if half_width is None else np.asarray(half_width, np.float64)
@@ -226,7 +228,13 @@ def predicted_scores(measure: ArrayLike, mos: ArrayLike, half_width: ArrayLike |
     return Prediction(plcc, float(spearmanr(x, y)[0]), float(np.sqrt(np.mean(off**2))), outside, fitted)
 
 
-@checked(quality=numbers, observers=whole, bias=number, spread=number, seed=whole)
+@checked(
+    quality=numbers_in_a_row,
+    observers=whole_from(1, 1 << 20),
+    bias=number_from(0, 1e9),
+    spread=number_from(0, 1e9),
+    seed=whole_from(0, 2**63 - 1),
+)
 def simulated_scores(
     quality: ArrayLike, observers: int, *, bias: float = 0.5, spread: float = 0.7, seed: int = 0
 ) -> Floats:
@@ -239,12 +247,16 @@ def simulated_scores(
     return true + own + generator.normal(0, spread, (observers, len(true)))
 
 
-@checked(scale=numbers, comparisons=whole, model=one_of(*MODELS), seed=whole)
+@checked(
+    scale=numbers_in_a_row, comparisons=whole_from(0, 1 << 31), model=one_of(*MODELS), seed=whole_from(0, 2**63 - 1)
+)
 def simulated_wins(
     scale: ArrayLike, comparisons: int, *, model: str = "bradley-terry", seed: int = 0
 ) -> NDArray[np.int64]:
     """Wins by SIMULATED observers, (stimuli, stimuli), of so many comparisons of each pair; see `pair_scale`."""
     generator, true = np.random.default_rng(seed), np.asarray(scale, np.float64)
+    if not np.isfinite(true).all():
+        raise ValueError("scale holds a number that is not finite: finite ones are needed")
     law = _law(model)
     wins = np.zeros((len(true), len(true)), np.int64)
     for i in range(len(true)):

@@ -81,10 +81,17 @@ def decode_levels(coded: Encoded) -> Iterator[Stage]:
 
     Raises
     ------
+    TypeError
+        If ``coded`` is no coded picture; before the first stage.
     ValueError
-        If another scheme coded the picture, it has more than 2²⁷ pixels, or the payload is damaged.
+        If another scheme coded the picture, or it has more than 2²⁷ pixels; before the first stage. If the payload
+        is damaged.
     """
-    coder, blank = _light_field(coded)
+    return _stages(coded, *_light_field(coded))
+
+
+def _stages(coded: Encoded, coder: LightField, blank: IIPicture) -> Iterator[Stage]:
+    """Yield what `decode_levels` returns."""
     started = cpu_seconds()
     (width, height), (cols, rows) = blank.lenses, blank.ei_pixels
     try:
@@ -127,7 +134,7 @@ def decode_view(coded: Encoded, place: tuple[int, int]) -> DecodedView:
     col, row = whole_pair("place", place)
     cols, rows = blank.ei_pixels
     if not (0 <= row < rows and 0 <= col < cols):
-        raise ValueError(f"view {place} is asked for: there are {cols}×{rows}, from (0, 0)")
+        raise ValueError(f"place is {(col, row)}: there are {cols}×{rows} views, from (0, 0)")
     started = cpu_seconds()
     try:
         pixels, read, views = coder.decode_view(coded.payload, blank, coded.options, (row, col))

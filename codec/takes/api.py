@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IIVideo
+from ii_core import IIVideo, checks
 from ii_core.files import one_line, read_json, write_json
 
 from .. import file_header
-from ..api import blank_picture
+from ..api import blank_picture, check_coded
 from ..checks import check_type, whole
 from ..clock import cpu_seconds
 from ..coders.pseudo_video import PseudoVideo, Source
@@ -72,6 +72,17 @@ class EncodedTake:
     encode_seconds: float | None = None
     codec_seconds: float | None = None
 
+    def __post_init__(self) -> None:
+        check_coded(self)
+        _coder_of(self.scheme)
+        check_type("plan", self.plan, Plan, "a Plan")
+        whole("frames", self.frames, 1, MAX_FRAMES)
+        if not 0 < checks.number("fps", self.fps) < math.inf:
+            raise ValueError(f"fps is {self.fps!r}: a finite number above 0 is needed")
+        check_type("segments", self.segments, list, "a list of bytes")
+        for payload in self.segments:
+            check_type("segments holds a value that", payload, bytes, "bytes")
+
     @property
     def size(self) -> tuple[int, int]:
         """(M, N) of a frame."""
@@ -108,7 +119,7 @@ class EncodedTake:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an ``.ii`` file, whole or not at all."""
-        check_type("path", path, (str, os.PathLike), "a path")
+        checks.path("path", path)
         container.write(path, _values(self), self.segments)
 
     @classmethod
@@ -129,18 +140,19 @@ class EncodedTake:
         OSError
             If it cannot be read.
         """
-        check_type("path", path, (str, os.PathLike), "a path")
+        checks.path("path", path)
+        checks.flag("partial", partial)
         name = os.fspath(path)
         values, start = container.read_header(path)
         try:
             coded = _from_values(values)
-            count = len(coded.plan.segments(coded.frames))
+            count = coded.plan.count(coded.frames)
         except (ValueError, TypeError, OverflowError, KeyError) as error:
             raise ValueError(f"{name} is damaged: {one_line(error)}") from None
         segments, wrong = container.read_segments(path, start, count)
         if not wrong:
             return replace(coded, segments=segments)
-        there = sum(map(len, coded.plan.segments(coded.frames)[: len(segments)]))
+        there = min(len(segments) * (coded.plan.span or coded.frames), coded.frames)
         if partial and there:
             return replace(coded, segments=segments, frames=there)
         can = f"frames 0..{there - 1} can be decoded with partial=True (--partial)" if there else "no frame is whole"
@@ -232,7 +244,11 @@ def encode_take(
     if plan is None:
         plan = Plan()
     check_type("plan", plan, Plan, "a Plan")
-    if rate not in RATES:
+    if path is not None:
+        checks.path("path", path)
+    if progress is not None:
+        checks.callable_("progress", progress)
+    if not isinstance(rate, str) or rate not in RATES:
         raise ValueError(f"unknown rate {rate!r}: known are {', '.join(RATES)}")
     parsed, settings = parse_scheme(scheme, **options)
     coder = _coder_of(parsed.name)
@@ -434,16 +450,20 @@ def open_take(
         If the file cannot be read.
     """
     check_type("coded", coded, (EncodedTake, str, os.PathLike), "a coded take or a path")
+    checks.flag("partial", partial)
     name = "the coded take"
     if not isinstance(coded, EncodedTake):
         name, coded = os.fspath(coded), EncodedTake.load(coded, partial=partial)
-    longest = max(map(len, coded.plan.segments(coded.frames)))
+    longest = min(coded.plan.span or coded.frames, coded.frames)
     pixels = longest * math.prod(coded.size)
     if pixels > whole("max_pixels", max_pixels, 1, 1 << 40):
         raise ValueError(
             f"{name} has segments of {pixels} pixels: at most {max_pixels} are decoded, "
             "raise max_pixels (--max-pixels)"
         )
+    needed = coded.plan.count(coded.frames)
+    if len(coded.segments) != needed:
+        raise ValueError(f"{name} has {len(coded.segments)} segments: {needed} are needed for {coded.frames} frames")
     blank = blank_picture(coded.structure, coded.dtype)
     coder = _coder_of(coded.scheme)
     source = CodedFrames(coder, coded.options, coded.plan, coded.segments, coded.frames, blank, name)

@@ -22,6 +22,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from ii_core import checks
 from ii_core.files import atomic_path, check_file
 
 from ..bitstream.compact import leb128, read_leb128, read_values, write_values
@@ -42,7 +43,16 @@ class DamagedTake(ValueError):
 
 
 def is_take(path: str | os.PathLike[str]) -> bool:
-    """Whether a file starts like a coded take."""
+    """Whether a file starts like a coded take.
+
+    Raises
+    ------
+    TypeError
+        If ``path`` is no path.
+    OSError
+        If the file cannot be read.
+    """
+    checks.path("path", path)
     with open(path, "rb") as file:
         return file.read(len(MAGIC)) == MAGIC
 

@@ -9,8 +9,8 @@ import numpy as np
 from ii_core import IIPicture, video_of
 from ii_core.camera import whole_pair
 
-from ..checks import whole
-from ..contract import find
+from ..checks import check_type, whole
+from ..contract import MAX_PIXELS, find
 from .api import MAX_FRAMES, EncodedTake, encode_take
 from .order import Plan
 
@@ -60,7 +60,10 @@ def take_floor(scheme: str, lenses: Pair, ei_pixels: Pair, *, frames: int = 8, p
     ----------
     Olsson 2008, §5.5.3, with all instants in place of one.
     """
+    check_type("scheme", scheme, str, "a name")
     (k, l), (u, v) = whole_pair("lenses", lenses), whole_pair("ei_pixels", ei_pixels)
+    if k * u * l * v > MAX_PIXELS:
+        raise ValueError(f"lenses and ei_pixels make {k * u}×{l * v} pixels: at most {MAX_PIXELS} are allowed")
     black = IIPicture(np.broadcast_to(np.uint8(0), (l * v, k * u, 3)), lenses, ei_pixels)
     video = video_of([black] * whole("frames", frames, 1, MAX_FRAMES))
     coarsest = find(scheme.partition(":")[0]).qp_range

@@ -25,10 +25,13 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import whole
+from ii_core import checks
+
+from ..checks import check_type, whole
 
 WALKS = ("time-first", "view-first", "interleaved")
 Table = NDArray[np.int64]
+MOST_FRAMES = 1 << 24  # views × instants of a cost
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +60,7 @@ class Plan:
     strip: int = 4
 
     def __post_init__(self) -> None:
-        if self.walk not in WALKS:
+        if not isinstance(self.walk, str) or self.walk not in WALKS:
             raise ValueError(f"unknown walk {self.walk!r}: known are {', '.join(WALKS)}")
         for name, least in (("span", 0), ("group", 0), ("strip", 1)):
             whole(name, getattr(self, name), least, 1 << 30)
@@ -66,6 +69,10 @@ class Plan:
         """Raise ValueError unless the groups divide the views."""
         if self.group and views % self.group:
             raise ValueError(f"group is {self.group} views: a divisor of their number {views}, or 0, is needed")
+
+    def count(self, instants: int) -> int:
+        """Number of segments of a take."""
+        return -(-instants // (self.span or instants))
 
     def segments(self, instants: int) -> list[range]:
         """Instants of each segment of a take."""
@@ -118,7 +125,13 @@ def component_cost(plan: Plan, views: int, instants: int) -> AccessCost:
     """Cost of one component image: the frames of its group up to it. Without B pictures.
 
     The mean is (G + 1)/2 for groups of G frames, the worst case G.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is of another type or out of range.
     """
+    _check_counts(plan, views, instants)
     costs = [
         np.arange(len(plan.table(views, len(part)))) % plan.group_frames(views, len(part)) + 1
         for part in plan.segments(instants)
@@ -134,11 +147,18 @@ def view_cost(plan: Plan, views: int, instants: int, needed: Sequence[int]) -> A
     ----------
     needed : sequence of int
         Places j of the component images in the order Γ of a still.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is of another type or out of range.
     """
-    if not len(needed) or min(needed) < 0 or max(needed) >= views:
-        raise ValueError(f"needed are {list(needed)[:5]}: at least one of the {views} views, from 0, is needed")
+    _check_counts(plan, views, instants)
+    checks.sequence("needed", needed)
+    wanted = {whole("needed", place, 0, MOST_FRAMES) for place in needed}
+    if not wanted or max(wanted) >= views:
+        raise ValueError(f"needed is {list(needed)[:5]}: one or more of the {views} views, from 0, are needed")
     costs: list[int] = []
-    wanted = set(needed)
     for part in plan.segments(instants):
         table, size = plan.table(views, len(part)), plan.group_frames(views, len(part))
         for instant in range(len(part)):
@@ -147,3 +167,10 @@ def view_cost(plan: Plan, views: int, instants: int, needed: Sequence[int]) -> A
             np.maximum.at(last, at // size, at % size + 1)
             costs.append(int(last.sum()))
     return AccessCost(mean=float(np.mean(costs)), worst=max(costs))
+
+
+def _check_counts(plan: Plan, views: int, instants: int) -> None:
+    check_type("plan", plan, Plan, "a Plan")
+    whole("views", views, 1, MOST_FRAMES)
+    whole("instants", instants, 1, MOST_FRAMES // views)
+    plan.check(views)

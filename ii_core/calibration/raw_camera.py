@@ -194,7 +194,7 @@ def calibrate(
     frames = {"raw": raw, "white": white, "dark": dark}
     for what, frame in frames.items():
         if frame is not None and (frame.ndim not in (2, 3) or frame.shape[:2] != raw.shape[:2]):
-            raise ValueError(f"{what} is {frame.shape}: {raw.shape[:2]}, the picture's size, is needed")
+            raise ValueError(f"{what} is {frame.shape} and raw {raw.shape}: frames of one size are needed")
     picture = raw if white is None else white
     clipped = _clipped(picture)
     grey = _grey(picture, mosaic) - (0 if dark is None else _grey(dark, None))
@@ -284,7 +284,8 @@ def _drift(grid: LensGrid) -> float:
 
 @checks.checked(
     calibration=checks.instance(Calibration), raw=checks.array, white=checks.array, dark=checks.array,
-    mosaic=checks.one_of(*MOSAICS), curve=checks.one_of(*CURVES),
+    mosaic=checks.one_of(*MOSAICS), curve=checks.one_of(*CURVES), full_scale=checks.number_from(1e-9, 1e9),
+    bits=checks.whole,
 )  # fmt: skip
 def calibrated_picture(
     calibration: Calibration,
@@ -370,7 +371,9 @@ def _linear(frame: NDArray[Any], curve: str) -> NDArray[np.float32]:
     return linear(frame.astype(np.float32) / np.float32(peak)).astype(np.float32)
 
 
-@checks.checked(calibration=checks.instance(Calibration), picture=checks.instance(IIPicture))
+@checks.checked(
+    calibration=checks.instance(Calibration), picture=checks.instance(IIPicture), zoom=checks.whole_from(1, 16)
+)
 def centres_picture(calibration: Calibration, picture: IIPicture, *, zoom: int = 2) -> NDArray[np.uint8]:
     """Centres over the raw picture, (zoom·N, zoom·M, 3): green of the grid, yellow found, red left out."""
     from ..picture import codes8

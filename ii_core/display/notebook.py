@@ -71,7 +71,9 @@ class EmbeddedViewer:
         return f'<iframe srcdoc="{source}" style="width:100%;height:{self.height}px;border:0"></iframe>'
 
 
-@checks.checked(picture=checks.instance(IIPicture), decoded=checks.instance(IIPicture), height=checks.whole)
+@checks.checked(
+    picture=checks.instance(IIPicture), decoded=checks.instance(IIPicture), depth=checks.array, height=checks.whole
+)
 def embed_viewer(
     picture: IIPicture, decoded: IIPicture | None = None, *, depth: NDArray[Any] | None = None, height: int = 600
 ) -> EmbeddedViewer:

@@ -36,6 +36,9 @@ def time_chart(takes: Mapping[str, TakeQuality], path: str | os.PathLike[str]) -
     check_suffix(path)
     if not takes:
         raise ValueError("there are no takes: at least one is needed")
+    for name, quality in takes.items():
+        checks.text("takes has a name that", name)
+        checks.instance(TakeQuality)(f"takes[{name!r}]", quality)
     seen = any(quality.view_psnr is not None for quality in takes.values())
     panels = [
         "Q_global [dB],\nband: Q_angle",

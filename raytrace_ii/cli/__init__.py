@@ -12,6 +12,8 @@ from typing import Any
 
 import typer
 
+from ii_core.foreign import ForeignError
+
 from . import synthesize, render, pictures, calibrating, coding, evaluate, show, eye, observers, video
 from .common import app
 from .ending import ends_soon
@@ -60,6 +62,8 @@ def _run() -> None:
         if end.code == TERMINATED:
             print("interrupted", file=sys.stderr)
         raise
+    except ForeignError as error:
+        _fail(str(error))
     except RecursionError:
         _fail("the input nests too deeply")
     except (KeyboardInterrupt, typer.Abort):

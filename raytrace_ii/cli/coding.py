@@ -64,6 +64,8 @@ def encode(
         plan = Plan(walk=walk, span=span, group=group, strip=strip)
         encode_frames(picture, output, scheme, plan, bpp=bpp, qp=qp, rate=rate)
         return
+    if quality is not None and quality.is_integer():
+        quality = int(quality)  # of schemes that take whole numbers alone
     original = IIPicture.load(picture)
     with progress_bar(f"{scheme} codes {picture.name}", at_once=True) as report:
         coded = encode(original, scheme, bpp=bpp, qp=qp, quality=quality, progress=report)

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from ii_core.interrupt import Terminated
+
 GRACE_SECONDS = 1.5  # for the cleanup, also if compiled code runs longer
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
 SHOW_CURSOR = b"\x1b[?25h"  # a progress bar hides it
@@ -50,7 +52,7 @@ def ends_soon() -> Iterator[None]:
 
 
 def _terminate(number: int, frame: Any) -> None:
-    sys.exit(CODES[signal.SIGTERM])
+    raise Terminated(CODES[signal.SIGTERM])
 
 
 def _watch(heard: socket.socket, left: threading.Event) -> None:

@@ -11,6 +11,8 @@ from typing import Annotated
 
 import typer
 
+from ii_core.interrupt import STOPS
+
 Plugins = Annotated[
     list[Path] | None,
     typer.Option("--plugin", help="A Python file that registers coders or measures; may be repeated."),
@@ -49,7 +51,10 @@ def _run(path: Path) -> None:
     sys.modules[spec.name] = module  # classes of the file can be pickled
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except STOPS:
+        raise
+    except BaseException as error:  # SystemExit, too
+        del sys.modules[spec.name]
         lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path.resolve())]
         line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
         where = f"{path}, line {line}" if line else str(path)

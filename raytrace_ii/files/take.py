@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core.checks import text, within
+
 from ..scene.keyframes import Track, looking_pose, turned_pose
 from ..scene.scene import Scene
 from ..shapes.primitives import rotation
@@ -21,6 +23,7 @@ from .load import GLTF_TYPES, MeshFiles, SceneLoader, built, is_mesh, mesh_scene
 from .toml_schema import ObjectTable, TrackTable, check_shape, checked_tables, raw_tables
 
 DEFAULT_FPS = 24.0
+MOST_SECONDS = 1e9
 CAMERA_KEYS = {"position_mm": 3, "look_at_mm": 3, "rotate_deg": 3}
 TABLES = ("scene", "background", "fog", "light.NUMBER", "material.NAME", "texture.NAME", "object.NAME", "camera")
 
@@ -162,9 +165,7 @@ class Take:
             raise ValueError(f"frame {frame:g}: {error}") from None
 
     def _instant(self, seconds: float) -> float:
-        if not isinstance(seconds, int | float | np.number) or not 0 <= seconds < math.inf:
-            raise ValueError(f"seconds is {seconds!r}: a finite number of at least 0 is needed")
-        return float(seconds)
+        return within("seconds", seconds, 0.0, MOST_SECONDS, "time", " s")
 
     def _data_at(self, seconds: float) -> dict[str, Any]:
         """The file's tables with the animated keys set."""
@@ -204,6 +205,8 @@ def load_take(name: str | os.PathLike[str], *, clip: str | None = None, fps: flo
     TypeError, ValueError, OSError
         As `load_scene`; or if nothing moves, or a keyframe names what is not there.
     """
+    if clip is not None:
+        text("clip", clip)
     return Take(scene_path(name), clip=clip, fps=fps)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, TypedDict
@@ -89,6 +91,8 @@ class RenderOptions:
         for name in ("error", "noise"):
             if not isinstance(getattr(self, name), int | float | np.number):
                 raise TypeError(f"{name} is {getattr(self, name)!r}: a number is needed")
+        if not 0 < self.error < math.inf or self.error > sys.float_info.max:
+            raise ValueError(f"error is {_short(self.error)}: a positive number of 8-bit steps is needed")
         sampling(self.samples, self.error)
         if not 0 <= self.noise <= MOST_NOISE:
             raise ValueError(f"noise sigma is {_short(self.noise)}: a number from 0 to {MOST_NOISE} is needed")

@@ -17,13 +17,14 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ii_core import IICamera, MapCamera
-from ii_core.files import read_json, write_json
+from ii_core import IICamera, MapCamera, checks
+from ii_core.files import IMAGE_TYPES, read_json, write_json
 from ii_core.picture import sidecar
 
 from ..files.take import Take
 from ..scene.hashing import content_hash
 from ..scene.scene import Scene
+from ..tracing.tracer import rigid
 from .options import RenderOptions, SetKeywords, check_keywords
 from .products import Product, commit, is_done, manifest_kept_if_used, record_of
 from .render import render_to
@@ -90,7 +91,9 @@ def render_take(
         If a file cannot be written.
     """
     check_keywords(options, SetKeywords)
-    numbers = _numbers(take, frames)
+    _check(take, folder, camera, support, suffix, progress)
+    checks.flag("force", force)
+    numbers, base = _numbers(take, frames), rigid(pose)
     wanted = RenderOptions(dtype=dtype, pose=pose, **options)
     of_pictures = {field: getattr(wanted, field) for field in PICTURE_OPTIONS}
     folder = Path(folder)
@@ -98,7 +101,6 @@ def render_take(
     old = _read_manifest(folder, take.name)
     manifest = {**_header(take, camera, of_pictures), "frames": dict(old.get("frames", {}))}
     means = {"workers": wanted.workers, "executor": wanted.executor}
-    base = np.eye(4) if pose is None else np.asarray(pose, np.float64)
     hashed: list[tuple[Scene, str]] = []
     manifest["claims"] = _claims(folder, numbers, support or {}, suffix, old, force)
     with manifest_kept_if_used(folder / MANIFEST):
@@ -150,13 +152,30 @@ def _beside(picture: Path, name: str) -> Path:
     return picture.with_name(f"{picture.stem}_{name}")
 
 
+def _check(take: Any, folder: Any, camera: Any, support: Any, suffix: Any, progress: Any) -> None:
+    """Raise TypeError or ValueError that names an argument of a wrong type, or a suffix of no picture."""
+    checks.instance(Take)("take", take)
+    checks.path("folder", folder)
+    checks.instance(IICamera, MapCamera)("camera", camera)
+    if support is not None:
+        checks.mapping("support", support)
+        for name, kinds in support.items():
+            checks.text("support has a name that", name)
+            checks.list_of(str)(f"support[{name!r}]", kinds)
+    checks.one_of(*IMAGE_TYPES)("suffix", suffix)
+    if progress is not None:
+        checks.callable_("progress", progress)
+
+
 def _numbers(take: Take, frames: Sequence[int] | None) -> list[int]:
+    if frames is not None:
+        checks.sequence("frames", frames)
     numbers = list(range(take.frames) if frames is None else frames)
     if not numbers:
-        raise ValueError("there are no frames to render: at least one number is needed")
+        raise ValueError("frames is empty: at least one number is needed")
     for number in numbers:
         if not isinstance(number, int | np.integer) or not 0 <= number < take.frames:
-            raise ValueError(f"frame {number!r}: {take.name} has {take.frames}, from 0 to {take.frames - 1}")
+            raise ValueError(f"frames holds {number!r}: {take.name} has {take.frames}, from 0 to {take.frames - 1}")
     return numbers
 
 

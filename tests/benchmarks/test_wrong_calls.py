@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from benchmarks.stability import wrong_calls
-from benchmarks.stability.wrong_calls import Call, attack, calls, outcome, untried
+from benchmarks.stability.wrong_calls import attack as attacks
+from benchmarks.stability.wrong_calls.__main__ import calls, untried
+from benchmarks.stability.wrong_calls.attack import attack, outcome
+from benchmarks.stability.wrong_calls.good import Call
 
 FEW = [
     None,
@@ -19,14 +21,6 @@ FEW = [
     slice("a", None),
     object(),
 ]
-# Functions without a call of their own: they need takes, raw pictures, displays or scores.
-WITHOUT = {
-    "calibrate", "calibrated_picture", "centres_picture", "component_cost", "converging_distance", "crosstalk",
-    "decode_levels", "decode_view", "embed_viewer", "encode_take", "eye_image", "is_take", "load_take",
-    "measure_take", "open_take", "opinion_scores", "pair_scale", "open_video", "predicted_scores", "render_take",
-    "screened_observers", "simulated_scores", "simulated_wins", "take_floor", "time_chart", "video_of", "view_cost",
-    "viewing_zone", "write_view_folders",
-}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -35,18 +29,20 @@ def named(tmp_path_factory):
 
 
 def test_no_error_is_accidental(named, tmp_path, monkeypatch):
-    """On b1dc540 1271 of 4530 calls raised AttributeErrors, IndexErrors and accidental TypeErrors."""
+    """On b1dc540 1271 of 4530 calls raised AttributeErrors, IndexErrors and accidental TypeErrors.
+
+    Functions of takes, raw pictures, eyes and observers came later and had been left out: 600 of their calls did.
+    """
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(wrong_calls, "SLOW", {"plot_all", "q_depth", "depth_from_focus"})
+    monkeypatch.setattr(attacks, "SLOW", {"plot_all", "q_depth", "depth_from_focus"})
     counts, findings = attack(named, FEW)
     assert not findings
-    assert counts["refused"] > 3000
+    assert counts["refused"] > 4000
 
 
 def test_every_public_function_is_tried_with_every_argument(named):
-    missing = {entry.partition("(")[0] for entry in untried(named)}
-    assert missing - WITHOUT == {"encode"} & missing  # its three targets exclude one another
-    assert not {name for name in WITHOUT if name in named}
+    """It had left out 29 functions by name, and counted the last call of a function alone."""
+    assert untried(named) == []
 
 
 def test_judgement():

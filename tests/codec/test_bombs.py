@@ -34,10 +34,9 @@ room = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesi
 resource.setrlimit(resource.RLIMIT_AS, (room, room))
 for one in coded:
     for lenses, ei_pixels in CLAIMS:
-        mutant = replace(one, structure={**one.structure, "lenses": lenses, "ei_pixels": ei_pixels})
         started = time.process_time()
         try:
-            decode(mutant)
+            decode(replace(one, structure={**one.structure, "lenses": lenses, "ei_pixels": ei_pixels}))
             said = "a picture"
         except ValueError as error:
             said = "refused"

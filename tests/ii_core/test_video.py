@@ -58,7 +58,7 @@ def test_access_by_time_and_view():
 
 
 @pytest.mark.parametrize(("call", "error"), [
-    (lambda v: v[3], IndexError), (lambda v: v[-1], IndexError), (lambda v: v[True], IndexError),
+    (lambda v: v[3], IndexError), (lambda v: v[-1], IndexError), (lambda v: v[True], TypeError),
     (lambda v: v.component(0, "xi", (0, 0)), ValueError), (lambda v: v.component(0, "si", (16, 0)), ValueError),
     (lambda v: video_of([]), ValueError), (lambda v: video_of([v[0]], fps=0), ValueError),
 ])  # fmt: skip
