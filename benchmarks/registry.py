@@ -171,6 +171,12 @@ BENCHMARKS = {
             "accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",), writes=(f"{IMAGES}/depth_truth.*",)
         ),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
+        Benchmark(
+            "accuracy.eye_views",
+            records=OWN,
+            fills=("docs/display.md", "docs/observers.md"),
+            writes=(f"{IMAGES}/opinions_simulated.*",),
+        ),
         Benchmark("accuracy.map_precision", records=OWN, writes=(f"{IMAGES}/map_precision.*",)),
         Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),
         Benchmark(

@@ -82,7 +82,7 @@ def view_quality(pair: PicturePair, viewpoints: Mapping[str, ArrayLike] | None =
         a, b, valid = view_pair(pair, viewpoint)
         if not (np.isfinite(a[valid]).all() and np.isfinite(b[valid]).all()):
             pair.check_finite()
-        values[name] = _mssim(a, b, valid)
+        values[name] = mssim(a, b, valid)
         squared = float(np.square(a[valid].astype(np.float64) - b[valid]).sum())
         each[name] = float(psnr(squared, 3 * valid.sum(), a.dtype))
         errors, counts = errors + squared, counts + 3 * int(valid.sum())
@@ -124,7 +124,8 @@ def error_map(reference: IIPicture, decoded: IIPicture, viewpoint_mm: Any) -> ND
     return np.where(valid, error, np.nan)
 
 
-def _mssim(a: NDArray[Any], b: NDArray[Any], valid: NDArray[np.bool_]) -> float:
+def mssim(a: NDArray[Any], b: NDArray[Any], valid: NDArray[np.bool_]) -> float:
+    """Mean SSIM of two views, over the windows whose pixels are all valid."""
     from skimage.metrics import structural_similarity
 
     x, y = (image @ LUMA * (255 / peak(image.dtype)) for image in (a, b))
