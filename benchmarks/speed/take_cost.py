@@ -2,8 +2,8 @@
 
     python -m benchmarks run take_cost [--scale 16] [--takes car,apples]
 
-In *car* bodies move in every frame, in *apples* the camera alone. A still is rendered of a scene made for it, so that
-its trees are built; only `render` is counted. Of the take everything is counted, with files, hashes and manifest.
+In *car* bodies move in every frame, in *apples* the camera alone. A still is rendered of a copy of its scene, so that
+its trees are built, and only `render` is counted. Of the take everything is counted: models, files, hashes, manifest.
 Both alternate in parts, and the ratio is the median over the parts. Memory is the peak of processes of their own.
 """
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
+from copy import copy
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -20,11 +21,11 @@ from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, cpu_seconds, origin
 from ii_core import preset
-from raytrace_ii import load_take, render, render_take
+from raytrace_ii import Take, load_take, render, render_take
 
 RECORDS = Records("take_cost", ("benchmarks.speed.take_cost",))
 SCALE, TAKES = 16, ("car", "apples")
-FRAMES, PART = 48, 6  # of a take; of a part, after which take and stills alternate
+FRAMES, PART = 48, 8  # of a take; of a part, after which take and stills alternate
 PEAK = """
 import resource, sys
 from ii_core import preset
@@ -49,7 +50,7 @@ def measured(take: str, scale: int) -> dict[str, Any]:
     """CPU seconds of parts of the take and of their stills; peak memory in MB of one frame and of all."""
     camera = preset("setup1", scale=scale)
     render(load_take(take).scene_at(0.0), camera)  # kernels are compiled
-    moving = load_take(take)
+    moving, alone = load_take(take), load_take(take)
     of_take, of_stills = [], []
     with tempfile.TemporaryDirectory() as folder:
         for first in range(0, FRAMES, PART):
@@ -57,7 +58,7 @@ def measured(take: str, scale: int) -> dict[str, Any]:
             started = cpu_seconds()
             render_take(moving, folder, camera, frames=numbers)
             of_take.append(cpu_seconds() - started)
-            of_stills.append(sum(still(take, number / moving.fps, camera) for number in numbers))
+            of_stills.append(sum(still(alone, number / alone.fps, camera) for number in numbers))
     ratios = [a / b for a, b in zip(of_take, of_stills, strict=True)]
     peaks = {f"peak_mb_{frames}_frames": peak(take, scale, frames) for frames in (1, FRAMES)}
     return {
@@ -72,10 +73,9 @@ def measured(take: str, scale: int) -> dict[str, Any]:
     }
 
 
-def still(take: str, seconds: float, camera: Any) -> float:
+def still(take: Take, seconds: float, camera: Any) -> float:
     """CPU seconds of rendering one instant of a scene that nothing has rendered yet."""
-    fresh = load_take(take)
-    scene, pose = fresh.scene_at(seconds), fresh.pose_at(seconds)
+    scene, pose = copy(take.scene_at(seconds)), take.pose_at(seconds)
     started = cpu_seconds()
     render(scene, camera, pose=pose)
     return cpu_seconds() - started
