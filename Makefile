@@ -25,8 +25,10 @@ lint: $(VENV)/.installed
 bench: $(VENV)/.installed
 	$(BIN)/python -m benchmarks run ratios
 
+# the gallery's pages take some 20 minutes of CPU time once; make docs GALLERY_SCALE=16 makes small ones in one
+GALLERY_SCALE ?= 2
 docs: $(VENV)/.docs
-	$(BIN)/python -m benchmarks run gallery --missing
+	$(BIN)/python -m benchmarks run gallery --missing --scale $(GALLERY_SCALE)
 	$(BIN)/mkdocs build --strict -f docs/site/mkdocs.yml
 
 $(VENV)/.docs: $(VENV)/.installed
