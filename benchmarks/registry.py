@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.records import RESULTS, ROOT, seconds_in
+from ii_core.json_lines import lines_of
 
 LEAST = 6.0  # seconds: a shorter sum is of single calls, not of the run
 OWN = "NAME.jsonl"  # records in the file of the benchmark's name
@@ -94,7 +95,7 @@ class Benchmark:
         """
         total, bound = 0.0, False
         for path in self.result_files():
-            if path.suffix == ".jsonl":
+            if ".jsonl" in path.suffixes:
                 for record in newest(path):
                     spent = record.get("cpu_seconds") or record.get("seconds")
                     bound |= spent is None
@@ -114,7 +115,7 @@ class Benchmark:
 def newest(path: Path) -> list[Mapping[str, Any]]:
     """Return the last record of each key of a file, of each step and size for those of the study."""
     found = {}
-    for line in path.read_text(encoding="utf-8").splitlines():
+    for line in lines_of(path):
         record = json.loads(line)
         found[json.dumps(record.get("key", record.get("parameters")), sort_keys=True)] = record
     return list(found.values())
@@ -235,7 +236,7 @@ BENCHMARKS = {
         Benchmark(
             "study",
             needs="records of coders",
-            records="study/*.jsonl",
+            records="study/*.jsonl.gz",
             fills=("docs/study.md",),
             tables_in="study.page",
             writes=(f"{IMAGES}/study/*",),

@@ -1,7 +1,8 @@
-"""JSON-lines files: appended record by record; a killed writer loses no whole record."""
+"""JSON-lines files: appended record by record; a killed writer loses no whole record. ``.gz`` files are read."""
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 from collections.abc import Mapping
@@ -30,6 +31,12 @@ def append_record(path: Path, record: Mapping[str, Any]) -> None:
         os.fsync(file.fileno())
 
 
+def lines_of(path: Path) -> list[bytes]:
+    """Return the lines of a file with their ends, decompressed if its suffix is ``.gz``."""
+    data = path.read_bytes()
+    return (gzip.decompress(data) if path.suffix == ".gz" else data).splitlines(keepends=True)
+
+
 def read_records(path: Path, format: str, version: int) -> list[dict[str, Any]]:
     """Return all records of a file, oldest first, without an incomplete last line.
 
@@ -44,7 +51,7 @@ def read_records(path: Path, format: str, version: int) -> list[dict[str, Any]]:
         return []
     check_file(path)
     found = []
-    for number, line in enumerate(path.read_bytes().splitlines(keepends=True), 1):
+    for number, line in enumerate(lines_of(path), 1):
         if not line.endswith(b"\n"):
             break
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, filled
 from benchmarks.records import ROOT, origin, with_commits
 from ii_core.files import atomic_path
+from ii_core.json_lines import lines_of, read_records
 from metrics import bd_psnr, bd_rate
 from metrics.rd import UndefinedDifference
 
@@ -21,11 +23,12 @@ from .charts import LABELS, draw_all
 from .claims import Claim, Results, by_detail, claims, gain, of_scenes, shown, type_table
 from .coding import SCENES
 from .rates import BFRAMES, GOPS, MODERN, PVS, RANGES, REFERENCE, SI, VOLUME
-from .runner import digest_of, records
+from .runner import FORMAT, VERSION, digest_of
 from .theirs import said
 from .volume_model import APART, MODEL
 
 PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
+ENDING = ".jsonl.gz"  # of published records: they are a sixth of the size of the lines
 CODERS_SCALE = 4
 PHOTOGRAPHS = {"component-images": ".jpg", "other-cameras": ".jpg", "artefacts-": ".webp", "equal-": ".webp"}
 OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
@@ -47,8 +50,8 @@ def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Pat
     for place in (images, kept):
         place.mkdir(parents=True, exist_ok=True)
     for path in sorted(folder.glob("*.jsonl")):
-        keep(path, kept / path.name)
-    everything = {path.stem: records(kept, path.stem) for path in sorted(kept.glob("*.jsonl"))}
+        keep(path, kept / f"{path.name}.gz")
+    everything = published(kept)
     best = {name: largest(some) for name, some in everything.items()}
     copy_pictures(folder, images, best)
     for path in draw_all({name: record["result"] for name, record in best.items()}, images):
@@ -62,7 +65,7 @@ def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Pat
 
 def tables(kept: Path = KEPT) -> Tables:
     """Return all tables of the page from the kept records."""
-    everything = {path.stem: records(kept, path.stem) for path in sorted(kept.glob("*.jsonl"))}
+    everything = published(kept)
     best = {name: largest(some) for name, some in everything.items()}
     results = {name: record["result"] for name, record in best.items()}
     made = {
@@ -87,12 +90,18 @@ def page_name(name: str) -> str:
     return next((name.replace(".png", end) for kind, end in PHOTOGRAPHS.items() if name.startswith(kind)), name)
 
 
+def published(kept: Path) -> dict[str, list[dict[str, Any]]]:
+    """Return the published records of every step."""
+    paths = sorted(kept.glob(f"*{ENDING}"))
+    return {path.name.removesuffix(ENDING): read_records(path, FORMAT, VERSION) for path in paths}
+
+
 def keep(new: Path, old: Path) -> None:
-    """Append the lines of one file that another lacks."""
-    there = old.read_text(encoding="utf-8").splitlines() if old.exists() else []
-    lines = [line for line in new.read_text(encoding="utf-8").splitlines() if line not in there]
+    """Append the lines of one file that another, compressed one lacks; equal lines make an equal file."""
+    there = lines_of(old) if old.exists() else []
+    lines = [line for line in lines_of(new) if line not in there]
     with atomic_path(old) as temporary:
-        temporary.write_text("".join(f"{line}\n" for line in [*there, *lines]), encoding="utf-8")
+        temporary.write_bytes(gzip.compress(b"".join([*there, *lines]), mtime=0))
 
 
 def largest(some: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
@@ -400,7 +409,7 @@ def record_table(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
         commit = git["commit"][:10] + (", dirty" if git["dirty"] else "")
         again = {True: "the same to the bit", False: "**not the same**", None: ""}[record.get("repeats")]
         scale = record["parameters"].get("scale", "")
-        link = f"[{name}](../benchmarks/results/study/{name}.jsonl)"
+        link = f"[{name}](../benchmarks/results/study/{name}{ENDING})"
         lines.append(
             f"| {link} | {record['shows']} | {scale} | {commit} | {record.get('cpu_seconds', '')} | {again} |"
         )

@@ -1,5 +1,6 @@
 """Study: steps, records, reproducibility, comparison with the dissertation."""
 
+import gzip
 import json
 import math
 
@@ -94,7 +95,7 @@ def test_a_small_study_resumes_repeats_and_fills_the_page(tmp_path, capsys):
     )
     for _ in range(2):  # published again, nothing is kept twice
         publish(tmp_path / "out", page=page, images=tmp_path / "images", kept=tmp_path / "kept")
-        lines = (tmp_path / "kept" / "floors.jsonl").read_text().splitlines()
+        lines = gzip.decompress((tmp_path / "kept" / "floors.jsonl.gz").read_bytes()).splitlines()
         assert [json.loads(line).get("repeats") for line in lines] == [None, True]
     assert (tmp_path / "images" / "artefacts-setup1_views.webp").exists()
     assert (
