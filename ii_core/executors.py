@@ -24,6 +24,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from .extras import load
 from .parallel import cores
 
 Work = Callable[..., Any]
@@ -158,9 +159,9 @@ def _shared(client: Any, work: Work) -> Any:
 
 
 def _on_cluster(work: Work, item: tuple[Any, ...], identity: Identity, ours: Mapping[str, str]) -> Any:
-    from distributed import get_worker
-
-    check_identity(identity(), ours, f"dask worker {get_worker().address}")  # which may have joined late
+    check_identity(
+        identity(), ours, f"dask worker {load('distributed').get_worker().address}"
+    )  # which may have joined late
     return work(*item)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IIPicture, checks
 from ii_core.executors import as_they_come, check_executor, lost
+from ii_core.extras import load
 from ii_core.identity import library_versions, source_hash
 from ii_core.progress import reporter
 
@@ -86,8 +87,7 @@ def bd_rate(rates_a: ArrayLike, quality_a: ArrayLike, rates_b: ArrayLike, qualit
                 "quality falls",
             )
     _check_overlap("quality", a[1], b[1])
-    import bjontegaard
-
+    bjontegaard = load("bjontegaard")
     # Its own notion of overlap, a share of the union, only warns; ours has been checked.
     return float(bjontegaard.bd_rate(*a, *b, method=METHOD, require_matching_points=False, min_overlap=0))
 
@@ -120,8 +120,7 @@ def bd_psnr(rates_a: ArrayLike, quality_a: ArrayLike, rates_b: ArrayLike, qualit
     """
     a, b = _curve("a", rates_a, quality_a), _curve("b", rates_b, quality_b)
     _check_overlap("rate", a[0], b[0], np.log10)
-    import bjontegaard
-
+    bjontegaard = load("bjontegaard")
     return float(bjontegaard.bd_psnr(*a, *b, method=METHOD, require_matching_points=False, min_overlap=0))
 
 

@@ -11,15 +11,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import imagecodecs
 import numpy as np
 from numpy.typing import NDArray
+
+from ii_core.extras import Lazy
 
 from ..clock import cpu_seconds
 from ..colour import Format
 from ..contract import Option, Options
 from ..frames import Film
 from .pseudo_video import DEPTH, ORDER, Packets, PseudoVideo
+
+imagecodecs = Lazy("imagecodecs")
 
 # The temporal delimiter at the start of every frame. AVIF omits it, but libaom's sequences contain it.
 DELIMITER = b"\x12\x00"

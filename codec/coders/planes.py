@@ -10,11 +10,14 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import imagecodecs
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core.extras import Lazy
+
 from ..bitstream import jpeg2000
+
+imagecodecs = Lazy("imagecodecs")
 
 MAX_COMPONENTS = 4095  # imagecodecs' limit; the standard's is 16384
 FINEST_DB = 140.0
@@ -44,7 +47,7 @@ def encode_planes(planes: NDArray[Any], squared_error: float, *, wavelet: str) -
     level = None if squared_error == 0 else min(max(10 * math.log10(peak**2 / squared_error), 1e-3), FINEST_DB)
     whole = imagecodecs.jpeg2k_encode(
         planes,
-        level,  # type: ignore[arg-type]
+        level,
         codecformat="J2K",
         planar=True,
         mct=False,

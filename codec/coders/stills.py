@@ -16,7 +16,6 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, ClassVar
 
-import imagecodecs
 import numpy as np
 import PIL
 from numpy.typing import NDArray
@@ -24,11 +23,14 @@ from PIL import Image, features
 from PIL.JpegImagePlugin import JpegImageFile
 
 from ii_core import IIPicture
+from ii_core.extras import Lazy
 
 from ..bitstream.jpeg2000 import without_comments
 from ..clock import cpu_seconds
 from ..contract import Coder, Goal, Option, Options, Pixels
 from ..search import Axis, CodingResult, Run, meet_size
+
+imagecodecs = Lazy("imagecodecs")
 
 LOSSLESS = Option(about="1 for lossless coding", default=0, low=0, high=1)
 

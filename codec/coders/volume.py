@@ -20,11 +20,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
-import imagecodecs
 import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
+from ii_core.extras import Lazy
 from ii_core.jit import kernel
 
 from ..clock import cpu_seconds
@@ -34,6 +34,8 @@ from ..order import BY, ORDERS
 from ..search import Axis, CodingResult, Run, meet_size
 from . import lifting
 from .planes import MAX_COMPONENTS, decode_planes, encode_planes, picked_planes
+
+imagecodecs = Lazy("imagecodecs")
 
 NAMES = {"ei": "elementary images", "si": "sub-images", "ri": "ray-space images"}
 

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from ..extras import load
 from ..files import atomic_path
 
 # Colours of Okabe and Ito, which colour-blind readers tell apart; without their yellow, too pale on white.
@@ -18,11 +19,8 @@ SUFFIXES = (".png", ".pdf", ".svg")
 
 def new_figure(width: float, height: float, layout: Any = "constrained") -> Any:
     """Return an empty matplotlib Figure of a size in inches, registered with no window."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout=layout)
-    FigureCanvasAgg(figure)
+    figure = load("matplotlib.figure").Figure(figsize=(width, height), layout=layout)
+    load("matplotlib.backends.backend_agg").FigureCanvasAgg(figure)
     return figure
 
 
@@ -52,13 +50,11 @@ def save(figure: Any, path: str | os.PathLike[str], *, dpi: int = 130) -> Path:
     OSError
         If the file cannot be written.
     """
-    import matplotlib
-
     kind = check_suffix(path)
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {}}[kind]
     text: Any = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "raytrace-ii"}
     drawn = io.BytesIO()  # on a full disk matplotlib truncates PDF and SVG files without an error
-    with matplotlib.rc_context(text):
+    with load("matplotlib").rc_context(text):
         figure.savefig(drawn, dpi=dpi, format=kind, metadata=undated)
     with atomic_path(path) as temporary:
         temporary.write_bytes(drawn.getvalue())

@@ -62,6 +62,12 @@ def _run() -> None:
         if end.code == TERMINATED:
             print("interrupted", file=sys.stderr)
         raise
+    except ImportError as error:
+        from ii_core.extras import NotInstalled
+
+        if not isinstance(error, NotInstalled):
+            raise
+        _fail(str(error))
     except ForeignError as error:
         _fail(str(error))
     except RecursionError:

@@ -17,17 +17,15 @@ def cluster(address: str | None, identity: Callable[[], Mapping[str, str]]) -> I
     if address is None:
         yield None
         return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise ValueError("--dask needs dask, which is not installed: pip install 'raytrace-ii[dask]'") from None
     import logging
 
     from ii_core.executors import check_workers
+    from ii_core.extras import load
 
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told by our one line
+    load("distributed")
     try:
-        client = Client(address, timeout=5, set_as_default=False)
+        client = load("distributed").Client(address, timeout=5, set_as_default=False)
     except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # tls:// without certificates, too
         raise OSError(f"no dask scheduler answers at {address}: {error}") from None
     try:

@@ -63,6 +63,7 @@ def measure(
 ) -> None:
     """Compare two II-pictures of the same structure, or two takes over time."""
     from ii_core import IIPicture
+    from ii_core.extras import load
     from ii_core.files import read_depth, read_image, write_json
     from metrics import report
 
@@ -77,6 +78,7 @@ def measure(
         measure_frames(reference, decoded, json, plots, force)
         return
     if plots:
+        load("matplotlib")  # before the work
         from metrics import PLOTS, plot_all
 
         check_outputs([*files, *(plots / name for name in PLOTS)], force, make_folder=True)
@@ -174,6 +176,7 @@ def study(
     """
     from codec import parse_scheme
     from ii_core import IIPicture
+    from ii_core.extras import load
     from ii_core.files import read_depth
     from metrics.rd import identity
 
@@ -184,6 +187,9 @@ def study(
     if dask and plugin:
         raise ValueError("--plugin is for this machine alone: with --dask, install it as a package on all workers")
     load_plugins(plugin)
+    if not orders:
+        for library in ("matplotlib", "bjontegaard"):  # before the work
+            load(library)
     stems = [picture.stem for picture in pictures]
     if len(set(stems)) < len(stems):
         raise ValueError(f"pictures are named {', '.join(stems)}: every picture needs a name of its own")

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, model_validator
 
+from ii_core.extras import load
+
 from ..scene.scene import unit_rows
 from .implicit_parts import Array, Ball, Block, Capsule, Part, Tube
 from .primitives import Mesh, Shape
@@ -49,7 +51,7 @@ class Implicit(Shape):
         return self
 
     def mesh(self) -> Mesh:
-        from skimage.measure import marching_cubes  # slow to import
+        marching_cubes = load("skimage.measure").marching_cubes  # slow to import
 
         low, count = self._grid()
         x, y, z = (low[i] + self.cell_mm * np.arange(count[i]) for i in range(3))

@@ -11,11 +11,11 @@ import struct
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-import imagecodecs
 import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
+from ii_core.extras import Lazy
 
 from ...clock import cpu_seconds
 from ...contract import Coder, Goal, Option, Options, Pixels
@@ -23,6 +23,8 @@ from ...frames import Layout, layout
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
 from ..volume import NAMES, Volume, gather_real, lines, principal_axes, scatter_real
 from .stream import LEAST_SLICES, Part, decode_volumes, encode_volume, squared_error
+
+imagecodecs = Lazy("imagecodecs")
 
 COARSEST_DB, FINEST_DB = 0.0, 70.0
 # Binary logarithms of the step in 8-bit codes. The coarsest leaves only the mean, the finest gives 70 dB. One more

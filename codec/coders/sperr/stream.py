@@ -17,12 +17,15 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import imagecodecs
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core.extras import Lazy
+
 from ...clock import spent_elsewhere
 from . import worker
+
+imagecodecs = Lazy("imagecodecs")
 
 Shape = tuple[int, ...]
 
