@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ii_core import checks
 from ii_core.display.figure import COLOURS, LINES, MARKERS, check_suffix, new_figure, save
+from ii_core.extras import load
 
 from ..measure import measure_of
 from ..points import check_measured, is_study
@@ -77,14 +78,13 @@ def draw(study: Mapping[str, Any], measure: str = "q_global") -> Any:
 
 def set_rate_axis(axes: Any, points: Sequence[Mapping[str, Any]]) -> None:
     """Set a logarithmic axis of rates that contains all points, and a light grid."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
+    ticker = load("matplotlib.ticker")
     rates = [point["bpp"] for point in points]
     axes.set_xscale("log")
     axes.set_xlim(min(rates) / 1.3, max(rates) * 1.3)
-    axes.xaxis.set_major_locator(LogLocator(base=10, subs=(1, 2, 5), numticks=50))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_locator(ticker.LogLocator(base=10, subs=(1, 2, 5), numticks=50))
+    axes.xaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_locator(ticker.NullLocator())
     axes.set_xlabel("rate [bit/pixel]")
     axes.grid(True, color="0.9", linewidth=0.8)
     axes.set_axisbelow(True)
