@@ -33,12 +33,17 @@ Floats = NDArray[np.float32]
 
 
 def codings(span: int = INSTANTS) -> dict[str, tuple[str, Plan]]:
-    """Scheme and plan by name; a time-first walk has the last view at most 2·span − 1 frames back."""
+    """Scheme and plan by name.
+
+    One reference is one dimension. In a time-first walk the last view is at most 2·span − 1 frames back, so that 16
+    references are both dimensions. Groups of one view have no other view: they tell what more instants bring.
+    """
 
     def scheme(refs: int) -> str:
         return f"si-h264:rate=cq,refs={refs}"
 
     first, across = Plan(walk="time-first", span=span), Plan(walk="view-first", span=span)
+    films = Plan(walk="time-first", span=span, group=1)
     strips = {strip: Plan(walk="interleaved", span=span, strip=strip) for strip in (2, 4, 8)}
     return {
         "time-first, 1 reference": (scheme(1), first),
@@ -47,6 +52,8 @@ def codings(span: int = INSTANTS) -> dict[str, tuple[str, Plan]]:
         "interleaved by 2 views, 16 references": (scheme(16), strips[2]),
         "interleaved by 4 views, 16 references": (scheme(16), strips[4]),
         "interleaved by 8 views, 16 references": (scheme(16), strips[8]),
+        "time-first, groups of 1 view, 1 reference": (scheme(1), films),
+        "time-first, groups of 1 view, 16 references": (scheme(16), films),
     }
 
 
