@@ -119,11 +119,11 @@ def field_errors(name: str) -> dict[str, Any]:
 
 def coding(name: str) -> dict[str, Any]:
     """Return the gain of SI-PVS over JPEG 2000 on *Apples* through a real lens and through its twin."""
-    full, scene, pose = real_camera(name), load_scene("apples"), np.eye(4)
+    real, scene, pose = scaled(real_camera(name), SCALE), load_scene("apples"), np.eye(4)
     pose[2, 3] = -BACK_MM
     result: dict[str, Any] = {}
-    for which, camera in (("real", full), ("ideal", ideal_twin(full))):
-        picture = render(scene, scaled(camera, SCALE), samples=4, pose=pose, support=()).picture
+    for which, camera in (("real", real), ("ideal", ideal_twin(real))):
+        picture = render(scene, camera, samples=4, pose=pose, support=()).picture
         curves = {
             "si-h264": [encode(picture, "si-h264", qp=qp) for qp in QPS],
             "jpeg2000": [encode(picture, "jpeg2000", bpp=bpp) for bpp in RATES],
@@ -138,8 +138,8 @@ def coding(name: str) -> dict[str, Any]:
                 *zip(*points["jpeg2000"], strict=True), *zip(*points["si-h264"], strict=True)
             ),
         }
-    real, ideal = (result[which]["points"]["si-h264"] for which in ("real", "ideal"))
-    result["real_over_ideal_percent"] = difference(ideal, real)
+    curves_of = {which: result[which]["points"]["si-h264"] for which in ("ideal", "real")}
+    result["real_over_ideal_percent"] = difference(*curves_of.values())
     return result
 
 

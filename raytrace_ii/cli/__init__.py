@@ -14,7 +14,7 @@ import typer
 
 from ii_core.foreign import ForeignError
 
-from . import synthesize, render, pictures, calibrating, coding, evaluate, show, eye, observers, video
+from . import synthesize, render, pictures, calibrating, coding, evaluate, benchmarking, show, eye, observers, video
 from .common import app
 from .ending import ends_soon
 from .folders import no_empty_folders
@@ -22,6 +22,7 @@ from .words import SPELT, one_line
 
 __all__ = [
     "app",
+    "benchmarking",
     "calibrating",
     "coding",
     "evaluate",

@@ -8,6 +8,7 @@ import importlib.util
 import itertools
 import os
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -70,7 +71,7 @@ def written_commands(text):
 
 def variants(line):
     """``a | b`` is one or the other; what stands in brackets may be given."""
-    words, choices = re.sub(r"[\[\]]", "", line).split()[1:], []
+    words, choices = shlex.split(re.sub(r"[\[\]]", "", line))[1:], []
     for i, word in enumerate(words):
         if word == "|":
             continue

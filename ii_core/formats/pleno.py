@@ -1,0 +1,142 @@
+"""Views for the programs of JPEG Pleno: ``RRR_CCC.ppm`` of 10 bit, or the same names as PNG.
+
+Rows and columns count from the top left, in camera order. 8-bit codes become the nearest of the 1024 codes and return
+unchanged.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..files import check_file, write_image
+from ..picture import IIPicture
+from .views import camera_views, read_view
+
+TEN_BIT = 1023
+KINDS = ("ppm", "png")
+MAX_HEADER = 256  # bytes
+Pixels = NDArray[Any]
+
+
+def write_pleno_views(picture: IIPicture, folder: Path, kind: str) -> int:
+    """Write every view of an 8-bit picture; return the number of views.
+
+    Parameters
+    ----------
+    picture : IIPicture
+        Regular, uint8.
+    folder : Path
+        Created if missing.
+    kind : {"ppm", "png"}
+
+    Raises
+    ------
+    ValueError
+        If the picture is not regular or not of 8 bit.
+    """
+    if picture.pixels.dtype != np.uint8:
+        raise ValueError(f"picture is {picture.pixels.dtype}: views for other programs are made of uint8")
+    folder.mkdir(parents=True, exist_ok=True)
+    count = 0
+    for row, col, view in camera_views(picture):
+        path = folder / view_name(row, col, kind)
+        if kind == "ppm":
+            write_ppm(path, _ten_bit(view))
+        else:
+            write_image(path, view)
+        count += 1
+    return count
+
+
+def read_pleno_views(folder: Path, like: IIPicture, kind: str) -> IIPicture:
+    """Return the picture of the views in a folder.
+
+    Parameters
+    ----------
+    like : IIPicture
+        Structure and camera.
+
+    Raises
+    ------
+    ValueError
+        If a view is missing, is no such picture, or has another size.
+    OSError
+        If a view cannot be read.
+    """
+    out = np.empty_like(like.pixels)
+    empty = like.with_pixels(out)
+    for row, col, view in camera_views(empty):  # views of `out`, in place
+        path = folder / view_name(row, col, kind)
+        if not path.is_file():
+            raise ValueError(f"view {path.name} is missing")
+        found = _eight_bit(read_ppm(path)) if kind == "ppm" else read_view(path)
+        if found.shape != view.shape or found.dtype != np.uint8:
+            raise ValueError(
+                f"view {path.name} is {found.shape[1]}×{found.shape[0]} px of {found.dtype}: "
+                f"{view.shape[1]}×{view.shape[0]} px of uint8 are needed"
+            )
+        view[...] = found
+    return empty
+
+
+def view_name(row: int, col: int, kind: str) -> str:
+    """Return the name of a view's file."""
+    return f"{row:03}_{col:03}.{kind}"
+
+
+def write_ppm(path: Path, codes: Pixels) -> None:
+    """Write (T, S, 3) codes of 10 bit as a binary PPM, two bytes a value, the high byte first."""
+    height, width, _ = codes.shape
+    path.write_bytes(f"P6\n{width} {height}\n{TEN_BIT}\n".encode() + codes.astype(">u2").tobytes())
+
+
+def read_ppm(path: Path) -> Pixels:
+    """Return the codes of a binary PPM of 10 bit, (T, S, 3) uint16.
+
+    Raises
+    ------
+    ValueError
+        If it is no such file, or its length does not fit its size.
+    """
+    check_file(path)
+    data = path.read_bytes()
+    words, end = _header(data[:MAX_HEADER])
+    if len(words) != 4 or words[0] != b"P6" or not all(word.isdigit() and len(word) < 8 for word in words[1:]):
+        raise ValueError(f"view {path.name} is no binary PPM")
+    width, height, most = map(int, words[1:])
+    if most != TEN_BIT:
+        raise ValueError(f"view {path.name} has codes to {most}: {TEN_BIT}, 10 bit, are needed")
+    if len(data) - end != 6 * width * height:
+        raise ValueError(f"view {path.name} has {len(data) - end} bytes of pixels: {6 * width * height} are needed")
+    codes = np.frombuffer(data, ">u2", offset=end).astype(np.uint16).reshape(height, width, 3)
+    if codes.max(initial=0) > TEN_BIT:
+        raise ValueError(f"view {path.name} has a code of {codes.max()}: at most {TEN_BIT} is allowed")
+    return codes
+
+
+def _header(data: bytes) -> tuple[list[bytes], int]:
+    """Return the four words of a PPM's head, without comments, and where its pixels begin."""
+    words: list[bytes] = []
+    at = 0
+    while len(words) < 4 and at < len(data):
+        if data[at : at + 1].isspace():
+            at += 1
+        elif data[at : at + 1] == b"#":
+            at = data.find(b"\n", at) + 1 or len(data)
+        else:
+            stop = next((i for i in range(at, len(data)) if data[i : i + 1].isspace()), len(data))
+            words.append(data[at:stop])
+            at = stop
+    return words, at + 1  # one white space ends the head
+
+
+def _ten_bit(codes: Pixels) -> Pixels:
+    return (codes.astype(np.uint32) * TEN_BIT * 2 + 255) // 510
+
+
+def _eight_bit(codes: Pixels) -> Pixels:
+    return ((codes.astype(np.uint32) * 255 * 2 + TEN_BIT) // (2 * TEN_BIT)).astype(np.uint8)

@@ -1,0 +1,204 @@
+"""External commands as a coder: views out as files, a coded file back, and views of the decoder.
+
+Commands run without a shell, in folders of their own, with a time limit. The decoder runs where there is nothing but
+the coded file.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import resource
+import shlex
+import shutil
+import signal
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from ii_core import IIPicture
+from ii_core.files import one_line
+from ii_core.formats.pleno import KINDS, read_pleno_views, write_pleno_views
+
+KNOWN = ("{in}", "{out}", "{bpp}", "{bytes}", "{rows}", "{columns}", "{width}", "{height}")
+MAX_OUTPUT = 300  # characters of what a failed command said
+
+
+class Refused(ValueError):
+    """The benchmark refuses a coder: a command fails, runs too long, or gives no picture back."""
+
+
+@dataclass(frozen=True)
+class ExternalFile:
+    """Coded file of an external command."""
+
+    data: bytes
+    bpp: float
+    encode_seconds: float
+    reached: bool
+    like: IIPicture
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the file."""
+        return len(self.data)
+
+
+@dataclass(frozen=True)
+class Decoded:
+    """Decoded picture and CPU seconds of the decoder."""
+
+    picture: IIPicture
+    seconds: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class External:
+    """Coder of two external commands.
+
+    Parameters
+    ----------
+    encoder, decoder : str
+        Commands, split as a shell would, but run without one. ``{in}`` and ``{out}`` are needed in both: of the
+        encoder the folder of views and the coded file, of the decoder the coded file and the folder of views. Others
+        are ``{bpp}``, ``{bytes}`` (the target), ``{rows}``, ``{columns}`` (views), ``{width}``, ``{height}`` (of a
+        view).
+    kind : {"ppm", "png"}
+        Files of the views: binary PPM of 10 bit, or PNG of 8 bit; named RRR_CCC.
+    seconds : float
+        Limit of each command.
+    rate_tolerance : float
+        Share by which a file may exceed its target to meet it.
+
+    Raises
+    ------
+    ValueError
+        If a command cannot be split, is empty, lacks a placeholder, has an unknown one, or its program is not found.
+    """
+
+    encoder: str
+    decoder: str
+    kind: str = "ppm"
+    seconds: float = 3600.0
+    rate_tolerance: float = 0.02
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"unknown kind of views {self.kind!r}: known are {', '.join(KINDS)}")
+        for name, command in (("encoder", self.encoder), ("decoder", self.decoder)):
+            words = _split(name, command)
+            for needed in ("{in}", "{out}"):
+                if not any(needed in word for word in words):
+                    raise ValueError(f"{name} {command!r} has no {needed}: both {{in}} and {{out}} are needed")
+            if unknown := sorted(set(re.findall(r"\{\w*\}", command)) - set(KNOWN)):
+                raise ValueError(f"{name} {command!r} has an unknown {unknown[0]}: known are {', '.join(KNOWN)}")
+            if shutil.which(words[0]) is None:
+                raise ValueError(f"{name}: program {words[0]!r} is not found")
+
+    def encode(self, picture: IIPicture, scheme: str, *, bpp: float) -> ExternalFile:
+        """Code a picture at a rate; the arguments are those of `metrics.rate_distortion`.
+
+        Raises
+        ------
+        Refused
+            If the command fails, runs too long or writes nothing.
+        """
+        with _folder() as folder:
+            views, out = folder / "views", folder / "coded"
+            write_pleno_views(picture, views, self.kind)
+            across, down = picture.size
+            values = self._values(picture) | {
+                "{in}": str(views),
+                "{out}": str(out),
+                "{bpp}": f"{bpp:.6g}",
+                "{bytes}": str(int(bpp * across * down / 8)),
+            }
+            seconds = self._run("encoder", self.encoder, values, folder)
+            if not out.is_file() or not out.stat().st_size:
+                raise Refused(f"encoder wrote no file at {bpp:g} bpp: {{out}} is one file")
+            data = out.read_bytes()
+        rate = 8 * len(data) / (across * down)
+        return ExternalFile(data, rate, seconds, rate <= bpp * (1 + self.rate_tolerance), picture)
+
+    def decode(self, coded: ExternalFile) -> Decoded:
+        """Decode a file where there is nothing else.
+
+        Raises
+        ------
+        Refused
+            If the command fails, runs too long, or views are missing or wrong.
+        """
+        with _folder() as folder:
+            source, views = folder / "coded", folder / "views"
+            source.write_bytes(coded.data)
+            views.mkdir()
+            values = self._values(coded.like) | {"{in}": str(source), "{out}": str(views)}
+            seconds = self._run("decoder", self.decoder, values, folder)
+            try:
+                return Decoded(read_pleno_views(views, coded.like, self.kind), seconds)
+            except (ValueError, OSError) as error:
+                raise Refused(f"decoder: {one_line(error)}") from None
+
+    @staticmethod
+    def _values(picture: IIPicture) -> dict[str, str]:
+        (columns, rows), (width, height) = picture.ei_pixels, picture.lenses
+        return {
+            "{rows}": str(rows), "{columns}": str(columns), "{width}": str(width), "{height}": str(height),
+            "{bpp}": "", "{bytes}": "",
+        }  # fmt: skip
+
+    def _run(self, name: str, command: str, values: dict[str, str], folder: Path) -> float:
+        """Run a command; return its CPU seconds."""
+        words = [_filled(word, values) for word in _split(name, command)]
+        before = _children_seconds()
+        with (folder / "said").open("wb") as said:
+            started = subprocess.Popen(
+                words, cwd=folder, stdin=subprocess.DEVNULL, stdout=said, stderr=said, start_new_session=True
+            )
+            try:
+                code = started.wait(self.seconds)
+            except subprocess.TimeoutExpired:
+                raise Refused(f"{name} ran longer than {self.seconds:g} s: it was ended") from None
+            finally:
+                _end(started)
+        if code:
+            text = one_line((folder / "said").read_bytes()[-MAX_OUTPUT:].decode("utf-8", "replace"))
+            raise Refused(f"{name} ended with code {code}: {text or 'it said nothing'}")
+        return _children_seconds() - before
+
+
+def _split(name: str, command: str) -> list[str]:
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise ValueError(f"{name} {command!r} cannot be split into words: {error}") from None
+    if not words:
+        raise ValueError(f"{name} is empty: a command is needed")
+    return words
+
+
+def _filled(word: str, values: dict[str, str]) -> str:
+    for key, value in values.items():
+        word = word.replace(key, value)
+    return word
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a command with all processes of its session."""
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _children_seconds() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+@contextmanager
+def _folder() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="raytrace-ii-") as folder:
+        yield Path(folder)

@@ -1,0 +1,186 @@
+"""Profiles of the benchmark: pictures, rates, measures and rules, one TOML file a profile and version."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import assets
+from ii_core import IICamera, checks, preset
+from ii_core.files import one_line, read_text
+
+from ..measure import measure_of
+
+FIELDS = {
+    "name",
+    "version",
+    "about",
+    "rates_bpp",
+    "measures",
+    "rank_by",
+    "anchor",
+    "rate_tolerance",
+    "seconds",
+    "picture",
+}
+PICTURE = {"name", "use", "scene", "camera", "scale", "samples", "at_mm", "sha256"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """Reference picture: how it is made, and the hash of its pixels.
+
+    Parameters
+    ----------
+    name, use : str
+        Name, and what the picture is for.
+    scene : str
+        Scene of the package.
+    camera : str or mapping
+        Camera of the package, or its values.
+    scale, samples : int
+    at_mm : (x, y, z)
+        Place of the camera in the scene.
+    sha256 : str, optional
+        Of the pixels; None if not fixed yet.
+    """
+
+    name: str
+    use: str
+    scene: str
+    camera: Any
+    scale: int = 1
+    samples: int = 1
+    at_mm: tuple[float, ...] = (0.0, 0.0, 0.0)
+    sha256: str | None = None
+
+    def made_camera(self) -> IICamera:
+        """Return the camera."""
+        if isinstance(self.camera, str):
+            return preset(self.camera, scale=self.scale)
+        return IICamera.from_json({"name": self.name, **self.camera})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profile:
+    """Definition of a benchmark.
+
+    Parameters
+    ----------
+    name : str
+    version : int
+        Results of different versions are never ranked together.
+    about : str
+    rates_bpp : tuple of float
+        Targets: bits of the coded file per pixel of the II-picture.
+    measures : tuple of str
+        Registered measures.
+    rank_by : str
+        The measure of the ranking.
+    anchor : str
+        Coder whose curve Bjøntegaard differences refer to.
+    rate_tolerance : float
+        A target is met by a file that is at most this share larger.
+    seconds : float
+        Limit of one external command.
+    pictures : tuple of Reference
+    digest : str
+        SHA-256 of the file: results name it.
+    """
+
+    name: str
+    version: int
+    about: str
+    rates_bpp: tuple[float, ...]
+    measures: tuple[str, ...]
+    rank_by: str
+    anchor: str
+    rate_tolerance: float
+    seconds: float
+    pictures: tuple[Reference, ...]
+    digest: str
+
+    def meets(self, bpp: float, target: float) -> bool:
+        """Return whether a rate counts as that target."""
+        return bpp <= target * (1 + self.rate_tolerance)
+
+
+def profile_names() -> dict[str, str]:
+    """Return the names of the profiles of the package with a description in one line."""
+    return {path.stem: profile(path.stem).about for path in sorted(_folder().glob("*.toml"))}
+
+
+@checks.checked(name=checks.path)
+def profile(name: str) -> Profile:
+    """Return a profile by name or from a file that ends in ``.toml``.
+
+    Raises
+    ------
+    ValueError
+        If the name is unknown, or the file is no profile.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(name)
+    if path.suffix != ".toml":
+        path = _folder() / f"{name}.toml"
+        if "/" in str(name) or not path.is_file():
+            known = ", ".join(p.stem for p in sorted(_folder().glob("*.toml")))
+            raise ValueError(f"unknown profile {str(name)!r}: known are {known}, or give a .toml file")
+    text = read_text(path)
+    try:
+        return _profile(tomllib.loads(text), hashlib.sha256(text.encode()).hexdigest())
+    except (ValueError, TypeError, KeyError) as error:
+        raise ValueError(f"{path}: {one_line(error)}") from None
+
+
+def _profile(data: Mapping[str, Any], digest: str) -> Profile:
+    _check_keys("profile", data, FIELDS)
+    rates = tuple(checks.number("rates_bpp", rate) for rate in data["rates_bpp"])
+    if not rates or list(rates) != sorted(set(rates)) or not (rates[0] > 0 and math.isfinite(rates[-1])):
+        raise ValueError(f"rates_bpp are {list(rates)}: positive rates, each larger than the one before, are needed")
+    measures = tuple(measure_of(name).name for name in data["measures"])
+    if data["rank_by"] not in measures:
+        raise ValueError(f"rank_by is {data['rank_by']!r}: one of the measures, {', '.join(measures)}, is needed")
+    pictures = tuple(_reference(values) for values in data["picture"])
+    names = [picture.name for picture in pictures]
+    if not names or len(set(names)) != len(names):
+        raise ValueError(f"pictures are {names}: at least one, each of its own name, is needed")
+    return Profile(
+        name=str(data["name"]),
+        version=checks.whole("version", data["version"]),
+        about=str(data["about"]),
+        rates_bpp=rates,
+        measures=measures,
+        rank_by=data["rank_by"],
+        anchor=str(data["anchor"]),
+        rate_tolerance=checks.within("rate_tolerance", data["rate_tolerance"], 0, 1),
+        seconds=checks.within("seconds", data["seconds"], 1, 1e6),
+        pictures=pictures,
+        digest=digest,
+    )
+
+
+def _reference(values: Mapping[str, Any]) -> Reference:
+    _check_keys("picture", values, PICTURE, optional={"scale", "samples", "at_mm", "sha256"})
+    given = dict(values)
+    if "at_mm" in given:
+        given["at_mm"] = checks.place("at_mm", given["at_mm"], 3)
+    return Reference(**given)
+
+
+def _check_keys(what: str, data: Mapping[str, Any], known: set[str], optional: set[str] | None = None) -> None:
+    if unknown := set(data) - known:
+        raise ValueError(f"{what} has no {', '.join(sorted(unknown))}: known are {', '.join(sorted(known))}")
+    if missing := known - set(data) - (optional or set()):
+        raise ValueError(f"{what}: {', '.join(sorted(missing))} missing")
+
+
+def _folder() -> Path:
+    return Path(str(files(assets) / "benchmarks"))

@@ -1,0 +1,116 @@
+"""Commands of the open benchmark: benchmark, ranking."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .common import Force, app, check_outputs, columns
+from .plugins import Plugins, load_plugins
+from .progress import progress_bar, say_done
+from .words import say
+
+if TYPE_CHECKING:
+    from ii_core import IIPicture
+    from metrics.benchmark.profile import Profile, Reference
+
+
+@app.command()
+def benchmark(
+    profile: Annotated[str | None, typer.Argument(help="Its name, or a .toml file; all are listed if none.")] = None,
+    scheme: Annotated[str | None, typer.Option(help="As in `raytrace-ii schemes`, options after a colon.")] = None,
+    external: Annotated[
+        tuple[str, str],
+        typer.Option(help="Commands of an encoder and a decoder: 'enc {in} {out} {bpp}' 'dec {in} {out}'."),
+    ] = ("", ""),
+    name: Annotated[str | None, typer.Option(help="Of the external commands in results.")] = None,
+    views: Annotated[str, typer.Option(help="Files for external commands: ppm of 10 bit, or png.")] = "ppm",
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="The result, .json.")] = None,
+    plugin: Plugins = None,
+    force: Force = False,
+) -> None:
+    """Run a coder, or external commands, on the pictures of a benchmark."""
+    from metrics.benchmark.profile import profile as profile_of
+    from metrics.benchmark.profile import profile_names
+    from metrics.benchmark.result import run, write_result
+
+    load_plugins(plugin)
+    if profile is None:
+        columns(profile_names())
+        return
+    defined = profile_of(profile)
+    if output is None:
+        raise ValueError("output is missing: -o result.json is needed")
+    check_outputs([output], force)
+    coder, tools = _coder(defined, scheme, external, name, views)
+    with progress_bar(f"{defined.name} {defined.version}, {coder}") as progress:
+        result = run(defined, coder, _pictures(defined), progress=progress, **tools)
+    write_result(output, result)
+    changed = [row["name"] for row in result["pictures"] if row["as_defined"] is False]
+    if changed:
+        say(f"not the pixels of the definition: {', '.join(changed)}; such results are ranked among themselves alone")
+    points = [point for row in result["pictures"] for point in row["points"]]
+    say_done(f"{output}: {coder} meets {sum(p['reached'] for p in points)} of {len(points)} targets")
+
+
+def _coder(
+    profile: Profile, scheme: str | None, external: tuple[str, str], name: str | None, views: str
+) -> tuple[str, dict[str, Any]]:
+    """Return the coder's name, and its functions for `run`."""
+    if (scheme is None) == (not any(external)):
+        raise ValueError("coder is missing: either --scheme or --external is needed")
+    if scheme is not None:
+        from codec import encode, timed_decode
+        from codec.contract import parse_scheme
+
+        if name is not None:
+            raise ValueError(f"name is {name!r}: only --external takes one, a scheme has its own")
+        parse_scheme(scheme)
+        return scheme, {"encode": encode, "decode": timed_decode}
+    from metrics.benchmark.external import External
+
+    if not name:
+        raise ValueError("name is missing: --name says what the external commands are called in results")
+    encoder, decoder = external
+    tool = External(
+        encoder=encoder, decoder=decoder, kind=views, seconds=profile.seconds, rate_tolerance=profile.rate_tolerance
+    )
+    return name, {"encode": tool.encode, "decode": tool.decode, "commands": [encoder, decoder]}
+
+
+def _pictures(profile: Profile) -> Iterator[tuple[Reference, IIPicture]]:
+    """Yield the reference pictures, rendered."""
+    from ii_core import camera_pose
+    from raytrace_ii import load_scene, render
+
+    for reference in profile.pictures:
+        pose = camera_pose(reference.at_mm)
+        shot = render(
+            load_scene(reference.scene), reference.made_camera(), samples=reference.samples, pose=pose, support=()
+        )
+        yield reference, shot.picture
+
+
+@app.command()
+def ranking(
+    profile: Annotated[str, typer.Argument(help="The profile of all results.")],
+    results: Annotated[list[Path], typer.Argument(help="Results of `raytrace-ii benchmark`.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The page, .md; its chart is .png beside it.")],
+    force: Force = False,
+) -> None:
+    """Rank results of a benchmark on a page with a chart."""
+    from metrics.benchmark.profile import profile as profile_of
+    from metrics.benchmark.ranking import chart_path, ranked, write_page
+    from metrics.benchmark.result import read_result
+
+    if output.suffix != ".md":
+        raise ValueError(f"{output} is no Markdown page: .md is needed")
+    defined = profile_of(profile)
+    check_outputs([output, chart_path(output)], force)
+    read = [(str(path), read_result(path)) for path in results]
+    write_page(output, defined, read)
+    for place, row in enumerate(ranked(defined, [result for _, result in read]), 1):
+        say(f"{place}  {row['coder']}  {row['met']} of {row['targets']} targets, {row['quality']:.2f}")

@@ -1,0 +1,360 @@
+"""Open benchmark: definitions, external commands, views as files, results and their ranking."""
+
+import json
+import shlex
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ii_core import IIPicture
+from ii_core.formats.pleno import read_pleno_views, read_ppm, write_pleno_views, write_ppm
+from metrics.benchmark.external import External, Refused
+from metrics.benchmark.profile import profile, profile_names
+from metrics.benchmark.ranking import chart_path, ranked, write_page
+from metrics.benchmark.result import read_result, run, write_result
+from metrics.study import picture_json
+
+PYTHON = f"{shlex.quote(sys.executable)} -I -S"  # without packages: starts in 20 ms
+# Views as they are, deflated after dropping as many bits as the target needs.
+CODER = """
+import pathlib, sys, zlib
+act, source, target, *more = sys.argv[1:]
+source, target = pathlib.Path(source), pathlib.Path(target)
+if act == "enc":
+    limit, files = int(more[0]), sorted(source.iterdir())
+    views = [f.read_bytes() for f in files]
+    for drop in range(10):
+        data = b""
+        for f, view in zip(files, views):
+            codes = [view[i] * 256 + view[i + 1] >> drop << drop for i in range(len(view) - 6 * 6 * 5, len(view), 2)]
+            data += f.name.encode() + b"|" + view[:-6 * 6 * 5] + b"".join(c.to_bytes(2, "big") for c in codes)
+        coded = zlib.compress(data, 9)
+        if len(coded) <= limit:
+            break
+    target.write_bytes(coded)
+else:
+    assert [p.name for p in source.parent.iterdir() if p.is_file() and p.name != "said"] == [source.name]
+    data = zlib.decompress(source.read_bytes())
+    while data:
+        name, _, data = data.partition(b"|")
+        size = len(b"P6\\n6 5\\n1023\\n") + 6 * 6 * 5
+        (target / name.decode()).write_bytes(data[:size])
+        data = data[size:]
+"""
+PROFILE = """
+name = "mine"
+version = 3
+about = "A test."
+rates_bpp = [2.0, 6.0, 12.0, 20.0]
+measures = ["q_global"]
+rank_by = "q_global"
+anchor = "deflate"
+rate_tolerance = 0.02
+seconds = 20
+[[picture]]
+name = "ramp"
+use = "a test"
+scene = "apples"
+camera = "setup1"
+"""
+
+
+@pytest.fixture
+def picture():
+    """6×5 lenses of 3×3 pixels: a ramp with some noise."""
+    rng = np.random.default_rng(4)
+    ramp = np.add.outer(np.arange(15) * 9, np.arange(18) * 5)[..., None] + rng.integers(0, 30, (15, 18, 3))
+    return IIPicture(ramp.clip(0, 255).astype(np.uint8), (6, 5), (3, 3))
+
+
+@pytest.fixture
+def definition(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(PROFILE)
+    return profile(path)
+
+
+@pytest.fixture
+def coder(tmp_path):
+    script = tmp_path / "coder.py"
+    script.write_text(CODER)
+    start = f"{PYTHON} {shlex.quote(str(script))}"
+    return External(encoder=f"{start} enc {{in}} {{out}} {{bytes}}", decoder=f"{start} dec {{in}} {{out}}")
+
+
+# -- views as files
+
+
+def test_every_8_bit_code_survives_10_bits(tmp_path):
+    codes = np.arange(256, dtype=np.uint8).repeat(3).reshape(1, 256, 3).repeat(2, axis=0)
+    # One view of 256×2, and a second one: a picture of 2×1 pixels a lens.
+    pixels = np.repeat(codes, 2, axis=1)
+    shown = IIPicture(pixels, (256, 2), (2, 1))
+    assert write_pleno_views(shown, tmp_path, "ppm") == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["000_000.ppm", "000_001.ppm"]
+    np.testing.assert_array_equal(read_pleno_views(tmp_path, shown, "ppm").pixels, pixels)
+    ten = read_ppm(tmp_path / "000_001.ppm")[0, :, 0]
+    assert (ten[0], ten[128], ten[255]) == (0, round(128 * 1023 / 255), 1023)
+
+
+def test_bytes_of_a_ppm_are_the_format_s(tmp_path):
+    write_ppm(tmp_path / "a.ppm", np.array([[[0, 1, 1023], [256, 2, 3]]]))
+    assert (tmp_path / "a.ppm").read_bytes() == b"P6\n2 1\n1023\n\0\0\0\1\3\xff\1\0\0\2\0\3"
+    (tmp_path / "b.ppm").write_bytes(b"P6 # made by hand\n2\t1 1023\n\0\0\0\1\3\xff\1\0\0\2\0\3")
+    np.testing.assert_array_equal(read_ppm(tmp_path / "b.ppm"), read_ppm(tmp_path / "a.ppm"))
+
+
+def test_first_view_is_that_from_the_top_left(tmp_path, picture):
+    write_pleno_views(picture, tmp_path / "a", "png")
+    again = read_pleno_views(tmp_path / "a", picture, "png")
+    np.testing.assert_array_equal(again.pixels, picture.pixels)
+    # Elementary images of plain lenses are upside down: their first pixel looks to the lower right, from there
+    # the camera that stands at the top left.
+    from ii_core.files import read_image
+
+    np.testing.assert_array_equal(read_image(tmp_path / "a" / "000_000.png"), picture.pixels[0::3, 0::3])
+    np.testing.assert_array_equal(read_image(tmp_path / "a" / "002_001.png"), picture.pixels[2::3, 1::3])
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"", "is no binary PPM"),
+        (b"P5\n6 5\n1023\n", "is no binary PPM"),
+        (b"P6\n6 5\n255\n" + bytes(90), "has codes to 255: 1023"),
+        (b"P6\n6 5\n1023\n" + bytes(179), "has 179 bytes of pixels: 180"),
+        (b"P6\n5 6\n1023\n" + bytes(180), "is 5×6 px of uint8: 6×5 px"),
+        (b"P6\n6 5\n1023\n" + b"\x04\x00" * 90, "has a code of 1024"),
+        (b"P6\n99999999 5\n1023\n", "is no binary PPM"),
+    ],
+)
+def test_wrong_views_are_refused(tmp_path, picture, data, message):
+    write_pleno_views(picture, tmp_path, "ppm")
+    (tmp_path / "001_002.ppm").write_bytes(data)
+    with pytest.raises(ValueError, match=rf"view 001_002\.ppm {message}"):
+        read_pleno_views(tmp_path, picture, "ppm")
+
+
+# -- external commands
+
+
+def test_commands_code_and_decode(picture, coder):
+    coded = coder.encode(picture, "deflate", bpp=60.0)
+    assert coded.reached and coded.bpp == 8 * coded.nbytes / (18 * 15)
+    back = coder.decode(coded)
+    np.testing.assert_array_equal(back.picture.pixels, picture.pixels)
+    assert back.picture.ei_pixels == picture.ei_pixels and back.seconds > 0
+    coarse = coder.encode(picture, "deflate", bpp=6.0)
+    assert coarse.bpp <= 6.0 and abs(coder.decode(coarse).picture.pixels.astype(int) - picture.pixels).max() > 0
+    assert not coder.encode(picture, "deflate", bpp=0.01).reached
+
+
+def failing(code):
+    return f"{PYTHON} -c {shlex.quote(code)} {{in}} {{out}}"
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ("import sys; print('no such view'); sys.exit(3)", "ended with code 3: no such view"),
+        ("import sys; sys.exit(1)", "ended with code 1: it said nothing"),
+        ("import time; time.sleep(60)", "ran longer than 1 s"),
+        ("import os; os.abort()", "ended with code -6"),
+        ("pass", "encoder wrote no file at 2 bpp"),
+        ("import sys; open(sys.argv[2], 'w')", "encoder wrote no file at 2 bpp"),
+    ],
+)
+def test_a_failing_encoder_is_refused(picture, code, message):
+    broken = External(encoder=failing(code), decoder=failing("pass"), seconds=1.0)
+    started = time.perf_counter()
+    with pytest.raises(Refused, match=message):
+        broken.encode(picture, "broken", bpp=2.0)
+    assert time.perf_counter() - started < 30
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [("pass", "decoder: view 000_000.ppm is missing"), ("raise SystemExit('damaged')", "ended with code 1: damaged")],
+)
+def test_what_does_not_decode_is_refused(picture, coder, code, message):
+    coded = coder.encode(picture, "deflate", bpp=20.0)
+    with pytest.raises(Refused, match=message):
+        replace(coder, decoder=failing(code)).decode(coded)
+
+
+def test_children_of_a_command_end_with_it(tmp_path, picture):
+    mark = tmp_path / "alive"
+    child = f"import time,pathlib; time.sleep(4); pathlib.Path({str(mark)!r}).touch()"
+    code = f"import subprocess, sys, time; subprocess.Popen([sys.executable, '-S', '-c', {child!r}]); time.sleep(60)"
+    with pytest.raises(Refused, match="ran longer"):
+        External(encoder=failing(code), decoder=failing("pass"), seconds=1.5).encode(picture, "x", bpp=1.0)
+    time.sleep(4)  # the child's own four seconds: it would have written by now
+    assert not mark.exists()
+
+
+def test_no_shell_reads_the_commands(tmp_path, picture):
+    stolen = tmp_path / "stolen"
+    code = "import sys, json; json.dump(sys.argv[3:], open(sys.argv[2], 'w'))"
+    words = External(encoder=f"{failing(code)} ; touch {stolen} $HOME *", decoder=failing("pass"))
+    assert json.loads(words.encode(picture, "x", bpp=1.0).data) == [";", "touch", str(stolen), "$HOME", "*"]
+    assert not stolen.exists()
+
+
+@pytest.mark.parametrize(
+    ("encoder", "message"),
+    [
+        ("", "encoder is empty"),
+        ("enc {in}", "has no {out}"),
+        ("enc {out}", "has no {in}"),
+        ("enc '{in} {out}", "cannot be split into words"),
+        ("no-such-program {in} {out}", "program 'no-such-program' is not found"),
+        (f"{sys.executable} {{in}} {{out}} {{rate}}", "has an unknown {rate}: known are {in}, {out}, {bpp}"),
+    ],
+)
+def test_wrong_commands_are_refused_before_work(encoder, message):
+    with pytest.raises(ValueError, match=message):
+        External(encoder=encoder, decoder="python3 {in} {out}")
+
+
+# -- definitions
+
+
+def test_profiles_of_the_package():
+    assert set(profile_names()) == {"dissertation", "jpeg-pleno", "small"}
+    pleno, own = profile("jpeg-pleno"), profile("dissertation")
+    assert pleno.rates_bpp == (0.001, 0.005, 0.02, 0.1, 0.75) and {"q_ycbcr", "q_ssim"} <= set(pleno.measures)
+    assert len(own.pictures) == 8 and {p.scale for p in own.pictures} == {1}
+    for made in (pleno, own, profile("small")):
+        for reference in made.pictures:
+            camera = reference.made_camera()
+            assert camera.regular and reference.use
+    field = pleno.pictures[0].made_camera()
+    assert field.ei_pixels == (9, 9) and field.lenses == (512, 512) and field.viewer_mm == field.start_mm
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("rates_bpp = [2.0, 6.0", "rates_bpp = [6.0, 2.0"), "rates_bpp are .*each larger"),
+        (('measures = ["q_global"]', 'measures = ["beauty"]'), "unknown measure 'beauty'"),
+        (('rank_by = "q_global"', 'rank_by = "q_view"'), "rank_by is 'q_view'"),
+        (("seconds = 20", "seconds = 0"), "seconds is 0"),
+        (("version = 3\n", ""), "profile: version missing"),
+        (("version = 3", "version = 3\nprice = 1"), "profile has no price"),
+        (('use = "a test"\n', ""), "picture: use missing"),
+        (("rates_bpp = [", "rates_bpp = ["[:-1]), "mine.toml: "),
+    ],
+)
+def test_wrong_profiles_are_one_clear_line(tmp_path, change, message):
+    path = tmp_path / "mine.toml"
+    path.write_text(PROFILE.replace(*change))
+    with pytest.raises(ValueError, match=message) as error:
+        profile(path)
+    assert "\n" not in str(error.value)
+    with pytest.raises(ValueError, match="unknown profile 'mine': known are dissertation, jpeg-pleno, small"):
+        profile("mine")
+
+
+# -- results and ranking
+
+
+def result_of(definition, picture, name, coder):
+    return run(
+        definition, name, [(definition.pictures[0], picture)], encode=coder.encode, decode=coder.decode,
+        commands=[coder.encoder, coder.decoder],
+    )  # fmt: skip
+
+
+def test_a_result_has_provenance_and_survives_its_file(tmp_path, definition, picture, coder):
+    told = []
+    result = run(
+        definition, "deflate", [(definition.pictures[0], picture)], encode=coder.encode, decode=coder.decode,
+        progress=lambda *step: told.append(step),
+    )  # fmt: skip
+    again = read_result(write_result(tmp_path / "r.json", result))
+    assert again["profile"] == {"name": "mine", "version": 3, "sha256": definition.digest}
+    assert {"git", "machine", "versions", "date"} <= set(again) and again["versions"]["python"]
+    (row,) = again["pictures"]
+    assert row["sha256"] == picture_json("ramp", picture)["sha256"] and row["as_defined"] is None
+    points = row["points"]
+    assert [p["target_bpp"] for p in points] == [2.0, 6.0, 12.0, 20.0]
+    assert [p["reached"] for p in points] == [p["bpp"] <= 1.02 * p["target_bpp"] for p in points]
+    assert points == result["pictures"][0]["points"] and told[-1][:2] == (4, 4)
+
+
+def test_a_coder_that_fails_once_has_no_result(definition, picture, coder):
+    def decode(coded):
+        if coded.bpp > 10:
+            raise Refused("decoder: view 000_000.ppm is missing")
+        return coder.decode(coded)
+
+    with pytest.raises(ValueError, match=r"deflate on ramp: decoder: view 000_000\.ppm is missing"):
+        run(definition, "deflate", [(definition.pictures[0], picture)], encode=coder.encode, decode=decode)
+
+
+def test_pictures_of_other_pixels_are_said(definition, picture, coder):
+    fixed = picture_json("ramp", picture)["sha256"]
+    for digest, expected in ((fixed, True), ("0" * 64, False)):
+        reference = replace(definition.pictures[0], sha256=digest)
+        made = run(
+            replace(definition, pictures=(reference,)), "deflate", [(reference, picture)],
+            encode=coder.encode, decode=coder.decode,
+        )  # fmt: skip
+        assert made["pictures"][0]["as_defined"] is expected
+
+
+def with_points(result, name, *, rate=1.0, gain=0.0, last=True):
+    """The result of another coder: other rates and qualities."""
+    points = [
+        {**p, "bpp": p["target_bpp"] * rate, "q_global": 30.0 + i + gain, "reached": last or i < 3}
+        for i, p in enumerate(result["pictures"][0]["points"])
+    ]
+    return {**result, "coder": name, "pictures": [{**result["pictures"][0], "points": points}]}
+
+
+def test_ranking_by_targets_met_then_quality(tmp_path, definition, picture, coder):
+    base = result_of(definition, picture, "deflate", coder)
+    named = [
+        ("a.json", with_points(base, "deflate")),
+        ("b.json", with_points(base, "better", gain=1.0)),
+        ("c.json", with_points(base, "high but short", gain=9.0, last=False)),
+        ("d.json", with_points(base, "half|rate", rate=0.5)),
+    ]
+    rows = ranked(definition, [result for _, result in named])
+    assert [row["coder"] for row in rows] == ["better", "deflate", "half|rate", "high but short"]
+    assert [row["met"] for row in rows] == [4, 4, 4, 3] and rows[1]["quality"] == 31.5
+    difference = {row["coder"]: row["bd_rate"] for row in rows}
+    assert difference["deflate"] == pytest.approx(0, abs=1e-9)
+    assert difference["half|rate"] == pytest.approx(-50, abs=1e-6)  # half the rate at every quality
+    page, chart = write_page(tmp_path / "rank.md", definition, named)
+    text = page.read_text()
+    assert chart == chart_path(page) and chart.read_bytes()[:4] == b"\x89PNG" and "rank.png" in text
+    assert text.index("| better |") < text.index("| deflate |") < text.index("half\\|rate")
+    assert sorted(path.name for path in tmp_path.glob("rank*")) == ["rank.md", "rank.png"]
+
+
+def test_results_that_cannot_be_compared_are_refused(tmp_path, definition, picture, coder):
+    base = result_of(definition, picture, "deflate", coder)
+    other = {**base, "coder": "x", "pictures": [{**base["pictures"][0], "sha256": "1" * 64}]}
+    newer = {**base, "coder": "x", "profile": {**base["profile"], "version": 4}}
+    short = {**base, "coder": "x", "pictures": [{**base["pictures"][0], "points": base["pictures"][0]["points"][:2]}]}
+    for wrong, message in (
+        (other, "b.json has other pictures than a.json"),
+        (newer, "b.json is of profile mine version 4"),
+        (short, "b.json: ramp is not measured at the rates"),
+        (base, "b.json and a.json are both of deflate"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            write_page(tmp_path / "rank.md", definition, [("a.json", base), ("b.json", wrong)])
+    assert not (tmp_path / "rank.md").exists()
+
+
+@pytest.mark.parametrize("text", ["[]", "{}", '{"format": "ii-benchmark", "version": 1}', "not json"])
+def test_files_that_are_no_results_are_refused(tmp_path, text):
+    path = tmp_path / "r.json"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=r"r\.json: "):
+        read_result(path)
