@@ -63,12 +63,11 @@ def _coder(
     if (scheme is None) == (not any(external)):
         raise ValueError("coder is missing: either --scheme or --external is needed")
     if scheme is not None:
-        from codec import encode, timed_decode
-        from codec.contract import parse_scheme
+        from codec import encode, options, timed_decode
 
         if name is not None:
             raise ValueError(f"name is {name!r}: only --external takes one, a scheme has its own")
-        parse_scheme(scheme)
+        options(scheme)  # raises ValueError for an unknown one
         return scheme, {"encode": encode, "decode": timed_decode}
     from metrics.benchmark.external import External
 
