@@ -86,6 +86,27 @@ def test_the_range_of_disparity_is_found(disparity, down):
     assert high - low <= 256 * abs(disparity[1]) + 2 * ranges.MARGIN
 
 
+def test_disparities_of_the_sides_are_within_the_range():
+    """A plane of disparity 4 that the middle view does not show: it is flat there."""
+    moved = shifted_plane((4, 4), grid=(7, 7), height=48, width=48)
+    pixels = moved.pixels.copy().reshape(48, 7, 48, 7, 3)
+    pixels[:, 2:5, :, 2:5] = 90
+    source = lf._Source(moved.with_pixels(pixels.reshape(336, 336, 3)), checked_options(lf.LightField(), {}))
+    low, high, _ = ranges.estimated(source.view, source.grid)
+    assert low <= -4 * 256 and high == ranges.MARGIN
+
+
+def test_sky_tells_no_disparity():
+    """Above a textured ground that does not move, flat sky fits at every disparity."""
+    field = shifted_plane((0, 0), grid=(3, 3), height=48, width=48)
+    pixels = field.pixels.copy().reshape(48, 3, 48, 3, 3)
+    sky = 200 + np.random.default_rng(7).integers(-1, 2, (24, 3, 48, 3, 3))
+    pixels[:24] = sky
+    source = lf._Source(field.with_pixels(pixels.reshape(144, 144, 3)), checked_options(lf.LightField(), {}))
+    low, high, _ = ranges.estimated(source.view, source.grid)
+    assert (low, high) == (-ranges.MARGIN, ranges.MARGIN)
+
+
 def test_small_things_before_a_far_ground_are_within_the_range():
     """A ground that moves by nine samples a view, and a sticker of 6×6 that does not move."""
     ground = shifted_plane((9, 9), grid=(3, 3), height=48, width=48)
