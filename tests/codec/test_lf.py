@@ -224,7 +224,7 @@ def test_the_middle_view_takes_few_bytes():
 
 def test_a_view_beyond_the_grid_is_refused():
     coded = encode(shifted_plane((1, 1), grid=(2, 2)), "si-lf:fast", qp=40)
-    with pytest.raises(ValueError, match=r"view \(2, 0\) is asked for: there are 2×2"):
+    with pytest.raises(ValueError, match=r"place is \(2, 0\): there are 2×2 views"):
         decode_view(coded, (2, 0))
 
 
