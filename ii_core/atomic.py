@@ -86,7 +86,7 @@ def remove_temporaries() -> None:
 
 
 def _target(path: Path) -> Path:
-    """Where a file really lies; OSError if something other than a file is there."""
+    """Return the path of a file behind links; OSError if something other than a file is there."""
     real = Path(os.path.realpath(path))
     try:
         mode = real.stat().st_mode

@@ -105,7 +105,7 @@ def lost(error: Exception, executor: Any) -> str | None:
 def crew(
     work: Work, workers: int | None, executor: Any, identity: Identity
 ) -> Iterator[tuple[Callable[[tuple[Any, ...]], Any], int]]:
-    """How to have one item worked on, and how many are worked on at a time."""
+    """Function that submits one item, and the number of items in work at a time."""
     client = client_of(executor)
     if executor is None:
         width = cores() if workers is None else workers

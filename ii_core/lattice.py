@@ -52,7 +52,7 @@ class Lattice(NamedTuple):
         return dx + self.middle[0], dy + self.middle[1]
 
     def offsets(self, dx: Any, dy: Any) -> tuple[Any, Any]:
-        """Where an offset in the straight grid leads on the pixels."""
+        """Return the offset on the pixel array of an offset in the straight grid."""
         if self.axes is None:
             return dx, dy
         xx, xy, yx, yy = self.axes

@@ -29,7 +29,7 @@ FRAME = re.compile(r"frame_(\d+)(\.(?:png|tif|tiff|exr))?")
 
 
 class FrameSource(Protocol):
-    """What an II-video reads its frames from."""
+    """Source of the frames of an II-video."""
 
     def picture(self, frame: int) -> IIPicture:
         """Return one frame."""
@@ -165,7 +165,7 @@ class IIVideo:
         return np.asarray(stack[a, b] if kind == "ri" else stack[b, a])
 
     def view(self, frame: int, viewpoint_mm: ArrayLike, *, interpolation: str = "linear") -> Any:
-        """What a viewer at one point sees of one frame; see `view_image`."""
+        """Return the view image of one frame from one point; see `view_image`."""
         return view_image(self[frame], viewpoint_mm, interpolation=interpolation)
 
     @checks.checked(folder=checks.path, progress=checks.callable_)

@@ -245,7 +245,7 @@ def turned_pixels(picture: IIPicture) -> NDArray[Any]:
 
 
 def widening(camera: IICamera, beyond_mm: float) -> float:
-    """How much wider a sub-image samples a plane beyond the lenses than the lens plane: 1 if zones are parallel."""
+    """Return the sampling distance of a sub-image at a plane over that in the lens plane; 1 if zones are parallel."""
     return 1.0 if camera.viewer_mm is None else 1 + beyond_mm / camera.viewer_mm
 
 

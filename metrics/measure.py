@@ -105,7 +105,7 @@ class Measure:
 
     @property
     def caption(self) -> str:
-        """What the number is, its unit, and whether lower is better."""
+        """Description of the number, its unit, and whether lower is better."""
         return self.text + (f" in {self.unit}" if self.unit else "") + self._direction
 
     @property

@@ -369,7 +369,7 @@ def _measure(
 
 
 def _options(scheme: str) -> dict[str, str]:
-    """What stands after the colon of a scheme's name; a preset, which has no key, gets the key ``preset``."""
+    """Return the options after the colon of a scheme's name; a preset, which has no key, gets the key ``preset``."""
     found: dict[str, str] = {}
     for item in scheme.partition(":")[2].split(","):
         key, equals, value = (part.strip() for part in item.partition("="))

@@ -52,7 +52,7 @@ class PairScale(NamedTuple):
 
 
 class Prediction(NamedTuple):
-    """How well a measure predicts opinion scores.
+    """Accuracy of a measure as a predictor of opinion scores.
 
     Attributes
     ----------
@@ -187,7 +187,7 @@ def pair_scale(wins: ArrayLike, *, model: str = "bradley-terry", confidence: flo
 
 @checked(measure=numbers, mos=numbers, half_width=numbers)
 def predicted_scores(measure: ArrayLike, mos: ArrayLike, half_width: ArrayLike | None = None) -> Prediction:
-    """How well a measure predicts opinion scores, after a monotone fit.
+    """Return the accuracy of a measure as a predictor of opinion scores, after a monotone fit.
 
     The fit is the logistic function of four parameters of the Video Quality Experts Group; where it does not
     converge, a straight line.

@@ -28,7 +28,7 @@ class Ball:
     material: Material
 
     def distances(self, o: Array, d: Array) -> tuple[Array, Array]:
-        """Where unit rays (n, 3) come in and go out, NaN where they pass by."""
+        """Return distances of entry and exit of unit rays (n, 3), NaN for a miss."""
         to = o - np.asarray(self.centre_mm)
         half = -(to * d).sum(axis=1)
         # from the line's own nearest point: no difference of large squares

@@ -85,14 +85,14 @@ def exposed(
 
 
 def micro_image_centres(camera: IICamera, k: NDArray[Any], l: NDArray[Any]) -> NDArray[np.float64]:
-    """Where the middle of the main lens is seen through lenses (k, l), pixels (…, 2)."""
+    """Return the image of the centre of the main lens through lenses (k, l), pixels (…, 2)."""
     grown = growth(camera)
     places = camera.lens_lattice.centres(k, l)
     return np.stack([(p - n / 2) * grown + n / 2 for p, n in zip(places, camera.pixels, strict=True)], axis=-1)
 
 
 def growth(camera: IICamera) -> float:
-    """How much wider than lenses the images of the main lens's rim lie, about the middle of the sensor."""
+    """Return the pitch of the images of the main lens over the pitch of the lenses."""
     far = camera.front[0].z_mm - camera.gap_mm
     return 1 + camera.gap_mm / far
 

@@ -156,7 +156,7 @@ def away_from_camera(scene: Scene) -> Scene:
 
 
 def compare(scene: Scene, camera: IICamera, segments: int, samples: int, *, smooth: bool = True) -> dict[str, Any]:
-    """How alike the two pictures are, in 8 bits.
+    """Return the similarity of the two pictures, in 8 bits.
 
     Three times: as they are; with Fresnel's losses in the L/D camera; and also without what is reflected in the glass
     and comes out in the end, by a recursion that ends with the scene's first hit.

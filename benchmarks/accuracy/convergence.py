@@ -233,7 +233,7 @@ def lens_orders(rows: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
 
 
 def images(segments: int) -> list[dict[str, Any]]:
-    """Where a ball lens puts the image of a point on the axis against Gauss: 1/a + 1/b = 1/f from its centre."""
+    """Return the error of the image distance of a ball lens against Gauss: 1/a + 1/b = 1/f from its centre."""
     radius, ior = 5.0, GLASS.ior
     focal = ior * radius / (2 * (ior - 1))
     glass = Ball("lens", (0, 0, 0), radius, GLASS).body(segments, True)

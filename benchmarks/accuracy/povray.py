@@ -123,7 +123,7 @@ def _coded(light: Array) -> NDArray[np.uint8]:
 
 
 def version() -> str:
-    """What ``povray`` calls itself."""
+    """Return the version that ``povray`` prints."""
     run = subprocess.run(["povray", "--version"], capture_output=True, text=True, check=False)
     return stated(run.stdout + run.stderr)
 

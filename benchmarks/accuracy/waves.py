@@ -97,7 +97,7 @@ def error_db(kernel: Any, true: Any) -> float:
 
 
 def blurred(scene: str, scale: int) -> dict[str, Any]:
-    """What diffraction at full setup1 does to a picture: its error, views, and the coding gain of SI-PVS."""
+    """Return the effect of diffraction at full setup1 on a picture: error, views, coding gain of SI-PVS."""
     sharp = render(load_scene(scene), preset("setup1", scale=scale), samples=4, noise=1.0, support=()).picture
     soft = lens_blurred(sharp, preset("setup1"))
     found = {"psnr": q_global(sharp, soft), "q_view": q_view(sharp, soft).mean}
@@ -149,7 +149,7 @@ def tables() -> Tables:
 
 
 def limits_table() -> list[str]:
-    """Where each model crosses `ENOUGH_DB`, by sweep, at 550 nm; and the pixels there."""
+    """Return the value at which each model crosses `ENOUGH_DB`, by sweep, at 550 nm, and the pixels there."""
     rows = [row for row in RECORDS.rows(wavelength_nm=WAVELENGTH) if "sweep" in row]
     lines = [
         "| varied | rays: 40 dB at | model: 40 dB at | worst of the model | wave | model |",

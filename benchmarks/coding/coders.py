@@ -122,7 +122,8 @@ def studied(scale: int) -> list[dict[str, Any]]:
 def comparable(scale: int) -> list[dict[str, Any]]:
     """Return the newest row of every scene and scheme at a scale, those of a scene all of one picture.
 
-    Filtering of textures changed pictures of `FILTERED`; rows before have no commit. The one with more rows counts.
+    Texture filtering changed the pictures of `FILTERED`; older rows have no commit. Of such a scene, the newer rows
+    are returned once they are at least as many as the older ones.
     """
     rows = [row for row in RECORDS.rows(scale=scale) if row["scene"] not in FILTERED]
     for scene in FILTERED:

@@ -221,7 +221,7 @@ def tables() -> Tables:
 
 
 def table() -> list[str]:
-    """What a second dimension can bring by prediction, and brings by the encoder; a column a take."""
+    """Return the gain of a second dimension, possible by prediction and reached by the encoder; a column a take."""
     rows = {(row["take"], row["what"]): row for row in RECORDS.rows(scale=SCALE)}
     if not rows:
         return ["Not measured yet."]

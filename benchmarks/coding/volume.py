@@ -89,7 +89,7 @@ def lossless(picture: IIPicture) -> dict[str, float]:
 
 
 def apart(picture: IIPicture, squared_error: float = 10.0) -> dict[str, float]:
-    """What one codestream for all sub-images saves against one for each at the same squared error."""
+    """Return the saving of one codestream for all sub-images against one for each, at equal squared error."""
     shape = layout(picture.lenses, picture.ei_pixels, "si")
     stack = component_images(picture, "si").reshape(shape.frames, shape.height, shape.width, 3)
     planes = np.ascontiguousarray(np.moveaxis((stack.astype(np.int16) - 128) * 4, -1, 1))

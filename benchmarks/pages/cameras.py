@@ -124,7 +124,7 @@ def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
 
 
 def all_scenes() -> NDArray[np.uint8]:
-    """What a viewer sees of every scene through setup 1's display, two in a row."""
+    """Return views of every scene on setup 1's display, two in a row."""
     pinhole, pose = projection_camera(preset("setup1"), 480)
     pictures = [
         orthoscopic(render(load_scene(name), pinhole, samples=9, pose=pose, support=()).picture).pixels
@@ -137,7 +137,7 @@ def all_scenes() -> NDArray[np.uint8]:
 
 
 def precision() -> str:
-    """What storing a camera as pictures costs, from `benchmarks.accuracy.map_precision`."""
+    """Return the errors of cameras stored as pictures, from `benchmarks.accuracy.map_precision`."""
     rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
     lines = [
         "\n## Stored as pictures: which format is enough\n",
@@ -159,7 +159,7 @@ def precision() -> str:
 
 
 def in_scene() -> str:
-    """How the camera compares with one of glass inside the scene, from `benchmarks.accuracy.camera_in_scene`."""
+    """Return the comparison with a camera of glass in the scene, from `benchmarks.accuracy.camera_in_scene`."""
     (study,) = camera_in_scene.RECORDS.rows(scale=camera_in_scene.SCALE)
     lines = [
         IN_SCENE,
@@ -244,7 +244,7 @@ def as_colour(values: NDArray[np.float64], on: NDArray[np.bool_]) -> NDArray[np.
 
 
 def seen(picture: IIPicture, name: str) -> NDArray[Any]:
-    """What a viewer sees from the front; with a main lens the middle sub-image, turned."""
+    """Return the view from the front; with a main lens the middle sub-image, rotated."""
     if picture.lenses == (1, 1):
         return orthoscopic(picture).pixels
     if name.startswith("plenoptic") and name != "plenoptic":

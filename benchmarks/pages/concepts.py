@@ -162,7 +162,7 @@ def draw_components(picture: IIPicture) -> Any:
 
 
 def draw_views(picture: IIPicture) -> Any:
-    """What viewers at the left, in front and at the right see."""
+    """Draw views from the left, the front and the right."""
     assert picture.camera is not None
     eyes = five_viewpoints(picture.camera)
     figure, axes = panels(1, 3, (12, 2.4))

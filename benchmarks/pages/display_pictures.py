@@ -34,7 +34,7 @@ def main() -> None:
 
 
 def faults(picture: IIPicture) -> dict[str, NDArray[np.uint8]]:
-    """What the eye sees, by what is different."""
+    """Return views of an eye by the property of display or eye that is varied."""
     camera = camera_of(picture)
     place: Any = tuple(map(float, five_viewpoints(camera)["front"]))
     point, eye = Eye(position_mm=place), Eye(position_mm=place, pupil_mm=4.0)

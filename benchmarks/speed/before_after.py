@@ -73,7 +73,7 @@ def rendered(code: Path, scene: str, scale: int, picture: Path, depth: Path | No
 
 
 def compared(folder: Path) -> dict[str, Any]:
-    """How far the pictures differ, over all pixels and over those of objects, and their rates at equal quality."""
+    """Return differences of the pictures, over all pixels and over objects, and rates at equal quality."""
     before, after = (read_image(folder / f"{code}.png").astype(float) for code in ("before", "after"))
     objects = np.isfinite(read_image(folder / "after.exr")[..., 0])
     off = np.abs(after - before).max(axis=2) > VISIBLE

@@ -123,7 +123,7 @@ def depth_highlight() -> list[Row]:
 
 
 def depth_noise() -> list[Row]:
-    """What `depth_truth` measured: pixels within a tenth of their depth, over noise, scene by scene."""
+    """Return the share of pixels within a tenth of their depth, over noise, by scene, from `depth_truth`."""
     rows = [row for row in _kept() if row["scale"] == 8]
     return [
         {

@@ -18,7 +18,7 @@ from raytrace_ii import load_scene, render, trace
 
 
 def quantised_maps() -> list[Row]:
-    """What `benchmarks.accuracy.map_precision` measured."""
+    """Return the records of `benchmarks.accuracy.map_precision`."""
     rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
     return [
         {

@@ -244,7 +244,7 @@ def _pixels(places: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 class _Level:
-    """How the light of lenses changes over the picture: a polynomial of the fourth degree, robust to dark lenses."""
+    """Fit the light of lenses over the picture: a polynomial of the fourth degree, robust to dark lenses."""
 
     def __init__(self, places: Floats, heights: Floats, size: tuple[int, int]) -> None:
         self.size = size

@@ -97,7 +97,7 @@ class Calibration:
         }
 
     def not_told(self) -> list[str]:
-        """What the picture could not tell."""
+        """Parameters that were assumed, since a picture does not contain them."""
         notes = [f"{what}: assumed, depth in millimetres has no scale" for what in self.assumed]
         notes.append("lens centres: the middles of micro-images stand for them, as if seen from far away")
         if self.source != "white image":

@@ -60,7 +60,7 @@ class Eye:
 
 
 class EyeImage(NamedTuple):
-    """What an eye sees.
+    """View of an eye.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class EyeImage(NamedTuple):
 def eye_image(
     picture: IIPicture, display: DisplayModel, eye: Eye, *, size: Pair | None = None, rays: int | None = None
 ) -> EyeImage:
-    """What an eye sees of a display: the mean over its pupil of the light that the panel sends there.
+    """Return the view of an eye of a display: the mean over its pupil of the light from the panel.
 
     A ray from a point of the pupil meets the lens plane under the lens of its cell. Through a lens with centre c it
     ends on the panel at q = c + (c − e)·g/d, e being the point of the pupil and d its distance from the lens plane. A
@@ -170,7 +170,7 @@ def _half(display: DisplayModel) -> NDArray[np.float64]:
 
 
 def _lens(display: DisplayModel, distance: float, sign: float) -> NDArray[np.float64]:
-    """What a lens does to a ray: to the place on the panel, in pixels, and to its slope there; aperture, parallax."""
+    """Effect of a lens on a ray: offset on the panel in pixels, slope there, aperture, parallax."""
     lens, gap, pitch = display.optics, display.gap_mm, display.camera.pixel_pitch_mm
     spread, bend, radius = 0.0, 0.0, math.inf
     if isinstance(lens, Lenslet):

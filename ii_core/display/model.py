@@ -102,7 +102,7 @@ class DisplayModel:
 
     @property
     def optics(self) -> LensModel:
-        """What stands over every lens."""
+        """Kind of element over every lens."""
         return self.camera.lens_model
 
     @property

@@ -12,7 +12,7 @@ from .model import DisplayModel
 
 
 class ViewingZone(NamedTuple):
-    """Where every lens shows its own elementary image, at one distance, across and up.
+    """Viewing zone at one distance, across and up: there, every lens shows its own elementary image.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Depth from focus: which layer of the scene each lens's pixel shows, estimated from the picture alone."""
+"""Depth from focus: the layer of the scene at each lens's pixel, estimated from the picture alone."""
 
 from __future__ import annotations
 
@@ -328,7 +328,7 @@ def pixel_tables(
 
 
 def pixels_per_lens(camera: IICamera, layers_mm: Floats) -> Floats:
-    """How far a point of each layer moves from lens to lens in its elementary image, in sides of that: Λ/z'."""
+    """Return the shift of a point of each layer from lens to lens, in sides of the elementary image: Λ/z'."""
     beyond = np.asarray(layers_mm) - camera.origin_mm[2] - camera.gap_mm
     with np.errstate(divide="ignore"):
         # At the lens plane and before it nothing is in focus: infinitely far off through all but the own lens.

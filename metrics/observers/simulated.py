@@ -1,4 +1,4 @@
-"""Results of SIMULATED observers, for tests of an analysis: nobody has seen anything."""
+"""Results of SIMULATED observers, for tests of an analysis; no person took part."""
 
 from __future__ import annotations
 

@@ -142,7 +142,7 @@ def read_tables(path: Path) -> SceneFile:
 
 
 def built(path: Path, make: Callable[..., Made], *arguments: Any) -> Made:
-    """What a function makes of a scene file; its errors name the file."""
+    """Return the result of a function of a scene file; its errors name the file."""
     try:
         return make(*arguments)
     except ValueError as error:
@@ -297,7 +297,7 @@ class SceneLoader:
         )
 
     def _once(self, key: Any, value: Any, other: Any, make: Callable[[], Any]) -> Any:
-        """What a table makes, made again only if the table or the other thing that it uses has changed."""
+        """Return the object of a table, made again only if the table or the object that it uses has changed."""
         found = self._made.get(key)
         if found is None or found[0] != value or found[1] is not other:
             found = self._made[key] = value, other, make()
@@ -445,7 +445,7 @@ def _scaled(material: Material, size: float) -> Material:
 
 
 def _coordinates(material: Material, mesh: Mesh, size: NDArray[np.float64], shared: dict[Any, Any]) -> Any:
-    """What a body's textures are read at; ``shared`` keeps what instances have in common."""
+    """Return the coordinates of a body's textures; ``shared`` holds those that instances share."""
     texture = material.texture
     if isinstance(texture, VertexColours):
         if mesh.colours is None:
@@ -491,7 +491,7 @@ def mesh_scene(path: Path, model: Model, place: ObjectTable | None = None) -> Sc
 
 
 def working_place(path: Path, model: Model) -> ObjectTable:
-    """Where a model fills the working volume."""
+    """Return the transform that fits a model into the working volume."""
     corners = np.concatenate([part.mesh.vertices for part in model.parts])
     low, high = corners.min(axis=0), corners.max(axis=0)
     if not max(np.abs(low).max(), np.abs(high).max()) <= np.finfo(np.float32).max:

@@ -137,7 +137,7 @@ def _cut(row: bytes, element: Element) -> bytes:
 
 
 def _width(element: Element, words: list[bytes]) -> int:
-    """How many words a row needs."""
+    """Return the number of words of a row."""
     at = 0
     for p in element.properties:
         at += 1 if p.length is None else 1 + int(words[at])

@@ -180,7 +180,7 @@ class MeshFile(_Strict):
 
 
 class ObjectTable(BaseModel):
-    """Where a shape stands; the shape's own parameters lie beside these."""
+    """Placement of a shape; the shape's own parameters are in the same table."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
     name: str = ""

@@ -231,7 +231,7 @@ def check_disparity(camera: Camera) -> None:
 
 
 def disparity(camera: Camera, depth: NDArray[np.float32]) -> NDArray[np.float32]:
-    """How far a point at depth z moves from one elementary image to the next on the right, in pixels to the right.
+    """Return the shift of a point at depth z from an elementary image to its right neighbour, in pixels to the right.
 
     ±Λ·δL·(1/(z − z₀ − Λ) + 1/d) / δP, negative if elementary images are erect; z₀ is where the pixel array stands, d
     where viewing zones meet. Downwards it moves as far per lens pitch. NaN where depth is.

@@ -211,7 +211,7 @@ def _header(take: Take, camera: Any, options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_manifest(folder: Path, name: str) -> dict[str, Any]:
-    """What the folder's manifest says; nothing if there is none."""
+    """Return the manifest of the folder; empty if there is none."""
     path = folder / MANIFEST
     if not path.exists():
         return {}

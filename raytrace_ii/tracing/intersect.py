@@ -1,4 +1,4 @@
-"""Rays against triangles, by Embree: in packets where its library can be called directly, else one by one by embreex.
+"""Ray–triangle intersection by Embree: in packets if its library can be called directly, else one by one by embreex.
 
 What Embree leaves to its caller is settled here: float32 C-order arrays, finite vertices, one geometry whose
 primitive number is the row of the face, places of hits that are the same for every kind of call, one winner of faces

@@ -50,7 +50,7 @@ def share(scene: Scene, other: Scene) -> None:
 
 
 class PackedScene:
-    """What the kernels read.
+    """Packed scene: the arrays that the kernels read.
 
     ``corners`` is (F, 3, 3) float32 positions, ``faces`` (F, 5) unit normals, lifts and pulls. ``normals`` is like
     ``corners`` for shading, of length 1 or 0, of no faces if every body is flat; ``coordinates`` for textures, of no
@@ -150,7 +150,7 @@ def _material_row(m: Material, textures: TextureTable) -> NDArray[np.float64]:
 
 
 def _brightest(scene: Scene) -> float:
-    """How much brighter than 1 anything may be that a ray can meet: its weight counts for as much more."""
+    """Return the largest radiance in the scene, at least 1; weights of rays are compared after scaling by it."""
     sky = scene.background
     image = sky.intensity * float(sky.image.pixels.max()) if sky.image is not None else 0.0
     colours = [sky.horizon, sky.zenith, sky.nadir, scene.ambient, *(light.colour for light in scene.lights)]

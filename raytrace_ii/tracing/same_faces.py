@@ -1,4 +1,4 @@
-"""Faces with the same corners, of which Embree sees now one, now the other."""
+"""Coincident faces: Embree's choice among them varies, so the lowest is taken."""
 
 from __future__ import annotations
 

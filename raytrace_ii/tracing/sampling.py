@@ -1,4 +1,4 @@
-"""Where a pixel's samples lie, and how many it gets.
+"""Supersampling: positions and number of the samples of a pixel.
 
 A fixed number is one sample in each cell of a grid. An adaptive number starts with the least, then doubles, pixel by
 pixel, until the estimated standard error of the pixel is within a target or the most is reached. The estimate is
@@ -74,7 +74,7 @@ def sampling(samples: Any, error: float) -> Sampling:
 
 
 def fixed_places(camera: IICamera, samples: int, seed: int, sample: int, rows: slice, cols: slice) -> list[ArrayLike]:
-    """Where in the pixel and where on the aperture one of a fixed number of samples lies, for a block of pixels."""
+    """Return the positions in pixel and aperture of one of a fixed number of samples, for a block of pixels."""
     if samples == 1:
         return [(0.5, 0.5), (0.5, 0.5)]
     down = max(d for d in range(1, math.isqrt(samples) + 1) if samples % d == 0)

@@ -58,7 +58,7 @@ class RayCount:
 
 @dataclass(frozen=True, eq=False)
 class Traced:
-    """What n rays saw: linear radiance (n, 3), and depth, normal (n, 3), object, ray length and shading normal
+    """Results of n rays: linear radiance (n, 3), and depth, normal (n, 3), object, ray length and shading normal
     (n, 3) of the first hit."""
 
     radiance: NDArray[np.float32]

@@ -1,1 +1,1 @@
-"""A coder of light fields: views on a grid, predicted from each other by disparity."""
+"""Light-field coder: views on a grid, predicted from each other by disparity."""

@@ -119,7 +119,7 @@ def new_blocks(height: int, width: int) -> np.ndarray[Any, Any]:
 
 @lean
 def neighbours(blocks, field, value, by, bx):
-    """How many of the blocks above and left have a value."""
+    """Return the number of blocks above and to the left that have a value."""
     count = 0
     if by > 0 and blocks[field, by - 1, bx] == value:
         count += 1
@@ -195,7 +195,7 @@ def guesses(job, by, bx, log):
 
 @lean
 def from_where(job, by, bx, log, index):
-    """Where an index is the guess of: 1 the synthesis, 2 the block left, 3 the one above, 0 none."""
+    """Return the source that predicts an index: 1 synthesis, 2 block to the left, 3 block above, 0 none."""
     made, left, above = guesses(job, by, bx, log)
     none = job.low - 1
     if made > none and index == made:

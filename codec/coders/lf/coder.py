@@ -1,4 +1,4 @@
-"""A light field: sub-images on their grid, each predicted by disparity from decoded ones near it."""
+"""Light-field coder ``si-lf``: sub-images on their grid, predicted by disparity from decoded neighbours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Coefficients of a block: their syntax, its cost, and quantisation that weighs rate against error."""
+"""Coefficients of a block: syntax, cost in bits, and rate–distortion optimised quantisation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the contexts of each syntax element begin."""
+"""Offsets of the contexts of each syntax element."""
 
 from __future__ import annotations
 

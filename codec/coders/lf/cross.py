@@ -1,4 +1,4 @@
-"""Prediction of the residual's second and third plane from its first: a block's colours often lie on a line.
+"""Prediction of the residual's second and third plane from its first: the colours of a block often lie on a line.
 
 The factor is in quarters, chosen for each block and plane, and multiplies the first plane's coefficients as decoded.
 """

@@ -1,4 +1,4 @@
-"""Lossless coding: what the decoded view misses, sample by sample.
+"""Lossless coding: the error of the decoded view, sample by sample.
 
 A sample is predicted by the view that the blocks give, corrected by a linear filter of what that view missed at
 samples before: left, above, and in the colours coded already. The filter's weights follow the error (normalised
@@ -25,7 +25,7 @@ MOST_MISSED = 1 << 20
 
 
 class Exact(NamedTuple):
-    """What is known of a view that is coded lossless.
+    """State of the lossless coding of a view.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def prepare(exact, views, view, axes, sixteen):
 
 @lean
 def _features(missed, i, y, x, found):
-    """What was missed before; y and x count from the border of ``missed``. Return their sum of magnitudes."""
+    """Gather earlier errors; y and x count from the border of ``missed``. Return the sum of their magnitudes."""
     found[0], found[1] = missed[i, y, x - 1], missed[i, y - 1, x]
     found[2], found[3] = missed[i, y - 1, x - 1], missed[i, y - 1, x + 1]
     found[4], found[5] = missed[i, y, x - 2], missed[i, y - 2, x]

@@ -1,4 +1,4 @@
-"""The decoded views of a light field, and what encoder and decoder do alike for each next one."""
+"""Decoded views of a light field, and the steps per view that encoder and decoder share."""
 
 from __future__ import annotations
 

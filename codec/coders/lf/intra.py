@@ -1,4 +1,4 @@
-"""Prediction of a block from what is decoded above and to the left of it: flat, smooth, or along 34 directions."""
+"""Intra prediction of a block from decoded samples above and to the left: flat, smooth, or 34 directions."""
 
 from __future__ import annotations
 

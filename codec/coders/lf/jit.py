@@ -1,4 +1,4 @@
-"""How this folder's kernels are compiled: their disk cache is valid only while no file of the folder changes.
+"""Compilation of this folder's kernels; their disk cache is valid while no file of the folder changes.
 
 numba compares the time stamp of a kernel's own file with that in its cache. The kernels here call each other across
 files, and the machine code of a callee is part of its caller's. The hash of all files with kernels and that of the

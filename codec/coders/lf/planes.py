@@ -1,4 +1,4 @@
-"""Views of a picture as planes of its principal colours, in whole eighths of an 8-bit code."""
+"""Planes of the principal colours of views, in integer eighths of an 8-bit code."""
 
 from __future__ import annotations
 

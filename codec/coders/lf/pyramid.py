@@ -1,4 +1,4 @@
-"""In what order the views on a grid are coded, by levels of ever closer views, and which ones predict which.
+"""Coding order of the views on a grid: levels of increasing density, and the references of each view.
 
 A level has *phases*: views of one phase do not predict each other, so that they may be coded at the same time.
 """

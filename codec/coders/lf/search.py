@@ -1,4 +1,4 @@
-"""How the encoder finds blocks: by squared error + weight · bits, from the largest block down."""
+"""Encoder search of blocks: least squared error + weight · bits, from the largest block down."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ MOST_GUESSES = 16
 
 
 class Search(NamedTuple):
-    """What the encoder has beside the job.
+    """State of the encoder beside the job.
 
     Parameters
     ----------

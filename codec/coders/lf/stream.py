@@ -23,7 +23,7 @@ _LEVEL = struct.Struct("<II")
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What the decoder needs besides the structure.
+    """Parameters of a stream that the decoder needs besides the structure.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The view that a decoder makes by itself: disparity carried over from decoded views, and their samples along it.
+"""View synthesis at the decoder: disparity projected from decoded views, and their samples along it.
 
 Every decoded view keeps a disparity for each sample. For a new view these are moved to where they lead (`project`).
 Where several surfaces meet, the one is taken on which the references agree (`choose`), and their samples are blended
@@ -128,7 +128,7 @@ def _between(views, view, p, y, x, py, px):
 
 @lean
 def _difference(s, y, x, d):
-    """How far the sources differ at a sample if it has that disparity, in eighths of a code; see `_remembered`."""
+    """Return the difference of the sources at a sample for a disparity, in eighths of a code; see `_remembered`."""
     height, width = s.counts.shape
     count = min(s.sources.shape[0], MATCHED)
     seen = 0
@@ -165,7 +165,7 @@ def _remembered(s, y, x, d):
 
 @lean
 def _disagreement(s, y, x, d, enough):
-    """How far the sources differ around a sample if it has that disparity, in eighths of a code.
+    """Return the difference of the sources around a sample for a disparity, in eighths of a code.
 
     A sum that is known to reach ``enough`` is not finished.
     """
@@ -359,7 +359,7 @@ def _weighted(s, y, x, count):
 
 @lean
 def _mismatch(s, at, y, x, d):
-    """How far the nearest two sources differ from the decoded view around a sample, in eighths of a code."""
+    """Return the difference of the best two sources from the decoded view around a sample, in eighths of a code."""
     height, width = s.counts.shape
     count = min(s.sources.shape[0], MATCHED)
     least, second = 1 << 40, 1 << 40

@@ -160,7 +160,7 @@ class GltfFile:
             return str(error)
 
     def _fetch(self, uri: str, where: str) -> bytes:
-        """What a uri stands for: the data in it, or a file that it names in the glTF's own folder."""
+        """Return the data of a URI: those in it, or of a file that it names in the glTF's own folder."""
         if uri.startswith("data:"):
             head, _, body = uri.partition(",")
             try:

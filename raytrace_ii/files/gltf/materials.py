@@ -244,7 +244,7 @@ class Looks:
         return np.append(colour, values[-1] if channels in (2, 4) else 1.0)
 
     def _wrap(self, info: TextureInfo, where: str) -> tuple[str, str]:
-        """How a texture goes on beyond its border, along u and v."""
+        """Wrap mode of a texture along u and v."""
         texture: TextureSource = self.file.at("textures", info.index, where)
         if texture.sampler is None:
             return "repeat", "repeat"

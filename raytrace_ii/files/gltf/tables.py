@@ -287,7 +287,7 @@ class ImageSource(_Table):
 
 
 class Sampler(_Table):
-    """How a texture goes on beyond its border. All are read bilinear; filters against aliasing are not needed."""
+    """Wrap modes of a texture. Filter modes are ignored: textures are read bilinear and filtered by the tracer."""
 
     magFilter: int | None = None
     minFilter: Any = None
