@@ -16,10 +16,11 @@ from .formats.rig import Rig
 from .formats.views import write_views
 from .maps import MapCamera, read_maps, write_maps
 from .panel import PanelDesign, panel_display
-from .picture import IIPicture, add_sensor_noise
+from .picture import IIPicture
 from .pose import camera_pose
 from .presets import camera_names, preset, preset_cameras
 from .regular import from_smallest_rectangle, resampled, smallest_rectangle
+from .sensor_noise import add_sensor_noise
 from .video import IIVideo, open_video, video_of, write_view_folders
 from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stand_back, view_image
 

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise, checks
 from ii_core.display.notebook import captioned
 from ii_core.files import RowWriter, atomic_paths, check_type, image_rows
-from ii_core.picture import NOISE_ROWS, noisy_rows, picture_rows, sidecar
+from ii_core.picture import picture_rows, sidecar
 from ii_core.progress import reporter
+from ii_core.sensor_noise import NOISE_ROWS, noisy_rows
 
 from ..scene.scene import Scene
 from ..tracing.sampling import sampling
