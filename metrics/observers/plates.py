@@ -12,6 +12,7 @@ Viénot, Brettel and Mollon 1999: signals of the cones from linear sRGB.
 from __future__ import annotations
 
 import io
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -35,11 +36,13 @@ class Plate(NamedTuple):
     png: bytes
 
 
-def plates(seed: int = 0) -> list[Plate]:
+@lru_cache(maxsize=4)
+def plates(seed: int = 0) -> tuple[Plate, ...]:
     """Make a plate of each of `KINDS` with different digits."""
     generator = np.random.default_rng(seed)
     digits = generator.choice(np.arange(2, 10), len(KINDS), replace=False)
-    return [Plate(int(digit), _drawn(int(digit), kind, generator)) for digit, kind in zip(digits, KINDS, strict=True)]
+    drawn = zip(digits.tolist(), KINDS, strict=True)
+    return tuple(Plate(digit, _drawn(digit, kind, generator)) for digit, kind in drawn)
 
 
 def colours(kind: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -96,20 +96,20 @@ def test_a_whole_test_gives_results_that_are_read(show, page, tmp_path):
 
 
 def test_the_pixels_shown_are_those_of_the_views(show, tmp_path):
-    """The first frame of either picture, read from the canvas; on the screen each pixel is a square."""
-    written(tmp_path / "t.html", show="front", seconds=0.3, training=0)
+    """Either picture as it stands on the canvas before it goes grey; on the screen each pixel is a square."""
+    written(tmp_path / "t.html", show="front", training=0)
     tab = show(tmp_path / "t.html")
     begun(tab)
-    tab.click("#next")
+    tab.evaluate(
+        """() => { const grey = blank; ii.shown = [];
+             blank = (seconds) => {
+               const c = byId("left"), d = c.getContext("2d").getImageData(0, 0, c.width, c.height);
+               ii.shown.push([c.width, c.height, Array.from(d.data), c.getBoundingClientRect().width]);
+               return grey(seconds); } }"""
+    )
+    vote(tab)
     front = five_viewpoints(CAMERA)["front"]
-    first, second = tab.evaluate("ii.plan.orders[0][0]")
-    for caption, number in (("Reference", first), ("Second picture", second)):
-        tab.wait_for_function("text => byId('caption').textContent === text", arg=caption)
-        shown = tab.evaluate(
-            """() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => {
-                 const c = byId("left"), d = c.getContext("2d").getImageData(0, 0, c.width, c.height);
-                 done([c.width, c.height, Array.from(d.data), c.getBoundingClientRect().width]) })))"""
-        )
+    for number, shown in zip(tab.evaluate("ii.plan.orders[0][0]"), tab.evaluate("ii.shown"), strict=True):
         wanted, _ = view_image(noise(number), front)
         got = np.array(shown[2]).reshape(shown[1], shown[0], 4)[..., :3]
         assert np.abs(got - wanted).max() <= 1  # halves are rounded either way
@@ -155,6 +155,24 @@ def test_a_closed_tab_loses_nothing(browser, page, tmp_path):
     (one,) = read_results([tmp_path / "whole.jsonl"]).observers
     assert [grade for _, grade in one.answers] == [4, 5, 1] and one.complete
     context.close()
+
+
+def test_a_presentation_begins_again_when_the_tab_was_out_of_sight(show, tmp_path):
+    written(tmp_path / "t.html", training=0)
+    tab = show(tmp_path / "t.html")
+    begun(tab)
+    tab.evaluate(
+        """() => { const shown = play;
+             const sight = (value) => { Object.defineProperty(document, "hidden", { value, configurable: true });
+                                        document.dispatchEvent(new Event("visibilitychange")); };
+             play = (...what) => {
+               const playing = shown(...what);
+               sight(true); sight(false); play = shown;
+               return playing; } }"""
+    )
+    answer(tab, "4")
+    record = tab.evaluate("ii.answers.records.at(-1)")
+    assert record["repeated"] == 1 and min(record["shown_ms"]) >= 50
 
 
 def test_a_window_that_is_too_small_is_refused(show, page):
