@@ -60,7 +60,7 @@ def camera_pose(
 def _facing(ahead: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
     """Axes of the camera, as columns: x to the right, y up, z ahead."""
     if not ahead.any():
-        raise ValueError("look_at_mm is where the camera stands: another point is needed")
+        raise ValueError("at_mm and look_at_mm are one point: two are needed")
     z = ahead / np.linalg.norm(ahead)
     x = np.cross(up, z)
     if np.linalg.norm(x) <= 1e-9 * np.linalg.norm(up):

@@ -14,8 +14,8 @@ from .packets import Tile, new_tile_part, packets_of, tile_part
 
 LEVELS = 5
 BITS = {"int16": 16, "int32": 24}  # of 32; OpenJPEG needs the others for itself
-COM, SIZ, COD, SOT = 0xFF64, 0xFF51, 0xFF52, 0xFF90
-EOC = b"\xff\xd9"
+COM, SIZ, COD, QCD, SOT = 0xFF64, 0xFF51, 0xFF52, 0xFF5C, 0xFF90
+SOD, EOC = b"\xff\x93", b"\xff\xd9"
 
 Shape = tuple[int, int, int]
 
@@ -52,7 +52,46 @@ def whole_codestream(stream: bytes, shape: Shape, dtype: str, *, wavelet: str, l
         raise ValueError("its JPEG 2000 stream is cut short or of another coding style")
     if len(stream) < (least := tile_of(shape, lossless).packet_count()):
         raise ValueError(f"its JPEG 2000 stream has {len(stream)} bytes, its packets alone have {least}")
+    check_segments(stream)
     return _head(shape, dtype) + stream
+
+
+def check_segments(stream: bytes) -> None:
+    """Check the segments of a stream, from its coding style on.
+
+    A second coding style, in the main header or in that of a tile-part, can state precincts of one sample, of which
+    OpenJPEG makes a structure each: 1600 bytes a pixel.
+
+    Raises
+    ------
+    ValueError
+        If there is more than a coding style, a quantisation, comments and one tile-part up to the end.
+    """
+    at, found = 0, []
+    while (marker := int.from_bytes(stream[at : at + 2])) in (COD, QCD, COM):
+        found.append(marker)
+        at += 2 + int.from_bytes(stream[at + 2 : at + 4])
+    part = int.from_bytes(stream[at + 6 : at + 10])
+    whole = part in (0, len(stream) - at - len(EOC)) and stream.endswith(EOC)
+    if [marker for marker in found if marker != COM] != [COD, QCD] or not whole or stream[at + 12 : at + 14] != SOD:
+        raise ValueError("its JPEG 2000 stream is not one coding style, one quantisation and one tile-part")
+
+
+def check_picture_stream(codestream: bytes, size: tuple[int, int], levels: int) -> None:
+    """Check that a codestream is an RGB picture of 8 bit as Pillow writes it: one tile, one layer, whole precincts.
+
+    Raises
+    ------
+    ValueError
+        If it has another size, tiles, another coding style or further segments, which could take more memory.
+    """
+    width, height = size
+    sizes = struct.pack(">HHH8IH", SIZ, 47, 0, width, height, 0, 0, width, height, 0, 0, 3) + b"\x07\x01\x01" * 3
+    style = struct.pack(">HHBBHB", COD, 12, 0, 0, 1, 1) + bytes((levels, 4, 4, 0, 1))
+    head = b"\xff\x4f" + sizes
+    if not codestream.startswith(head + style):
+        raise ValueError(f"its JPEG 2000 stream is no RGB picture of {width}×{height} px in one tile")
+    check_segments(codestream[len(head) :])
 
 
 def tile_of(shape: Shape, lossless: bool) -> Tile:

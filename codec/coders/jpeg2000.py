@@ -16,6 +16,7 @@ from PIL.Jpeg2KImagePlugin import Jpeg2KImageFile
 
 from ii_core import IIPicture
 
+from ..bitstream.jpeg2000 import check_picture_stream
 from ..contract import Coder, Goal, Options
 from ..search import CodingResult, Run, meet_rate
 
@@ -68,10 +69,16 @@ class Jpeg2000(Coder):
             with Jpeg2KImageFile(io.BytesIO(payload)) as image:
                 if image.size != blank.size or image.mode != "RGB":
                     raise ValueError(f"its JPEG 2000 stream is {image.size} {image.mode}, {blank.size} RGB is needed")
+                check_picture_stream(payload, blank.size, _levels(blank.size))
                 pixels = np.array(image)
         except (OSError, SyntaxError) as error:
             raise ValueError(f"its JPEG 2000 stream does not decode ({error})") from None
         return pixels, time.thread_time() - started
+
+
+def _levels(size: tuple[int, int]) -> int:
+    """Return the wavelet levels: OpenJPEG does not halve a side of one pixel."""
+    return min(LEVELS, int(math.log2(min(size))))
 
 
 def _encode(pixels: NDArray[np.uint8], ratio: float) -> Run:
@@ -85,8 +92,7 @@ def _encode(pixels: NDArray[np.uint8], ratio: float) -> Run:
         no_jp2=True,
         quality_mode="rates",
         quality_layers=[ratio],
-        # OpenJPEG does not halve a side of one pixel.
-        num_resolutions=min(LEVELS, int(math.log2(min(image.size)))) + 1,
+        num_resolutions=_levels(image.size) + 1,
         irreversible=False,
         mct=1,
     )

@@ -125,3 +125,88 @@ def test_larger_pictures_decode_by_an_explicit_limit(run, tmp_path):
 def test_the_least_that_jpeg_writes_is_taken(chroma):
     picture = IIPicture(np.zeros((1024, 1024, 3), np.uint8), (64, 64), (16, 16))
     assert decode(encode(picture, f"jpeg:chroma={chroma}", quality=1)).pixels.max() <= 1  # a rounding of colour
+
+
+PRECINCTS = """
+import resource, sys, time
+from dataclasses import replace
+import numpy as np
+from codec import decode, encode
+from ii_core import IIPicture
+
+how = sys.argv[1]
+coded = encode(IIPicture(np.zeros((2048, 2048, 3), np.uint8), (256, 256), (8, 8)), "jpeg2000", bpp=1)
+payload = coded.payload
+assert len(payload) < 1000
+at = payload.index(b"\\xff\\x52")
+style = payload[at : at + 14]
+levels = style[9]
+small = b"\\xff\\x52" + (13 + levels).to_bytes(2, "big") + b"\\x01" + style[5:14] + b"\\x00" + b"\\x11" * levels
+if how == "precincts":
+    payload = payload[:at] + small + payload[at + 14 :]
+elif how == "second style":
+    payload = payload[: at + 14] + small + payload[at + 14 :]
+elif how == "style of a tile":
+    tile = payload.index(b"\\xff\\x93")
+    payload = payload[:tile] + small + payload[tile:]
+elif how == "tiles":
+    payload = payload[:24] + (16).to_bytes(4, "big") * 2 + payload[32:]
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+started = time.process_time()
+try:
+    decode(replace(coded, payload=payload))
+except ValueError as error:
+    print(error)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before >> 10, time.process_time() - started)
+"""
+
+
+@pytest.mark.parametrize("how", ["whole", "precincts", "second style", "style of a tile", "tiles"])
+def test_forged_precincts_and_tiles_of_jpeg2000_take_no_memory(how):
+    """Small precincts took 1600 bytes a pixel; the tests above forge sizes alone, whose memory is the picture's."""
+    done = subprocess.run(
+        [sys.executable, "-c", PRECINCTS, how], capture_output=True, text=True, timeout=100, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    *said, numbers = done.stdout.splitlines()
+    megabytes, seconds = map(float, numbers.split())
+    assert ("damaged" in "".join(said)) == (how != "whole")
+    assert megabytes < (120 if how == "whole" else 20)  # 10 bytes a pixel of the picture are 42 MB
+    assert seconds < 5
+
+
+SPERR = """
+import resource, sys, time
+from dataclasses import replace
+import numpy as np
+from codec import decode, encode
+from ii_core import IIPicture
+
+side = int(sys.argv[1])
+noise = np.random.default_rng(0).integers(0, 9, (64, 64, 3), np.uint8)
+coded = encode(IIPicture(noise, (8, 8), (8, 8)), "si-sperr", bpp=1)
+structure = coded.structure | {"lenses": [side // 8, side // 8]}
+payload = coded.payload[:1000].ljust(1024, b"\\0")
+own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+try:
+    decode(replace(coded, payload=payload, structure=structure))
+except ValueError as error:
+    print(error)
+worker = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - own >> 10, worker >> 10)
+"""
+
+
+@pytest.mark.parametrize(
+    ("side", "own", "worker"), [(2048, 22 * 4 + 50, 40 * 4 + 200), (2056, 5, 200), (8192, 5, 200)]
+)
+def test_forged_volumes_of_sperr_take_memory_by_their_bytes(side, own, worker):
+    """A kilobyte stands for 2048² pixels at most: 22 bytes each here and 40 in the decoder's process, in MB."""
+    done = subprocess.run(
+        [sys.executable, "-c", SPERR, str(side)], capture_output=True, text=True, timeout=100, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    *said, numbers = done.stdout.splitlines()
+    assert ("too few for" in "".join(said)) == (side > 2048)
+    taken = [int(number) for number in numbers.split()]
+    assert taken[0] <= own and taken[1] <= worker

@@ -1,12 +1,27 @@
 """Coders and measures of other packages that fail or return something else; coded pictures put together by hand."""
 
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
 
-from codec import Coder, CodingResult, Encoded, Run, decode, encode, encode_take, open_take, register
+from codec import (
+    Coder,
+    CodingResult,
+    DamagedTake,
+    Encoded,
+    EncodedTake,
+    Run,
+    decode,
+    encode,
+    encode_take,
+    open_take,
+    register,
+)
 from codec.contract import _CODERS
+from codec.takes import container
+from codec.takes.api import _values
 from ii_core import IIPicture, video_of
 from ii_core.foreign import ForeignError
 from metrics import Measure, measuring, register_measure, report
@@ -150,6 +165,21 @@ def test_a_coded_take_without_all_segments_is_refused():
     coded = encode_take(video_of([PICTURE]), "si-h264", qp=40)
     with pytest.raises(ValueError, match="has 0 segments: 1 are needed for 1 frames"):
         open_take(type(coded)(**{**vars(coded), "segments": []}))
+
+
+def test_a_take_that_states_many_segments_takes_no_memory(tmp_path):
+    """A header of 2²⁴ segments made a list of as many ranges, 900 MB."""
+    coded = encode_take(video_of([PICTURE]), "si-h264", qp=40)
+    values = _values(coded)
+    values[9], values[12] = 1 << 24, 1  # frames, span
+    container.write(tmp_path / "t.ii", values, coded.segments)
+    tracemalloc.start()
+    try:
+        with pytest.raises(DamagedTake, match="segment 2 of 16777216: frames "):
+            EncodedTake.load(tmp_path / "t.ii")
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.mark.parametrize(

@@ -217,7 +217,7 @@ def test_a_camera_looks_at_a_point_with_its_top_up():
     np.testing.assert_allclose(pose[:3, 0], [0.8, 0, -0.6])  # its right: clockwise seen from above
     np.testing.assert_array_equal(camera_pose((1, 2, 3))[:3], [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3]])
     assert camera_pose(up=(1, 0, 0))[:3, 1] == pytest.approx([1, 0, 0])
-    with pytest.raises(ValueError, match="look_at_mm is where the camera stands"):
+    with pytest.raises(ValueError, match="at_mm and look_at_mm are one point"):
         camera_pose((1, 2, 3), look_at_mm=(1, 2, 3))
     with pytest.raises(ValueError, match=r"up is \[0.0, 0.0, 2.0\]: a direction other than that of sight"):
         camera_pose(up=(0, 0, 2))
