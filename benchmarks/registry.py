@@ -143,7 +143,9 @@ BENCHMARKS = {
         Benchmark("accuracy.camera_in_scene", records=OWN, writes=(f"{IMAGES}/camera_in_scene.*",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",), tables_in="pages.calibration"),
         Benchmark("accuracy.lens_rays", needs="--peer, an interpreter with optiland", records=OWN),
-        Benchmark("accuracy.real_lenses", records=OWN, writes=(f"{IMAGES}/real_lenses.*",)),
+        Benchmark(
+            "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)
+        ),
         Benchmark("coding.disparity", records=OWN),
         Benchmark("coding.orders", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.headers", records=OWN, fills=("docs/structure.md",)),

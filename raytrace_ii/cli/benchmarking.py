@@ -67,7 +67,7 @@ def _coder(
 
         if name is not None:
             raise ValueError(f"name is {name!r}: only --external takes one, a scheme has its own")
-        options(scheme)  # raises ValueError for an unknown one
+        options(scheme.partition(":")[0])  # raises ValueError for an unknown one, before rendering
         return scheme, {"encode": encode, "decode": timed_decode}
     from metrics.benchmark.external import External
 
