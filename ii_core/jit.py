@@ -15,6 +15,8 @@ from typing import Any
 
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
 
 
 class Cache(FunctionCache):
@@ -97,15 +99,58 @@ def part_kernel(function: Callable[..., Any], **options: Any) -> Any:
     Without the code that takes Python's arguments apart, which takes longer to compile than most parts themselves:
     tables of surfaces and rays are some sixty arrays.
     """
-    compiled = lean_kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
-    compiled.add_overload = lambda result: _keep(compiled, result)
-    compiled._compile_for_args = lambda *_, **__: function
-    return compiled
+    return _part(function, **{"fastmath": {"contract"}, **options})
 
 
 def stage_kernel(function: Callable[..., Any]) -> Any:
     """Compile a part whose machine code is inlined into its callers, as that of `inner_kernel` is."""
     return part_kernel(function, forceinline=True)
+
+
+def exact_stage_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a part as `stage_kernel` does, which rounds after every operation as `exact_kernel` does."""
+    return _part(function, forceinline=True)
+
+
+class _Fragment(JITCodeLibrary):
+    """Code of a part: LLVM optimises and translates it within its callers, not for itself as well."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        self._ensure_finalized()
+        return 0
+
+    @property
+    def codegen(self) -> Any:
+        return _NoEnvironments()
+
+
+class _NoEnvironments:
+    """Lean kernels raise nothing and make no objects: a part needs no environment of Python."""
+
+    def set_env(self, name: str, environment: Any) -> None:
+        pass
+
+
+class _PartCompiler(CompilerBase):
+    """Numba's compiler with a `_Fragment` for a library."""
+
+    def define_pipelines(self) -> list[Any]:
+        self.state.library = _Fragment(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
+
+
+def _part(function: Callable[..., Any], **options: Any) -> Any:
+    flags: dict[str, Any] = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, **options}
+    compiled: Any = numba.njit(nogil=True, error_model="numpy", pipeline_class=_PartCompiler, **flags)(function)
+    compiled.add_overload = lambda result: _keep(compiled, result)
+    compiled._compile_for_args = lambda *_, **__: function
+    return compiled
 
 
 def late_kernel(function: Callable[..., Any]) -> Any:

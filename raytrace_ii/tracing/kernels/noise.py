@@ -90,7 +90,7 @@ def _lerp(t, a, b):
     return a + t * (b - a)
 
 
-@inline_kernel
+@stage_kernel
 def _slope(cell, x, y, z):
     """Dot product with one of Perlin's sixteen gradients, chosen by a multiplicative hash.
 

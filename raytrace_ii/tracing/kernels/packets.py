@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ii_core.jit import exact_kernel as kernel
-from ii_core.jit import inline_kernel
-from ii_core.jit import kernel as lean_kernel
+from ii_core.jit import exact_stage_kernel as stage_kernel
+from ii_core.jit import inline_kernel, part_kernel
 
 from .addresses import call
 
@@ -61,7 +61,7 @@ class Calls(NamedTuple):
 
 def _reduce(function: Any) -> Any:
     """A kernel's inner function whose minima may be taken in any order, and so in vectors: packets have no NaN."""
-    return lean_kernel(function, forceinline=True, _nrt=False, error_model="numpy", fastmath={"nnan", "nsz"})
+    return part_kernel(function, fastmath={"nnan", "nsz"}, forceinline=True)
 
 
 @inline_kernel
@@ -102,7 +102,7 @@ def place_hits(origins, directions, corners, primitives, u, v, distances):
             u[i], v[i], distances[i] = a, b, t
 
 
-@inline_kernel
+@stage_kernel
 def _begin(packet, numbers, width):
     """Set what stays the same from packet to packet: nearest distance, time, mask, flags, instance."""
     for lane in range(width):
@@ -113,7 +113,7 @@ def _begin(packet, numbers, width):
         numbers[_INSTANCE * width + lane] = -1
 
 
-@inline_kernel
+@stage_kernel
 def _fill(packet, numbers, width, lane, o, d, i, far):
     for c in range(3):
         packet[c * width + lane] = o[i, c]
@@ -134,15 +134,15 @@ def _spread(packet, first, width):
     return total
 
 
-@inline_kernel
+@stage_kernel
 def _together(packet, calls, width):
     """Whether rays are near enough to each other for a packet."""
     x, y, z = packet[_DIRECTION * width], packet[(_DIRECTION + 1) * width], packet[(_DIRECTION + 2) * width]
-    near, narrow = _spread(packet, 0, width), _spread(packet, _DIRECTION, width)
+    near, narrow = _spread(packet, np.int64(0), width), _spread(packet, np.int64(_DIRECTION), width)
     return (near <= calls.near) & (narrow <= calls.narrow * (abs(x) + abs(y) + abs(z)))
 
 
-@inline_kernel
+@stage_kernel
 def _place(packet, numbers, width, corners):
     """Put u, v and distance as `place_hit` gives them in place of Embree's: a loop without branches, for vectors."""
     for lane in range(width):
@@ -165,7 +165,7 @@ def _place(packet, numbers, width, corners):
         packet[_FAR * width + lane] = t if sure else packet[_FAR * width + lane]
 
 
-@inline_kernel
+@stage_kernel
 def _take(packet, numbers, width, lane, i, primitives, u, v, distances):
     primitives[i] = numbers[_FACE * width + lane] if numbers[_GEOMETRY * width + lane] >= 0 else -1
     u[i], v[i], distances[i] = packet[_U * width + lane], packet[_V * width + lane], packet[_FAR * width + lane]
@@ -184,49 +184,49 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
         calls, active, packet, numbers, one, one_number, origins, directions, reach, corners,
         primitives, u, v, distances,
     ):  # fmt: skip
-        n = origins.shape[0]
-        _begin(packet, numbers, width)
-        _begin(one, one_number, 1)
+        n, wide, narrow = origins.shape[0], np.int64(width), np.int64(1)  # no literals: parts are compiled once
+        _begin(packet, numbers, wide)
+        _begin(one, one_number, narrow)
         for first in range(0, n, width):
             lanes = min(width, n - first)
             for lane in range(width):
                 i = first + min(lane, lanes - 1)
                 active[lane] = -1 if lane < lanes else 0
                 far = reach[i] if reach.shape[0] > 0 else _NO_END
-                _fill(packet, numbers, width, lane, origins, directions, i, far)
-            if _together(packet, calls, width):
+                _fill(packet, numbers, wide, lane, origins, directions, i, far)
+            if _together(packet, calls, wide):
                 call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
-                _place(packet, numbers, width, corners)
+                _place(packet, numbers, wide, corners)
                 for lane in range(lanes):
-                    _take(packet, numbers, width, lane, first + lane, primitives, u, v, distances)
+                    _take(packet, numbers, wide, lane, first + lane, primitives, u, v, distances)
             else:
                 for i in range(first, first + lanes):
                     far = reach[i] if reach.shape[0] > 0 else _NO_END
-                    _fill(one, one_number, 1, 0, origins, directions, i, far)
+                    _fill(one, one_number, narrow, 0, origins, directions, i, far)
                     call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
-                    _place(one, one_number, 1, corners)
-                    _take(one, one_number, 1, 0, i, primitives, u, v, distances)
+                    _place(one, one_number, narrow, corners)
+                    _take(one, one_number, narrow, 0, i, primitives, u, v, distances)
 
     @kernel
     def occluded(
         calls, active, packet, numbers, one, one_number, origins, directions, reach, found
     ):  # fmt: skip
-        n = origins.shape[0]
-        _begin(packet, numbers, width)
-        _begin(one, one_number, 1)
+        n, wide, narrow = origins.shape[0], np.int64(width), np.int64(1)  # no literals: parts are compiled once
+        _begin(packet, numbers, wide)
+        _begin(one, one_number, narrow)
         for first in range(0, n, width):
             lanes = min(width, n - first)
             for lane in range(width):
                 i = first + min(lane, lanes - 1)
                 active[lane] = -1 if lane < lanes else 0
-                _fill(packet, numbers, width, lane, origins, directions, i, reach[i])
-            if _together(packet, calls, width):
+                _fill(packet, numbers, wide, lane, origins, directions, i, reach[i])
+            if _together(packet, calls, wide):
                 call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
                 for lane in range(lanes):
                     found[first + lane] = 0 if packet[_FAR * width + lane] < 0 else -1
             else:
                 for i in range(first, first + lanes):
-                    _fill(one, one_number, 1, 0, origins, directions, i, reach[i])
+                    _fill(one, one_number, narrow, 0, origins, directions, i, reach[i])
                     call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
                     found[i] = 0 if one[_FAR] < 0 else -1
 
