@@ -2,6 +2,8 @@
 
 import io
 import json
+import subprocess
+import sys
 import threading
 import urllib.error
 import urllib.request
@@ -439,6 +441,21 @@ def test_the_commands_from_pictures_to_a_table(run, coded, tmp_path):
     assert "MOS of SIMULATED observers, 16 observers" in out and "observer-017.jsonl is empty" in out
     assert out.count("±") == 6 and "q_view, all" in out and Image.open(tmp_path / "o.png").width > 500
     assert json.loads((tmp_path / "o.json").read_text())["stimuli"][0]["answers"] == 16
+
+
+def test_the_command_serves_the_test_and_keeps_results(coded, tmp_path):
+    words = ["subjective", *map(str, coded[:2]), "--show", "front", "--measures", "none", "--serve"]
+    command = [sys.executable, "-m", "raytrace_ii.cli", *words, "--results", str(tmp_path / "r")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            assert "answers go to" in server.stdout.readline()
+            url = server.stdout.readline().split()[0]
+            with urllib.request.urlopen(url) as page:
+                assert b"ii.frame(1, 0," in page.read()
+            assert post(f"{url}results") == (200, {"observer": 1})
+            assert (tmp_path / "r" / "observer-001.jsonl").read_bytes() == b""
+        finally:
+            server.terminate()
 
 
 @pytest.mark.parametrize(
