@@ -82,6 +82,18 @@ def picture_files(path: Path, dtype: str) -> list[Path]:
     return [*image_file(path, dtype), sidecar(path)]
 
 
+def check_page(output: Path | None, serve: bool, port: int, force: bool) -> None:
+    """Raise an error unless either a page can be written or a server can use the port."""
+    if (output is None) == (not serve):
+        raise ValueError("one of --output and --serve is needed")
+    if output is not None:
+        if output.suffix not in (".html", ".htm"):
+            raise ValueError(f"{output} is no page: .html is needed")
+        check_outputs([output], force)
+    if not 0 <= port < 1 << 16:
+        raise ValueError(f"port is {port}: a number from 1 to 65535, or 0 for any that is free, is needed")
+
+
 def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = False) -> None:
     """Raise an error, before any work, unless all files of a command can be written without loss of others.
 

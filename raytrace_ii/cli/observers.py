@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, app, check_outputs, columns, pair
+from .common import Force, app, check_outputs, check_page, columns, pair
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar
 from .words import say
@@ -61,14 +61,7 @@ def subjective(
         method=method, show=show, frames=frames, seconds=seconds, grey_seconds=grey, block=block,
         observers=observers, training=training, seed=seed,
     )  # fmt: skip
-    if (output is None) == (not serve):
-        raise ValueError("one of --output and --serve is needed")
-    if output is not None:
-        if output.suffix not in (".html", ".htm"):
-            raise ValueError(f"{output} is no page: .html is needed")
-        check_outputs([output], force)
-    if not 0 <= port < 1 << 16:
-        raise ValueError(f"port is {port}: a number from 1 to 65535, or 0 for any that is free, is needed")
+    check_page(output, serve, port, force)
     points = None if size is None else pair("size", size)
     stimuli = _stimuli(pictures, measures)
     with progress_bar("views") as report:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, app, check_outputs, image_file, load_any, pair
+from .common import Force, app, check_outputs, check_page, image_file, load_any, pair
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, say_done, spinner
 from .video import coding, compared_takes, is_take_source
@@ -44,14 +44,7 @@ def view(
     from ii_core.files import read_depth
 
     load_plugins(plugin)
-    if (output is None) == (not serve):
-        raise ValueError("one of --output and --serve is needed")
-    if output is not None:
-        if output.suffix not in (".html", ".htm"):
-            raise ValueError(f"{output} is no page: .html is needed")
-        check_outputs([output], force)
-    if not 0 <= port < 1 << 16:
-        raise ValueError(f"port is {port}: a number from 1 to 65535, or 0 for any that is free, is needed")
+    check_page(output, serve, port, force)
     is_take = is_take_source(picture)
     if depth is not None and is_take:
         raise ValueError(f"--depth is the map of one picture, {picture} is a take: leave it out")

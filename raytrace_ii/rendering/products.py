@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ii_core.files import read_json
+
 from ..scene.hashing import file_hash
 from .render import Stats
 
@@ -20,6 +22,42 @@ class Product:
     files: tuple[Path, ...]
     key: str
     make: Callable[..., Stats]
+
+
+def read_manifest(path: Path, form: str, what: str, name: str) -> dict[str, Any]:
+    """Return a manifest; empty if there is none.
+
+    Parameters
+    ----------
+    form, what, name : str
+        Value of the key ``format``, and key and value of the manifest's subject: ``"set", "reference"``.
+
+    Raises
+    ------
+    ValueError
+        If the file is not the manifest of this subject.
+    """
+    if not path.exists():
+        return {}
+    manifest = read_json(path)
+    if not isinstance(manifest, dict) or manifest.get("format") != form or manifest.get(what) != name:
+        raise ValueError(f"{path} is not the manifest of the {what} {name!r}: another folder is needed")
+    return manifest
+
+
+def is_product(record: Any) -> bool:
+    """Return whether a value of a manifest is the record of a product: its key, and size and hash of its files."""
+    return (
+        isinstance(record, dict)
+        and isinstance(record.get("key"), str)
+        and isinstance(record.get("files"), dict)
+        and all(isinstance(file, dict) and {"bytes", "sha256"} <= set(file) for file in record["files"].values())
+    )
+
+
+def damaged(path: Path) -> ValueError:
+    """Return the error of a manifest with values of wrong types."""
+    return ValueError(f"{path} is damaged: remove it, and give --force to make its files again")
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from typing import Any, Unpack
 from numpy.typing import ArrayLike
 
 from ii_core import Camera, IICamera, MapCamera, projection_camera
-from ii_core.files import read_json, write_json
+from ii_core.files import write_json
 from ii_core.picture import sidecar
 
 from ..files.load import load_scene
@@ -26,7 +26,18 @@ from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES
 from .contact_sheet import contact_sheet
 from .job import check_disparity
 from .options import RenderOptions, SetKeywords, check_keywords
-from .products import Product, commit, fingerprint, is_done, is_same, manifest_kept_if_used, record_of
+from .products import (
+    Product,
+    commit,
+    damaged,
+    fingerprint,
+    is_done,
+    is_product,
+    is_same,
+    manifest_kept_if_used,
+    read_manifest,
+    record_of,
+)
 from .render import render_to
 
 SETS = {"reference": ("apples", "car", "cuboid", "dolphin", "hairdo", "mountains", "objects", "twins")}
@@ -169,14 +180,9 @@ def _header(name: str, cameras: Sequence[Any], options: dict[str, Any]) -> dict[
 
 def _read_manifest(folder: Path, name: str) -> dict[str, Any]:
     """Return the manifest of the folder; empty if there is none."""
-    path = folder / MANIFEST
-    if not path.exists():
-        return {}
-    manifest = read_json(path)
-    if not isinstance(manifest, dict) or manifest.get("format") != "ii-picture-set" or manifest.get("set") != name:
-        raise ValueError(f"{path} is not the manifest of the set {name!r}: another folder is needed")
-    if not _is_well_formed(manifest):
-        raise ValueError(f"{path} is damaged: remove it, and give --force to make its files again")
+    manifest = read_manifest(folder / MANIFEST, "ii-picture-set", "set", name)
+    if manifest and not _is_well_formed(manifest):
+        raise damaged(folder / MANIFEST)
     return manifest
 
 
@@ -191,13 +197,7 @@ def _is_well_formed(manifest: dict[str, Any]) -> bool:
     records = [record for made in products if made for record in made.values()]
     if manifest.get(CONTACT) is not None:
         records.append(manifest[CONTACT])
-    return all(
-        isinstance(record, dict)
-        and isinstance(record.get("key"), str)
-        and isinstance(record.get("files"), dict)
-        and all(isinstance(file, dict) and {"bytes", "sha256"} <= set(file) for file in record["files"].values())
-        for record in records
-    )
+    return all(map(is_product, records))
 
 
 def _write_manifest(folder: Path, manifest: dict[str, Any], old: dict[str, Any]) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ii_core import IICamera, MapCamera, checks
-from ii_core.files import IMAGE_TYPES, read_json, write_json
+from ii_core.files import IMAGE_TYPES, write_json
 from ii_core.picture import sidecar
 
 from ..files.take import Take
@@ -26,7 +26,7 @@ from ..scene.hashing import content_hash
 from ..scene.scene import Scene
 from ..tracing.tracer import rigid
 from .options import RenderOptions, SetKeywords, check_keywords
-from .products import Product, commit, is_done, manifest_kept_if_used, record_of
+from .products import Product, commit, damaged, is_done, is_product, manifest_kept_if_used, read_manifest, record_of
 from .render import render_to
 
 FORMAT, VERSION, MANIFEST = "ii-take", 1, "manifest.json"
@@ -212,17 +212,9 @@ def _header(take: Take, camera: Any, options: dict[str, Any]) -> dict[str, Any]:
 
 def _read_manifest(folder: Path, name: str) -> dict[str, Any]:
     """Return the manifest of the folder; empty if there is none."""
-    path = folder / MANIFEST
-    if not path.exists():
-        return {}
-    manifest = read_json(path)
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT or manifest.get("take") != name:
-        raise ValueError(f"{path} is not the manifest of the take {name!r}: another folder is needed")
-    entries, claims = manifest.get("frames"), manifest.get("claims")
-    if not isinstance(claims, list) or not isinstance(entries, dict) or not all(
-        isinstance(entry, dict) and isinstance(entry.get("key"), str) and isinstance(entry.get("files"), dict)
-        and all(isinstance(file, dict) and {"bytes", "sha256"} <= set(file) for file in entry["files"].values())
-        for entry in entries.values()
-    ):  # fmt: skip
-        raise ValueError(f"{path} is damaged: remove it, and give --force to make its files again")
+    manifest = read_manifest(folder / MANIFEST, FORMAT, "take", name)
+    entries = manifest.get("frames")
+    sound = isinstance(manifest.get("claims"), list) and isinstance(entries, dict)
+    if manifest and not (sound and all(map(is_product, entries.values()))):
+        raise damaged(folder / MANIFEST)
     return manifest
