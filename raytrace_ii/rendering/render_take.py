@@ -213,8 +213,8 @@ def _header(take: Take, camera: Any, options: dict[str, Any]) -> dict[str, Any]:
 def _read_manifest(folder: Path, name: str) -> dict[str, Any]:
     """Return the manifest of the folder; empty if there is none."""
     manifest = read_manifest(folder / MANIFEST, FORMAT, "take", name)
-    entries = manifest.get("frames")
-    sound = isinstance(manifest.get("claims"), list) and isinstance(entries, dict)
-    if manifest and not (sound and all(map(is_product, entries.values()))):
+    entries, claims = manifest.get("frames"), manifest.get("claims")
+    sound = isinstance(claims, list) and isinstance(entries, dict) and all(map(is_product, entries.values()))
+    if manifest and not sound:
         raise damaged(folder / MANIFEST)
     return manifest
