@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from .common import Force, app, check_outputs
-from .progress import spinner
+from .progress import say_done, spinner
 from .words import say
 
 
@@ -64,4 +64,4 @@ def calibrate(
         write_json(files["report.json"], found.report())
         write_image(files["centres.png"], centres_picture(found, made))
     say(found.describe())
-    say(f"{picture_file}: values read as {curve}; run raytrace-ii regular {picture_file} -o … next")
+    say_done(f"{picture_file}: values read as {curve}; run raytrace-ii regular {picture_file} -o … next")

@@ -110,7 +110,7 @@ def import_(
     check_type(output, made.pixels.dtype.name)
     made.save(output)
     (k, l), (u, v) = made.lenses, made.ei_pixels
-    say(f"{output}: {k}×{l} lenses of {u}×{v} px, {made.pixels.dtype}")
+    say_done(f"{output}: {k}×{l} lenses of {u}×{v} px, {made.pixels.dtype}")
     if order is not None:
         say(order.describe())
     if made.camera is None:

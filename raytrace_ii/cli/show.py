@@ -57,7 +57,7 @@ def view(
         options["progress"] = lambda done, total: report(done, total, "")
         if output is not None:
             size = write_viewer(output, original, decoded, **options)
-            say(f"{output}: {size / 2**20:.1f} MB")
+            say_done(f"{output}: {size / 2**20:.1f} MB")
             return
         import tempfile
 
