@@ -175,7 +175,7 @@ def export(
         write_quilt(original, target, row=row)
     else:
         write_image(target, original.pixels)
-    say_done(str(target))
+    say(target)  # a result: its name is ours
 
 
 @app.command()

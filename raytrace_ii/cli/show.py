@@ -12,7 +12,6 @@ from .common import Force, app, check_outputs, check_page, image_file, load_any,
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, say_done, spinner
 from .video import coding, compared_takes, is_take_source
-from .words import say
 
 if TYPE_CHECKING:
     from ii_core import IIPicture
