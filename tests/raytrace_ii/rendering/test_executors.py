@@ -243,7 +243,5 @@ def test_a_cluster_that_is_not_there_is_one_line(run, refused, tmp_path, monkeyp
     refused(run(*command, "127.0.0.1:1"), "no dask scheduler answers at 127.0.0.1:1")
     refused(run(*command, "127.0.0.1:1", "--workers", 2), "--workers is for threads of this machine")
     monkeypatch.setitem(sys.modules, "distributed", None)
-    refused(
-        run(*command, "127.0.0.1:1"), "--dask needs dask, which is not installed: pip install 'raytrace-ii[dask]'"
-    )
+    refused(run(*command, "127.0.0.1:1"), "dask is not installed: pip install 'raytrace-ii[dask]'")
     assert list(tmp_path.iterdir()) == []
