@@ -31,7 +31,8 @@ RECORDS = Records("light_field", ("benchmarks.coding.light_field",))
 SCENES = ("apples", "twins", "car", "cuboid")
 FIELDS = ("car-9x9", "apples-9x9")
 IMPORTED = "flower"
-OURS = ("si-lf", "si-lf:sources=0")
+OURS = "si-lf"
+TOOLS = {"si-lf:sources=0": "synthesis off", "si-lf:cross=0": "colours not predicted"}
 QUANTISERS = {
     "si-lf": (22, 30, 38, 44, 50),
     "si-avif:best": (18, 28, 38, 48, 58),
@@ -44,7 +45,7 @@ VIEWS, GAP = 9, 6  # views a side; the field's disparity is that of the scene th
 
 def main() -> None:
     """Measure, print, keep and fill the page."""
-    parser = command_line(__doc__, pictures=SCENES + FIELDS, schemes=(*OTHERS, *OURS, *LOSSLESS))
+    parser = command_line(__doc__, pictures=SCENES + FIELDS, schemes=(*OTHERS, OURS, *TOOLS, *LOSSLESS))
     parser.add_argument("--flower", help="folder of the views of a light field camera")
     asked = parser.parse_args()
     names = [*asked.pictures, *([IMPORTED] if asked.flower else [])]
@@ -123,19 +124,20 @@ def tables() -> Tables:
     rows = RECORDS.rows()
     curves = {(row["picture"], row["scheme"]): row["points"] for row in rows if "points" in row}
     exact = {(row["picture"], row["scheme"]): row["bpp"] for row in rows if "bpp" in row}
-    names = [name for name in (*SCENES, *FIELDS, IMPORTED) if (name, "si-lf") in curves]
+    names = [name for name in (*SCENES, *FIELDS, IMPORTED) if (name, OURS) in curves]
     marks = ("lf-against", "lf-tools", "lf-lossless")
     if not names:
         return {("docs/lf.md", mark): ["Not measured yet."] for mark in marks}
     against = ["| picture | " + " | ".join(f"`{other}`" for other in OTHERS) + " | encode µs | decode µs |"]
     against.append("|---|" + "---|" * (len(OTHERS) + 2))
-    tools = ["| picture | synthesis off |", "|---|---|"]
+    tools = ["| picture | " + " | ".join(TOOLS.values()) + " |", "|---|" + "---|" * len(TOOLS)]
     for name in names:
-        ours = curves[name, "si-lf"]
+        ours = curves[name, OURS]
         cells = [_difference(curves.get((name, other)), ours) for other in OTHERS]
         times = [f"{np.median([point[key] for point in ours]):.1f}" for key in ("encode_us", "decode_us")]
         against.append(f"| {name} | {' | '.join(cells + times)} |")
-        tools.append(f"| {name} | {_difference(ours, curves.get((name, OURS[1])))} |")
+        without = [_difference(ours, curves.get((name, tool))) for tool in TOOLS]
+        tools.append(f"| {name} | {' | '.join(without)} |")
     lossless = ["| picture | " + " | ".join(f"`{scheme}`" for scheme in LOSSLESS) + " |"]
     lossless.append("|---|" + "---|" * len(LOSSLESS))
     for name in names:
