@@ -8,12 +8,15 @@ Views are the middle sub-images of frames that `benchmarks.coding.takes` renders
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from benchmarks.coding import crossing
+from benchmarks.coding import crossing, neighbours
 from benchmarks.coding.takes import (  # fmt: skip
     FRAMES,
     INSTANTS,
@@ -69,23 +72,18 @@ def access_chart() -> None:
 
 
 def crossing_chart() -> None:
-    """Draw time-first against view-first over the decorrelation in time over that in view, plain and compensated."""
+    """Draw time-first against view-first over the ratio of decorrelations, by number of references."""
     figure = new_figure(9.5, 4.4)
     panels = figure.subplots(1, 2, sharey=True)
-    for axes, kind in zip(panels, ("plain", "compensated"), strict=True):
+    for axes, refs, title in zip(panels, (8, 1), ("8 references", "1 reference"), strict=True):
         for i, pitch in enumerate(crossing.PITCHES):
-            rows = [row for row in crossing.rows() if row["pitch_px"] == pitch and row["rate"] is not None]
-            places = sorted((crossing.ratios(row, kind)[0], row["rate"]) for row in rows)
-            axes.plot(*np.array(places or np.empty((0, 2))).T, marker=MARKERS[i], color="0.35", linewidth=0.8,
-                      label=f"apples, lens pitch {pitch} px, four speeds" if kind == "plain" else None)  # fmt: skip
-    for i, take in enumerate(TAKES):
-        rows = [row for row in RECORDS.rows(scale=SCALE) if "step" in row and row["take"] == take]
-        places = [((1 - row["time_correlation"]) / (1 - row["view_correlation"]),
-                   difference(*(row["curves"][name] for name in ONE_WAY))) for row in rows]  # fmt: skip
-        known = np.array(sorted(place for place in places if place[1] is not None) or np.empty((0, 2)))
-        panels[0].plot(*known.T, marker="o", color=COLOURS[i], label=f"take {take}, ×1, ×2, ×4")
-    titles = "sub-images as they are, (5.3)", "after motion compensation"
-    for axes, title in zip(panels, titles, strict=True):
+            rows = [row for row in crossing.rows() if (row["refs"], row["pitch_px"]) == (refs, pitch)]
+            for kind, face in (("plain", "0.35"), ("compensated", "none")):
+                places = [(crossing.ratios(row, kind)[0], row["rate"]) for row in rows]
+                label = f"apples, lens pitch {pitch} px, by speed" if (refs, kind) == (8, "plain") else None
+                drawn(axes, places, MARKERS[i], "0.35", label=label, markerfacecolor=face)
+        for i, take in enumerate(TAKES):
+            drawn(axes, take_places(take, refs), "o", COLOURS[i], label=f"take {take}" if refs == 8 else None)
         axes.axhline(0, color="0.5", linewidth=0.8)
         axes.axvline(1, color="0.5", linewidth=0.8, linestyle=":")
         axes.set_xscale("log")
@@ -93,6 +91,27 @@ def crossing_chart() -> None:
         axes.set_title(title, loc="left", fontsize=10)
     panels[0].set_ylabel("rate of time-first against view-first [%]")
     finished(figure, "takes_crossing.png", ncols=3)
+
+
+def take_places(take: str, refs: int) -> list[tuple[float, float | None]]:
+    """Ratio of decorrelations and rate of a take: with 8 references at each speed, with one as it is."""
+    rows = {row["step"]: row for row in RECORDS.rows(scale=SCALE, take=take) if "step" in row}
+    ratios = {
+        step: (1 - row["time_correlation"]) / (1 - row["view_correlation"]) for step, row in sorted(rows.items())
+    }
+    if refs == 8:
+        return [(ratios[step], difference(*(rows[step]["curves"][name] for name in ONE_WAY))) for step in ratios]
+    coded = {row["what"]: row for row in neighbours.RECORDS.rows(scale=SCALE, take=take)}
+    pair = [coded.get(f"{name}, 1 reference") for name in ONE_WAY]
+    return (
+        [] if None in pair or 1 not in ratios else [(ratios[1], difference(*(row["points"] for row in pair if row)))]
+    )
+
+
+def drawn(axes: Axes, places: Sequence[tuple[float, float | None]], marker: str, colour: str, **look: Any) -> None:
+    """Draw rates over ratios, where there is a rate."""
+    known = sorted((x, y) for x, y in places if y is not None)
+    axes.plot(*np.array(known or np.empty((0, 2))).T, marker=marker, color=colour, linewidth=0.8, **look)
 
 
 def finished(figure: Figure, name: str, *, ncols: int) -> None:
