@@ -62,10 +62,10 @@ def test_closing_lines_name_wall_and_cpu_time_and_quiet_leaves_nothing(run, pict
 
 def test_a_bar_in_a_terminal_counts_and_tells_times(monkeypatch, capsys):
     monkeypatch.setattr(progress, "console", lambda **options: console(**options, force_terminal=True, width=80))
-    with progress.progress_bar("render apples") as report:
+    with progress.progress_bar("render [bold] :smile:") as report:  # no markup
         report(128, 128, "tiles")
     err = capsys.readouterr().err
-    assert "render apples" in err and "128/128 tiles, 0:00" in err
+    assert "render [bold] :smile:" in err and "128/128 tiles, 0:00" in err
     monkeypatch.setattr(progress.running, "quiet", True)
     with progress.progress_bar("render apples") as report:
         report(1, 2, "tiles")
