@@ -14,9 +14,6 @@ EXTRAS = {
     "bjontegaard": ("charts", "bjontegaard"),
     "imagecodecs": ("coders", "imagecodecs"),
     "distributed": ("dask", "dask"),
-    "trimesh": ("meshes", "trimesh"),
-    "scipy": ("science", "scipy"),
-    "skimage": ("science", "scikit-image"),
 }
 
 

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from .checks import MOST_MM, length, number, within
 from .elements import Array, Bundle, Element, FrontElement, LensModel, Scaling, Under
-from .extras import load
 from .surfaces import Surfaces
 
 MOST_IOR = 1000.0  # a material of 4.5 is a rarity
@@ -320,6 +319,8 @@ def scaled_chain(elements: Sequence[Element], scaling: Scaling, *, nearer_mm: fl
 
 def _radius(lens: SphericalLenslet, gap: float, cell: tuple[float, ...], vergence: float) -> float:
     """Return the radius of a spherical lenslet of a given vergence."""
+    from scipy.optimize import brentq
+
     least = math.hypot(*cell) / 2
 
     def excess(radius: float) -> float:
@@ -333,7 +334,7 @@ def _radius(lens: SphericalLenslet, gap: float, cell: tuple[float, ...], vergenc
             f"spherical-lenslet: no radius_mm of at least half the cell's diagonal, {least:g}, focuses where it did: "
             "a smaller scale is needed"
         )
-    return float(load("scipy.optimize").brentq(excess, low, high, xtol=1e-15 * high, rtol=1e-14))
+    return float(brentq(excess, low, high, xtol=1e-15 * high, rtol=1e-14))
 
 
 def _times(length: float | None, factor: float) -> float | None:

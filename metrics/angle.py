@@ -13,8 +13,7 @@ from ii_core.colour import CB, CR, KB, KG, KR
 from .global_angle import angle_quality
 from .pair import Compared, PicturePair, Structure, picture_pair
 from .quality import AngleQuality
-from .ssim import WINDOW, ssim_terms
-from .view import LUMA
+from .view import LUMA, WINDOW
 
 Floats = NDArray[np.float64]
 # BT.709, full range: Y, Cb and Cr from R, G and B.
@@ -124,9 +123,9 @@ def angle_ssim(pair: PicturePair, *, scales: int = 1) -> AngleQuality:
         a, b = (x @ LUMA * 255 for x in (a, b))
         product = 1.0
         for i, exponent in enumerate(exponents):
-            luminance, contrast = ssim_terms(a, b)
+            whole, contrast = _ssim(a, b)
             last = i == scales - 1
-            mean = float((luminance * contrast if last else contrast).mean())
+            mean = whole if last else contrast
             product *= mean if scales == 1 else max(mean, 0.0) ** exponent
             if not last:
                 a, b = (_halved(x) for x in (a, b))
@@ -147,6 +146,22 @@ def _each(pair: PicturePair, measure: Callable[[Floats, Floats], float]) -> Angl
         a, b = (field[:, :, v, u].astype(np.float64) / pair.peak for field in fields)
         values[v, u] = measure(a, b)
     return angle_quality(values, pair.reference)
+
+
+def _ssim(a: Floats, b: Floats) -> tuple[float, float]:
+    """Return mean SSIM, and mean of its contrast–structure term, where the whole window fits."""
+    from skimage.filters import gaussian
+
+    def mean(x: Floats) -> Floats:
+        side = WINDOW // 2
+        return gaussian(x, sigma=1.5, truncate=side / 1.5, mode="reflect")[side:-side, side:-side]
+
+    c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
+    ma, mb = mean(a), mean(b)
+    va, vb, both = mean(a * a) - ma * ma, mean(b * b) - mb * mb, mean(a * b) - ma * mb
+    contrast = (2 * both + c2) / (va + vb + c2)
+    luminance = (2 * ma * mb + c1) / (ma * ma + mb * mb + c1)
+    return float((luminance * contrast).mean()), float(contrast.mean())
 
 
 def _halved(x: Floats) -> Floats:

@@ -10,8 +10,7 @@ from .angle import SCALES, angle_ssim, angle_ycbcr
 from .depth.q_depth import depth_quality
 from .global_angle import angle_psnr, global_psnr
 from .measure import MEASURES, Measure, Needs, register_measure
-from .ssim import WINDOW
-from .view import view_quality
+from .view import WINDOW, view_quality
 
 __all__ = ["MEASURES"]
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ii_core.checks import checked, number, number_from, numbers, numbers_in_a_row, one_of, whole_from
-from ii_core.extras import load
 
 Floats = NDArray[np.float64]
 MODELS = ("bradley-terry", "thurstone")
@@ -88,7 +87,7 @@ def opinion_scores(scores: ArrayLike, *, confidence: float = 0.95) -> OpinionSco
     ValueError
         If there are no scores at all, a stimulus has none, or the confidence is out of range.
     """
-    t = load("scipy.stats").t
+    from scipy.stats import t
 
     table = _table(scores)
     if not 0 < confidence < 1:
@@ -208,7 +207,7 @@ def predicted_scores(measure: ArrayLike, mos: ArrayLike, half_width: ArrayLike |
     ----------
     ITU-T P.1401; VQEG 2003, final report of phase II.
     """
-    spearmanr = load("scipy.stats").spearmanr
+    from scipy.stats import spearmanr
 
     x, y = np.asarray(measure, np.float64), np.asarray(mos, np.float64)
     if x.shape != y.shape or x.ndim != 1:
@@ -276,14 +275,14 @@ def _table(scores: ArrayLike) -> Floats:
 
 def _law(model: str) -> Any:
     """Distribution of a difference of two stimuli."""
-    logistic, norm = load("scipy.stats").logistic, load("scipy.stats").norm
+    from scipy.stats import logistic, norm
 
     return logistic if model == "bradley-terry" else norm
 
 
 def _check_beaten(wins: Floats) -> None:
     """Raise unless a chain of wins leads from every stimulus to every other: else the scale is infinite."""
-    connected_components = load("scipy.sparse.csgraph").connected_components
+    from scipy.sparse.csgraph import connected_components
 
     groups, label = connected_components(wins > 0, connection="strong")
     if groups > 1:
@@ -307,7 +306,7 @@ def _likelihood(wins: Floats, scale: Floats, law: Any) -> tuple[Floats, Floats]:
 
 def _monotone(x: Floats, y: Floats) -> Floats:
     """The logistic fit of y over x."""
-    OptimizeWarning, curve_fit = (getattr(load("scipy.optimize"), name) for name in ("OptimizeWarning", "curve_fit"))
+    from scipy.optimize import OptimizeWarning, curve_fit
 
     unit = (x - x.mean()) / x.std()
 

@@ -16,8 +16,8 @@ from ii_core.view import camera_of
 from .global_angle import psnr
 from .pair import Compared, PicturePair, Structure, picture_pair
 from .quality import ViewQuality
-from .ssim import WINDOW, ssim_terms
 
+WINDOW = 11  # pixels across the Gaussian of Wang 2004
 # BT.601, as in MATLAB's rgb2gray, which is usual with Wang's ssim.m.
 LUMA = np.array([0.2989, 0.5870, 0.1140])
 
@@ -126,7 +126,14 @@ def error_map(reference: IIPicture, decoded: IIPicture, viewpoint_mm: Any) -> ND
 
 def mssim(a: NDArray[Any], b: NDArray[Any], valid: NDArray[np.bool_]) -> float:
     """Mean SSIM of two views, over the windows whose pixels are all valid."""
-    x, y = (np.where(valid, image @ LUMA * (255 / peak(image.dtype)), 0.0) for image in (a, b))
-    luminance, contrast = ssim_terms(x, y)
+    from skimage.metrics import structural_similarity
+
+    x, y = (image @ LUMA * (255 / peak(image.dtype)) for image in (a, b))
+    options = {"data_range": 255, "gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
+    if valid.all():
+        return float(structural_similarity(x, y, **options))
+    side = WINDOW // 2
+    x, y = (np.where(valid, image, 0.0) for image in (x, y))
+    _, similarity = structural_similarity(x, y, full=True, **options)
     whole = np.lib.stride_tricks.sliding_window_view(valid, (WINDOW, WINDOW)).all(axis=(2, 3))
-    return float((luminance * contrast)[whole].mean()) if whole.any() else math.nan
+    return float(similarity[side:-side, side:-side][whole].mean()) if whole.any() else math.nan

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
-from ..extras import Lazy, load
 from .refusal import NoLenses
-
-ndimage = Lazy("scipy.ndimage")
 
 LEAST_PITCH = 4.0  # pixels from lens to lens: under it, a micro-image has no centre to speak of
 FEWEST = 5  # lenses a side
@@ -167,7 +165,7 @@ class Summits:
 
     def __init__(self, grey: NDArray[np.float32], sigma: float) -> None:
         self.sigma = sigma
-        oaconvolve = load("scipy.signal").oaconvolve  # a second to import
+        from scipy.signal import oaconvolve  # a second to import
 
         half = int(np.ceil(KERNEL * sigma))
         y, x = np.mgrid[-half : half + 1, -half : half + 1] / (KERNEL * sigma)

@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from ..scene.scene import unit_rows
 from ..shapes.primitives import Mesh
-from ..shapes.watertight import components
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -85,8 +86,9 @@ def smooth_corners(places: Array, faces: Rows, groups: Rows | None = None) -> tu
     p = places[faces]
     normal = unit_rows(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]))
     linked = _linked(at, normal, np.full(len(faces), -1) if groups is None else groups)
-    rows = components(at.size, linked).reshape(-1, 3)
-    total = np.zeros((rows.max(initial=-1) + 1, 3))
+    count, label = connected_components(linked, directed=False)
+    rows = label.reshape(-1, 3).astype(np.int64)
+    total = np.zeros((count, 3))
     for corner in range(3):
         before, after = p[:, corner - 1] - p[:, corner], p[:, corner - 2] - p[:, corner]
         angle = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), np.einsum("ij,ij->i", before, after))
@@ -94,8 +96,8 @@ def smooth_corners(places: Array, faces: Rows, groups: Rows | None = None) -> tu
     return unit_rows(total), rows
 
 
-def _linked(at: Rows, normal: Array, groups: Rows) -> Rows:
-    """Return pairs (n, 2) of corners that smooth edges connect; ``at`` are the positions (F, 3) of corners."""
+def _linked(at: Rows, normal: Array, groups: Rows) -> coo_matrix:
+    """Return the corners (3 F) that smooth edges connect, from the positions (F, 3) of corners."""
     face = np.tile(np.arange(len(at)), 3)
     start, end = np.concatenate([np.arange(3 * len(at)).reshape(-1, 3)[:, [i, (i + 1) % 3]] for i in range(3)]).T
     place = at.reshape(-1)
@@ -111,4 +113,5 @@ def _linked(at: Rows, normal: Array, groups: Rows) -> Rows:
     )  # faces without area have no angle to their neighbours
     within = (groups[one] == groups[other]) & (groups[one] != 0)
     smooth = same & within & ((groups[one] > 0) | flat | (cosine >= np.cos(np.radians(CREASE_DEG)) - 1e-9))
-    return np.concatenate([np.stack([tip[:-1][smooth], tip[1:][smooth]], axis=1) for tip in (low, high)])
+    pairs = np.concatenate([np.stack([tip[:-1][smooth], tip[1:][smooth]], axis=1) for tip in (low, high)])
+    return coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(at.size, at.size))

@@ -10,8 +10,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.extras import load
-
 Array = NDArray[np.float64]
 Column = Array | list[Array]
 Columns = dict[str, dict[str, Column]]
@@ -150,7 +148,7 @@ def _short(element: Element) -> ValueError:
 
 def _parsed(body: bytes, order: Order | None, elements: list[Element]) -> Columns:
     """Columns as trimesh parses them; ``order`` is None for ASCII."""
-    ply = load("trimesh.exchange.ply")  # half a second that scenes without files need not wait for
+    from trimesh.exchange import ply  # half a second that scenes without files need not wait for
 
     parse = ply._ply_ascii if order is None else ply._ply_binary
     table = {e.name: _as_in_trimesh(e, order or "<") for e in elements if e.count}

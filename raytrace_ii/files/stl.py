@@ -11,8 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.extras import load
-
 from .beside import read_bytes
 from .corners import joined
 from .mesh_model import Model, Part
@@ -70,7 +68,7 @@ def _text(data: bytes) -> NDArray[np.float64]:
 
 def _parsed(data: bytes) -> NDArray[np.float64]:
     """Return the corners (3 F, 3) of all triangles, one after another."""
-    load_stl = load("trimesh.exchange.stl").load_stl  # imported late: it takes half a second
+    from trimesh.exchange.stl import load_stl  # imported late: it takes half a second
 
     log = logging.getLogger("trimesh")
     if not log.handlers:  # otherwise Python prints a traceback for each unreadable normal

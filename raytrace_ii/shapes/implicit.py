@@ -8,8 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, model_validator
 
-from ii_core.extras import load
-
 from ..scene.scene import unit_rows
 from .implicit_parts import Array, Ball, Block, Capsule, Part, Tube
 from .primitives import Mesh, Shape
@@ -51,7 +49,7 @@ class Implicit(Shape):
         return self
 
     def mesh(self) -> Mesh:
-        marching_cubes = load("skimage.measure").marching_cubes  # slow to import
+        from skimage.measure import marching_cubes  # slow to import
 
         low, count = self._grid()
         x, y, z = (low[i] + self.cell_mm * np.arange(count[i]) for i in range(3))

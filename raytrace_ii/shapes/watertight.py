@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.extras import load
-
 SAME = 1e-6  # of the largest coordinate: nearer corners are equal, as in single precision
 
 
@@ -42,24 +40,14 @@ def _open_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _merged(vertices: NDArray[np.float64], loose: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return a number for every vertex, equal for vertices of ``loose`` at one position."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     points, row = np.unique(vertices[loose] + 0.0, axis=0, return_inverse=True)  # of soup, a sixth
-    pairs = load("scipy.spatial").cKDTree(points).query_pairs(SAME * np.abs(vertices).max(), output_type="ndarray")
-    place = components(len(points), pairs)[row.reshape(-1)]
+    pairs = cKDTree(points).query_pairs(SAME * np.abs(vertices).max(), output_type="ndarray")
+    linked = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+    place = connected_components(linked)[1][row.reshape(-1)]
     number = np.arange(len(vertices))
     number[loose] = loose[np.unique(place, return_index=True)[1]][place]
     return number
-
-
-def components(count: int, pairs: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
-    """Return the number of the connected component of each of ``count`` points, linked in pairs (n, 2).
-
-    Components are numbered in the order of their first points.
-    """
-    first = np.arange(count)  # of the component, as far as known
-    a, b = pairs.T
-    while (first[a] != first[b]).any():
-        low, high = np.minimum(first[a], first[b]), np.maximum(first[a], first[b])
-        np.minimum.at(first, high, low)
-        while ((shorter := first[first]) != first).any():
-            first = shorter
-    return np.unique(first, return_inverse=True)[1].reshape(-1)

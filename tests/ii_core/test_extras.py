@@ -5,11 +5,9 @@ import sys
 import tomllib
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from ii_core.extras import EXTRAS
-from raytrace_ii.shapes.watertight import components
 
 ROOT = Path(__file__).parents[2]
 WITHOUT = f"""
@@ -59,7 +57,6 @@ def test_pictures_are_rendered_coded_and_measured_without_extras():
     ("said", "arguments"),
     {
         "matplotlib is not installed: pip install 'raytrace-ii[charts]'": ["study", "a.png", "-o", "s"],
-        "scikit-image is not installed: pip install 'raytrace-ii[science]'": ["render", "car", "-o", "c.png"],
         "dask is not installed: pip install 'raytrace-ii[dask]'": [
             "render",
             "apples",
@@ -81,19 +78,3 @@ def test_extras_are_those_of_the_package():
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     for extra, package in EXTRAS.values():
         assert any(wanted.startswith(package) for wanted in extras[extra]), (extra, package)
-
-
-def test_components_of_points():
-    """Against scipy's, for random links and for a long chain."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    rng = np.random.default_rng(3)
-    chain = np.stack([np.arange(999), np.arange(1, 1000)], axis=1)
-    for count, pairs in (
-        (60, rng.integers(0, 60, (40, 2))),
-        (1000, rng.permutation(chain)),
-        (5, np.empty((0, 2), int)),
-    ):
-        graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-        np.testing.assert_array_equal(components(count, pairs), connected_components(graph, directed=False)[1])
