@@ -25,6 +25,7 @@ def cluster(address: str | None, identity: Callable[[], Mapping[str, str]]) -> I
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told by our one line
     load("distributed")
     try:
+        _check_address(address)
         client = load("distributed").Client(address, timeout=5, set_as_default=False)
     except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # tls:// without certificates, too
         raise OSError(f"no dask scheduler answers at {address}: {error}") from None
@@ -36,3 +37,16 @@ def cluster(address: str | None, identity: Callable[[], Mapping[str, str]]) -> I
     with client:
         check_workers(client, identity)  # before the output is opened
         yield client
+
+
+def _check_address(address: str) -> None:
+    """Raise ValueError for an address that no client takes: a half-made client complains as the process ends."""
+    from distributed.comm.addressing import get_address_host_port, parse_address
+    from distributed.comm.registry import get_backend
+    from distributed.security import Security
+
+    scheme, _ = parse_address(address)
+    get_backend(scheme)
+    get_address_host_port(address)
+    if scheme == "tls" and Security().get_connection_args("client").get("ssl_context") is None:
+        raise ValueError("no TLS certificates are configured for dask")

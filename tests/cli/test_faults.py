@@ -347,3 +347,12 @@ def test_only_this_machines_own_names_are_served(served):
     assert process.wait(20) == 143
     assert process.stderr.read().count("Traceback") == 0
     assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("address", ["tls://", "tls://127.0.0.1:9", "nothing://x"])
+def test_addresses_of_no_scheduler_are_one_line_to_the_end_of_the_process(picture, address):
+    """In this process a client's complaint at its end, nine lines, was not seen."""
+    command = [*COMMAND, "study", picture, "-o", picture.parent / "study", "--rates", "1", "--dask", address]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=100)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert done.stderr.startswith(f"error: no dask scheduler answers at {address}: ")
