@@ -11,7 +11,7 @@ from benchmarks.accuracy.analytic import still_life
 from benchmarks.stability.geometry import Row, ball, body, ground
 from raytrace_ii import Background, Light, Material, Scene, trace
 from raytrace_ii.shapes.primitives import Box, Mesh
-from raytrace_ii.tracing.packing import LIFT
+from raytrace_ii.tracing.lift import LIFT
 
 ONES = (1.0, 1.0, 1.0)
 TERMINATOR = np.array([1.0, 0.37, -0.43])  # towards a light that no ring of a ball's vertices is aligned with

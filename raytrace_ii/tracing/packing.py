@@ -13,20 +13,13 @@ from numpy.typing import NDArray
 
 from ..scene.scene import Body, Light, Material, Scene, Vector, unit_rows
 from ..scene.textures import Image
+from . import lift
 from .intersect import Intersector
 from .kernels import tables
 from .kernels.arrays import Surfaces, Surroundings
 from .kernels.tables import DIRECTIONAL, LEAST_WEIGHT, MATERIAL_COLUMNS, POINT, SPOT
 from .texture_table import TextureTable
 
-# Spawned rays start this share of the face's largest coordinate off the face: float32 places a hit to about
-# 1e-7 of it, and from 1e-6 on no ray meets its own face again.
-LIFT = 4e-6
-# Embree tells the sides of a face by the product of its normal, as long as twice its area, and the way from the ray's
-# start, in float32: a lift of fewer subnormal steps is rounded away. It is at most this share of the longest edge.
-LIFT_STEPS, MOST_LIFT = 8 * float(np.finfo(np.float32).smallest_subnormal), 1e-3
-
-_SOME_FACES = 1 << 16
 MOST_NESTED = 8  # bodies whose bounds meet in one place that a ray keeps count of
 
 _kept: WeakKeyDictionary[Scene, PackedScene] = WeakKeyDictionary()
@@ -72,7 +65,7 @@ class PackedScene:
         self.nested = min(int(meeting.sum(axis=1).max(initial=0)), MOST_NESTED)
         vertices = [b.vertices for b in bodies[:first_clear]] + _overlapping(bodies[first_clear:], meeting)
         self.corners = _per_corner(vertices, bodies)
-        self.faces = _face_table(self.corners)
+        self.faces = lift.face_table(self.corners)
         self.normals = _per_corner([None if b.normals is None else unit_rows(b.normals) for b in bodies], bodies)
         self.coordinates = _per_corner(
             [b.texture_coordinates if b.material.textures else None for b in bodies], bodies
@@ -164,7 +157,7 @@ def _brightest_emission(body: Body) -> float:
 
 def _meeting(bounds: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(B, B): whether bounds touch or overlap, to float32's precision."""
-    slack = 4 * LIFT * np.abs(bounds).max(axis=(1, 2))[:, None]
+    slack = 4 * lift.LIFT * np.abs(bounds).max(axis=(1, 2))[:, None]
     low, high = bounds[:, 0] - slack, bounds[:, 1] + slack
     return ((low[:, None] <= high[None]) & (high[:, None] >= low[None])).all(axis=2)
 
@@ -181,7 +174,7 @@ def _overlapping(bodies: Sequence[Body], meeting: NDArray[np.bool_]) -> list[NDA
         above = sum(meeting[b, other] for other in order[:place])
         if above:
             vertices = np.asarray(bodies[b].vertices, np.float64)
-            step = above * 4 * LIFT * np.abs(vertices).max()
+            step = above * 4 * lift.LIFT * np.abs(vertices).max()
             grown[b] = vertices + step * _corner_normals(vertices, np.asarray(bodies[b].faces))
     return grown
 
@@ -234,27 +227,3 @@ def _light_row(light: Light) -> list[float]:
 
 def _unit(vector: Vector) -> NDArray[np.float64]:
     return np.asarray(vector, np.float64) / np.linalg.norm(vector)
-
-
-def _face_table(corners: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Unit normal (0 for a face without area), lift in mm and pull of every face.
-
-    The pull takes a hit about as far towards the middle of its face as the lift takes it off the face, as a share
-    of the way.
-    """
-    out = np.empty((len(corners), 5), np.float32)
-    for first in range(0, len(corners), _SOME_FACES):  # in float64 all at once would take ten times the table
-        some = slice(first, first + _SOME_FACES)
-        out[some] = _face_rows(corners[some].astype(np.float64))
-    return out
-
-
-def _face_rows(p: NDArray[np.float64]) -> NDArray[np.float64]:
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-    longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
-    least = np.divide(LIFT_STEPS, length[:, 0], out=np.zeros_like(longest), where=length[:, 0] > 0)
-    lift = np.maximum(LIFT * np.abs(p).max(axis=(1, 2)), np.minimum(least, MOST_LIFT * longest))
-    pull = np.minimum(np.divide(lift, longest, out=np.zeros_like(lift), where=longest > 0), 0.25)
-    return np.column_stack([unit, lift, pull])

@@ -15,7 +15,7 @@ from raytrace_ii.tracing.kernels.fresnel import fresnel
 from raytrace_ii.tracing.kernels.sky import background_colour
 from raytrace_ii.tracing.kernels.srgb import encode_srgb
 from raytrace_ii.tracing.kernels.tables import LEAST_WEIGHT
-from raytrace_ii.tracing.packing import LIFT
+from raytrace_ii.tracing.lift import LIFT
 from tests.support.trace_scenes import (
     BLACK,
     UNIFORM,
