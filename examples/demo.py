@@ -25,8 +25,8 @@ from ii_core import (
 from ii_core.files import write_image
 from metrics.rd import RATES
 from raytrace_ii import Scene, Shot, load_scene, render
-from raytrace_ii.cli.common import progress_bar, spinner
 from raytrace_ii.cli.evaluate import SCHEMES, run_study
+from raytrace_ii.cli.progress import progress_bar, spinner
 
 
 def main() -> None:

@@ -80,7 +80,7 @@ def crossing_chart() -> None:
             rows = [row for row in crossing.rows() if (row["refs"], row["pitch_px"]) == (refs, pitch)]
             for kind, face in (("plain", "0.35"), ("compensated", "none")):
                 places = [(crossing.ratios(row, kind)[0], row["rate"]) for row in rows]
-                label = f"apples, lens pitch {pitch} px, by speed" if (refs, kind) == (8, "plain") else None
+                label = f"apples, lens pitch {pitch} px" if (refs, kind) == (8, "plain") else None
                 drawn(axes, places, MARKERS[i], "0.35", label=label, markerfacecolor=face)
         for i, take in enumerate(TAKES):
             drawn(axes, take_places(take, refs), "o", COLOURS[i], label=f"take {take}" if refs == 8 else None)
@@ -109,9 +109,10 @@ def take_places(take: str, refs: int) -> list[tuple[float, float | None]]:
 
 
 def drawn(axes: Axes, places: Sequence[tuple[float, float | None]], marker: str, colour: str, **look: Any) -> None:
-    """Draw rates over ratios, where there is a rate."""
+    """Draw rates over ratios by rising ratio, where there is a rate."""
     known = sorted((x, y) for x, y in places if y is not None)
-    axes.plot(*np.array(known or np.empty((0, 2))).T, marker=marker, color=colour, linewidth=0.8, **look)
+    if known:
+        axes.plot(*np.array(known).T, marker=marker, color=colour, linewidth=0.8, **look)
 
 
 def finished(figure: Figure, name: str, *, ncols: int) -> None:

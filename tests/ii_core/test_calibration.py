@@ -154,7 +154,7 @@ def test_a_picture_without_lenses_is_refused(picture):
 
 
 def test_frames_of_other_sizes_are_refused():
-    with pytest.raises(ValueError, match=r"white is \(10, 10\): \(300, 300\)"):
+    with pytest.raises(ValueError, match=r"white is \(10, 10\) and raw \(300, 300\)"):
         calibrate(NOISE, white=NOISE[:10, :10])
     with pytest.raises(ValueError, match="pixel_pitch_mm is 0"):
         calibrate(NOISE, pixel_pitch_mm=0)

@@ -84,7 +84,7 @@ def test_a_shorter_decoded_take_counts_its_frames():
     assert len(measure_take(shown([0, 0, 0]), shown([1, 1])).q_global) == 2
     with pytest.raises(ValueError, match="decoded has 3 frames, reference 2"):
         measure_take(shown([0, 0]), shown([1, 1, 1]))
-    with pytest.raises(ValueError, match="no viewpoints"):
+    with pytest.raises(ValueError, match="at least one viewpoint"):
         measure_take(shown([0]), shown([1]), viewpoints_mm=[])
 
 

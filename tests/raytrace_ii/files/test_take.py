@@ -158,7 +158,7 @@ def test_what_is_wrong_is_named_before_anything_is_rendered(tmp_path, old, new, 
 def test_a_scene_without_animation_does_not_move(tmp_path):
     with pytest.raises(ValueError, match="does not move"):
         take_of(tmp_path, BALLS)
-    with pytest.raises(ValueError, match="at least 0"):
+    with pytest.raises(ValueError, match="from 0 to"):
         take_of(tmp_path, BALLS + MOVES).scene_at(-1)
 
 
