@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shutil
 
-from benchmarks.coding import disparity
+from benchmarks.coding import disparity, light_field
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, commit_of, origin, with_commits
@@ -35,6 +35,7 @@ def main() -> None:
 def tables() -> Tables:
     """Return the tables of the README; one is also on the page of the study."""
     made = {("README.md", "gain"): gain_table(), ("docs/study.md", "gain"): gain_table()}
+    made["README.md", "light-field"] = light_field.tables()["docs/lf.md", "lf-against"]
     return {**made, ("README.md", "disparity"): disparity_table(), ("README.md", "speed"): speed_table()}
 
 
