@@ -18,6 +18,7 @@ from .glass import LINE_D_NM
 from .surfaces import Surface, Surfaces
 
 KEYS = {"about", "source", "back_mm", "wavelength_nm", "surfaces"}
+MOST_NAME = 255  # characters of a lens or its file in a camera file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,11 +72,10 @@ def lens(name: str | os.PathLike[str]) -> Prescription:
     """
     path = Path(name)
     if path.suffix.lower() not in (".json", ".zmx"):
+        if str(name) not in (known := lens_names()):
+            said = checks.shown(str(name))
+            raise ValueError(f"unknown lens {said}: known are {', '.join(known)}, or give a .json or .zmx file")
         path = _folder() / f"{name}.json"
-        if os.sep in str(name) or not path.is_file():
-            raise ValueError(
-                f"unknown lens {str(name)!r}: known are {', '.join(lens_names())}, or give a .json or .zmx file"
-            )
     try:
         data = read_zmx(path) if path.suffix.lower() == ".zmx" else read_json(path)
         return _prescription(data)
@@ -126,6 +126,8 @@ def placed(element: Any, folder: Path) -> Any:
         raise ValueError("surfaces: z_mm is missing: the place of the surface nearest the pixels is needed")
     checks.path("surfaces: prescription", element["prescription"])
     name = element["prescription"]
+    if len(str(name)) > MOST_NAME:
+        raise ValueError(f"surfaces: prescription is {checks.shown(name)}: at most {MOST_NAME} characters are needed")
     is_file = Path(name).suffix.lower() in (".json", ".zmx")
     rest = {key: value for key, value in element.items() if key in ("enlarge", "wavelength_nm")}
     return lens(folder / name if is_file else name).at(element["z_mm"], **rest)

@@ -63,10 +63,10 @@ def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IIC
     path = Path(name)
     if path.suffix != ".json":
         stem = ALIASES.get(str(name), str(name))
-        path = _folder() / f"{stem}.json"
-        if not path.is_file() or os.sep in stem:
+        if stem not in {found.stem for found in _folder().glob("*.json")}:
             known = ", ".join([*sorted(camera_names()), *ALIASES])
-            raise ValueError(f"unknown camera {str(name)!r}: known are {known}, or give a .json file")
+            raise ValueError(f"unknown camera {checks.shown(str(name))}: known are {known}, or give a .json file")
+        path = _folder() / f"{stem}.json"
     data = _read(path)
     try:
         members = data["cameras"] if data.get("kind") == "set" else [data]

@@ -412,6 +412,8 @@ def test_wavelengths_that_glass_does_not_have(wavelength):
     [
         ({"z_mm": None}, "z_mm is missing"),
         ({"prescription": "tessar"}, "unknown lens 'tessar': known are double-gauss, triplet"),
+        ({"prescription": "a" * 4000}, r"surfaces: prescription is 'a{58}…: at most 255"),
+        ({"prescription": "a" * 4000 + ".json"}, "at most 255 characters"),
         ({"kind": "lens"}, "an element with a prescription has"),
         ({"focal_mm": 50}, "no focal_mm"),
         ({"enlarge": -1}, "factor is -1"),
