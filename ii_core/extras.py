@@ -1,6 +1,6 @@
-"""Libraries of optional extras, imported on first use.
+"""Libraries imported on first use: those of optional extras, and modules that take long to import.
 
-The wheel installs without them; an error names the extra that holds a missing one.
+The wheel installs without the extras; an error names the one that holds a missing library.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ class NotInstalled(ImportError):
 
 
 def load(name: str) -> Any:
-    """Return a module of a library in `EXTRAS`.
+    """Return a module.
 
     Raises
     ------
     NotInstalled
-        If the library is missing.
+        If its library is in `EXTRAS`, and missing.
     """
     library = name.partition(".")[0]
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] != library:
+        if library not in EXTRAS or (error.name or "").partition(".")[0] != library:
             raise
         extra, package = EXTRAS[library]
         raise NotInstalled(f"{package} is not installed: pip install 'raytrace-ii[{extra}]'") from None
 
 
 class Lazy:
-    """Module of a library in `EXTRAS`; its attributes load it."""
+    """Module whose attributes load it."""
 
     def __init__(self, name: str) -> None:
         self._name = name

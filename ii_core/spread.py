@@ -18,17 +18,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import j1
 
 from .camera import IICamera
 from .checks import checked, instance, length, number, numbers, place
 from .colour import linear, srgb
+from .extras import Lazy
 from .jit import exact_kernel
 from .optics import Lenslet
 from .parallel import over_rows
 from .picture import IIPicture, peak
 from .wave import WAVELENGTHS_NM
 
+special = Lazy("scipy.special")
 FIRST_ZERO = 1.2196698912665045  # of Airy's pattern, in λΛ/δL
 FINE = 4  # samples across a pixel, at least
 STEPS = 16  # of widths: 1/32 pixel where they are small, 6 % where they are large
@@ -190,7 +191,7 @@ def _by_rays(f: NDArray[Any], disk: float, ring: float) -> NDArray[np.float64]:
     cut = np.clip(f * ring / FIRST_ZERO, 0, 1)  # the lens passes no frequency beyond δL/λΛ
     passed = (np.arccos(cut) - cut * np.sqrt(1 - cut * cut)) * 2 / math.pi
     v = math.pi * disk * f
-    passed *= np.where(v == 0, 1.0, 2 * j1(v) / np.where(v == 0, 1.0, v))
+    passed *= np.where(v == 0, 1.0, 2 * special.j1(v) / np.where(v == 0, 1.0, v))
     return np.fft.ifft2(passed).real
 
 

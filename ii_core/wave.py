@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import correlate1d
-from scipy.special import j1
 
 from .camera import IICamera
 from .checks import array, checked, instance, length, number, within
 from .colour import linear, srgb
+from .extras import Lazy
 from .picture import IIPicture
 
+ndimage, special = Lazy("scipy.ndimage"), Lazy("scipy.special")
 WAVELENGTHS_NM = (610.0, 550.0, 465.0)  # of sRGB's primaries, by dominant wavelength to 5 nm
 SAMPLES = 6.0  # for each period of the fastest phase
 MOST = {1: 1 << 20, 2: 1 << 12}  # samples across a field, by its dimensions
@@ -150,7 +150,7 @@ def diffraction_limit(
     x = np.asarray(x, np.float64)
     v = math.pi * length("width_mm", width_mm) / _mm(wavelength_nm) * x / np.hypot(x, length("gap_mm", gap_mm))
     safe = np.where(v == 0, 1.0, v)
-    return np.where(v == 0, 1.0, (np.sin(safe) / safe if dimensions == 1 else 2 * j1(safe) / safe) ** 2)
+    return np.where(v == 0, 1.0, (np.sin(safe) / safe if dimensions == 1 else 2 * special.j1(safe) / safe) ** 2)
 
 
 def model_spread(
@@ -259,8 +259,8 @@ def lens_blurred(
         light = block if block.dtype.kind == "f" else linear(block / np.iinfo(block.dtype).max)
         done = np.empty(light.shape)
         for c in range(3):
-            across = correlate1d(light[..., c], kernels[2 * c], axis=2, mode="nearest")
-            done[..., c] = correlate1d(across, kernels[2 * c + 1], axis=0, mode="nearest")
+            across = ndimage.correlate1d(light[..., c], kernels[2 * c], axis=2, mode="nearest")
+            done[..., c] = ndimage.correlate1d(across, kernels[2 * c + 1], axis=0, mode="nearest")
         if block.dtype.kind != "f":
             done = np.rint(np.clip(srgb(done), 0, 1) * np.iinfo(block.dtype).max)
         out[row * v : (row + 1) * v] = done.reshape(v, k * u, 3).astype(out.dtype)

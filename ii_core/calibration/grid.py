@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
+from ..extras import Lazy
 from ..lattice import Lattice, axes_of
 from .peaks import FEWEST, SMOOTH, Floats, Summits, Vectors, lattice_vectors, middle_of_one
 from .refusal import NoLenses
+
+ndimage = Lazy("scipy.ndimage")
 
 SKEW = 0.12  # of a pitch: how far rows may lean, or half a pitch may be missed
 REACH = 0.3  # of the pitch: a centre farther from its place is that of something else

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, special
 
+from ..extras import Lazy
 from .grid import LensGrid
+
+ndimage, special = Lazy("scipy.ndimage"), Lazy("scipy.special")
 
 EXPLAINED = 0.25  # of the variation from lens to lens, that types must explain to be there
 CHANCE = 1e-6  # probability that an even array shows as much

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
+from ..extras import Lazy
 from .refusal import NoLenses
+
+ndimage = Lazy("scipy.ndimage")
 
 LEAST_PITCH = 4.0  # pixels from lens to lens: under it, a micro-image has no centre to speak of
 FEWEST = 5  # lenses a side

@@ -16,11 +16,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
+from ..extras import Lazy
 from ..lattice import Lattice
 from ..regular import owners
 from .peaks import SMOOTH, Summits
+
+ndimage = Lazy("scipy.ndimage")
 
 FLOOR = 0.1  # ε
 DIM = 0.3  # of the typical lens's light: lenses with less say nothing about their neighbours

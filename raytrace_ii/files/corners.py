@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+
+from ii_core.extras import Lazy
 
 from ..scene.scene import unit_rows
 from ..shapes.primitives import Mesh
+
+csgraph, sparse = Lazy("scipy.sparse.csgraph"), Lazy("scipy.sparse")
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -86,7 +88,7 @@ def smooth_corners(places: Array, faces: Rows, groups: Rows | None = None) -> tu
     p = places[faces]
     normal = unit_rows(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]))
     linked = _linked(at, normal, np.full(len(faces), -1) if groups is None else groups)
-    count, label = connected_components(linked, directed=False)
+    count, label = csgraph.connected_components(linked, directed=False)
     rows = label.reshape(-1, 3).astype(np.int64)
     total = np.zeros((count, 3))
     for corner in range(3):
@@ -96,7 +98,7 @@ def smooth_corners(places: Array, faces: Rows, groups: Rows | None = None) -> tu
     return unit_rows(total), rows
 
 
-def _linked(at: Rows, normal: Array, groups: Rows) -> coo_matrix:
+def _linked(at: Rows, normal: Array, groups: Rows) -> Any:
     """Return the corners (3 F) that smooth edges connect, from the positions (F, 3) of corners."""
     face = np.tile(np.arange(len(at)), 3)
     start, end = np.concatenate([np.arange(3 * len(at)).reshape(-1, 3)[:, [i, (i + 1) % 3]] for i in range(3)]).T
@@ -114,4 +116,4 @@ def _linked(at: Rows, normal: Array, groups: Rows) -> coo_matrix:
     within = (groups[one] == groups[other]) & (groups[one] != 0)
     smooth = same & within & ((groups[one] > 0) | flat | (cosine >= np.cos(np.radians(CREASE_DEG)) - 1e-9))
     pairs = np.concatenate([np.stack([tip[:-1][smooth], tip[1:][smooth]], axis=1) for tip in (low, high)])
-    return coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(at.size, at.size))
+    return sparse.coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(at.size, at.size))
