@@ -82,8 +82,9 @@ def test_the_range_of_disparity_is_found(disparity, down):
     low, high, found = ranges.estimated(source.view, source.grid)
     assert found == down
     assert low <= -256 * disparity[1] <= high
-    # From the disparity to zero, which is always within the range.
-    assert high - low <= 256 * abs(disparity[1]) + 2 * ranges.MARGIN
+    # Zero is always within the range; beyond it and beyond the disparity there is at most the margin.
+    assert low >= min(0, -256 * disparity[1]) - ranges.MARGIN
+    assert high <= max(0, -256 * disparity[1]) + ranges.MARGIN
 
 
 def test_disparities_of_the_sides_are_within_the_range():
