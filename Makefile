@@ -36,7 +36,7 @@ $(VENV)/.docs: $(VENV)/.installed
 	touch $@
 
 $(VENV)/.installed: pyproject.toml
-	command -v "$(PYTHON)" >/dev/null || { echo "no Python from 3.11 on was found: install one or type make PYTHON=..." >&2; exit 1; }
+	"$(PYTHON)" -c "" 2>/dev/null || { echo "no Python from 3.11 on was found: install one or type make PYTHON=..." >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[dev]"
 	touch $@
