@@ -20,7 +20,7 @@ from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin, with_commits
 from codec import decode, encode, schemes
-from codec.inspect.header import coarsest, floor, frames, parts, si_below_ei, si_below_ri
+from codec.inspect.header_bits import coarsest, floor, frames, parts, si_below_ei, si_below_ri
 from ii_core import IIPicture, preset
 from metrics import q_global
 from raytrace_ii import load_scene, render

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from codec.inspect.header import floor
+from codec.inspect.header_bits import floor
 from codec.order import ORDERS
 
 from .coding import CODED, SCENES, curves, shot

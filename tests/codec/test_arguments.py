@@ -15,7 +15,7 @@ from codec import (
     parse_scheme,
     timed_decode,
 )
-from codec.inspect.header import coarsest, floor, parts
+from codec.inspect.header_bits import coarsest, floor, parts
 from ii_core import IIPicture
 
 PICTURE = IIPicture(np.zeros((4, 6, 3), np.uint8), (3, 2), (2, 2))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import codec
-from codec.inspect.header import coarsest, floor, parts
+from codec.inspect.header_bits import coarsest, floor, parts
 
 from .good import PICTURE, Call
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from codec import encode
-from codec.inspect.header import coarsest, floor, frames, parts, si_below_ei, si_below_ri
+from codec.inspect.header_bits import coarsest, floor, frames, parts, si_below_ei, si_below_ri
 from ii_core import IIPicture
 
 
