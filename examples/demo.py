@@ -1,4 +1,4 @@
-"""Demo: renders two scenes, writes views, codes them and draws rate–distortion charts. ``make demo``.
+"""Demo: two scenes rendered, shown as views, coded, and compared in rate–distortion charts (``make demo``).
 
 python examples/demo.py [--scale 2] [--scenes apples,cuboid] [-o out/demo]
 """
@@ -30,7 +30,7 @@ from raytrace_ii.cli.progress import progress_bar, spinner
 
 
 def main() -> None:
-    """Run the demo and say where everything is."""
+    """Run the demo and print the paths of its files."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scale", type=int, default=2, help="divides setup1's lenses")
     parser.add_argument("--scenes", default="apples,cuboid")
@@ -49,7 +49,7 @@ def main() -> None:
 
 
 def shoot(scene: Scene, name: str, scale: int) -> Shot:
-    """The scene through setup1, with the sensor's noise."""
+    """Return the scene through setup1, with sensor noise."""
     with progress_bar(f"render {name}") as report:
         return render(
             scene,
@@ -61,7 +61,7 @@ def shoot(scene: Scene, name: str, scale: int) -> Shot:
 
 
 def write_pictures(scene: Scene, shot: Shot, name: str, folder: Path) -> None:
-    """II-picture, detail, depth map, five views, sheet of sub-images and 2D projection."""
+    """Write II-picture, detail, depth map, five views, sheet of sub-images and 2D projection."""
     picture = shot.picture
     assert picture.camera is not None and shot.depth is not None
     picture.save(folder / f"{name}.png")
@@ -77,7 +77,7 @@ def write_pictures(scene: Scene, shot: Shot, name: str, folder: Path) -> None:
 
 
 def detail(picture: IIPicture, lenses: tuple[int, int] = (16, 8), zoom: int = 4) -> NDArray[Any]:
-    """A block of elementary images around the middle, magnified."""
+    """Return a block of elementary images around the middle, magnified."""
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
     left, top = (k - lenses[0]) // 2 * u, (l - lenses[1]) // 2 * v
     block = picture.pixels[top : top + lenses[1] * v, left : left + lenses[0] * u]
@@ -85,7 +85,7 @@ def detail(picture: IIPicture, lenses: tuple[int, int] = (16, 8), zoom: int = 4)
 
 
 def depth_picture(depth: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Depth for the eye: near is bright, on a logarithmic scale; nothing is black."""
+    """Return a depth map as a picture: near is bright, on a logarithmic scale; pixels without a hit are black."""
     found = np.isfinite(depth)
     near, far = np.log(np.percentile(depth[found], [0.5, 99.5]))
     level = 255 - 220 * np.clip((np.log(np.where(found, depth, 1.0)) - near) / max(far - near, 1e-9), 0, 1)
@@ -93,7 +93,7 @@ def depth_picture(depth: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def sheet(picture: IIPicture, count: int = 4, gap: int = 4) -> NDArray[Any]:
-    """count × count sub-images, evenly spread over the directions, on white."""
+    """Return a sheet of count × count sub-images, evenly spread over the directions, on white."""
     stack = sub_images(picture)
     rows, columns, height, width, _ = stack.shape
     page = np.full((count * (height + gap) - gap, count * (width + gap) - gap, 3), 255, stack.dtype)

@@ -1,7 +1,7 @@
 """Import of a light field from other programs, and comparison of several schemes on it.
 
 python examples/import_compare.py FOLDER [--bpp 0.5] [--schemes si-hevc,si-av1,jpeg2000] [-o compared.html]
-FOLDER holds one picture a view, with two numbers in each name, row and column.
+FOLDER holds one picture per view; each name contains two numbers, row and column.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from metrics import q_global, quality_rows
 
 
 def main() -> None:
-    """Print a row a scheme; leave the viewer's page of the best beside the original."""
+    """Print a row per scheme; write the viewer page of the best one beside the original."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--bpp", type=float, default=0.5)

@@ -32,7 +32,7 @@ def main() -> None:
     arguments = parser.parse_args()
     (columns, rows), (width, height) = (map(int, text.split("x")) for text in (arguments.tiles, arguments.size))
     camera, scene = preset("setup1", scale=arguments.scale), load_scene(arguments.scene)
-    middle = np.array([0.0, 0.0, 60.0])  # mm; the camera swings about it
+    middle = np.array([0.0, 0.0, 60.0])  # pivot of the camera, mm
     report = reporter(True, "frames")
 
     def frames() -> Iterator[Any]:

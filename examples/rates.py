@@ -14,7 +14,7 @@ from raytrace_ii import load_scene, render
 
 
 def main() -> None:
-    """Print a row a rate."""
+    """Print a row per rate."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scene", default="apples")
     parser.add_argument("--scale", type=int, default=8, help="divides setup1's lenses")

@@ -1,9 +1,9 @@
-"""Groups of elementary images by a cosine transform in three dimensions, after Forman.
+"""Coder of groups of elementary images by a three-dimensional cosine transform, after Forman (1997).
 
 Forman (1997) cut the elementary images of a lenticular picture into blocks of 8×8 pixels, put the blocks of eight
 neighbouring elementary images on each other, and transformed, quantised and entropy-coded these 8×8×8 pixels. Here
-elementary images have any size: their sides, and the rows of elementary images, are cut into parts as equal as can
-be of at most eight. The entropy coder is that of `codec.coders.lf`; Forman's was Huffman's.
+elementary images have any size: their sides, and the rows of elementary images, are cut into the fewest parts of at
+most eight, of nearly equal length. The entropy coder is that of `codec.coders.lf`; Forman used a Huffman code.
 
 References
 ----------
@@ -42,19 +42,20 @@ from .lf.arithmetic import (
 from .lf.jit import kernel, lean
 from .volume import principal_axes
 
-SIDE = 8  # of a block, at most
+SIDE = 8  # largest side of a block
 FINEST, COARSEST = 0, 63
 FRACTIONS = 16
 START, OCTAVE = 34 * FRACTIONS, -6.0 * FRACTIONS
-DEAD_ZONE = 1 / 3  # of a step: a coefficient is rounded up from this much below the next level
+DEAD_ZONE = 1 / 3  # rounding offset in steps: a coefficient is rounded up from this far below the next level
 MOST_LEVEL = 1 << 17
 MOST_STEP = 1 << 18
-PIXELS_A_BYTE = 4096  # at least a byte for so many pixels, zeros if need be
-PIXEL_BYTES = 64  # at most
+# The payload has at least one byte per so many pixels, padded with zeros: this bounds the memory of a forged size.
+PIXELS_A_BYTE = 4096
+PIXEL_BYTES = 64  # upper bound of the coded size of a pixel
 VERSION = 1
 
-# Contexts: whether a plane of a block has coefficients 3 × before 2; its last one 3 × 12 digits; of each coefficient
-# plane 3 × sum of indices 6 × neighbourhood 8.
+# Contexts. CODED: 3 planes × 2 states of the plane before. LAST: 3 planes × 12 digits of the last coefficient's
+# place. SIGNIFICANT, ABOVE_ONE: 3 planes × 6 classes of the sum of indices × 8 classes of the neighbourhood.
 CODED, LAST = 0, 6
 SIGNIFICANT = LAST + 36
 ABOVE_ONE = SIGNIFICANT + 144
@@ -100,7 +101,7 @@ class Forman(Coder):
 
     @property
     def versions(self) -> dict[str, str]:
-        """Return the version of the compiler of our kernels."""
+        """Return the version of numba, which compiles the kernels."""
         return {"numba": numba.__version__}
 
     def check(self, picture: IIPicture, options: Options) -> None:
@@ -122,7 +123,7 @@ class Forman(Coder):
         return meet_size(run, goal.bpp * count / 8, axis)
 
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
-        """Decode block by block; a stream that ends early is damage."""
+        """Decode block by block; a stream that ends early raises ValueError."""
         started = clock.cpu_seconds()
         height, width = blank.pixels.shape[:2]
         least = _least_bytes(height * width)
@@ -160,13 +161,13 @@ def _least_bytes(pixels: int) -> int:
 
 
 def parts(length: int, most: int) -> NDArray[np.int64]:
-    """Ends of the fewest parts of at most ``most``, as equal as can be; the first is 0."""
+    """Return the borders of the fewest parts of at most ``most``, of nearly equal length, from 0 on."""
     count = -(-length // most)
     return np.array([i * length // count for i in range(count + 1)])
 
 
 def _code(coder: Arithmetic, samples: NDArray[np.int16], picture: IIPicture, group: int, step: int) -> None:
-    """Write the blocks of planes, or read them."""
+    """Write or read the blocks of the three planes."""
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
     _code_blocks(coder, samples, (l, u, v), parts(k, group), parts(v, SIDE), parts(u, SIDE), step)
 

@@ -42,7 +42,7 @@ class Jpeg2000(Coder):
 
     @property
     def versions(self) -> dict[str, str]:
-        """Pillow and its OpenJPEG."""
+        """Return the versions of Pillow and its OpenJPEG."""
         return {"pillow": PIL.__version__, "openjpeg": str(features.version("jpg_2000"))}
 
     def check(self, picture: IIPicture, options: Options) -> None:

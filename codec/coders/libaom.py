@@ -61,7 +61,7 @@ class Avif(PseudoVideo[Settings]):
 
     @property
     def versions(self) -> dict[str, str]:
-        """imagecodecs and its libavif; PyAV, which decodes."""
+        """Return the versions of imagecodecs, of its libavif, and of PyAV, which decodes."""
         return {"imagecodecs": imagecodecs.__version__, "libavif": imagecodecs.avif_version().split()[-1]} | (
             super().versions
         )

@@ -29,18 +29,18 @@ def encode_planes(planes: NDArray[Any], squared_error: float, *, wavelet: str) -
     Parameters
     ----------
     planes : ndarray of int16 or int32, (C, H, W)
-        At most `MAX_COMPONENTS`; 24 bits are used of 32.
+        At most `MAX_COMPONENTS` planes; of int32, values of 24 bits.
     squared_error : float
-        Allowed mean over all planes. 0 is lossless and needs the 5/3.
+        Allowed mean squared error over all planes. 0 is lossless and needs the 5/3.
     wavelet : {"5/3", "9/7"}
         Within planes: the reversible 5/3, or the 9/7.
 
     Returns
     -------
     bytes
-        A codestream from its coding style on.
+        The codestream from its coding style (COD marker segment) on.
     """
-    if planes.shape[2] == 1:  # imagecodecs takes planes of one column for another kind of array
+    if planes.shape[2] == 1:  # imagecodecs misreads planes of one column
         planes = np.repeat(planes, 2, axis=2)
     bits = jpeg2000.BITS[planes.dtype.name]
     peak = 2.0**bits - 1
@@ -70,7 +70,7 @@ def decode_planes(
     Raises
     ------
     ValueError
-        If the stream is none for planes of that shape.
+        If the stream does not hold planes of that shape.
     """
     coded = (*shape[:2], max(2, shape[2]))
     whole = jpeg2000.whole_codestream(stream, coded, dtype, wavelet=wavelet, lossless=lossless)
@@ -91,7 +91,7 @@ def picked_planes(
     Raises
     ------
     ValueError
-        If the stream is none for planes of that shape.
+        If the stream does not hold planes of that shape.
     """
     coded = (*shape[:2], max(2, shape[2]))
     jpeg2000.whole_codestream(stream, coded, dtype, wavelet=wavelet, lossless=lossless)  # check the coding style

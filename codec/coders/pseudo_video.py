@@ -36,7 +36,7 @@ DEPTH = Option(about="bits of a sample inside the coder", default="10", choices=
 MAX_TARGET = 1e18  # bytes; upper cap on the target size
 # Budgets of encoder runs: for the quantiser, and for the share of frames coded finer.
 QUANTISER_RUNS, SHARE_RUNS = 5, 4
-START = 0.6  # of the range of quantisers, from the finest: the first trial
+START = 0.6  # first trial of a search, as a share of the range of quantisers from the finest on
 
 Settings = TypeVar("Settings")
 
@@ -134,7 +134,7 @@ class PseudoVideo(Coder, Generic[Settings]):
 
     @property
     def versions(self) -> dict[str, str]:
-        """PyAV and its libavcodec."""
+        """Return the versions of PyAV and its libavcodec."""
         return {"av": av.__version__, "libavcodec": ".".join(map(str, av.library_versions["libavcodec"]))}
 
     @abstractmethod

@@ -122,7 +122,7 @@ class Jpeg(Still):
 
     @property
     def versions(self) -> dict[str, str]:
-        """Pillow and its libjpeg-turbo."""
+        """Return the versions of Pillow and its libjpeg-turbo."""
         return {"pillow": PIL.__version__, "libjpeg-turbo": str(features.version("libjpeg_turbo"))}
 
     def check(self, picture: IIPicture, options: Options) -> None:
@@ -179,7 +179,7 @@ class JpegXl(Still):
 
     @property
     def versions(self) -> dict[str, str]:
-        """imagecodecs and its libjxl."""
+        """Return the versions of imagecodecs and its libjxl."""
         return {"imagecodecs": imagecodecs.__version__, "libjxl": imagecodecs.jpegxl_version().split()[-1]}
 
     def _run_encoder(self, pixels: NDArray[Any], options: Options, setting: float | None) -> bytes:
@@ -260,7 +260,7 @@ class Htj2k(Still):
 
     @property
     def versions(self) -> dict[str, str]:
-        """imagecodecs and its OpenJPH."""
+        """Return the versions of imagecodecs and its OpenJPH."""
         return {"imagecodecs": imagecodecs.__version__, "openjph": imagecodecs.htj2k_version().split()[-1]}
 
     def _run_encoder(self, pixels: NDArray[Any], options: Options, setting: float | None) -> bytes:

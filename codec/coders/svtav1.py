@@ -21,7 +21,7 @@ class Av1(Video):
     standard = "AV1"
     encoder = "libsvtav1"
     decoder = "libdav1d"
-    # SVT-AV1 accepts sides of 4, and then overflows its buffer with noise.
+    # SVT-AV1 accepts sides of 4, but its output buffer overflows on noise of that size.
     min_side = 8
     max_side = 8192
     min_coded_frame = 4
@@ -38,7 +38,7 @@ class Av1(Video):
             default="crf",
             choices=("crf", "cq"),
         ),
-        # From 8 on small frames of noise come back wrong: errors above 100 codes at the finest factor.
+        # Presets from 8 on: decoded small frames of noise have errors above 100 codes at the finest rate factor.
         "preset": Option(about="SVT-AV1's preset, 0 is the greatest effort", default=4, low=0, high=7),
         "depth": DEPTH,
         "threads": Option(about="levels of parallelism; the bytes do not depend on it", default=1, low=1, high=6),

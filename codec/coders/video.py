@@ -58,7 +58,7 @@ class Settings:
 
 
 class Video(PseudoVideo[Settings]):
-    """Pseudo video sequence by an FFmpeg encoder, FFmpeg's name of which is ``encoder``."""
+    """Pseudo video sequence by an FFmpeg encoder; ``encoder`` is its name in FFmpeg."""
 
     def run_encoder(self, pixels: NDArray[Any], film: Film, settings: Settings) -> Packets:
         """Code the frames of a film once."""
@@ -131,9 +131,9 @@ def two_passes(source: Source[Settings], kilobits: int, settings: Callable[[str]
 
 
 def with_zone(settings: Settings, key: str, frames: int, finer: str) -> Settings:
-    """Return settings of x264 or x265 whose first frames form a zone, finer as the text ``finer`` says.
+    """Return settings of x264 or x265 whose first frames form a zone of finer quantisation.
 
-    ``key`` names the parameters of the library.
+    ``key`` names the parameters of the library, ``finer`` is the rate parameter of the zone.
     """
     parameters = settings.parameters[key] + f":zones=0,{max(0, frames - 1)},{finer}"
     return replace(settings, parameters={**settings.parameters, key: parameters})

@@ -45,7 +45,7 @@ GROUP = 1024
 
 # Range of qualities, and the change that about doubles the size.
 COARSEST_DB, FINEST_DB, DB_AN_OCTAVE = 0.0, 70.0, 3.0
-# Largest quality to search, by bits of a pixel: lossless coding takes little more.
+# Largest quality to search, by bits of a sample: above it lossless coding takes few more bytes.
 NEARLY_LOSSLESS_DB = {8: 55.0, 16: 70.0}
 START_DB = 33.0  # at one bit per pixel
 # Largest part of the allowed error that comes from rounding coefficients to whole numbers before coding.
@@ -63,8 +63,8 @@ class Volume(Coder):
     """Component images of one kind as slices of a volume, or each alone.
 
     The payload is a header of 20 bytes (kind of coding, rounding step, colour matrix), then for each group of slices
-    the length of its codestream and the codestream, without what structure and options say already. There is one
-    group up to 1365 slices; beyond, groups of 1024 meet one squared error.
+    the length of its codestream and the codestream, without the fields that structure and options determine. Up to
+    1365 slices are one group; more slices make groups of 1024, which meet one squared error.
 
     References
     ----------
@@ -89,7 +89,7 @@ class Volume(Coder):
 
     @property
     def versions(self) -> dict[str, str]:
-        """imagecodecs and its OpenJPEG."""
+        """Return the versions of imagecodecs and its OpenJPEG."""
         return {"imagecodecs": imagecodecs.__version__, "openjpeg": imagecodecs.jpeg2k_version().split()[-1]}
 
     def check(self, picture: IIPicture, options: Options) -> None:

@@ -52,7 +52,7 @@ class H264(Video):
     scale_about = "quantiser: constant, or x264's constant rate factor with rate=crf; 0 is lossless but for colour"
     options: ClassVar[Mapping[str, Option]] = {
         **COMMON,
-        "bframes": Option(about="B pictures between P pictures, always as many", default=0, low=0, high=16),
+        "bframes": Option(about="fixed number of B pictures between P pictures", default=0, low=0, high=16),
         "merange": Option(about="motion range in pixels", default=16, low=16, high=128),
         "rate": Option(
             about="rate control: constant bit rate, constant quantiser, constant rate factor with macroblock tree, "

@@ -32,7 +32,7 @@ class Hevc(Video):
     scale_about = "x265's constant rate factor, or a constant quantiser with rate=cq"
     options: ClassVar[Mapping[str, Option]] = {
         **COMMON,
-        "bframes": Option(about="B pictures between P pictures, always as many", default=4, low=0, high=16),
+        "bframes": Option(about="fixed number of B pictures between P pictures", default=4, low=0, high=16),
         "merange": Option(about="motion range in pixels", default=57, low=16, high=128),
         "rate": Option(
             about="rate control: constant rate factor, constant quantiser, two passes",

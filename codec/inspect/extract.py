@@ -10,12 +10,12 @@ schemes            files
 ``*-vp9``          ``.mkv``, ``.mp4``, ``.webm``, ``.ivf``
 ``*-ffv1``         ``.mkv``, ``.avi``
 ``*-mpeg2``        ``.mkv``, ``.mp4``, ``.m2v`` (the payload as it is)
-whole pictures     what their payload is: ``.j2k`` or, in its boxes, ``.jp2``; ``.jpg``, ``.jxl``, ``.jph``
+whole pictures     the payload as it is: ``.j2k``, ``.jpg``, ``.jxl``, ``.jph``; in JP2 boxes: ``.jp2``
 =================  ===========================================================================================
 
 Files show the coded frames in the order of the sequence, at an arbitrary 25 frames per second. Some encoders need
 frames larger than the component image, or transposed; `extract` reports this. HEVC streams get a conformance
-window, by which players show the component image alone. Streams of libaom get the matrix that they hold, BT.709.
+window, so that players show the component image alone. Streams of libaom get the label of their matrix, BT.709.
 """
 
 from __future__ import annotations

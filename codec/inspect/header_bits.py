@@ -38,7 +38,7 @@ class Parts:
     messages : int
         Messages that no decoder needs.
     headers : int or None
-        Slice headers; None where they are not parsed and count as data.
+        Slice headers; None if they are not parsed and count as data.
     data : int
         The rest, macroblock headers and motion included.
     units : int

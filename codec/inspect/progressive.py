@@ -24,9 +24,9 @@ class Stage:
     Parameters
     ----------
     level : int
-        From 0, which is the view in the middle.
+        Level from 0, the view in the middle.
     bytes_read : int
-        Of the payload so far, header and index included.
+        Bytes of the payload read so far, header and index included.
     seconds : float
         CPU time so far.
     decoded : ndarray of bool, (V, U)
@@ -44,17 +44,17 @@ class Stage:
 
 @dataclass(frozen=True, kw_only=True)
 class DecodedView:
-    """One view, decoded alone, and what that took.
+    """One view, decoded alone, with the bytes read and the CPU time.
 
     Parameters
     ----------
     pixels : ndarray, (T, S, 3)
     bytes_read : int
-        Of the payload, header and index included.
+        Bytes of the payload read, header and index included.
     payload_bytes : int
-        Of the whole picture.
+        Size of the payload of the whole picture.
     views_decoded : int
-        The view itself included.
+        Number of views decoded, the view itself included.
     seconds : float
         CPU time.
     """
@@ -91,7 +91,7 @@ def decode_levels(coded: Encoded) -> Iterator[Stage]:
 
 
 def _stages(coded: Encoded, coder: LightField, blank: IIPicture) -> Iterator[Stage]:
-    """Yield what `decode_levels` returns."""
+    """Yield the stages of `decode_levels`."""
     started = cpu_seconds()
     (width, height), (cols, rows) = blank.lenses, blank.ei_pixels
     try:

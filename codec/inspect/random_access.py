@@ -18,8 +18,8 @@ def decode_component(coded: Encoded, place: tuple[int, int]) -> Pixels:
     Parameters
     ----------
     coded : Encoded
-        Pseudo video sequences decode the group of pictures that holds the component image: with ``gop=1`` one frame,
-        with the default ``gop=0`` all frames before it too.
+        A pseudo video sequence is decoded from the start of the group of pictures that holds the component image:
+        with ``gop=1`` one frame, with the default ``gop=0`` all frames before it, too.
     place : (int, int)
         (u, v) of a sub-image, (k, l) of an elementary image, (v, l) of a ray-space image.
 

@@ -31,7 +31,7 @@ from .segments import SegmentFilm, segment_film, segment_options
 
 RATES = ("take", "segment")
 MAX_FRAMES = 1 << 24
-QUANTISER_RUNS = 7  # of the whole take
+QUANTISER_RUNS = 7  # encoder runs over the whole take, at most
 Progress = Callable[[int, int], None]
 
 
@@ -42,15 +42,15 @@ class EncodedTake:
     Parameters
     ----------
     scheme, options, structure, dtype, target_bpp, qp, quality
-        As of `codec.Encoded`; the structure is that of a frame.
+        As in `codec.Encoded`; the structure is that of a frame.
     frames : int
-        Number T of frames that are there.
+        Number T of frames.
     fps : float
-        Frames a second.
+        Frames per second.
     plan : Plan
         Order and groups.
     segments : list of bytes
-        Payloads.
+        Payload of each segment.
     runs : int or None
         Encoder runs over the whole take. None if read from a file.
     encode_seconds, codec_seconds : float or None
@@ -129,14 +129,14 @@ class EncodedTake:
         Parameters
         ----------
         partial : bool
-            Of a file that ends early or is damaged, take the whole segments before the damage.
+            Keep the whole segments before the damage of a file that ends early or is damaged.
 
         Raises
         ------
         DamagedTake
             If it is truncated or damaged in a segment, without ``partial`` or in the first one.
         ValueError
-            If it is no coded take, or its header is damaged.
+            If the file is no coded take, or its header is damaged.
         OSError
             If it cannot be read.
         """
@@ -161,7 +161,7 @@ class EncodedTake:
 
 
 def _values(coded: EncodedTake) -> list[Any]:
-    """The header: that of a picture, then frames, rate and plan."""
+    """Return the values of the header: those of a picture, then frames, rate and plan."""
     plan = coded.plan
     return [*file_header.values(coded), coded.frames, coded.fps, plan.walk, plan.span, plan.group, plan.strip]
 
@@ -214,17 +214,17 @@ def encode_take(
     bpp : float
         Target: bits of the file per pixel of all frames.
     qp : int
-        Quantiser, in the scheme's range. None of both for lossless coding.
+        Quantiser, in the scheme's range. Give neither ``bpp`` nor ``qp`` for lossless coding.
     plan : Plan, optional
         Order over view and time, and groups; the default plan if not given.
     rate : {"take", "segment"}
-        How a target is met: by one quantiser for the whole take, searched, and the next finer one in its first
-        segments (constant quality); or segment by segment (constant rate).
+        "take" searches one quantiser for the whole take, and uses the next finer one in its first segments (constant
+        quality). "segment" meets the target in each segment (constant rate).
     path : path, optional
         Write the ``.ii`` file here. Segments of ``qp`` and of ``rate="segment"`` are kept in ``path.part`` until all
-        are done: a run that was killed goes on after its last whole segment.
+        are done: after a killed run, the next call continues after the last whole segment.
     progress : callable, optional
-        Called with segments done and in all; a search goes over all of them several times.
+        Called with the number of segments done and in all; a search codes all of them several times.
     **options
         Options of the scheme. ``gop`` follows from the plan.
 
@@ -235,9 +235,9 @@ def encode_take(
     Raises
     ------
     TypeError, ValueError
-        If an argument is unknown or out of range, or the scheme codes no takes or not this one; before long work.
+        If an argument is unknown or out of range, or the scheme codes no takes or not this one; before coding starts.
     OSError
-        If a frame cannot be read, or the file not be written.
+        If a frame cannot be read, or the file cannot be written.
     """
     started = cpu_seconds()
     check_type("video", video, IIVideo, "an IIVideo")
@@ -314,7 +314,7 @@ class _Work:
         return self.coder.encode_film(pixels, self.film(len(part)), options, goal).run
 
     def one_by_one(self, goal: Goal, kept: _Part | None, progress: Progress | None) -> list[Run]:
-        """Every segment at the goal, those of an earlier run taken over."""
+        """Code every segment at the goal; keep the segments of an earlier run."""
         parts, runs = self.segments(), []
         if goal.bpp is not None:
             goal = Goal(bpp=max(goal.bpp - self.framing(len(parts)), goal.bpp / 2))
@@ -331,11 +331,11 @@ class _Work:
 
     def framing(self, segments: int) -> float:
         """Bits of header and framing per pixel of the take."""
-        framed = replace(self.coded, segments=[b"\0" * 128] * segments).overhead  # of lengths of two bytes
+        framed = replace(self.coded, segments=[b"\0" * 128] * segments).overhead  # payloads of two-byte lengths
         return 8 * framed / (self.video.frames * math.prod(self.video.size))
 
     def search(self, bpp: float, progress: Progress | None) -> tuple[list[Run], int]:
-        """One quantiser for all segments, and the next finer one in the first, that meet a rate."""
+        """Meet a rate by one quantiser for all segments and the next finer one in the first segments."""
         parts = self.segments()
         pixels = self.video.frames * math.prod(self.video.size)
         target = max((bpp - self.framing(len(parts))) * pixels / 8, 1.0)
@@ -374,14 +374,14 @@ class _Work:
 
 
 def _mixtures(pair: tuple[Trial[list[Run]], Trial[list[Run]]]) -> Iterator[list[Run]]:
-    """First segments of the finer quantiser, the others of the coarser one."""
+    """Return mixtures: the first segments at the finer quantiser, the others at the coarser one."""
     coarse, fine = (trial.result for trial in pair)
     for first in range(1, len(fine)):
         yield [*fine[:first], *coarse[first:]]
 
 
 class _Part:
-    """Segments of a take that is being coded, kept in ``path.part`` beside a list of what they were made of."""
+    """Segments of a take that is being coded, kept in ``path.part`` beside a list of the hashes of their pictures."""
 
     def __init__(self, path: Path, coded: EncodedTake) -> None:
         self.path, self.index = path.with_name(path.name + ".part"), path.with_name(path.name + ".part.json")
@@ -404,7 +404,7 @@ class _Part:
         return None
 
     def keep(self, number: int, pixels: NDArray[Any], payload: bytes) -> None:
-        """Append a segment; those before it are there."""
+        """Append a segment; all segments before it have been kept."""
         mode = "r+b" if self.path.exists() and number else "wb"
         with open(self.path, mode) as file:
             file.seek(sum(len(container.framed(i, old)) for i, old in enumerate(self._payloads)))

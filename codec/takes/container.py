@@ -5,13 +5,14 @@ part            bytes    meaning
 ==============  =======  =============================================================================
 magic           4        ``89 49 49 56``
 version         1        1
-length                   of the header, LEB128
+length                   length of the header, LEB128
 digest          8        the first bytes of SHA-256 of magic, version, length and header
 header                   values of `codec.file_header`, and of the take, as `codec.bitstream.compact`
 segments                 each: length in LEB128; digest of its number, 4 bytes, length and payload; payload
 ==============  =======  =============================================================================
 
-The header says how many segments there are. A file that ends early or is damaged in a segment has all before it.
+The header determines the number of segments. If a file ends early or is damaged in a segment, all segments before
+it can be read.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from ..container import MAX_HEADER
 MAGIC = b"\x89IIV"
 VERSION = 1
 _DIGEST = 8
-_LONGEST = 9  # bytes of a number in LEB128
+_LONGEST = 9  # largest number of bytes of a number in LEB128
 
 
 class DamagedTake(ValueError):
@@ -65,7 +66,7 @@ def head(header: list[Any]) -> bytes:
 
 
 def framed(number: int, payload: bytes) -> bytes:
-    """Return a segment as it stands in the file."""
+    """Return the bytes of a segment in the file: length, digest and payload."""
     length = leb128(len(payload))
     return length + _digest(number.to_bytes(4, "little"), length, payload) + payload
 
@@ -114,7 +115,7 @@ def read_header(path: str | os.PathLike[str]) -> tuple[list[Any], int]:
 
 
 def read_segments(path: str | os.PathLike[str], start: int, count: int) -> tuple[list[bytes], str]:
-    """Return the whole segments from the front, and what is wrong after them; nothing is wrong with all of them."""
+    """Return the whole segments from the front, and the fault after them; the fault is empty if all are whole."""
     path = Path(path)
     found: list[bytes] = []
     size = path.stat().st_size

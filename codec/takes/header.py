@@ -36,12 +36,12 @@ class TakeFloor:
 
     @property
     def bpp(self) -> float:
-        """Rate over all frames below which nothing can be coded: where H = 1."""
+        """Least rate of the scheme over all frames, for which H = 1."""
         width, height = self.coded.size
         return self.bits / (width * height * self.coded.frames)
 
     def portion(self, bpp: float) -> float:
-        """H at a rate (5.13). Above 1 the rate cannot be reached."""
+        """Return H at a rate (5.13); above 1 the rate cannot be reached."""
         return self.bpp / bpp
 
 

@@ -31,7 +31,7 @@ from ..checks import check_type, whole
 
 WALKS = ("time-first", "view-first", "interleaved")
 Table = NDArray[np.int64]
-MOST_FRAMES = 1 << 24  # views × instants of a cost
+MOST_FRAMES = 1 << 24  # largest views × instants of an access cost
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +80,7 @@ class Plan:
         return [range(first, min(first + span, instants)) for first in range(0, instants, span)]
 
     def group_frames(self, views: int, instants: int) -> int:
-        """Frames of a group of pictures in a segment of so many instants."""
+        """Return the number of frames of a group of pictures in a segment of so many instants."""
         return (self.group or views) * instants
 
     def table(self, views: int, instants: int) -> Table:
@@ -115,14 +115,14 @@ def _snake(width: int, height: int, first: int = 0) -> Table:
 
 @dataclass(frozen=True, kw_only=True)
 class AccessCost:
-    """Frames that must be decoded to show something at one instant, over all places and instants."""
+    """Number of frames decoded to show one image at one instant: statistics over all places and instants."""
 
     mean: float
     worst: int
 
 
 def component_cost(plan: Plan, views: int, instants: int) -> AccessCost:
-    """Cost of one component image: the frames of its group up to it. Without B pictures.
+    """Return the cost of one component image: the frames of its group up to it, without B pictures.
 
     The mean is (G + 1)/2 for groups of G frames, the worst case G.
 
@@ -141,7 +141,7 @@ def component_cost(plan: Plan, views: int, instants: int) -> AccessCost:
 
 
 def view_cost(plan: Plan, views: int, instants: int, needed: Sequence[int]) -> AccessCost:
-    """Cost of a view image at one instant, which needs several component images: their groups up to the last.
+    """Return the cost of a view image at one instant: for each group, the frames up to the last one needed.
 
     Parameters
     ----------

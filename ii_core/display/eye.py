@@ -17,7 +17,7 @@ from ..optics import Lenslet, unit_disk
 from ..picture import IIPicture
 from .model import LAYOUTS, DisplayModel
 
-RAYS = 64  # of an eye with a pupil, for each point it sees
+RAYS = 64  # rays per point of the view, for a pupil that is no point
 MOST_RAYS = 1 << 16
 EYES_APART_MM = 63.0
 
@@ -99,10 +99,10 @@ def eye_image(
     display : DisplayModel
     eye : Eye
     size : (width, height), optional
-        Points that are looked at, spread over the lens array; one a lens if not given.
+        Points of the view, spread over the lens array; one per lens if not given.
     rays : int, optional
-        For each point, from places all over the pupil to places all over the point's share of the lens plane. One
-        for a point pupil and `RAYS` for others if not given; one ray joins the centres.
+        Rays per point, spread over the pupil and over the point's cell on the lens plane. If not given, 1 for a point
+        pupil and `RAYS` for others. A single ray joins the centres.
 
     Returns
     -------
@@ -154,7 +154,7 @@ def eye_image(
 
 
 def _place(camera: IICamera, eye: Eye) -> NDArray[np.float64]:
-    """The eye from the camera's origin: x, y, distance from the lens plane; and its defocus there, 1 − d/F."""
+    """Return the eye's x, y and distance d from the lens plane, and its defocus there, 1 − d/F."""
     x, y, z = (a - b for a, b in zip(eye.position_mm, camera.origin_mm, strict=True))
     distance = camera.gap_mm - z
     if not distance > 0:
@@ -163,14 +163,14 @@ def _place(camera: IICamera, eye: Eye) -> NDArray[np.float64]:
 
 
 def _half(display: DisplayModel) -> NDArray[np.float64]:
-    """Half the size of the lens array; that of the panel to the bit, as in `view_positions`, where pitches agree."""
+    """Return half the size of the lens array; to the bit the panel's if pitches match, as in `view_positions`."""
     camera = display.camera
     own = zip(camera.size_mm, camera.lens_pitch_mm, display.lens_pitch_mm, camera.lenses, strict=True)
     return np.array([(size if pitch == made else count * pitch) / 2 for size, made, pitch, count in own])
 
 
 def _lens(display: DisplayModel, distance: float, sign: float) -> NDArray[np.float64]:
-    """Effect of a lens on a ray: offset on the panel in pixels, slope there, aperture, parallax."""
+    """Return the effect of a lens on a ray: offset on the panel in pixels, slope there, aperture, parallax."""
     lens, gap, pitch = display.optics, display.gap_mm, display.camera.pixel_pitch_mm
     spread, bend, radius = 0.0, 0.0, math.inf
     if isinstance(lens, Lenslet):
@@ -182,13 +182,13 @@ def _lens(display: DisplayModel, distance: float, sign: float) -> NDArray[np.flo
 
 
 def _emitters(display: DisplayModel) -> NDArray[np.float64]:
-    """Half the side of what a sub-pixel lights, as a share of it; fill, lobe, brightness, black level, crosstalk."""
+    """Return half the side of the emitting area in sub-pixels; fill, lobe, brightness, black level, crosstalk."""
     reach = math.sqrt(display.fill) / 2
     return np.array([reach, display.fill, display.lobe, display.brightness, display.black, display.crosstalk])
 
 
 def _table(dtype: np.dtype[Any]) -> NDArray[np.float32]:
-    """Linear light of every code; none for floats, which are linear."""
+    """Return the linear light of every code; an empty table for floats, which are linear."""
     if dtype.kind == "f":
         return np.empty(0, np.float32)
     top = np.iinfo(dtype).max
@@ -196,10 +196,10 @@ def _table(dtype: np.dtype[Any]) -> NDArray[np.float32]:
 
 
 def _rays(count: int, pupil_mm: float, step: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Places on the pupil and on a point's share of the lens plane, mm from their centres, (count, 4)."""
+    """Return places on the pupil and on a point's cell of the lens plane, mm from their centres, (count, 4)."""
     if count == 1:
         return np.zeros((1, 4))
-    # Roberts's sequence in four dimensions: the root of x⁵ = x + 1 and its powers
+    # Roberts's low-discrepancy sequence in four dimensions: powers of the root of x⁵ = x + 1
     root = 1.1673039782614187
     unit = (0.5 + np.arange(count)[:, None] * root ** -np.arange(1.0, 5.0)) % 1
     on_pupil = np.stack(unit_disk(unit[:, :2]), axis=-1) * (pupil_mm / 2)
@@ -208,7 +208,7 @@ def _rays(count: int, pupil_mm: float, step: NDArray[np.float64]) -> NDArray[np.
 
 @exact_kernel
 def see(pixels, table, points_x, points_y, rays, eye, array, panel, lens, light, layout, lenses, ei, out, seen):
-    """Fill ``out`` and ``seen`` of `eye_image`: every point looked at, every ray to it."""
+    """Fill ``out`` and ``seen`` of `eye_image`, for every point of the view and every ray to it."""
     x, y, _, blur = eye
     pitch_x, pitch_y, half_x, half_y, shift_x, shift_y, cos, sin = array
     made_x, made_y, edge_x, edge_y, pixel = panel
@@ -220,7 +220,7 @@ def see(pixels, table, points_x, points_y, rays, eye, array, panel, lens, light,
             red, green, blue, met = 0.0, 0.0, 0.0, 0
             for r in range(len(rays)):
                 ex, ey = x + rays[r, 0], y + rays[r, 1]
-                # where the ray crosses the lens plane, and the lens over it
+                # intersection of the ray with the lens plane, and its lens
                 ax = points_x[j] + rays[r, 2] + rays[r, 0] * blur
                 ay = points_y[i] + rays[r, 3] + rays[r, 1] * blur
                 dx, dy = ax - shift_x, ay - shift_y
@@ -233,7 +233,7 @@ def see(pixels, table, points_x, points_y, rays, eye, array, panel, lens, light,
                 off_x, off_y = ax - cx, ay - cy
                 if off_x * off_x + off_y * off_y > radius * radius:
                     continue
-                # how far that lens is from the one its elementary image is made for, in pixels
+                # distance in pixels of that lens from the lens that its elementary image is made for
                 wrong_x = (cx - ((k + 0.5) * made_x - edge_x)) / pixel
                 wrong_y = (cy - (edge_y - (l + 0.5) * made_y)) / pixel
                 px = k * ei[0] + (ei[0] - 1) / 2 - (cx - ex) * to_pixels - off_x * spread - wrong_x
@@ -246,7 +246,7 @@ def see(pixels, table, points_x, points_y, rays, eye, array, panel, lens, light,
                 if lobe > 0.0:
                     tx, ty = (cx - ex) * slope + off_x * bend, (cy - ey) * slope + off_y * bend
                     weight *= (1.0 + tx * tx + ty * ty) ** (-lobe / 2)
-                # the emitter of that place, and how much brighter it is than the panel's mean
+                # the emitter there, and its brightness relative to the panel's mean
                 first, last = 0, 3
                 across, down = px + 0.5 - m, py + 0.5 - n
                 if layout == 1:
@@ -282,5 +282,5 @@ def see(pixels, table, points_x, points_y, rays, eye, array, panel, lens, light,
 
 @exact_kernel
 def signal(pixels, table, n, m, c):
-    """Linear light of one code."""
+    """Return the linear light of one code."""
     return table[int(pixels[n, m, c])] if len(table) else pixels[n, m, c]

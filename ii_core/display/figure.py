@@ -10,7 +10,7 @@ from typing import Any
 from ..extras import load
 from ..files import atomic_path
 
-# Colours of Okabe and Ito, which colour-blind readers tell apart; without their yellow, too pale on white.
+# Colours of Okabe and Ito, which colour-blind readers can distinguish; without their yellow, too pale on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 LINES = ("-", "--", "-.")

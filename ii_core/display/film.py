@@ -16,7 +16,7 @@ from PIL import Image
 from ii_core.files import atomic_path
 
 ANIMATIONS = (".mp4", ".gif", ".webp")
-QUALITY_CRF = 18  # of x264: no visible loss
+QUALITY_CRF = 18  # x264's constant rate factor: no visible loss
 
 
 def write_animation(path: str | os.PathLike[str], frames: Iterable[NDArray[np.uint8]], *, fps: float = 25) -> Path:

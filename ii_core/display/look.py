@@ -15,7 +15,7 @@ from ..picture import IIPicture, codes8
 from ..view import camera_of, five_viewpoints, view_positions, widening
 
 ASSUMED_ANGLE_DEG = 20.0
-MOST_FRAMES = 3000  # of a film: two minutes at 25 frames per second
+MOST_FRAMES = 3000  # longest film: two minutes at 25 frames per second
 
 
 def with_assumed_camera(picture: IIPicture) -> IIPicture:

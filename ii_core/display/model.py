@@ -17,7 +17,7 @@ LAYOUTS = ("square", "rgb-stripe", "pentile")
 class DisplayModel:
     """A display for II-pictures of one camera: the camera's pixels emit, and its lens array sends the light back.
 
-    With the defaults it is the camera run backwards. Every other value is a fault, or a choice, of the display.
+    With the defaults the display reverses the camera's rays. Other values model faults or choices of the display.
 
     Parameters
     ----------
@@ -25,21 +25,21 @@ class DisplayModel:
         Structure of the pictures shown, and the panel: pixels, pixel pitch, and the lens array they are made for.
         It is regular and has no lens in front of the array.
     lens_pitch_mm : float or (float, float), optional
-        Of the display's own lens array; the camera's if not given.
+        Pitch of the display's own lens array; the camera's if not given.
     gap_mm : float, optional
         g, from the panel to the lens plane, which stays in place; the camera's Λ if not given.
     shift_mm : (x, y)
-        Of the lens array against the panel.
+        Shift of the lens array against the panel.
     turn_deg : float
-        Of the lens array against the panel, counter-clockwise as the viewer sees it with x to the right.
+        Rotation of the lens array against the panel, counter-clockwise as the viewer sees it with x to the right.
     layout : {"square", "rgb-stripe", "pentile"}
-        Sub-pixels: one emitter of all colours, three upright stripes, or red and blue by turns beside green.
+        Sub-pixels: one emitter of all colours, three upright stripes, or alternately red and blue beside green.
     fill : float
-        Share of a sub-pixel's area that emits, (0, 1]. A panel's mean light hangs neither on it nor on the layout.
+        Share of a sub-pixel's area that emits, (0, 1]. The panel's mean light is independent of it and of the layout.
     lobe : float
         n: radiance falls as cosⁿ of the angle to the panel's normal; 0 is the same in all directions.
     brightness : float
-        Factor of all light.
+        Factor on all light.
     black : float
         Light of a black pixel as a share of white's, [0, 1).
     crosstalk : float
@@ -96,7 +96,7 @@ class DisplayModel:
         known = (Pinhole, Grin, Lenticular, Lenslet)
         if not isinstance(self.optics, known):
             names = ", ".join(kind.kind for kind in known)
-            raise ValueError(f"camera has a {self.optics.kind} over every lens: the display knows {names}")
+            raise ValueError(f"camera has a {self.optics.kind} over every lens: the display models {names}")
         if isinstance(self.optics, Lenslet) and not isinstance(self.optics.focal_mm, float | int):
             raise ValueError("camera has lenses of several focal lengths: the display has one")
 

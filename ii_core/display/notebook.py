@@ -19,7 +19,7 @@ from ..view import camera_of, five_viewpoints, view_image
 from .look import with_assumed_camera
 from .viewer.page import JPEG_QUALITY, write_viewer
 
-WIDTH = 512  # pixels of a shown picture, at least: few lenses are magnified by whole numbers
+WIDTH = 512  # least width in pixels of a shown picture: small ones are magnified by whole numbers
 
 
 def front_view(picture: IIPicture) -> NDArray[np.uint8]:
@@ -57,7 +57,7 @@ class EmbeddedViewer:
     page : str
         The whole page, HTML.
     height : int
-        Of the cell, in pixels.
+        Height of the cell in pixels.
     """
 
     def __init__(self, page: str, height: int) -> None:
@@ -84,7 +84,7 @@ def embed_viewer(
     picture, decoded, depth
         As for `ii_core.display.viewer.write_viewer`.
     height : int
-        Of the cell, in pixels.
+        Height of the cell in pixels.
 
     Raises
     ------

@@ -27,7 +27,7 @@ Progress = Callable[[int, int], None] | None
 def write_quilt_video(
     video: IIVideo, path: str | os.PathLike[str], *, row: int | None = None, progress: Progress = None
 ) -> Path:
-    """One row of views as an MP4 of quilts, ``name_qsCxRaA.mp4``; tiles are laid out as by `write_quilt`.
+    """Write one row of views as an MP4 of quilts, ``name_qsCxRaA.mp4``, with the tiles of `write_quilt`.
 
     Raises
     ------
@@ -44,9 +44,9 @@ def write_quilt_video(
 
 
 def write_view_films(video: IIVideo, folder: str | os.PathLike[str], *, progress: Progress = None) -> list[Path]:
-    """A film of each view, ``view_ROW_COLUMN.mp4``, row by row from the top left camera.
+    """Write a film of each view, ``view_ROW_COLUMN.mp4``, row by row from the top left camera.
 
-    Every frame is read once a row of views: at most one row of films is kept, 8 bit.
+    Every frame is read once per row of views; memory holds at most one row of films, 8 bit.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def write_path_film(
     depth_mm: float | None = None,
     progress: Progress = None,
 ) -> Path:
-    """A film in which scene and viewer move: frame τ from viewpoint τ, over and over if there are fewer.
+    """Write a film in which scene and viewer move: frame τ from viewpoint τ, with viewpoints repeated in a loop.
 
     Parameters
     ----------
@@ -106,14 +106,14 @@ def write_path_film(
 
 
 def open_quilt_video(path: str | os.PathLike[str], *, grid: Pair | None = None) -> IIVideo:
-    """II-video of a quilt video: lenses are the tiles' pixels, its views one row of pixels under each lens.
+    """Open a quilt video as II-video: a lens for each pixel of a tile, and the views as one row of pixels under it.
 
-    Frames are decoded in order; one before the latest starts over.
+    Frames are decoded in order; reading a frame before the latest one restarts at the first.
 
     Parameters
     ----------
     grid : (columns, rows), optional
-        Of tiles, if the name does not say ``_qsCxRaA``.
+        Grid of tiles, if the name does not contain ``_qsCxRaA``.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def open_quilt_video(path: str | os.PathLike[str], *, grid: Pair | None = None) 
     path = Path(path)
     match = QUILT.search(path.stem)
     if match is None and grid is None:
-        raise ValueError(f"{path.name} says no _qsCxRaA: its grid of tiles is needed")
+        raise ValueError(f"{path.name} has no _qsCxRaA in its name: the grid of tiles is needed")
     tiles = grid or (int(match[1]), int(match[2]))  # type: ignore[index]
     source = _QuiltFilm(path, tiles)
     try:
@@ -159,7 +159,7 @@ class _QuiltFilm:
         raise ValueError(f"{self.path} ends before frame {frame}")
 
     def all(self) -> Iterator[Any]:
-        """Every frame, RGB, in order."""
+        """Yield every frame, RGB, in order."""
         with av.open(str(self.path)) as file:
             for frame in file.decode(video=0):
                 yield frame.to_ndarray(format="rgb24")
@@ -175,7 +175,7 @@ class _QuiltFilm:
 
 
 def eight_bit(picture: IIPicture) -> IIPicture:
-    """A picture as a screen shows it."""
+    """Return a picture in 8-bit sRGB."""
     return picture.with_pixels(codes8(picture.pixels))
 
 

@@ -15,7 +15,7 @@ from ..picture import IIPicture, peak
 from ..view import camera_of, five_viewpoints, view_image
 from .figure import new_figure, save
 
-AMPLIFY = (32, 16, 8, 4, 2, 1)  # factors of the difference: the largest that clips at most one value in ten is used
+AMPLIFY = (32, 16, 8, 4, 2, 1)  # factors of the difference; `plot_views` selects one
 
 
 @checks.checked(reference=checks.instance(IIPicture), decoded=checks.instance(IIPicture), path=checks.path)

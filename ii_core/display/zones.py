@@ -12,16 +12,16 @@ from .model import DisplayModel
 
 
 class ViewingZone(NamedTuple):
-    """Viewing zone at one distance, across and up: there, every lens shows its own elementary image.
+    """Viewing zone at one distance, across and up: every lens shows its own elementary image there.
 
     Attributes
     ----------
     centre_mm : (x, y)
-        Of the zone, from the display's axis.
+        Centre of the zone, from the display's axis.
     size_mm : (width, height)
-        Negative where no such place is: some lenses then show their neighbours' images.
+        Size of the zone; negative if there is none, since some lenses show their neighbours' images everywhere.
     period_mm : (x, y)
-        From the zone to the side zones beside it, in which lenses show their neighbours' images.
+        Distance to the neighbouring side zones, in which lenses show their neighbours' images.
     """
 
     centre_mm: tuple[float, float]
@@ -31,11 +31,11 @@ class ViewingZone(NamedTuple):
 
 @checked(display=instance(DisplayModel), distance_mm=number)
 def viewing_zone(display: DisplayModel, distance_mm: float) -> ViewingZone:
-    """Viewing zone at a distance from the lens plane.
+    """Return the viewing zone at a distance from the lens plane.
 
     A lens at c, whose elementary image of width P is made for a lens at c₀, shows it to an eye at x while
-    |c − c₀ + (c − x)·g/d| ≤ P/2: over c + (c − c₀)·d/g ± P·d/2g. The zone is what the lenses in the corners of the
-    array have in common.
+    |c − c₀ + (c − x)·g/d| ≤ P/2: over c + (c − c₀)·d/g ± P·d/2g. The zone is the intersection of these ranges for
+    the lenses in the corners of the array.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def viewing_zone(display: DisplayModel, distance_mm: float) -> ViewingZone:
 
 @checked(display=instance(DisplayModel))
 def converging_distance(display: DisplayModel) -> tuple[float, float]:
-    """Distance from the lens plane at which the zones of all lenses fall on one another, across and up, mm.
+    """Return the distance from the lens plane at which the zones of all lenses coincide, across and up, mm.
 
     d = g·p/(P − p), P being the pitch of elementary images and p that of lenses: P = p(1 + g/d). Infinite if the
     pitches are equal.
@@ -87,10 +87,10 @@ def converging_distance(display: DisplayModel) -> tuple[float, float]:
 
 @checked(pupil_mm=number, border_mm=number)
 def crosstalk(pupil_mm: float, border_mm: float) -> float:
-    """Share of an eye's light that comes from beyond the straight border of a zone or view.
+    """Return the share of an eye's light that comes from beyond the straight border of a zone or view.
 
-    The light on either side of the border is even. Beyond lies the segment of the pupil's disk: with
-    t = 2b/D, (arccos t − t√(1 − t²))/π.
+    The light on either side of the border is uniform. A segment of the pupil's disk lies beyond the border; its share
+    is (arccos t − t√(1 − t²))/π with t = 2b/D.
 
     Parameters
     ----------

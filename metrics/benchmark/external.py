@@ -1,6 +1,6 @@
-"""External commands as a coder: views out as files, a coded file back, and views of the decoder.
+"""External commands as a coder: the encoder reads files of views, the decoder writes them.
 
-Commands run without a shell, in folders of their own, with a time limit. The decoder runs where there is nothing but
+Commands run without a shell, in folders of their own, with a time limit. The folder of the decoder holds nothing but
 the coded file.
 """
 
@@ -24,11 +24,11 @@ from ii_core.files import one_line
 from ii_core.formats.pleno import KINDS, read_pleno_views, write_pleno_views
 
 KNOWN = ("{in}", "{out}", "{bpp}", "{bytes}", "{rows}", "{columns}", "{width}", "{height}")
-MAX_OUTPUT = 300  # characters of what a failed command said
+MAX_OUTPUT = 300  # characters of a failed command's output that the message quotes
 
 
 class Refused(ValueError):
-    """The benchmark refuses a coder: a command fails, runs too long, or gives no picture back."""
+    """The benchmark refuses a coder: a command fails, runs too long, or returns no picture."""
 
 
 @dataclass(frozen=True)
@@ -62,10 +62,9 @@ class External:
     Parameters
     ----------
     encoder, decoder : str
-        Commands, split as a shell would, but run without one. ``{in}`` and ``{out}`` are needed in both: of the
-        encoder the folder of views and the coded file, of the decoder the coded file and the folder of views. Others
-        are ``{bpp}``, ``{bytes}`` (the target), ``{rows}``, ``{columns}`` (views), ``{width}``, ``{height}`` (of a
-        view).
+        Commands, split by a shell's rules, but run without one. Both need ``{in}`` and ``{out}``: for the encoder the
+        folder of views and the coded file, for the decoder the coded file and the folder of views. Optional are
+        ``{bpp}``, ``{bytes}`` (the target), ``{rows}``, ``{columns}`` (views), ``{width}``, ``{height}`` (of a view).
     kind : {"ppm", "png"}
         Files of the views: binary PPM of 10 bit, or PNG of 8 bit; named RRR_CCC.
     seconds : float
@@ -124,7 +123,7 @@ class External:
         return ExternalFile(data, rate, seconds, rate <= bpp * (1 + self.rate_tolerance), picture)
 
     def decode(self, coded: ExternalFile) -> Decoded:
-        """Decode a file where there is nothing else.
+        """Decode a file in a folder that holds nothing else.
 
         Raises
         ------
@@ -166,7 +165,7 @@ class External:
                 _end(started)
         if code:
             text = one_line((folder / "said").read_bytes()[-MAX_OUTPUT:].decode("utf-8", "replace"))
-            raise Refused(f"{name} ended with code {code}: {text or 'it said nothing'}")
+            raise Refused(f"{name} ended with code {code}: {text or 'without output'}")
         return _children_seconds() - before
 
 

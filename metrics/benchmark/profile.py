@@ -1,4 +1,4 @@
-"""Profiles of the benchmark: pictures, rates, measures and rules, one TOML file a profile and version."""
+"""Profiles of the benchmark: pictures, rates, measures and rules; one TOML file per profile and version."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PICTURE = {"name", "use", "scene", "camera", "scale", "samples", "at_mm", "sha25
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
-    """Reference picture: how it is made, and the hash of its pixels.
+    """Reference picture: scene, camera and sampling, and the hash of its pixels.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Reference:
     at_mm : (x, y, z)
         Place of the camera in the scene.
     sha256 : str, optional
-        Of the pixels; None if not fixed yet.
+        SHA-256 of the pixels; None if not fixed yet.
     """
 
     name: str
@@ -86,12 +86,12 @@ class Profile:
     anchor : str
         Coder whose curve Bjøntegaard differences refer to.
     rate_tolerance : float
-        A target is met by a file that is at most this share larger.
+        A file meets a target if it is at most this share larger.
     seconds : float
-        Limit of one external command.
+        Time limit of one external command.
     pictures : tuple of Reference
     digest : str
-        SHA-256 of the file: results name it.
+        SHA-256 of the file, which results name.
     """
 
     name: str

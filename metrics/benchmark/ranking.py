@@ -1,7 +1,7 @@
 """Ranking of results of the benchmark: a Markdown page with a table and a chart.
 
-First counts how many targets a coder meets, then its mean quality at the targets it meets. Bjøntegaard differences
-refer to the profile's anchor, where its result is among those ranked.
+Coders are ranked by the number of targets that they meet, then by their mean quality at these targets. Bjøntegaard
+differences refer to the profile's anchor, if its result is among those ranked.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def ranked(profile: Profile, results: Sequence[Result]) -> list[dict[str, Any]]:
 
 
 def _differences(profile: Profile, anchor: Result | None, result: Result) -> list[float]:
-    """Return the Bjøntegaard differences of all pictures that have one."""
+    """Return the Bjøntegaard differences of all pictures for which they are defined."""
     found = []
     for one, other in zip(anchor["pictures"] if anchor else (), result["pictures"], strict=False):
         curves = [_curve(row, profile.rank_by) for row in (one, other)]

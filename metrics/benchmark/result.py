@@ -55,7 +55,7 @@ def run(
     Raises
     ------
     ValueError
-        If a point cannot be coded or does not decode: a coder is benchmarked whole or not at all.
+        If a point cannot be coded or does not decode: no partial results are kept.
     """
     date = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     total, rows = len(profile.pictures) * len(profile.rates_bpp), []
@@ -103,7 +103,7 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If the file is none.
+        If the file is no result of the benchmark.
     OSError
         If it cannot be read.
     """

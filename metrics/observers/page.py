@@ -28,7 +28,7 @@ from .plan import Options, frame_order, frames_per_second, make_plan
 from .plates import plates
 
 MAX_EMBEDDED = 256 << 20  # bytes; browsers read no more in reasonable time
-WIDTH = {"dsis": 900, "pairs": 600}  # pixels of the screen that small views are enlarged to
+WIDTH = {"dsis": 900, "pairs": 600}  # width in pixels of the screen to which small views are enlarged
 CONE = 0.9  # share of the viewing zone that a path covers
 
 
@@ -39,17 +39,17 @@ class Stimulus:
     Parameters
     ----------
     scene, name : str
-        Of the scene, and of the picture among the others of its scene.
+        Name of the scene, and name of the picture among the others of its scene.
     picture : IIPicture
         Regular, with the structure of its scene's reference.
     reference : bool
         Whether it is the picture before coding.
     scheme : str
-        That coded it.
+        Scheme that coded the picture.
     bpp : float, optional
         Bits per pixel.
     measures : mapping of str to float
-        Its quality by our measures, which opinions are compared with.
+        Quality of the picture by each measure, for comparison with the opinions.
     """
 
     scene: str
@@ -62,7 +62,7 @@ class Stimulus:
 
     @property
     def entry(self) -> dict[str, Any]:
-        """What the plan keeps of it; measures without a finite value are left out."""
+        """Entry of the plan; measures without a finite value are left out."""
         finite = {name: float(value) for name, value in self.measures.items() if np.isfinite(value)}
         plain = {"scene": self.scene, "name": self.name, "reference": self.reference, "scheme": self.scheme}
         return {**plain, "bpp": self.bpp, "measures": finite}
@@ -95,7 +95,7 @@ def write_test(
     served : bool
         Whether the page sends results to the server that it comes from, or has them downloaded.
     progress : callable, optional
-        Called with views done and views in all.
+        Called with the number of views done and of all views.
 
     Returns
     -------
@@ -183,7 +183,7 @@ def _views(picture: IIPicture, show: str, count: int, size: Pair) -> Iterator[ND
 
 
 def _html(plan: Mapping[str, Any], served: bool) -> str:
-    """The page around its data, which goes where the NUL is."""
+    """Return the page, with a NUL in the place of its data."""
     folder = files(__package__)
     page, style, script = (
         (folder / name).read_text(encoding="utf-8") for name in ("page.html", "style.css", "test.js")

@@ -15,35 +15,35 @@ FORMAT, VERSION = "ii-subjective-test", 1
 METHODS = ("dsis", "pairs")
 SHOWS = ("front", "views", "across", "around")
 GRADES = ("imperceptible", "perceptible, but not annoying", "slightly annoying", "annoying", "very annoying")
-MOST_PRESENTATIONS = 1000  # of one observer: about six hours
-ROUND_S = 4.0  # of a path of viewpoints, once
+MOST_PRESENTATIONS = 1000  # upper cap for one observer: about six hours
+ROUND_S = 4.0  # duration of one round of a path of viewpoints
 Pair = tuple[int, int]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """How a test is made.
+    """Options of a test with observers.
 
     Parameters
     ----------
     method : {"dsis", "pairs"}
-        Double-stimulus impairment scale (ITU-R BT.500-14): the reference, then the picture, then a grade from 1 to 5.
-        Or comparison of two pictures side by side.
+        "dsis": double-stimulus impairment scale (ITU-R BT.500-14): the reference, then the picture, then a grade from
+        1 to 5. "pairs": comparison of two pictures side by side.
     show : {"front", "views", "across", "around"}
         One view; the five of `five_viewpoints` one after another; a pseudo-video of viewpoints from left to right and
         back, or around the viewing zone.
     frames : int
         Views of a pseudo-video, 2 to 200.
     seconds, grey_seconds : float
-        Of each picture, and of the grey between; BT.500 has 10 and 3.
+        Duration of each picture and of the grey between; BT.500 has 10 s and 3 s.
     block : int
         Presentations between breaks.
     observers : int
-        Different orders, an even number. Observers beyond it start again with the first.
+        Number of different orders, even. Observers beyond this number start again with the first order.
     training : int
-        Presentations before the test, of the first scene, that do not count.
+        Number of presentations of the first scene before the test; their answers do not count.
     seed : int
-        Of the orders.
+        Seed of the random orders.
 
     Raises
     ------
@@ -77,14 +77,15 @@ class Options:
 def make_plan(
     stimuli: Sequence[Mapping[str, Any]], errors: Sequence[float], options: Options, **rest: Any
 ) -> dict[str, Any]:
-    """Return the plan as JSON holds it.
+    """Return the plan as plain values for JSON.
 
     Parameters
     ----------
     stimuli : sequence of mapping
         ``scene``, ``name`` and ``reference``, true for one of each scene.
     errors : sequence of float
-        How far each is from its reference, for the training: best, worst, then evenly between.
+        Error of each stimulus against its reference. The training shows the best, the worst, then others evenly
+        spread between them.
     options : Options
     **rest
         Further entries of the plan.
@@ -119,7 +120,7 @@ def make_plan(
 
 
 def _pairs(scene: str, members: list[int], stimuli: Sequence[Mapping[str, Any]], method: str) -> list[Pair]:
-    """Reference and picture, the reference itself hidden among them; or all pairs of a scene."""
+    """Return pairs of reference and picture, the hidden reference included ("dsis"), or all pairs of a scene."""
     references = [number for number in members if stimuli[number]["reference"]]
     if len(references) != 1 or len(members) < 2:
         raise ValueError(
@@ -139,7 +140,7 @@ def _training(
 
 
 def _orders(pairs: list[Pair], scenes: list[str], options: Options) -> list[list[Pair]]:
-    """Orders in twos: the second is the first backwards, and side by side the other way round.
+    """Return the orders two by two: the second is the first backwards, with the sides of each pair exchanged.
 
     Each pair's place and each picture's side are balanced over two observers.
     """
@@ -155,13 +156,13 @@ def _orders(pairs: list[Pair], scenes: list[str], options: Options) -> list[list
 
 
 def _shuffled(scenes: list[str], generator: np.random.Generator) -> list[int]:
-    """A random order without a scene twice in a row, as far as there are others."""
+    """Return a random order without the same scene twice in a row, as long as other scenes are left."""
     left = {scene: list(generator.permutation([i for i, s in enumerate(scenes) if s == scene])) for scene in scenes}
     order: list[int] = []
     last = ""
     for remaining in range(len(scenes), 0, -1):
         open_ = [scene for scene, rest in left.items() if rest and scene != last] or [last]
-        # a scene with more than half of what is left must be next, or two of it meet at the end
+        # a scene with more than half of the remaining pairs must be next, else two of its pairs meet at the end
         most = max(open_, key=lambda scene: len(left[scene]))
         weights = np.array([len(left[scene]) for scene in open_], float)
         drawn = open_[generator.choice(len(open_), p=weights / weights.sum())]
@@ -171,13 +172,13 @@ def _shuffled(scenes: list[str], generator: np.random.Generator) -> list[int]:
 
 
 def duration_s(plan: Mapping[str, Any]) -> float:
-    """About how long an observer takes, with three seconds for each answer."""
+    """Return the duration of a test for one observer, estimated with 3 s for each answer."""
     each = 2 * plan["seconds"] + plan["grey_seconds"] if plan["method"] == "dsis" else plan["seconds"]
     return (len(plan["training"]) + len(plan["orders"][0])) * (each + 3)
 
 
 def frame_order(show: str, frames: int) -> tuple[int, list[int]]:
-    """Views of a path, and the order in which they are shown, for ever."""
+    """Return the number of views of a path, and the order in which they are shown in a loop."""
     if show == "front":
         return 1, [0]
     if show == "views":
@@ -186,5 +187,5 @@ def frame_order(show: str, frames: int) -> tuple[int, list[int]]:
 
 
 def frames_per_second(show: str, shown: int, seconds: float) -> float:
-    """Five views share the time of a presentation; a path takes `ROUND_S`."""
+    """Return the frame rate: five views share the time of a presentation, a path takes `ROUND_S`."""
     return 5 / seconds if show == "views" else shown / ROUND_S

@@ -1,4 +1,4 @@
-"""Plates of dots that show whether an observer tells red from green.
+"""Plates of dots that test whether an observer distinguishes red from green.
 
 Figure and ground of a plate differ in the signal of one kind of cone alone, of long waves (protan) or of middle ones
 (deutan), and every dot has a brightness of its own. A control plate differs in brightness. This separates observers
@@ -23,10 +23,11 @@ from ii_core.colour import srgb
 
 CONES = np.array([[17.8824, 43.5161, 4.11935], [3.45565, 27.1554, 3.86714], [0.0299566, 0.184309, 1.46709]])
 KINDS = ("control", "protan", "deutan", "protan", "deutan")
-SIDE, TIMES = 260, 3  # pixels of a plate; drawn larger, then reduced
+SIDE, TIMES = 260, 3  # side of a plate in pixels; plates are drawn three times as large, then reduced
 DOTS, RADII = 2500, (3.0, 8.0)  # dots tried, and their least and largest radius
 GROUND = np.array([0.24, 0.22, 0.10])  # linear light
-CONTRAST = 0.24  # of the red, or of the brightness
+# Difference of figure and ground in red linear light; a control plate's figure is darker by three times this share.
+CONTRAST = 0.24
 
 
 class Plate(NamedTuple):
@@ -46,7 +47,7 @@ def plates(seed: int = 0) -> tuple[Plate, ...]:
 
 
 def colours(kind: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Linear light of figure and ground."""
+    """Return the linear light of figure and ground."""
     if kind == "control":
         return GROUND * (1 - 3 * CONTRAST), GROUND
     along = np.linalg.inv(CONES)[:, ("protan", "deutan").index(kind)]

@@ -1,4 +1,4 @@
-"""Results of observers: files of JSON lines as the page writes them, and checks that they are whole."""
+"""Results of observers: files of JSON lines that the page writes, and checks of their integrity."""
 
 from __future__ import annotations
 
@@ -16,25 +16,26 @@ from ii_core.files import check_file, parse_json
 from . import plan as plans
 
 FORMAT, VERSION = "ii-observer", 1
-MOST_BYTES = 16 << 20  # of a file: hundred times a long test
+MOST_BYTES = 16 << 20  # largest file: a hundred times a long test
 SEAL = re.compile(r',"check":"([0-9a-f]{64})"}$')
 CHOICES = {"dsis": (1, 2, 3, 4, 5), "pairs": ("left", "same", "right")}
 
 
 class Observer(NamedTuple):
-    """What one observer answered.
+    """Answers of one observer.
 
     Attributes
     ----------
     number : int
     answers : list of ((int, int), answer)
-        The pair of stimuli shown and the grade, 1 to 5, or "left", "same" or "right"; without those of the training.
+        The pair of stimuli shown and the grade, 1 to 5, or "left", "same" or "right"; answers of the training are not
+        included.
     complete : bool
-        Whether the test came to its end.
+        Whether the observer finished the test.
     colours : bool
-        Whether the plates of colours were read.
+        Whether the observer read the plates of colours.
     simulated : bool
-        Whether nobody has seen anything.
+        Whether the answers are simulated: no person took part.
     """
 
     number: int
@@ -50,11 +51,11 @@ class Results(NamedTuple):
     Attributes
     ----------
     plan : dict
-        Of the test: its ``method`` and ``stimuli``.
+        Plan of the test, with its ``method`` and ``stimuli``.
     observers : list of Observer
-        Those whose files are whole, by number.
+        Observers whose files are whole, by number.
     notes : list of str
-        A line for every file that is left out and every observer who stopped half way.
+        A line for every file that is left out and every observer who did not finish.
     """
 
     plan: dict[str, Any]
@@ -66,9 +67,9 @@ class Results(NamedTuple):
 def read_results(paths: Sequence[str | os.PathLike[str]]) -> Results:
     """Read the files of observers, with one clear line for each that cannot be used.
 
-    Left out are empty files, files of another test than the first, a second file of one observer, and files with a
-    line that was changed, removed or added by hand. The check finds accidents and careless changes; it is no
-    signature. Observers who stopped half way count by what they answered.
+    Empty files, files of another test than the first, a second file of one observer, and files with a line that was
+    changed, removed or added by hand are left out. The check finds accidents and careless changes; it is no
+    signature. The answers of observers who did not finish count.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def read_results(paths: Sequence[str | os.PathLike[str]]) -> Results:
     Raises
     ------
     ValueError
-        If no file can be used; the message has the line of the first.
+        If no file can be used; the message is the note on the first file.
     OSError
         If a file cannot be read.
     """
@@ -111,7 +112,7 @@ def read_observer(path: Path) -> tuple[str, Observer]:
     Raises
     ------
     ValueError
-        If the file is empty, or a line is not what the page wrote; an incomplete last line is passed over.
+        If the file is empty, or a line is not as the page wrote it; an incomplete last line is ignored.
     """
     if path.stat().st_size > MOST_BYTES:
         raise ValueError(f"{path} has more than {MOST_BYTES >> 20} MB, no result of an observer")

@@ -12,7 +12,7 @@ import numpy as np
 
 from .results import FORMAT, VERSION, sealed
 
-AT = "2000-01-01T00:00:00.000Z"  # of everything simulated
+AT = "2000-01-01T00:00:00.000Z"  # date of all simulated answers
 
 
 def write_simulated(
@@ -27,20 +27,20 @@ def write_simulated(
 ) -> list[Path]:
     """Write the files of SIMULATED observers, and return their paths.
 
-    A grade is the quality with the observer's bias and noise, rounded to 1 to 5. The better of two is drawn by the
-    quality with noise; nearer than a fifth of ``spread`` is "the same".
+    A grade is the quality plus the observer's bias and noise, rounded to 1 to 5. Of two pictures, the one of higher
+    quality plus noise is better; if the two differ by less than a fifth of ``spread``, the answer is "the same".
 
     Parameters
     ----------
     folder : path
-        That exists.
+        Existing folder.
     plan : dict
         From `write_test`.
     quality : sequence of float
-        Of each stimulus, 1 to 5.
+        Quality of each stimulus, 1 to 5.
     observers : int
     bias, spread : float
-        Standard deviations, of an observer and of each answer.
+        Standard deviations of the observers' biases and of the noise of each answer.
     seed : int
     """
     generator = np.random.default_rng(seed)

@@ -1,4 +1,4 @@
-"""Folder of results on a server: one file an observer, to which lines are only ever added."""
+"""Folder of results on a server: one append-only file per observer."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class ResultFolder:
                 return number
 
     def extend(self, number: int, data: bytes) -> None:
-        """Add the lines of an observer that the file lacks, and have the disk take them.
+        """Append the lines of an observer that the file lacks, and flush them to the disk.
 
         Parameters
         ----------
@@ -65,13 +65,13 @@ class ResultFolder:
         Raises
         ------
         FileNotFoundError
-            If nobody has this number.
+            If there is no observer of this number.
         ValueError
-            If the lines are not whole, of another test, or do not begin with those that the file holds.
+            If the lines are not whole, belong to another test, or do not begin with the lines of the file.
         """
         path = self.path(number)
         if not path.is_file():
-            raise FileNotFoundError(f"nobody has the number {number}")
+            raise FileNotFoundError(f"there is no observer of number {number}")
         if len(data) > MOST_BYTES or not data.endswith(b"\n"):
             raise ValueError(f"results of {len(data)} bytes: whole lines of at most {MOST_BYTES >> 20} MB are needed")
         first = checked_lines(data, "result")[0]
@@ -80,7 +80,7 @@ class ResultFolder:
         with self._lock, path.open("r+b") as file:
             held = file.read()
             if not data.startswith(held):
-                if held.startswith(data):  # sent late: later lines are here already
+                if held.startswith(data):  # a late request: the file holds these lines already
                     return
                 raise ValueError(f"{path.name} holds other lines: nothing is replaced")
             file.write(data[len(held) :])

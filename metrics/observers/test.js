@@ -1,6 +1,6 @@
 "use strict";
 // A test with observers. Results are lines of JSON; each holds the SHA-256 of the line before it and its own text.
-const CARD_MM = 85.6, HEIGHTS = 3; // of a picture, to its observer
+const CARD_MM = 85.6, HEIGHTS = 3; // viewing distance in heights of a picture
 const byId = (id) => document.getElementById(id);
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 const clicked = (...buttons) => new Promise((done) => {
@@ -27,7 +27,7 @@ async function sha256(text) {
   return Array.from(new Uint8Array(digest), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-// Answers of one observer: in the browser's storage at once, on the server as soon as it takes them.
+// Answers of one observer: stored in the browser at once, and sent to the server until it accepts them.
 class Answers {
   constructor(observer, lines = []) {
     Object.assign(this, { observer, lines, sent: 0, writing: Promise.resolve(), sending: null });
@@ -77,7 +77,7 @@ class Answers {
       if (reply.ok) this.sent = count;
       else refused = ` (${reply.status})`;
     } catch { /* no server: the answers stay in the browser's storage */ }
-    byId("status").textContent = this.sent < count ? `The server has not taken the last answers${refused}: trying again.` : "";
+    byId("status").textContent = this.sent < count ? `The server has not accepted the last answers${refused}: trying again.` : "";
     if (this.sent < count) await pause(1000);
   }
 
@@ -157,12 +157,12 @@ async function numbered() {
   try {
     const reply = await fetch("results", { method: "POST", headers: { "Content-Type": "application/json" } });
     if (reply.ok) return (await reply.json()).observer;
-  } catch { /* said below */ }
+  } catch { /* reported below */ }
   byId("status").textContent = "The server does not answer: start it again, then begin.";
   return 0;
 }
 
-// Size of a view on the page, in its own pixels: whole pixels of the screen.
+// Size of a view on the page in CSS pixels, a whole number of pixels of the screen.
 function viewSize() {
   const scale = ii.plan.zoom / devicePixelRatio;
   return [ii.plan.size[0] * scale, ii.plan.size[1] * scale];
@@ -220,7 +220,7 @@ async function rest(answers, after, left) {
   await answers.append("break", { after, seconds: Math.round((performance.now() - began) / 100) / 10 });
 }
 
-// One presentation, again from its begin whenever the tab was out of sight.
+// Show one presentation; restart it whenever the tab was hidden.
 async function presentation(pair) {
   const films = await Promise.all(pair.map((stimulus) => Promise.all(ii.blobs[stimulus].map((one) => createImageBitmap(one)))));
   const { method, seconds, grey_seconds: grey } = ii.plan, [left, right] = [byId("left"), byId("right")];
@@ -250,7 +250,7 @@ function closed(films, answer) {
   return answer;
 }
 
-// Show films until the time is up or an answer is there; the milliseconds shown, or null if the tab was out of sight.
+// Show films until the time is up or an answer is given; return the milliseconds, or null if the tab was hidden.
 async function play(films, seconds, caption, answered) {
   const { sequence, fps } = ii.plan, [width, height] = viewSize();
   let done = false, hidden = document.hidden;
@@ -282,7 +282,7 @@ async function blank(seconds) {
 
 let voting = null;
 function vote() {
-  voting?.abort(); // of a presentation that begins again
+  voting?.abort(); // voting of a presentation that restarts
   voting = new AbortController();
   const dsis = ii.plan.method === "dsis", began = performance.now();
   const choices = dsis ? ii.plan.grades.map((text, i) => [5 - i, text, String(5 - i)])

@@ -1,4 +1,4 @@
-"""Verdict of observers on stimuli: scores with intervals, and how measures predict them."""
+"""Analysis of a test with observers: scores of stimuli with intervals, and their prediction by measures."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ EVERYTHING = "all"
 
 
 class Judged(NamedTuple):
-    """What observers say of one stimulus.
+    """Score of one stimulus.
 
     Attributes
     ----------
     stimulus : int
-        Its place in the plan.
+        Index of the stimulus in the plan.
     score, half_width : float
-        Mean opinion score, 1 to 5; or quality above the reference's on the scale of pairs. Half of its interval.
+        Mean opinion score, 1 to 5, or quality above the reference's on the scale of pairs; half width of its
+        confidence interval.
     given : int
-        Answers that it rests on.
+        Number of answers.
     """
 
     stimulus: int
@@ -37,20 +38,21 @@ class Judged(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What observers say, and what measures predict.
+    """Scores of all stimuli, and their prediction by measures.
 
     Attributes
     ----------
     plan : dict
     judged : list of Judged
     predictions : dict of (str, str) to Prediction
-        By measure, and by group of stimuli: "all", a scene, or a scheme. Groups of less than five are left out.
+        By measure, and by group of stimuli: "all", a scene, or a scheme. Groups of fewer than five stimuli are left
+        out.
     notes : list of str
         Lines on files and observers left out, and scenes without a scale.
     observers : int
-        That count.
+        Number of observers whose answers count.
     simulated : bool
-        Whether one of them is simulated: then nothing here was said by people.
+        Whether one of the observers is simulated; the scores are then not those of people.
     """
 
     plan: dict[str, Any]
@@ -62,7 +64,7 @@ class Verdict(NamedTuple):
 
     @property
     def unit(self) -> str:
-        """What a score is."""
+        """Name of the score's scale."""
         what = "MOS" if self.plan["method"] == "dsis" else "quality above the reference"
         return what + (" of SIMULATED observers" if self.simulated else "")
 
@@ -74,7 +76,7 @@ class Verdict(NamedTuple):
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Everything as JSON holds it; None for NaN."""
+        """Return the verdict as plain values for JSON; None for NaN."""
         stimuli = self.plan["stimuli"]
         judged = [
             {**stimuli[one.stimulus], "score": one.score, "half_width": _known(one.half_width), "answers": one.given}
@@ -93,19 +95,19 @@ class Verdict(NamedTuple):
 def verdict(results: Results, *, confidence: float = 0.95) -> Verdict:
     """Analyse results: screening, scores with intervals, prediction by measures.
 
-    Observers who did not read the plates of colours are left out, then those that `screened_observers` finds.
+    Observers who did not read the plates of colours are left out, then the outliers of `screened_observers`.
 
     Parameters
     ----------
     results : Results
         From `read_results`.
     confidence : float
-        Of the intervals.
+        Level of the confidence intervals.
 
     Raises
     ------
     ValueError
-        If nobody is left, or no scene has a scale.
+        If no observer is left, or no scene has a scale.
 
     References
     ----------
@@ -130,7 +132,7 @@ def verdict(results: Results, *, confidence: float = 0.95) -> Verdict:
 def _graded(
     observers: list[Observer], count: int, confidence: float
 ) -> tuple[list[Observer], list[Judged], list[str]]:
-    """Mean opinion scores after screening."""
+    """Return the observers kept by the screening, mean opinion scores, and notes."""
     scores = np.full((len(observers), count), np.nan)
     for row, one in enumerate(observers):
         for (_, shown), grade in one.answers:
@@ -151,7 +153,7 @@ def _graded(
 def _compared(
     observers: list[Observer], stimuli: list[dict[str, Any]], confidence: float
 ) -> tuple[list[Judged], list[str]]:
-    """Scale of each scene, from its reference."""
+    """Return scores on the scale of each scene, relative to its reference, and notes."""
     wins = np.zeros((len(stimuli), len(stimuli)))
     for one in observers:
         for (left, right), answer in one.answers:
@@ -181,7 +183,7 @@ def _compared(
 
 
 def _predictions(made: Verdict) -> Iterator[tuple[tuple[str, str], Prediction]]:
-    """Predictions of each measure for each group that is large enough and not all alike."""
+    """Yield the prediction by each measure for each group of five or more stimuli that are not all equal."""
     stimuli = made.plan["stimuli"]
     groups = [EVERYTHING, *dict.fromkeys(s["scene"] for s in stimuli), *dict.fromkeys(s["scheme"] for s in stimuli)]
     for measure in dict.fromkeys(name for one in stimuli for name in one["measures"]):

@@ -20,7 +20,7 @@ from .rd_chart import edges
 def angle_figure(quality: AngleQuality) -> Any:
     """Return the figure of `metrics.plot_angle`."""
     values = quality.values
-    figure = new_figure(6.2, 5.2, "compressed")  # for axes of fixed shape
+    figure = new_figure(6.2, 5.2, "compressed")  # layout for axes of fixed aspect ratio
     axes: Any = figure.add_subplot()
     v, u = values.shape
     across, down = np.arange(u, dtype=float), np.arange(v, dtype=float)

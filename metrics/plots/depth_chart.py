@@ -44,7 +44,7 @@ def depth_over_rate(study: Mapping[str, Any], scheme: str) -> tuple[Floats, Floa
     Raises
     ------
     ValueError
-        If the study lacks Q_depth or the scheme, or its points have different layers.
+        If the study lacks Q_depth or the scheme, or the scheme's points have different layers.
 
     References
     ----------

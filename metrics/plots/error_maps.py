@@ -18,7 +18,7 @@ from ..depth.virtual_camera import view_of
 from ..quality import DepthQuality
 
 COLOURS_OF_ERRORS = "magma"
-PANELS = 12  # of a sheet of layers: more would be too small to see anything in
+PANELS = 12  # largest number of panels on a sheet of layers: more would be too small to read
 Floats = NDArray[np.float64]
 
 
@@ -48,7 +48,7 @@ def plot_error_layers(reference: IIPicture, quality: DepthQuality, path: str | o
     ----------
     reference : IIPicture
     quality : DepthQuality
-        Of that picture, from `q_depth`.
+        Result of `q_depth` for that picture.
     path : path
         .png, .pdf or .svg; replaced whole, and returned.
 

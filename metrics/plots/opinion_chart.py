@@ -16,7 +16,7 @@ from ..observers.verdict import EVERYTHING, Verdict
 def opinion_chart(made: Verdict, path: str | os.PathLike[str]) -> Path:
     """Draw scores with their intervals over each measure that predicts them, and the monotone fit.
 
-    Colours are schemes, markers scenes. The title says so where observers are simulated.
+    Colours stand for schemes, markers for scenes. If observers are simulated, the vertical axis says so.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def opinion_chart(made: Verdict, path: str | os.PathLike[str]) -> Path:
     figure = new_figure(3.4 * columns + 0.4, 2.9 * rows + 0.9)
     panels = figure.subplots(rows, columns, squeeze=False, sharey=True)
     schemes, scenes = (list(dict.fromkeys(one[key] for one in stimuli)) for key in ("scheme", "scene"))
-    for axes, measure in zip(panels.flat, measures, strict=False):  # the last row may have room
+    for axes, measure in zip(panels.flat, measures, strict=False):  # the last row may have empty panels
         pairs = made.with_measure(measure)
         for value, one in pairs:
             stimulus = stimuli[one.stimulus]

@@ -48,7 +48,7 @@ def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str], *, measure:
 
 
 def chart_png(study: Mapping[str, Any], measure: str = "q_global") -> bytes:
-    """The PNG of `rd_chart`, without a file."""
+    """Return the PNG of `rd_chart` as bytes."""
     drawn = io.BytesIO()
     draw(study, measure).savefig(drawn, dpi=100, format="png")
     return drawn.getvalue()
@@ -71,7 +71,7 @@ def draw(study: Mapping[str, Any], measure: str = "q_global") -> Any:
         style = {"color": "0.4", "marker": "o", "linestyle": ":"}
         axes.plot([], [], markerfacecolor="white", label="target not met: nearest rate", **style)
     axes.set_title(study.get("picture", {"name": ""})["name"], loc="left")
-    # Below the axes there is room for long scheme names, and the legend covers no curve.
+    # Below the axes the legend has space for long scheme names, and covers no curve.
     figure.legend(loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3)
     return figure
 

@@ -93,7 +93,7 @@ def summary_table(
 
 
 def _differences(found: Mapping[str, Any], kind: Measure, bd_quality: str) -> dict[str, str]:
-    """Cells of the differences to the anchor: values, or why they are not defined."""
+    """Return the cells of differences to the anchor: values, or the reason why they are undefined."""
     columns = {
         "gain": ("gain", kind.digits, kind.unit),
         "BD-rate": ("bd_rate_percent", 1, "%"),

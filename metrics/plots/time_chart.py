@@ -22,7 +22,7 @@ def time_chart(takes: Mapping[str, TakeQuality], path: str | os.PathLike[str]) -
     Parameters
     ----------
     takes : mapping of str to TakeQuality
-        By what the legend calls them.
+        Qualities of takes by their names in the legend.
     path : path
         .png, .pdf or .svg; replaced whole, and returned.
 

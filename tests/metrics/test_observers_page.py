@@ -250,7 +250,7 @@ def test_answers_given_while_the_server_is_away_arrive_later(browser, server, tm
         tab.wait_for_function("ii.answers.sent === ii.answers.lines.length")
     for key in "421":
         answer(tab, key)
-    tab.wait_for_selector("#status:has-text('The server has not taken the last answers')")
+    tab.wait_for_selector("#status:has-text('The server has not accepted the last answers')")
     with server:
         tab.wait_for_selector("text=All answers are saved.")
     tab.close()

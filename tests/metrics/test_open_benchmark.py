@@ -160,7 +160,7 @@ def failing(code):
     ("code", "message"),
     [
         ("import sys; print('no such view'); sys.exit(3)", "ended with code 3: no such view"),
-        ("import sys; sys.exit(1)", "ended with code 1: it said nothing"),
+        ("import sys; sys.exit(1)", "ended with code 1: without output"),
         ("import time; time.sleep(60)", "ran longer than 1 s"),
         ("import os; os.abort()", "ended with code -6"),
         ("pass", "encoder wrote no file at 2 bpp"),

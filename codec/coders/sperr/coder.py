@@ -27,8 +27,8 @@ from .stream import LEAST_SLICES, Part, decode_volumes, encode_volume, squared_e
 imagecodecs = Lazy("imagecodecs")
 
 COARSEST_DB, FINEST_DB = 0.0, 70.0
-# Binary logarithms of the step in 8-bit codes. The coarsest leaves only the mean, the finest gives 70 dB. One more
-# about halves the size; a step of 64 (START) gives about 1 bpp.
+# Binary logarithms of the step in 8-bit codes. The coarsest leaves only the mean, the finest gives 70 dB. Each
+# doubling of the step about halves the size; a step of 64 (START) gives about 1 bpp.
 FINEST, COARSEST, START, OCTAVE = -2.0, 18.0, 6.0, -1.0
 QUALITY_RUNS, NEAR_DB = 6, 0.05
 DB_A_STEP = 5.0  # growth of the error where the step doubles, about
@@ -64,7 +64,7 @@ class Sperr(Coder):
 
     @property
     def versions(self) -> dict[str, str]:
-        """imagecodecs and its SPERR."""
+        """Return the versions of imagecodecs and its SPERR."""
         return {"imagecodecs": imagecodecs.__version__, "sperr": imagecodecs.sperr_version().split()[-1]}
 
     def check(self, picture: IIPicture, options: Options) -> None:

@@ -126,7 +126,7 @@ def _by_worker(streams: list[bytes], shape: Shape) -> tuple[NDArray[np.float32],
     samples = len(streams) * math.prod(shape)
     head = worker.HEAD.pack(*shape, len(streams))
     try:
-        # By its path and not as a module of this package, which takes long to import.
+        # Start the worker by its path: importing it as a module of this package takes long.
         ended = subprocess.run(
             [sys.executable, "-P", str(Path(worker.__file__))],
             input=head + b"".join(worker.LENGTH.pack(len(stream)) + stream for stream in streams),

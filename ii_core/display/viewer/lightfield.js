@@ -1,6 +1,6 @@
 "use strict";
 // The light field on the graphics card. Everything is in index space: lens k across and l down, pixel u across and
-// v down under a lens. A point that pixel (u, v) shows under lens (k, l), pixel (u + 1, v) shows `focus` lenses on.
+// v down under a lens. A point shown by pixel (u, v) under lens (k, l) is shown by pixel (u + 1, v) under lens k + focus.
 
 const SHARED = `#version 300 es
 precision highp float;
@@ -9,8 +9,8 @@ precision highp sampler2DArray;
 uniform sampler2DArray original, decoded;
 uniform ivec2 lenses, ei;
 uniform int side, across;   // pages of the mosaic of sub-images: pixels of a side, pages in a row
-uniform vec2 corner;        // the pane's top left corner, in pixels from the canvas's lower left
-uniform vec2 origin, pace;  // lens coordinates there, and lenses per pixel
+uniform vec2 corner;        // top left corner of the pane, in pixels from the lower left of the canvas
+uniform vec2 origin, pace;  // lens coordinates of that corner, and lenses per pixel
 uniform vec2 base, slope;   // a viewer sees pixel base + slope · lens under a lens: (4.1)
 uniform vec2 focus;
 out vec4 colour;
@@ -25,7 +25,7 @@ vec4 texel(sampler2DArray pages, ivec2 lens, ivec2 view) {
 
 bool beyond(vec2 lens) { return any(lessThan(lens, vec2(-0.5))) || any(greaterThan(lens, vec2(lenses) - 0.5)); }
 
-// Between four lenses, as one pixel of each sees it; nothing outside the array or where no page has come yet.
+// Interpolates one pixel between four lenses; 0 outside the array and in pages that have not been loaded.
 vec4 between(sampler2DArray pages, vec2 lens, ivec2 view) {
   if (beyond(lens)) return vec4(0);
   ivec2 low = ivec2(floor(lens));
@@ -40,16 +40,16 @@ void main() { gl_Position = vec4(vec2(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 
 
 const VIEW = `${SHARED}
 uniform sampler2D preview;
-uniform vec2 radius;        // of the aperture, in pixels under a lens; 1 is linear between neighbours
-uniform int stride;         // of the pixels taken, when there is no time for all
+uniform vec2 radius;        // radius of the aperture, in pixels under a lens; 1 interpolates linearly between neighbours
+uniform int stride;         // stride of the pixels summed; above 1 for speed while the view moves
 uniform int mode;           // 0 original, 1 decoded, 2 split, 3 difference
-uniform float divide, gain; // where a split pane is parted, in pixels; of a difference
+uniform float divide, gain; // column of the split in pixels; gain of the difference
 uniform vec3 mask;
 
 const vec4 NOTHING = vec4(0.05, 0.05, 0.06, 1);
 
-// The scene focused on one plane: all pixels within the aperture, each from the lens that sees the same point. Towards
-// the array's border the focus goes back to 0, so that the lens of the next pixel is never beyond it.
+// The scene focused on one plane: the mean of all pixels within the aperture, each from the lens that sees the same
+// point. Towards the border of the array the focus falls to 0, so that no lens beyond it is needed.
 vec4 look(sampler2DArray pages, vec2 lens) {
   vec2 pixel = base + slope * lens;
   vec2 zone = floor((pixel + 0.5) / vec2(ei));  // 0, or a neighbouring elementary image: a side viewing zone
@@ -74,7 +74,7 @@ vec4 look(sampler2DArray pages, vec2 lens) {
 void main() {
   vec2 lens = place();
   float x = gl_FragCoord.x - corner.x;
-  if (beyond(lens)) {  // beside the array is no picture, whatever the focus
+  if (beyond(lens)) {  // there is no picture outside the array, at any focus
     colour = vec4(mask * NOTHING.rgb, 1);
     return;
   }
@@ -89,10 +89,10 @@ void main() {
   colour = vec4(mask * colour.rgb, 1);
 }`;
 
-// One line of lenses, all its pixels across: a point is a straight line, the steeper the nearer the lens plane.
+// Epipolar image of one row of lenses: a point is a straight line, which is steeper nearer to the lens plane.
 const EPI = `${SHARED}
 uniform vec2 cursor;
-uniform float rows;         // pixels of the pane's height
+uniform float rows;         // height of the pane in pixels
 uniform int second;
 void main() {
   vec2 at = place();
@@ -103,17 +103,17 @@ void main() {
   if (second == 1) colour = between(decoded, lens, ivec2(u, v)); else colour = between(original, lens, ivec2(u, v));
   vec2 seen = vec2(base.x + slope.x * at.x, abs(slope.x * pace.x) + float(ei.x) / rows);
   if (abs(pixel - seen.x) < seen.y) colour.rgb = mix(colour.rgb, vec3(1, 0.8, 0.2), 0.7);
-  // a point in focus under the cursor
+  // the line of a point in focus under the cursor
   float line = (at.x - cursor.x - focus.x * (pixel - base.x - slope.x * cursor.x)) / pace.x;
   float lean = focus.x / pace.x * float(ei.x) / rows;
   if (abs(line) < sqrt(1.0 + lean * lean)) colour.rgb = mix(colour.rgb, vec3(0.3, 0.9, 1), 0.8);
   colour.a = 1.0;
 }`;
 
-// The picture as it is, around the cursor; the pixels that make the present view are marked.
+// The lenslet picture around the cursor; the pixels of the present view are marked.
 const RAW = `${SHARED}
-uniform vec2 middle;        // of the pane, in pixels of the picture
-uniform vec2 extent;        // of the pane
+uniform vec2 middle;        // centre of the pane, in pixels of the picture
+uniform vec2 extent;        // size of the pane
 uniform float magnify;
 uniform int second;
 void main() {
@@ -132,7 +132,7 @@ void main() {
   colour.a = 1.0;
 }`;
 
-// How much the pixels of one point differ, for one focus a pixel: least where the point is.
+// Variance of the pixels of one point, one focus per pixel: least at the depth of the point.
 const PICK = `${SHARED}
 uniform vec2 cursor, range;
 uniform float count;
@@ -159,7 +159,7 @@ class LightField {
   constructor(canvas, meta) {
     const gl = canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: false });
     if (!gl) throw new Error("This browser offers no WebGL2, which the viewer needs.");
-    // A slot holds one frame: a texture a picture. The views are of the frame in the slot `shown`.
+    // A slot holds one frame, with one texture per picture. Views show the frame in the slot `shown`.
     Object.assign(this, { gl, canvas, meta, programs: {}, slots: [], shown: 0 });
     this.slot(0);
     this.preview = gl.createTexture();
@@ -212,7 +212,7 @@ class LightField {
   }
 
   async put(bytes, target) {
-    // decoded off the main thread, code values untouched
+    // decode off the main thread, without changing code values
     const bitmap = await createImageBitmap(new Blob([bytes]), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
     target(bitmap);
     bitmap.close();
@@ -234,7 +234,7 @@ class LightField {
     });
   }
 
-  // What `render` draws, cut at a pane's edges.
+  // Clips the drawing of `render` at the edges of a pane.
   within(pane, render) {
     const { gl } = this;
     gl.enable(gl.SCISSOR_TEST);
@@ -272,7 +272,7 @@ class LightField {
     else gl.uniform3fv(place, value);
   }
 
-  // What `render` draws into a canvas of its own, as bytes from the top row down.
+  // Renders into a buffer of its own; returns bytes from the top row down.
   offscreen(width, height, render) {
     const { gl } = this, texture = gl.createTexture(), buffer = gl.createFramebuffer();
     gl.activeTexture(gl.TEXTURE0);

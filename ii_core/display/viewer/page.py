@@ -29,15 +29,15 @@ from ...video import IIVideo, video_of
 from ...view import camera_of, five_viewpoints, lens_array_mm, view_image
 from ..look import ASSUMED_ANGLE_DEG, with_assumed_camera
 
-PAGE_SIDE = 2048  # the largest texture every WebGL2 takes
+PAGE_SIDE = 2048  # texture size that every WebGL2 supports
 PREVIEW_SIDE = 512
-MOST_LAYERS = 256  # and the most layers
+MOST_LAYERS = 256  # number of texture layers that every WebGL2 supports
 MAX_EMBEDDED = 256 << 20  # bytes of a page; browsers read no more in reasonable time
-CARD_BYTES = 512 << 20  # of frames of a take on the graphics card; two frames are there in any case
+CARD_BYTES = 512 << 20  # budget for frames of a take on the graphics card, which holds at least two
 JPEG_QUALITY = 95
-FARTHEST = 250  # gaps to the farthest focus
+FARTHEST = 250  # depth of the farthest focus, in gaps
 SCRIPTS = ("lightfield.js", "take.js", "viewer.js")
-TAKE_FILE = "take.pages"  # of a folder: the pages of all frames of a take, which browsers read in part
+TAKE_FILE = "take.pages"  # file in a folder with the pages of all frames of a take; browsers request parts of it
 Rows = Sequence[tuple[str, str]]
 Shown = IIPicture | IIVideo
 
@@ -48,16 +48,16 @@ class ViewerOptions(TypedDict, total=False):
     Attributes
     ----------
     depth : ndarray, (N, M), optional
-        z in mm of every pixel, as `raytrace_ii.render` gives it: clicks focus by it instead of by the picture. Not of
-        an II-video.
+        z in mm of every pixel, from `raytrace_ii.render`: clicks focus by it instead of by the picture. Not for an
+        II-video.
     title : str
-        The name shown.
+        Title shown.
     quality : int or None
-        Of JPEG pages (4:4:4), 1 to 100, 95 if not given; None for WebP without loss, four times as large as 95.
+        Quality of JPEG pages (4:4:4), 1 to 100, 95 if not given; None for lossless WebP, four times as large as 95.
     quality_rows : sequence of (str, str)
         Names and values of a table beside the picture, such as ``("Q_global", "31.20 dB")``.
     labels : (str, str)
-        Of the halves of a split view, such as ``("original", "si-h264, 0.10 bpp, 31.20 dB")``.
+        Labels of the halves of a split view, such as ``("original", "si-h264, 0.10 bpp, 31.20 dB")``.
     """
 
     depth: NDArray[Any] | None
@@ -86,7 +86,7 @@ def write_viewer(
     decoded : IIPicture or IIVideo, optional
         Of the same structure and number of frames, to compare it with.
     progress : callable, optional
-        Called with pages done and pages in all.
+        Called with the number of pages done and of all pages.
     **options : ViewerOptions
         Depth map, title, quality, table and labels.
 
@@ -99,7 +99,7 @@ def write_viewer(
     ------
     ValueError
         If the structures or numbers of frames do not match, the depth map has another size, or the page would be
-        larger than `MAX_EMBEDDED`; of a video this is known by its first frame.
+        larger than `MAX_EMBEDDED`; for a video, the first frame decides this.
     OSError
         If the file cannot be written.
     """
@@ -131,8 +131,8 @@ def write_viewer_folder(
 ) -> None:
     """Write the page as index.html with its data in files beside it, for a web server; see `write_viewer`.
 
-    All pages of a video are in one file, of which the browser requests the bytes of a frame when it needs them. A
-    server without range requests sends the whole file each time.
+    All pages of a video are in one file; the browser requests the bytes of one frame at a time. A server without
+    range requests sends the whole file each time.
     """
     page = _Page(picture, decoded, **options)
     order: list[list[Any]] = []
@@ -151,7 +151,7 @@ def write_viewer_folder(
 
 
 class _Page:
-    """What one page shows, checked once."""
+    """Contents of one page, validated."""
 
     def __init__(
         self,
@@ -177,7 +177,7 @@ class _Page:
         if quality is not None and not 1 <= quality <= 100:
             raise ValueError(f"quality is {quality}: a whole number from 1 to 100 is needed")
         if depth is not None and self.frames > 1:
-            raise ValueError("depth is the map of one picture: a take is shown without it")
+            raise ValueError("depth is the map of one picture: leave it out for a take")
         if depth is not None and depth.shape != picture.pixels.shape[:2]:
             raise ValueError(
                 f"depth is {depth.shape}, the picture {picture.pixels.shape[:2]}: the same size is needed"
@@ -191,11 +191,11 @@ class _Page:
         if math.prod(self.grid) > MOST_LAYERS:
             raise ValueError(
                 f"a picture of {k * u}×{l * v} px fills {math.prod(self.grid)} texture layers: "
-                f"{MOST_LAYERS} of {self.side}×{self.side} px are what every browser has"
+                f"browsers support {MOST_LAYERS} of {self.side}×{self.side} px at least"
             )
 
     def html(self, data: str) -> str:
-        """The page around its data."""
+        """Return the page with its data, a text of script elements."""
         folder = files(__package__)
         text = {name: (folder / name).read_text(encoding="utf-8") for name in ("page.html", "style.css")}
         script = "\n".join((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)
@@ -215,7 +215,7 @@ class _Page:
         )
 
     def meta(self) -> dict[str, Any]:
-        """What the script must know."""
+        """Return the parameters of the script."""
         picture = self.structure
         (u, _), assumed = picture.ei_pixels, picture.camera is None
         camera = camera_of(with_assumed_camera(picture))
@@ -251,7 +251,7 @@ class _Page:
         }
 
     def about(self) -> str:
-        """One line on the picture."""
+        """Return one line of text on the picture."""
         picture = self.structure
         (k, l), (u, v) = picture.lenses, picture.ei_pixels
         camera = f"camera {picture.camera.name}" if picture.camera else f"no camera: {ASSUMED_ANGLE_DEG:g}° assumed"
@@ -259,7 +259,7 @@ class _Page:
         return f"{k} × {l} lenses of {u} × {v} px, {camera}{frames}"
 
     def quality(self) -> str:
-        """The table of qualities, in HTML; what follows _ in a name's first word stands lower."""
+        """Return the table of qualities in HTML; the part of a name's first word after _ is a subscript."""
 
         def named(name: str) -> str:
             symbol, *rest = name.split(" ", 1)
@@ -273,7 +273,7 @@ class _Page:
         return f'<table aria-label="Quality of the decoded picture">{lines}</table>'
 
     def parts(self, progress: Callable[[int, int], None] | None) -> Iterator[tuple[str, tuple[int, ...], bytes]]:
-        """Kind, place and bytes of everything the page shows, what is seen first first.
+        """Yield kind, place and bytes of each part of the page, in the order in which they become visible.
 
         The place of a page is its picture (0, or 1 for the decoded one), layer and frame.
         """
@@ -312,7 +312,7 @@ class _Page:
         return out.getvalue()
 
     def _preview(self) -> bytes:
-        """What the viewer sees from the front, where the page starts."""
+        """Return the view from the front, with which the page starts."""
         picture = with_assumed_camera(self.videos[0][0])
         view, _ = view_image(picture, five_viewpoints(camera_of(picture))["front"])
         step = max(1, -(-max(picture.lenses) // PREVIEW_SIDE))
@@ -331,6 +331,6 @@ COMPARE = """<label>Show <select data-state="mode">
 
 
 def depth_view(picture: IIPicture, depth: NDArray[Any]) -> NDArray[np.float32]:
-    """The part of a depth map on the lenslet grid that the sub-image in the middle has, (L, K)."""
+    """Return the depth map of the sub-image in the middle, (L, K)."""
     u, v = picture.ei_pixels
     return np.asarray(depth[v // 2 :: v, u // 2 :: u], np.float32)

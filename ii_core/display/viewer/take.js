@@ -1,30 +1,29 @@
 "use strict";
-// Frames of a take: which are on the card, which are loaded next, and the clock that plays them. A still is a take of
-// one frame.
+// Frames of a take: cache on the graphics card, loading order, and the playback clock. A still is a take of one frame.
 
 class Take {
-  // `changed` follows every frame that is shown; `failed` gets the message of a frame that cannot be loaded.
+  // Calls `changed` after every frame that is shown, and `failed` with the message of a frame that cannot be loaded.
   constructor(meta, field, changed, failed) {
     const bytes = 4 * meta.side ** 2 * meta.pages * (meta.compared ? 2 : 1);
     Object.assign(this, { field, changed, failed, frames: meta.frames, fps: meta.fps, shown: 0, wanted: 0, playing: false });
     this.slots = Math.min(meta.frames, Math.max(2, Math.floor(meta.card_bytes / bytes)));
     this.parts = Array.from({ length: meta.frames }, () => []);
-    this.slotOf = new Map();  // of every frame that is whole on the card
+    this.slotOf = new Map();  // slot of every frame that is completely on the card
   }
 
-  // A page of a frame; `source` returns its bytes. Pages of the first frame are shown as they come.
+  // Adds a page of a frame; `source` returns its bytes. Pages of the first frame are shown as soon as they are loaded.
   add(frame, picture, layer, source) {
     this.parts[frame].push([picture, layer, source]);
     if (frame === 0) return source().then((bytes) => this.field.setPage(0, picture, layer, bytes));
   }
 
-  // All frames are known and the first is on the card.
+  // Called when all frames are known and the first one is on the card.
   ready() {
     this.slotOf.set(0, 0);
     this.pump();
   }
 
-  // Show a frame as soon as it is on the card, and go on from it while playing.
+  // Show a frame as soon as it is on the card; playback continues from it.
   seek(frame) {
     this.begun = null;
     this.want(frame);
@@ -43,8 +42,8 @@ class Take {
     this.changed();
   }
 
-  // Load frames, one at a time, until the wanted one and as many after it as have room are on the card. While
-  // playing, a frame that comes too late is shown all the same: slow loading leaves out frames, but never stops.
+  // Load frames, one at a time, until the wanted one and as many after it as fit are on the card. During playback a
+  // late frame is shown, too: slow loading skips frames, but playback never stops.
   async pump() {
     if (this.busy || !this.slotOf.size) return;
     this.busy = true;
@@ -77,7 +76,7 @@ class Take {
     this.slotOf.set(frame, slot);
   }
 
-  // A slot without a frame; if there is none, that of the frame that is needed last.
+  // Return a free slot, or the slot of the frame that is needed last.
   room() {
     const used = new Set(this.slotOf.values());
     for (let slot = 0; slot < this.slots; slot++) if (!used.has(slot)) return slot;
@@ -88,7 +87,7 @@ class Take {
     return slot;
   }
 
-  // Play from the wanted frame on, over and over, at the take's rate; `ticked` gets the frame that is due.
+  // Play in a loop from the wanted frame on, at the take's rate; `ticked` is called with the frame that is due.
   play(ticked) {
     if (this.playing || this.frames < 2) return;
     this.playing = true;
@@ -111,7 +110,7 @@ class Take {
   }
 }
 
-// A file beside the page, or its bytes from … to − 1. A server without range requests sends the whole file.
+// Fetch a file beside the page, or its bytes from … to − 1. A server without range requests sends the whole file.
 async function fileBytes(name, from, to) {
   const answer = await fetch(name, from === undefined ? {} : { headers: { Range: `bytes=${from}-${to - 1}` } });
   if (!answer.ok) throw new Error(`${name} cannot be loaded: the server answers ${answer.status}`);

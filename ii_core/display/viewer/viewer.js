@@ -1,15 +1,15 @@
 "use strict";
-// What the user sees and does: panes, the viewer's place, pointer, keyboard, and a link that keeps it all.
+// User interface: panes, the viewer's place, pointer, keyboard, and a link that stores the state.
 
 const DEFAULTS = { t: 0, x: 0, y: 0, r: 1, f: 0, a: 1.5, zoom: 1, cx: 0.5, cy: 0.5, mode: "original", split: 0.5, gain: 4,
   stereo: "off", eyes: 0.25 };
 // The opening focus moves a neighbouring pixel's lens by at most this share of the array.
 const OPENING_SHARE = 1 / 16;
 const MODES = ["original", "decoded", "split", "difference"];
-// Until the first touch the viewer sways: amplitude in shares of the zone, and seconds of a turn.
+// Until the first input the viewer sways: amplitude in shares of the zone, and period in seconds.
 const SWAY = { x: 0.45, y: 0.2, seconds: 7 };
-const SLOWEST = 250;  // milliseconds a frame: what draws more slowly, a processor say, sways no further
-const MOST_ZOOMED = 3;  // on a tall screen the opening zoom fills the pane's height, up to this
+const SLOWEST = 250;  // milliseconds per frame: slower rendering, such as on a CPU, stops the sway
+const MOST_ZOOMED = 3;  // on a tall screen the opening zoom fills the pane's height, up to this factor
 
 class Viewer {
   constructor(meta) {
@@ -19,7 +19,7 @@ class Viewer {
     this.take = new Take(meta, this.field, () => this.redraw(), (message) => this.say(message));
     this.limits = { t: [0, meta.frames - 1], x: [-2, 2], y: [-2, 2], r: [0.35, 10], f: meta.focus, a: [1, Math.max(1, Math.max(...meta.ei) / 2)],
       zoom: [1, 40], cx: [0, 1], cy: [0, 1], split: [0, 1], gain: [1, 32], eyes: [0, 1] };
-    // What the page opens with and Reset returns to; the focus comes once the picture is there.
+    // Initial state, also that of Reset; the focus is set once the picture is loaded.
     this.opening = { ...DEFAULTS, a: Math.min(DEFAULTS.a, this.limits.a[1]), zoom: this.openingZoom(),
       ...(meta.compared ? { mode: "split" } : {}) };
     this.state = { ...this.opening };
@@ -29,16 +29,16 @@ class Viewer {
     this.work = [];
     this.loaded = 0;
     this.fromLink();
-    this.focused = /[#&]f=/.test(location.hash);  // by the link or, while data still come, by the user
+    this.focused = /[#&]f=/.test(location.hash);  // set by the link or, during loading, by the user
     this.bind();
     this.canvas.addEventListener("webglcontextlost", () =>
-      ii.failed("The graphics card gave the picture up, perhaps for want of memory. Reload the page to try again."));
+      ii.failed("The graphics card has dropped the picture, perhaps because memory ran out. Reload the page to try again."));
     new ResizeObserver(() => this.redraw()).observe(document.getElementById("main"));
     document.querySelector("aside").addEventListener("scroll", () => this.redraw());
     this.redraw();
   }
 
-  // --- data, as it comes -------------------------------------------------------------------------------------
+  // --- loading of data ---------------------------------------------------------------------------------------
   bytes(text) {
     return Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   }
@@ -73,7 +73,7 @@ class Viewer {
     if (!this.touched && !location.hash && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.sway();
   }
 
-  // The viewer's place swings around its own, which the state keeps, until `set` changes something.
+  // Sway the viewer around the place in the state, until `set` changes something.
   sway() {
     let begun = null, before = null, slow = 0;
     const step = (now) => {
@@ -94,15 +94,15 @@ class Viewer {
     requestAnimationFrame(step);
   }
 
-  // 1 shows the whole array; on a tall screen that would leave most of the pane empty.
+  // Zoom 1 shows the whole array; on a tall screen this would leave most of the pane empty.
   openingZoom() {
     const box = document.getElementById("main").getBoundingClientRect(), { lenses, camera: c } = this.meta;
     const across = box.width / (lenses[0] * c.lens_pitch_mm[0]), down = box.height / (lenses[1] * c.lens_pitch_mm[1]);
     return box.height > box.width ? Math.min(Math.max(1, down / across), MOST_ZOOMED) : 1;
   }
 
-  // Where the focus is unless the link says it: on the nearer things, or on what lies in the middle, as far as
-  // neighbouring pixels' lenses stay in the array almost everywhere.
+  // Initial focus unless the link sets it: the first quartile of the depth map, or the point in the middle. The focus
+  // is limited such that the lenses of neighbouring pixels stay in the array almost everywhere.
   start() {
     const found = this.depthMap ? [...this.depthMap].filter(Number.isFinite).sort((a, b) => a - b) : [];
     const f = found.length ? this.focusOf(found[Math.floor(found.length / 4)]) : this.pick(this.cursor);
@@ -123,7 +123,7 @@ class Viewer {
   lines(eye = 0) {
     const { camera: c, ei, sign } = this.meta, e = this.viewpoint(eye);
     const scale = (sign * c.gap_mm) / ((c.gap_mm - e[2]) * c.pixel_pitch_mm), down = scale * (c.vertical_parallax ? 1 : 0);
-    // Elementary images stand beside their lenses where viewing zones meet at a viewer.
+    // Elementary images are offset from their lenses if viewing zones converge on a viewer.
     const aside = c.viewer_mm ? sign * c.gap_mm / (c.viewer_mm * c.pixel_pitch_mm) : 0;
     const beside = c.vertical_parallax ? aside : 0;
     const first = [c.lens_pitch_mm[0] / 2 - c.size_mm[0] / 2, c.size_mm[1] / 2 - c.lens_pitch_mm[1] / 2];
@@ -213,12 +213,12 @@ class Viewer {
     } else one(pane, 0, [1, 1, 1]);
   }
 
-  // While something moves, at most about 8 × 8 pixels under each lens are added up.
+  // During motion, about 8 × 8 pixels under each lens are summed at most.
   stride() {
     return this.quick || this.take.playing ? Math.max(1, Math.round(this.state.a / 4)) : 1;
   }
 
-  // The present view with one pixel a lens, as `view_image` makes it: {width, height, data}.
+  // The present view with one pixel per lens, as in `view_image`: {width, height, data}.
   snapshot() {
     const [width, height] = this.meta.lenses;
     const data = this.field.offscreen(width, height, (pane) => this.field.draw("view", pane, { ...this.optics(),
@@ -238,7 +238,7 @@ class Viewer {
   }
 
   // --- focus -------------------------------------------------------------------------------------------------
-  // The focus at which all pixels that see the point under a place agree best; from the depth map if there is one.
+  // Return the focus of least variance among the pixels that see the point at a place; from the depth map if given.
   pick(lens) {
     if (this.depthMap) return this.pickFromMap(lens);
     const count = 512, { base, slope } = this.lines(), range = this.meta.focus.map((f) => f * this.meta.sign);
@@ -253,11 +253,11 @@ class Viewer {
     return this.meta.focus[0] + (this.meta.focus[1] - this.meta.focus[0]) * best / (count - 1);
   }
 
-  // Walk along the line of sight until it passes the surface that the centre view's depth map tells.
+  // Step along the line of sight until it passes the surface of the centre view's depth map.
   pickFromMap(lens) {
     const { lenses, ei, sign, camera: c } = this.meta, { base, slope } = this.lines();
     const ratio = c.vertical_parallax ? c.lens_pitch_mm[0] / c.lens_pitch_mm[1] : 0, [near, far] = this.meta.focus;
-    const centre = ei.map((n) => Math.floor(n / 2)), steps = 2000;  // as `depth_view` takes it
+    const centre = ei.map((n) => Math.floor(n / 2)), steps = 2000;  // as in `depth_view`
     let nearest = null, apart = Infinity;
     for (let i = 0; i <= steps; i++) {
       const f = near + (far - near) * i / steps;
@@ -273,7 +273,7 @@ class Viewer {
 
   // --- state -------------------------------------------------------------------------------------------------
   set(change, quick = false) {
-    if (this.swaying) {  // go on from where the sway has led
+    if (this.swaying) {  // continue from the present place of the sway
       this.state.x += this.swung[0];
       this.state.y += this.swung[1];
       this.swung = [0, 0];
@@ -301,7 +301,7 @@ class Viewer {
     return key === "t" ? Math.round(inside) : inside;
   }
 
-  // Play or pause. The viewer's place, focus and comparison stay free meanwhile.
+  // Play or pause. Viewpoint, focus and comparison can be changed during playback.
   play(on) {
     if (on) this.take.play((frame) => {
       this.state.t = frame;
@@ -334,7 +334,7 @@ class Viewer {
     document.getElementById("status").textContent = text;
   }
 
-  // Values as the page names them.
+  // Labels of the values.
   shown() {
     const { state, meta: { camera: c } } = this, degrees = (angle) => `${(angle * 180 / Math.PI).toFixed(1)}°`;
     const late = !this.take.playing && this.take.shown !== state.t;
@@ -348,7 +348,7 @@ class Viewer {
     };
   }
 
-  // Whether a control changes anything as things stand.
+  // Whether a control has an effect in the present state.
   matters(key) {
     const { state, meta: { ei, camera } } = this, limit = this.limits[key];
     const rules = { eyes: state.stereo !== "off", split: state.mode === "split", gain: state.mode === "difference",
@@ -437,7 +437,7 @@ class Viewer {
     });
   }
 
-  // The space bar plays wherever it does not press a button.
+  // The space bar plays, unless a button has the keyboard focus.
   bindPlay() {
     document.getElementById("play")?.addEventListener("click", () => this.play(!this.take.playing));
     document.addEventListener("keydown", (event) => {
@@ -467,7 +467,7 @@ class Viewer {
     });
   }
 
-  // The picture alone, on the full screen where the browser lets a page have it.
+  // Show the picture alone, on the full screen if the browser allows it.
   bindWide() {
     const show = (wide) => {
       document.body.classList.toggle("wide", wide);
@@ -488,7 +488,7 @@ class Viewer {
     document.addEventListener("keydown", (event) => event.key === "Escape" && this.widen(false));
   }
 
-  // Tilting the device turns the view as it would turn a display: by the same angle, from where it was switched on.
+  // Tilting the device rotates the view like a display: by the same angle, relative to the tilt at switching on.
   bindTilt() {
     const button = document.getElementById("tilt"), radian = Math.PI / 180;
     if (!window.DeviceOrientationEvent || !navigator.maxTouchPoints) return;
@@ -511,7 +511,7 @@ class Viewer {
     });
   }
 
-  // Dragging turns the scene: to the right, and the viewer goes left. A pane's width is the whole viewing zone.
+  // Dragging turns the scene: a drag to the right moves the viewer left. A pane's width spans the whole viewing zone.
   look(across, up) {
     this.set({ x: this.state.x + 2 * across, y: this.state.y + 2 * up }, true);
   }
@@ -535,7 +535,7 @@ class Viewer {
     this.redraw();
   }
 
-  // Another frame, in a circle; the take rests there.
+  // Step to another frame, cyclically, and pause.
   stepped(by) {
     this.take.pause();
     return { t: (this.state.t + by + this.meta.frames) % this.meta.frames };
@@ -562,7 +562,7 @@ class Viewer {
   }
 }
 
-// Called by the page as its parts arrive; text is base64.
+// Called by the page when its parts are loaded; text is base64.
 const ii = {
   start(meta) {
     try {
@@ -571,7 +571,7 @@ const ii = {
       ii.failed(error.message);
     }
   },
-  // A still picture stands under the message.
+  // A still picture is shown below the message.
   failed(message) {
     document.querySelector("#failure p").textContent = message;
     document.getElementById("failure").hidden = false;
@@ -587,7 +587,7 @@ const ii = {
   },
   page: (picture, layer, frame, text) => ii.viewer?.page(picture, layer, frame, async () => ii.viewer.bytes(text)),
   depth: (text) => ii.viewer?.depth(ii.viewer.bytes(text)),
-  // The same from files beside the page, for a picture too large to stand in it.
+  // The same from files beside the page, for a picture too large to embed.
   async fetch(order) {
     ii.still(order.find(([kind]) => kind === "preview")[1]);
     if (!ii.viewer) return;
