@@ -9,6 +9,7 @@ Takes are rendered once into ``out/takes``. Numbers go to ``benchmarks/results/t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -39,26 +40,35 @@ PLANS = {
     "interleaved, groups of 16 views": Plan(walk="interleaved", span=SPAN, group=16, strip=4),
 }
 ONE_WAY = ("view-first", "time-first")
-# Scheme and quantisers by coder, of PSNRs that overlap. `si-lf` codes pictures alone; its frames are FRAMES_ALONE.
+ORDERS = ("view-first", "time-first", "interleaved", "stills")  # of every coder; the first is its anchor
+# Scheme and quantisers by coder. `si-lf` codes pictures alone: the frame FRAME_ALONE.
 CODERS = {
     "H.264": (SCHEME, QPS),
-    "HEVC": ("si-hevc", QPS),
-    "AV1": ("si-av1", (20, 32, 44, 56)),
+    "HEVC": ("si-hevc:rate=cq,refs=8", QPS),
+    "AV1": ("si-av1:rate=cq", (24, 35, 46, 57)),
     "si-lf": ("si-lf", (26, 32, 38, 44)),
 }
-FRAMES_ALONE = (0, 4)
+FRAME_ALONE = 4
 
 
 def main() -> None:
     """Measure, print, keep, and fill tables."""
     asked = command_line(__doc__, scale=SCALE, takes=TAKES).parse_args()
     takes = asked.takes
-    keys = [{"take": take, "scale": asked.scale, "plan": plan} for plan in PLANS for take in takes]
+    keys: list[dict[str, Any]] = [
+        {"take": take, "scale": asked.scale, "plan": plan} for plan in PLANS for take in takes
+    ]
     keys += [{"take": take, "scale": asked.scale, "step": step} for step in STEPS for take in takes]
-    keys += [{"take": take, "scale": asked.scale, "coder": coder} for coder in CODERS for take in takes]
+    keys += [
+        {"take": take, "scale": asked.scale, "coder": coder, "order": order}
+        for order in ORDERS
+        for coder in CODERS
+        for take in takes
+        if coder != "si-lf" or order == "stills"
+    ]
     for key in RECORDS.todo(keys, asked.again):
         video = rendered(key["take"], asked.scale)
-        RECORDS.measure(key, lambda key=key, video=video: coded(video, **key))
+        RECORDS.measure(key, partial(coded, video, **key))
         print(key, flush=True)
     print("\n".join(line for lines in tables().values() for line in lines))
     publish(tables())
@@ -72,10 +82,15 @@ def rendered(take: str, scale: int) -> IIVideo:
     return open_video(folder)
 
 
-def coded(video: IIVideo, take: str, scale: int, plan: str = "", step: int = 0, coder: str = "") -> dict[str, Any]:
-    """Points of one plan; of a coder; or, of every step-th frame, points of both one-way orders and correlations."""
+def coded(
+    video: IIVideo, take: str, scale: int, plan: str = "", step: int = 0, coder: str = "", order: str = ""
+) -> dict[str, Any]:
+    """Points of one plan; of a coder in one order; or, of every step-th frame, of both one-way orders."""
+    if coder == "si-lf":
+        return {"points": alone(video, *CODERS[coder])}
     if coder:
-        return {"curves": by_coder(video, *CODERS[coder])}
+        some = video_of([video[i] for i in range(INSTANTS)], fps=video.fps)
+        return {"points": points(some, PLANS[order], *CODERS[coder])}
     if plan:
         return {"points": points(video_of([video[i] for i in range(FRAMES)], fps=video.fps), PLANS[plan])}
     some = video_of([video[step * i] for i in range(INSTANTS)], fps=video.fps / step)
@@ -83,20 +98,15 @@ def coded(video: IIVideo, take: str, scale: int, plan: str = "", step: int = 0, 
     return {"curves": curves, **correlations(some)}
 
 
-def by_coder(video: IIVideo, scheme: str, quantisers: Sequence[int]) -> dict[str, list[dict[str, float]]]:
-    """Points of the first instants as stills and time-first; of a coder of pictures only as stills."""
-    if scheme == "si-lf":
-        return {"stills": [alone(video, scheme, qp) for qp in quantisers]}
-    some = video_of([video[i] for i in range(INSTANTS)], fps=video.fps)
-    return {name: points(some, PLANS[name], scheme, quantisers) for name in ("stills", "time-first")}
-
-
-def alone(video: IIVideo, scheme: str, qp: int) -> dict[str, float]:
-    """Rate and quality of frames that a coder of pictures codes one by one."""
-    original = video_of([video[i] for i in FRAMES_ALONE], fps=video.fps)
-    coded = [encode(picture, scheme, qp=qp) for picture in original]
-    quality = measure_take(original, video_of([decode(one) for one in coded], fps=video.fps))
-    return {"qp": qp, "bpp": sum(one.bpp for one in coded) / len(coded), "psnr_of_pooled_mse": quality.pooled_psnr}
+def alone(video: IIVideo, scheme: str, quantisers: Sequence[int]) -> list[dict[str, float]]:
+    """Rate and quality of a frame by a coder of pictures, at every quantiser."""
+    original = video_of([video[FRAME_ALONE]], fps=video.fps)
+    found = []
+    for qp in quantisers:
+        one = encode(original[0], scheme, qp=qp)
+        quality = measure_take(original, video_of([decode(one)], fps=video.fps))
+        found.append({"qp": qp, "bpp": one.bpp, "psnr_of_pooled_mse": quality.pooled_psnr})
+    return found
 
 
 def points(
@@ -176,7 +186,7 @@ def plan_table() -> list[str]:
                 cells.append("–")
                 continue
             off = difference(take["stills"]["points"], take[plan]["points"])
-            cells.append("anchor" if plan == "stills" else "–" if off is None else f"{off:+.1f} %")
+            cells.append("anchor" if plan == "stills" else rate_text(off))
         lines.append(f"| {plan} | {cost.mean:g} | " + " | ".join(cells) + " |")
         commits.append([take[plan]["commit"] for take in rows.values() if plan in take])
     every = [row for take in rows.values() for row in take.values()]
@@ -184,19 +194,23 @@ def plan_table() -> list[str]:
 
 
 def coder_table() -> list[str]:
-    """A row a coder and order: Bjøntegaard rate against stills of H.264."""
-    rows = {(row["coder"], row["take"]): row for row in RECORDS.rows(scale=SCALE) if "coder" in row}
+    """A row a coder and order: Bjøntegaard rate against its own first order, and against H.264 in that order."""
+    rows = {(row["coder"], row["order"], row["take"]): row for row in RECORDS.rows(scale=SCALE) if "order" in row}
     if not rows:
         return ["Not measured yet."]
-    lines = ["| coder | order | " + " | ".join(TAKES) + " |", "|---|---|" + "---|" * len(TAKES)]
+    lines = [
+        "| coder | order | " + " | ".join(f"{take}, own | H.264" for take in TAKES) + " |",
+        "|---|---|" + "---|---|" * len(TAKES),
+    ]
     for coder in CODERS:
-        for order in ("stills", "time-first"):
+        for order in ORDERS:
             cells = []
             for take in TAKES:
-                anchor, test = (rows.get((name, take), {"curves": {}})["curves"] for name in ("H.264", coder))
-                off = difference(anchor["stills"], test[order]) if "stills" in anchor and order in test else None
-                cells.append("anchor" if (coder, order) == ("H.264", "stills") else rate_text(off))
-            if coder != "si-lf" or order == "stills":
+                for anchor in (coder, "H.264"):
+                    pair = [rows.get((name, by, take)) for name, by in ((anchor, ORDERS[0]), (coder, order))]
+                    off = None if None in pair else difference(*(row["points"] for row in pair if row))
+                    cells.append("anchor" if (anchor, ORDERS[0]) == (coder, order) else rate_text(off))
+            if any((coder, order, take) in rows for take in TAKES):
                 lines.append(f"| {coder} | {order} | " + " | ".join(cells) + " |")
     return [origin(rows.values()), "", *lines]
 
@@ -219,7 +233,7 @@ def speed_table() -> list[str]:
         off = difference(*(row["curves"][name] for name in ONE_WAY))
         lines.append(
             f"| {row['take']} | ×{row['step']} | {1 - row['time_correlation']:.4f} | "
-            f"{1 - row['view_correlation']:.4f} | {'–' if off is None else f'{off:+.1f} %'} |"
+            f"{1 - row['view_correlation']:.4f} | {rate_text(off)} |"
         )
     return [origin(rows), "", *lines]
 
