@@ -1,11 +1,12 @@
 """Q_view by the model of display and eye, and measures against SIMULATED observers of that display.
 
-    python -m benchmarks run eye_views
+    python -m benchmarks run eye_views --scales 4,2
 
-Scenes, schemes and rates of Figure 5.19 at ``scale=4`` of setup 3. Q_view takes one pixel through the middle of every
+Scenes, schemes and rates of Figure 5.19 through setup 3. Q_view takes one pixel through the middle of every
 lens (4.3). Here its five views are also those of an eye with a pupil, before an ideal display and before one with
 faults. The question is whether the order of schemes changes. The observers are simulated: their quality is Q_view
-before the display with faults, and their answers go through plan, files and analysis of a test.
+before the display with faults, and their answers go through plan, files and analysis of a test. Measures of others
+(`view_measures`) are compared with ours by the same observers.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.accuracy.view_measures import CANDIDATES, available, candidates
 from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
@@ -34,8 +36,16 @@ from metrics.observers.simulated import write_simulated
 from metrics.plots.opinion_chart import opinion_chart
 from metrics.view import mssim
 
-RECORDS = Records("eye_views", ("benchmarks.accuracy.eye_views", "benchmarks.study.coding", "benchmarks.study.views"))
-SCALE, RATES = 4, (0.15, 0.3, 0.63, 1.0)
+RECORDS = Records(
+    "eye_views",
+    (
+        "benchmarks.accuracy.eye_views",
+        "benchmarks.accuracy.view_measures",
+        "benchmarks.study.coding",
+        "benchmarks.study.views",
+    ),
+)
+SCALES, RATES = (4, 2), (0.15, 0.3, 0.63, 1.0)
 MEASURES = ("q_global", "q_angle_min", "q_view", "q_view_min", "q_view_psnr", "q_view_pooled_psnr")
 PUPIL_MM = 4.0
 FAULTS: dict[str, Any] = {"layout": "rgb-stripe", "fill": 0.6, "black": 0.005, "crosstalk": 0.1, "turn_deg": 0.05}
@@ -46,9 +56,10 @@ OBSERVERS, BIAS, SPREAD = 24, 0.3, 0.7
 
 def main() -> None:
     """Measure, keep, draw, fill the pages."""
-    asked = command_line(__doc__).parse_args()
-    for key in RECORDS.todo(({"scene": scene, "scale": SCALE} for scene in SCENES), asked.again):
-        RECORDS.measure(key, lambda key=key: {"points": points(key["scene"], key["scale"])})
+    asked = command_line(__doc__, scenes=SCENES, scales=[str(scale) for scale in SCALES]).parse_args()
+    keys = [{"scene": scene, "scale": int(scale)} for scale in asked.scales for scene in asked.scenes]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda key=key: {"points": points(**key), "peers": available()})
     path = IMAGES / "opinions_simulated.png"
     opinion_chart(simulated(), path)
     write_picture(path, path)
@@ -58,7 +69,7 @@ def main() -> None:
 def points(scene: str, scale: int) -> list[dict[str, Any]]:
     """Return measures, and Q_view before each display, of every scheme and rate."""
     picture = shot(scene, "setup3", scale).picture
-    measure = measuring(picture, MEASURES)
+    measure, others = measuring(picture, MEASURES), candidates(picture)
     references = {name: eye_views(picture, name) for name in DISPLAYS}
 
     def point(one: tuple[str, float]) -> dict[str, Any]:
@@ -66,7 +77,7 @@ def points(scene: str, scale: int) -> list[dict[str, Any]]:
         decoded = decode(coded)
         seen = {name: q_eye(references[name], eye_views(decoded, name)) for name in DISPLAYS}
         head = {"scheme": one[0], "target_bpp": one[1], "bpp": coded.bpp, "reached": coded.reached}
-        return {**head, **measure(decoded), **seen}
+        return {**head, **measure(decoded), **others(decoded), **seen}
 
     with ThreadPoolExecutor(cores()) as pool:
         return list(pool.map(point, ((scheme, rate) for scheme in SHOWN for rate in RATES)))
@@ -87,10 +98,18 @@ def q_eye(reference: list[Any], decoded: list[Any]) -> float:
 
 
 def rows() -> list[dict[str, Any]]:
-    """Return all points at rates that the scheme reaches, with scene and commit."""
-    names = ("scene", "commit")
+    """Return all points at rates that the scheme reaches, with scene, scale and commit."""
+    names = ("scene", "scale", "commit")
     found = [{**point, **{name: row[name] for name in names}} for row in RECORDS.rows() for point in row["points"]]
     return [point for point in found if point["reached"]]
+
+
+def finest() -> list[dict[str, Any]]:
+    """Return the points of the finest scale at which every scene is measured."""
+    found = rows()
+    scenes = {one["scene"] for one in found}
+    whole = [s for s in {one["scale"] for one in found} if {o["scene"] for o in found if o["scale"] == s} == scenes]
+    return [one for one in found if one["scale"] == min(whole)]
 
 
 def tables() -> Tables:
@@ -103,27 +122,35 @@ def order_table() -> list[str]:
     if not (found := rows()):
         return []
     lines = [
-        "| scene | pairs | order kept, ideal display | order kept, with faults | reversed by more than 0.01 |",
-        "|---|---|---|---|---|",
+        "| scale | scene | pairs | order kept, ideal display | with faults | reversed by more than 0.01 |",
+        "|---|---|---|---|---|---|",
     ]
-    total = np.zeros(4, int)
-    for scene in SCENES:
-        counts = np.zeros(4, int)
-        for a, b in combinations([one for one in found if one["scene"] == scene], 2):
-            apart = a["q_view"] - b["q_view"]
-            if a["target_bpp"] != b["target_bpp"] or abs(apart) < TIE:
-                continue
-            kept = [apart * (a[name] - b[name]) > 0 for name in DISPLAYS]
-            clear = any(-np.sign(apart) * (a[name] - b[name]) > 0.01 for name in DISPLAYS)
-            counts += [1, *kept, clear]
-        total += counts
-        lines.append(f"| {scene} | " + " | ".join(map(str, counts)) + " |")
-    return [*lines, "| all | " + " | ".join(map(str, total)) + " |", "", origin(found)]
+    for scale in sorted({one["scale"] for one in found}, reverse=True):
+        at = [one for one in found if one["scale"] == scale]
+        counts = {scene: kept_pairs([one for one in at if one["scene"] == scene]) for scene in SCENES}
+        counts = {scene: each for scene, each in counts.items() if each.any()}
+        if len(counts) > 1:
+            counts["all"] = np.sum(list(counts.values()), axis=0)
+        lines += [f"| {scale} | {scene} | " + " | ".join(map(str, each)) + " |" for scene, each in counts.items()]
+    return [*lines, "", origin(found)]
+
+
+def kept_pairs(found: list[dict[str, Any]]) -> Any:
+    """Return pairs with an order, pairs that keep it before each display, and pairs that are clearly reversed."""
+    counts = np.zeros(4, int)
+    for a, b in combinations(found, 2):
+        apart = a["q_view"] - b["q_view"]
+        if a["target_bpp"] != b["target_bpp"] or abs(apart) < TIE:
+            continue
+        kept = [apart * (a[name] - b[name]) > 0 for name in DISPLAYS]
+        clear = any(-np.sign(apart) * (a[name] - b[name]) > 0.01 for name in DISPLAYS)
+        counts += [1, *kept, clear]
+    return counts
 
 
 def simulated() -> Verdict:
     """Return what SIMULATED observers say: their quality is Q_view before the display with faults, from 1 to 5."""
-    found = rows()
+    found = finest()
     low, high = (f([number(one["faults"]) for one in found]) for f in (min, max))
     stimuli: list[dict[str, Any]] = []
     quality: list[float] = []
@@ -133,7 +160,7 @@ def simulated() -> Verdict:
         for one in (one for one in found if one["scene"] == scene):
             label = LABELS[1 + SHOWN.index(one["scheme"])]
             name = f"{label}, {one['target_bpp']:g} bpp"
-            kept = {name: number(one[name]) for name in MEASURES}
+            kept = {name: number(one[name]) for name in measured(found)}
             stimuli.append({"scene": scene, "name": name, "reference": False, "scheme": label, "measures": kept})
             quality.append(1 + 4 * (number(one["faults"]) - low) / (high - low))
     plan = make_plan(stimuli, [5 - one for one in quality], Options(observers=OBSERVERS))
@@ -142,17 +169,23 @@ def simulated() -> Verdict:
         return verdict(read_results(files))
 
 
+def measured(found: list[dict[str, Any]]) -> list[str]:
+    """Return our measures, and those of others that every point has."""
+    return [*MEASURES, *(name for name in CANDIDATES if all(name in one for one in found))]
+
+
 def simulated_table() -> list[str]:
     """PLCC, SROCC, RMSE and outlier ratio of each measure for all stimuli; PLCC by scene and by scheme."""
-    if not (found := rows()):
+    if not rows():
         return []
+    found = finest()
     made = simulated()
     groups = [group for group in dict.fromkeys(group for _, group in made.predictions) if group != "all"]
     lines = [
         f"| measure | PLCC | SROCC | RMSE | outliers | {' | '.join(groups)} |",
         "|---|" + "---|" * (4 + len(groups)),
     ]
-    for measure in MEASURES:
+    for measure in measured(found):
         every = made.predictions[measure, "all"]
         each = " | ".join(f"{made.predictions[measure, group].plcc:.2f}" for group in groups)
         head = f"{every.plcc:.3f} | {every.srocc:.3f} | {every.rmse:.2f} | {every.outlier_ratio:.0%}"
