@@ -168,6 +168,7 @@ BENCHMARKS = {
         Benchmark("pages.make_textures", writes=("assets/textures/*",)),
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
         Benchmark("stability.wrong_calls", records=OWN, fills=("docs/stability.md",)),
+        Benchmark("stability.install", needs="package registries", records=OWN, fills=("docs/tutorial.md",)),
         Benchmark("pages.focus_patterns", writes=(f"{IMAGES}/focus_patterns.*",)),
         Benchmark("pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)),
         Benchmark(
