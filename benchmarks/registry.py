@@ -244,6 +244,7 @@ BENCHMARKS = {
             tables_in="study.page",
             writes=(f"{IMAGES}/study/*",),
         ),
+        Benchmark("pages.data_card", fills=("docs/benchmark.md",)),
         Benchmark("pages.tables", needs="records of all others"),
     )
 }

@@ -45,6 +45,12 @@ def source_hash(packages: Sequence[str], endings: Sequence[str] = (".py",)) -> s
     return digest.hexdigest()
 
 
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of a file."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 @lru_cache(maxsize=4096)
 def _file_hash(path: Path, _changed: int) -> bytes:
     return hashlib.sha256(path.read_bytes()).digest()

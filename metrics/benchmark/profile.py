@@ -66,6 +66,10 @@ class Reference:
             return preset(self.camera, scale=self.scale)
         return IICamera.from_json({"name": self.name, **self.camera})
 
+    def matches(self, sha256: str) -> bool | None:
+        """Return whether pixels of this hash are those of the definition; None if it does not fix them."""
+        return None if self.sha256 is None else self.sha256 == sha256
+
 
 @dataclass(frozen=True, kw_only=True)
 class Profile:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from ..points import check_points, spelt, unspelt
 from ..rd import rate_distortion
 from ..study import picture_json, provenance
 from .profile import Profile, Reference
+from .run_log import RunLog
 
 FORMAT, VERSION = "ii-benchmark", 1
 NEEDED = {"profile", "coder", "pictures", "git", "machine", "versions", "date"}
@@ -25,12 +26,13 @@ Made = Callable[[Reference], IIPicture]
 def run(
     profile: Profile,
     coder: str,
-    pictures: Iterable[tuple[Reference, IIPicture]],
+    made: Made,
     *,
     encode: Callable[..., Any],
     decode: Callable[[Any], Any],
     commands: Sequence[str] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
+    log: RunLog | None = None,
 ) -> dict[str, Any]:
     """Run a coder on the pictures of a profile.
 
@@ -39,13 +41,16 @@ def run(
     profile : Profile
     coder : str
         Scheme, or the name of external commands.
-    pictures : iterable of (Reference, IIPicture)
+    made : callable
+        ``made(reference)`` returns the picture; it is not called for a picture whose points are all in the log.
     encode, decode : callable
         As for `metrics.rate_distortion`.
     commands : sequence of str, optional
         External commands.
     progress : callable, optional
         ``progress(done, total, text)`` after every point.
+    log : RunLog, optional
+        Finished points, which are not measured again; every new point is added.
 
     Returns
     -------
@@ -55,40 +60,69 @@ def run(
     Raises
     ------
     ValueError
-        If a point cannot be coded or does not decode: no partial results are kept.
+        If a point cannot be coded or does not decode: there is no result of a part. Or if the log has points of other
+        pixels.
     """
-    date = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    origin, date = provenance(), datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     total, rows = len(profile.pictures) * len(profile.rates_bpp), []
-    for number, (reference, picture) in enumerate(pictures):
-        made = picture_json(reference.name, picture)
+    for number, reference in enumerate(profile.pictures):
+        done = number * len(profile.rates_bpp)
 
-        def report(done: int, _: int, text: str, number: int = number, name: str = reference.name) -> None:
+        def report(found: int, _: int, text: str, done: int = done, name: str = reference.name) -> None:
             if progress is not None:
-                progress(number * len(profile.rates_bpp) + done, total, f"{name}: {text}")
+                progress(done + found, total, f"{name}: {text}")
 
-        try:
-            points = rate_distortion(
-                picture, [coder], profile.rates_bpp, encode=encode, decode=decode, progress=report, workers=1,
-                measure=measuring(picture, [name for name in profile.measures if name != "q_global"]),
-            )  # fmt: skip
-        except ValueError as error:
-            raise ValueError(f"{coder} on {reference.name}: {one_line(error)}") from error
-        for point in points:
-            point["reached"] = profile.meets(point["bpp"], point["target_bpp"])
-        rows.append({**made, "as_defined": _as_defined(reference, made["sha256"]), "points": points})
+        rows.append(_row(profile, coder, reference, made, log, encode=encode, decode=decode, progress=report))
     return {
         "profile": {"name": profile.name, "version": profile.version, "sha256": profile.digest},
         "coder": coder,
         "commands": None if commands is None else list(commands),
-        **provenance(),
+        **origin,
         "date": date,
         "pictures": rows,
     }
 
 
-def _as_defined(reference: Reference, found: str) -> bool | None:
-    """Return whether a picture is the one of the profile; None if the profile does not fix it."""
-    return None if reference.sha256 is None else reference.sha256 == found
+def _row(
+    profile: Profile, coder: str, reference: Reference, made: Made, log: RunLog | None, **tools: Any
+) -> dict[str, Any]:
+    """Return a picture's identity and points; points of the log are not measured again."""
+    known = {point["target_bpp"]: point for point in (log.points(reference.name) if log else ())}
+    identity = log.picture(reference.name) if log else None
+    if identity is None or set(profile.rates_bpp) - set(known):
+        picture = made(reference)
+        found, before = picture_json(reference.name, picture), identity
+        if before is not None and before["sha256"] != found["sha256"]:
+            raise ValueError(
+                f"{reference.name} has pixels {found['sha256'][:12]}, finished points in {log and log.path} are of "
+                f"{before['sha256'][:12]}: --force starts again"
+            )
+        identity = found
+
+        def keep(point: dict[str, Any]) -> None:
+            if log is not None:
+                log.keep(found, _judged(profile, point))
+
+        try:
+            points = rate_distortion(
+                picture, [coder], profile.rates_bpp, workers=1, keep=keep,
+                known={(coder, rate): point for rate, point in known.items()},
+                measure=measuring(picture, [name for name in profile.measures if name != "q_global"]), **tools,
+            )  # fmt: skip
+        except ValueError as error:
+            raise ValueError(f"{coder} on {reference.name}: {one_line(error)}") from error
+    else:
+        points = [known[rate] for rate in profile.rates_bpp]
+    return {
+        **identity,
+        "as_defined": reference.matches(identity["sha256"]),
+        "points": [_judged(profile, point) for point in points],
+    }
+
+
+def _judged(profile: Profile, point: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a point that counts as reached by the rule of the profile."""
+    return {**point, "reached": profile.meets(point["bpp"], point["target_bpp"])}
 
 
 def write_result(path: str | os.PathLike[str], result: Mapping[str, Any]) -> Path:

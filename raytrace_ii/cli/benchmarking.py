@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,8 +13,7 @@ from .progress import progress_bar, say_done
 from .words import say
 
 if TYPE_CHECKING:
-    from ii_core import IIPicture
-    from metrics.benchmark.profile import Profile, Reference
+    from metrics.benchmark.profile import Profile
 
 
 @app.command()
@@ -28,14 +26,23 @@ def benchmark(
     ] = ("", ""),
     name: Annotated[str | None, typer.Option(help="Of the external commands in results.")] = None,
     views: Annotated[str, typer.Option(help="Files for external commands: ppm of 10 bit, or png.")] = "ppm",
+    pictures: Annotated[
+        Path | None, typer.Option(help="Folder of `raytrace-ii render --set benchmark`; rendered if none.")
+    ] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The result, .json.")] = None,
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
-    """Run a coder, or external commands, on the pictures of a benchmark."""
+    """Run a coder, or external commands, on the pictures of a benchmark.
+
+    Every point is written when it is measured. The same command continues a run that failed or was stopped.
+    """
     from metrics.benchmark.profile import profile as profile_of
     from metrics.benchmark.profile import profile_names
     from metrics.benchmark.result import run, write_result
+    from metrics.benchmark.run_log import RunLog
+
+    from .benchmark_pictures import rendered, stored
 
     load_plugins(plugin)
     if profile is None:
@@ -46,9 +53,16 @@ def benchmark(
         raise ValueError("output is missing: -o result.json is needed")
     check_outputs([output], force)
     coder, tools = _coder(defined, scheme, external, name, views)
-    with progress_bar(f"{defined.name} {defined.version}, {coder}") as progress:
-        result = run(defined, coder, _pictures(defined), progress=progress, **tools)
+    made = rendered if pictures is None else stored(defined, pictures)
+    log = RunLog(output.with_suffix(".points.jsonl"), defined, coder, tools.get("commands"), restart=force)
+    try:
+        with progress_bar(f"{defined.name} {defined.version}, {coder}") as progress:
+            result = run(defined, coder, made, progress=progress, log=log, **tools)
+    except ValueError as error:
+        kept = f"; finished points are in {log.path}, the same command continues" if log.path.exists() else ""
+        raise ValueError(f"{error}{kept}") from error
     write_result(output, result)
+    log.remove()
     changed = [row["name"] for row in result["pictures"] if row["as_defined"] is False]
     if changed:
         say(f"not the pixels of the definition: {', '.join(changed)}; such results are ranked among themselves alone")
@@ -78,19 +92,6 @@ def _coder(
         encoder=encoder, decoder=decoder, kind=views, seconds=profile.seconds, rate_tolerance=profile.rate_tolerance
     )
     return name, {"encode": tool.encode, "decode": tool.decode, "commands": [encoder, decoder]}
-
-
-def _pictures(profile: Profile) -> Iterator[tuple[Reference, IIPicture]]:
-    """Yield the reference pictures, rendered."""
-    from ii_core import camera_pose
-    from raytrace_ii import load_scene, render
-
-    for reference in profile.pictures:
-        pose = camera_pose(reference.at_mm)
-        shot = render(
-            load_scene(reference.scene), reference.made_camera(), samples=reference.samples, pose=pose, support=()
-        )
-        yield reference, shot.picture
 
 
 @app.command()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -152,6 +152,14 @@ def pair(name: str, text: str, limit: int = 1 << 16) -> tuple[int, int]:
     if not (1 <= a <= limit and 1 <= b <= limit):
         raise ValueError(f"{name} is {text!r}: two whole numbers from 1 to {limit} as in 9x9 are needed")
     return a, b
+
+
+def check_only(context: typer.Context, reason: str, allowed: Set[str]) -> None:
+    """Raise ValueError if a command was given options other than these."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    given = [name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"]
+    if others := [name for name in given if name not in {*allowed, "quiet"}]:
+        raise ValueError(f"{reason}: leave out --{others[0].replace('_', '-')}")
 
 
 def columns(rows: dict[str, str]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .cluster import Dask, cluster
-from .common import Force, Workers, app, check_outputs, image_file, picture_files
+from .common import Force, Workers, app, check_only, check_outputs, image_file, picture_files
 from .progress import progress_bar, say_done
 
 if TYPE_CHECKING:
@@ -20,11 +20,14 @@ Exr = Path | None
 
 @app.command()
 def render(
+    context: typer.Context,
     output: Annotated[
         Path, typer.Option("-o", "--output", help=".png, .tif (8 or 16 bit) or .exr (linear float); a set's folder.")
     ],
     scene: Annotated[str, typer.Argument(help="A scene's name, or a .toml or mesh file.")] = "",
-    set_name: Annotated[str, typer.Option("--set", help="Render a set of scenes instead: reference.")] = "",
+    set_name: Annotated[
+        str, typer.Option("--set", help="Render a set instead: reference, benchmark or benchmark:PROFILE.")
+    ] = "",
     camera: Annotated[str, typer.Option(help="A camera's name, a .json file, or a folder of maps.")] = "setup1",
     scale: Annotated[int, typer.Option(help="Divides the number of lenses, at the same pixels per lens.")] = 1,
     frames: Annotated[
@@ -71,6 +74,13 @@ def render(
     """
     if bool(scene) == bool(set_name):
         raise ValueError("a scene, or --set, is needed: `raytrace-ii scenes` lists scenes")
+    if set_name.partition(":")[0] == "benchmark":
+        from .benchmark_pictures import render_profiles
+
+        allowed = {"set_name", "output", "workers", "force"}
+        check_only(context, "the profile of a benchmark defines its pictures", allowed)
+        render_profiles(set_name.partition(":")[2], output, force, workers)
+        return
     if bits not in (8, 16):
         raise ValueError(f"bits is {bits}: 8 or 16 is needed")
     if dask and workers is not None:

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from ii_core.files import read_json
+from ii_core.identity import file_hash
 
-from ..scene.hashing import file_hash
 from .render import Stats
 
 

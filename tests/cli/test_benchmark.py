@@ -1,12 +1,15 @@
 """Commands benchmark and ranking, and the pixels of the small profile."""
 
+import json
 import re
 
+import numpy as np
 import pytest
 
+from ii_core import IIPicture
 from metrics.benchmark.profile import profile
 from metrics.study import picture_json
-from raytrace_ii.cli.benchmarking import _pictures
+from raytrace_ii.cli.benchmark_pictures import rendered
 
 TINY = """
 name = "tiny"
@@ -58,7 +61,71 @@ def test_wrong_calls_are_one_line_before_work(run, monkeypatch, tmp_path, argume
     assert code == 2 and message in error and len(error.splitlines()) == 1 and not list(tmp_path.iterdir())
 
 
+def test_the_set_is_rendered_checked_and_used(run, tmp_path):
+    made = tmp_path / "tiny.toml"
+    made.write_text(TINY + f'sha256 = "{"0" * 64}"\n')
+    data = tmp_path / "data"
+    code, out, _ = run("render", "--set", f"benchmark:{made}", "-o", data)
+    picture = IIPicture.load(data / "tiny" / "apples.png")
+    found = picture_json("", picture)["sha256"]
+    assert code == 0 and f"tiny/apples  {found}" in out and "not the pixels of the definition: apples" in out
+    card = (data / "tiny" / "README.md").read_text()
+    assert "**Not the pixels of the definition:** apples." in card and "| a test | apples |" in card
+    when = (data / "tiny" / "apples.png").stat().st_mtime_ns
+
+    made.write_text(TINY + f'sha256 = "{found}"\n')
+    code, out, _ = run("render", "--set", f"benchmark:{made}", "-o", data)
+    assert code == 0 and "1 of 1 fixed hashes met" in out and "not the pixels" not in out
+    assert (data / "tiny" / "apples.png").stat().st_mtime_ns == when  # not rendered again
+    assert "All fixed hashes are met." in (data / "tiny" / "README.md").read_text()
+
+    taken = ("benchmark", made, "--scheme", "jpeg2000", "--pictures", data)
+    assert run(*taken, "-o", tmp_path / "a.json")[0] == 0
+    assert json.loads((tmp_path / "a.json").read_text())["pictures"][0]["as_defined"] is True
+    picture.with_pixels(np.zeros_like(picture.pixels)).save(data / "tiny" / "apples.png")
+    code, _, error = run(*taken, "-o", tmp_path / "b.json")
+    assert code == 2 and "apples.png has other pixels than its manifest says" in error
+    assert run("render", "--set", f"benchmark:{made}", "-o", data)[0] == 0  # made again, as it was
+    assert picture_json("", IIPicture.load(data / "tiny" / "apples.png"))["sha256"] == found
+
+
+def test_a_set_replaces_no_files_of_others_and_takes_no_options(run, refused, tmp_path):
+    (tmp_path / "tiny.toml").write_text(TINY)
+    (tmp_path / "data" / "tiny").mkdir(parents=True)
+    (tmp_path / "data" / "tiny" / "apples.png").write_text("mine")
+    named = f"benchmark:{tmp_path / 'tiny.toml'}"
+    refused(
+        run("render", "--set", named, "-o", tmp_path / "data"), "apples.png is there already: --force replaces it"
+    )
+    assert [path.name for path in (tmp_path / "data" / "tiny").iterdir()] == ["apples.png"]
+    refused(run("render", "--set", named, "-o", tmp_path / "new", "--scale", 2), "leave out --scale")
+    refused(run("render", "--set", "benchmark:none", "-o", tmp_path / "new"), "unknown profile 'none'")
+    refused(run("benchmark", tmp_path / "tiny.toml", "--scheme", "jpeg2000", "--pictures", tmp_path / "new", "-o",
+                tmp_path / "r.json"), "has no picture apples")  # fmt: skip
+    assert not (tmp_path / "new").exists() and not list(tmp_path.glob("r*"))
+
+
+def test_a_stopped_run_continues(run, tmp_path, monkeypatch):
+    import codec
+
+    (tmp_path / "tiny.toml").write_text(TINY)
+    calls, encode = [], codec.encode
+
+    def dies(picture, scheme, *, bpp):
+        calls.append(bpp)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return encode(picture, scheme, bpp=bpp)
+
+    monkeypatch.setattr(codec, "encode", dies)
+    command = ("benchmark", tmp_path / "tiny.toml", "--scheme", "jpeg2000", "-o", tmp_path / "r.json")
+    assert run(*command)[0] == 130 and (tmp_path / "r.points.jsonl").exists()
+    assert run(*command)[0] == 0 and calls == [4.0, 8.0, 8.0]
+    assert [p["target_bpp"] for p in json.loads((tmp_path / "r.json").read_text())["pictures"][0]["points"]] == [4, 8]
+    assert not (tmp_path / "r.points.jsonl").exists()
+
+
 @pytest.mark.slow
 def test_the_small_profile_renders_to_the_bit():
-    for reference, picture in _pictures(profile("small")):
-        assert picture_json(reference.name, picture)["sha256"] == reference.sha256, reference.name
+    for reference in profile("small").pictures:
+        assert picture_json("", rendered(reference))["sha256"] == reference.sha256, reference.name

@@ -15,7 +15,8 @@ from metrics.benchmark.external import External, Refused
 from metrics.benchmark.profile import profile, profile_names
 from metrics.benchmark.ranking import chart_path, ranked, write_page
 from metrics.benchmark.result import read_result, run, write_result
-from metrics.study import picture_json
+from metrics.benchmark.run_log import RunLog
+from metrics.study import picture_json, provenance
 
 PYTHON = f"{shlex.quote(sys.executable)} -I -S"  # without packages: starts in 20 ms
 # Views as they are, deflated after dropping as many bits as the target needs.
@@ -263,7 +264,7 @@ def test_wrong_profiles_are_one_clear_line(tmp_path, change, message):
 
 def result_of(definition, picture, name, coder):
     return run(
-        definition, name, [(definition.pictures[0], picture)], encode=coder.encode, decode=coder.decode,
+        definition, name, lambda _: picture, encode=coder.encode, decode=coder.decode,
         commands=[coder.encoder, coder.decoder],
     )  # fmt: skip
 
@@ -271,7 +272,7 @@ def result_of(definition, picture, name, coder):
 def test_a_result_has_provenance_and_survives_its_file(tmp_path, definition, picture, coder):
     told = []
     result = run(
-        definition, "deflate", [(definition.pictures[0], picture)], encode=coder.encode, decode=coder.decode,
+        definition, "deflate", lambda _: picture, encode=coder.encode, decode=coder.decode,
         progress=lambda *step: told.append(step),
     )  # fmt: skip
     again = read_result(write_result(tmp_path / "r.json", result))
@@ -292,7 +293,7 @@ def test_a_coder_that_fails_once_has_no_result(definition, picture, coder):
         return coder.decode(coded)
 
     with pytest.raises(ValueError, match=r"deflate on ramp: decoder: view 000_000\.ppm is missing"):
-        run(definition, "deflate", [(definition.pictures[0], picture)], encode=coder.encode, decode=decode)
+        run(definition, "deflate", lambda _: picture, encode=coder.encode, decode=decode)
 
 
 def test_pictures_of_other_pixels_are_said(definition, picture, coder):
@@ -300,10 +301,86 @@ def test_pictures_of_other_pixels_are_said(definition, picture, coder):
     for digest, expected in ((fixed, True), ("0" * 64, False)):
         reference = replace(definition.pictures[0], sha256=digest)
         made = run(
-            replace(definition, pictures=(reference,)), "deflate", [(reference, picture)],
+            replace(definition, pictures=(reference,)), "deflate", lambda _: picture,
             encode=coder.encode, decode=coder.decode,
         )  # fmt: skip
         assert made["pictures"][0]["as_defined"] is expected
+
+
+class Counted:
+    """A coder that fails at its n-th encoding, and counts them."""
+
+    def __init__(self, coder, fails_at=0):
+        self.coder, self.fails_at, self.count = coder, fails_at, 0
+
+    def encode(self, picture, scheme, *, bpp):
+        self.count += 1
+        if self.count == self.fails_at:
+            raise Refused("encoder ended with code 9: killed")
+        return self.coder.encode(picture, scheme, bpp=bpp)
+
+
+def test_a_run_that_fails_late_continues(tmp_path, definition, picture, coder):
+    """On b1dc540 and until 2026-11-22 a run that failed at its last point kept nothing."""
+    path = tmp_path / "r.points.jsonl"
+    two = replace(definition, pictures=tuple(replace(definition.pictures[0], name=n) for n in ("one", "two")))
+    whole = run(two, "deflate", lambda _: picture, encode=coder.encode, decode=coder.decode)
+    first = Counted(coder, fails_at=7)
+    with pytest.raises(ValueError, match="deflate on two: encoder ended with code 9"):
+        log = RunLog(path, two, "deflate")
+        run(two, "deflate", lambda _: picture, encode=first.encode, decode=coder.decode, log=log)
+    path.write_bytes(path.read_bytes() + b'{"format": "ii-bench')  # killed while it wrote
+    rest, made = Counted(coder), []
+    log = RunLog(path, two, "deflate")
+    again = run(
+        two, "deflate", lambda reference: made.append(reference.name) or picture, encode=rest.encode,
+        decode=coder.decode, log=log,
+    )  # fmt: skip
+    assert (rest.count, made) == (2, ["two"])  # nothing twice, not even the first picture rendered
+
+    def plain(result):
+        points = [point for row in result["pictures"] for point in row["points"]]
+        return [{k: v for k, v in point.items() if not k.endswith("_seconds")} for point in points]
+
+    assert plain(again) == plain(whole)
+    assert [row["sha256"] for row in again["pictures"]] == [row["sha256"] for row in whole["pictures"]]
+    log.remove()
+    assert not path.exists()
+
+
+def test_points_of_another_run_are_never_mixed(tmp_path, definition, picture, coder, monkeypatch):
+    path, script = tmp_path / "r.points.jsonl", tmp_path / "coder.py"
+    commands = [coder.encoder, coder.decoder]
+    broken = Counted(coder, fails_at=3)
+    with pytest.raises(ValueError, match="killed"):
+        run(
+            definition, "deflate", lambda _: picture, encode=broken.encode, decode=coder.decode,
+            log=RunLog(path, definition, "deflate", commands),
+        )  # fmt: skip
+    kept = path.read_bytes()
+    assert len(RunLog(path, definition, "deflate", commands).points("ramp")) == 2
+    with pytest.raises(ValueError, match="another definition, mine version 3"):
+        RunLog(path, replace(definition, digest="0" * 64), "deflate", commands)
+    with pytest.raises(ValueError, match="another coder, deflate and not inflate"):
+        RunLog(path, definition, "inflate", commands)
+    with pytest.raises(ValueError, match="another commands"):
+        RunLog(path, definition, "deflate")
+    script.write_text(CODER + "# rebuilt")
+    with pytest.raises(ValueError, match="another programs"):
+        RunLog(path, definition, "deflate", commands)
+    script.write_text(CODER)
+    other = picture.with_pixels(255 - picture.pixels)
+    with pytest.raises(ValueError, match=r"ramp has pixels .* --force starts again"):
+        run(
+            definition, "deflate", lambda _: other, encode=coder.encode, decode=coder.decode,
+            log=RunLog(path, definition, "deflate", commands),
+        )  # fmt: skip
+    git = {"commit": "1" * 40, "dirty": False}
+    monkeypatch.setattr("metrics.benchmark.run_log.provenance", lambda: {**provenance(), "git": git})
+    with pytest.raises(ValueError, match=r"r\.points\.jsonl, line 1: points of another commit"):
+        RunLog(path, definition, "deflate", commands)
+    assert path.read_bytes() == kept
+    assert not RunLog(path, definition, "deflate", commands, restart=True).points("ramp") and not path.exists()
 
 
 def with_points(result, name, *, rate=1.0, gain=0.0, last=True):

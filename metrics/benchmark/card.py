@@ -1,0 +1,59 @@
+"""Data card of a profile: what each picture is for, how it is made, and the hash of its pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from .profile import Profile, Reference
+
+CAPTION = "SHA-256 is that of the pixels (rows of R, G, B, one byte each); z is in mm."
+HEAD = ("picture", "what it is for", "scene", "camera", "lenses, pixels under each", "samples", "SHA-256")
+
+
+def card_table(profile: Profile, found: Mapping[str, str] | None = None) -> list[str]:
+    """Return the table of a data card in Markdown.
+
+    Parameters
+    ----------
+    profile : Profile
+    found : mapping of str to str, optional
+        Hashes of rendered pixels by name, which the table shows instead of those of the definition.
+    """
+    lines = [f"| {' | '.join(HEAD)} |", "|" + "---|" * len(HEAD)]
+    for reference in profile.pictures:
+        camera = reference.made_camera()
+        (k, l), (u, v) = camera.lenses, camera.ei_pixels
+        sha256 = reference.sha256 if found is None else found.get(reference.name)
+        cells = (
+            reference.name, reference.use, reference.scene, _camera(reference), f"{k}×{l}, {u}×{v}",
+            str(reference.samples), "not fixed" if sha256 is None else f"`{sha256[:12]}`",
+        )  # fmt: skip
+        lines.append(f"| {' | '.join(cells)} |")
+    return [*lines, "", CAPTION]
+
+
+def data_card(profile: Profile, found: Mapping[str, str]) -> str:
+    """Return the data card of rendered pictures as a page of Markdown."""
+    wrong = [name for reference in profile.pictures if reference.matches(found[name := reference.name]) is False]
+    told = f"**Not the pixels of the definition:** {', '.join(wrong)}." if wrong else "All fixed hashes are met."
+    lines = [
+        f"# Data of benchmark {profile.name}, version {profile.version}",
+        "",
+        profile.about,
+        "",
+        *card_table(profile, found),
+        "",
+        told,
+        "",
+        "Pictures are rendered from scenes of this package, 8 bit, sRGB, without sensor noise, seed 0. They suit",
+        "comparisons of coders. They do not show noise, blur or errors of real cameras.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _camera(reference: Reference) -> str:
+    """Return the name of a camera, its scale and its place."""
+    name = "converged views" if not isinstance(reference.camera, str) else f"`{reference.camera}`"
+    scale = f", scale {reference.scale}" if reference.scale != 1 else ""
+    return f"{name}{scale}" + (f" at z = {reference.at_mm[2]:g}" if any(reference.at_mm) else "")
