@@ -36,12 +36,12 @@ __all__ = [
     "video",
 ]
 
-INTERRUPTED = 130  # the exit code of a command that Ctrl-C ended
-TERMINATED = 143  # and of one that SIGTERM ended
+INTERRUPTED = 130  # exit code of a command ended by Ctrl-C
+TERMINATED = 143  # exit code of a command ended by SIGTERM
 
 
 def main() -> None:
-    """Run the command; a bad input is one line on the error stream and exit code 2, a warning one line."""
+    """Run the command; print one line on the error stream for bad input (exit code 2) and for each warning."""
     warnings.showwarning = _warn
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -54,7 +54,7 @@ def _run() -> None:
     try:
         with no_empty_folders():
             code = app(standalone_mode=False)
-        if code == INTERRUPTED:  # what typer makes of Ctrl-C
+        if code == INTERRUPTED:  # typer's return value after Ctrl-C
             print("interrupted", file=sys.stderr)
         sys.exit(code if isinstance(code, int) else 0)
     except (ValueError, OSError, MemoryError, ArithmeticError) as error:
@@ -77,7 +77,7 @@ def _run() -> None:
         print("interrupted", file=sys.stderr)
         sys.exit(INTERRUPTED)
     except Exception as error:
-        # A wrong option or argument: typer's own complaint, without its frame.
+        # A wrong option or argument: typer's own message, without its frame.
         if not hasattr(error, "format_message"):
             raise
         _fail(error.format_message())

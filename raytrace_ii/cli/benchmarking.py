@@ -18,13 +18,17 @@ if TYPE_CHECKING:
 
 @app.command()
 def benchmark(
-    profile: Annotated[str | None, typer.Argument(help="Its name, or a .toml file; all are listed if none.")] = None,
-    scheme: Annotated[str | None, typer.Option(help="As in `raytrace-ii schemes`, options after a colon.")] = None,
+    profile: Annotated[
+        str | None, typer.Argument(help="Name or .toml file of a profile; lists all if not given.")
+    ] = None,
+    scheme: Annotated[
+        str | None, typer.Option(help="Scheme from `raytrace-ii schemes`, options after a colon.")
+    ] = None,
     external: Annotated[
         tuple[str, str],
         typer.Option(help="Commands of an encoder and a decoder: 'enc {in} {out} {bpp}' 'dec {in} {out}'."),
     ] = ("", ""),
-    name: Annotated[str | None, typer.Option(help="Of the external commands in results.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the external commands in results.")] = None,
     views: Annotated[str, typer.Option(help="Files for external commands: ppm of 10 bit, or png.")] = "ppm",
     pictures: Annotated[
         Path | None, typer.Option(help="Folder of `raytrace-ii render --set benchmark`; rendered if none.")
@@ -80,13 +84,13 @@ def _coder(
         from codec import encode, options, timed_decode
 
         if name is not None:
-            raise ValueError(f"name is {name!r}: only --external takes one, a scheme has its own")
+            raise ValueError(f"name is {name!r}: only --external takes a name, a scheme has its own")
         options(scheme.partition(":")[0])  # raises ValueError for an unknown one, before rendering
         return scheme, {"encode": encode, "decode": timed_decode}
     from metrics.benchmark.external import External
 
     if not name:
-        raise ValueError("name is missing: --name says what the external commands are called in results")
+        raise ValueError("name is missing: --name gives the name of the external commands in results")
     encoder, decoder = external
     tool = External(
         encoder=encoder, decoder=decoder, kind=views, seconds=profile.seconds, rate_tolerance=profile.rate_tolerance

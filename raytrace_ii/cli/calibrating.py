@@ -20,20 +20,21 @@ def calibrate(
     dark: Annotated[Path | None, typer.Option(help="Dark frame: the same camera without light.")] = None,
     metadata: Annotated[Path | None, typer.Option(help="JSON of packed .raw samples, if not RAW.json.")] = None,
     mosaic: Annotated[str | None, typer.Option(help="Colours of the sensor: rggb, bggr, grbg or gbrg.")] = None,
-    lattice: Annotated[str | None, typer.Option(help="rectangular or hexagonal; found if not given.")] = None,
-    pixel_pitch_mm: Annotated[float | None, typer.Option(help="Of the sensor; no picture tells.")] = None,
-    gap_mm: Annotated[float | None, typer.Option(help="From sensor to lenses; no picture tells.")] = None,
+    lattice: Annotated[str | None, typer.Option(help="rectangular or hexagonal; detected if not given.")] = None,
+    pixel_pitch_mm: Annotated[float | None, typer.Option(help="Pixel pitch of the sensor; not measured.")] = None,
+    gap_mm: Annotated[float | None, typer.Option(help="Gap from sensor to lenses; not measured.")] = None,
     curve: Annotated[
-        str | None, typer.Option(help="Of the values: linear or srgb. Of 8 bit srgb, else linear, if not given.")
+        str | None,
+        typer.Option(help="Tone curve of the values: linear or srgb; by default srgb for 8 bit."),
     ] = None,
-    full_scale: Annotated[float | None, typer.Option(help="Raw value above dark that becomes white.")] = None,
-    bits: Annotated[int, typer.Option(help="Of the picture: 8, which all coders take, or 16.")] = 8,
+    full_scale: Annotated[float | None, typer.Option(help="Raw value above dark of white.")] = None,
+    bits: Annotated[int, typer.Option(help="Bits of the picture: 8, which all coders accept, or 16.")] = 8,
     force: Force = False,
 ) -> None:
-    """Find the camera of a raw lenslet picture: pitch, turn, offset and shear of its lens grid.
+    """Estimate the camera of a raw lenslet picture: pitch, rotation, offset and shear of its lens grid.
 
-    Writes picture.png, an II-picture with its camera and without vignetting, camera.json, report.json, and
-    centres.png, the centres over the picture. `raytrace-ii regular` brings the picture to a regular structure.
+    Write picture.png, an II-picture with its camera and without vignetting, camera.json, report.json, and
+    centres.png, the centres over the picture. `raytrace-ii regular` converts the picture to a regular structure.
     """
     from ii_core import calibrate as find
     from ii_core import calibrated_picture, centres_picture

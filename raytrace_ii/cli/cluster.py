@@ -13,7 +13,7 @@ Dask = Annotated[str | None, typer.Option(help="Work on the cluster of this dask
 
 @contextmanager
 def cluster(address: str | None, identity: Callable[[], Mapping[str, str]]) -> Iterator[Any]:
-    """A client of a dask scheduler whose workers run this code, closed at the end; None without an address."""
+    """Yield a client of a dask scheduler whose workers run this code, closed at the end; None without an address."""
     if address is None:
         yield None
         return
@@ -22,12 +22,12 @@ def cluster(address: str | None, identity: Callable[[], Mapping[str, str]]) -> I
     from ii_core.executors import check_workers
     from ii_core.extras import load
 
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told by our one line
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # our one line reports a lost scheduler
     load("distributed")
     try:
         _check_address(address)
         client = load("distributed").Client(address, timeout=5, set_as_default=False)
-    except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # tls:// without certificates, too
+    except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # also tls:// without certificates
         raise OSError(f"no dask scheduler answers at {address}: {error}") from None
     try:
         client.wait_for_workers(1, timeout=30)
@@ -40,7 +40,7 @@ def cluster(address: str | None, identity: Callable[[], Mapping[str, str]]) -> I
 
 
 def _check_address(address: str) -> None:
-    """Raise ValueError for an address that no client takes: a half-made client complains as the process ends."""
+    """Raise ValueError for a malformed address: a half-made client would print errors when the process ends."""
     from distributed.comm.addressing import get_address_host_port, parse_address
     from distributed.comm.registry import get_backend
     from distributed.security import Security

@@ -17,7 +17,7 @@ from .words import say
 @app.command()
 def schemes(
     names: Annotated[list[str] | None, typer.Argument(help="Only these.")] = None,
-    help_options: Annotated[bool, typer.Option("--help-options", help="List the options of each.")] = False,
+    help_options: Annotated[bool, typer.Option("--help-options", help="List the options of each scheme.")] = False,
     plugin: Plugins = None,
 ) -> None:
     """List the coding schemes."""
@@ -38,15 +38,15 @@ def schemes(
 def encode(
     picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar, or a folder of frames.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The coded file.")],
-    scheme: Annotated[str, typer.Option(help="As in `raytrace-ii schemes`, options after a colon.")] = "si-h264",
-    bpp: Annotated[float | None, typer.Option(help="Bits per pixel to aim at.")] = None,
-    qp: Annotated[int | None, typer.Option(help="Quantiser to keep.")] = None,
+    scheme: Annotated[str, typer.Option(help="From `raytrace-ii schemes`, options after a colon.")] = "si-h264",
+    bpp: Annotated[float | None, typer.Option(help="Target rate, bits per pixel.")] = None,
+    qp: Annotated[int | None, typer.Option(help="Constant quantiser.")] = None,
     quality: Annotated[float | None, typer.Option(help="Quality on the scheme's own scale.")] = None,
-    walk: Annotated[str, typer.Option(help="Of frames: view-first, time-first or interleaved.")] = "view-first",
-    span: Annotated[int, typer.Option(help="Of frames: instants of a group of pictures, 0 for all.")] = 8,
-    group: Annotated[int, typer.Option(help="Of frames: views of a group of pictures, 0 for all.")] = 0,
-    strip: Annotated[int, typer.Option(help="Of the interleaved walk: views of a strip.")] = 4,
-    rate: Annotated[str, typer.Option(help="Of frames: meet --bpp over the take, or by segment.")] = "take",
+    walk: Annotated[str, typer.Option(help="II-video: view-first, time-first or interleaved.")] = "view-first",
+    span: Annotated[int, typer.Option(help="II-video: instants of a group of pictures, 0 for all.")] = 8,
+    group: Annotated[int, typer.Option(help="II-video: views of a group of pictures, 0 for all.")] = 0,
+    strip: Annotated[int, typer.Option(help="II-video, interleaved: views of a strip.")] = 4,
+    rate: Annotated[str, typer.Option(help="II-video: meet --bpp over the take, or in each segment.")] = "take",
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
@@ -65,7 +65,7 @@ def encode(
         encode_frames(picture, output, scheme, plan, bpp=bpp, qp=qp, rate=rate)
         return
     if quality is not None and quality.is_integer():
-        quality = int(quality)  # of schemes that take whole numbers alone
+        quality = int(quality)  # schemes of whole qualities
     original = IIPicture.load(picture)
     with progress_bar(f"{scheme} codes {picture.name}", at_once=True) as report:
         coded = encode(original, scheme, bpp=bpp, qp=qp, quality=quality, progress=report)
@@ -87,9 +87,9 @@ def decode(
     max_pixels: Annotated[
         int | None, typer.Option(help="Largest number of pixels to decode, 2^27 by default; bounds memory.")
     ] = None,
-    frame: Annotated[int | None, typer.Option(help="Of a take: only this frame, from 0.")] = None,
+    frame: Annotated[int | None, typer.Option(help="Decode only this frame of a take, from 0.")] = None,
     partial: Annotated[
-        bool, typer.Option("--partial", help="Of a take that is truncated or damaged: the frames before the damage.")
+        bool, typer.Option("--partial", help="Decode the frames before the damage of a truncated or damaged take.")
     ] = False,
     plugin: Plugins = None,
     force: Force = False,
@@ -108,7 +108,7 @@ def decode(
         decode_frames(coded, output, frame, place, force, {"partial": partial, **limit})
         return
     if partial or frame is not None:
-        raise ValueError(f"{coded} is one picture: --frame and --partial are of takes")
+        raise ValueError(f"{coded} is one picture: --frame and --partial are for takes")
     stream = Encoded.load(coded)
     files = picture_files if component is None else image_file
     check_outputs(files(output, stream.dtype), force)
@@ -124,7 +124,8 @@ def decode(
 def extract(
     coded: Annotated[Path, typer.Argument(help="A file from `raytrace-ii encode`.")],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="A video or picture file: .mkv, .mp4, .obu, .jp2, … by the scheme.")
+        Path,
+        typer.Option("-o", "--output", help="A video or picture file, by scheme .mkv, .mp4, .obu, .jp2, …"),
     ],
     plugin: Plugins = None,
     force: Force = False,

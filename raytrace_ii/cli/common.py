@@ -91,7 +91,7 @@ def check_page(output: Path | None, serve: bool, port: int, force: bool) -> None
             raise ValueError(f"{output} is no page: .html is needed")
         check_outputs([output], force)
     if not 0 <= port < 1 << 16:
-        raise ValueError(f"port is {port}: a number from 1 to 65535, or 0 for any that is free, is needed")
+        raise ValueError(f"port is {port}: a number from 1 to 65535, or 0 for any free one, is needed")
 
 
 def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = False) -> None:
@@ -140,7 +140,7 @@ def check_folder(folder: Path, force: bool) -> None:
     """Create an output folder; raise an error if it is not empty."""
     create_folder(folder)
     if any(folder.iterdir()) and not force:
-        raise FileExistsError(f"{folder} is not empty: --force writes into it all the same")
+        raise FileExistsError(f"{folder} is not empty: --force writes into it anyway")
 
 
 def pair(name: str, text: str, limit: int = 1 << 16) -> tuple[int, int]:

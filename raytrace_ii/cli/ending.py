@@ -13,10 +13,10 @@ from typing import Any
 
 from ii_core.interrupt import Terminated
 
-GRACE_SECONDS = 1.5  # for the cleanup, also if compiled code runs longer
+GRACE_SECONDS = 1.5  # time limit of the cleanup, even if compiled code runs longer
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
-SHOW_CURSOR = b"\x1b[?25h"  # a progress bar hides it
-_watched: list[socket.socket] = []  # of interrupted commands: closed with the process
+SHOW_CURSOR = b"\x1b[?25h"  # progress bars hide the cursor
+_watched: list[socket.socket] = []  # sockets of interrupted commands, closed with the process
 
 
 @contextmanager
@@ -47,7 +47,7 @@ def ends_soon() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
         if ended:
             told.close()  # ends the thread
-        else:  # Python waits for the threads of pools when it exits: the watch goes on
+        else:  # Python waits for the threads of pools when it exits: keep the time limit until then
             _watched.append(told)
 
 
@@ -70,7 +70,7 @@ def _watch(heard: socket.socket, left: threading.Event) -> None:
 
 
 def _stop(code: int, *, said: bool) -> None:
-    """End the process without waiting for threads; remove its unfinished files; say so unless the command has."""
+    """End the process without waiting for threads; remove its unfinished files; print "interrupted" unless done."""
     from ii_core.atomic import remove_temporaries
 
     remove_temporaries()

@@ -26,8 +26,8 @@ OVER_DEPTH = ("q_depth_min", "q_depth_mean", "q_depth_max")
 Layers = Annotated[
     str | None,
     typer.Option(
-        help="Depth layers: NEAR:FAR:COUNT in mm, spaced in equal ratios; COUNT of one gap each, from pixels on; "
-        "dissertation for 250 of these. 250 over all depths of the picture if not given."
+        help="Depth layers: NEAR:FAR:COUNT in mm, spaced in equal ratios; or COUNT layers one gap apart, from the "
+        "pixel plane on; or dissertation, 250 of the latter. Default: 250 layers over all depths of the picture."
     ),
 ]
 Method = Annotated[str, typer.Option(help="Method of depth from focus: dissertation or robust.")]
@@ -44,19 +44,19 @@ def measures(plugin: Plugins = None) -> None:
 
 @app.command()
 def measure(
-    reference: Annotated[Path, typer.Argument(help="The II-picture as it was, or a folder of frames.")],
+    reference: Annotated[Path, typer.Argument(help="The original II-picture, or a folder of frames.")],
     decoded: Annotated[
         Path, typer.Argument(help="The decoded II-picture, a plain picture of the same size, or a coded file.")
     ],
-    json: Annotated[Path | None, typer.Option(help="Write the numbers here.")] = None,
+    json: Annotated[Path | None, typer.Option(help="Write the numbers to this .json.")] = None,
     plots: Annotated[
         Path | None, typer.Option(help="Write charts of angles, depth, views and errors into this folder.")
     ] = None,
-    depth: Annotated[Path | None, typer.Option(help="Q_depth with this map of z in mm (.exr).")] = None,
-    focus: Annotated[bool, typer.Option("--focus", help="Q_depth with depth from focus.")] = False,
+    depth: Annotated[Path | None, typer.Option(help="Measure Q_depth with this map of z in mm (.exr).")] = None,
+    focus: Annotated[bool, typer.Option("--focus", help="Measure Q_depth with depth from focus.")] = False,
     method: Method = "dissertation",
     layers: Layers = None,
-    ssim: Annotated[bool, typer.Option("--ssim", help="Also SSIM and MS-SSIM of every sub-image.")] = False,
+    ssim: Annotated[bool, typer.Option("--ssim", help="Also measure SSIM and MS-SSIM of every sub-image.")] = False,
     mask: Annotated[Path | None, typer.Option(help="Measure only the pixels that are white in this picture.")] = None,
     plugin: Plugins = None,
     force: Force = False,
@@ -74,7 +74,7 @@ def measure(
         from .take import measure_frames
 
         if depth or focus or layers or ssim or mask:
-            raise ValueError("--depth, --focus, --layers, --ssim and --mask are of single pictures")
+            raise ValueError("--depth, --focus, --layers, --ssim and --mask are for single pictures")
         measure_frames(reference, decoded, json, plots, force)
         return
     if plots:
@@ -148,7 +148,7 @@ def study(
         str, typer.Option(help="Schemes separated by commas; options of a scheme by semicolons.")
     ] = ",".join(SCHEMES),
     anchor: Annotated[
-        str | None, typer.Option(help="The scheme that others are compared with; the first if not given.")
+        str | None, typer.Option(help="Anchor: the scheme of comparison; the first if not given.")
     ] = None,
     rates: Annotated[
         str | None,
@@ -203,7 +203,7 @@ def study(
     if anchor is not None and (anchor := _scheme(anchor)) not in names:
         raise ValueError(f"anchor is {anchor!r}: one of the schemes {', '.join(names)} is needed")
     if depth is not None and len(pictures) > 1:
-        raise ValueError(f"--depth is of one picture, {len(pictures)} are given: study them one by one")
+        raise ValueError(f"--depth is the map of one picture, {len(pictures)} are given: study them one by one")
     targets, wanted = _rates(rates), _measures(measures)
     files = [file for stem in stems for file in study_files(output, stem, wanted)]
     check_outputs([*files, *([output / PICTURES] if len(stems) > 1 else [])], force, make_folder=True)
@@ -263,16 +263,16 @@ def run_study(
     workers: int | None = None, executor: Any = None, extra: dict[str, Any] | None = None,
     measures: Sequence[str] = ("q_global",), anchor: str | None = None, **over_depth: Any,
 ) -> None:  # fmt: skip
-    """Measure; leave `study_files` in a folder, the charts and tables made from the JSON; print the tables.
+    """Measure a study; write `study_files` into a folder, with charts and tables from the JSON; print the tables.
 
     Points are kept in ``NAME_rd.points.jsonl`` until all are measured; a study that was killed continues from there.
-    Without rates they are `default_rates`. ``over_depth`` are depth, layers_mm and method of `measuring`.
+    Rates default to `default_rates`. ``over_depth`` holds depth, layers_mm and method of `measuring`.
     """
     from codec import encode, timed_decode
     from ii_core.parallel import cores
     from metrics import PointLog, default_rates, measuring, provenance, rate_distortion, write_study
 
-    provenance()  # the commit that measures, also if the checkout moves on meanwhile
+    provenance()  # record the commit that measures, even if the checkout changes meanwhile
     more = measuring(picture, measures, **over_depth) if set(measures) - {"q_global"} else None
     log = PointLog(folder / f"{name}_rd.points.jsonl", picture, measures=sorted(measures), **over_depth)
     if log.known:
@@ -314,7 +314,7 @@ def draw_study(folder: Path, name: str, measures: Sequence[str]) -> None:
 
 
 def write_means(folder: Path, names: Sequence[str], measures: Sequence[str]) -> None:
-    """Leave the mean differences over several pictures in a folder; print them."""
+    """Write the mean differences over several pictures into a folder; print them."""
     from ii_core.files import write_json
     from metrics import mean_differences, provenance, read_study
     from metrics.points import spelt

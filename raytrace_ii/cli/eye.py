@@ -17,29 +17,29 @@ if TYPE_CHECKING:
 @app.command()
 def eye(
     picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar, which names its camera.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="A picture; of two eyes NAME_left and NAME_right.")],
-    at: Annotated[str | None, typer.Option(help="Where the eye is, mm: x,y,z; in front if not given.")] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="A picture; with --both NAME_left and NAME_right.")],
+    at: Annotated[str | None, typer.Option(help="Position of the eye, mm: x,y,z; in front if not given.")] = None,
     pupil: Annotated[float, typer.Option(help="Diameter of the pupil, mm; 0 is a point.")] = 3.0,
     focus: Annotated[
         float | None, typer.Option(help="Distance in focus from the eye, mm; the lens plane if not given.")
     ] = None,
-    rays: Annotated[int | None, typer.Option(help="For each point; 64 with a pupil if not given.")] = None,
+    rays: Annotated[int | None, typer.Option(help="Rays per point; 64 with a pupil if not given.")] = None,
     both: Annotated[bool, typer.Option("--both", help="Two eyes, left and right of --at.")] = False,
     apart: Annotated[float, typer.Option(help="Distance between the eyes, mm.")] = 63.0,
-    size: Annotated[str | None, typer.Option(help="Points looked at, as 800x400; one a lens if not given.")] = None,
+    size: Annotated[str | None, typer.Option(help="Points of the view, as 800x400; default: one per lens.")] = None,
     layout: Annotated[str, typer.Option(help="Sub-pixels: square, rgb-stripe or pentile.")] = "square",
     fill: Annotated[float, typer.Option(help="Share of a sub-pixel that emits.")] = 1.0,
     lobe: Annotated[float, typer.Option(help="Power of the cosine of the angle to the panel's normal.")] = 0.0,
-    brightness: Annotated[float, typer.Option(help="Factor of all light.")] = 1.0,
+    brightness: Annotated[float, typer.Option(help="Factor on all light.")] = 1.0,
     black: Annotated[float, typer.Option(help="Light of black as a share of white's.")] = 0.0,
     crosstalk: Annotated[float, typer.Option(help="Share of a pixel's light from its four neighbours.")] = 0.0,
-    lens_pitch: Annotated[float | None, typer.Option(help="Of the display's lens array, mm.")] = None,
-    gap: Annotated[float | None, typer.Option(help="From panel to lens plane, mm.")] = None,
-    shift: Annotated[str, typer.Option(help="Of the lens array against the panel, mm: x,y.")] = "0,0",
-    turn: Annotated[float, typer.Option(help="Of the lens array against the panel, degrees.")] = 0.0,
+    lens_pitch: Annotated[float | None, typer.Option(help="Pitch of the display's lens array, mm.")] = None,
+    gap: Annotated[float | None, typer.Option(help="Gap from panel to lens plane, mm.")] = None,
+    shift: Annotated[str, typer.Option(help="Shift of the lens array on the panel, mm: x,y.")] = "0,0",
+    turn: Annotated[float, typer.Option(help="Rotation of the lens array on the panel, degrees.")] = 0.0,
     force: Force = False,
 ) -> None:
-    """Show what an eye sees of a display: pupil, focus, sub-pixels, misaligned lenses.
+    """Compute the view of an eye of a display: pupil, focus, sub-pixels, misaligned lenses.
 
     A point pupil, square pixels and the camera's own lens array give the view image.
     """
@@ -68,7 +68,7 @@ def eye(
 
 
 def _zone(display: DisplayModel, eye: Eye) -> str:
-    """Whether the eye is in the viewing zone."""
+    """Return whether the eye is in the viewing zone, in words."""
     from ii_core import viewing_zone
 
     x, y, z = (a - b for a, b in zip(eye.position_mm, display.camera.origin_mm, strict=True))
@@ -80,11 +80,11 @@ def _zone(display: DisplayModel, eye: Eye) -> str:
 
 
 def _numbers(name: str, text: str, count: int) -> tuple[float, ...]:
-    """Numbers with commas between them."""
+    """Return the numbers of a text separated by commas."""
     try:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
         numbers = ()
     if len(numbers) != count:
-        raise ValueError(f"{name} is {text!r}: {count} numbers with commas between them are needed")
+        raise ValueError(f"{name} is {text!r}: {count} numbers separated by commas are needed")
     return numbers

@@ -1,4 +1,4 @@
-"""Output folders: a command that fails leaves none of those that it created and has not filled."""
+"""Output folders; a command that fails removes the empty folders that it created."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
-_created: list[Path] = []  # by this command
+_created: list[Path] = []  # folders created by this command
 
 
 def create_folder(folder: Path) -> None:

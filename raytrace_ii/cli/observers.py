@@ -23,7 +23,7 @@ MEASURES = ("q_global", "q_angle_min", "q_view", "q_view_psnr")
 def subjective(
     pictures: Annotated[
         list[Path],
-        typer.Argument(help="For each scene the II-picture as it was, with its sidecar; then its coded files."),
+        typer.Argument(help="For each scene the original II-picture with its sidecar, then its coded files."),
     ],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The page, .html.")] = None,
     method: Annotated[str, typer.Option(help="dsis (ITU-R BT.500) or pairs.")] = "dsis",
@@ -31,14 +31,14 @@ def subjective(
         str, typer.Option(help="front: one view; views: five; across, around: pseudo-video along a path.")
     ] = "around",
     frames: Annotated[int, typer.Option(help="Views of a pseudo-video.")] = 24,
-    size: Annotated[str | None, typer.Option(help="Pixels of a view, as 512x256; one a lens if not given.")] = None,
-    seconds: Annotated[float, typer.Option(help="Of each picture.")] = 10.0,
+    size: Annotated[str | None, typer.Option(help="Pixels of a view, as 512x256; one per lens if not given.")] = None,
+    seconds: Annotated[float, typer.Option(help="Seconds of each picture.")] = 10.0,
     grey: Annotated[float, typer.Option(help="Seconds of grey between reference and picture.")] = 3.0,
     block: Annotated[int, typer.Option(help="Presentations between breaks.")] = 40,
-    observers: Annotated[int, typer.Option(help="Different orders, an even number.")] = 24,
-    training: Annotated[int, typer.Option(help="Presentations before the test that do not count.")] = 3,
-    seed: Annotated[int, typer.Option(help="Of the orders.")] = 0,
-    title: Annotated[str, typer.Option(help="Shown to the observers.")] = "Quality of pictures",
+    observers: Annotated[int, typer.Option(help="Number of different orders, even.")] = 24,
+    training: Annotated[int, typer.Option(help="Training presentations, which do not count.")] = 3,
+    seed: Annotated[int, typer.Option(help="Seed of the orders.")] = 0,
+    title: Annotated[str, typer.Option(help="Title shown to the observers.")] = "Quality of pictures",
     measures: Annotated[
         str | None,
         typer.Option(help="Measures that opinions are compared with, or none; four that need no depth if not given."),
@@ -107,7 +107,7 @@ def _stimuli(paths: list[Path], measures: str | None) -> list[Stimulus]:
             made.append(Stimulus(scene=path.stem, name="reference", picture=reference, reference=True))
             continue
         if reference is None:
-            raise ValueError(f"{path} comes before any picture: the picture as it was comes first, then its files")
+            raise ValueError(f"{path} comes before any picture: give the original first, then its coded files")
         coded = Encoded.load(path)
         picture = decode(coded)
         name = f"{coded.scheme}, {coded.bpp:.3g} bpp"
@@ -123,7 +123,7 @@ def _stimuli(paths: list[Path], measures: str | None) -> list[Stimulus]:
 
 
 def _possible(reference: IIPicture) -> list[str]:
-    """Return those of `MEASURES` whose needs a picture meets."""
+    """Return the names in `MEASURES` whose needs the picture meets."""
     from metrics import MEASURES as KNOWN
     from metrics import PicturePair
 
@@ -134,12 +134,12 @@ def _possible(reference: IIPicture) -> list[str]:
 @app.command()
 def opinions(
     results: Annotated[list[Path], typer.Argument(help="Files of observers, or a folder of them.")],
-    json: Annotated[Path | None, typer.Option(help="Write the numbers here.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw scores over measures here: .png, .pdf or .svg.")] = None,
-    confidence: Annotated[float, typer.Option(help="Of the intervals.")] = 0.95,
+    json: Annotated[Path | None, typer.Option(help="Write the numbers to this .json.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw scores over measures into this .png, .pdf or .svg.")] = None,
+    confidence: Annotated[float, typer.Option(help="Level of the confidence intervals.")] = 0.95,
     force: Force = False,
 ) -> None:
-    """Analyse results of a test with observers: scores with intervals, and how measures predict them."""
+    """Analyse results of a test with observers: scores with intervals, and their prediction by measures."""
     from ii_core.files import write_json
     from metrics.observers import read_results, verdict
     from metrics.plots.opinion_chart import opinion_chart

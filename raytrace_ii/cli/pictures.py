@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @app.command()
 def regular(
     picture: Annotated[Path, typer.Argument(help="An II-picture of a hexagonal, non-integer or shifted structure.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="The same as a regular one.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The regular II-picture.")],
     method: Annotated[
         str, typer.Option(help="rectangle (no pixel changes) or resample (centred on lenses).")
     ] = "resample",
@@ -76,11 +76,12 @@ def import_(
         bool | None, typer.Option("--flip-across/--no-flip-across", help="Views are numbered from right to left.")
     ] = None,
     camera: Annotated[str | None, typer.Option(help="Camera of the II-picture: a .json file or a name.")] = None,
-    baseline_mm: Annotated[float | None, typer.Option(help="From camera to camera of an array of cameras.")] = None,
-    focal_mm: Annotated[float | None, typer.Option(help="Focal length of each.")] = None,
-    sensor_mm: Annotated[float | None, typer.Option(help="Longer side of the sensor of each.")] = None,
+    baseline_mm: Annotated[float | None, typer.Option(help="Distance of neighbouring cameras of an array.")] = None,
+    focal_mm: Annotated[float | None, typer.Option(help="Focal length of each camera.")] = None,
+    sensor_mm: Annotated[float | None, typer.Option(help="Longer side of each sensor.")] = None,
     focus_mm: Annotated[
-        float | None, typer.Option(help="From the cameras to where views agree; infinity by default.")
+        float | None,
+        typer.Option(help="Distance of the plane of zero disparity from the cameras; infinity by default."),
     ] = None,
     force: Force = False,
 ) -> None:
@@ -121,7 +122,7 @@ def _rig(
     camera: str | None, baseline_mm: float | None, focal_mm: float | None, sensor_mm: float | None,
     focus_mm: float | None,
 ) -> Rig | None:  # fmt: skip
-    """The array of cameras of the options; ValueError if some of it is missing."""
+    """Return the array of cameras of the options; raise ValueError if a parameter is missing."""
     from ii_core import Rig
 
     needed = {"baseline-mm": baseline_mm, "focal-mm": focal_mm, "sensor-mm": sensor_mm}
@@ -175,7 +176,7 @@ def export(
         write_quilt(original, target, row=row)
     else:
         write_image(target, original.pixels)
-    say(target)  # a result: its name is ours
+    say(target)  # a result: the command chose the name
 
 
 @app.command()

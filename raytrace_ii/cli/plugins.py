@@ -46,14 +46,14 @@ def _run(path: Path) -> None:
     if path.suffix != ".py":
         raise ValueError(f"plugin {path} is no Python file: .py is needed")
     spec = spec_from_file_location(f"plugin_{path.stem}", path)
-    assert spec is not None and spec.loader is not None  # a .py file has both
+    assert spec is not None and spec.loader is not None  # a .py file always has both
     module = module_from_spec(spec)
     sys.modules[spec.name] = module  # classes of the file can be pickled
     try:
         spec.loader.exec_module(module)
     except STOPS:
         raise
-    except BaseException as error:  # SystemExit, too
+    except BaseException as error:  # also SystemExit
         del sys.modules[spec.name]
         lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path.resolve())]
         line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
@@ -62,7 +62,7 @@ def _run(path: Path) -> None:
 
 
 def _registered() -> set[str]:
-    """The names of all coders and measures."""
+    """Return the names of all coders and measures."""
     from codec import schemes
     from metrics import known_measures
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 Report = Callable[[int, int, str], None]
-EVERY_SECONDS = 30.0  # between lines of progress in a log
-BAR = 24  # characters: title, numbers and times fit 80 columns
+EVERY_SECONDS = 30.0  # interval of the lines of progress in a log
+BAR = 24  # width in characters: title, numbers and times fit 80 columns
 
 
 @dataclass
@@ -71,11 +71,14 @@ class App(typer.Typer):
 
 def _tell_compilation(kept: bool) -> None:
     if not running.quiet and sys.stderr.isatty():
-        print("compiling, once" if kept else "compiling: no folder can be written to keep it", file=sys.stderr)
+        print(
+            "compiling, once" if kept else "compiling: no folder can keep the result",
+            file=sys.stderr,
+        )
 
 
 def cpu_seconds() -> float:
-    """CPU seconds of this process, all its threads, and its ended child processes."""
+    """Return the CPU seconds of this process, all its threads, and its ended child processes."""
     spent = os.times()
     return spent.user + spent.system + spent.children_user + spent.children_system
 
@@ -98,7 +101,7 @@ def console(**options: Any) -> Console:
 def progress_bar(title: str, *, at_once: bool = False) -> Iterator[Report]:
     """Show progress on the error stream; yield a function of done, total and a text on the last step.
 
-    In a terminal a bar with the time so far and the time left. Elsewhere one line every `EVERY_SECONDS`.
+    A terminal gets a bar with the time so far and the time left; a log gets one line every `EVERY_SECONDS`.
 
     Parameters
     ----------
@@ -124,7 +127,7 @@ def _bar(title: str, at_once: bool, out: Console) -> Iterator[Report]:
     state = State()
 
     class Told(ProgressColumn):
-        """Column of the state, with times that run on between reports."""
+        """Column of the state, whose times are updated between reports."""
 
         def render(self, task: Any) -> Text:
             return Text(str(state))
@@ -133,7 +136,7 @@ def _bar(title: str, at_once: bool, out: Console) -> Iterator[Report]:
     task = bar.add_task(one_line(title), total=None)
 
     def report(done: int, total: int, step: str) -> None:
-        bar.start()  # late start: a failure before the first step leaves no empty bar
+        bar.start()  # started late, so that a failure before the first step leaves no empty bar
         state.update(done, total, step)
         bar.update(task, completed=done, total=total)
 
@@ -154,9 +157,9 @@ class State:
         self.began = self.run_began = self.updated = time.monotonic()
 
     def update(self, done: int, total: int, step: str) -> None:
-        """Keep the number of steps done."""
+        """Set the number of steps done."""
         self.updated = time.monotonic()
-        if done < self.done:  # the next run, whose frames count from 0
+        if done < self.done:  # the next run starts from 0
             self.run_began = self.updated
         self.done, self.total, self.step = done, total, one_line(step)
 
@@ -175,7 +178,7 @@ def _minutes(seconds: float) -> str:
 
 
 def _lines(title: str, out: Console) -> Report:
-    """Return a function that prints a line of progress now and then."""
+    """Return a function that prints a line of progress every `EVERY_SECONDS`."""
     printed, state = time.monotonic(), State()
 
     def report(done: int, total: int, step: str) -> None:

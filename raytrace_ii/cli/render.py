@@ -31,27 +31,27 @@ def render(
     camera: Annotated[str, typer.Option(help="A camera's name, a .json file, or a folder of maps.")] = "setup1",
     scale: Annotated[int, typer.Option(help="Divides the number of lenses, at the same pixels per lens.")] = 1,
     frames: Annotated[
-        str, typer.Option(help="Of a scene that moves: one frame 5, several 0..47, or all; the output is a folder.")
+        str, typer.Option(help="Frames of a moving scene: 5, 0..47 or all; the output is a folder.")
     ] = "",
-    clip: Annotated[str, typer.Option(help="Of a glTF file that moves: the name of its animation.")] = "",
-    fps: Annotated[float | None, typer.Option(help="Frames a second, in place of the file's.")] = None,
+    clip: Annotated[str, typer.Option(help="Name of the animation in a glTF file.")] = "",
+    fps: Annotated[float | None, typer.Option(help="Frames per second, in place of the file's.")] = None,
     at: Annotated[str | None, typer.Option(help="Position of the camera in the scene, mm: x,y,z.")] = None,
     look_at: Annotated[str | None, typer.Option(help="Scene point on the axis of the camera, mm: x,y,z.")] = None,
     up: Annotated[str | None, typer.Option(help="Direction of the camera's top, such as 0,1,0.")] = None,
     turn: Annotated[
-        str | None, typer.Option(help="Rotation afterwards, degrees: right, or right,up or right,up,clockwise.")
+        str | None, typer.Option(help="Rotation after look-at, degrees: right, or right,up or right,up,clockwise.")
     ] = None,
     samples: Annotated[str, typer.Option(help="Rays per pixel; adaptive between two powers of 2: 4..64.")] = "1",
     error: Annotated[
         float | None,
         typer.Option(help="Target standard error of adaptive samples, in 8-bit steps [0.5]."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of samples and noise.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of samples and noise.")] = 0,
     noise: Annotated[float, typer.Option(help="σ of sensor noise, in 8-bit steps.")] = 0.0,
     texture_filter: Annotated[
         bool, typer.Option(help="Read image textures over a ray's width; --no-texture-filter reads them at a point.")
     ] = True,
-    bits: Annotated[int, typer.Option(help="8 or 16, for .png and .tif.")] = 8,
+    bits: Annotated[int, typer.Option(help="Bits per channel: 8, or 16 for .png and .tif.")] = 8,
     support: Annotated[Exr, typer.Option(help="Write all support images to this .exr, as named channels.")] = None,
     depth: Annotated[Exr, typer.Option(help="Write z in mm from the pixel plane to this .exr.")] = None,
     ray_length: Annotated[Exr, typer.Option(help="Write ray length in mm from the lens to this .exr.")] = None,
@@ -69,8 +69,8 @@ def render(
     The picture of a camera of one lens is upright, and fills z = 0. A camera of several pixel arrays gives numbered
     pictures. Pictures may be larger than memory. The same command continues an interrupted set.
 
-    With --frames a scene that moves is rendered into a folder, frame_0000.png and on; support images stand beside
-    each, with its name before theirs. Frames that are there and would be the same are kept.
+    --frames renders a moving scene into a folder: frame_0000.png and so on, and support images as frame_0000_NAME.
+    Unchanged frames are kept.
     """
     if bool(scene) == bool(set_name):
         raise ValueError("a scene, or --set, is needed: `raytrace-ii scenes` lists scenes")
@@ -104,7 +104,7 @@ def render(
             render_frames(scene, moving, frames, output, arrays[0], images, force, means)
         return
     if clip or fps is not None:
-        raise ValueError("--clip and --fps are of scenes that move: --frames is needed")
+        raise ValueError("--clip and --fps are for moving scenes: --frames is needed")
     if set_name:
         from ..rendering.executors import identity
 
@@ -218,7 +218,7 @@ def _pose(camera: Any, at: str | None, look_at: str | None, up: str | None, turn
 
 
 def _floats(name: str, text: str, least: int, most: int) -> list[float]:
-    """Numbers parted by commas."""
+    """Return the numbers of a text separated by commas."""
     try:
         numbers = [float(x) for x in text.split(",")]
     except ValueError:
@@ -260,7 +260,7 @@ def _save_projection(scene: Any, camera: Any, pose: Any, path: Path, means: dict
 
 
 def _told(s: Stats) -> str:
-    """Numbers of rays, and the share of Embree in the time of tracing."""
+    """Return the numbers of rays and the share of Embree in the CPU time, in words."""
     counts = ", ".join(f"{count / 1e6:.2f} M {kind}" for kind, count in s.rays.items() if count)
     spread = f" ({s.mean_samples:.1f} per pixel)" if len(s.samples) > 1 else ""
     weak = sum(s.skipped.values()) / 1e6

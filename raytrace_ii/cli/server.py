@@ -17,7 +17,9 @@ from urllib.parse import unquote
 if TYPE_CHECKING:
     from metrics.observers.store import ResultFolder
 
-RANGE = re.compile(r"bytes=(\d{1,18})-(\d{1,18})?")  # one range from the front; other forms get the whole file
+RANGE = re.compile(
+    r"bytes=(\d{1,18})-(\d{1,18})?"
+)  # a single range with a first byte; other forms get the whole file
 
 
 class FilePart:
@@ -51,7 +53,7 @@ class PageServer(ThreadingHTTPServer):
 class Pages(SimpleHTTPRequestHandler):
     """Handler of requests for files of one folder, for host names of this machine only.
 
-    This refuses DNS rebinding: a page of another site, resolved to 127.0.0.1, sends its own host name.
+    The check of the host name prevents DNS rebinding: a page of another site, resolved to 127.0.0.1, sends its own.
     """
 
     def send_head(self) -> Any:
@@ -98,9 +100,9 @@ class Pages(SimpleHTTPRequestHandler):
 
 
 class Answers(Pages):
-    """Handler that also takes results of observers: POST results for a number, POST results/NUMBER with all lines.
+    """Handler that also receives answers of observers: POST results for a number, POST results/NUMBER with all lines.
 
-    Pages of other sites cannot send JSON here: the browser asks first, and this server does not answer that.
+    Pages of other sites cannot send JSON here: the browser sends a preflight request, which this server refuses.
     """
 
     def __init__(self, *args: Any, kept: ResultFolder, **kwargs: Any) -> None:
@@ -113,7 +115,7 @@ class Answers(Pages):
         return partial(cls, kept=kept)
 
     def do_POST(self) -> None:
-        """Give a number to a new observer, or keep an observer's lines."""
+        """Return a number for a new observer, or store an observer's lines."""
         if self.misdirected():
             return
         found = re.fullmatch(r"/results(?:/(\d{1,9}))?", self.path)

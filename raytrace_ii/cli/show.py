@@ -38,7 +38,7 @@ def view(
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
-    """Write a viewer page for a browser: parallax, focus, comparison, stereo; takes play."""
+    """Write a viewer page for a browser: parallax, focus, comparison, stereo, playback of takes."""
     from ii_core.display.viewer import JPEG_QUALITY, write_viewer, write_viewer_folder
     from ii_core.files import read_depth
 
@@ -69,7 +69,7 @@ def view(
 
 
 def _compared(picture: Path, compare: Path | None) -> tuple[IIPicture, IIPicture | None, dict[str, Any]]:
-    """Both pictures, and table and labels of their comparison."""
+    """Return both pictures, and table and labels of their comparison."""
     from ii_core import IIPicture
     from metrics import quality_rows
 
@@ -110,7 +110,7 @@ def display(
     at: Annotated[str | None, typer.Option(help="Simulation: position of the eye, mm: x,y,z.")] = None,
     fill: Annotated[float, typer.Option(help="Simulation: diameter of a lens over the pitch.")] = 1.0,
     frames: Annotated[int, typer.Option(help="Parallax: views around the viewing zone, at most 3000.")] = 60,
-    fps: Annotated[int, typer.Option(help="Parallax: frames a second.")] = 25,
+    fps: Annotated[int, typer.Option(help="Parallax: frames per second.")] = 25,
     force: Force = False,
 ) -> None:
     """Write pictures for other displays, and films with parallax.

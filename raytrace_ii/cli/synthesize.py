@@ -92,7 +92,7 @@ def _print_solution(text: str) -> None:
         try:
             given[MEASURES[key.strip()]] = float(value)
         except (KeyError, ValueError):
-            raise ValueError(f"{item!r} is no measure: {', '.join(MEASURES)} = number are known") from None
+            raise ValueError(f"{item!r} is no length: NAME=NUMBER is needed for {', '.join(MEASURES)}") from None
     columns({key: f"{value:.6g}" for key, value in solve(**given).items()})
 
 
@@ -120,7 +120,7 @@ def _design(text: str, output: Path | None, force: bool) -> None:
             wishes[NUMBERS[key]] = _number(key, value)
         else:
             known = ", ".join(["panel", "pixels", *WISHES, *NUMBERS, "lenses"])
-            raise ValueError(f"{item!r} is no wish for a design: known are {known}")
+            raise ValueError(f"{item!r} is unknown for --design: known are {known}")
     needed = {"size_mm": "panel", "pixels": "pixels", "lens_pitch_mm": "pitch", "viewer_mm": "distance"}
     if missing := [key for name, key in needed.items() if name not in wishes]:
         raise ValueError(f"the design has no {', '.join(missing)}: {', '.join(needed.values())} are needed")
@@ -138,16 +138,16 @@ def _design(text: str, output: Path | None, force: bool) -> None:
 
 
 def _sides(text: str) -> float | list[float]:
-    """A diagonal, as 15.6in, or two sides, as 345x194mm."""
+    """Return the length of a diagonal, as 15.6in, or of two sides, as 345x194mm."""
     first, _, second = text.lower().replace("×", "x").partition("x")
-    if not (first and second):  # "x" alone is no pair of sides
+    if not (first and second):  # "x" alone
         return _length("panel", text)
     unit = "".join(c for c in second if c not in "0123456789.")
     return [_length("panel", first if first.endswith(unit) else first + unit), _length("panel", second)]
 
 
 def _length(key: str, text: str) -> float:
-    """Millimetres, from a number with a unit; without one it is millimetres."""
+    """Return millimetres from a number with a unit; the default unit is mm."""
     unit = next((unit for unit in sorted(LENGTHS, key=len, reverse=True) if text.endswith(unit)), "")
     return _number(key, text.removesuffix(unit)) * LENGTHS.get(unit, 1.0)
 

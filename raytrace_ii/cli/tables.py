@@ -1,4 +1,4 @@
-"""Tables for a terminal of any width: columns that do not fit stand in a further table below."""
+"""Tables for a terminal of any width: columns that do not fit continue in a further table below."""
 
 from __future__ import annotations
 

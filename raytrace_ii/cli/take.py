@@ -32,7 +32,7 @@ def render_frames(
     made = [manifest["frames"][str(number)] for number in numbers]
     seconds, rays = sum(m["seconds"] for m in made), sum(sum(m["rays"].values()) for m in made)
     about = f"{rays / 1e6:.1f} M rays, all rendered in {seconds:.1f} s"
-    say_done(f"{folder}: {len(made)} frames of {take.fps:g} a second, {about}")
+    say_done(f"{folder}: {len(made)} frames of {take.fps:g} per second, {about}")
 
 
 def _frame_numbers(text: str, count: int) -> list[int]:
@@ -49,7 +49,7 @@ def _frame_numbers(text: str, count: int) -> list[int]:
 
 
 def support_files(kinds: list[str], together: Path | None, extra: dict[str, Path]) -> dict[str, list[str]]:
-    """Support images by the name of their file; ``kinds`` share the file ``together``."""
+    """Return support images by the name of their file; ``kinds`` share the file ``together``."""
     found: dict[str, list[str]] = {together.name: list(kinds)} if together is not None else {}
     for kind, path in extra.items():
         found.setdefault(path.name, []).append(kind)
@@ -71,7 +71,7 @@ def encode_frames(folder: Path, output: Path, scheme: str, plan: Any, **goal: An
         f"{coded.mbit_per_second:.4g} Mbit/s"
     )
     if not coded.reached:
-        say(f"{scheme} cannot reach {goal['bpp']:g} bpp with this take: {coded.bpp:.4g} is as near as it comes")
+        say(f"{scheme} cannot reach {goal['bpp']:g} bpp with this take: the nearest rate is {coded.bpp:.4g} bpp")
 
 
 def decode_frames(
@@ -122,7 +122,7 @@ def measure_frames(reference: Path, decoded: Path, json: Path | None, plots: Pat
     if json:
         write_json(json, {"reference": str(reference), "decoded": str(decoded), **numbers})
     rows = {
-        "frames": f"{numbers['frames']}, {quality.fps:g} a second",
+        "frames": f"{numbers['frames']}, {quality.fps:g} per second",
         "Q_global": f"{quality.pooled_psnr:.2f} dB of the pooled error, {quality.mean_psnr:.2f} dB mean of frames, "
         f"{quality.worst_psnr:.2f} dB worst frame",
         "flicker": f"{quality.mean_flicker:.3f} 8-bit steps, mean of frames, where the original is still",

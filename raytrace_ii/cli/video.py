@@ -24,15 +24,18 @@ def video(
         Path, typer.Argument(help="A folder of frames, a coded take, or a quilt video: name_qsCxRaA.mp4.")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder; for quilt and parallax an .mp4.")],
-    to: Annotated[str, typer.Option(help="frames, views, quilt, films (one a view) or parallax.")] = "parallax",
-    fps: Annotated[float | None, typer.Option(help="Frames a second, in place of the source's.")] = None,
+    to: Annotated[str, typer.Option(help="frames, views, quilt, films (one per view) or parallax.")] = "parallax",
+    fps: Annotated[float | None, typer.Option(help="Frames per second, in place of the source's.")] = None,
     row: Annotated[int | None, typer.Option(help="Quilt: row of views; the middle one if not given.")] = None,
     size: Annotated[str, typer.Option(help="Parallax: pixels of a frame.")] = "800x400",
-    depth: Annotated[float | None, typer.Option(help="Parallax: z in mm of what appears in the plane.")] = None,
+    depth: Annotated[
+        float | None,
+        typer.Option(help="Parallax: z in mm of the plane in focus."),
+    ] = None,
     cone: Annotated[float, typer.Option(help="Parallax: share of the viewing zone.")] = 0.9,
     force: Force = False,
 ) -> None:
-    """Turn II-video into folders of frames or views, quilt videos, films of each view or of a moving viewer."""
+    """Convert II-video to folders of frames or views, quilt videos, films of each view or of a moving viewer."""
     from ii_core import write_view_folders
     from ii_core.display.look import viewpoints_around, with_assumed_camera
     from ii_core.display.video import write_path_film, write_quilt_video, write_view_films
@@ -70,7 +73,7 @@ def video(
 
 
 def is_take_source(path: Path) -> bool:
-    """Whether a path is an II-video: a folder, a coded take or a film."""
+    """Return whether a path is an II-video: a folder, a coded take or a film."""
     if path.suffix == ".ii" and path.is_file():
         from codec import is_take
 
@@ -79,17 +82,19 @@ def is_take_source(path: Path) -> bool:
 
 
 def compared_takes(source: Path, compare: Path | None) -> tuple[IIVideo, IIVideo | None, dict[str, Any]]:
-    """Both takes, and table and labels of their comparison in the viewer."""
+    """Return both takes, and table and labels of their comparison in the viewer."""
     original = opened(source)
     if compare is None:
         return original, None, {}
     if not is_take_source(compare):
-        raise ValueError(f"{compare} is no take as {source} is: a folder of frames or a coded take is needed")
+        raise ValueError(f"{compare} is no take, but {source} is: a folder of frames or a coded take is needed")
     from metrics import measure_take
 
     decoded = opened(compare)
     if decoded.frames != original.frames:
-        raise ValueError(f"{compare} has {decoded.frames} frames, {source} {original.frames}: as many are needed")
+        raise ValueError(
+            f"{compare} has {decoded.frames} frames, {source} {original.frames}: the same number is needed"
+        )
     with progress_bar(f"measure {compare.name}") as report:
         quality = measure_take(original, decoded, progress=lambda done, total: report(done, total, ""))
     rows = [
@@ -102,7 +107,7 @@ def compared_takes(source: Path, compare: Path | None) -> tuple[IIVideo, IIVideo
 
 
 def coding(path: Path) -> list[str]:
-    """Scheme and rate of a coded picture or take, or the name of a picture or folder."""
+    """Return scheme and rate of a coded picture or take, or the name of a picture or folder."""
     from ii_core.files import IMAGE_TYPES
 
     if path.is_dir() or path.suffix.lower() in (*IMAGE_TYPES, *FILMS):
@@ -114,7 +119,7 @@ def coding(path: Path) -> list[str]:
 
 
 def opened(source: Path, fps: float | None = None) -> IIVideo:
-    """An II-video of a folder, a coded take or a quilt video."""
+    """Open a folder, a coded take or a quilt video as II-video."""
     from ii_core import open_video
 
     if source.suffix == ".ii":
@@ -133,5 +138,5 @@ def opened(source: Path, fps: float | None = None) -> IIVideo:
 
 
 def _at(video: IIVideo, fps: float | None) -> IIVideo:
-    """The same frames at another rate, which is checked."""
+    """Return the same frames at another, checked rate."""
     return video if fps is None else replace(video, fps=fps)

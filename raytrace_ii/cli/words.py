@@ -11,11 +11,11 @@ ASCII = {
     "²": "^2", "³": "^3", "é": "e", "ø": "o", "→": "->", "‖": "||", "⅓": "1/3", "½": "1/2",
     "─": "-", "━": "-", "╺": "-", "╸": "-", "│": "|", "┃": "|",
 }  # fmt: skip
-SPELT = "raytrace-ii-spelt"  # the name of an error handler of codecs
+SPELT = "raytrace-ii-spelt"  # name of our error handler in `codecs`
 
 
 def plain(text: str) -> str:
-    """The text with control characters, and halves of bytes that are no UTF-8, spelt out: \\\\x1b is no colour."""
+    """Return the text with control characters and invalid UTF-8 as escapes: \\\\x1b instead of a colour."""
     return "".join(c if c.isprintable() or c == "\n" else _escaped(c) for c in text)
 
 

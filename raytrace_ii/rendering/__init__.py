@@ -1,1 +1,1 @@
-"""Rendering: jobs, executors, pictures written as they come, render sets, contact sheets."""
+"""Rendering: jobs, executors, pictures in memory or written band by band, render sets, takes, contact sheets."""

@@ -14,7 +14,7 @@ from ii_core.files import read_channels, read_image, write_image
 
 from ..tracing.support_images import SUPPORT_IMAGES
 
-WIDTH, GAP, LINE = 480, 8, 22  # of a panel, between panels, for a name
+WIDTH, GAP, LINE = 480, 8, 22  # pixels: width of a panel, gap between panels, height of a title
 COLUMNS = 2
 
 
@@ -26,7 +26,7 @@ def contact_sheet(path: Path, panels: Sequence[tuple[str, Path, Path]]) -> Path:
     path : path
         A picture file.
     panels : sequence of (str, path, path)
-        Title, picture, and the EXR file of its support images as `render_to` writes it.
+        Title, picture, and the EXR file of its support images from `render_to`.
     """
     drawn = [_panel(title, read_image(picture), read_channels(support)) for title, picture, support in panels]
     rows = -(-len(drawn) // COLUMNS)

@@ -29,7 +29,7 @@ def run(
     try:
         yield from in_order(job.tile, tiles, identity=identity, workers=workers, executor=executor)
     except BaseException as error:
-        job.stop()  # an error, Ctrl-C, or the rest is not wanted: threads leave their blocks
+        job.stop()  # after an error, Ctrl-C or an early end: threads leave their blocks
         if isinstance(error, Exception) and (reason := lost(error, executor)) is not None:
             raise OSError(f"{reason} while it rendered: the picture is not finished") from error
         raise

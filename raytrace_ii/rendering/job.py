@@ -22,7 +22,7 @@ from ..tracing.sampling import Adaptive, Sampling, adaptive_mean, fixed_places
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
 from .tiles import Order, Tile, ray_order, tiles
 
-TILE_RAYS = 65536  # large against the overhead of numpy, small enough for work arrays to stay in cache
+TILE_RAYS = 65536  # many enough to hide the overhead of numpy, few enough for work arrays to stay in cache
 
 
 def _curve(peak: int, samples: int) -> NDArray[np.float64]:
@@ -79,16 +79,16 @@ class Job:
         )  # fmt: skip
 
     def tiles(self) -> list[Tile]:
-        """Blocks that cover the picture, in rows of blocks, the same whatever the workers."""
+        """Return the tiles that cover the picture, in rows of tiles; independent of the workers."""
         return list(tiles(self.camera, TILE_RAYS, whole_lenses=isinstance(self.sampling, Adaptive)))
 
     def stop(self) -> None:
-        """Make all threads of this process leave their blocks after the sample they trace."""
+        """Make all threads of this process leave their tiles after the current sample."""
         self._stopped.set()
 
     def _check_stopped(self) -> None:
         if self._stopped.is_set():
-            raise CancelledError("the picture is not wanted any more")
+            raise CancelledError("the picture was cancelled")
 
     def tile(self, rows: slice, cols: slice) -> Block:
         """Render one tile."""
@@ -117,7 +117,7 @@ class Job:
         return Block(rows, cols, arrays, tracer.count, histogram, time.thread_time() - started)
 
     def _tracer(self) -> Tracer:
-        """This thread's own, counting from 0."""
+        """Return this thread's own tracer, with counts reset."""
         tracer: Tracer | None = getattr(self._local, "tracer", None)
         if tracer is None:
             tracer = self._local.tracer = Tracer(
@@ -127,14 +127,14 @@ class Job:
         return tracer
 
     def _lobes(self) -> tuple[int, int]:
-        """Rays that a sample sends over the lobe of a rough mirror, and samples that share the lobe's places."""
+        """Return the rays of a sample over a rough mirror's lobe, and the samples that share the lobe's positions."""
         least, most = (self.sampling.least, self.sampling.most) if isinstance(self.sampling, Adaptive) else (
             self.sampling, self.sampling
         )  # fmt: skip
         return -(-LOBE_RAYS // least), most
 
     def _footprint(self) -> tuple[float, float]:
-        """Width of a sample's ray at its origin, mm, and how much it grows a mm: its part of the pixel."""
+        """Return the width of a sample's ray at its origin in mm, and its growth per mm: its part of the pixel."""
         if not self.texture_filter or not packed(self.scene).images:
             return 0.0, 0.0
         samples = self.sampling.least if isinstance(self.sampling, Adaptive) else self.sampling
@@ -142,7 +142,7 @@ class Job:
         return width / samples**0.5, spread / samples**0.5
 
     def _support_room(self, rays: int) -> Support | None:
-        """Support arrays for so many rays, None if no support image is wanted."""
+        """Return support arrays for so many rays; None if no support image is requested."""
         if not set(self.support) - {"samples"}:
             return None
         return Support.empty((rays,), {"depth" if name == "disparity" else name for name in self.support})
@@ -150,7 +150,7 @@ class Job:
     def _fixed(
         self, tracer: Tracer, samples: int, rows: slice, cols: slice, order: Order, support: Support | None
     ) -> NDArray[np.float32]:
-        """Summed radiance of a block whose pixels all have the same number of samples, in the order of the rays."""
+        """Return the summed radiance of a tile at a fixed number of samples, in the order of the rays."""
         radiance = np.zeros((len(order.pixels), 3), np.float32)
         keys = self._keys(cols.start + order.columns, rows.start + order.rows, 0, 1)
         if samples == 1 and isinstance(self.camera, IICamera):
@@ -170,7 +170,7 @@ class Job:
         return radiance
 
     def _keys(self, m: NDArray[Any], n: NDArray[Any], first: int, count: int) -> NDArray[np.uint64] | None:
-        """Keys of ``count`` samples of each pixel, if the scene is glossy."""
+        """Return the keys of ``count`` samples of each pixel; None unless the scene is glossy."""
         if not packed(self.scene).glossy:
             return None
         keys = np.empty(m.size * count, np.uint64)
@@ -180,7 +180,7 @@ class Job:
     def _adaptive(
         self, tracer: Tracer, wanted: Adaptive, rows: slice, cols: slice, order: Order, support: Support | None
     ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """Mean radiance of a block, and how many samples each pixel took, in the order of the rays."""
+        """Return the mean radiance of a tile and the number of samples per pixel, in the order of the rays."""
         assert isinstance(self.camera, IICamera)
 
         def shoot(L: Any, D: Any, shares: Any, *, numbers: Any, first: slice | None) -> NDArray[np.float32]:
@@ -201,11 +201,11 @@ class Job:
 
 
 def footprint(camera: Camera) -> tuple[float, float]:
-    """Distance of the rays of neighbouring pixels at their origins, mm, and how much it grows a mm of their way.
+    """Return the distance of the rays of neighbouring pixels at their origins in mm, and its growth per mm.
 
-    The median over the middle of the picture, so that pairs under two lenses do not count, and the mean of across and
-    down. Through a pinhole: 0, and the pixel pitch over the distance from pixel to pinhole. Negative at the origins
-    if rays start behind the lenses: at the lenses they meet, and then part.
+    Both are medians over the middle of the picture, which exclude pairs under two lenses, averaged over across and
+    down. For a pinhole they are 0, and the pixel pitch over the distance from pixel to pinhole. The distance at the
+    origins is negative if rays start behind the lenses: they converge at the lenses, and diverge behind them.
     """
     columns, rows = camera.pixels
     down, across = (slice(max(n // 2 - 32, 0), n // 2 + 32) for n in (rows, columns))
@@ -220,7 +220,7 @@ def footprint(camera: Camera) -> tuple[float, float]:
 
 
 def check_disparity(camera: Camera) -> None:
-    """Raise ValueError unless neighbouring lenses of a camera see a point at a known distance from each other."""
+    """Raise ValueError unless the camera's parameters determine disparity between neighbouring lenses."""
     model, named = camera.model, f"camera {camera.name!r}"
     if model is None:
         raise ValueError(f"disparity: the maps of {named} have no camera parameters")
@@ -233,8 +233,8 @@ def check_disparity(camera: Camera) -> None:
 def disparity(camera: Camera, depth: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the shift of a point at depth z from an elementary image to its right neighbour, in pixels to the right.
 
-    ±Λ·δL·(1/(z − z₀ − Λ) + 1/d) / δP, negative if elementary images are erect; z₀ is where the pixel array stands, d
-    where viewing zones meet. Downwards it moves as far per lens pitch. NaN where depth is.
+    ±Λ·δL·(1/(z − z₀ − Λ) + 1/d) / δP, negative if elementary images are erect; z₀ is the z of the pixel array, d the
+    distance at which viewing zones converge. The shift downwards is the same per lens pitch. NaN if depth is NaN.
     """
     model = camera.model
     assert model is not None

@@ -17,7 +17,7 @@ from ..tracing.sampling import sampling
 from .job import CURVES
 
 MOST_WORKERS = 1024
-MOST_NOISE = 1e6  # 8-bit steps; white is 255
+MOST_NOISE = 1e6  # 8-bit steps, of which white has 255
 
 
 class SetKeywords(TypedDict, total=False):
@@ -49,7 +49,7 @@ class RenderOptions:
         Rays per pixel. One ray starts at the pixel's centre. Several are stratified: one in each cell of a grid over
         the pixel, at a position hashed from ``seed`` and the pixel, and likewise over an aperture. All pass the lens
         of the pixel. A pair selects adaptive sampling: pixels get the least number, then more up to the most, until
-        they meet ``error``. Stored maps have a number of their own.
+        they meet ``error``. Stored maps fix the number of samples.
     error : float
         Target of adaptive sampling: standard error of a pixel in 8-bit steps, estimated from its samples and from its
         neighbours under the same lens; see `sampling` for the estimate and its limits.
@@ -62,12 +62,12 @@ class RenderOptions:
     workers : int, optional
         Threads; as many as cores if not given.
     executor : concurrent.futures.Executor or dask.distributed.Client, optional
-        Threads, processes on this machine, or a cluster that renders. It is not closed.
+        Executor of the rendering: threads, processes on this machine, or a cluster. It is not closed.
     pose : array_like, (4, 4), optional
         Rigid transform from the camera's frame to the scene's.
     texture_filter : bool
-        Filter image textures, maps and skies over the width of a ray at its hit point; every sample has its part of
-        the pixel, see `job.footprint`. Point sampling, the alternative, shows texels finer than pixels as noise.
+        Filter image textures, maps and skies over the width of a ray at its hit point; each sample covers its part
+        of the pixel, see `job.footprint`. The alternative, point sampling, shows texels finer than pixels as noise.
 
     Raises
     ------

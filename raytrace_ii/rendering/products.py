@@ -17,7 +17,7 @@ from .render import Stats
 
 @dataclass(frozen=True)
 class Product:
-    """Files that are made together, and all that they depend on."""
+    """Files that are rendered together, and the hash of all their inputs."""
 
     files: tuple[Path, ...]
     key: str
@@ -74,7 +74,7 @@ def manifest_kept_if_used(manifest: Path) -> Iterator[None]:
 
 
 def record_of(product: Product, stats: Stats) -> dict[str, Any]:
-    """Return what a manifest keeps of a product."""
+    """Return a product's record in a manifest."""
     return {
         "key": product.key,
         "files": {path.name: fingerprint(path) for path in product.files},
@@ -92,21 +92,21 @@ def fingerprint(path: Path) -> dict[str, Any]:
 
 
 def is_done(product: Product, record: dict[str, Any] | None) -> bool:
-    """Whether all files are there, the very ones, made of the very same."""
+    """Return whether all files exist, unchanged, and were made of the same inputs."""
     if record is None or record.get("key") != product.key:
         return False
     return all(is_same(path, record["files"].get(path.name)) for path in product.files)
 
 
 def is_same(path: Path, fingerprint: Any) -> bool:
-    """Whether a file is there with this size and hash."""
+    """Return whether a file exists with this size and hash."""
     if not fingerprint or not path.is_file() or path.stat().st_size != fingerprint["bytes"]:
         return False
     return file_hash(path) == fingerprint["sha256"]
 
 
 def commit() -> str | None:
-    """The commit of the source that runs; None if it was installed."""
+    """Return the commit of the running source; None if it was installed."""
     root = Path(__file__).parents[2]
     if not (root / ".git").exists():
         return None

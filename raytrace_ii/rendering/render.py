@@ -37,7 +37,7 @@ Progress = Callable[[int, int], None]
 class Stats:
     """Cost of a picture.
 
-    ``rays`` counts rays by kind (primary, shadow, reflection, refraction), and ``skipped`` those too weak to change
+    ``rays`` counts rays by kind (primary, shadow, reflection, refraction), ``skipped`` the rays too weak to change
     an 8-bit pixel. ``seconds`` is wall-clock time. ``embree_seconds`` and ``cpu_seconds`` are sums over all threads
     and processes. ``samples`` counts pixels by their number of samples. ``embree`` is Embree's version and packet
     size, or the reason for single rays.
@@ -53,7 +53,7 @@ class Stats:
 
     @property
     def mean_samples(self) -> float:
-        """Samples per pixel."""
+        """Mean number of samples per pixel."""
         return sum(n * pixels for n, pixels in self.samples.items()) / sum(self.samples.values())
 
 
@@ -339,7 +339,7 @@ def _options(scene: Any, camera: Any, options: RenderKeywords, progress: Any) ->
     if not isinstance(camera, IICamera | MapCamera):
         raise TypeError(f"camera is a {type(camera).__name__}: an IICamera or a MapCamera is needed")
     if progress is not None and not callable(progress) and not isinstance(progress, bool):
-        raise TypeError(f"progress is {progress!r}: True, or a function of blocks done and blocks in all, is needed")
+        raise TypeError(f"progress is {progress!r}: True, or a function of two numbers, is needed")
     check_keywords(options, RenderKeywords)
     return RenderOptions(**options)
 

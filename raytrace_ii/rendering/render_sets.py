@@ -43,7 +43,7 @@ from .render import render_to
 SETS = {"reference": ("apples", "car", "cuboid", "dolphin", "hairdo", "mountains", "objects", "twins")}
 MANIFEST, CONTACT = "manifest.json", "contact.png"
 PICTURE_OPTIONS = ("samples", "error", "seed", "noise", "dtype", "texture_filter")
-FLAT_PIXELS, FLAT_SAMPLES = 1024, 4  # pixels across, samples per pixel
+FLAT_PIXELS, FLAT_SAMPLES = 1024, 4  # of the 2-D projection: pixels across, samples per pixel
 
 Progress = Callable[[str, int, int], None]
 
@@ -140,7 +140,7 @@ def _products(
 
         common = {"pose": pose, "upright": camera.lenses == (1, 1), **means}
         shoot = partial(render_to, picture, scene, camera, **options, **common)
-        # one ray through every pixel's centre, without shading
+        # a single sample: one ray through the centre of every pixel, without shading
         survey = partial(render_to, None, replace(scene, lights=()), camera, support=images, **common)
         yield f"picture{number}", Product((picture,), content_hash("picture", *seen, options), shoot)
         yield f"support{number}", Product((support,), content_hash("support", *seen, list(images)), survey)
@@ -201,7 +201,7 @@ def _is_well_formed(manifest: dict[str, Any]) -> bool:
 
 
 def _write_manifest(folder: Path, manifest: dict[str, Any], old: dict[str, Any]) -> None:
-    """Write the manifest of finished renders; entries of others do not change."""
+    """Write the manifest of finished renders; keep the entries of other renders."""
     scenes = dict(old.get("scenes", {}))
     for title, entry in manifest["scenes"].items():
         before = scenes.get(title, {}).get("products", {})

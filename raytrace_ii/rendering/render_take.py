@@ -1,8 +1,8 @@
 """Rendering of takes into a folder: pictures and support images per frame, and a manifest.
 
-The manifest says of every file what it was made of, as a hash of that frame's scene, pose, camera and options, and
-what it is, as another. Frames that are there already, made of the same, are not made again: a take that was
-interrupted goes on where it was, and a changed keyframe renders the frames that it changes.
+The manifest holds two hashes per frame: of its inputs (scene, pose, camera, options) and of its files. Frames with
+unchanged hashes are not rendered again: an interrupted take continues, and a changed keyframe renders only the frames
+that it changes.
 """
 
 from __future__ import annotations
@@ -49,30 +49,30 @@ def render_take(
     progress: Progress | None = None,
     **options: Unpack[SetKeywords],
 ) -> dict[str, Any]:
-    """Render frames of a take, or what is left of them.
+    """Render frames of a take, or the rest of them.
 
-    Of frame τ there are ``frame_TTTT.png`` with its sidecar and ``frame_TTTT_NAME`` for each file of support images.
-    A frame is kept if its manifest entry has the same scene, pose, camera, options and version, and its files are
-    unchanged. Each frame is recorded when it is done: a run that is killed loses at most the frame it was at.
+    The files of frame τ are ``frame_TTTT.png`` with its sidecar, and ``frame_TTTT_NAME`` for each file of support
+    images. A frame is kept if its manifest entry has the same scene, pose, camera, options and version, and its files
+    are unchanged. Each frame is recorded when it is done: a killed run loses one frame at most.
 
     Parameters
     ----------
     folder : path
-        Made if it is not there.
+        Created if missing.
     camera : IICamera or MapCamera
         One pixel array.
     frames : sequence of int, optional
         Frame numbers, from 0; all if not given.
     pose : array_like, (4, 4), optional
-        Where the camera stands; its motion in the take comes before.
+        Pose of the camera; the motion in the take multiplies it from the left.
     support : mapping, optional
         Names of files, as ``support.exr``, to the support images in each.
     suffix : str
         Type of the pictures: .png, .tif or .exr.
     force : bool
-        Replace files that are there and of no earlier run of this take.
+        Replace files of these names that are not in the manifest.
     progress : callable, optional
-        Called with frame number, blocks done and blocks in all.
+        Called with the frame number, and the numbers of blocks done and of all blocks.
     **options
         ``samples``, ``error``, ``seed``, ``noise``, ``texture_filter``, ``workers``, ``executor``: `RenderOptions`.
 
@@ -86,7 +86,7 @@ def render_take(
     TypeError, ValueError
         If an argument is of the wrong type or out of range, or the folder holds another take.
     FileExistsError
-        If a file is there that no manifest knows, without ``force``.
+        If a file exists that is not in the manifest, without ``force``.
     OSError
         If a file cannot be written.
     """
@@ -120,7 +120,7 @@ def render_take(
 
 
 def frame_file(folder: Path, number: int, suffix: str) -> Path:
-    """The picture of a frame."""
+    """Return the path of a frame's picture."""
     return folder / f"frame_{number:04}{suffix}"
 
 
@@ -128,8 +128,8 @@ def _product(
     folder: Path, number: int, scene: Scene, pose: Any, camera: Any, support: Mapping[str, Sequence[str]],
     suffix: str, options: dict[str, Any], means: dict[str, Any], hashed: list[tuple[Scene, str]],
 ) -> Product:  # fmt: skip
-    """A frame's files, and what they depend on."""
-    if not hashed or hashed[-1][0] is not scene:  # a scene that does not move is hashed once
+    """Return a frame's files and the hash of their inputs."""
+    if not hashed or hashed[-1][0] is not scene:  # hash a scene that does not move once
         hashed[:] = [(scene, content_hash(scene))]
     picture = frame_file(folder, number, suffix)
     images: dict[str, list[Path]] = {}
@@ -153,7 +153,7 @@ def _beside(picture: Path, name: str) -> Path:
 
 
 def _check(take: Any, folder: Any, camera: Any, support: Any, suffix: Any, progress: Any) -> None:
-    """Raise TypeError or ValueError that names an argument of a wrong type, or a suffix of no picture."""
+    """Raise TypeError or ValueError for an argument of a wrong type, or a suffix of no picture type."""
     checks.instance(Take)("take", take)
     checks.path("folder", folder)
     checks.instance(IICamera, MapCamera)("camera", camera)
@@ -182,7 +182,7 @@ def _numbers(take: Take, frames: Sequence[int] | None) -> list[int]:
 def _claims(
     folder: Path, numbers: Sequence[int], support: Mapping[str, Any], suffix: str, old: Mapping[str, Any], force: bool
 ) -> list[str]:
-    """Names of all files of the take; FileExistsError if one is there that no manifest has claimed."""
+    """Return the names of all files of the take; raise FileExistsError if one exists outside the manifest."""
     known = set(old.get("claims", ()))
     ours = [path.name for number in numbers for path in _files(folder, number, support, suffix)]
     strange = [name for name in ours if name not in known and (folder / name).exists()]

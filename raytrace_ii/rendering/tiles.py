@@ -100,7 +100,7 @@ def _along_rays(camera: Camera, rows: slice, cols: slice) -> Integers:
     """Return the ranks of pixels by coarse direction, origin and fine direction, each along a Morton curve."""
     L, D = camera.rays(rows, cols)
     D = D / np.maximum(np.abs(D).sum(axis=2, keepdims=True), 1e-300)
-    axes = np.argsort(np.ptp(L.reshape(-1, 3), axis=0))[1:]  # the two along which the origins lie
+    axes = np.argsort(np.ptp(L.reshape(-1, 3), axis=0))[1:]  # the two axes along which the origins spread most
     direction, origin = _morton(D[..., :2], 8), _morton(L[..., axes], 8)
     return ((direction >> 6) << 22) | (origin << 6) | (direction & 63)
 

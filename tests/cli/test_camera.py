@@ -131,4 +131,4 @@ def test_solving_for_what_is_missing(run, refused):
     assert code == 0 and found["view_angle_deg"] == pytest.approx(29.91, abs=0.005)  # to the digits of 0.39 and 0.73
     refused(run("camera", "--solve", "pitch=0.39"), "under-determined")
     refused(run("camera", "--solve", "pitch=0.39,gap=0.73,pixel=0.0061,angle=31"), "contradictory")
-    refused(run("camera", "--solve", "width=3"), "'width=3' is no measure")
+    refused(run("camera", "--solve", "width=3"), "'width=3' is no length: NAME=NUMBER is needed")

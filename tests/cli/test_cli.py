@@ -114,7 +114,7 @@ def test_several_pictures_an_anchor_and_rates_that_are_found(run, refused, pictu
     assert means["jpegxl"]["gain"] == pytest.approx(sum(gains) / 2) and len(gains) == 2
     refused(run(*command, "--force", "--anchor", "jpeg"), "anchor is 'jpeg': one of the schemes jpeg2000, si-h264")
     refused(run("study", picture, picture, "-o", tmp_path / "t"), "every picture needs a name of its own")
-    refused(run(*command, "--depth", "z.exr", "--force"), "--depth is of one picture, 2 are given")
+    refused(run(*command, "--depth", "z.exr", "--force"), "--depth is the map of one picture, 2 are given")
     refused(run("study", picture, "-o", tmp_path / "t", "--dask", "x:1", "--plugin", "my.py"), "--plugin is for this")
 
 

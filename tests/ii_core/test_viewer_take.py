@@ -243,9 +243,9 @@ def test_takes_that_cannot_be_shown(run, refused, take, shot, tmp_path):
     out = ["-o", tmp_path / "v.html"]
     refused(run("view", tmp_path / "frames", "--depth", tmp_path / "d.exr", *out), "--depth is the map of one")
     refused(run("view", tmp_path / "frames", "--compare", tmp_path / "short", *out), "has 2 frames")
-    refused(run("view", tmp_path / "frames", "--compare", tmp_path / "a.png", *out), "is no take as")
+    refused(run("view", tmp_path / "frames", "--compare", tmp_path / "a.png", *out), "is no take, but")
     refused(run("display", tmp_path / "frames", "-o", tmp_path / "f.mp4"), "is a take: raytrace-ii video")
-    with pytest.raises(ValueError, match="2 frames, the take of 6 frames: as many are needed"):
+    with pytest.raises(ValueError, match="2 frames, the take of 6 frames: the same number is needed"):
         write_viewer(tmp_path / "v.html", take, video_of([take[0], take[1]]))
     with pytest.raises(ValueError, match="depth is the map of one picture"):
         write_viewer(tmp_path / "v.html", take, depth=shot.depth)

@@ -317,5 +317,5 @@ def test_the_command_designs_a_camera_that_renders(run, refused, tmp_path):
     assert IIPicture.load(tmp_path / "p.png").camera.start_mm > 300
     refused(run("camera", "--design", wish, "-o", file), "is there already")
     refused(run("camera", "--design", "panel=15.6in,pixels=3840x2160"), "the design has no pitch, distance")
-    refused(run("camera", "--design", wish + ",size=3"), "'size=3' is no wish for a design: known are panel, pixels")
+    refused(run("camera", "--design", wish + ",size=3"), "'size=3' is unknown for --design: known are panel, pixels")
     refused(run("camera", "--design", wish + ",gap=2ft"), "gap is '2ft': a number, or a length in mm, cm, m, in")

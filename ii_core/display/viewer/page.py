@@ -173,7 +173,7 @@ class _Page:
         for video in self.videos[1:]:
             picture.check_same_structure(video.structure)
             if video.frames != self.frames:
-                raise ValueError(f"decoded has {video.frames} frames, {self.what}: as many are needed")
+                raise ValueError(f"decoded has {video.frames} frames, {self.what}: the same number is needed")
         if quality is not None and not 1 <= quality <= 100:
             raise ValueError(f"quality is {quality}: a whole number from 1 to 100 is needed")
         if depth is not None and self.frames > 1:
