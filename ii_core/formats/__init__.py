@@ -8,8 +8,8 @@ belongs to the viewer further to the right. In a picture of erect elementary ima
 layout        what it is
 ============  ==================================================================================================
 views         a folder of pictures with two numbers in their names, any names: ``view_03_12.png``,
-              ``out_03_12_-381.9_1103.4.png`` (Stanford), ``IMG_0001_033_04_08.png``. Which number runs across, and
-              which way, is found from the pictures (`order.Arrangement`)
+              ``IMG_0001_033_04_08.png``, ``out_03_12_-381.9_1103.4.png`` (Stanford, with the places of cameras).
+              These places or the pictures tell which number runs across, and which way (`order.Arrangement`)
 HCI           ``input_Cam000.png`` … row by row from the top left camera, the grid in ``parameters.cfg``
 quilt         ``name_qsCxRaA.png``: C×R tiles of views along one line, the leftmost at the bottom left, rows upward;
               what does not divide by C and R is cut off at the right and the top

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,7 @@ def picture_of(
     """
     given = {"transposed": transposed, "flip_down": flip_down, "flip_across": flip_across}
     chosen: Any = {name: value for name, value in given.items() if value is not None}
-    order = estimate(views.read, views.shape, Arrangement(**chosen), views.known | set(chosen))
+    order = _arranged(views, chosen)
     first = views.read(0, 0)
     height, width = first.shape[:2]
     cols, rows = order.grid(views.shape)
@@ -83,3 +84,23 @@ def picture_of(
         return picture, order
     known = IIPicture.from_structure_json(pixels, views.structure)
     return (known.with_pixels(turned_pixels(known)) if known.erect else known), order
+
+
+def _arranged(views: Views, chosen: dict[str, Any]) -> Arrangement:
+    """Return the arrangement: as chosen, else by the places of cameras in names, else by the pictures."""
+    names = views.positions if views.structure is None else None
+    if names is None:
+        return estimate(views.read, views.shape, Arrangement(**chosen), views.known | set(chosen))
+    start: dict[str, Any] = {
+        "transposed": names.transposed,
+        "flip_across": names.flip_across,
+        "flip_down": names.flip_down,
+        **chosen,
+    }
+    order = estimate(
+        views.read, views.shape, Arrangement(**start), {*views.known, *chosen, "transposed", "flip_across"}
+    )
+    across, down = names.step_mm
+    how = "; vertical places upwards is assumed" if order.basis == "assumed" else f"; {order.basis}"
+    told = "" if order.basis == "given" else how
+    return replace(order, basis=f"by camera places in names, {across:.4g}×{down:.4g} mm apart{told}")

@@ -15,6 +15,7 @@ from ..camera import Pair
 from ..files import read_image
 from ..picture import IIPicture
 from .order import Read
+from .positions import Positions
 from .rig import Rig
 
 WHOLE_ORDER = frozenset(("transposed", "flip_down", "flip_across"))
@@ -36,6 +37,8 @@ class Views:
         Structure of the original picture, if `write_views` stored it.
     rig : Rig, optional
         Measures of the cameras, if the layout holds them.
+    positions : Positions, optional
+        Grid of the cameras, if names hold their places.
     """
 
     shape: tuple[int, int]
@@ -43,6 +46,7 @@ class Views:
     known: frozenset[str] = frozenset()
     structure: dict[str, Any] | None = None
     rig: Rig | None = None
+    positions: Positions | None = None
 
 
 def listed(files: list[Path], grid: Pair, known: frozenset[str]) -> Views:

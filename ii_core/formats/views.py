@@ -17,6 +17,7 @@ from ..files import one_line, read_json, write_image, write_json
 from ..picture import IIPicture
 from .grid import WHOLE_ORDER, Views, camera_views, checked_reader, listed, read_view
 from .hci import HCI_VIEW, hci_views
+from .positions import named_positions
 
 PICTURES = (".png", ".tif", ".tiff", ".exr", ".hdr", ".jpg", ".jpeg", ".ppm", ".pgm", ".bmp", ".webp")
 NUMBER = re.compile(r"-?\d+\.\d+|\d+")
@@ -72,9 +73,11 @@ def _numbered(folder: Path, members: list[Path], grid: Pair | None) -> Views:
         if len(steps) > 1:
             raise ValueError(f"view numbers in {folder} have gaps: {', '.join(map(str, numbers))}")
     shape = len(first), len(second)
+    at = [(first.index(i), second.index(j)) for i, j in zip(a, b, strict=True)]
     return Views(
         shape=shape,
         read=checked_reader(lambda i, j: table[first[i], second[j]], read_view),
+        positions=named_positions(fields, at),
         **_written(folder, shape),
     )
 

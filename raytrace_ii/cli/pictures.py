@@ -87,8 +87,9 @@ def import_(
 ) -> None:
     """Import a light field of other programs as an II-picture.
 
-    The arrangement of views is estimated from the pictures and printed. The camera is read from the parameters.cfg of
-    an HCI folder, or given: --camera, or --baseline-mm, --focal-mm and --sensor-mm.
+    The arrangement of views is estimated from the pictures and printed. Names with the places of cameras, as in the
+    Stanford archive (out_04_07_-435.23_1123.45.png), settle it and give --baseline-mm. The camera is read from the
+    parameters.cfg of an HCI folder, or given: --camera, or --baseline-mm, --focal-mm and --sensor-mm.
     """
     from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset
     from ii_core.files import check_type, image_types
@@ -96,12 +97,15 @@ def import_(
 
     image_types(output)
     check_outputs([output, sidecar(output)], force)
+    views = None if ei_pixels is not None else find_views(source, grid=None if grid is None else pair("grid", grid))
+    if baseline_mm is None and focal_mm is not None and views is not None and views.positions is not None:
+        baseline_mm = views.positions.baseline_mm
     rig = _rig(camera, baseline_mm, focal_mm, sensor_mm, focus_mm)
     known = None if camera is None else preset(camera)
-    if ei_pixels is not None:
+    if views is None:
+        assert ei_pixels is not None
         made, order = load_mosaic(source, pair("ei-pixels", ei_pixels)), None
     else:
-        views = find_views(source, grid=None if grid is None else pair("grid", grid))
         with spinner(f"import {source.name}"):
             made, order = picture_of(views, transposed=transposed, flip_down=flip_down, flip_across=flip_across)
     if rig is not None:

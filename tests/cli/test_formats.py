@@ -98,6 +98,11 @@ def test_imported_views_get_a_camera(run, refused, shot, tmp_path):
     assert code == 0 and "no camera" not in said
     camera = IIPicture.load(out).camera
     assert camera.viewer_mm == 800 and camera.start_mm == 800
+    for path in sorted(views.glob("*.png")):  # the camera places of the Stanford archive, 5 mm apart
+        row, col = map(int, path.stem.split("_")[1:])
+        path.rename(views / f"out_{row:02}_{col:02}_{5 * (7.5 - row):.6f}_{5 * (col - 7.5):.6f}.png")
+    code, said, _ = run("import", views, "-o", out, *rig[2:], "--sensor-mm", 35, "--focus-mm", 800, "--force")
+    assert code == 0 and "by camera places in names, 5×5 mm apart" in said and IIPicture.load(out).camera == camera
     import json
 
     (tmp_path / "c.json").write_text(json.dumps(preset("setup1", scale=16).to_json()))

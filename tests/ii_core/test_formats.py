@@ -1,6 +1,7 @@
 """Light-field formats: exact round trips, orders of views, refused files."""
 
 import json
+import re
 import shutil
 import warnings
 from dataclasses import replace
@@ -167,6 +168,44 @@ def test_the_order_of_a_rendered_picture_is_found(shot, order):
     assert low < high <= 0  # an II-picture's scene lies behind its lenses
     told = estimate(read, shape, Arrangement(flip_down=order["flip_down"]), {"flip_down"})
     assert {key: getattr(told, key) for key in order} == order
+
+
+def named_by_places(folder, picture, order, *, upwards, part=slice(5, 9)):
+    """Write the middle views as Stanford does; U to the right, V up or down, both of both signs, with jitter."""
+    stack = sub_images(picture)[part, part]
+    rows, cols = stack.shape[:2]
+    shape = (cols, rows) if order["transposed"] else (rows, cols)
+    rng = np.random.default_rng(1)
+    for a, b in np.ndindex(*shape):
+        row, col = Arrangement(**order).place(a, b, shape)
+        u, v = 8.6 * (col - 1.3) + rng.normal(0, 0.2), (-8.2 if upwards else 8.2) * (row - 1.6) + rng.normal(0, 0.2)
+        write_image(folder / f"out_{a:02}_{b:02}_{v:.6f}_{u:.6f}_.png", stack[row, col])
+    return stack
+
+
+@pytest.mark.parametrize("order", ORDERS, ids=str)
+@pytest.mark.parametrize("upwards", [True, False])
+def test_places_in_names_settle_order_and_180_degrees(shot, tmp_path, order, upwards):
+    """On b1dc540 left to right was assumed: half of these came out rotated by 180°."""
+    stack = named_by_places(tmp_path, shot.picture, order, upwards=upwards)
+    made, found = picture_of(find_views(tmp_path))
+    assert {key: getattr(found, key) for key in order} == order
+    np.testing.assert_array_equal(sub_images(made), stack)
+    assert found.disparity[1] <= 0  # all behind the lenses: of the sign of the truth
+    assert re.search(r"by camera places in names, 8\.\d+×8\.\d+ mm apart; seen: ", found.describe())
+
+
+@pytest.mark.parametrize("order", ORDERS[::3], ids=str)
+def test_places_alone_settle_views_without_detail(tmp_path, order):
+    """Colours tell the views apart, and no shift is seen."""
+    pixels = np.random.default_rng(3).integers(0, 256, (16, 16, 3), np.uint8)
+    flat = IIPicture(np.tile(pixels, (12, 9, 1)), (9, 12), (16, 16))
+    stack = named_by_places(tmp_path, flat, order, upwards=True)
+    made, found = picture_of(find_views(tmp_path))
+    assert {key: getattr(found, key) for key in order} == order and "upwards is assumed" in found.describe()
+    np.testing.assert_array_equal(sub_images(made), stack)
+    given = picture_of(find_views(tmp_path), flip_across=not order["flip_across"])[1]
+    assert given.flip_across != order["flip_across"]  # what is given wins
 
 
 def test_without_detail_nothing_is_seen_and_that_is_said():
