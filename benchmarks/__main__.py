@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def description(benchmark: Benchmark) -> str:
-    """Return name, summary, needs, cost and files of a benchmark, for people."""
+    """Return name, summary, needs, cost and files of a benchmark as readable text."""
     spent = benchmark.minutes()
     cost = "no times recorded" if spent is None else f"{'at least ' * spent[1]}{spent[0]:.1f} min by its records"
     files = [f"benchmarks/results/{benchmark.pattern}"] * bool(benchmark.records)

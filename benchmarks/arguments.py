@@ -31,7 +31,7 @@ def command_line(
         "--again",
         choices=AGAIN,
         default=CHANGED,
-        help="measure again: rows of other code or libraries (changed), nothing that has a row (missing), all",
+        help="measure again: rows of other code or libraries (changed), missing rows alone (missing), all rows (all)",
     )
     return parser
 

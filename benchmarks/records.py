@@ -1,8 +1,8 @@
 """Append-only records of benchmarks: every row has its own commit, machine, versions and date.
 
-A record is a line of JSON in ``benchmarks/results/NAME.jsonl``. The script that measures a row appends it the moment
-its measurement ends; nothing else writes there, and no line is changed afterwards. Readers take the newest record of
-each key. `check` holds the files to this rule.
+A record is a line of JSON in ``benchmarks/results/NAME.jsonl``. The script that measures a row appends it when its
+measurement ends; nothing else writes there, and no line is changed afterwards. Readers take the newest record of
+each key. `check` verifies these rules.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 STAMP = ("code", "git", "machine", "versions", "when")
 FIELDS = ("key", *STAMP, "seconds", "result")
-# Sources of every number, besides the modules of the benchmark itself; pages and charts may change freely.
+# Packages that determine every number, besides the modules of the benchmark itself; pages and charts are excluded.
 PACKAGES = ("ii_core", "raytrace_ii", "codec", "metrics", "assets")
 SOURCES = (".py", ".toml", ".json", ".png", ".jpg")
 CHANGED, MISSING, ALL = AGAIN = ("changed", "missing", "all")
@@ -46,7 +46,7 @@ class Records:
     name : str
         Name of the file in ``benchmarks/results``, without its ending.
     modules : tuple of str
-        Modules of ``benchmarks`` that the results come from.
+        Modules of ``benchmarks`` that compute the results.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Records:
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the file."""
         return RESULTS / f"{self.name}.jsonl"
 
     def measure(self, key: Mapping[str, Any], call: Callable[[], Mapping[str, Any]]) -> Record:
@@ -76,7 +76,7 @@ class Records:
             "cpu_seconds": round(cpu_seconds() - cpu, 2),
             "result": result,
         }
-        stamp(self.modules)  # processes that the measurement started have loaded the same code
+        stamp(self.modules)  # again after the measurement: its child processes may have loaded code later
         append_record(self.path, record)
         return record
 
@@ -87,8 +87,8 @@ class Records:
         ----------
         keys : iterable of mapping
         again : {"changed", "missing", "all"}
-            "changed": keys without a record by the present code and libraries; "missing": keys without a measured
-            record, whatever the code; "all": every key.
+            "changed": keys without a record by the present code and libraries; "missing": keys without a record by
+            any code; "all": every key.
         """
         there = {_name(record["key"]): record for record in self.newest()}
         now = {"code": code_hash(self.modules), "versions": provenance()["versions"]}
@@ -121,12 +121,12 @@ class Records:
         return [record for record in found.values() if only.items() <= record["key"].items()]
 
     def by(self, name: str, values: Iterable[str], **only: Any) -> dict[str, dict[str, Any]]:
-        """Return the row of each of these values of a key, in their order; values without one are left out."""
+        """Return the row of each of these values of a key, in their order; values without a row are left out."""
         rows = {row[name]: row for row in self.rows(**only)}
         return {value: rows[value] for value in values if value in rows}
 
     def rows(self, *, unsure: bool | None = None, **only: Any) -> list[dict[str, Any]]:
-        """Return key and result of the newest records as one dict each, with ``commit`` as `commit_of` gives it."""
+        """Return key and result of the newest records as one dict each, with the ``commit`` of `commit_of`."""
         return [{**r["key"], **r["result"], "commit": commit_of(r)} for r in self.newest(unsure=unsure, **only)]
 
 
@@ -136,12 +136,12 @@ def cpu_seconds() -> float:
 
 
 def stamp(modules: Sequence[str]) -> dict[str, Any]:
-    """Return code hash, commit, machine and versions as they were when this process first measured, and the time.
+    """Return code hash, commit, machine and versions at the first measurement of this process, and the present time.
 
     Raises
     ------
     RuntimeError
-        If sources have changed on disk since then.
+        If sources have changed on disk since the first measurement.
     """
     begin, now = _at_start(tuple(modules)), code_hash(modules)
     if now != begin["code"]:
@@ -185,7 +185,7 @@ def commit_of(record: Mapping[str, Any]) -> str:
 
 
 def origin(rows: Iterable[Mapping[str, Any]]) -> str:
-    """Return a sentence that says which commits measured these rows."""
+    """Return a sentence with the commits that measured these rows."""
     commits = list(dict.fromkeys(row["commit"] for row in rows))
     known = ", ".join(f"`{commit}`" for commit in commits if commit != "unsure")
     if "unsure" not in commits:
@@ -196,7 +196,7 @@ def origin(rows: Iterable[Mapping[str, Any]]) -> str:
 
 
 def by_scene(scenes: Mapping[str, Any]) -> str:
-    """Return a sentence that says which commit measured which scene."""
+    """Return a sentence with the commits and the scenes that each measured."""
     commits: dict[str, list[str]] = {}
     for name, one in scenes.items():
         commits.setdefault(one["commit"], []).append(name)
@@ -206,14 +206,14 @@ def by_scene(scenes: Mapping[str, Any]) -> str:
 
 
 def with_commits(lines: Sequence[str], commits: Sequence[Iterable[str]]) -> list[str]:
-    """Return a Markdown table with a column of commits, if its rows were not all measured by one.
+    """Return a Markdown table, with a column of commits unless a single commit measured all rows.
 
     Parameters
     ----------
     lines : sequence of str
         Head, rule and rows.
     commits : sequence of iterables of str
-        Those of each row's records.
+        Commits of each row's records.
     """
     each = [list(dict.fromkeys(some)) for some in commits]
     if len({commit for some in each for commit in some}) < 2:
@@ -224,19 +224,19 @@ def with_commits(lines: Sequence[str], commits: Sequence[Iterable[str]]) -> list
 
 
 def _counts(line: str) -> bool:
-    """Whether a committed line must stay: its provenance is known, and its commit is in this history."""
+    """Return whether a committed line must stay: its provenance is known, and its commit is in this history."""
     git = json.loads(line).get("git")
     return '"unsure":' not in line and (git is None or exists(git["commit"]))
 
 
 def check(path: Path) -> list[str]:
-    """Return what is wrong with a file of records, a line each.
+    """Return the faults of a file of records, one line each.
 
-    Every record has all fields and a commit that exists, as far as this checkout has a history. No two have the same
-    measured seconds under different commits, unless the seconds of their whole measurements differ too: short times
-    are equal by chance, as they are rounded to milliseconds. No committed line was changed or removed, unless its
-    commit is unknown. Records converted from a file of an earlier form have no code hash and no date. Records marked
-    ``unsure`` have no commit either: several commits measured them, and the file of that time named one for all.
+    Every record needs all fields and an existing commit, if this checkout has a history. Two records of different
+    commits must not have the same measured seconds, unless the seconds of their whole measurements differ, too: short
+    times are rounded to milliseconds and may be equal by chance. Committed lines must not be changed or removed,
+    unless their commit is unknown. Records converted from an earlier file format have no code hash and no date.
+    Records marked ``unsure`` have no commit either: several commits measured them, but their file named only one.
     """
     wrong, seen = [], dict[tuple[float, ...], Record]()
     for number, record in enumerate(read_records(path, FORMAT, VERSION), 1):
@@ -261,7 +261,7 @@ def check(path: Path) -> list[str]:
 
 
 def _copied(first: Record, second: Record) -> bool:
-    """Whether of two records with equal times in their results one is a copy of the other under another commit."""
+    """Return whether one of two records with equal times is a copy of the other under another commit."""
     whole = (first["seconds"], second["seconds"])
     return commit_of(first) != commit_of(second) and (None in whole or whole[0] == whole[1])
 
@@ -286,7 +286,7 @@ def _git(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @lru_cache(maxsize=1024)
 def exists(commit: str) -> bool:
-    """Whether a commit is an ancestor of HEAD; True without a history. One of a rebased branch is none."""
+    """Return whether a commit is an ancestor of HEAD; True without a history. Commits of rebased branches are not."""
     try:
         shallow = _git("rev-parse", "--is-shallow-repository")
         return shallow.stdout.strip() != "false" or not _git("merge-base", "--is-ancestor", commit, "HEAD").returncode
@@ -308,7 +308,7 @@ def seconds_in(value: Any) -> Iterable[float]:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON gives it back: lists for tuples, text for infinities, None for NaN."""
+    """Return a value as JSON can store it: lists for tuples, text for infinities, None for NaN."""
     return json.loads(json.dumps(_spelt(value)))
 
 
@@ -331,7 +331,7 @@ def _finite(value: Any) -> Any:
 
 
 def number(value: Any) -> float:
-    """Return a number that `plain` has spelt."""
+    """Return the number of a value from `plain`."""
     return math.nan if value is None else float(value)
 
 

@@ -14,8 +14,8 @@ from typing import Any
 from benchmarks.records import RESULTS, ROOT, seconds_in
 from ii_core.json_lines import lines_of
 
-LEAST = 6.0  # seconds: a shorter sum is of single calls, not of the run
-OWN = "NAME.jsonl"  # records in the file of the benchmark's name
+LEAST = 6.0  # seconds: shorter sums are times of single calls, not of the run
+OWN = "NAME.jsonl"  # stands for the file of the benchmark's name
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,8 @@ class Benchmark:
     def minutes(self) -> tuple[float, bool] | None:
         """Return the minutes of its newest records, and whether that is only a lower bound; None without times.
 
-        CPU time where a record has it, else the time by the clock of the row, else the sum of times that the row
-        itself reports, which leaves out rendering and searching.
+        CPU time if the record has it, else wall-clock time, else the sum of the times in the result, which excludes
+        rendering and search.
         """
         total, bound = 0.0, False
         for path in self.result_files():

@@ -19,7 +19,7 @@ STUCK = 300  # seconds without output after which a worker is killed
 
 @dataclass(frozen=True)
 class Case:
-    """End of one case, and what it took; ``said`` is the last error line of a dead worker."""
+    """Outcome and cost of one case; ``said`` is the last error line of a dead worker."""
 
     number: int
     what: str
@@ -37,8 +37,8 @@ class Case:
 def cases(module: str, arguments: Sequence[str], count: int) -> Iterator[Case]:
     """Yield the ends of the cases 0 to ``count`` − 1 that ``python -m MODULE ARGUMENTS --range FIRST LAST`` prints.
 
-    Every line of the worker is a JSON list: number, kind of end, CPU seconds and, optionally, megabytes. A case whose
-    worker dies or prints nothing for `STUCK` seconds is yielded as such, and a new worker begins behind it.
+    Every line of the worker is a JSON list: number, kind of end, CPU seconds and, optionally, megabytes. If a worker
+    dies or prints nothing for `STUCK` seconds, its case is yielded as such, and a new worker starts with the next.
     """
     first = 0
     while first < count:
@@ -60,7 +60,7 @@ def cases(module: str, arguments: Sequence[str], count: int) -> Iterator[Case]:
 
 
 class Watchdog:
-    """Kill a worker without output for too long, and one that is left early."""
+    """Kill a worker that prints nothing for too long, or whose caller stops reading."""
 
     def __init__(self, worker: subprocess.Popen[str]) -> None:
         self.worker, self.fired, self._last = worker, False, time.monotonic()

@@ -1,7 +1,7 @@
 """Reference ray tracer: spheres and a floor in closed form, float64, no triangles.
 
-It shares nothing with `raytrace_ii` but the plain values of its materials and lights; intersections, Snell, Fresnel,
-shadows and sky are written again. `World.scene` is the same world as triangle meshes.
+It shares only the values of materials and lights with `raytrace_ii`; intersections, Snell's and Fresnel's formulas,
+shadows and sky are implemented independently. `World.scene` is the same world as triangle meshes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from raytrace_ii import Background, Body, Light, Material, Scene
 from raytrace_ii.shapes.primitives import Plane, Sphere
 
 Array = NDArray[np.float64]
-NEAR = 1e-9  # mm: nearer than this a ray meets the surface that it starts on
+NEAR = 1e-9  # mm: nearer hits are the surface on which the ray starts
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Ball:
         """Return distances of entry and exit of unit rays (n, 3), NaN for a miss."""
         to = o - np.asarray(self.centre_mm)
         half = -(to * d).sum(axis=1)
-        # from the line's own nearest point: no difference of large squares
+        # measured from the point nearest to the centre: avoids the difference of large squares
         square = self.radius_mm**2 - ((to + half[:, None] * d) ** 2).sum(axis=1)
         root = np.sqrt(np.where(square >= 0, square, np.nan))
         return half - root, half + root
@@ -81,7 +81,7 @@ class Floor:
 
 @dataclass(frozen=True)
 class World:
-    """Solids under lights and sky. Glass balls stand apart and have no light of their own."""
+    """Solids under lights and sky. Glass balls do not touch or overlap, and have no local shading."""
 
     solids: tuple[Ball | Floor, ...]
     lights: tuple[Light, ...] = ()
@@ -90,14 +90,14 @@ class World:
     max_depth: int = 6
 
     def scene(self, segments: int, *, smooth: bool = True) -> Scene:
-        """The world as triangles, ``segments`` of them around a ball."""
+        """Return the world as triangle meshes, with ``segments`` triangles around a ball."""
         return Scene(
             bodies=[solid.body(segments, smooth) for solid in self.solids], lights=self.lights,
             background=self.background, ambient=self.ambient, max_depth=self.max_depth,
         )  # fmt: skip
 
     def nearest(self, o: Array, d: Array) -> tuple[Array, NDArray[np.int64], Array]:
-        """Distance (inf on a miss), row of the solid (−1) and outward normal (NaN) of what unit rays (n, 3) meet."""
+        """Return distance (inf on a miss), row of the solid (−1) and outward normal (NaN) at hits of rays (n, 3)."""
         every = np.stack([solid.first(o, d) for solid in self.solids])
         t, which = every.min(axis=0), every.argmin(axis=0)
         which[~np.isfinite(t)] = -1
@@ -108,11 +108,11 @@ class World:
         return t, which, normal
 
     def radiance(self, o: Array, d: Array) -> Array:
-        """Linear light (n, 3) along unit rays that start in the open."""
+        """Return linear light (n, 3) along unit rays that start in air."""
         return self._seen(o, d, 0, -1)
 
     def _seen(self, o: Array, d: Array, depth: int, inside: int) -> Array:
-        """``inside`` is the row of the ball in which all these rays run, −1 for none."""
+        """Return linear light along rays inside ball ``inside``; −1 for rays in air."""
         t, which, normal = self.nearest(o, d)
         out = np.empty_like(o)
         out[which < 0] = self.sky(d[which < 0])
@@ -160,7 +160,7 @@ class World:
         return out
 
     def _arriving(self, p: Array, towards: Array, reach: Array) -> Array:
-        """Share of a light (n, 3) that reaches points through what stands between; glass does not bend it."""
+        """Return the share of a light (n, 3) that reaches points past occluders; glass does not refract it."""
         share = np.ones_like(p)
         for solid in self.solids:
             m = solid.material
@@ -177,7 +177,7 @@ class World:
         return share
 
     def sky(self, d: Array) -> Array:
-        """Horizon to zenith and nadir, with the sine of the height."""
+        """Return the sky's light: from horizon to zenith or nadir, linear in the sine of the elevation."""
         b = self.background
         rise = np.minimum(np.abs(d[:, 1:2]) / np.sin(np.radians(b.spread_deg)), 1)
         pole = np.where(d[:, 1:2] > 0, b.zenith, b.nadir)
@@ -185,7 +185,7 @@ class World:
 
 
 def reflectance(cosine: Array, ratio: float) -> tuple[Array, Array]:
-    """Fresnel's unpolarised reflectance for n1/n2 = ``ratio``, the cosine behind; (1, 0) past the last angle."""
+    """Return Fresnel's unpolarised reflectance at n1/n2 = ``ratio``, and the refracted cosine; (1, 0) if total."""
     sine = ratio * np.sqrt(np.maximum(1 - cosine**2, 0))
     behind = np.sqrt(np.maximum(1 - sine**2, 0))
     s = (ratio * cosine - behind) / (ratio * cosine + behind)
@@ -194,7 +194,7 @@ def reflectance(cosine: Array, ratio: float) -> tuple[Array, Array]:
 
 
 def _towards(light: Light, p: Array) -> tuple[Array, Array]:
-    """Unit vectors to a light, and how far it is."""
+    """Return unit vectors to a light, and its distance."""
     if light.kind == "directional":
         d = -np.asarray(light.vector, float)
         return np.broadcast_to(d / np.linalg.norm(d), p.shape), np.full(len(p), np.inf)

@@ -2,9 +2,9 @@
 
     python -m benchmarks run calibration
 
-A white image is the share of light that every pixel gets through a camera with a main lens, whose rim makes the
-micro-images: the mean weight of its rays. Light falls off towards the corners, photons and the sensor make noise, and
-a given share of the lenses is dark or saturated. Each row holds the worst and typical errors of one kind of picture.
+A white image is the mean weight of every pixel's rays through a camera with a main lens; the rim of the main lens
+bounds the micro-images. Light falls off towards the corners, photons and the sensor add noise, and a given share of
+the lenses is dark or saturated. Each row holds worst and median errors of one kind of picture.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from ii_core.calibration import Calibration
 from ii_core.optics import Lens
 
 RECORDS = Records("calibration", ("benchmarks.accuracy.calibration",))
-CAMERAS = 50  # a row; four rows of small pictures
+CAMERAS = 50  # cameras per row; four rows of small pictures
 PIXEL_MM = 0.005
 # Distance of the main lens, in gaps and sides of the picture: its rim's images shift by a sixth of a pixel towards
-# the border. In our camera a pixel sees through the lens over it alone: farther shifts would cut micro-images.
+# the border. In our camera a pixel's rays pass only the lens over it: larger shifts would cut micro-images.
 FAR = 3.0
 ELECTRONS, READ_NOISE, OFFSET, FULL = 2000.0, 5.0, 30.0, 2300.0
 
 
 def random_camera(rng: np.random.Generator, size: tuple[int, int], pitch_px: float, hexagonal: bool) -> IICamera:
-    """A camera behind a main lens, whose turned and shifted lens array is larger than its sensor."""
+    """Return a camera behind a main lens, with a rotated and shifted lens array that is larger than its sensor."""
     across = pitch_px
     down = across * rng.uniform(0.92, 1.08) * (math.sqrt(3) / 2 if hexagonal else 1)
     reach = 2 * math.hypot(*size) / 2
@@ -55,7 +55,7 @@ def random_camera(rng: np.random.Generator, size: tuple[int, int], pitch_px: flo
 
 
 def white_image(camera: IICamera, samples: int = 3) -> NDArray[np.float32]:
-    """Share of light of every pixel before an even scene, the mean over samples×samples points of it."""
+    """Return the share of light of every pixel before a uniform scene, the mean over samples×samples of its rays."""
     width, height = camera.pixels
     out = np.zeros((height, width), np.float32)
     for top in range(0, height, 256):
@@ -70,9 +70,9 @@ def white_image(camera: IICamera, samples: int = 3) -> NDArray[np.float32]:
 def exposed(
     share: NDArray[np.float32], camera: IICamera, rng: np.random.Generator, bad: float = 0.0
 ) -> NDArray[np.uint16]:
-    """A white image as a sensor gives it: falling off by 40 % to the corners, noisy, ``bad`` of the lenses spoilt.
+    """Return a white image as recorded: 40 % fall-off to the corners, noise, and a share ``bad`` of spoilt lenses.
 
-    Half of the bad ones are dark, half get four times the light, which is beyond the sensor's scale.
+    Half of the spoilt lenses are dark, half get four times the light, which saturates the sensor.
     """
     height, width = share.shape
     x, y = np.linspace(-1, 1, width), np.linspace(-1, 1, height)[:, None]
@@ -98,7 +98,7 @@ def growth(camera: IICamera) -> float:
 
 
 def errors(camera: IICamera, found: Calibration) -> dict[str, float]:
-    """Relative errors of pitch, that of the turn in degrees, and the rms distance of centres in pixels."""
+    """Return relative errors of pitch, the error of rotation in degrees, and the rms error of centres in pixels."""
     true, lattice = camera.lens_lattice, found.grid.lattice
     pitch = [a / (b * growth(camera)) - 1 for a, b in zip(lattice.pitch, true.pitch, strict=True)]
     k, l = np.meshgrid(np.arange(lattice.lenses[0]), np.arange(lattice.lenses[1]))
@@ -114,7 +114,7 @@ def errors(camera: IICamera, found: Calibration) -> dict[str, float]:
 
 
 def trial(seed: int, hexagonal: bool, bad: float, size: tuple[int, int] | None = None) -> dict[str, float]:
-    """Errors of one random camera: pictures of 300–700 px a side if no size is given, 20–60 lenses across."""
+    """Return the errors of one random camera: 300–700 px a side if no size is given, 20–60 lenses across."""
     rng = np.random.default_rng((seed, hexagonal, round(100 * bad)))
     pixels = size or (int(rng.integers(300, 701)), int(rng.integers(300, 701)))
     pitch = rng.uniform(max(6, min(pixels) / 60), min(24, min(pixels) / 20)) if size is None else rng.uniform(10, 20)

@@ -2,9 +2,9 @@
 
     python -m benchmarks run camera_in_scene [--scale 16]
 
-In the scene stand plano-convex lenslets of glass, one triangle mesh each, with black walls between them, before a
-black box that holds the pixels, from which rays start. The other camera is a `SphericalLenslet`, which the scene
-never sees. Both are traced by the same renderer along the same samples. Numbers go to
+One camera is part of the scene: plano-convex lenslets of glass, one triangle mesh each, with black walls between
+them, before a black box with the pixels, from which rays start. The other camera is a `SphericalLenslet`, whose rays
+start in the scene. Both are traced by the same renderer along the same samples. Numbers go to
 ``benchmarks/results/camera_in_scene.jsonl``, the pictures to ``docs/images/camera_in_scene.jpg``.
 """
 
@@ -32,12 +32,12 @@ RECORDS, SCALE = Records("camera_in_scene", ("benchmarks.accuracy.camera_in_scen
 GLASS = (1.0, 1.0, 1.0)
 BLACK = Material(colour=(0.0, 0.0, 0.0))
 REPEATS = 5
-FACES = 2  # of a lenslet before the scene: as many more generations of rays
+FACES = 2  # faces of a lenslet before the scene, each of which costs one generation of rays
 
 
 @dataclass(frozen=True, kw_only=True)
 class FromPixels(LensModel):
-    """Rays in air from the pixel towards places on the lenslet's flat face: all else is in the scene."""
+    """Rays in air from the pixel towards the lenslet's flat face; the rest of the camera is in the scene."""
 
     kind: ClassVar[str] = "from-pixels"
     samples_aperture: ClassVar[bool] = True
@@ -50,7 +50,7 @@ class FromPixels(LensModel):
 
 @dataclass(frozen=True, kw_only=True)
 class LossyLenslet(SphericalLenslet):
-    """A spherical lenslet whose rays carry what Fresnel's formulas let through both faces."""
+    """A spherical lenslet whose rays are weighted by Fresnel's transmittance of both faces."""
 
     kind: ClassVar[str] = "lossy-spherical-lenslet"
 
@@ -62,7 +62,7 @@ class LossyLenslet(SphericalLenslet):
         entering = _unit(u.cx + spread * u.ax - u.px, u.cy + spread * u.ay - u.py, np.float64(u.gap))
         centre = u.gap + self.thickness(u.cell) - self.radius_mm
         normal = _unit(rays.lx - u.cx, rays.ly - u.cy, rays.lz - centre)
-        leaving = (direction * normal).sum(axis=-1)  # by reciprocity, as if light entered along this cosine
+        leaving = (direction * normal).sum(axis=-1)  # by reciprocity, light that enters at this cosine
         through = (1 - reflectance(entering[..., 2], self.ior)) * (1 - reflectance(leaving, self.ior))
         return rays._replace(weight=np.where(rays.weight > 0, through, 0.0))
 
@@ -115,7 +115,7 @@ def lens_bodies(camera: IICamera, segments: int, *, smooth: bool = True) -> list
         name="walls", vertices=(wall + places[:, None]).reshape(-1, 3), material=BLACK,
         faces=(wall_faces + np.arange(len(places))[:, None, None] * len(wall)).reshape(-1, 3),
     )  # fmt: skip
-    # A box open to the lenslets, for what they reflect back must not light the scene's floor beside the pixels.
+    # A box open to the lenslets: light that they reflect back must not hit the scene's floor beside the pixels.
     front, behind = camera.gap_mm, -1.0
     around = np.array([[-width, -height], [width, -height], [width, height], [-width, height]]) / 2
     box = np.concatenate([np.column_stack([around, np.full(4, z)]) for z in (behind, front)])
@@ -125,7 +125,7 @@ def lens_bodies(camera: IICamera, segments: int, *, smooth: bool = True) -> list
 
 
 def in_scene(scene: Scene, camera: IICamera, segments: int, *, smooth: bool = True) -> tuple[Scene, IICamera]:
-    """The scene with the camera's lenslets in it, and the camera that is left: pixels."""
+    """Return the scene with the camera's lenslets in it, and the rest of the camera: pixels."""
     model = camera.lens_model
     assert isinstance(model, SphericalLenslet)
     bodies = [*scene.bodies, *lens_bodies(camera, segments, smooth=smooth)]
@@ -147,7 +147,7 @@ def with_aperture(camera: IICamera, aperture_mm: float) -> IICamera:
 
 
 def away_from_camera(scene: Scene) -> Scene:
-    """The scene lit from the far side, so that a camera in it casts no shadow on what it sees."""
+    """Return the scene lit from the far side, so that a camera in it casts no shadow into its own picture."""
     lights = [
         replace(light, vector=(*light.vector[:2], -abs(light.vector[2]))) if light.kind == "directional" else light
         for light in scene.lights
@@ -158,8 +158,8 @@ def away_from_camera(scene: Scene) -> Scene:
 def compare(scene: Scene, camera: IICamera, segments: int, samples: int, *, smooth: bool = True) -> dict[str, Any]:
     """Return the similarity of the two pictures, in 8 bits.
 
-    Three times: as they are; with Fresnel's losses in the L/D camera; and also without what is reflected in the glass
-    and comes out in the end, by a recursion that ends with the scene's first hit.
+    There are three comparisons: as rendered; with Fresnel's losses in the L/D camera; and also without light that is
+    reflected inside the glass before it leaves, by a recursion that ends at the scene's first hit.
     """
     started = time.perf_counter()
     scene_with, pixels = in_scene(scene, camera, segments, smooth=smooth)
@@ -186,7 +186,7 @@ def compare(scene: Scene, camera: IICamera, segments: int, samples: int, *, smoo
 
 
 def ratio(scene: Scene, camera: IICamera, segments: int, samples: int, *, direct: bool) -> list[float]:
-    """CPU time of the camera in the scene over that of L/D, taken in turn."""
+    """Return ratios of the CPU time of the camera in the scene to that of L/D, measured in turn."""
     scene_with, pixels = in_scene(scene, camera, segments)
     if direct:
         scene, scene_with = scene.with_depth(0), scene_with.with_depth(FACES)
@@ -194,12 +194,12 @@ def ratio(scene: Scene, camera: IICamera, segments: int, samples: int, *, direct
     def seconds(what: Scene, through: IICamera) -> float:
         return render(what, through, samples=samples, workers=1, support=()).stats.cpu_seconds
 
-    seconds(scene_with, pixels), seconds(scene, camera)  # trees and kernels
+    seconds(scene_with, pixels), seconds(scene, camera)  # build trees and compile kernels
     return [seconds(scene_with, pixels) / seconds(scene, camera) for _ in range(REPEATS)]
 
 
 def stray_light(camera: IICamera, segments: int) -> tuple[float, float]:
-    """Under an even sky: light that comes through reflections in the glass, of what comes directly; mean and most."""
+    """Return mean and largest share of light by reflections in the glass, over direct light, under a uniform sky."""
     nothing = Body(name="speck", vertices=1e4 + np.eye(3), faces=np.array([[0, 1, 2]]), material=BLACK)
     even: Any = dict.fromkeys(("horizon", "zenith", "nadir"), (1.0, 1.0, 1.0))
     scene_with, pixels = in_scene(Scene(bodies=[nothing], background=Background(**even)), camera, segments)
@@ -211,21 +211,21 @@ def stray_light(camera: IICamera, segments: int) -> tuple[float, float]:
 
 
 def transmitted(camera: IICamera) -> tuple[float, float]:
-    """Least and greatest share of light that Fresnel lets through on chief rays."""
+    """Return the least and greatest Fresnel transmittance of chief rays."""
     share = lossy(camera).weighted_rays()[2]
     assert share is not None
     return float(share[share > 0].min()), float(share.max())
 
 
 def main() -> None:
-    """Compare, time and keep."""
+    """Compare, time and record."""
     asked = command_line(__doc__, scale=SCALE).parse_args()
     for key in RECORDS.todo([{"scale": asked.scale}], asked.again):
         RECORDS.measure(key, lambda: study(asked.scale))
 
 
 def study(scale: int) -> dict[str, Any]:
-    """Compare, time and print; the two pictures go beside the record."""
+    """Compare, time and print; write the picture of both cameras."""
     camera, coarse = preset("spherical", scale=scale), preset("spherical", scale=2 * scale)
     apples = load_scene("apples")
     unshaded = away_from_camera(apples)

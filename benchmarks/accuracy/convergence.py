@@ -4,8 +4,8 @@
 
 Balls of ever more segments (h = 2π/segments is the side of a triangle on a ball of radius 1) against `analytic`, a
 tracer in closed form: distance from the true surface, depth, normal, radiance and PSNR of a picture with shadow,
-mirror and glass. Then lenses of triangles: where they put the image of a point on the axis against Gauss, and where
-single rays end against Snell. The order of convergence is the slope of a straight line through the logarithms.
+mirror and glass. Then lenses of triangles: the image position of a point on the axis against Gauss, and the ends of
+single rays against Snell. The order of convergence is the slope of a straight line through the logarithms.
 Numbers and chart go to ``benchmarks/results/convergence.jsonl`` and
 ``docs/images/convergence.png``.
 """
@@ -32,15 +32,15 @@ from raytrace_ii.scene.textures import Image
 
 MODULES = tuple(f"benchmarks.accuracy.{name}" for name in ("convergence", "analytic", "camera_in_scene"))
 RECORDS = Records("convergence", MODULES)
-FINEST = 768  # segments, of the page
+FINEST = 768  # segments of the finest ball on the page
 COARSEST = 12
-STEEP = 0.2  # least cosine between ray and surface where depth is compared: nearer to the rim its error has no bound
-LIT = 0.05  # least cosine to each of three lights where a normal is read off their light
-# A highlight weaker than half a step of 8 bits is not evaluated: light cannot come nearer to the truth than this, and
-# levels that do are left out of the fit.
+STEEP = 0.2  # least cosine between ray and normal for comparing depth: nearer to the rim its error is unbounded
+LIT = 0.05  # least cosine to each of three lights for measuring a normal
+# The renderer omits highlights below half an 8-bit step. This limits the accuracy of radiance; levels of smaller
+# errors are left out of the fit.
 FLOOR = 4e-5
 GLASS = Material(colour=(0, 0, 0), transmission=(1.0, 1.0, 1.0), ior=1.5)
-# What must come out, and what is fitted: the order of every error in h.
+# Expected order of every error in h, which the fit is compared with.
 ORDERS = {
     "position": 2, "depth": 2, "normal_flat": 1, "normal_smooth": 2,
     "radiance_flat": 1, "radiance_smooth": 2, "picture_smooth": 1,
@@ -48,7 +48,7 @@ ORDERS = {
 
 
 def main() -> None:
-    """Measure, print, keep and draw."""
+    """Measure, print, record and draw."""
     parser = command_line(__doc__)
     parser.add_argument("--finest", type=int, default=FINEST, help="segments of the finest ball")
     asked = parser.parse_args()
@@ -86,7 +86,7 @@ def measured(finest: int = FINEST) -> dict[str, Any]:
 
 
 def order(rows: list[dict[str, Any]], name: str, skip: int = 1) -> float:
-    """Slope of log error over log h, without the ``skip`` coarsest levels, where the law does not hold yet."""
+    """Return the slope of log error over log h, without the ``skip`` coarsest levels, which are not asymptotic."""
     lowest = FLOOR if name.startswith("radiance") else 0.0
     chosen = [row for row in rows[skip:] if row[name] > lowest]
     h, error = (np.log([row[key] for row in chosen]) for key in ("h", name))
@@ -130,7 +130,7 @@ def balls(levels: list[int], camera: IICamera) -> list[dict[str, Any]]:
 
 
 def _unshaded(world: World, o: Array, d: Array, t: Array, normal: Array) -> NDArray[np.bool_]:
-    """Points well on the lit side of every light: no shadow's edge runs among them."""
+    """Return the points well on the lit side of every light, where no shadow's edge lies."""
     ok = np.isfinite(t)
     for light in world.lights:
         p = o[ok] + t[ok, None] * d[ok]
@@ -141,17 +141,17 @@ def _unshaded(world: World, o: Array, d: Array, t: Array, normal: Array) -> NDAr
 
 
 def _off_surface(world: World, p: Array, which: NDArray[np.int64]) -> Array:
-    """Distance of points from the spheres that they should lie on."""
+    """Return the distance of points from their true spheres."""
     centres = np.array([solid.centre_mm for solid in world.solids])[which]
     radii = np.array([solid.radius_mm if isinstance(solid, Ball) else np.nan for solid in world.solids])[which]
     return np.linalg.norm(p - centres, axis=1) - radii
 
 
 def smooth_normal_error(world: World, segments: int, o: Array, d: Array) -> float:
-    """Angle between true normals and those that shading uses, read off the light of three lamps on white balls.
+    """Return the rms angle between true and shading normals, measured by the light of three lamps on white balls.
 
     A red, a green and a blue light along three directions make the radiance n·l in each colour: three equations for
-    the normal, without asking the renderer for it.
+    the normal, independent of the renderer's support images.
     """
     towards = np.array([[0.7, 0.0, -1.0], [-0.4, 0.6, -1.0], [-0.4, -0.6, -1.0]])
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
@@ -174,15 +174,15 @@ def smooth_normal_error(world: World, segments: int, o: Array, d: Array) -> floa
 
 
 def ball_lens(levels: list[int]) -> list[dict[str, Any]]:
-    """Parallel rays through a glass ball of 5 mm: where they meet the plane of Gauss's focus, against Snell."""
+    """Return errors of parallel rays through a glass ball of radius 5 mm, in Gauss's focal plane, against Snell."""
     radius, centre, ior = 5.0, 20.0, GLASS.ior
-    focus = ior * radius / (2 * (ior - 1))  # from the centre
+    focus = ior * radius / (2 * (ior - 1))  # distance from the centre
     height = radius * np.linspace(0.05, 0.6, 12)
     o = _ring(height, 0.0)
     d = np.broadcast_to([0.0, 0.0, 1.0], o.shape)
     incident = np.arcsin(height / radius)
     bent = 2 * (incident - np.arcsin(np.sin(incident) / ior))
-    spot = (height / np.sin(bent) - focus) * np.tan(bent)  # (n,) how far off the axis, on the ray's own side
+    spot = (height / np.sin(bent) - focus) * np.tan(bent)  # (n,) from the axis, positive on the ray's side
     true = o[:, :2] / np.repeat(height, RING)[:, None] * np.repeat(spot, RING)[:, None]
     rows = []
     for segments in levels:
@@ -195,7 +195,7 @@ def ball_lens(levels: list[int]) -> list[dict[str, Any]]:
 
 
 def plano_convex(levels: list[int]) -> list[dict[str, Any]]:
-    """Parallel rays onto the curved face of one lenslet of 10 mm's sphere, ``segments``² squares, against Snell."""
+    """Return errors of parallel rays onto the curved face of a lenslet of ``segments``² squares, against Snell."""
     radius, ior, pitch, gap = 10.0, GLASS.ior, 6.0, 1.0
     camera = IICamera(
         pixels=(16, 16), lenses=(1, 1), pixel_pitch_mm=pitch / 16, gap_mm=gap,
@@ -204,12 +204,12 @@ def plano_convex(levels: list[int]) -> list[dict[str, Any]]:
     model = camera.lens_model
     assert isinstance(model, SphericalLenslet)
     thickness = model.thickness(camera.lens_pitch_mm)
-    behind = radius / (ior - 1) - thickness / ior  # from the flat face to the focus, lensmaker's formula
+    behind = radius / (ior - 1) - thickness / ior  # distance from the flat face to the focus, lensmaker's formula
     height = pitch / 2 * np.linspace(0.05, 0.9, 12)
     o = _ring(height, gap + 30.0)
     d = np.broadcast_to([0.0, 0.0, -1.0], o.shape)
     incident = np.arcsin(height / radius)
-    bent = incident - np.arcsin(np.sin(incident) / ior)  # within the glass
+    bent = incident - np.arcsin(np.sin(incident) / ior)  # angle to the axis within the glass
     sag = radius - np.sqrt(radius**2 - height**2)
     spot = height - (thickness - sag) * np.tan(bent) - behind * np.tan(np.arcsin(ior * np.sin(bent)))
     true = o[:, :2] / np.repeat(height, RING)[:, None] * np.repeat(spot, RING)[:, None]
@@ -250,7 +250,7 @@ def images(segments: int) -> list[dict[str, Any]]:
     return rows
 
 
-RING = 36  # rays a circle
+RING = 36  # rays per circle
 
 
 def _ring(height: Array, z: float) -> Array:
@@ -286,12 +286,12 @@ def _rms(values: NDArray[np.floating[Any]]) -> float:
 
 
 def _angle(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> Array:
-    """Angles between rows, well-conditioned where they are small."""
+    """Return angles between rows, by a formula that is well-conditioned for small angles."""
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
 
 
 def chart(result: dict[str, Any], path: Path) -> None:
-    """Geometry, picture and lenses, each with the slope it should have."""
+    """Draw errors of geometry, picture and lenses, each with its expected slope."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

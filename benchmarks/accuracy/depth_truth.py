@@ -2,11 +2,11 @@
 
     python -m benchmarks run depth_truth [--scale 2] [--scenes apples,cuboid]
 
-Errors are counted in depth layers over the view pixels that hit something within the 250 layers. They are also told
-apart by what is seen, the first that holds: ``clear``, a body that hands light on; ``mirror``, one that reflects;
-``edge``, one view pixel or less from a step in depth of more than a fifth, where what is seen is hidden from lenses
-nearby; ``flat``, without texture to go by (within a pixel of the elementary image luma changes by less than 3 steps
-of 8 bits); else ``textured``. Sensor noise is that of scale 8, where an array is 64 lenses wide. Numbers go to
+Errors are counted in depth layers, over the view pixels whose hit lies within the 250 layers. Pixels are also
+classified; the first class that applies counts: ``clear``, a transmitting body; ``mirror``, a reflecting one;
+``edge``, within one view pixel of a step in depth of more than a fifth, where nearby lenses do not see the same
+point; ``flat``, without texture (luma changes by less than 3 8-bit steps within a pixel of the elementary image);
+else ``textured``. Sensor noise is measured at scale 8, with arrays of 64 lenses across. Numbers go to
 ``benchmarks/results/depth_truth.jsonl``, the chart drawn from them to ``docs/images/depth_truth.png``.
 """
 
@@ -38,15 +38,15 @@ SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "m
 KINDS = ("textured", "flat", "edge", "mirror", "clear")
 NOISES = (0, 1, 2, 4, 8)
 NOISE_SCALE = 8
-SURE = 0.5  # confidence
-FEW = 10  # pixels: the PSNR of a layer of fewer is left to chance
-BINS = np.geomspace(2.5, 250.5, 25)  # edges, in layers: what the chart pools
-BPP = 0.35  # of JPEG 2000, the distortion that Q_depth is asked about
+SURE = 0.5  # least confidence of a sure estimate
+FEW = 10  # pixels: the PSNR of a layer with fewer is random
+BINS = np.geomspace(2.5, 250.5, 25)  # edges in layers of the bins that the chart pools
+BPP = 0.35  # rate of JPEG 2000, whose distortion Q_depth measures
 SHADES = {"dissertation": COLOURS[1], "robust": COLOURS[0], "true": "0.15"}
 
 
 def main() -> None:
-    """Measure, keep, print and draw."""
+    """Measure, record, print and draw."""
     asked = command_line(__doc__, scale=SCALE, scenes=SCENES).parse_args()
     keys = [
         {"scene": name, "scale": scale, "bpp": BPP} for name in asked.scenes for scale in (NOISE_SCALE, asked.scale)
@@ -59,7 +59,7 @@ def main() -> None:
 
 
 def study(name: str, scale: int) -> dict[str, Any]:
-    """Errors of both methods on one picture, at the scale for noise with all noises; Q_depth at others."""
+    """Return errors of both methods on one picture: for all noises at the scale for noise, else with Q_depth."""
     scene = load_scene(name)
     shot = render(scene, preset("setup1", scale=scale), support=("depth", "object_id"))
     kinds, rows = tell_apart(scene, shot), []
@@ -82,12 +82,12 @@ def data() -> dict[str, list[dict[str, Any]]]:
 
 
 def tables() -> Tables:
-    """Return the table of what is kept."""
+    """Return the table of the records."""
     return {("docs/metrics.md", "depth-truth"): table(data())}
 
 
 def table(data: dict[str, Any]) -> list[str]:
-    """Both methods, scene by scene, without noise."""
+    """Return a table of both methods, scene by scene, without noise."""
     head = ("scene", "scale", "median", "90 %", "within 1 layer", "within 10 %", "Q_depth off")
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     commits = []
@@ -123,13 +123,13 @@ def estimates(picture: IIPicture) -> dict[str, tuple[FocusDepth, float]]:
 
 
 def say(row: dict[str, Any]) -> None:
-    """The gist of a row."""
+    """Print the summary of a row."""
     shown = ("scene", "scale", "noise", "method", "median_layers", "p90_layers", "within_one_layer", "within_10_%")
     print("  ".join(f"{row[k]:.3g}" if isinstance(row[k], float) else str(row[k]) for k in shown), flush=True)
 
 
 def errors(found: FocusDepth, shot: Shot, kinds: NDArray[np.int64]) -> dict[str, Any]:
-    """Errors of the estimate in layers, all together, by kind and where it is sure."""
+    """Return errors of the estimate in layers: over all pixels, by kind, and over sure pixels."""
     camera = shot.picture.camera
     assert camera is not None and shot.depth is not None
     z = shot.depth[virtual_camera_pixels(camera)] / np.float64(camera.gap_mm)
@@ -161,7 +161,7 @@ def _share(right: NDArray[np.bool_]) -> float:
 
 
 def tell_apart(scene: Scene, shot: Shot) -> NDArray[np.int64]:
-    """Which of KINDS each view pixel is."""
+    """Return the kind, an index into KINDS, of each view pixel."""
     assert shot.picture.camera is not None and shot.depth is not None and shot.object_id is not None
     index = virtual_camera_pixels(shot.picture.camera)
     z = shot.depth[index]
@@ -172,7 +172,7 @@ def tell_apart(scene: Scene, shot: Shot) -> NDArray[np.int64]:
     body = {body.name: body.material for body in scene.bodies}
     materials = [body[name] for name in shot.object_names]
     seen = shot.object_id[index]
-    mirror = np.array([max(m.mirror) > 0 for m in materials] + [False])[seen]  # −1, nothing, is the last
+    mirror = np.array([max(m.mirror) > 0 for m in materials] + [False])[seen]  # the last entry: no hit
     clear = np.array([max(m.transmission) > 0 for m in materials] + [False])[seen]
     return np.select([clear, mirror, edge, flat], [4, 3, 2, 1], 0)
 
@@ -194,7 +194,7 @@ def quality(shot: Shot, found: dict[str, tuple[FocusDepth, float]]) -> dict[str,
 
 
 def pooled(quality: DepthQuality) -> list[float | None]:
-    """Q_depth of the layers within each of BINS together, None of fewer than FEW pixels."""
+    """Return Q_depth pooled over the layers of each of BINS; None for fewer than FEW pixels."""
     d = np.arange(1, quality.values.size + 1)
     error = np.where(quality.counts > 0, quality.counts / 10 ** (quality.values / 10), 0.0)
     counts, errors = (np.histogram(d, BINS, weights=w)[0] for w in (quality.counts, error))
@@ -205,14 +205,14 @@ def pooled(quality: DepthQuality) -> list[float | None]:
 
 
 def draw(data: dict[str, Any]) -> Any:
-    """Above Q_depth with true and estimated depth, scene by scene; below, where depth is right and where not."""
+    """Draw Q_depth with true and estimated depth by scene; below, accuracy of depth by kind and noise."""
     figure = new_figure(15, 11)
     upper, lower = figure.subfigures(2, 1, height_ratios=[3, 2])
     panels = upper.subplots(2, 4)
     for axes, curve in zip(panels.flat, data["q_depth"], strict=False):
         for name, marker in (("true", "o"), ("dissertation", "s"), ("robust", "^")):
             values = np.array([np.nan if v is None else v for v in curve[name]], float)
-            here = np.isfinite(values)  # a line goes on over bins that hold nothing
+            here = np.isfinite(values)  # the line skips empty bins
             label = "true depth" if name == "true" else f"from focus, {name}"
             layer = np.array(curve["layer"])[here]
             axes.plot(

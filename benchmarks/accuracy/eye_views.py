@@ -2,11 +2,11 @@
 
     python -m benchmarks run eye_views --scales 4,2
 
-Scenes, schemes and rates of Figure 5.19 through setup 3. Q_view takes one pixel through the middle of every
-lens (4.3). Here its five views are also those of an eye with a pupil, before an ideal display and before one with
-faults. The question is whether the order of schemes changes. The observers are simulated: their quality is Q_view
-before the display with faults, and their answers go through plan, files and analysis of a test. Measures of others
-(`view_measures`) are compared with ours by the same observers.
+Scenes, schemes and rates are those of Figure 5.19, through setup 3. Q_view takes one pixel through the middle of
+every lens (4.3). Here its five views are also computed for an eye with a pupil, before an ideal display and before
+one with faults, to see whether the order of schemes changes. The observers are simulated: their quality is Q_view
+before the display with faults, and their answers pass through plan, files and analysis of a test. Third-party
+measures (`view_measures`) are compared with ours by the same observers.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ MEASURES = ("q_global", "q_angle_min", "q_view", "q_view_min", "q_view_psnr", "q
 PUPIL_MM = 4.0
 FAULTS: dict[str, Any] = {"layout": "rgb-stripe", "fill": 0.6, "black": 0.005, "crosstalk": 0.1, "turn_deg": 0.05}
 DISPLAYS: dict[str, dict[str, Any]] = {"ideal": {}, "faults": FAULTS}
-TIE = 0.001  # of Q_view: schemes that are nearer have no order
+TIE = 0.001  # schemes whose Q_view differs by less have no order
 OBSERVERS, BIAS, SPREAD = 24, 0.3, 0.7
 
 
 def main() -> None:
-    """Measure, keep, draw, fill the pages."""
+    """Measure, record, draw, fill the pages."""
     asked = command_line(__doc__, scenes=SCENES, scales=[str(scale) for scale in SCALES]).parse_args()
     keys = [{"scene": scene, "scale": int(scale)} for scale in asked.scales for scene in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
@@ -84,7 +84,7 @@ def points(scene: str, scale: int) -> list[dict[str, Any]]:
 
 
 def eye_views(picture: IIPicture, display: str) -> list[Any]:
-    """Return what an eye sees of a display from the five viewpoints."""
+    """Return the views of an eye of a display from the five viewpoints."""
     camera = camera_of(picture)
     model = DisplayModel(camera=camera, **DISPLAYS[display])
     places: Any = five_viewpoints(camera).values()
@@ -113,7 +113,7 @@ def finest() -> list[dict[str, Any]]:
 
 
 def tables() -> Tables:
-    """Return the order of schemes before displays, and what predicts simulated observers."""
+    """Return the tables of the order of schemes before displays, and of the prediction of simulated observers."""
     return {("docs/display.md", "eye-order"): order_table(), ("docs/observers.md", "simulated"): simulated_table()}
 
 
@@ -149,7 +149,7 @@ def kept_pairs(found: list[dict[str, Any]]) -> Any:
 
 
 def simulated() -> Verdict:
-    """Return what SIMULATED observers say: their quality is Q_view before the display with faults, from 1 to 5."""
+    """Return the verdict of SIMULATED observers; quality is Q_view before the display with faults, scaled to 1–5."""
     found = finest()
     low, high = (f([number(one["faults"]) for one in found]) for f in (min, max))
     stimuli: list[dict[str, Any]] = []
@@ -170,7 +170,7 @@ def simulated() -> Verdict:
 
 
 def measured(found: list[dict[str, Any]]) -> list[str]:
-    """Return our measures, and those of others that every point has."""
+    """Return our measures, and the third-party measures that every point has."""
     return [*MEASURES, *(name for name in CANDIDATES if all(name in one for one in found))]
 
 

@@ -1,8 +1,8 @@
 """Rays through lenses of surfaces against optiland: ``python -m benchmarks run lens_rays --peer PYTHON``.
 
-PYTHON is an interpreter with optiland. It weighs over 1 GB with what it needs, so that no test installs it. Both get
-the same surfaces and refractive indices. Our rays leave the image plane and end in front of the lens. The peer traces
-them back into the image plane.
+PYTHON is an interpreter with optiland. Tests do not install optiland: it takes over 1 GB with its dependencies. Both
+programs get the same surfaces and refractive indices. Our rays leave the image plane and end in front of the lens;
+optiland traces them back into the image plane.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from ii_core.surfaces import Surface, Surfaces
 
 RECORDS = Records("lens_rays", modules=("benchmarks.accuracy.lens_rays",))
 RAYS = 5000
-AHEAD_MM = 10.0  # from the first vertex to the plane where our rays end
+AHEAD_MM = 10.0  # distance from the plane where our rays end to the first vertex
 WAVELENGTHS_NM = (486.1327, 587.5618, 656.2725)
 
-# Run by the peer: surfaces and rays in, rays in the image plane out. Its light runs along +z from the first vertex.
+# Program for the peer: reads surfaces and rays, prints rays in the image plane. Light runs along +z from the vertex.
 PEER = """
 import json, sys
 import numpy as np
@@ -75,7 +75,7 @@ def conic_singlet(wavelength_nm: float) -> tuple[Surfaces, float]:
 
 
 def cases() -> dict[str, Any]:
-    """Return functions of the wavelength that give a lens and its back distance."""
+    """Return functions from the wavelength to a lens and its back distance."""
 
     def published(name: str) -> Any:
         made = lens(name)
@@ -136,7 +136,7 @@ def worst(differences: NDArray[np.float64]) -> float:
 
 
 def run_peer(python: str, given: dict[str, Any]) -> Any:
-    """Return the answer of the peer."""
+    """Return the peer's rays in the image plane."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "rays.json"
         path.write_text(json.dumps(given), encoding="utf-8")

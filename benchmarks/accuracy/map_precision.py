@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def stored(camera: IICamera, format: str) -> tuple[Any, int]:
-    """The camera from its maps, and the bytes of the two images."""
+    """Return the camera loaded from stored maps, and the bytes of the two images."""
     with tempfile.TemporaryDirectory() as folder:
         write_maps([camera], folder, format=format)
         size = sum(path.stat().st_size for path in Path(folder).iterdir() if path.suffix != ".json")
@@ -84,7 +84,7 @@ def errors(camera: IICamera, maps: Any) -> dict[str, float]:
 
 
 def chart(rows: list[dict[str, Any]], path: Path) -> None:
-    """PSNR over bytes, a marker a format, a colour a camera."""
+    """Draw PSNR over bytes: one marker per format, one colour per camera."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 4.5), layout="constrained")
@@ -93,7 +93,7 @@ def chart(rows: list[dict[str, Any]], path: Path) -> None:
     for axes, scene in zip(figure.subplots(1, 2, sharey=True), SCENES, strict=True):
         for row in rows:
             if not np.isfinite(number(row[f"psnr_{scene}"])):
-                continue  # the float maps are what the others are held against
+                continue  # the float maps are the reference
             axes.plot(
                 row["bytes_per_pixel"], row[f"psnr_{scene}"], markers[row["format"]], color=colours[row["camera"]],
                 markersize=8,

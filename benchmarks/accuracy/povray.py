@@ -2,11 +2,11 @@
 
     python -m benchmarks run povray [--scale 16]
 
-POV-Ray knows balls and planes in closed form, and its ``mesh_camera`` takes one ray per pixel from a mesh of tiny
-triangles: from their centroids along their normals, which is a way to hand over any L and D. Its picture is held
-against ours (triangles) and against `analytic` (closed form, as itself): PSNR of linear light by object, and a
-picture of the difference. Needs ``povray`` on the path (Debian: ``apt-get install povray``); without it the script
-says so and ends. Numbers and pictures go to ``benchmarks/results/povray.jsonl`` and ``docs/images/povray.jpg``.
+POV-Ray intersects balls and planes in closed form. Its ``mesh_camera`` takes one ray per pixel from a mesh of small
+triangles: from the centroid along the normal, so that any L and D can be passed. Its picture is compared with ours
+(triangles) and with `analytic` (closed form, too): PSNR of linear light by object, and a picture of the difference.
+``povray`` must be on the path (Debian: ``apt-get install povray``); without it the script prints this and ends.
+Numbers and pictures go to ``benchmarks/results/povray.jsonl`` and ``docs/images/povray.jpg``.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SIDE = 1.0  # mm from corner to centroid of a triangle that stands for a ray; PO
 
 
 def main() -> None:
-    """Render with all three, compare, keep."""
+    """Render with all three, compare and record."""
     asked = command_line(__doc__, scale=SCALE).parse_args()
     if shutil.which("povray") is None:
         print("povray is not installed: nothing to compare with (Debian: apt-get install povray)")
@@ -72,7 +72,7 @@ def main() -> None:
 
 
 def compare(world: World, camera: IICamera, mesh: bool) -> tuple[list[dict[str, Any]], NDArray[np.uint8]]:
-    """PSNR by object for one camera, with glass and without; and ours, POV-Ray's and their difference."""
+    """Return PSNR by object for one camera, with glass and without; and both pictures with their difference."""
     L, D = camera.rays()
     if not mesh:  # POV-Ray's own pinhole makes upright pictures: turned by 180° they are the pinhole's
         L, D = L[::-1, ::-1], D[::-1, ::-1]
@@ -129,21 +129,21 @@ def version() -> str:
 
 
 def stated(text: str) -> str:
-    """The version in what POV-Ray prints, among which are complaints about missing configuration files.
+    """Return the version in POV-Ray's output, which may also contain warnings about missing configuration files.
 
     Raises
     ------
     ValueError
-        If no version is there.
+        If the output has no version.
     """
     found = re.search(r"POV-Ray \d\S*", text)
     if found is None:
-        raise ValueError(f"povray --version says no version: {text.strip()[:200]!r}")
+        raise ValueError(f"povray --version prints no version: {text.strip()[:200]!r}")
     return found.group()
 
 
 def povray(world: World, camera: IICamera, o: Array, d: Array, mesh: bool) -> Array:
-    """Linear light (rows, columns, 3) as POV-Ray sees it."""
+    """Return linear light (rows, columns, 3) rendered by POV-Ray."""
     width, height = camera.pixels
     height += (
         mesh  # row n of a mesh camera's picture shows the triangles of row n − 1: one row more, the first dropped
@@ -173,7 +173,7 @@ def vector(values: Sequence[float] | Array) -> str:
 
 
 def pinhole(camera: IICamera) -> str:
-    """POV-Ray's own camera of the same field."""
+    """Return POV-Ray's own camera with the same field of view."""
     (width, height), gap = camera.size_mm, camera.gap_mm
     return (
         f"camera {{ perspective location <0,0,{gap}> direction <0,0,{gap}> right <{width},0,0> up <0,{height},0> }}"
@@ -181,7 +181,7 @@ def pinhole(camera: IICamera) -> str:
 
 
 def mesh_camera(o: Array, d: Array) -> str:
-    """A triangle for every ray, about its start and across it, pixel by pixel."""
+    """Return a mesh camera: for every ray a triangle around its start, perpendicular to it, pixel by pixel."""
     side = np.cross(d, np.where(np.abs(d[:, 1:2]) < 0.9, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]]))
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     other = np.cross(d, side)
@@ -193,9 +193,9 @@ def mesh_camera(o: Array, d: Array) -> str:
 
 
 def described(world: World) -> list[str]:
-    """The world in POV-Ray's language: no fall-off, Lambert, Blinn's highlight, Fresnel, Beer–Lambert, sky."""
+    """Return the world as POV-Ray's input: no fall-off, Lambert, Blinn's highlight, Fresnel, Beer–Lambert, sky."""
     b = world.background
-    # a sky sphere's map runs over (1 + y)/2, ours straight in y up to the sine of the spread
+    # a sky sphere's colour map runs over (1 + y)/2; ours is linear in y up to the sine of the spread
     steep = np.sin(np.radians(b.spread_deg))
     stops = [
         (0.0, b.nadir),
@@ -232,10 +232,10 @@ def solid(one: Ball | Floor, world: World) -> str:
 
 
 def finish(m: Material, world: World) -> str:
-    """One material."""
+    """Return a material as POV-Ray's input."""
     local = 1 - max(m.mirror) - max(m.transmission)
     if max(m.transmission) > 0:
-        # fade_power 1001 is Beer–Lambert: colour^(way/distance); a face hands on its share, `filter`, on each side
+        # fade_power 1001 is Beer–Lambert: colour^(path/distance); each face transmits its share, `filter`
         colour = np.exp(-np.array(m.absorption_per_mm))
         return (
             f"pigment {{ rgbf <{m.transmission[0]},{m.transmission[1]},{m.transmission[2]},1> }} "
@@ -244,7 +244,7 @@ def finish(m: Material, world: World) -> str:
             f"fade_color rgb {vector(colour)} }}"
         )
     shine = f"specular {m.specular} roughness {1 / m.shininess:.9g}" if m.specular else "specular 0"
-    ambient = vector(np.array(world.ambient) * local)  # the pigment's colour comes in by itself
+    ambient = vector(np.array(world.ambient) * local)  # POV-Ray multiplies by the pigment's colour
     return (
         f"pigment {{ rgb {vector(m.colour)} }} finish {{ ambient rgb {ambient} diffuse {local:.9g} {shine} "
         f"reflection {{ rgb {vector(m.mirror)} }} }}"

@@ -33,9 +33,9 @@ RECORDS = Records("real_lenses", ("benchmarks.accuracy.real_lenses",))
 LENSES = {"double-gauss": 0.5, "triplet": 1.0}  # enlarged to f = 50 mm
 SCALE = 8
 FIELDS = 25
-QPS = (22, 27, 32, 37)  # of SI-PVS
+QPS = (22, 27, 32, 37)  # quantisers of SI-PVS
 RATES = (0.8, 1.6, 3.2, 6.4)  # bpp of JPEG 2000, for the qualities of SI-PVS
-BACK_MM = 130.0  # *Apples* round the plane in focus
+BACK_MM = 130.0  # shift of *Apples* to the plane in focus
 CHART = IMAGES / "real_lenses.png"
 
 
@@ -52,7 +52,7 @@ def real_camera(name: str) -> IICamera:
 
 
 def ideal_twin(camera: IICamera) -> IICamera:
-    """Return the camera with a thin lens that images the same planes onto each other at the same magnification."""
+    """Return the camera with a thin lens that images the same planes at the same magnification."""
     gap, opening = camera.gap_mm, camera.front[1].pupil()
     assert opening is not None
     focus = through_front_mm(camera, gap)

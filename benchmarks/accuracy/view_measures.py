@@ -1,7 +1,7 @@
-"""Measures of others over views, beside Q_view: multi-scale SSIM, FLIP, and consistency over angle.
+"""Third-party measures of views, for comparison with Q_view: multi-scale SSIM, FLIP, and consistency over angle.
 
-Multi-scale SSIM and FLIP are those of sewar and flip-evaluator. Both serve this comparison alone; without them their
-values are missing: ``pip install sewar flip-evaluator``.
+Multi-scale SSIM and FLIP are computed by sewar and flip-evaluator, which only this comparison needs: ``pip install
+sewar flip-evaluator``. Without them their values are missing.
 
 References
 ----------
@@ -39,7 +39,7 @@ def available() -> dict[str, str]:
 
 
 def candidates(reference: IIPicture) -> Callable[[IIPicture], dict[str, float]]:
-    """Return a function that gives all candidates that can be measured of a decoded picture."""
+    """Return a function that measures all available candidates of a decoded picture."""
     places = list(five_viewpoints(camera_of(reference)).values())
     seen, there = partial(_views, places=places), available()
     first = seen(reference)
@@ -49,7 +49,7 @@ def candidates(reference: IIPicture) -> Callable[[IIPicture], dict[str, float]]:
         found = {"epi_psnr": epi_psnr(reference, decoded)}
         if "ms_ssim" in there:
             found["ms_ssim"] = float(np.mean([ms_ssim(a, b) for a, b in zip(first, second, strict=True)]))
-        if "flip" in there:  # a difference: its negative rises with quality
+        if "flip" in there:  # FLIP is a difference: its negative rises with quality
             found["flip"] = -float(np.mean([flip(a, b) for a, b in zip(first, second, strict=True)]))
         return found
 
@@ -79,8 +79,8 @@ def flip(a: NDArray[Any], b: NDArray[Any]) -> float:
 def epi_psnr(reference: IIPicture, decoded: IIPicture) -> float:
     """Consistency over angle, dB: PSNR of the change of the error from each sub-image to the next.
 
-    An error that is the same in all views moves with no viewer; one that changes along the lines of epipolar images
-    flickers as a viewer moves.
+    An error that is equal in all views does not change when the viewer moves; an error that changes along the lines
+    of epipolar images flickers.
     """
     (k, l), (u, v) = reference.lenses, reference.ei_pixels
     error = (decoded.pixels.astype(np.int32) - reference.pixels).reshape(l, v, k, u, 3)

@@ -2,10 +2,10 @@
 
     python -m benchmarks run waves
 
-A row of pixels under one slit lens shows a texture of even patches, 8 pixels long in the mean. The truth is the
-wave's point-spread function, summed over pixels. The model by rays leaves the texture as it is, the point-spread
-model folds the geometric blur with sinc². Errors are PSNR of linear light. The last rows blur *Apples* and *Cuboid*
-as the lenses of full setup1 do, and code them.
+A row of pixels under one slit lens shows a texture of uniform patches with a mean length of 8 pixels. The truth is
+the wave's point-spread function, summed over pixels. The ray model does not change the texture, the point-spread
+model convolves the geometric blur with sinc². Errors are PSNR of linear light. The last rows blur *Apples* and
+*Cuboid* like the lenses of full setup1, and code them.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from metrics.plots.rd_chart import COLOURS, MARKERS, new_figure, save
 from raytrace_ii import load_scene, render
 
 RECORDS = Records("waves", ("benchmarks.accuracy.waves",))
-PIXELS = 16  # under a lens
+PIXELS = 16  # per lens
 PITCH, RATIO, WAVELENGTH = 0.0976, 1.8718, 550.0  # of setup1: mm, gap over pitch, nm
 WAVELENGTHS = (450.0, 550.0, 650.0)
 ENOUGH_DB = 40.0
 SCENES, SCALE, RATES = ("apples", "cuboid"), 8, (0.1, 0.2, 0.4, 0.8)
-TEXTURE, PATCH = 4096, 8  # pixels of the texture, and of a patch in the mean
-# What is varied: values, and what the axis says.
+TEXTURE, PATCH = 4096, 8  # lengths in pixels of the texture, and of a patch in the mean
+# Sweeps: values, and label of the axis.
 SWEEPS: dict[str, tuple[tuple[float, ...], str]] = {
     "pitch": (tuple(float(x) for x in np.geomspace(0.02, 2.0, 13)), "lens pitch [mm], 16 pixels a lens"),
     "gap": (tuple(float(x) for x in np.geomspace(0.8, 12.8, 9)), "gap over lens pitch"),
@@ -45,7 +45,7 @@ SWEEPS: dict[str, tuple[tuple[float, ...], str]] = {
 
 
 def main() -> None:
-    """Measure, keep, draw, fill the page."""
+    """Measure, record, draw, fill the page."""
     asked = command_line(__doc__).parse_args()
     keys = [{"sweep": name, "wavelength_nm": wavelength} for name in SWEEPS for wavelength in WAVELENGTHS]
     for key in RECORDS.todo(keys, asked.again):
@@ -59,7 +59,7 @@ def main() -> None:
 
 
 def sweep(name: str, wavelength_nm: float) -> list[dict[str, float]]:
-    """Errors of both models and their cost at each value."""
+    """Return errors and cost of both models at each value."""
     points = []
     for value in SWEEPS[name][0]:
         pitch = value if name == "pitch" else PITCH
@@ -88,7 +88,7 @@ def sweep(name: str, wavelength_nm: float) -> list[dict[str, float]]:
 
 
 def error_db(kernel: Any, true: Any) -> float:
-    """PSNR of the texture seen through one kernel against that through another."""
+    """Return the PSNR of the texture blurred by one kernel against the texture blurred by another."""
     generator = np.random.default_rng(0)
     lengths = generator.geometric(1 / PATCH, TEXTURE)
     texture = np.repeat(generator.random(TEXTURE), lengths)[:TEXTURE]
@@ -113,7 +113,7 @@ def blurred(scene: str, scale: int) -> dict[str, Any]:
 
 
 def draw() -> Any:
-    """A panel a sweep: rays in full lines, the point-spread model dotted."""
+    """Draw one panel per sweep: rays as solid lines, the point-spread model as dotted lines."""
     figure = new_figure(8.5, 7.5)
     for axes, (name, (_, label)) in zip(figure.subplots(2, 2).flat, SWEEPS.items(), strict=True):
         for i, wavelength in enumerate(WAVELENGTHS):
@@ -144,7 +144,7 @@ def draw() -> Any:
 
 
 def tables() -> Tables:
-    """Return where each model leaves 40 dB, and what becomes of setup1."""
+    """Return the tables of the limits of each model at 40 dB, and of the effect on setup1."""
     return {("docs/waves.md", "limits"): limits_table(), ("docs/waves.md", "setup1"): setup1_table()}
 
 
@@ -167,7 +167,7 @@ def limits_table() -> list[str]:
 
 
 def crossing(points: list[dict[str, float]], key: str) -> str:
-    """Value at which an error passes `ENOUGH_DB`, by interpolation, with pixel and blur there."""
+    """Return the value at which an error crosses `ENOUGH_DB`, by interpolation, with pixel and blur there."""
     for a, b in pairwise(points):
         low, high = number(a[key]), number(b[key])
         if (low - ENOUGH_DB) * (high - ENOUGH_DB) <= 0 and low != high:
@@ -180,7 +180,7 @@ def crossing(points: list[dict[str, float]], key: str) -> str:
 
 
 def setup1_table() -> list[str]:
-    """Error by diffraction, and the coding gain with and without it."""
+    """Return a table of the error by diffraction, and of the coding gain with and without it."""
     rows = [row for row in RECORDS.rows(scale=SCALE) if "scene" in row]
     lines = ["| scene | PSNR | Q_view | gain of SI-PVS, rays | gain, waves |", "|---|---|---|---|---|"] + [
         f"| {row['scene']} | {row['psnr']:.1f} dB | {row['q_view']:.4f} | {row['gain_rays']:+.2f} dB | "

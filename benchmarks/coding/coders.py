@@ -34,7 +34,7 @@ from raytrace_ii import load_scene, render
 
 RECORDS = Records("coders", ("benchmarks.coding.coders", "benchmarks.coding.rd"))
 SCENES = ("apples", "twins", "car", "cuboid")
-FILTERED = ("twins", "car", "cuboid")  # scenes whose textures look otherwise since they are filtered
+FILTERED = ("twins", "car", "cuboid")  # scenes whose pictures were changed by texture filtering
 ANCHOR = "si-h264:chroma=420,rate=cq"
 RATES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
 # Quantisers by coder, over the anchor's range of quality.
@@ -46,8 +46,8 @@ QUANTISERS = {
     "avif": (8, 18, 28, 38, 46, 54, 62),
     "mpeg2": (1, 2, 4, 7, 12, 20, 31),
 }
-LETTERS = 8  # height of labels in the chart, points
-NEAR = 0.1  # of the least rate: tolerance of the recommended setting
+LETTERS = 8  # height of labels in the chart, typographic points
+NEAR = 0.1  # tolerance of the recommended setting, relative to the least rate
 # Trials with one option changed, which led to defaults and presets.
 TRIALS = (
     "si-h264:rate=cq",
@@ -101,7 +101,7 @@ def main() -> None:
 
 
 def measure(picture: IIPicture, keys: Sequence[Mapping[str, Any]], workers: int) -> None:
-    """Measure and record curves of one picture; an interrupt drops the curves not yet begun."""
+    """Measure and record curves of one picture; an interrupt drops the curves not yet started."""
 
     done = count(1)
 
@@ -120,10 +120,10 @@ def studied(scale: int) -> list[dict[str, Any]]:
 
 
 def comparable(scale: int) -> list[dict[str, Any]]:
-    """Return the newest row of every scene and scheme at a scale, those of a scene all of one picture.
+    """Return the newest row of every scene and scheme at a scale, such that all rows of a scene are of one picture.
 
-    Texture filtering changed the pictures of `FILTERED`; older rows have no commit. Of such a scene, the newer rows
-    are returned once they are at least as many as the older ones.
+    Texture filtering changed the pictures of `FILTERED`; older rows have no commit. For these scenes the newer rows
+    are returned if there are at least as many as older ones, else the older rows.
     """
     rows = [row for row in RECORDS.rows(scale=scale) if row["scene"] not in FILTERED]
     for scene in FILTERED:
@@ -279,7 +279,7 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.grid(alpha=0.3, which="both")
-    figure.canvas.draw()  # fixes the positions of points
+    figure.canvas.draw()  # draw to fix the positions of points
     for (names, at, _), offset in zip(named, offsets(named, axes), strict=True):
         axes.annotate(names, at, offset, textcoords="offset points", fontsize=LETTERS)
     figure.savefig(path, dpi=150)

@@ -1,12 +1,12 @@
-"""Time-first against view-first by speed of the camera and lens pitch, and where correlations predict the crossing.
+"""Time-first against view-first by speed of the camera and lens pitch; prediction of the crossing by correlations.
 
     python -m benchmarks run crossing [--again missing]
 
 The still scene of the take *apples* is seen by a camera that moves sideways at a constant speed, through lenses of
-three pitches over the same pixels and gap. Means of the correlation (5.3) and of the residual energy (5.7) of
-sub-images that follow one another in time, and in view, are set beside the Bjøntegaard rate of both orders: as they
-are, and after motion compensation by `benchmarks.coding.neighbours`. Orders have one reference: with 8, the list of a
-time-first walk of 4 instants holds the last view too, and no crossing can be found. Rows without ``refs`` have 8.
+three pitches over the same pixels and gap. The Bjøntegaard rate of both orders is compared with the mean correlation
+(5.3) and residual energy (5.7) of sub-images that are neighbours in time, and in view: without and with motion
+compensation by `benchmarks.coding.neighbours`. Orders have one reference: with 8, the references of a time-first walk
+of 4 instants include the last view, and there is no crossing. Rows without ``refs`` have 8.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ RECORDS = Records(
     "crossing", ("benchmarks.coding.crossing", "benchmarks.coding.neighbours", "benchmarks.coding.takes")
 )
 SCALE, INSTANTS = 8, 4
-PITCHES = (8, 16, 32)  # of a lens, in pixels; `setup1` has 16
-SPEEDS = (0.2, 0.8, 3.2, 12.8)  # mm a frame
+PITCHES = (8, 16, 32)  # lens pitches in pixels; `setup1` has 16
+SPEEDS = (0.2, 0.8, 3.2, 12.8)  # mm per frame
 REFS = 1
 
 
@@ -50,7 +50,7 @@ def main() -> None:
 
 
 def measured(scale: int, pitch_px: int, mm_per_frame: float, refs: int) -> dict[str, Any]:
-    """Points of both one-way orders, and correlations."""
+    """Return points of both one-way orders, and correlations."""
     video = moving(scale, pitch_px, mm_per_frame)
     curves = {name: points(video, Plan(walk=name, span=INSTANTS), f"si-h264:rate=cq,refs={refs}") for name in ONE_WAY}
     now, last = neighbours(video)
@@ -61,7 +61,7 @@ def measured(scale: int, pitch_px: int, mm_per_frame: float, refs: int) -> dict[
 
 
 def moving(scale: int, pitch_px: int, mm_per_frame: float) -> IIVideo:
-    """Instants around the middle of the path, through lenses of so many pixels."""
+    """Return instants around the middle of the path, through lenses of so many pixels."""
     camera = preset("setup1", scale=scale)
     across, down = (n // pitch_px for n in camera.pixels)
     camera = replace(camera, lenses=(across, down), lens_pitch_mm=None)
@@ -75,7 +75,7 @@ def moving(scale: int, pitch_px: int, mm_per_frame: float) -> IIVideo:
 
 
 def likeness(images: Floats, others: Floats) -> dict[str, float]:
-    """Mean correlation (5.3) and mean residual energy a pixel (5.7) of pairs of images."""
+    """Return mean correlation (5.3) and mean residual energy per pixel (5.7) of pairs of images."""
     a, b = (group.reshape(len(group), -1).astype(np.float64) for group in (images, others))
     energy = float(np.square(a - b).mean())
     a, b = (group - group.mean(axis=1, keepdims=True) for group in (a, b))
@@ -84,13 +84,13 @@ def likeness(images: Floats, others: Floats) -> dict[str, float]:
 
 
 def ratios(row: dict[str, Any], kind: str) -> tuple[float, float]:
-    """Decorrelation 1 − c and residual energy of time over those of view; 1 is the predicted crossing."""
+    """Return ratios time over view of decorrelation 1 − c and residual energy; 1 is the predicted crossing."""
     time, view = row[kind]["time"], row[kind]["view"]
     return (1 - time["correlation"]) / (1 - view["correlation"]), time["energy"] / view["energy"]
 
 
 def rows() -> list[dict[str, Any]]:
-    """Return the rows with ``rate``, that of time-first against view-first in percent, by pitch and speed."""
+    """Return the rows with ``rate``, the rate of time-first against view-first in percent, by pitch and speed."""
     found = [
         {"refs": 8, **row, "rate": difference(*(row["curves"][name] for name in ONE_WAY))} for row in RECORDS.rows()
     ]
@@ -103,7 +103,7 @@ def tables() -> Tables:
 
 
 def table() -> list[str]:
-    """A row a pitch and speed: ratios of decorrelation and energy, and the rate."""
+    """Return a table with a row per pitch and speed: ratios of decorrelation and energy, and the rate."""
     found = rows()
     if not found:
         return ["Not measured yet."]

@@ -38,8 +38,8 @@ RECORDS = Records("fuzz", ("benchmarks.coding.fuzz", "benchmarks.workers"))
 LENSES, EI = (16, 8), (4, 4)
 ENDS = {"picture": "a picture of the right shape", "refused": "a ValueError"}
 SLOW = 1.0  # largest CPU seconds of a refusal
-MOST_FINDINGS = 50  # of a scheme, after which no new worker is started
-HEADROOM = 1 << 30  # bytes of address space beyond those after the first decoding
+MOST_FINDINGS = 50  # findings of a scheme after which no new worker is started
+HEADROOM = 1 << 30  # bytes of address space beyond the use after the first decoding
 
 
 def main() -> None:
@@ -103,7 +103,7 @@ def work(scheme: str, seed: int, first: int, last: int, *, limit: bool = True) -
     """Decode mutations by number; print a line of JSON for each."""
     coded = sample(scheme)
     strangers = [sample(name).payload for name in ("si-h264", "jpeg2000")]
-    decode(coded)  # memory and time of the first decoding count for no mutation
+    decode(coded)  # decode once, so that compilation and imports count for no mutation
     room = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + HEADROOM
     if limit:
         resource.setrlimit(resource.RLIMIT_AS, (room, room))

@@ -26,14 +26,14 @@ from metrics import q_global
 from raytrace_ii import load_scene, render
 
 RECORDS = Records("headers", ("benchmarks.coding.headers",))
-SCENE, SCALE = "apples", 4  # of the page
+SCENE, SCALE = "apples", 4  # conditions of the page
 SIDES = (16, 32, 64, 128, 256)
 RATES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
 KINDS = ("si", "ei", "ri")
 
 
 def main() -> None:
-    """Measure, print, keep and fill the tables."""
+    """Measure, print, record and fill the tables."""
     parser = command_line(__doc__, scale=SCALE, schemes=schemes())
     parser.add_argument("--scene", default=SCENE)
     parser.add_argument("--sides", default=",".join(map(str, SIDES)))

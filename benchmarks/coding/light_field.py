@@ -2,10 +2,10 @@
 
     python -m benchmarks run light_field [--pictures car,car-9x9] [--schemes si-lf] [--flower FOLDER]
 
-Pictures are four scenes through `setup1` at scale 8, and two fields of 9×9 views of 120×56 pixels with disparity of
-both signs, made from four samples a pixel: the camera's gap is 32/3 of that of `setup1`, and each view is cut one
-column or row further on than its neighbour. ``--flower`` adds 96×64 pixels in the middle of the 10×10 views of a
-light field camera that lie in a folder. Every scheme is run at five quantisers, and lossless. Numbers go to
+Pictures are four scenes through `setup1` at scale 8, and two light fields of 9×9 views of 120×56 pixels with
+disparity of both signs, rendered with four samples per pixel: the camera's gap is 32/3 of that of `setup1`, and each
+view is cropped one column or row further on than its neighbour. ``--flower`` adds the middle 96×64 pixels of 10×10
+views of a light field camera from a folder. Every scheme is run at five quantisers, and lossless. Numbers go to
 ``benchmarks/results/light_field.jsonl``, tables to ``docs/lf.md``.
 """
 
@@ -40,11 +40,11 @@ QUANTISERS = {
 }
 OTHERS = ("si-avif:best", "si-hevc:best")
 LOSSLESS = ("si-lf:lossless=1", "si-ffv1", "jpegxl:lossless=1")
-VIEWS, GAP = 9, 6  # views a side; the field's disparity is that of the scene through this much more gap
+VIEWS, GAP = 9, 6  # views per side; factor on disparity, by a larger gap
 
 
 def main() -> None:
-    """Measure, print, keep and fill the page."""
+    """Measure, print, record and fill the page."""
     parser = command_line(__doc__, pictures=SCENES + FIELDS, schemes=(*OTHERS, OURS, *TOOLS, *LOSSLESS))
     parser.add_argument("--flower", help="folder of the views of a light field camera")
     asked = parser.parse_args()
@@ -59,7 +59,7 @@ def main() -> None:
 
 @cache
 def picture(name: str, flower: str | None = None) -> IIPicture:
-    """A picture of this benchmark."""
+    """Return a picture of this benchmark."""
     if name == IMPORTED:
         whole, _ = picture_of(find_views(str(flower)))
         (width, height), (cols, rows) = whole.lenses, whole.ei_pixels
@@ -88,7 +88,7 @@ def picture(name: str, flower: str | None = None) -> IIPicture:
 
 
 def measured(original: IIPicture, scheme: str) -> dict[str, Any]:
-    """A curve, or the rate of a lossless scheme."""
+    """Return a curve, or the rate of a lossless scheme."""
     if scheme not in LOSSLESS:
         return curve(original, scheme)
     coded = encode(original, scheme)
@@ -101,7 +101,7 @@ def measured(original: IIPicture, scheme: str) -> dict[str, Any]:
 
 
 def curve(original: IIPicture, scheme: str) -> dict[str, Any]:
-    """Rate, PSNR and CPU microseconds a pixel at each quantiser."""
+    """Return rate, PSNR and CPU microseconds per pixel at each quantiser."""
     width, height = original.size
     points = []
     for qp in QUANTISERS[scheme if scheme in QUANTISERS else scheme.partition(":")[0]]:
@@ -120,7 +120,7 @@ def curve(original: IIPicture, scheme: str) -> dict[str, Any]:
 
 
 def tables() -> Tables:
-    """The tables of docs/lf.md."""
+    """Return the tables of docs/lf.md."""
     rows = RECORDS.rows()
     curves = {(row["picture"], row["scheme"]): row["points"] for row in rows if "points" in row}
     exact = {(row["picture"], row["scheme"]): row["bpp"] for row in rows if "bpp" in row}
@@ -151,7 +151,7 @@ def tables() -> Tables:
 
 
 def _difference(anchor: Any, tested: Any) -> str:
-    """Rate of ``tested`` at equal PSNR."""
+    """Return the Bjøntegaard rate of ``tested``."""
     if anchor is None or tested is None:
         return "–"
     try:

@@ -1,12 +1,11 @@
-"""Component images of a take predicted from their neighbours in view and time, and what encoders make of both.
+"""Prediction of component images of a take from neighbours in view and time, and its use by encoders.
 
     python -m benchmarks run neighbours [--takes car,apples,cuboid] [--again missing]
 
-Each sub-image is predicted block by block, motion-compensated, from the last instant, from the last view, from the
-better of both and from their mean, original pixels. The rate of a block is that of its residual by reverse
-water-filling, and that of its vectors. The same takes are coded by x264 with 1 to 16 references, in orders whose
-references hold both neighbours. The first numbers are what a second dimension can bring, the second what an encoder
-makes of it.
+Each sub-image is predicted block by block with motion compensation from original pixels: from the last instant, from
+the last view, from the better of both, and from their mean. The rate of a block is that of its residual by reverse
+water-filling plus that of its vectors. This estimates the possible gain of a second dimension. The gain reached by an
+encoder is measured with x264 at 1 to 16 references, in orders whose references include both neighbours.
 """
 
 from __future__ import annotations
@@ -26,17 +25,17 @@ from codec import Plan
 from ii_core import IIVideo, sub_images, video_of
 
 RECORDS = Records("neighbours", ("benchmarks.coding.neighbours", "benchmarks.coding.takes"))
-BLOCK, REACH, FINE = 8, 16, 4  # pixels of a block, of the search each way, and steps of a pixel
-QUANTISERS = (27, 32)  # of H.264; the distortion of a block is at most Δ²/12
-SAME = 0.5  # bits of a vector's number that is as in the last block; others are exponential Golomb codes
+BLOCK, REACH, FINE = 8, 16, 4  # side of a block, search range each way in pixels, steps per pixel
+QUANTISERS = (27, 32)  # H.264's quantisers; the distortion of a block is at most Δ²/12
+SAME = 0.5  # bits of a vector component that equals that of the last block; others are exponential Golomb codes
 Floats = NDArray[np.float32]
 
 
 def codings(span: int = INSTANTS) -> dict[str, tuple[str, Plan]]:
-    """Scheme and plan by name.
+    """Return scheme and plan by name.
 
-    One reference is one dimension. In a time-first walk the last view is at most 2·span − 1 frames back, so that 16
-    references are both dimensions. Groups of one view have no other view: they tell what more instants bring.
+    One reference predicts in one dimension. In a time-first walk the last view is at most 2·span − 1 frames back, so
+    that 16 references predict in both. Groups of one view have no other view: they show the gain of more instants.
     """
 
     def scheme(refs: int) -> str:
@@ -73,7 +72,7 @@ def main() -> None:
 
 
 def measured(take: str, scale: int, what: str) -> dict[str, Any]:
-    """Estimated bits of the predictions of a take, or points of one coding."""
+    """Return estimated bits of the predictions of a take, or points of one coding."""
     video = rendered(take, scale)
     some = video_of([video[frame] for frame in range(INSTANTS)], fps=video.fps)
     if what == "bits":
@@ -83,13 +82,13 @@ def measured(take: str, scale: int, what: str) -> dict[str, Any]:
 
 
 def luma_images(video: IIVideo) -> Floats:
-    """Luma of all sub-images, (T, V, U, L, K)."""
+    """Return the luma of all sub-images, (T, V, U, L, K)."""
     weights = np.array([0.2126, 0.7152, 0.0722], np.float32)
     return np.stack([sub_images(picture).astype(np.float32) @ weights for picture in video])
 
 
 def neighbours(video: IIVideo) -> tuple[Floats, dict[str, Floats]]:
-    """Sub-images from the second instant and column of views on, and their neighbours, all (count, L, K).
+    """Return sub-images from the second instant and column of views on, and their neighbours, all (count, L, K).
 
     Neighbours by name: ``time``, the last instant; ``view``, the last view.
     """
@@ -100,7 +99,7 @@ def neighbours(video: IIVideo) -> tuple[Floats, dict[str, Floats]]:
 
 
 def predicted(video: IIVideo) -> dict[str, Any]:
-    """Bits a pixel of each prediction at each quantiser; sub-images that have both neighbours count."""
+    """Return bits per pixel of each prediction at each quantiser, over sub-images with both neighbours."""
     now, last = neighbours(video)
     found: dict[str, dict[str, float]] = {}
     for qp in QUANTISERS:
@@ -109,26 +108,26 @@ def predicted(video: IIVideo) -> dict[str, Any]:
         rates = {name: residual_bits(now, image, qp) + vectors for name, (image, vectors) in by.items()}
         mean = (by["time"][0] + by["view"][0]) / 2
         both = residual_bits(now, mean, qp) + by["time"][1] + by["view"][1]
-        rates["better"] = np.minimum(rates["time"], rates["view"]) + 1  # a bit says which
+        rates["better"] = np.minimum(rates["time"], rates["view"]) + 1  # one bit selects the neighbour
         rates["mean"] = np.minimum(rates["better"], both) + 1
         found[str(qp)] = {name: float(rate.mean()) / pixels for name, rate in rates.items()}
     return {"bits_per_pixel": found}
 
 
 def weight(qp: int) -> float:
-    """Squared error that is worth one bit: the λ of H.264's reference software."""
+    """Return the squared error that is worth one bit: the λ of H.264's reference software."""
     return float(0.85 * 2 ** ((qp - 12) / 3))
 
 
 def residual_bits(images: Floats, predictions: Floats, qp: int) -> NDArray[np.float64]:
-    """Bits of each block's residual: ½ log₂(D/θ) a pixel where its mean squared error D > θ = Δ²/12, else none."""
+    """Return bits of each block's residual: ½ log₂(D/θ) per pixel if its mean squared error D > θ = Δ²/12, else 0."""
     step = 2 ** ((qp - 4) / 6)
     error = np.maximum(squared_error(images, predictions), 1e-12)
     return np.asarray(BLOCK * BLOCK * np.maximum(0.0, 0.5 * np.log2(error / (step * step / 12))))
 
 
 def squared_error(images: Floats, predictions: Floats) -> NDArray[np.float64]:
-    """Mean squared error of each block, (images, blocks down, blocks across)."""
+    """Return the mean squared error of each block, (images, blocks down, blocks across)."""
     count, height, width = images.shape
     apart = np.square(images - predictions, dtype=np.float64)
     return np.asarray(apart.reshape(count, height // BLOCK, BLOCK, width // BLOCK, BLOCK).mean(axis=(2, 4)))
@@ -146,12 +145,13 @@ def compensated(images: Floats, references: Floats, weight: float) -> tuple[Floa
     -------
     predictions : ndarray, (images, height, width)
     bits : ndarray, (images, blocks down, blocks across)
-        Of the vectors.
+        Bits of the vectors.
     """
     count, height, width = images.shape
     if height % BLOCK or width % BLOCK:
         raise ValueError(f"images are {width}×{height} px: multiples of {BLOCK} are needed")
-    sides = [((n - 1) * FINE + 1) / n for n in (height, width)]  # ends on ends: every FINE-th sample is a pixel
+    # Both grids end at the same places, so that every FINE-th sample is a pixel.
+    sides = [((n - 1) * FINE + 1) / n for n in (height, width)]
     best, bits = np.empty_like(images), np.empty((count, height // BLOCK, width // BLOCK))
     for number, reference in enumerate(references):
         fine = ndimage.zoom(reference, sides, order=3, mode="nearest")
@@ -161,7 +161,7 @@ def compensated(images: Floats, references: Floats, weight: float) -> tuple[Floa
 
 @njit(cache=True, nogil=True)
 def _vector_bits(down, across):  # type: ignore[no-untyped-def]
-    """Bits of a vector, as its difference from that of the last block."""
+    """Return the bits of a vector, coded as the difference from that of the last block."""
     total = 0.0
     for n in (down, across):
         code = 2 * abs(n)
@@ -171,7 +171,7 @@ def _vector_bits(down, across):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _error(image, fine, top, left, down, across, least):  # type: ignore[no-untyped-def]
-    """Squared error of one block, moved by so many fine steps, until it is at least ``least``; borders go on."""
+    """Return the squared error of one block moved by fine steps; stop at ``least``. Borders are repeated."""
     rows, cols = fine.shape
     total = 0.0
     for y in range(BLOCK):
@@ -187,7 +187,7 @@ def _error(image, fine, top, left, down, across, least):  # type: ignore[no-unty
 
 @njit(cache=True, nogil=True)
 def _predict(image, fine, weight, out, bits):  # type: ignore[no-untyped-def]
-    """Fill the best prediction of each block, and the bits of its vector."""
+    """Write the best prediction of each block, and the bits of its vector."""
     rows, cols = fine.shape
     last_down, last_across = 0, 0
     for top in range(0, image.shape[0], BLOCK):
@@ -221,7 +221,7 @@ def tables() -> Tables:
 
 
 def table() -> list[str]:
-    """Return the gain of a second dimension, possible by prediction and reached by the encoder; a column a take."""
+    """Return the gain of a second dimension, as predicted and as reached by the encoder; one column per take."""
     rows = {(row["take"], row["what"]): row for row in RECORDS.rows(scale=SCALE)}
     if not rows:
         return ["Not measured yet."]

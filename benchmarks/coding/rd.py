@@ -17,8 +17,8 @@ class RDPoint(NamedTuple):
 
     bpp: float
     q_global: float  # dB
-    reached: bool | None  # as `codec.encode` says of a target rate
-    runs: int  # of the encoder until the target rate was met
+    reached: bool | None  # whether the target rate was met, as in `codec.encode`
+    runs: int  # encoder runs until the target rate was met
     encode_seconds: float | None  # with rearrangement and colour conversion
     encoder_seconds: float | None  # inside the encoder alone
     decode_seconds: float
@@ -33,7 +33,7 @@ def rd_point(picture: IIPicture, scheme: str, **goal: Any) -> RDPoint:
     ----------
     picture : IIPicture
     scheme : str
-        With options: ``si-h264:rate=cq``.
+        Scheme with options: ``si-h264:rate=cq``.
     goal
         One of ``bpp``, ``qp`` and ``quality``, as `codec.encode` takes them.
     """
@@ -53,7 +53,7 @@ def rd_point(picture: IIPicture, scheme: str, **goal: Any) -> RDPoint:
 
 
 def climbing(points: Sequence[Point]) -> list[Point]:
-    """Return points by rate, without those whose additional bits do not raise PSNR (4:2:0 limits it)."""
+    """Return points by rate, without points whose additional bits do not raise PSNR (4:2:0 limits it)."""
     kept: list[Point] = []
     for point in sorted(points, key=lambda p: p["bpp"]):
         if not kept or (point["psnr"] > kept[-1]["psnr"] + 1e-3 and point["bpp"] > kept[-1]["bpp"]):

@@ -28,7 +28,8 @@ SCALE = 8  # of the page
 TAKES = ("apples", "car", "cuboid")
 SCHEME = "si-h264:rate=cq,refs=8"
 QPS = (22, 27, 32, 37)
-FRAMES, STEPS, INSTANTS = 16, (1, 2, 4), 8  # of the orders; of the speeds: frames left out, and frames that are kept
+# Instants of the orders; for the speeds: steps between frames, and instants.
+FRAMES, STEPS, INSTANTS = 16, (1, 2, 4), 8
 SPAN = 8
 PLANS = {
     "stills": Plan(span=1),
@@ -40,7 +41,7 @@ PLANS = {
     "interleaved, groups of 16 views": Plan(walk="interleaved", span=SPAN, group=16, strip=4),
 }
 ONE_WAY = ("view-first", "time-first")
-ORDERS = ("view-first", "time-first", "interleaved", "stills")  # of every coder; the first is its anchor
+ORDERS = ("view-first", "time-first", "interleaved", "stills")  # orders of every coder; the first is its anchor
 # Scheme and quantisers by coder. `si-lf` codes pictures alone: the frame FRAME_ALONE.
 CODERS = {
     "H.264": (SCHEME, QPS),
@@ -52,7 +53,7 @@ FRAME_ALONE = 4
 
 
 def main() -> None:
-    """Measure, print, keep, and fill tables."""
+    """Measure, print, record, and fill tables."""
     asked = command_line(__doc__, scale=SCALE, takes=TAKES).parse_args()
     takes = asked.takes
     keys: list[dict[str, Any]] = [
@@ -75,7 +76,7 @@ def main() -> None:
 
 
 def rendered(take: str, scale: int) -> IIVideo:
-    """A take's frames that are used, rendered unless they are there."""
+    """Return the frames of a take that are used, rendered unless they exist."""
     folder = ROOT / "out" / "takes" / f"{take}_{scale}"
     frames = sorted({*range(FRAMES), *(step * i for step in STEPS for i in range(INSTANTS))})
     render_take(load_take(take), folder, preset("setup1", scale=scale), frames=range(frames[-1] + 1))
@@ -85,7 +86,7 @@ def rendered(take: str, scale: int) -> IIVideo:
 def coded(
     video: IIVideo, take: str, scale: int, plan: str = "", step: int = 0, coder: str = "", order: str = ""
 ) -> dict[str, Any]:
-    """Points of one plan; of a coder in one order; or, of every step-th frame, of both one-way orders."""
+    """Return points of one plan, of a coder in one order, or of both one-way orders on every step-th frame."""
     if coder == "si-lf":
         return {"points": alone(video, *CODERS[coder])}
     if coder:
@@ -99,7 +100,7 @@ def coded(
 
 
 def alone(video: IIVideo, scheme: str, quantisers: Sequence[int]) -> list[dict[str, float]]:
-    """Rate and quality of a frame by a coder of pictures, at every quantiser."""
+    """Return rate and quality of a frame by a coder of pictures, at every quantiser."""
     original = video_of([video[FRAME_ALONE]], fps=video.fps)
     found = []
     for qp in quantisers:
@@ -112,7 +113,7 @@ def alone(video: IIVideo, scheme: str, quantisers: Sequence[int]) -> list[dict[s
 def points(
     video: IIVideo, plan: Plan, scheme: str = SCHEME, quantisers: Sequence[int] = QPS
 ) -> list[dict[str, float]]:
-    """Rate and quality at every quantiser."""
+    """Return rate and quality at every quantiser."""
     found = []
     for qp in quantisers:
         coded = encode_take(video, scheme, qp=qp, plan=plan)
@@ -131,7 +132,7 @@ def points(
 
 
 def correlations(video: IIVideo) -> dict[str, float]:
-    """Mean correlation (5.3) of sub-images that follow one another in view, along rows, and in time."""
+    """Return the mean correlation (5.3) of sub-images that are neighbours in view, along rows, and in time."""
     view: list[float] = []
     time: list[float] = []
     last = None
@@ -148,7 +149,7 @@ def correlations(video: IIVideo) -> dict[str, float]:
 
 
 def difference(anchor: Sequence[Mapping[str, Any]], test: Sequence[Mapping[str, Any]]) -> float | None:
-    """Bjøntegaard rate of a curve against another, percent; None where curves have none."""
+    """Return the Bjøntegaard rate of a curve against another, percent; None if undefined."""
     a, b = ([[p[name] for p in curve] for name in ("bpp", "psnr_of_pooled_mse")] for curve in (anchor, test))
     try:
         return bd_rate(*a, *b)
@@ -157,7 +158,7 @@ def difference(anchor: Sequence[Mapping[str, Any]], test: Sequence[Mapping[str, 
 
 
 def by_plan(scale: int = SCALE) -> dict[str, dict[str, Any]]:
-    """Rows by take and plan."""
+    """Return rows by take and plan."""
     found: dict[str, dict[str, Any]] = {}
     for row in RECORDS.rows(scale=scale):
         if "plan" in row:
@@ -172,7 +173,7 @@ def tables() -> Tables:
 
 
 def plan_table() -> list[str]:
-    """A row a plan: random access, Bjøntegaard rate of each take against its stills."""
+    """Return a table with a row per plan: random access, Bjøntegaard rate of each take against its stills."""
     rows = by_plan()
     if not rows:
         return ["Not measured yet."]
@@ -194,7 +195,7 @@ def plan_table() -> list[str]:
 
 
 def coder_table() -> list[str]:
-    """A row a coder and order: Bjøntegaard rate against its own first order, and against H.264 in that order."""
+    """Return a table by coder and order: rate against its first order, and against H.264 in that order."""
     rows = {(row["coder"], row["order"], row["take"]): row for row in RECORDS.rows(scale=SCALE) if "order" in row}
     if not rows:
         return ["Not measured yet."]
@@ -216,12 +217,12 @@ def coder_table() -> list[str]:
 
 
 def rate_text(off: float | None) -> str:
-    """A Bjøntegaard rate as a table shows it."""
+    """Return a Bjøntegaard rate as text of a cell."""
     return "–" if off is None else f"{off:+.1f} %"
 
 
 def speed_table() -> list[str]:
-    """A row a take and speed: correlations, and rate of time-first against view-first."""
+    """Return a table by take and speed: correlations, and rate of time-first against view-first."""
     rows = [row for row in RECORDS.rows(scale=SCALE) if "step" in row]
     if not rows:
         return ["Not measured yet."]

@@ -3,8 +3,8 @@
     python -m benchmarks run volume [--scale 4] [--scenes apples,cuboid]
 
 Rates against the dissertation's video setting (x264 IPPP, 4:2:0, constant quantiser, parallel order) are Bjøntegaard
-differences by RGB PSNR, over the qualities that both curves reach. Goes to ``benchmarks/results/volume.jsonl`` and
-into the tables of ``docs/volume.md``.
+differences by RGB PSNR, over the qualities that both curves reach. Numbers go to ``benchmarks/results/volume.jsonl``,
+the tables to ``docs/volume.md``.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ LOSSLESS = ("si-jp3d", "si-jp3d:levels=1", "ri-jp3d", "ei-jp3d", "si-jpeg2000", 
 
 
 def main() -> None:
-    """Measure, print and keep."""
+    """Measure, print and record."""
     asked = command_line(__doc__, scale=SCALE, scenes=("apples", "cuboid")).parse_args()
     keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
@@ -59,7 +59,7 @@ def main() -> None:
 
 
 def study(scene: str, scale: int) -> dict[str, Any]:
-    """All of one scene."""
+    """Return all results of one scene."""
     picture = render(load_scene(scene), preset("setup1", scale=scale), noise=1.0, support=()).picture
     return {
         "size": picture.size, "curves": curves(picture), "lossless_bpp": lossless(picture), "apart": apart(picture)
@@ -67,7 +67,7 @@ def study(scene: str, scale: int) -> dict[str, Any]:
 
 
 def curves(picture: IIPicture) -> dict[str, list[tuple[float, float]]]:
-    """(bpp, RGB PSNR) of each scheme."""
+    """Return (bpp, RGB PSNR) of each scheme."""
     found: dict[str, list[tuple[float, float]]] = {}
     for scheme, settings in CURVES.items():
         points = [rd_point(picture, scheme, **setting) for setting in settings]
@@ -76,7 +76,7 @@ def curves(picture: IIPicture) -> dict[str, list[tuple[float, float]]]:
 
 
 def lossless(picture: IIPicture) -> dict[str, float]:
-    """Bits per pixel to the bit."""
+    """Return the rates of lossless coding, bits per pixel."""
     found = {}
     for name in LOSSLESS:
         coded = encode(
@@ -98,7 +98,7 @@ def apart(picture: IIPicture, squared_error: float = 10.0) -> dict[str, float]:
         stream = encode_planes(slices, 16 * squared_error, wavelet="9/7")
         whole = whole_codestream(stream, slices.shape, "int16", wavelet="9/7", lossless=False)
         size += len(whole)
-        head += whole.index(b"\xff\x93")  # all before the data
+        head += whole.index(b"\xff\x93")  # all headers before the data
         back = decode_planes(stream, slices.shape, "int16", wavelet="9/7", lossless=False)
         error += float(np.mean((back.astype(float) - slices) ** 2)) / len(planes) / 16
     together = planes.reshape(-1, shape.height, shape.width)
@@ -112,7 +112,7 @@ def apart(picture: IIPicture, squared_error: float = 10.0) -> dict[str, float]:
 
 
 def rows(name: str, scene: dict[str, Any]) -> list[str]:
-    """The scene's lines of the table."""
+    """Return the scene's lines of the table."""
     anchor = list(zip(*scene["curves"][ANCHOR], strict=True))
     lines = []
     for scheme, points in scene["curves"].items():

@@ -37,12 +37,12 @@ DOCS, CAMERAS = ROOT / "docs", ROOT / "assets" / "cameras"
 PANEL = (320, 160)  # pixels across and down
 GAP = 6
 SCALES = {"hdtv": 5}
-# Where the camera stands, mm before the usual place: its front lens needs room.
+# Shift of the camera in mm towards the viewer, to make room for its front lens.
 BACK = {
     "depth-control": 70, "grin-hexagonal-depth-control": 70, "plenoptic1": 150, "plenoptic2": 150,
     "plenoptic1-double-gauss": 130, "plenoptic2-triplet": 150,
 }  # fmt: skip
-SMALL = ("plenoptic1-double-gauss", "plenoptic2-triplet")  # as JPEG, a third of the bytes without loss
+SMALL = ("plenoptic1-double-gauss", "plenoptic2-triplet")  # stored as JPEG, a third of the bytes of PNG
 
 
 def main() -> None:
@@ -63,7 +63,7 @@ def file_name(camera: str) -> str:
 
 
 def page() -> str:
-    """Return the page: cameras by kind, and what their maps are good for."""
+    """Return the page: cameras by kind, and the precision of stored maps."""
     text = [INTRODUCTION]
     for kind, names in KINDS.items():
         text.append(f"\n## {kind}\n")
@@ -72,11 +72,11 @@ def page() -> str:
 
 
 def shown(name: str) -> IICamera:
-    """The camera of the pictures, the first of several."""
+    """Return the camera of the pictures, the first of several."""
     return preset_cameras(name, scale=SCALES.get(name, 8))[0]
 
 
-# All cameras but the family setup2, whose members differ in numbers alone.
+# All cameras, without the family setup2, whose members differ only in numbers.
 KINDS = {
     "Setups of the dissertation": ("setup1", "setup3"),
     "Other lenses": ("grin", "hpo", "depth-priority", "resolution-priority", "multi-focus", "spherical"),
@@ -191,7 +191,7 @@ exchanged as files.
 
 
 def figure(value: float) -> str:
-    """Two or three digits that say something."""
+    """Return a number with two or three significant digits."""
     return f"{value:.0f}" if value >= 100 else f"{value:.2g}" if value > 1e-6 else "0"
 
 
@@ -203,7 +203,7 @@ in spite of its size, because its eight bits are relative to the largest of the 
 
 
 def strip(scene: Scene, camera: IICamera, name: str) -> NDArray[np.uint8]:
-    """L, D, a detail and a view side by side on white."""
+    """Return L, D, a detail and a view side by side on white."""
     pose = stand_back(camera) if camera.lenses == (1, 1) else np.eye(4)
     pose[2, 3] -= BACK.get(name, 0)
     picture = render(scene, camera, samples=16, pose=pose, support=()).picture
@@ -227,7 +227,7 @@ def strip(scene: Scene, camera: IICamera, name: str) -> NDArray[np.uint8]:
 
 
 def middle(camera: IICamera) -> tuple[slice, slice]:
-    """A block of about eight by four lenses, or everything if there are no more."""
+    """Return a block of about eight by four lenses, or the whole array if it is smaller."""
     (m, n), (u, v) = camera.pixels, camera.ei_pixels
     width, height = (m, n) if camera.lenses == (1, 1) else (round(8 * u), round(4 * max(u, v)))
     left, top = max(0, (m - width) // 2), max(0, (n - height) // 2)
@@ -237,7 +237,7 @@ def middle(camera: IICamera) -> tuple[slice, slice]:
 
 
 def as_colour(values: NDArray[np.float64], on: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """x, y, z from least to greatest as red, green, blue; what has no extent stays dark, and blocked rays black."""
+    """Return x, y, z from least to greatest as red, green, blue; constant axes are dark, blocked rays black."""
     low, high = values[on].min(axis=0), values[on].max(axis=0)
     share = (values - low) / np.where(high - low > 1e-9, high - low, np.inf)
     return np.where(on[..., None], np.clip(255 * share, 0, 255), 0).astype(np.uint8)
@@ -262,7 +262,7 @@ def seen(picture: IIPicture, name: str) -> NDArray[Any]:
 
 
 def fitted(pixels: NDArray[Any], how: Image.Resampling) -> NDArray[np.uint8]:
-    """Scaled to fit the panel."""
+    """Return a picture scaled to fit the panel."""
     image = Image.fromarray(np.ascontiguousarray(pixels))
     share = min(PANEL[0] / image.width, PANEL[1] / image.height)
     return np.asarray(image.resize((max(1, round(image.width * share)), max(1, round(image.height * share))), how))

@@ -11,7 +11,7 @@ from benchmarks.pages.pictures import IMAGES
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import origin, with_commits
 
-SCALE = 4  # of the large study; the small study is at full size
+SCALE = 4  # scale of the large study; the small study is at full size
 
 
 def main() -> None:
@@ -38,7 +38,7 @@ def tables() -> Tables:
     }
 
 
-# What a user wants, and the scheme for it; rates and times come from the records.
+# Purposes, and the scheme for each; rates and times come from the records.
 CHOICES = {
     "the smallest file, whatever it takes": "si-avif:best",
     "a small file in seconds": "si-hevc:balanced",
@@ -50,7 +50,7 @@ CHOICES = {
 
 
 def which(rows: list[dict[str, Any]]) -> list[str]:
-    """Schemes by what a user wants."""
+    """Return a table of schemes by purpose."""
     known = {row["scheme"]: row for row in summary(rows)}
     lines = ["| you want | take | rate at equal PSNR | CPU s |", "|---|---|---|---|"]
     for wish, scheme in CHOICES.items():

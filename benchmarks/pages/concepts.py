@@ -33,13 +33,13 @@ from raytrace_ii import load_scene, render
 from .cameras import as_colour
 
 FOLDER = ROOT / "docs" / "images" / "concepts"
-CORNER = (76, 32)  # lens k, l at the upper left of the detail that is shown: an apple's edge
-SHOWN = (6, 3)  # lenses across and down in it
+CORNER = (76, 32)  # upper left lens (k, l) of the detail shown: an apple's edge
+SHOWN = (6, 3)  # lenses across and down in the detail
 INK = "#d81b60"
 
 
 def main() -> None:
-    """Render once, draw everything."""
+    """Render once and draw all pictures."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     camera = preset("setup1", scale=4)
     picture = render(load_scene("apples"), camera, support=()).picture
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def save(name: str, figure: Any) -> None:
-    """Write it and say so."""
+    """Write a picture and print its path."""
     figure.savefig(FOLDER / f"{name}.png", dpi=110, bbox_inches="tight", facecolor="white")
     plt.close(figure)
     write_picture(FOLDER / f"{name}.png", FOLDER / f"{name}.png")
@@ -60,7 +60,7 @@ def save(name: str, figure: Any) -> None:
 
 
 def panels(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, list[Axes]]:
-    """A figure of empty panels."""
+    """Return a figure of empty panels."""
     figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False)
     for axis in axes.flat:
         axis.set_axis_off()
@@ -68,13 +68,13 @@ def panels(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, lis
 
 
 def show(axis: Axes, pixels: NDArray[Any], title: str) -> None:
-    """Pixels as squares under a title."""
+    """Draw pixels as squares under a title."""
     axis.imshow(pixels, interpolation="nearest")
     axis.set_title(title, fontsize=9)
 
 
 def draw_rays(camera: IICamera) -> Any:
-    """A cut through three lenses of the camera: pixels, lens plane and the rays that L and D are."""
+    """Draw a section through three lenses of the camera: pixels, lens plane and the rays of L and D."""
     u, v = camera.ei_pixels
     k = camera.lenses[0] // 2 - 1
     columns = slice(int(k * u), int((k + 3) * u))
@@ -103,7 +103,7 @@ def draw_rays(camera: IICamera) -> Any:
 
 
 def draw_maps(camera: IICamera) -> Any:
-    """L and D of the detail as pictures."""
+    """Draw L and D of the detail as pictures."""
     (k, l), (across, down) = CORNER, SHOWN
     u, v = (int(n) for n in camera.ei_pixels)
     block = {"rows": slice(l * v, (l + down) * v), "cols": slice(k * u, (k + across) * u)}
@@ -117,7 +117,7 @@ def draw_maps(camera: IICamera) -> Any:
 
 
 def draw_pixels(picture: IIPicture) -> Any:
-    """Which pixels of a detail belong to one EI, one SI and one RI."""
+    """Draw the pixels of a detail that belong to one EI, one SI and one RI."""
     (k, l), (across, down) = CORNER, SHOWN
     u, v = picture.ei_pixels
     detail = picture.pixels[l * v : (l + down) * v, k * u : (k + across) * u]
@@ -136,7 +136,7 @@ def draw_pixels(picture: IIPicture) -> Any:
 
 
 def grid(axis: Axes, size: tuple[int, ...], cell: tuple[int, int]) -> None:
-    """Lines between elementary images."""
+    """Draw lines between elementary images."""
     for x in range(0, size[1] + 1, cell[0]):
         axis.axvline(x - 0.5, color="black", lw=0.4)
     for y in range(0, size[0] + 1, cell[1]):
@@ -144,7 +144,7 @@ def grid(axis: Axes, size: tuple[int, ...], cell: tuple[int, int]) -> None:
 
 
 def draw_components(picture: IIPicture) -> Any:
-    """One component image of each kind, and its neighbour."""
+    """Draw one component image of each kind, and its neighbour."""
     (K, L), (U, V) = picture.lenses, picture.ei_pixels
     k, l = CORNER
     ei, si, ri = elementary_images(picture), sub_images(picture), ray_space_images(picture)
@@ -174,7 +174,7 @@ def draw_views(picture: IIPicture) -> Any:
 
 
 def draw_sequence(picture: IIPicture) -> Any:
-    """The orders in which sub-images become frames, and some frames of the parallel one."""
+    """Draw the orders of sub-images as frames, and some frames of the parallel order."""
     V, U = picture.ei_pixels[1], picture.ei_pixels[0]
     frames = sub_images(picture).reshape(V * U, *picture.lenses[::-1], 3)
     figure = plt.figure(figsize=(11, 4.2), layout="constrained")

@@ -24,7 +24,7 @@ SCALE, TIMES = 4, 2
 
 
 def main() -> None:
-    """Render, look and write."""
+    """Render a picture, compute the views and write them."""
     picture = render(load_scene("apples"), preset("setup1", scale=SCALE), samples=4, support=()).picture
     images = faults(picture)
     write_picture(IMAGES / "display_eye.jpg", sheet([*images.values()], 3, [*images]))
@@ -63,7 +63,7 @@ def faults(picture: IIPicture) -> dict[str, NDArray[np.uint8]]:
 
 
 def zones() -> Any:
-    """Share of lenses that show their own elementary image over the eye's place, and the zone in closed form."""
+    """Draw the share of lenses with their own elementary image over the eye's place, and the zone in closed form."""
     camera = preset("setup1", scale=16)
     (k, _), (u, _) = camera.lenses, camera.ei_pixels
     pixels = np.zeros((camera.pixels[1], camera.pixels[0], 3), np.uint8)
@@ -93,7 +93,7 @@ def zones() -> Any:
 
 
 def zone_displays(camera: IICamera, distance: float) -> dict[str, DisplayModel]:
-    """Displays by what is different."""
+    """Return displays by their fault."""
     meeting = camera.lens_pitch_mm[0] / (1 + camera.gap_mm / distance)
     return {
         "matched arrays": DisplayModel(camera=camera),

@@ -2,7 +2,7 @@
 
     python -m benchmarks run focus_patterns
 
-The picture is ``docs/images/focus_patterns.png``, made from the defaults in the code and nothing else.
+The picture is ``docs/images/focus_patterns.png``, drawn from the defaults in the code alone.
 """
 
 from __future__ import annotations

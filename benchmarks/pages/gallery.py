@@ -20,7 +20,7 @@ from raytrace_ii import load_scene, render, scene_names
 
 GALLERY = ROOT / "docs" / "gallery"
 STILL = {"width": 900, "height": 500}
-# State of the page in each still: what a stranger should see first.
+# State of the viewer page in each still.
 STILLS = {"apples": "#a=3", "cuboid": "#x=0.5&y=0.3", "objects": "#stereo=anaglyph&eyes=0.15", "mountains": "#f=0"}
 QUALITY = 80
 SAMPLES = 16
@@ -35,12 +35,12 @@ that each lens sees them whole: no display of this kind can resolve them.
 
 
 def main() -> None:
-    """Write the pages, and the stills if the command line says so."""
+    """Write the pages, and with ``--stills`` the stills."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", nargs="+", choices=list(scene_names()), default=list(scene_names()))
     parser.add_argument("--stills", action="store_true", help="draw the stills and write the README, in a browser")
     parser.add_argument("--scale", type=int, default=SCALE, help="divides the lenses of setup1")
-    parser.add_argument("--missing", action="store_true", help="leave pages as they are that exist")
+    parser.add_argument("--missing", action="store_true", help="keep existing pages")
     asked = parser.parse_args()
     for name in asked.scenes:
         if asked.missing and page_of(name).exists():

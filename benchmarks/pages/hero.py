@@ -1,7 +1,7 @@
 """Animation at the head of the README: ``python -m benchmarks run hero``.
 
-*Apples* through full *setup1* with 16 samples a pixel, seen along an ellipse in the viewing zone, as `raytrace-ii
-display` makes it. Rendering takes three minutes of CPU time.
+*Apples* through full *setup1* with 16 samples per pixel, seen along an ellipse in the viewing zone, as in
+`raytrace-ii display`. Rendering takes three minutes of CPU time.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ii_core.display.look import focused_view, viewpoints_around
 from raytrace_ii import load_scene, render
 
 PATH = IMAGES / "apples.webp"
-SIZE, DEPTH_MM = (720, 360), 37.0  # the apples in front
+SIZE, DEPTH_MM = (720, 360), 37.0  # pixels of a frame; focus on the apples in front
 FRAMES, FPS = 20, 10
 
 
@@ -25,7 +25,7 @@ def main() -> None:
 
 
 def film(picture: IIPicture, path: str | os.PathLike[str]) -> None:
-    """Write the picture as it looks along the ellipse."""
+    """Write the film of views along the ellipse."""
     places = viewpoints_around(picture, FRAMES)
     write_animation(path, (focused_view(picture, place, size=SIZE, depth_mm=DEPTH_MM) for place in places), fps=FPS)
 

@@ -1,6 +1,6 @@
-"""Textures of the reference scenes, drawn: ``python -m benchmarks.pages.make_textures``.
+"""Textures of the reference scenes, drawn by formulas: ``python -m benchmarks.pages.make_textures``.
 
-The same numbers give the same bytes.
+The random numbers are seeded: the files are reproducible to the byte.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ TILE, TILES = 128, 4  # pixels a side, tiles a side
 
 
 def cuboid_tiles() -> NDArray[np.uint8]:
-    """4×4 busy patterns, each with its own colours and a dark frame, for the small cubes of *Cuboid*."""
+    """Return 4×4 detailed patterns, each with its own colours and a dark frame, for the small cubes of *Cuboid*."""
     generator = np.random.default_rng(20261121)
     y, x = np.mgrid[0:TILE, 0:TILE] / TILE
     patterns = [
@@ -41,11 +41,11 @@ def cuboid_tiles() -> NDArray[np.uint8]:
     return np.rint(np.clip(sheet, 0, 1) * 255).astype(np.uint8)
 
 
-FACE_MM = (-8.0, -12.0, 8.0, 10.0)  # what of a head 20 mm high the face is drawn on: x, y, and greater x, y
+FACE_MM = (-8.0, -12.0, 8.0, 10.0)  # rectangle of the face on a head 20 mm high: least x and y, greatest x and y
 
 
 def face(skin: str, iris: str, lips: str, brow: str) -> NDArray[np.uint8]:
-    """A woman's face as it is thrown onto a head from in front: eyes, brows, lips, a blush."""
+    """Return a woman's face, projected onto a head from the front: eyes, brows, lips, a blush."""
     x0, y0, x1, y1 = FACE_MM
     rows, columns = 484, 352
     x = x0 + (x1 - x0) * (np.arange(columns) + 0.5)[None, :] / columns + np.zeros((rows, 1))
@@ -55,7 +55,7 @@ def face(skin: str, iris: str, lips: str, brow: str) -> NDArray[np.uint8]:
     side = np.abs(x)
 
     def lay(colour: str, distance: NDArray[np.float64], soft: float = 0.08, share: float = 1.0) -> None:
-        """A colour where the distance is negative, its border ``soft`` mm wide."""
+        """Draw a colour where the distance is negative, with a border ``soft`` mm wide."""
         cover = share * np.clip(0.5 - distance / soft, 0, 1)[..., None]
         out[...] += cover * (_rgb(colour) - out)
 
@@ -95,7 +95,7 @@ def face(skin: str, iris: str, lips: str, brow: str) -> NDArray[np.uint8]:
 
 
 def flowers() -> NDArray[np.uint8]:
-    """A repeating print of blossoms and leaves on dark blue, for a dress."""
+    """Return a repeating print of blossoms and leaves on dark blue, for a dress."""
     size = 256
     y, x = (np.mgrid[0:size, 0:size] + 0.5) / size
     out = np.empty((size, size, 3))
@@ -116,7 +116,7 @@ def flowers() -> NDArray[np.uint8]:
 
 
 def tartan() -> NDArray[np.uint8]:
-    """A repeating check of woven bands, for a blouse."""
+    """Return a repeating check of woven bands, for a blouse."""
     size = 128
     place = (np.arange(size) + 0.5) / size
     bands = np.empty((size, 3))

@@ -15,8 +15,8 @@ from ii_core.files import atomic_path
 
 IMAGES = ROOT / "docs" / "images"
 WIDEST = 1500  # pixels: twice the column of a page
-QUALITY = 80  # of JPEG
-MANY = 16384  # colours: a chart with more holds photographs, which a palette would band
+QUALITY = 80  # JPEG quality
+MANY = 16384  # colours; a chart with more contains photographs, in which a palette would cause banding
 
 
 def write_picture(path: str | os.PathLike[str], source: NDArray[np.uint8] | str | os.PathLike[str]) -> None:
@@ -28,8 +28,8 @@ def write_picture(path: str | os.PathLike[str], source: NDArray[np.uint8] | str 
         ``.png``, ``.webp`` without loss for photographs whose pixels matter (a quarter smaller), or ``.jpg`` for
         JPEG of quality 80 without subsampled colour; replaced, whole.
     source : (H, W, 3) uint8 or path
-        Anything wider than 1500 pixels is reduced to that. A PNG keeps its colours, but a chart, which is a file
-        with an alpha channel, gets a palette of 256.
+        Pictures wider than 1500 pixels are reduced to that width. Charts, which are files with an alpha channel, get
+        a palette of 256 colours; other PNG keep their colours.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def write_picture(path: str | os.PathLike[str], source: NDArray[np.uint8] | str 
 
 
 def with_palette(picture: Image.Image) -> Image.Image:
-    """Return an RGB picture in at most 256 colours, or as it is where it has many."""
+    """Return an RGB picture reduced to 256 colours, unless it has more than `MANY`."""
     colours = picture.getcolors(MANY)
     if colours is None:
         return picture

@@ -2,8 +2,8 @@
 
     python -m benchmarks run tables [--check]
 
-A benchmark that owns tables has ``tables()``, which makes them from its records alone: a dict from page and mark to
-lines. They stand between ``<!-- mark -->`` and ``<!-- /mark -->`` of the page.
+A benchmark that owns tables has a function ``tables()``, which makes them from its records alone: a dict from page
+and mark to lines. The lines are written between ``<!-- mark -->`` and ``<!-- /mark -->`` of the page.
 """
 
 from __future__ import annotations
@@ -21,12 +21,14 @@ from ii_core.files import atomic_path
 
 Tables = Mapping[tuple[str, str], list[str]]
 OWNERS = tuple(benchmark.tables for benchmark in BENCHMARKS.values() if benchmark.tables)
-ELSEWHERE = {("docs/viewer.md", "viewer")}  # filled by benchmarks.speed.viewer, in a browser, from a file of its own
+ELSEWHERE = {
+    ("docs/viewer.md", "viewer")
+}  # filled by benchmarks.speed.viewer, which needs a browser and has a file of its own
 MARK = re.compile(r"^<!-- ([a-z][\w-]*) -->$", re.M)
 
 
 def main() -> None:
-    """Fill all pages, or say which of them are not up to date."""
+    """Fill all pages, or print the tables that are out of date."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="change nothing, fail if a table differs")
     if parser.parse_args().check:
@@ -75,16 +77,14 @@ def fill(path: Path, mark: str, lines: list[str]) -> None:
 
 
 def stale(owners: Iterable[str] = OWNERS, root: Path = ROOT) -> list[str]:
-    """Return the tables that differ from what records give today, and marks that no benchmark fills; a line each."""
+    """Return the tables that differ from the present records, and marks that no benchmark fills; one line each."""
     wrong, owned = [], set()
     for owner in owners:
         for (page, mark), lines in tables_of(owner).items():
             owned.add((page, mark))
             text = (root / page).read_text(encoding="utf-8")
             if filled(text, mark, lines) != text:
-                wrong.append(
-                    f"{page}: table {mark} is not what the records give: type python -m benchmarks run tables"
-                )
+                wrong.append(f"{page}: table {mark} differs from the records: type python -m benchmarks run tables")
     pages = [root / "README.md", *sorted((root / "docs").glob("*.md"))]
     marks = {(p.relative_to(root).as_posix(), mark) for p in pages for mark in MARK.findall(p.read_text("utf-8"))}
     return wrong + [f"{page}: no benchmark fills {mark}" for page, mark in sorted(marks - owned - ELSEWHERE)]

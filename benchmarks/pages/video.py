@@ -94,7 +94,7 @@ def crossing_chart() -> None:
 
 
 def take_places(take: str, refs: int) -> list[tuple[float, float | None]]:
-    """Ratio of decorrelations and rate of a take: with 8 references at each speed, with one as it is."""
+    """Return ratio of decorrelations and rate of a take: for 8 references at each speed, for one at its own speed."""
     rows = {row["step"]: row for row in RECORDS.rows(scale=SCALE, take=take) if "step" in row}
     ratios = {
         step: (1 - row["time_correlation"]) / (1 - row["view_correlation"]) for step, row in sorted(rows.items())
@@ -109,14 +109,14 @@ def take_places(take: str, refs: int) -> list[tuple[float, float | None]]:
 
 
 def drawn(axes: Axes, places: Sequence[tuple[float, float | None]], marker: str, colour: str, **look: Any) -> None:
-    """Draw rates over ratios by rising ratio, where there is a rate."""
+    """Draw the defined rates over their ratios, by rising ratio."""
     known = sorted((x, y) for x, y in places if y is not None)
     if known:
         axes.plot(*np.array(known).T, marker=marker, color=colour, linewidth=0.8, **look)
 
 
 def finished(figure: Figure, name: str, *, ncols: int) -> None:
-    """Give a chart its grid and legend, and write it among the pictures of the pages."""
+    """Add grid and legend to a chart, and write it among the pictures of the pages."""
     for axes in figure.axes:
         axes.grid(True, color="0.9", linewidth=0.8)
         axes.set_axisbelow(True)

@@ -14,7 +14,7 @@ from ii_core import IIPicture
 
 
 def bare_encoder(picture: IIPicture, scheme: str, qp: int, *, search: str = "umh") -> Callable[[], int]:
-    """A call that encodes ready frames with PyAV and returns the bytes it made; x264 may search motion otherwise."""
+    """Return a function that encodes prepared frames with PyAV, with another motion search of x264 if given."""
     coder, options = parse_scheme(scheme)
     assert isinstance(coder, Video)
     film = coder.film(picture, options)

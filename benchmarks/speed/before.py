@@ -1,8 +1,8 @@
 """CPU time of this code and of an earlier commit on the same pictures, interleaved within one run.
 
-A process for each code, both started at once, render the same bands of full ``setup1`` with one thread, one after the
-other, never together. The earlier code comes from a git worktree in a temporary folder. Its process also makes again
-the calls of ``EmbreeScene.run`` that its render makes, on the same rays in the same order: Embree's bare time.
+Two processes, one for each code, render the same bands of full ``setup1`` with one thread, in turn, never at the same
+time. The earlier code comes from a git worktree in a temporary folder. Its process also repeats the calls of
+``EmbreeScene.run`` of its render, on the same rays in the same order: this is Embree's bare time.
 
 As a script, ``python before.py SCENE BAND …``, it is one of these processes: a line of input is a task, "render" or
 "bare", the line of output its CPU seconds.
@@ -24,15 +24,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-COMMIT = "b1dc540"  # the last code that traced single rays in rows of pixels
+COMMIT = "b1dc540"  # the last commit that traced single rays in rows of pixels
 ROOT = Path(__file__).parents[2]
-BAND = 256  # rows of full setup1
-BANDS = {"hairdo": (7,)}  # a band of hair costs as much as four of others
+BAND = 256  # rows of full setup1 per band
+BANDS = {"hairdo": (7,)}  # one band of hair costs as much as four of other scenes
 USUAL_BANDS = (2, 7, 12)
 
 
 def nanoseconds(scene: str, repeats: int) -> dict[str, list[float]]:
-    """CPU nanoseconds a pixel of ``now`` and ``before``, and of the earlier code's ``bare`` calls of Embree."""
+    """Return CPU nanoseconds per pixel of ``now`` and ``before``, and of the earlier code's ``bare`` Embree calls."""
     bands = BANDS.get(scene, USUAL_BANDS)
     pixels = 8192 * BAND * len(bands)
     found: dict[str, list[float]] = {"now": [], "before": [], "bare": []}
@@ -45,7 +45,7 @@ def nanoseconds(scene: str, repeats: int) -> dict[str, list[float]]:
 
 @cache
 def _worktree() -> Path:
-    """A work tree of the earlier code, kept until this process ends: its kernels are compiled once for all scenes."""
+    """Return a work tree of the earlier code, kept until this process ends, so that its kernels are compiled once."""
     folder = tempfile.mkdtemp()
     tree = Path(folder) / COMMIT
     subprocess.run(["git", "-C", str(ROOT), "worktree", "add", "-q", "--detach", str(tree), COMMIT], check=True)
@@ -60,7 +60,7 @@ def _worktree() -> Path:
 
 @contextmanager
 def _process(code: Path, scene: str, bands: tuple[int, ...]) -> Iterator[Callable[[str], float]]:
-    """A process with the code of a tree, and how to have a task measured by it."""
+    """Start a process with the code of a tree; return a function that measures a task in it."""
     run = subprocess.Popen(
         [sys.executable, str(Path(__file__)), scene, *map(str, bands)],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=code,
@@ -77,7 +77,7 @@ def _process(code: Path, scene: str, bands: tuple[int, ...]) -> Iterator[Callabl
         return float(line)
 
     try:
-        measure("render")  # compiles
+        measure("render")  # compiles the kernels
         yield measure
     finally:
         to.close()

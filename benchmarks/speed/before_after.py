@@ -1,10 +1,10 @@
 """Effect of a change of the code on rendered pictures and on the anchor coder.
 
 ``python -m benchmarks run before_after -- b1dc540 --scenes twins,hairdo --scale 4`` renders each scene by the code of
-that commit, in a work tree of its own, and by the code at hand. It reports the PSNR of the two pictures, the share of
+that commit, in a work tree of its own, and by the present code. It reports the PSNR of the two pictures, the share of
 pixels that differ by more than 8 codes in a channel, and the rate of ``si-h264`` at equal quality (Bjøntegaard).
-Pictures to be coded have the tables' sensor noise, the same in both; those compared have none. One row a scene is
-appended to ``results/before_after.jsonl``.
+Pictures for coding have the tables' sensor noise, equal in both; pictures for comparison have none. One row per scene
+is appended to ``results/before_after.jsonl``.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from metrics.rd import UndefinedDifference
 
 RECORDS = Records("before_after", ("benchmarks.speed.before_after", "benchmarks.coding.rd"))
 SCHEME, QUANTISERS = "si-h264:rate=cq", (21, 26, 31, 36, 41)
-VISIBLE = 8  # codes of 8 bits
+VISIBLE = 8  # 8-bit codes
 
 
 def main() -> None:
-    """Render by both, compare, code, print and keep."""
+    """Render by both, compare, code, print and record."""
     parser = command_line(__doc__, scale=4, scenes=("apples", "twins", "car", "cuboid"))
     parser.add_argument("commit", help="of the code before")
     asked = parser.parse_args()
@@ -55,7 +55,7 @@ def main() -> None:
 
 
 def both(scene: str, scale: int, before: Path, folder: Path) -> dict[str, Any]:
-    """Render a scene by the code before and by the code at hand, and compare."""
+    """Render a scene by the earlier and by the present code, and compare."""
     for code, at in (("before", before), ("after", ROOT)):
         rendered(at, scene, scale, folder / f"{code}.png", folder / f"{code}.exr")
         rendered(at, scene, scale, folder / f"{code}_noisy.png", None)
@@ -94,7 +94,7 @@ def compared(folder: Path) -> dict[str, Any]:
 
 
 def points(picture: IIPicture) -> tuple[list[float], list[float]]:
-    """Rates in bits per pixel and Q_global in dB."""
+    """Return rates in bits per pixel and Q_global in dB."""
     found = [rd_point(picture, SCHEME, qp=qp) for qp in QUANTISERS]
     return [point.bpp for point in found], [point.q_global for point in found]
 

@@ -46,7 +46,7 @@ CUTS = (0.25, 0.5)
 
 
 def main() -> None:
-    """Measure, keep, and fill the page once all scenes are there."""
+    """Measure, record, and fill the page if all scenes have records."""
     parser = command_line(__doc__, scale=SCALE, scenes=SCENES)
     parser.add_argument("--rounds", type=int, default=ROUNDS)
     asked = parser.parse_args()
@@ -134,7 +134,7 @@ loaded = lru_cache(maxsize=len(CUTS) + 1)(cut_scene)
 
 def unshadowed(scene: Scene) -> Scene:
     """Return the scene without shadows: no shadow ray is traced."""
-    free = replace(scene)  # with a tree of its own
+    free = replace(scene)  # a copy with a tree of its own
     none = np.empty(0, np.float32)
 
     def clear(o: NDArray[Any]) -> tuple[Hits, float]:
@@ -142,7 +142,8 @@ def unshadowed(scene: Scene) -> Scene:
 
     vars(packed(free).intersector)["blocked"] = lambda o, d, reach: (np.full(len(o), -1, np.int32), 0.0)
     if packed(scene).lets_through:
-        found = packed(free).intersector.nearest_clear  # camera rays still need the body in which they start
+        # camera rays still need the body in which they start
+        found = packed(free).intersector.nearest_clear
         vars(packed(free).intersector)["nearest_clear"] = lambda o, d, reach=None: (
             found(o, d) if reach is None else clear(o)
         )
@@ -378,7 +379,7 @@ def draw(scenes: dict[str, Any]) -> Any:
     for axes, (name, one) in zip(figure.subplots(4, 2).flat, scenes.items(), strict=True):
         rows = sorted(one["left_out"], key=lambda row: _place(row["what"]), reverse=True)
         limit = one["limit"]["psnr"]
-        top = limit + 25  # identical pictures have infinite PSNR: they stand at the edge
+        top = limit + 25  # identical pictures have infinite PSNR: draw them at the edge
         x = [top if row["psnr"] is None else min(row["psnr"], top) for row in rows]
         good = [row["psnr"] is None or alike(row, one["limit"]) for row in rows]
         for y, (at, fine, row) in enumerate(zip(x, good, rows, strict=True)):

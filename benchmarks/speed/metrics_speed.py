@@ -37,12 +37,12 @@ RECORDS = Records("metrics_speed", ("benchmarks.speed.metrics_speed",))
 CHART, FRONT = ROOT / "docs/images/depth_cost.png", ROOT / "docs/images/depth_pareto.png"
 NEAR = 0.05  # share of correct depths that the recommended setting may lose against the best
 REPEATS = 7
-SCENES, SCALE, BPP = ("apples", "twins"), 4, 0.35  # of the accuracy chart
+SCENES, SCALE, BPP = ("apples", "twins"), 4, 0.35  # conditions of the accuracy chart
 FARTHEST = 250  # largest d of layers z = d·f
 
 
 def main() -> None:
-    """Measure all, print, keep and draw."""
+    """Measure all, print, record and draw."""
     asked = command_line(__doc__, scenes=SCENES).parse_args()
     for key in RECORDS.todo(({"what": what} for what in TARGETS), asked.again):
         RECORDS.measure(key, lambda what=key["what"]: {"value": value_of(what)})
@@ -113,7 +113,7 @@ def tables() -> Tables:
 
 
 def full_size() -> tuple[IIPicture, IIPicture]:
-    """Two pictures of noise that differ by noise."""
+    """Return two pictures of noise that differ by noise."""
     camera = preset("setup1")
     rng = np.random.default_rng(0)
     blocks = [rng.integers(0, 250, (256, 512, 3), dtype=np.uint8) for _ in range(2)]

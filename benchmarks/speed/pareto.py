@@ -48,7 +48,7 @@ BASE = 4  # samples at which depth and cut are compared
 
 
 def main() -> None:
-    """Measure, print, keep, draw and fill the page."""
+    """Measure, print, record, draw and fill the page."""
     asked = command_line(__doc__, scale=SCALE, scenes=SCENES).parse_args()
     camera = preset("setup1", scale=asked.scale)
     keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
@@ -82,7 +82,7 @@ def tables() -> Tables:
 
 
 def study(name: str, camera: IICamera) -> dict[str, Any]:
-    """All settings of one scene."""
+    """Return the results of all settings of one scene."""
     scenes = {cut: cut_scene(name, cut) for cut in CUTS} if sizes(scene_text(name)) else {1.0: load_scene(name)}
     finest, scene = scenes[max(scenes)], scenes[1.0]
     truth = shoot(at_depth(finest, TRUE["depth"]), camera, TRUE["samples"])[0]

@@ -1,7 +1,7 @@
 """Speed ratios within one run: our functions against the library's bare call or a copy. ``make bench``.
 
-Everything is interleaved and the median taken, because machines drift. Numbers go to
-``benchmarks/results/speed.jsonl`` with the commit they were taken on.
+Measurements are interleaved and medians taken, because the speed of machines drifts. Numbers go to
+``benchmarks/results/speed.jsonl`` with their commit.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ LEAST_GAIN = {"apples": "≥ 2.8", "cuboid": "≥ 2.8"}
 
 
 def main() -> None:
-    """Measure what is asked for, print and keep."""
+    """Measure the chosen ratios, print and record."""
     parser = command_line(__doc__)
     parser.add_argument("--only", default="*", help="ratios by name, * for anything: 'render*,peak*'")
     asked = parser.parse_args()
@@ -91,12 +91,12 @@ def targets() -> dict[str, tuple[str, Callable[[], list[float]]]]:
 
 @lru_cache
 def rendered(name: str) -> dict[str, list[float]]:
-    """CPU nanoseconds a pixel of bands of full setup1 at one sample, one thread: see `before.nanoseconds`."""
+    """Return CPU nanoseconds per pixel of bands of full setup1, one sample, one thread: see `before.nanoseconds`."""
     return nanoseconds(name, REPEATS)
 
 
 def gain(name: str) -> list[float]:
-    """Return how many times as fast a render is as that of the commit `before.COMMIT`, in CPU time."""
+    """Return the speed of a render over that of the commit `before.COMMIT`, in CPU time."""
     found = rendered(name)
     return [before / now for before, now in zip(found["before"], found["now"], strict=True)]
 
@@ -113,7 +113,7 @@ def gains(of: Callable[[str], list[float]]) -> list[float]:
 
 
 def workers_ratio(name: str) -> list[float]:
-    """Wall-clock speed of two workers against one, 8 Mpixel."""
+    """Return the wall-clock speed of two workers over that of one, 8 Mpixel."""
     scene, camera = load_scene(name), preset("setup1", scale=2)
     render(scene, preset("setup1", scale=32))
     one, two = (lambda n=n: render(scene, camera, workers=n) for n in (1, 2))
@@ -121,7 +121,7 @@ def workers_ratio(name: str) -> list[float]:
 
 
 def rearrange_ratio(kind: str) -> list[float]:
-    """Time of a rearrangement at full setup1 against copying the same array."""
+    """Return the time of a rearrangement at full setup1 over that of copying the same array."""
     camera = preset("setup1")
     pixels = np.random.default_rng(0).integers(0, 256, (camera.pixels[1], camera.pixels[0], 3), np.uint8)
     picture = IIPicture(pixels, camera.lenses, camera.ei_pixels)
@@ -130,7 +130,7 @@ def rearrange_ratio(kind: str) -> list[float]:
 
 
 def encode_ratio(scheme: str) -> list[float]:
-    """CPU time of `encode` from picture to bytes against the encoder alone on frames that lie ready."""
+    """Return the CPU time of `encode` from picture to bytes over that of the encoder alone on prepared frames."""
     scene = load_scene("apples")
     picture = render(scene, preset("setup1", scale=4), noise=1.0, support=()).picture
     bare = bare_encoder(picture, scheme, qp=30)
@@ -139,7 +139,7 @@ def encode_ratio(scheme: str) -> list[float]:
 
 
 def first_picture(*, cached: bool) -> list[float]:
-    """CPU seconds of a process from its start to a small picture, with kernels compiled before or not."""
+    """Return CPU seconds of a process from its start to a small picture, with kernels compiled before or not."""
     script = (
         "import time; from ii_core import preset; from raytrace_ii import load_scene, render;"
         "render(load_scene('apples'), preset('setup1', scale=32)); print(time.process_time())"
@@ -158,9 +158,9 @@ def first_picture(*, cached: bool) -> list[float]:
 
 
 def peak_memory() -> list[float]:
-    """GiB resident at most in a process that renders Apples at full setup1 and keeps picture and depth.
+    """Return the peak of resident memory in GiB of a process that renders Apples at full setup1 with depth.
 
-    Linux's own mark: `getrusage` would begin with what this process holds, from which the other is started.
+    It is Linux's VmHWM: `getrusage` would include the memory of this process, which starts the other.
     """
     script = (
         "from ii_core import preset; from raytrace_ii import load_scene, render;"
@@ -173,7 +173,7 @@ def peak_memory() -> list[float]:
 
 
 def cpu_flags() -> list[str]:
-    """Return the instruction sets for vectors that this CPU has, of those that Embree and numba use."""
+    """Return the vector instruction sets of this CPU that Embree and numba use."""
     known = ("sse4_2", "avx", "avx2", "fma", "avx512f", "avx512dq", "avx512bw", "avx512vl")
     try:
         text = Path("/proc/cpuinfo").read_text()

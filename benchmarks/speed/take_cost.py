@@ -2,9 +2,10 @@
 
     python -m benchmarks run take_cost [--scale 16] [--takes car,apples]
 
-In *car* bodies move in every frame, in *apples* the camera alone. A still is rendered of a copy of its scene, so that
-its trees are built, and only `render` is counted. Of the take everything is counted: models, files, hashes, manifest.
-Both alternate in parts, and the ratio is the median over the parts. Memory is the peak of processes of their own.
+In *car* bodies move in every frame, in *apples* the camera alone. A still is rendered from a copy of its scene, so
+that its trees are built, and its time is that of `render` alone. The time of the take includes models, files, hashes
+and manifest. Both alternate in parts, and the ratio is the median over the parts. Memory is the peak of separate
+processes.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from raytrace_ii import Take, load_take, render, render_take
 
 RECORDS = Records("take_cost", ("benchmarks.speed.take_cost",))
 SCALE, TAKES = 16, ("car", "apples")
-FRAMES, PART = 48, 8  # of a take; of a part, after which take and stills alternate
+FRAMES, PART = 48, 8  # frames of a take, and of a part; take and stills alternate after each part
 PEAK = """
 import resource, sys
 from ii_core import preset
@@ -47,9 +48,9 @@ def main() -> None:
 
 
 def measured(take: str, scale: int) -> dict[str, Any]:
-    """CPU seconds of parts of the take and of their stills; peak memory in MB of one frame and of all."""
+    """Return CPU seconds of parts of the take and of their stills; peak memory in MB of one frame and of all."""
     camera = preset("setup1", scale=scale)
-    render(load_take(take).scene_at(0.0), camera)  # kernels are compiled
+    render(load_take(take).scene_at(0.0), camera)  # compile kernels
     moving, alone = load_take(take), load_take(take)
     of_take, of_stills = [], []
     with tempfile.TemporaryDirectory() as folder:
@@ -74,7 +75,7 @@ def measured(take: str, scale: int) -> dict[str, Any]:
 
 
 def still(take: Take, seconds: float, camera: Any) -> float:
-    """CPU seconds of rendering one instant of a scene that nothing has rendered yet."""
+    """Return CPU seconds of rendering one instant of a scene that has not been rendered yet."""
     scene, pose = copy(take.scene_at(seconds)), take.pose_at(seconds)
     started = cpu_seconds()
     render(scene, camera, pose=pose)
@@ -82,7 +83,7 @@ def still(take: Take, seconds: float, camera: Any) -> float:
 
 
 def peak(take: str, scale: int, frames: int) -> float:
-    """Peak memory in MB of a process that renders so many frames."""
+    """Return the peak memory in MB of a process that renders so many frames."""
     with tempfile.TemporaryDirectory() as folder:
         code = PEAK.format(take=take, scale=scale, frames=frames, folder=str(Path(folder) / "take"))
         done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
@@ -95,7 +96,7 @@ def tables() -> Tables:
 
 
 def table() -> list[str]:
-    """A row a take: CPU time against its stills, and memory."""
+    """Return a table with a row per take: CPU time against its stills, and memory."""
     rows = RECORDS.rows()
     if not rows:
         return ["Not measured yet."]

@@ -2,7 +2,7 @@
 
     python -m benchmarks run texture_filter [--scale 32] [--scenes cuboid,twins]
 
-The reference has 256 samples a pixel and textures at points. PSNR is in 16-bit sRGB. Time is the median CPU time of
+The reference has 256 samples per pixel, point-sampled. PSNR is in 16-bit sRGB. Time is the median CPU time of
 `render` without support images, over rounds that interleave both settings, on one thread. Rows go to
 ``benchmarks/results/texture_filter.jsonl``, table and chart to ``docs/speed_accuracy.md``.
 """
@@ -30,7 +30,7 @@ SETTINGS = {"points": False, "filtered": True}
 
 
 def main() -> None:
-    """Measure, draw the chart and fill the page once all scenes are there."""
+    """Measure; draw the chart and fill the page if all scenes have records."""
     asked = command_line(__doc__, scale=SCALE, scenes=SCENES).parse_args()
     keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
@@ -53,7 +53,7 @@ def study(name: str, scale: int) -> dict[str, Any]:
     rows = []
     for samples in SAMPLES:
         psnr, seconds = dict[str, float](), {label: list[float]() for label in SETTINGS}
-        for _ in range(ROUNDS):  # interleaved: other jobs on the machine disturb both settings alike
+        for _ in range(ROUNDS):  # interleaved, so that other jobs on the machine affect both settings alike
             for label, on in SETTINGS.items():
                 shot = render(
                     scene, camera, samples=samples, texture_filter=on, dtype="uint16", support=(), workers=1

@@ -2,8 +2,8 @@
 
     python -m benchmarks run viewer
 
-A browser and playwright are needed. Frame rates are those of the browser's software renderer: they say what a
-machine without any graphics card does.
+A browser and playwright are needed. Frame rates are those of the browser's software renderer, without a graphics
+card.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader
 
 @contextmanager
 def tab(size: dict[str, int]) -> Iterator[Any]:
-    """An empty page of a browser without a screen."""
+    """Yield an empty page of a browser without a screen."""
     from playwright.sync_api import sync_playwright
 
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
@@ -45,7 +45,7 @@ def tab(size: dict[str, int]) -> Iterator[Any]:
 
 
 def main() -> None:
-    """Time and frame rates of Apples at full setup1."""
+    """Measure load time and frame rates of Apples at full setup1."""
     picture = render(load_scene("apples"), preset("setup1"), noise=1.0, support=()).picture
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as folder, tab({"width": 1400, "height": 800}) as page:
@@ -88,7 +88,7 @@ WebGL2RenderingContext.prototype.texImage2D = function (...values) {
 RENDERER = """() => {
   const gl = ii.viewer.field.gl, info = gl.getExtension("WEBGL_debug_renderer_info");
   return info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : gl.getParameter(gl.RENDERER); }"""
-# Each frame is waited for: a pixel is read back, which nothing can put off.
+# Reading a pixel back waits until each frame is finished.
 TURN = """state => {
   const v = ii.viewer, rates = [];
   v.set(state);
@@ -104,7 +104,7 @@ TURN = """state => {
 
 
 def report(page: Path) -> None:
-    """Put the numbers into the documentation."""
+    """Write the numbers into the documentation."""
     data = json.loads((RESULTS / "viewer.json").read_text(encoding="utf-8"))
     lines = ["| *Apples*, full `setup1` | |", "|---|---|"]
     lines += [f"| {row['what']} | {row['value']:.3g} {row['unit']} |" for row in data["rows"]]

@@ -1,6 +1,6 @@
 """Limits of the methods, measured: ``python -m benchmarks run stability [-- case ...]``.
 
-Every case sweeps one thing until it breaks; cases can be run one by one. Numbers go to
+Every case sweeps one parameter up to failure; cases can be run one by one. Numbers go to
 ``benchmarks/results/stability.jsonl``, pictures to ``docs/images``, tables to ``docs/stability.md``,
 with those of ``benchmarks.accuracy.convergence``.
 """
@@ -35,7 +35,7 @@ CASES: dict[str, Callable[[], list[Row]]] = {
         curves.bd_points,
     )
 }  # fmt: skip
-# Tables with a column for every value of something: row heads, that column, and what a cell holds.
+# Tables with a column for every value of a field: row heads, that field, and content of a cell.
 PIVOTS = {
     "rate_ends": (("asked, bit/pixel",), "scheme", ("got, bit/pixel", "PSNR, dB", "said reached")),
     "tiny_frames": (("lenses", "pixels a lens"), "scheme", ("got, bit/pixel", "PSNR, dB")),
@@ -46,7 +46,7 @@ PIVOTS = {
 
 
 def main() -> None:
-    """Run every case or those asked for, keep, draw, fill the page."""
+    """Run all or the chosen cases, record, draw, fill the page."""
     parser = command_line(__doc__)
     parser.add_argument("cases", nargs="*", metavar="case", help=f"all, or some of: {', '.join(CASES)}")
     arguments = parser.parse_args()
@@ -60,7 +60,7 @@ def main() -> None:
     write_picture(IMAGES / "stability_pictures_2.png", pictures.coding_and_depth())
     cases = {name: row["rows"] for name, row in measured().items()}
     if missing := set(CASES) - set(cases):
-        print(f"the page waits for {', '.join(sorted(missing))}")
+        print(f"the page lacks results of {', '.join(sorted(missing))}")
         return
     chart(cases, IMAGES / "stability.png")
     publish(tables())
@@ -81,7 +81,7 @@ def tables() -> Tables:
 
 
 def orders() -> list[str]:
-    """Fitted orders beside those expected, and the lens images."""
+    """Return fitted and expected orders of convergence, and the lens images."""
     found = convergence.measured()
     first, last = found["rows"][0], found["rows"][-1]
     heads = ["error", f"{first['segments']} segments", f"{last['segments']} segments", "order", "expected"]
@@ -105,7 +105,7 @@ def orders() -> list[str]:
 
 
 def table(rows: list[Row], pivot: Any = None) -> list[str]:
-    """Rows as Markdown: all of them, or one cell for every value of a column."""
+    """Return rows as Markdown: all of them, or one cell for every value of a column."""
     if pivot is None:
         heads = list(rows[0])
         body = [[number(row.get(head)) for head in heads] for row in rows]
@@ -126,7 +126,7 @@ def table(rows: list[Row], pivot: Any = None) -> list[str]:
 
 
 def number(value: Any) -> str:
-    """A value as the tables show it."""
+    """Return a value as text of a cell."""
     if value is None:
         return "–"
     if isinstance(value, bool):
@@ -136,7 +136,7 @@ def number(value: Any) -> str:
     return str(value)
 
 
-# What the chart shows: case, across, up, logarithmic, title.
+# Panels of the chart: case, abscissa, ordinate, logarithmic axis, title.
 PANELS: list[tuple[str, str, list[str], str, str]] = [
     ("lift", "lift", ["0 radii off", "10 radii off", "1000 radii off"], "x", "lit points that a ball shades itself"),
     ("scales", "radii off", ["form off, radii"], "xy", "form error of a ball far off"),
@@ -176,7 +176,7 @@ PANELS: list[tuple[str, str, list[str], str, str]] = [
 
 
 def chart(cases: Mapping[str, list[Row]], target: Path) -> None:
-    """A panel a sweep."""
+    """Draw one panel per sweep."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -187,7 +187,7 @@ def chart(cases: Mapping[str, list[Row]], target: Path) -> None:
         smallest = min(row[across] for row in rows if row[across] > 0)
         for i, name in enumerate(names):
             chosen = [row for row in rows if row.get(name) is not None]
-            # a logarithmic axis has no 0: it stands a third of a decade before the rest
+            # a logarithmic axis has no 0: draw it a third of a decade before the rest
             x = [row[across] if row[across] > 0 or "x" not in logarithmic else smallest / 3 for row in chosen]
             axes.plot(x, [row[name] for row in chosen], "os^D"[i] + "-", color=COLOURS[i], markersize=5, label=name)
         if "x" in logarithmic:

@@ -1,8 +1,8 @@
 """Limits of Bjøntegaard differences: little overlap, non-monotonic curves, few points.
 
-The truth is known, for the curves are cut out of measured ones, joined by monotone cubics (Fritsch and Carlson 1980)
-and taken as exact: those in ``rd_curves.json`` beside this file, by ``benchmarks.coding.coders`` on two scenes. They
-are kept apart from its latest run: the limits found here are of the method, and must not move with the coders.
+The truth is known: the curves are parts of measured ones, interpolated by monotone cubics (Fritsch and Carlson 1980)
+and taken as exact. The measured curves are in ``rd_curves.json`` beside this file, from ``benchmarks.coding.coders``
+on two scenes. The file does not follow later runs: the limits are those of the method, and independent of the coders.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ class Pair:
     high: float
 
     def truth(self, low: float, high: float) -> float:
-        """Percent of rate that b needs more than a, over a range of quality."""
+        """Return the excess rate of b over a in percent, over a range of quality."""
         quality = np.linspace(low, high, 2001)
         return float(100 * (10 ** np.mean(self.b(quality) - self.a(quality)) - 1))
 
     def points(self, curve: str, low: float, high: float, n: int = 5) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Rates and qualities of n points along a piece of one curve, their rates in equal ratios."""
+        """Return rates and qualities of n points along a part of one curve, with rates in equal ratios."""
         joined = getattr(self, curve)
         every = np.linspace(low, high, 2001)
         quality = np.interp(np.linspace(joined(low), joined(high), n), joined(every), every)
@@ -56,7 +56,7 @@ class Pair:
 
 @cache
 def pairs() -> tuple[Pair, ...]:
-    """Every scheme against the anchor on every scene, where both reach a range of 3 dB."""
+    """Return every scheme with the anchor on every scene, if both reach a common range of 3 dB."""
     rows = json.loads(CURVES.read_text(encoding="utf-8"))["rows"]
     curves = {(row["scene"], row["scheme"]): climbing(row["points"]) for row in rows}
     found = []
@@ -75,18 +75,18 @@ def _joined(points: list[dict[str, float]]) -> PchipInterpolator:
 
 
 def figure(a: tuple[Any, Any], b: tuple[Any, Any], method: str = METHOD) -> float:
-    """The package's own figure, however little the curves share."""
+    """Return the Bjøntegaard rate of the package, for any overlap of the curves."""
     return float(bjontegaard.bd_rate(*a, *b, method=method, require_matching_points=False, min_overlap=0))
 
 
 def bd_overlap() -> list[Row]:
-    """a cut to its lower end, b to its upper one, five points each: the figure as what they share shrinks."""
+    """Return errors over shrinking overlap: five points each on the lower end of a and on the upper end of b."""
     rows = []
     for shared in SHARED:
         off: dict[str, list[float]] = {"whole": [], "piece": [], "cubic": []}
         given = 0
         for pair in pairs():
-            width = (pair.high - pair.low) / (2 - shared)  # so that a share of it is what both cover
+            width = (pair.high - pair.low) / (2 - shared)  # such that both cover the given share of it
             a = pair.points("a", pair.low, pair.low + width)
             b = pair.points("b", pair.high - width, pair.high)
             found, piece = figure(a, b), pair.truth(pair.high - width, pair.low + width)
@@ -106,7 +106,7 @@ def bd_overlap() -> list[Row]:
 
 
 def bd_dents() -> list[Row]:
-    """The third of seven points of the tested curve measured too low: it nears its neighbour, and falls below it."""
+    """Return errors if the third of seven points of the tested curve is too low, up to below its neighbour."""
     rows = []
     for dent in DENTS_DB:
         off_rate, off_psnr, given = [], [], 0
@@ -129,7 +129,7 @@ def bd_dents() -> list[Row]:
 
 
 def bd_points() -> list[Row]:
-    """Fewer and more points along the whole of both curves."""
+    """Return errors over the number of points on the whole of both curves."""
     rows = []
     for n in POINTS:
         row: Row = {"points a curve": n}

@@ -17,22 +17,22 @@ from raytrace_ii import Body, Light, Material, Scene, render
 from raytrace_ii.scene.textures import Image, linear
 
 CAMERA = preset("setup1", scale=8)
-LAYER, BEHIND = 20, 60  # of the wall, and of what is seen in or through it; of 250
+LAYER, BEHIND = 20, 60  # of 250 layers: that of the wall, and that of the scene seen in or through it
 SHARES = (0.0, 0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0)
 KINDS = ("textured", "flat", "edge", "mirror", "clear")
 
 
 def wall(layer: float, steps: float, seed: int = 0, facing: float = 1.0, **material: Any) -> Body:
-    """A wall on one layer, before the camera or, ``facing`` −1, behind it, of random grey blots.
+    """Return a wall of random grey patches on one layer, before the camera or, for ``facing`` −1, behind it.
 
-    ``steps`` of 8-bit sRGB stand between the darkest and the brightest of them, about the middle grey.
+    The darkest and the brightest patch differ by ``steps`` of 8-bit sRGB around middle grey.
     """
     z = layer * CAMERA.gap_mm
-    half = 2 * z  # more than is seen
+    half = 2 * z  # larger than the field of view
     corners = np.array(
         [[-half, -half, facing * z], [half, -half, facing * z], [half, half, facing * z], [-half, half, facing * z]]
     )
-    cells = round(2 * half / (2 * z * CAMERA.pixel_pitch_mm / CAMERA.gap_mm))  # two of a lens's pixels each
+    cells = round(2 * half / (2 * z * CAMERA.pixel_pitch_mm / CAMERA.gap_mm))  # two pixels under a lens per patch
     codes = 127.5 + steps * (np.random.default_rng(seed).random((cells, cells, 1)) - 0.5)
     texture = Image(np.repeat(linear(codes / 255), 3, axis=2).astype(np.float32))
     return Body(
@@ -48,7 +48,7 @@ def seen(*bodies: Body, lights: tuple[Light, ...] = (), ambient: float = 1.0) ->
 
 
 def depth_contrast(sizes: tuple[float, ...] = (0, 1, 2, 4, 8, 16, 32, 64, 128)) -> list[Row]:
-    """A wall of ever less contrast under ever more noise: share of pixels within a tenth of its depth."""
+    """Return the share of pixels within a tenth of a wall's depth, over falling contrast and rising noise."""
     rows = []
     for steps in sizes:
         sharp = seen(wall(LAYER, steps))
@@ -64,22 +64,22 @@ def depth_contrast(sizes: tuple[float, ...] = (0, 1, 2, 4, 8, 16, 32, 64, 128)) 
 
 
 def estimated(picture: IIPicture, method: str) -> FocusDepth:
-    """Depth from focus on the dissertation's layers, in which these experiments count."""
+    """Return depth from focus on the dissertation's layers, in which these experiments count."""
     return depth_from_focus(picture, method=method, layers_mm=linear_layers(CAMERA))
 
 
 def near(found: FocusDepth, layer: int) -> float:
-    """Share of pixels within a tenth of a layer's depth."""
+    """Return the share of pixels within a tenth of a layer's depth."""
     z = layer * CAMERA.gap_mm
     with np.errstate(invalid="ignore"):
         return float((np.abs(found.depth_mm - z) < 0.1 * z).mean())
 
 
 def depth_two_layers(shares: tuple[float, ...] = SHARES) -> list[Row]:
-    """A wall that is ever more a mirror, or ever clearer: where what is seen in it takes its depth.
+    """Return the share of pixels at the depth of a wall, and of the scene seen in or through it, over its strength.
 
-    The mirror shows a wall behind the camera, which appears as far behind the mirror as it stands before it; the
-    clear one bends nothing. Both walls have the same contrast.
+    The mirror shows a wall behind the camera at its mirrored distance; the clear wall does not refract. Both walls
+    have the same contrast.
     """
     rows = []
     for share in shares:
@@ -99,12 +99,12 @@ def depth_two_layers(shares: tuple[float, ...] = SHARES) -> list[Row]:
 
 
 def mirrored() -> Body:
-    """The wall behind the camera that a mirror on LAYER shows on the layer BEHIND."""
+    """Return the wall behind the camera that a mirror on LAYER shows on the layer BEHIND."""
     return wall(BEHIND - 2 * LAYER, 128, seed=1, facing=-1.0)
 
 
 def depth_highlight() -> list[Row]:
-    """A wall of little contrast with a highlight that every lens sees elsewhere, ever stronger."""
+    """Return shares for a wall of low contrast under a rising highlight, whose place differs from lens to lens."""
     lamp = Light(kind="point", vector=(6.0, 4.0, -20.0), colour=(1.0, 1.0, 1.0))
     rows = []
     plain = wall(LAYER, 16)
@@ -137,7 +137,7 @@ def depth_noise() -> list[Row]:
 
 
 def depth_kinds() -> list[Row]:
-    """The same by what is seen, over all scenes."""
+    """Return the same by kind of pixel, over all scenes."""
     rows = [row for row in _kept() if row["scale"] == 8]
     out = []
     for kind in KINDS:
@@ -163,6 +163,6 @@ def _only(rows: list[dict[str, Any]], scene: str, noise: float, method: str) -> 
 
 
 def shown(found: FocusDepth) -> NDArray[np.uint8]:
-    """A depth map as grey levels, near bright, none black."""
+    """Return a depth map as grey levels: near is bright, pixels without depth are black."""
     z = found.layer + 1.0
     return np.where(found.layer < 0, 0, np.clip(300 - 55 * np.log(np.maximum(z, 1)), 20, 255)).astype(np.uint8)

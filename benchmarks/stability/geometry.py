@@ -43,7 +43,7 @@ def body(
 
 
 def around(centre: NDArray[np.float64], radius: float, n: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Rays from three radii off to points within nine tenths of the radius."""
+    """Return rays from a distance of three radii to points within nine tenths of the radius."""
     generator = np.random.default_rng(0)
     start, aim = (generator.normal(size=(n, 3)) for _ in range(2))
     start, aim = (3 * start / _length(start), 0.9 * aim / _length(aim))
@@ -56,7 +56,7 @@ def _length(vectors: NDArray[Any]) -> NDArray[Any]:
 
 @contextmanager
 def lifted(share: float) -> Iterator[None]:
-    """Scenes that are packed meanwhile start their spawned rays another share of the coordinates off the face."""
+    """Pack scenes with another lift of spawned rays, as a share of the coordinates."""
     lifts.LIFT = share
     try:
         yield
@@ -65,9 +65,9 @@ def lifted(share: float) -> Iterator[None]:
 
 
 def own_shadow(scale: float, offset: float, n: int = 4000) -> tuple[float, float, float]:
-    """Of a ball ``offset`` radii off: shares of lit points that are dark, of dark ones lit, and the form's error.
+    """Return shares of wrongly dark and wrongly lit points, and the form error, of a ball ``offset`` radii away.
 
-    The last is the root mean square distance of hits from the true ball, in radii; 5e-4 of it are the triangles'.
+    The form error is the rms distance of hits from the true ball, in radii; the triangles contribute 5e-4.
     """
     at = scale * offset * np.array([1, 1 / 3, -1 / 2])
     scene = Scene(bodies=[body(_scaled(ball(), scale), at=at)], lights=[SUN])
@@ -90,7 +90,7 @@ def _scaled(mesh: Mesh, scale: float) -> Mesh:
 
 
 def lift() -> list[Row]:
-    """Lit points that a ball shades itself, by how far off the face the ray to the light starts."""
+    """Return the share of lit points that a ball shades itself, over the lift of the ray to the light."""
     rows = []
     for share in (0.0, 1e-8, 3e-8, 1e-7, 1e-6, LIFT):
         with lifted(share):
@@ -102,7 +102,7 @@ def lift() -> list[Row]:
 
 
 def scales() -> list[Row]:
-    """The same at our lift over eleven decades of size, and how far the form is off, by distance from the origin."""
+    """Return the same at our lift over eleven decades of size, and the form error, by distance from the origin."""
     sizes = 10.0 ** np.arange(-4, 6)
     rows = []
     for offset in (0, 10, 100, 1e3, 1e4, 1e5, 1e6):
@@ -115,7 +115,7 @@ def scales() -> list[Row]:
 
 
 def coplanar() -> list[Row]:
-    """Two walls a gap apart, 20 mm away and leaning; the far one comes first in the scene. Rays that see it."""
+    """Return the share of rays that wrongly hit the far one of two tilted walls, the first in the scene, over the gap."""
     generator = np.random.default_rng(0)
     d = np.column_stack([*generator.uniform(-0.5, 0.5, (2, 20_000)), np.ones(20_000)])
     corners = np.array([[-20, -20, 0], [20, -20, 0], [20, 20, 0], [-20, 20, 0.0]]) @ rotation((17, 29, 5)).T
@@ -133,7 +133,7 @@ def coplanar() -> list[Row]:
 
 
 def contact_shadow() -> list[Row]:
-    """A carpet over a floor: points of the floor under it that are in its shadow, by its height in lifts."""
+    """Return the share of points of a floor in the shadow of a carpet, over the height of the carpet in lifts."""
     floor, half = body(ground(100), name="floor"), 50.0
     lift_mm = LIFT * half
     generator = np.random.default_rng(0)
@@ -141,7 +141,7 @@ def contact_shadow() -> list[Row]:
     for height in (0.25, 0.5, 0.9, 1.1, 2.0, 10.0):
         carpet = body(ground(20), at=(0, height * lift_mm, 0), name="carpet")
         scene = Scene(bodies=[carpet, floor], lights=[Light(kind="directional", vector=(1, -1, 0), colour=(1, 1, 1))])
-        # from below the floor's rim nothing is seen: rays start between floor and carpet, half the height up
+        # rays start between floor and carpet, at half the height: the carpet hides the floor from above
         x, z = generator.uniform(-9, 9, (2, 4000))
         o = np.column_stack([x, np.full(4000, 0.5 * height * lift_mm), z])
         seen = trace(scene, o, np.tile([0.0, -1.0, 0.0], (4000, 1)))
@@ -155,7 +155,7 @@ def _dark(seen: Any, on: NDArray[np.bool_]) -> float:
 
 
 def bad_faces() -> list[Row]:
-    """Balls of which a share of the faces is turned over, doubled or missing: PSNR against the sound ball, dB."""
+    """Return PSNR against the intact ball in dB, of balls with a share of reversed, double or missing faces."""
     camera = preset("setup1", scale=32)
     L, D = camera.rays()
     world = still_life()
@@ -172,7 +172,7 @@ def bad_faces() -> list[Row]:
                 scene = _only(world, name, world.scene(96), partial(change, share=share, generator=generator))
                 seen = trace(scene, L, D).radiance
                 error = float(np.mean((seen.astype(float) - sound) ** 2))
-                # float32's own rounding of the same light is at 150 dB and more
+                # rounding of the same light to float32 gives 150 dB and more
                 row[f"{name}, {kind}"] = float(-10 * np.log10(error)) if error > 1e-15 else None
         rows.append(row)
     return rows
@@ -197,7 +197,7 @@ def _missing(faces: NDArray[Any], share: float, generator: np.random.Generator) 
 
 
 def huge_beside_tiny(balls: int = 500, segments: int = 46) -> list[Row]:
-    """A million triangles in grains of 0.02 mm over floors of growing size: speed, and the grains' shadows."""
+    """Return speed, and shadows of a million triangles in grains of 0.02 mm, over floors of growing size."""
     generator = np.random.default_rng(0)
     grain = ball(0.01, segments)
     places = np.column_stack([generator.uniform(-1, 1, balls), np.full(balls, 0.02), generator.uniform(-1, 1, balls)])

@@ -1,4 +1,4 @@
-"""Installations of the package: size by extras and Python version, and whether each renders, codes and measures.
+"""Installations of the package: size by extras and Python version, and a trial of rendering, coding and measuring.
 
     python -m benchmarks run install [--pythons python3.11,python3.12] [--extras none,all]
 
@@ -26,8 +26,8 @@ from benchmarks.records import ROOT, Records, origin
 RECORDS = Records("install", ("benchmarks.stability.install",))
 NONE = "none"
 INSTALLERS = {"pip", "setuptools", "wheel"}
-LARGEST = 5  # distributions named in the table
-# Run by the installation, outside the checkout.
+LARGEST = 5  # number of distributions named in the table
+# Program that the installation runs outside the checkout.
 TRIAL = """
 import json, platform
 from codec import decode, encode, schemes
@@ -68,7 +68,7 @@ def main() -> None:
 
 
 def measured(python: str, extras: str) -> dict[str, Any]:
-    """Size in bytes of the installation and of its largest distributions; what its trial printed."""
+    """Return the size in bytes of the installation and of its largest distributions, and the results of its trial."""
     with tempfile.TemporaryDirectory() as folder:
         environment = Path(folder) / "venv"
         output(python, "-m", "venv", str(environment))
@@ -89,13 +89,13 @@ def measured(python: str, extras: str) -> dict[str, Any]:
 
 
 def size(distribution: Distribution) -> int:
-    """Bytes of the installed files of a distribution, without compiled Python files."""
+    """Return the bytes of the installed files of a distribution, without compiled Python files."""
     files = [Path(str(distribution.locate_file(file))) for file in distribution.files or ()]
     return sum(file.stat().st_size for file in files if file.is_file() and file.suffix != ".pyc")
 
 
 def output(*command: str, folder: str | Path = ROOT) -> str:
-    """Return what a command prints; its errors in ours."""
+    """Return the output of a command; raise with its error output if it fails."""
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"{' '.join(command[:6])}: {done.stderr.strip()[-2000:]}")
@@ -108,7 +108,7 @@ def tables() -> Tables:
 
 
 def table() -> list[str]:
-    """A row an installation: size, largest distributions, schemes that work."""
+    """Return a table with a row per installation: size, largest distributions, schemes that work."""
     rows = RECORDS.rows()
     if not rows:
         return ["Not measured yet."]

@@ -14,17 +14,19 @@ from raytrace_ii.shapes.primitives import Box, Mesh
 from raytrace_ii.tracing.lift import LIFT
 
 ONES = (1.0, 1.0, 1.0)
-TERMINATOR = np.array([1.0, 0.37, -0.43])  # towards a light that no ring of a ball's vertices is aligned with
+TERMINATOR = np.array(
+    [1.0, 0.37, -0.43]
+)  # direction of a light that is not aligned with any ring of a ball's vertices
 
 
 def terminator_scene(segments: int) -> Scene:
-    """A smooth white ball of 1 mm, lit from the right and a little from before."""
+    """Return a smooth white ball of 1 mm, lit from the right and slightly from the front."""
     light = Light(kind="directional", vector=tuple(-TERMINATOR), colour=ONES)
     return Scene(bodies=[body(ball(1, segments), at=(0, 0, 10), smooth=True)], lights=[light])
 
 
 def terminator() -> list[Row]:
-    """Points of a smooth ball that look towards the light and are dark, and how far the light is off at all."""
+    """Return the share of points of a smooth ball that face the light and are dark, and the error of light."""
     towards = TERMINATOR / np.linalg.norm(TERMINATOR)
     x, y = np.random.default_rng(0).uniform(-0.9, 0.9, (2, 60_000))
     o = np.column_stack([x, y, np.zeros_like(x)])
@@ -49,7 +51,7 @@ def terminator() -> list[Row]:
 
 
 def covered() -> list[Row]:
-    """A face of a smooth ball of 12 segments right under a sheet: the share in shadow, by the height of the sheet."""
+    """Return the share in shadow of a face of a smooth ball of 12 segments under a sheet, over the sheet's height."""
     mesh = ball(1.0, 12)
     face = mesh.vertices[mesh.faces[len(mesh.faces) // 2]]
     middle = face.mean(axis=0)
@@ -67,7 +69,7 @@ def covered() -> list[Row]:
 
 
 def grazing() -> list[Row]:
-    """A floor of 100 mm looked at, and lit, ever more flatly: what is seen and how bright against the cosine."""
+    """Return hits and light error on a floor of 100 mm, over ever more grazing angles of view and of light."""
     plane = body(ground(100.0), at=(3, 4, 50))
     generator = np.random.default_rng(0)
     points = np.column_stack([generator.uniform(-49, 49, (2, 4000)).T, np.zeros(4000)])[:, [0, 2, 1]] + [3, 4, 50]
@@ -75,7 +77,7 @@ def grazing() -> list[Row]:
     for angle in 10.0 ** np.arange(-1, -8, -1):
         look = np.array([0.0, -np.sin(angle), -np.cos(angle)])
         towards = np.array([np.cos(angle), np.sin(angle), 0.0])
-        # a light of 1/sin keeps the cosine of the least angles above what a weight must be to be traced
+        # a light of strength 1/sin keeps the weight at the least angles above the limit for tracing
         light = Light(kind="directional", vector=tuple(-towards), colour=(1 / np.sin(angle),) * 3)
         start = points - look * 30
         seen = trace(Scene(bodies=[plane], lights=[light]), start, np.tile(look, (len(start), 1)))
@@ -97,7 +99,7 @@ def _mean(values: NDArray[Any]) -> float | None:
 
 
 def camera_in_glass(segments: int = 384, n: int = 4000) -> list[Row]:
-    """Rays that start within a glass ball, ever nearer to its surface, against the closed form."""
+    """Return errors of rays that start in a glass ball, ever nearer to its surface, against the closed form."""
     world = still_life()
     (row,) = (i for i, solid in enumerate(world.solids) if solid.name == "glass")
     glass = world.solids[row]
@@ -123,7 +125,7 @@ def camera_in_glass(segments: int = 384, n: int = 4000) -> list[Row]:
 
 
 def camera_in_body() -> list[Row]:
-    """A camera within a ball, with a lamp outside and one beside it: what of it is seen and lit."""
+    """Return the share of a ball that a camera in it sees, and that a lamp outside and a lamp inside light."""
     d = np.random.default_rng(0).normal(size=(4000, 3))
     rows = []
     for name, place in (("lamp outside", (9, 9, 0)), ("lamp within", (0, 0, 10))):
@@ -141,7 +143,7 @@ def camera_in_body() -> list[Row]:
 
 
 def lamp_at_surface() -> list[Row]:
-    """A lamp ever nearer to a floor, above and below: points that it lights, against those that it should."""
+    """Return the share of a floor that a lamp lights, and should light, over its height above and below the floor."""
     plane = body(ground(100.0), at=(0, 0, 0))
     lift_mm = LIFT * 50
     x, z = np.random.default_rng(0).uniform(-40, 40, (2, 4000))
@@ -160,7 +162,7 @@ def lamp_at_surface() -> list[Row]:
 
 
 def bounces() -> list[Row]:
-    """A room of mirrors of 0.9 whose matt tenth glows by ambient light: 1 in the end, less 0.9^(depth + 1)."""
+    """Return the light missing in a room of mirrors of 0.9 with ambient light: 0.9^(depth + 1) in theory."""
     box = Box(shape="box", size_mm=(2, 2, 2)).mesh()
     room = body(box, Material(colour=ONES, mirror=(0.9,) * 3))
     d = np.random.default_rng(0).normal(size=(2000, 3))

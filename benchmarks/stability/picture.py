@@ -31,7 +31,7 @@ def quantised_maps() -> list[Row]:
 
 
 def map_bits() -> list[Row]:
-    """Unit directions of so many bits a component, over −1…1: what the picture loses."""
+    """Return the loss of the picture by unit directions of so many bits per component, over −1…1."""
     camera = preset("setup1", scale=16)
     L, D = camera.rays()
     scenes = {name: load_scene(name) for name in ("apples", "cuboid")}
@@ -63,7 +63,7 @@ def _finite(value: float | None) -> float | None:
 
 
 def pitches() -> list[Row]:
-    """Lenses of 16 and a bit pixels: the resampled picture against one rendered through the regular camera itself."""
+    """Return PSNR of resampled pictures of lenses of 16 to 17 pixels, against pictures of the regular camera."""
     scene = still_life().scene(192)
     lenses = (32, 16)
     usual = preset("setup1", scale=16)
@@ -91,7 +91,7 @@ def pitches() -> list[Row]:
 
 
 def view_borders() -> list[Row]:
-    """View images from ever farther aside against the scene seen from there through each lens, ray by ray."""
+    """Return PSNR of view images over the viewing angle, against the scene ray traced from there through each lens."""
     scene = still_life().scene(192)
     camera = preset("setup1", scale=8)
     picture = render(scene, camera, dtype="float32", support=()).picture
@@ -101,7 +101,7 @@ def view_borders() -> list[Row]:
     centres = np.column_stack(
         [cx * camera.pixel_pitch_mm - width / 2, height / 2 - cy * camera.pixel_pitch_mm, 0 * cx + camera.gap_mm]
     )
-    far, half = 40 * width, camera.view_angle_deg / 2  # far enough that every lens sees the viewer at one angle
+    far, half = 40 * width, camera.view_angle_deg / 2  # far enough for one viewing angle over all lenses
     rows = []
     for share in (0.0, 0.5, 0.8, 0.9, 0.95, 1.0, 1.05, 1.2, 1.5):
         eye = np.array([far * np.tan(np.radians(share * half)), 0, camera.gap_mm - far])
@@ -121,7 +121,7 @@ RATES = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 4.0, 12.0, 24.0, 60.0)
 
 
 def rate_ends() -> list[Row]:
-    """Rates from far too low to more than the picture itself holds: what comes out, and what it says of itself."""
+    """Return reached rates and reports of coders for targets from far too low to above the size of the picture."""
     picture = render(load_scene("apples"), preset("setup1", scale=16), noise=1.0, support=()).picture
     return [
         {"scheme": scheme, "asked, bit/pixel": bpp, **_coded(picture, scheme, bpp)}
@@ -131,7 +131,7 @@ def rate_ends() -> list[Row]:
 
 
 def tiny_frames() -> list[Row]:
-    """Pictures of hardly any lenses and pixels, at a third of a bit a pixel."""
+    """Return results of pictures of very few lenses and pixels, at a third of a bit per pixel."""
     generator = np.random.default_rng(0)
     rows = []
     for lenses, ei in (((1, 1), (1, 1)), ((1, 1), (16, 16)), ((2, 2), (2, 2)), ((2, 2), (16, 16)), ((5, 3), (7, 9))):

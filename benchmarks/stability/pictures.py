@@ -29,7 +29,7 @@ CODING_AND_DEPTH = [
 
 
 def rendering() -> NDArray[np.uint8]:
-    """Six of rendering."""
+    """Draw six failures of rendering."""
     corners = np.array([[-1.5, -1.5, 0], [1.5, -1.5, 0], [1.5, 1.5, 0], [-1.5, 1.5, 0.0]]) @ rotation((17, 29, 5)).T
     away = rotation((17, 29, 5)) @ [0, 0, 1]
     red, blue = (replace(geometry.WHITE, colour=colour) for colour in ((0.8, 0.1, 0.1), (0.1, 0.2, 0.8)))
@@ -55,7 +55,7 @@ def rendering() -> NDArray[np.uint8]:
 
 
 def coding_and_depth() -> NDArray[np.uint8]:
-    """Six of pictures that were coded, looked at from aside, stored or asked for their depth; 64 × 32 lenses."""
+    """Draw six failures of views, coding, stored cameras and depth from focus; 64 × 32 lenses."""
     camera = preset("setup1", scale=8)
     apples = render(load_scene("apples"), camera, support=()).picture
     aside = camera.gap_mm - 40 * camera.size_mm[0]
@@ -75,7 +75,7 @@ def coding_and_depth() -> NDArray[np.uint8]:
 
 
 def _seen(scene: Scene, towards: tuple[float, float, float], half: float, size: int = 200) -> NDArray[np.uint8]:
-    """A pinhole's picture from the origin, 8-bit sRGB."""
+    """Return a pinhole's picture from the origin, 8-bit sRGB."""
     across = (np.arange(size) + 0.5) / size * 2 - 1
     x, y = np.meshgrid(across, -across)
     d = np.stack([x * half, y * half, np.ones_like(x)], axis=-1) + np.asarray(towards) / towards[2] - [0, 0, 1]

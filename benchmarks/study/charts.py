@@ -30,7 +30,7 @@ LABELS = {
     "si-av1": "SI, AV1",
     "ei-av1:fast": "EI, AV1",
 }
-THEIRS = (SI, VOLUME, "ri-h264:chroma=420", "ei-h264:chroma=420", REFERENCE)  # as in Figure 5.10
+THEIRS = (SI, VOLUME, "ri-h264:chroma=420", "ei-h264:chroma=420", REFERENCE)  # schemes of Figure 5.10
 AXIS = {
     "q_global": r"$Q_\mathrm{global}$ [dB]",
     "q_view": r"$Q_\mathrm{view}$, mean MSSIM",

@@ -27,7 +27,7 @@ NAMES = {
     "ei-h264:chroma=420": "EI",
     "ri-h264:chroma=420": "RI",
 }
-EVEN_VIEW = 0.02  # of MSSIM: one point in the chart of the dissertation
+EVEN_VIEW = 0.02  # tolerance of MSSIM: one point in the chart of the dissertation
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def at_targets(points: Points, scheme: str, quality: str = "q_global") -> dict[f
 
 
 def gains(results: Results) -> Iterator[Claim]:
-    """Figure 5.10: SI-PVS over the others, 4:2:0 and 4:4:4."""
+    """Compare Figure 5.10: SI-PVS over the others, 4:2:0 and 4:4:4."""
     made = of_scenes(results, "rates")
     for what, numbers, other in (
         ("JPEG 2000", theirs.GAIN_JPEG2000, (REFERENCE, REFERENCE)),
@@ -82,7 +82,7 @@ def gains(results: Results) -> Iterator[Claim]:
 
 
 def models(results: Results) -> Iterator[Claim]:
-    """Figure 5.10: SI-PVS over the volume coded by the verification model, and over ours as that is fed."""
+    """Compare Figure 5.10: SI-PVS over the volume by the verification model, and by ours with each colour alone."""
     made, coded = of_scenes(results, "rates"), of_scenes(results, "volume")
     for how, volume in (("by the verification model", MODEL), ("of ours, each colour alone", APART)):
         for chroma, scheme in (("4:2:0", SI), ("4:4:4", "si-h264")):
@@ -126,7 +126,7 @@ def shown(value: float | None, form: str) -> str:
 
 
 def floors(results: Results) -> Iterator[Claim]:
-    """The lowest rate of EI-PVS, of a black picture."""
+    """Compare the lowest rate of EI-PVS, of a black picture."""
     if "floors" in results:
         ours = {"EI-PVS": results["floors"]["bpp"]["ei-h264:chroma=420"]}
         yield claim("5.10", "lowest rate of a black picture, bpp", theirs.EI_FLOOR, ours, ".2f", only="size")
@@ -178,7 +178,7 @@ def log_rate_at(curve: Sequence[tuple[float, float]], quality: float) -> float |
 
 
 def orders(results: Results) -> Iterator[Claim]:
-    """Figure 5.11: orders of sub-images."""
+    """Compare Figure 5.11: orders of sub-images."""
     for scene, result in of_scenes(results, "orders").items():
         ours = {
             order: gain(result["points"], f"{SI},order={order}", f"{SI},order=parallel") for order in theirs.ORDERS
@@ -224,13 +224,13 @@ def words(duel: Mapping[str, Any]) -> str:
 
 
 def type_table(result: Mapping[str, Any], *more: str) -> list[list[float | None]]:
-    """Our Table 5.5."""
+    """Return our Table 5.5."""
     flat = [gain(result["points"], scheme, types()[0]) for scheme in types(*more)]
     return [flat[i : i + len(BFRAMES)] for i in range(0, len(flat), len(BFRAMES))]
 
 
 def picture_types(results: Results) -> Iterator[Claim]:
-    """Table 5.5, as it is and with B pictures as references."""
+    """Compare Table 5.5, without and with B pictures as references."""
     numbers = {f"{i}{j}": theirs.TYPES[i][j] for i in range(len(GOPS)) for j in range(len(BFRAMES))}
     for step, what, more in (
         ("types-apples", "picture types and GOP, dB", ()),
@@ -245,7 +245,7 @@ def picture_types(results: Results) -> Iterator[Claim]:
 
 
 def ranges(results: Results) -> Iterator[Claim]:
-    """Table 5.6."""
+    """Compare Table 5.6."""
     schemes = [f"{SI},merange={r}" for r in RANGES]
     for scene in ("apples", "twins"):
         if f"ranges-{scene}" not in results:
@@ -269,7 +269,7 @@ def seconds(points: Points, scheme: str, what: str = "encode_seconds") -> float:
 
 
 def controls(results: Results) -> Iterator[Claim]:
-    """Table 5.7."""
+    """Compare Table 5.7."""
     for scene in ("apples", "twins"):
         if f"control-{scene}" not in results:
             continue
@@ -293,7 +293,7 @@ TIMED = {
 
 
 def times(results: Results) -> Iterator[Claim]:
-    """Table 5.8: encoding, against SI-PVS."""
+    """Compare Table 5.8: encoding, against SI-PVS."""
     for scene, result in of_scenes(results, "rates").items():
         own = {name: seconds(result["points"], scheme) for name, scheme in TIMED.items()}
         ours = {name: value / own["SI-PVS"] for name, value in own.items() if name != "SI-PVS"}
@@ -312,7 +312,7 @@ def times(results: Results) -> Iterator[Claim]:
 
 
 def views(results: Results) -> Iterator[Claim]:
-    """Figure 5.19 at 0.15 bpp: places."""
+    """Compare Figure 5.19: ranks at 0.15 bpp."""
     for scene, result in of_scenes(results, "artefacts").items():
         places = theirs.VIEW_PLACES[scene]
         ranks = {name: float(-place) for place, names in enumerate(places) for name in names}
@@ -327,7 +327,7 @@ def views(results: Results) -> Iterator[Claim]:
 
 
 def depths(results: Results) -> Iterator[Claim]:
-    """Figures 5.20 to 5.23; the dissertation has them for *Apples* alone."""
+    """Compare Figures 5.20 to 5.23, which the dissertation has for *Apples* alone."""
     for scene, result in of_scenes(results, "equal").items():
         but = "" if scene == "apples" else " (Apples)"
         rows = {NAMES[row["scheme"]]: row for row in result["rows"]}

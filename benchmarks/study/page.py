@@ -28,7 +28,7 @@ from .theirs import said
 from .volume_model import APART, MODEL
 
 PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
-ENDING = ".jsonl.gz"  # of published records: they are a sixth of the size of the lines
+ENDING = ".jsonl.gz"  # suffix of published records, compressed to a sixth of their size
 CODERS_SCALE = 4
 PHOTOGRAPHS = {"component-images": ".jpg", "other-cameras": ".jpg", "artefacts-": ".webp", "equal-": ".webp"}
 OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
@@ -229,7 +229,7 @@ def types_beside(results: Results) -> list[str]:
 
 
 def volume_table(results: Results) -> list[str]:
-    """Bjøntegaard rate of our volume against the verification model's, which codes each colour alone."""
+    """Return a table of the Bjøntegaard rate of our volume against the verification model, which codes colours alone."""
     coded, made = of_scenes(results, "volume"), of_scenes(results, "rates")
     scenes = [scene for scene in coded if scene in made]
     lines = ["| our volume | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"]

@@ -25,14 +25,14 @@ from .coding import setup3_scale, shot
 from .runner import Step
 from .sheets import GAP, enlarged, sheet
 
-PANEL = (208, 104)  # pixels, of Figure 2.25 and Figure 3.8
+PANEL = (208, 104)  # pixels of a panel of Figure 2.25 and Figure 3.8
 USES = ("benchmarks.study.coding", "benchmarks.study.sheets")
 CLOSE = 8  # lenses across a detail of Figure 3.8
 
 
 def steps(scale: int) -> list[Step]:
     """Return all steps."""
-    coarse = {"scale": max(scale, 4)}  # finer ones are not visible at this size
+    coarse = {"scale": max(scale, 4)}  # finer lenses are not visible at this size
     return [
         Step(name="component-images", shows="Figure 2.25", run=components, parameters=coarse, uses=USES),
         Step(name="other-cameras", shows="Figure 3.8", run=cameras, parameters={"scale": max(scale, 8)}, uses=USES),

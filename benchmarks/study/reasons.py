@@ -71,17 +71,18 @@ def steps(scale: int) -> list[Step]:
 class H264of2008(H264):
     """x264 with features and defaults as of the beginning of 2008."""
 
+    # One reference, no trellis, no 8×8 transform, no adaptive quantiser, no weighted B pictures.
     SET = "ref=1:subme=5:trellis=0:8x8dct=0:mixed-refs=0:aq-mode=0:weightb=0"
 
     def constant(self, quantiser: float, film: Film, options: Options) -> Settings:
-        """One reference, no trellis, no 8×8 transform, no adaptive quantiser, exhaustive search (Table 5.6)."""
+        """Return settings of 2008: `SET`, and exhaustive search (Table 5.6)."""
         settings = super().constant(quantiser, film, options)
         parameters = settings.parameters["x264-params"].replace("me=umh", "me=esa") + f":{self.SET}"
         return replace(settings, parameters={**settings.parameters, "x264-params": parameters})
 
 
 class PlainH264(H264of2008):
-    """The same with macroblocks of the plainest: none predicted from its neighbours' motion, divided or refined."""
+    """The same with the simplest macroblocks: no direct mode or partitions, least sub-pixel refinement, CAVLC."""
 
     SET = H264of2008.SET.replace("subme=5", "subme=1") + ":direct=none:partitions=none:chroma-me=0:cabac=0"
 
@@ -155,7 +156,7 @@ def frames(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
     parts = [part for part in (64, 16, 4, 1) if part <= rows]
     found = []
     for what, run in counted(picture):
-        run(rows // parts[0])  # loads and compiles
+        run(rows // parts[0])  # load libraries and compile kernels
         for part in parts:
             started = time.thread_time()
             runs = run(rows // part)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 GAP = 4
-LETTERS, STRIP = 15, 22  # pixels, of a label and of the strip it stands in
+LETTERS, STRIP = 15, 22  # heights in pixels of a label and of its strip
 
 
 def enlarged(image: NDArray[Any], times: int) -> NDArray[Any]:

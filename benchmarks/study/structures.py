@@ -13,9 +13,9 @@ from raytrace_ii import load_scene, render
 
 from .runner import Step
 
-SCENES = ("apples", "car")  # those of Figure 5.12
+SCENES = ("apples", "car")  # scenes of Figure 5.12
 SMALLER = (1, 2, 4, 8)  # divisors of the lenses of setup 2
-FEWEST = (4, 2)  # lenses
+FEWEST = (4, 2)  # least number of lenses across and down
 
 
 def steps(scale: int) -> list[Step]:
@@ -24,7 +24,7 @@ def steps(scale: int) -> list[Step]:
     for scene in SCENES:
         for smaller in SMALLER:
             if scene != SCENES[0] and smaller > 1:
-                continue  # one scene for the plane
+                continue  # the chart of best kinds needs one scene only
             sides = [side for side in SIDES if fits(side, scale * smaller)]
             if sides:
                 found.append(

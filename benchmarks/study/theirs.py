@@ -1,4 +1,4 @@
-"""Results of Olsson 2008 in numbers, as its text and tables give them, and criteria of agreement."""
+"""Results of Olsson 2008 as numbers from its text and tables, and criteria of agreement."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RATE_JPEG2000 = {"twins": 60.0, "car": 60.0}
 RATE_VOLUME = {"apples": 4.0, "twins": 4.0, "car": 4.0, "cuboid": 4.0}
 # Figure 5.11 and §5.8.2: parallel first, row with very small difference, column last.
 ORDERS = {"parallel": 4.0, "row": 3.0, "zigzag": 2.0, "spiral": 2.0, "column": 1.0}
-# Figure 5.12: who wins, SI (+) or EI (−), by pixels of an elementary image each way.
+# Figure 5.12: the better kind, SI (+) or EI (−), by pixels of an elementary image each way.
 DUELS = {"16": 1.0, "32": 1.0, "64": 1.0, "128": -1.0, "256": -1.0}
 # Table 5.5: dB against IP… with one I picture; rows J, 128, 32, 16, columns IP, IBP, IBBP, IBBBP.
 TYPES = (
@@ -40,7 +40,7 @@ ENCODE = {
     "EI-PVS": (1405.3, 1400.3, 1441.0, 1421.9),
     "RI-PVS": (15.9, 17.8, 18.9, 17.0),
 }
-# Figure 5.19 at 0.15 bpp and §5.8.5.2: places, the best first; what shares a place was as good.
+# Figure 5.19 at 0.15 bpp and §5.8.5.2: ranks, the best first; schemes of one rank were equally good.
 VIEW_PLACES = {
     "apples": (("EI",), ("SI",), ("RI",), ("JPEG 2000", "PVI")),
     "twins": (("EI",), ("SI",), ("RI",), ("JPEG 2000", "PVI")),

@@ -28,11 +28,11 @@ from .rates import VOLUME
 from .runner import Step
 
 ENCODER, DECODER = "opj_jp3d_compress", "opj_jp3d_decompress"
-# Five levels of CDF 5/3 along each axis. The coder of flat blocks of version 2.4 does not decode its own streams.
+# Five levels of CDF 5/3 along each axis. With two-dimensional blocks, version 2.4 cannot decode its own streams.
 SETTINGS = ("-n", "6,6,6", "-C", "3EB")
 HEADER = "Bpp\t8\nColor Map\t2\nDimensions\t{}\t{}\t{}\nResolution(mm)\t1\t1\t1\n"
 MODEL, APART = "verification model", f"{VOLUME}, colours apart"
-SHARE = 1 / 3  # of the bits for each colour
+SHARE = 1 / 3  # share of the bits of each colour
 COARSEST = 8  # smaller sub-images have too few pixels for five levels
 
 

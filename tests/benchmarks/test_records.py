@@ -234,7 +234,7 @@ def test_the_version_of_povray_is_a_version():
         "POV-Ray 3.7.0.10.unofficial\n\nThis is an unofficial version compiled by:\n"
     )
     assert povray.stated(said) == "POV-Ray 3.7.0.10.unofficial"
-    with pytest.raises(ValueError, match="says no version"):
+    with pytest.raises(ValueError, match="prints no version"):
         povray.stated("povray: not found")
     for line in (ROOT / "benchmarks/results/povray.jsonl").read_text().splitlines():
         version = json.loads(line)["result"]["povray"]

@@ -6,7 +6,8 @@
 A case is made from (reader, seed, number) alone: a valid file whose values, lengths, counts, types, lines or bytes
 are changed. Reading it must end in a valid object or in one line of ValueError, OSError, or a TypeError that our own
 code raises, in 10 s of CPU time and 2 GB of memory. Anything else is a finding, kept with its number. Cases run in
-worker processes, so that a crash is seen. A row a reader is appended to ``benchmarks/results/fuzz_readers.jsonl``.
+worker processes, so that crashes are recorded. A row per reader is appended to
+``benchmarks/results/fuzz_readers.jsonl``.
 """
 
 from __future__ import annotations
@@ -39,10 +40,10 @@ RECORDS = Records(
     "fuzz_readers", ("benchmarks.stability.fuzz_readers", "benchmarks.coding.fuzz", "benchmarks.workers")
 )
 GOOD = "object", "refused"
-MOST_SECONDS = 10  # of CPU time a case
-MOST_BYTES = 2 << 30  # of memory a case
+MOST_SECONDS = 10  # CPU seconds per case
+MOST_BYTES = 2 << 30  # bytes of memory per case
 MOST_TEXT = 1000  # characters of a message
-MOST_FINDINGS = 50  # of a reader, after which no new worker is started
+MOST_FINDINGS = 50  # findings of a reader after which no new worker is started
 
 
 def main() -> None:
@@ -126,7 +127,7 @@ def work(name: str, seed: int, first: int, last: int) -> None:
     """Run cases by number, a line of JSON for each; the system kills the process at a limit of CPU time."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with tempfile.TemporaryDirectory() as folder:
-        for number in range(-2, 0):  # what a first case takes is no case's own
+        for number in range(-2, 0):  # unrecorded first cases: imports and compilation count for no case
             outcome(case(name, seed, number, Path(folder)))
         room = _address_space() + MOST_BYTES
         resource.setrlimit(resource.RLIMIT_AS, (room, room))
@@ -146,19 +147,19 @@ def case(name: str, seed: int, number: int, folder: Path) -> Read:
 
 
 class _Printed(logging.Handler):
-    """Keeps what `logging` would print because nobody listens."""
+    """Collect the lines that `logging` would print without a handler."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
         self.lines: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep a line."""
+        """Store a line."""
         self.lines.append(f"{record.name}: {record.getMessage()[:150]}")
 
 
 def outcome(read: Read) -> str:
-    """Return "object", "refused", or what is a finding: an error, or a line of a library's log on the screen."""
+    """Return "object", "refused", or a finding: an error, or a line of a library's log on the screen."""
     before, logging.lastResort = logging.lastResort, (printed := _Printed())
     try:
         end = _end(read)

@@ -1,4 +1,4 @@
-"""Mutation of binary containers and of text: lengths, counts, types and tokens are changed, checksums put right."""
+"""Mutation of binary containers and of text: changed lengths, counts, types and tokens, with corrected checksums."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ TOKENS = (
 
 
 def bytes_changed(data: bytes, rng: Generator) -> bytes:
-    """Return bytes after accidents anywhere, or after numbers of one to eight bytes became extreme ones."""
+    """Return bytes after random damage, or with numbers of one to eight bytes replaced by extreme ones."""
     if rng.random() < 0.5:
         return damaged(data, [data], rng)
     mutant = bytearray(data)
@@ -63,7 +63,7 @@ def number_put(data: bytearray, at: int, rng: Generator) -> None:
 
 
 def text_changed(text: str, rng: Generator, lines: Sequence[str] = ()) -> str:
-    """Return a text after one to four changes of lines and tokens; ``lines`` are others that may be put in."""
+    """Return a text after one to four changes of lines and tokens; ``lines`` are candidates for insertion."""
     rows = text.splitlines()
     for _ in range(int(rng.geometric(0.5))):
         if not rows:
@@ -100,7 +100,7 @@ def text_changed(text: str, rng: Generator, lines: Sequence[str] = ()) -> str:
 
 
 def text_file(text: str, rng: Generator, lines: Sequence[str] = ()) -> bytes:
-    """Return a mutated text as bytes, now and then damaged as such."""
+    """Return a mutated text as bytes, sometimes with damaged bytes."""
     data = text_changed(text, rng, lines).encode("utf-8", "surrogatepass")
     return damaged(data, [data or b"x"], rng) if rng.random() < 0.1 else data
 
@@ -128,7 +128,7 @@ def png_changed(data: bytes, rng: Generator) -> bytes:
             case 3 if kind == b"IDAT":
                 try:
                     rows = zlib.decompress(body)
-                except zlib.error:  # changed before
+                except zlib.error:  # a chunk changed before
                     rows = body
                 chunks[i] = kind, zlib.compress(bytes_changed(rows, rng))
             case 4:
@@ -190,7 +190,7 @@ def headed(data: bytes, end: bytes, rng: Generator, lines: Sequence[str] = ()) -
 
 
 def glb(text: bytes, chunk: bytes, rng: Generator) -> bytes:
-    """Return a GLB of JSON and bytes, whose lengths and kinds of chunks are now and then wrong."""
+    """Return a GLB of JSON and bytes, sometimes with wrong lengths and kinds of chunks."""
     text += b" " * (-len(text) % 4)
     numbers = [2, 20 + len(text) + 8 + len(chunk), len(text), 0x4E4F534A, len(chunk), 0x004E4942]
     if rng.random() < 0.25:

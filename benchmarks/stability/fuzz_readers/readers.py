@@ -1,4 +1,4 @@
-"""Cases of every reader: a case writes its files into a folder and returns the call that reads them."""
+"""Cases of the readers of pictures, scenes and tables: each writes its files into a folder and returns the call."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ from .trees import json_text, mutated, pick, toml_text
 Read = Callable[[], object]
 Case = Callable[[Generator, Path], Read]
 READERS: dict[str, Case] = {}
-CODED = ("jpeg2000", "si-h264", "si-jpeg2000", "jpeg", "si-ffv1")  # quick schemes, of different options
+CODED = ("jpeg2000", "si-h264", "si-jpeg2000", "jpeg", "si-ffv1")  # quick schemes with different options
 
 
 def reader(name: str) -> Callable[[Case], Case]:
-    """Register what makes the cases of a reader."""
+    """Register the function that makes the cases of a reader."""
 
     def keep(case: Case) -> Case:
         READERS[name] = case
@@ -53,7 +53,7 @@ def reader(name: str) -> Callable[[Case], Case]:
 
 
 def _as_file(text: str, rng: Generator) -> bytes:
-    """Return text as bytes, now and then damaged as such."""
+    """Return text as bytes, sometimes with damaged bytes."""
     data = text.encode("utf-8", "surrogatepass")
     return bytes_changed(data, rng) if rng.random() < 0.08 else data
 
@@ -150,7 +150,7 @@ def texture(rng: Generator, folder: Path) -> Read:
 
 @reader("scene")
 def scene(rng: Generator, folder: Path) -> Read:
-    """A scene file beside sound meshes and textures."""
+    """A scene file beside valid meshes and textures."""
     _companions(folder)
     path = folder / "scene.toml"
     path.write_bytes(_as_file(toml_text(mutated(pick(rng, seeds.SCENES), rng, seeds.SCENES)), rng))
@@ -322,7 +322,7 @@ def hci_folder(rng: Generator, folder: Path) -> Read:
 
 @reader("quilt")
 def quilt(rng: Generator, folder: Path) -> Read:
-    """A quilt, whose name says its tiles."""
+    """A quilt, whose name contains its grid of tiles."""
     case = _fresh(folder)
     stem = pick(
         rng,
@@ -382,12 +382,12 @@ def _coded(scheme: str) -> tuple[list[Any], bytes]:
 
 @reader(".ii header")
 def coded_header(rng: Generator, folder: Path) -> Read:
-    """A coded picture whose header, under a checksum that is right, says something else."""
+    """A coded picture with a changed header and a correct checksum."""
     header, payload = _coded(pick(rng, CODED))
     path = folder / "case.ii"
     changed = mutated(header, rng, [_coded(name)[0] for name in CODED])
     try:
         write(path, json.loads(json_text(changed)), payload)
     except (ValueError, OverflowError, RecursionError, TypeError):
-        path.write_bytes(b"")  # what no header can hold is not this reader's
+        path.write_bytes(b"")  # values that no header can store are no case of this reader
     return partial(decode, path)

@@ -54,7 +54,7 @@ INDEX = {"format": "ii-video", "version": 1, "frames": 3, "fps": 24, "poses": [n
 
 @reader("animation")
 def animation(rng: Generator, folder: Path) -> Read:
-    """A scene that moves; scene and pose at instants within and beside the keyframes."""
+    """A scene that moves; scene and pose at instants within and outside the keyframes."""
     _companions(folder)
     tree = {**seeds.SCENES[0], "animation": mutated(ANIMATION, rng, TRACKS)}
     if rng.random() < 0.1:
@@ -115,7 +115,7 @@ def _coded() -> tuple[list[Any], tuple[bytes, ...]]:
 
 @reader("coded take")
 def coded_take(rng: Generator, folder: Path) -> Read:
-    """A coded take whose header, under a checksum that is right, says something else; or of damaged bytes."""
+    """A coded take with a changed header and a correct checksum, or with damaged bytes."""
     values, segments = _coded()
     path = folder / "case.ii"
     write(path, values, segments)
@@ -131,7 +131,7 @@ def coded_take(rng: Generator, folder: Path) -> Read:
             head(changed)
             write(path, changed, parts)
         except (ValueError, OverflowError, RecursionError, TypeError):
-            path.write_bytes(b"")  # what no header can hold is not this reader's
+            path.write_bytes(b"")  # values that no header can store are no case of this reader
     return partial(_last_frame, path, rng.random() < 0.3)
 
 

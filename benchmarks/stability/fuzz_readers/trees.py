@@ -11,11 +11,11 @@ from numpy.random import Generator
 
 
 class Raw(str):
-    """Text that is put into a file as it is."""
+    """Text that is written into a file unchanged."""
 
 
 class Twin(str):
-    """A key that may stand twice in an object: it equals nothing but itself."""
+    """A key that may occur twice in an object: it equals only itself."""
 
     __hash__ = object.__hash__
 
@@ -48,7 +48,7 @@ def pick(rng: Generator, options: Sequence[Any]) -> Any:
 
 
 def mutated(tree: Any, rng: Generator, strangers: Sequence[Any] = ()) -> Any:
-    """Return a copy of a tree after one to four changes; ``strangers`` are trees from which parts are taken."""
+    """Return a copy of a tree after one to four changes; parts of the trees ``strangers`` may be inserted."""
     holder = [copy.deepcopy(tree)]
     for _ in range(1 + int(rng.geometric(0.6)) if rng.random() < 0.5 else 1):
         _change(holder, rng, strangers)
@@ -69,7 +69,7 @@ def _places(holder: list[Any]) -> list[tuple[Any, Any]]:
 
 
 def _change(holder: list[Any], rng: Generator, strangers: Sequence[Any]) -> None:
-    """Change one place; a change that does not suit its value makes it a hostile one."""
+    """Change one place; if the change does not apply to its value, insert a hostile value."""
     places = _places(holder)
     container, key = pick(rng, places)
     value = container[key]
@@ -113,14 +113,14 @@ def _change(holder: list[Any], rng: Generator, strangers: Sequence[Any]) -> None
 
 
 def _holds(tree: Any, wanted: Any) -> bool:
-    """Whether a container is a tree, or stands in it."""
+    """Return whether a container is a tree or part of it."""
     return tree is wanted or any(
         container is wanted or container[key] is wanted for container, key in _places([tree])
     )
 
 
 def json_text(value: Any) -> str:
-    """Return a tree as JSON, keys that stand twice and raw text too."""
+    """Return a tree as JSON, with double keys and raw text."""
     if isinstance(value, Raw):
         return str(value)
     if isinstance(value, dict):
@@ -131,7 +131,7 @@ def json_text(value: Any) -> str:
 
 
 def toml_text(value: Any) -> str:
-    """Return a tree as TOML, a line for each key on top."""
+    """Return a tree as TOML, a line for each key of the root."""
     if not isinstance(value, dict):
         return f"value = {_inline(value)}"
     return "\n".join(f"{_quoted(key)} = {_inline(item)}" for key, item in value.items())

@@ -1,1 +1,1 @@
-"""Wrong calls of every public function: good calls of each, wrong values, and the judgement of their errors."""
+"""Wrong calls of every public function: good calls, wrong values, and classification of the errors."""

@@ -2,8 +2,8 @@
 
     python -m benchmarks run wrong_calls [--only q_global]
 
-A call must be taken, or end in TypeError or ValueError that names the argument, or in OSError where the value is a
-path. Anything else is an accidental error: raised inside, about something that the caller never wrote. A row is
+A call must succeed, or raise TypeError or ValueError that names the argument, or OSError if the value is a path.
+Other errors are accidental: raised inside, about a value that the caller did not write. A row is
 appended to ``benchmarks/results/wrong_calls.jsonl``.
 """
 

@@ -1,4 +1,4 @@
-"""Wrong values for every argument, and the judgement of what a call ends in."""
+"""Wrong values for every argument, and classification of the outcome of a call."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .good import Call
 
 
 class Odd:
-    """A class of no use to anyone."""
+    """A class that no function accepts."""
 
 
 WRONG = [
@@ -26,7 +26,7 @@ WRONG = [
 ]
 
 
-# What messages call an argument otherwise.
+# Other words of messages for an argument.
 SAID = {
     "coded": "coded|path", "options": "options?", "structure": "structure|lenses|ei_pixels",
     "path": "path|text|name|file|known \\w+ type|possible are", "folder": "folder|text|name",
@@ -43,14 +43,14 @@ SAID = {
     "quality": "quality|scheme",
     "picture": "picture|name|file", "optics": "optics|element|optical", "study": "study|points",
 }  # fmt: skip
-# Values that are right, and whose work has no end: threads, and samples of 10⁹.
+# Valid values that take too long: threads, and samples of 10⁹.
 LONG = {"workers", "samples", "across", "runs", "count", "views", "max_depth"}
-# Values that are right, and take seconds: depth from focus over layers that nobody gave.
+# Valid values that take seconds: depth from focus over default layers.
 DEFAULTS = {("q_depth", "depth"), ("depth_from_focus", "layers_mm"), ("plot_all", "quality"), ("plot_all", "folder")}
 
 
 def outcome(call: Call, argument: str, value: Any) -> str:
-    """Return "taken", "refused", "path", or what is wrong with the error."""
+    """Return "taken", "refused", "path", or the fault of the error."""
     if argument in LONG and isinstance(value, int | float) and 1000 < value < float("inf") and value < 10**400:
         return "taken"
     try:

@@ -1,4 +1,4 @@
-"""Good calls of what works on takes, in all packages."""
+"""Good calls of functions on takes, in all packages."""
 
 from __future__ import annotations
 

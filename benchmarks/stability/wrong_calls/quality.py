@@ -15,7 +15,7 @@ SCORES = [[1.0, 2.0], [3.0, 4.0]]
 
 
 def encode(picture: IIPicture, scheme: str, bpp: float) -> Any:
-    """Stand in for a coder, so that a study takes no time."""
+    """Act as a coder without work, so that a study takes no time."""
     return SimpleNamespace(bpp=bpp, nbytes=1, encode_seconds=0.0, reached=True)
 
 
