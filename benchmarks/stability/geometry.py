@@ -115,7 +115,7 @@ def scales() -> list[Row]:
 
 
 def coplanar() -> list[Row]:
-    """Return the share of rays that wrongly hit the far one of two tilted walls, the first in the scene, over the gap."""
+    """Return the share of rays that wrongly hit the far one of two tilted walls, first in the scene, over the gap."""
     generator = np.random.default_rng(0)
     d = np.column_stack([*generator.uniform(-0.5, 0.5, (2, 20_000)), np.ones(20_000)])
     corners = np.array([[-20, -20, 0], [20, -20, 0], [20, 20, 0], [-20, 20, 0.0]]) @ rotation((17, 29, 5)).T

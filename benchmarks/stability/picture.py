@@ -91,7 +91,7 @@ def pitches() -> list[Row]:
 
 
 def view_borders() -> list[Row]:
-    """Return PSNR of view images over the viewing angle, against the scene ray traced from there through each lens."""
+    """Return PSNR of view images over the viewing angle, against the scene, ray traced through each lens."""
     scene = still_life().scene(192)
     camera = preset("setup1", scale=8)
     picture = render(scene, camera, dtype="float32", support=()).picture

@@ -229,7 +229,7 @@ def types_beside(results: Results) -> list[str]:
 
 
 def volume_table(results: Results) -> list[str]:
-    """Return a table of the Bjøntegaard rate of our volume against the verification model, which codes colours alone."""
+    """Return a table of the Bjøntegaard rate of our volume against the verification model with separate colours."""
     coded, made = of_scenes(results, "volume"), of_scenes(results, "rates")
     scenes = [scene for scene in coded if scene in made]
     lines = ["| our volume | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"]
