@@ -22,7 +22,7 @@ from ii_core.files import IMAGE_TYPES, write_json
 from ii_core.picture import sidecar
 
 from ..files.take import Take
-from ..scene.hashing import content_hash
+from ..scene.hashing import SceneHashes, content_hash
 from ..scene.scene import Scene
 from ..tracing.tracer import rigid
 from .options import RenderOptions, SetKeywords, check_keywords
@@ -101,14 +101,15 @@ def render_take(
     old = _read_manifest(folder, take.name)
     manifest = {**_header(take, camera, of_pictures), "frames": dict(old.get("frames", {}))}
     means = {"workers": wanted.workers, "executor": wanted.executor}
-    hashed: list[tuple[Scene, str]] = []
+    hashes = SceneHashes()
     manifest["claims"] = _claims(folder, numbers, support or {}, suffix, old, force)
     with manifest_kept_if_used(folder / MANIFEST):
         write_json(folder / MANIFEST, manifest)
         for number in numbers:
             scene, stands = take.scene_at(number / take.fps), take.pose_at(number / take.fps) @ base
+            scene_hash = hashes.of(scene)
             product = _product(
-                folder, number, scene, stands, camera, support or {}, suffix, of_pictures, means, hashed
+                folder, number, scene, scene_hash, stands, camera, support or {}, suffix, of_pictures, means
             )
             if is_done(product, manifest["frames"].get(str(number))):
                 continue
@@ -125,12 +126,10 @@ def frame_file(folder: Path, number: int, suffix: str) -> Path:
 
 
 def _product(
-    folder: Path, number: int, scene: Scene, pose: Any, camera: Any, support: Mapping[str, Sequence[str]],
-    suffix: str, options: dict[str, Any], means: dict[str, Any], hashed: list[tuple[Scene, str]],
+    folder: Path, number: int, scene: Scene, scene_hash: str, pose: Any, camera: Any,
+    support: Mapping[str, Sequence[str]], suffix: str, options: dict[str, Any], means: dict[str, Any],
 ) -> Product:  # fmt: skip
     """Return a frame's files and the hash of their inputs."""
-    if not hashed or hashed[-1][0] is not scene:  # hash a scene that does not move once
-        hashed[:] = [(scene, content_hash(scene))]
     picture = frame_file(folder, number, suffix)
     images: dict[str, list[Path]] = {}
     for name, kinds in support.items():
@@ -138,7 +137,7 @@ def _product(
             images.setdefault(kind, []).append(_beside(picture, name))
     files = (picture, *dict.fromkeys(path for paths in images.values() for path in paths))
     key = content_hash(
-        "frame", version("raytrace-ii"), hashed[-1][1], camera, pose, options, suffix,
+        "frame", version("raytrace-ii"), scene_hash, camera, pose, options, suffix,
         {name: list(kinds) for name, kinds in support.items()},
     )  # fmt: skip
     make = partial(
