@@ -75,6 +75,7 @@ def lens_spread(
     *,
     focal_mm: float | None = None,
     depth_mm: float = math.inf,
+    spherical_mm: float = 0.0,
     dimensions: int = 1,
 ) -> tuple[Floats, Floats]:
     """Intensity that a point on the axis of a lens leaves on the pixel plane, by the wave.
@@ -92,6 +93,9 @@ def lens_spread(
         f; Λ if not given.
     depth_mm : float
         From the lens to the point.
+    spherical_mm : float
+        W₀₄₀: third-order spherical aberration of the wavefront at the rim. Positive if rays of the rim cross the axis
+        before the focus, as behind a single lens of glass.
     dimensions : {1, 2}
         A slit, or a round lens.
 
@@ -113,8 +117,10 @@ def lens_spread(
         raise ValueError(f"depth_mm is {depth_mm}: a positive distance, or infinity, is needed")
     if dimensions not in (1, 2):
         raise ValueError(f"dimensions is {dimensions}: 1 for a slit, 2 for a round lens, is needed")
-    blur = abs(defocus_mm(width, gap, focal_mm=focal, depth_mm=depth_mm))
-    slope = width / 2 / math.hypot(width / 2, min(gap, focal, depth_mm)) + width / 2 / math.hypot(width / 2, gap)
+    error = within("spherical_mm", spherical_mm, -width, width)
+    blur = abs(defocus_mm(width, gap, focal_mm=focal, depth_mm=depth_mm)) + 16 * abs(error) * gap / width
+    slope = 8 * abs(error) / width  # of the phases of lens, source and aberration at the rim
+    slope += sum(width / 2 / math.hypot(width / 2, one) for one in (min(gap, focal, depth_mm), gap))
     step = wavelength / slope / SAMPLES * 2
     window = 2 * (width + blur) + 40 * wavelength * gap / width
     count = 1 << math.ceil(math.log2(window / step))
@@ -125,6 +131,7 @@ def lens_spread(
     phase = -(np.sqrt(squared + focal**2) - focal)
     if math.isfinite(depth_mm):
         phase += np.sqrt(squared + depth_mm**2) - depth_mm
+    phase -= error * (4 * squared / width**2) ** 2
     # a sample on the rim counts by the share of it within
     rim = np.clip((width / 2 - np.sqrt(squared)) / step + 0.5, 0, 1)
     field = angular_spectrum(rim * np.exp(2j * math.pi / wavelength * phase), step, wavelength, gap)

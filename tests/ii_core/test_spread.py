@@ -74,7 +74,7 @@ def test_it_is_the_wave_in_focus_and_out_of_it(depth):
 
 def test_without_wavelength_it_is_the_disk_of_rays():
     """Of 6 pixels: each has the share of the disk over it, smoothed by the pixel of the source."""
-    kernel = _kernel(6.0, 1e-6, 15)
+    kernel = _kernel(6.0, 1e-6, 0.0, 15)
     fine = (np.arange(31 * 20) + 0.5) / 20 - 15.5
     disk = (np.hypot(fine[:, None], fine) <= 3).astype(float)
     triangles = np.clip(1 - abs(fine - np.arange(-15, 16)[:, None]), 0, None)
