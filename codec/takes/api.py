@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIVideo, checks
-from ii_core.files import one_line, read_json, write_json
+from ii_core.files import one_line
 
 from .. import file_header
 from ..api import blank_picture, check_coded
@@ -28,6 +27,7 @@ from .container import DamagedTake
 from .decoding import CodedFrames
 from .order import Plan
 from .segments import SegmentFilm, segment_film, segment_options
+from .unfinished import Unfinished
 
 RATES = ("take", "segment")
 MAX_FRAMES = 1 << 24
@@ -221,8 +221,8 @@ def encode_take(
         "take" searches one quantiser for the whole take, and uses the next finer one in its first segments (constant
         quality). "segment" meets the target in each segment (constant rate).
     path : path, optional
-        Write the ``.ii`` file here. Segments of ``qp`` and of ``rate="segment"`` are kept in ``path.part`` until all
-        are done: after a killed run, the next call continues after the last whole segment.
+        Write the ``.ii`` file here. Segments are kept in ``path.part`` until all are done, those of a search at each
+        quantiser: after a killed run, the next call continues after the last whole segment.
     progress : callable, optional
         Called with the number of segments done and in all; a search codes all of them several times.
     **options
@@ -266,18 +266,18 @@ def encode_take(
         dtype=video.structure.pixels.dtype.name, frames=video.frames, fps=float(video.fps), plan=plan, segments=[],
         target_bpp=goal.bpp, qp=goal.qp,
     )  # fmt: skip
-    work = _Work(video, coder, settings, plan, views, coded)
+    kept = None if path is None else Unfinished(Path(os.fspath(path)), container.head(_values(coded)))
+    work = _Work(video, coder, settings, plan, views, coded, kept)
     if goal.bpp is not None and rate == "take":
         runs, times = work.search(goal.bpp, progress)
     else:
-        part = None if path is None else _Part(Path(os.fspath(path)), coded)
-        runs, times = work.one_by_one(goal, part, progress), 1
+        runs, times = work.one_by_one(goal, progress), 1
     seconds = sum(run.codec_seconds for run in runs)
     coded = replace(coded, segments=[run.payload for run in runs], runs=times, codec_seconds=seconds)
     coded = replace(coded, encode_seconds=cpu_seconds() - started)
-    if path is not None:
+    if path is not None and kept is not None:
         coded.save(path)
-        _Part(Path(os.fspath(path)), coded).remove()
+        kept.remove()
     return coded
 
 
@@ -291,6 +291,7 @@ class _Work:
     plan: Plan
     views: int
     coded: EncodedTake
+    kept: Unfinished | None
 
     def segments(self) -> list[range]:
         """Instants of each segment."""
@@ -308,23 +309,24 @@ class _Work:
             pixels[i * height : (i + 1) * height] = self.video[frame].pixels
         return pixels
 
-    def run(self, part: range, pixels: NDArray[Any], goal: Goal) -> Run:
-        """Code a segment."""
+    def run(self, number: int, part: range, settings: str, code: Callable[[Source[Any]], Run]) -> Run:
+        """Code a segment; use the one of an earlier run if its pixels and settings are the same."""
+        pixels, film = self.stack(part), self.film(len(part))
         options = segment_options(self.coder, self.options, self.plan, self.views, len(part))
-        return self.coder.encode_film(pixels, self.film(len(part)), options, goal).run
+        source = Source(coder=self.coder, pixels=pixels, film=film, options=options)
+        return self.kept.run(number, pixels, settings, lambda: code(source)) if self.kept else code(source)
 
-    def one_by_one(self, goal: Goal, kept: _Part | None, progress: Progress | None) -> list[Run]:
-        """Code every segment at the goal; keep the segments of an earlier run."""
+    def one_by_one(self, goal: Goal, progress: Progress | None) -> list[Run]:
+        """Code every segment at the goal."""
         parts, runs = self.segments(), []
         if goal.bpp is not None:
             goal = Goal(bpp=max(goal.bpp - self.framing(len(parts)), goal.bpp / 2))
+
+        def code(source: Source[Any]) -> Run:
+            return self.coder.encode_film(source.pixels, source.film, source.options, goal).run
+
         for number, part in enumerate(parts):
-            pixels = self.stack(part)
-            known = kept.payload(number, pixels) if kept else None
-            run = Run(known, 0.0) if known is not None else self.run(part, pixels, goal)
-            runs.append(run)
-            if kept and known is None:
-                kept.keep(number, pixels, run.payload)
+            runs.append(self.run(number, part, "goal", code))
             if progress:
                 progress(number + 1, len(parts))
         return runs
@@ -344,12 +346,8 @@ class _Work:
         def at(quantiser: float) -> list[Run]:
             nonlocal done
             runs = []
-            for part in parts:
-                stack, film = self.stack(part), self.film(len(part))
-                options = segment_options(self.coder, self.options, self.plan, self.views, len(part))
-                settings = self.coder.constant(quantiser, film, options)
-                source = Source(coder=self.coder, pixels=stack, film=film, options=options)
-                runs.append(source.run(settings))
+            for number, part in enumerate(parts):
+                runs.append(self.run(number, part, f"at {quantiser!r}", lambda source: source.run_at(quantiser)))
                 done += 1
                 if progress:
                     progress(min(done, len(parts) * QUANTISER_RUNS - 1), len(parts) * QUANTISER_RUNS)
@@ -378,52 +376,6 @@ def _mixtures(pair: tuple[Trial[list[Run]], Trial[list[Run]]]) -> Iterator[list[
     coarse, fine = (trial.result for trial in pair)
     for first in range(1, len(fine)):
         yield [*fine[:first], *coarse[first:]]
-
-
-class _Part:
-    """Segments of a take that is being coded, kept in ``path.part`` beside a list of the hashes of their pictures."""
-
-    def __init__(self, path: Path, coded: EncodedTake) -> None:
-        self.path, self.index = path.with_name(path.name + ".part"), path.with_name(path.name + ".part.json")
-        self.header = hashlib.sha256(container.head(_values(coded))).hexdigest()
-        self._made: list[str] = []
-        self._payloads: list[bytes] = []
-        try:
-            index = read_json(self.index)
-            if index["header"] == self.header:
-                self._payloads, _ = container.read_segments(self.path, 0, len(index["segments"]))
-                self._made = list(index["segments"][: len(self._payloads)])
-        except (OSError, ValueError, KeyError, TypeError):
-            pass
-
-    def payload(self, number: int, pixels: NDArray[Any]) -> bytes | None:
-        """A segment of an earlier run, if it was made of these pixels."""
-        if number < len(self._payloads) and self._made[number] == _pixel_hash(pixels):
-            return self._payloads[number]
-        del self._payloads[number:], self._made[number:]
-        return None
-
-    def keep(self, number: int, pixels: NDArray[Any], payload: bytes) -> None:
-        """Append a segment; all segments before it have been kept."""
-        mode = "r+b" if self.path.exists() and number else "wb"
-        with open(self.path, mode) as file:
-            file.seek(sum(len(container.framed(i, old)) for i, old in enumerate(self._payloads)))
-            file.write(container.framed(number, payload))
-            file.truncate()
-            file.flush()
-            os.fsync(file.fileno())
-        self._payloads.append(payload)
-        self._made.append(_pixel_hash(pixels))
-        write_json(self.index, {"header": self.header, "segments": self._made})
-
-    def remove(self) -> None:
-        """Remove both files."""
-        self.path.unlink(missing_ok=True)
-        self.index.unlink(missing_ok=True)
-
-
-def _pixel_hash(pixels: NDArray[Any]) -> str:
-    return hashlib.sha256(np.ascontiguousarray(pixels).data).hexdigest()
 
 
 def open_take(

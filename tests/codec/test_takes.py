@@ -1,6 +1,5 @@
 """Takes: orders over view and time, coding by every pseudo video scheme, rates, damage, random access."""
 
-import dataclasses
 import os
 import signal
 import subprocess
@@ -12,11 +11,11 @@ import pytest
 
 from codec import DamagedTake, EncodedTake, Plan, component_cost, encode_take, open_take, take_floor, view_cost
 from codec.coders import groups
-from codec.coders.pseudo_video import PseudoVideo
+from codec.coders.pseudo_video import PseudoVideo, Source
 from codec.contract import find, schemes
 from codec.takes.order import WALKS
 from ii_core import IIPicture, open_video, sub_images, video_of
-from ii_core.files import read_image
+from ii_core.files import read_image, read_json
 
 VIDEO_SCHEMES = [name for name in schemes() if isinstance(find(name), PseudoVideo)]
 LENSES, EI = (32, 32), (4, 3)  # 12 sub-images of 32×32, 1024 elementary images of 4×3
@@ -262,7 +261,19 @@ def test_any_cut_and_any_flipped_byte_is_noticed(saved, tmp_path):
         open_take(file)
 
 
-def test_a_killed_run_goes_on_after_its_last_segment(tmp_path):
+class Stopped(Exception):
+    pass
+
+
+@pytest.fixture
+def encoder_runs(monkeypatch):
+    """A list that grows by one with every run of an encoder."""
+    runs, run_parts = [], Source.run_parts
+    monkeypatch.setattr(Source, "run_parts", lambda source, parts: runs.append(None) or run_parts(source, parts))
+    return runs
+
+
+def test_a_killed_run_goes_on_after_its_last_segment(tmp_path, encoder_runs):
     take(40).save(tmp_path / "take")
     code = (
         "from ii_core import open_video; from codec import encode_take, Plan\n"
@@ -277,31 +288,63 @@ def test_a_killed_run_goes_on_after_its_last_segment(tmp_path):
     process.wait()
     assert part.exists() and not (tmp_path / "t.ii").exists()
 
-    video = open_video(tmp_path / "take")
-    told = []
-    again = encode_take(
-        video,
-        "si-h264:preset=veryslow",
-        qp=20,
-        plan=Plan(span=1),
-        path=tmp_path / "t.ii",
-        progress=lambda done, total: told.append(done),
-    )
-    plain = encode_take(video, "si-h264:preset=veryslow", qp=20, plan=Plan(span=1))
-    assert again.segments == plain.segments and again.codec_seconds < plain.codec_seconds
+    video, kept = open_video(tmp_path / "take"), len(read_json(part)["segments"])
+    given = {"qp": 20, "plan": Plan(span=1)}
+    again = encode_take(video, "si-h264:preset=veryslow", path=tmp_path / "t.ii", **given)
+    assert 4 <= kept < 40 and len(encoder_runs) == 40 - kept
+    assert again.segments == encode_take(video, "si-h264:preset=veryslow", **given).segments
     assert sorted(os.listdir(tmp_path)) == ["t.ii", "take"]
 
 
-def test_segments_of_other_pictures_are_not_taken_over(tmp_path):
-    from codec.takes.api import _Part
+def interrupted(video, path, after, **goal):
+    """Code a take and stop after so many segments."""
 
-    video, plan = take(4), Plan(span=2)
-    coded = encode_take(video, "si-h264", qp=30, plan=plan)
-    kept = _Part(tmp_path / "t.ii", dataclasses.replace(coded, segments=[]))
-    stack = np.concatenate([video[0].pixels, video[1].pixels])
-    kept.keep(0, stack, coded.segments[0])
-    again = _Part(tmp_path / "t.ii", dataclasses.replace(coded, segments=[]))
-    assert again.payload(0, stack) == coded.segments[0] and again.payload(0, stack ^ 1) is None
+    def progress(done, total):
+        if done == after:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        encode_take(video, "si-h264", plan=Plan(span=1), path=path, progress=progress, **goal)
+
+
+@pytest.mark.parametrize(
+    ("goal", "after"), [({"qp": 30}, 3), ({"bpp": 0.6}, 7), ({"bpp": 0.6, "rate": "segment"}, 3)]
+)
+def test_no_segment_is_coded_twice_after_an_interruption(goal, after, tmp_path, encoder_runs):
+    """A search of four segments that stops at its seventh has one whole trial and three segments of the second."""
+    video = take(4, (48, 48), (4, 3))
+    plain = encode_take(video, "si-h264", plan=Plan(span=1), **goal)
+    needed = len(encoder_runs)
+    interrupted(video, tmp_path / "t.ii", after, **goal)
+    again = encode_take(video, "si-h264", plan=Plan(span=1), path=tmp_path / "t.ii", **goal)
+    assert len(encoder_runs) - needed == needed > after
+    assert again.segments == plain.segments and os.listdir(tmp_path) == ["t.ii"]
+
+
+def test_kept_segments_of_other_pictures_or_settings_are_not_used(tmp_path, encoder_runs):
+    video = take(4)
+    interrupted(video, tmp_path / "t.ii", 3, qp=30)
+    frames = list(video)
+    frames[1] = frames[1].with_pixels(255 - frames[1].pixels)
+    del encoder_runs[:]
+    changed = encode_take(video_of(frames, fps=10), "si-h264", qp=30, plan=Plan(span=1), path=tmp_path / "t.ii")
+    assert len(encoder_runs) == 2, "the changed frame and the last one"
+    np.testing.assert_allclose(open_take(changed)[1].pixels, frames[1].pixels, atol=60)
+    interrupted(video, tmp_path / "t.ii", 3, qp=30)
+    del encoder_runs[:]
+    encode_take(video, "si-h264", qp=31, plan=Plan(span=1), path=tmp_path / "t.ii")
+    assert len(encoder_runs) == 4
+
+
+def test_a_truncated_file_of_kept_segments_gives_its_whole_ones(tmp_path, encoder_runs):
+    video = take(4)
+    interrupted(video, tmp_path / "t.ii", 3, qp=30)
+    part = tmp_path / "t.ii.part"
+    part.write_bytes(part.read_bytes()[:-1])
+    del encoder_runs[:]
+    again = encode_take(video, "si-h264", qp=30, plan=Plan(span=1), path=tmp_path / "t.ii")
+    assert len(encoder_runs) == 2
+    assert again.segments == encode_take(video, "si-h264", qp=30, plan=Plan(span=1)).segments
 
 
 def test_a_segment_larger_than_allowed_is_refused(saved):
