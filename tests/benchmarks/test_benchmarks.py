@@ -71,7 +71,7 @@ def test_cost_is_that_of_the_newest_records(monkeypatch, tmp_path):
     assert "at least 2.0 min" in command.description(BENCHMARKS["orders"])
 
 
-def test_list_names_all_and_imports_none():
+def test_list_names_all_benchmarks_without_importing_them():
     script = "import sys, benchmarks.__main__ as m; m.main(['list']); sys.exit('matplotlib' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
     assert run.returncode == 0
@@ -79,7 +79,7 @@ def test_list_names_all_and_imports_none():
     assert heads == list(BENCHMARKS)
 
 
-def test_run_hands_options_on(monkeypatch):
+def test_run_passes_options_to_the_benchmark(monkeypatch):
     seen = []
     monkeypatch.setattr("benchmarks.coding.orders.main", lambda: seen.append(sys.argv))
     monkeypatch.setattr("benchmarks.stability.__main__.main", lambda: seen.append(sys.argv))

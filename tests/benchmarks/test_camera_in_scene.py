@@ -39,14 +39,14 @@ def test_same_picture_up_to_tessellation():
     assert errors[-1] < 5e-5  # a hundredth of a step of 8 bits
 
 
-def test_facets_are_the_coarse_way():
+def test_flat_faces_converge_with_order_1():
     # Flat faces turn rays by the angle between facets: order 1, and at the same mesh far more.
     smooth, maps = pictures(16)
     facets, _ = pictures(16, smooth=False)
     assert np.abs(facets - maps).mean() > 20 * np.abs(smooth - maps).mean()
 
 
-def test_losses_are_fresnel_s_at_both_faces():
+def test_losses_equal_fresnel_transmittance_of_both_faces():
     meshed, _ = camera_in_scene.in_scene(SCENE, CAMERA, 16)
     assert meshed.max_depth == 2
     axis = replace(CAMERA, pixels=(1, 1), lenses=(1, 1))
@@ -66,7 +66,7 @@ def test_losses_are_fresnel_s_at_both_faces():
     assert (share[through] > (1 - leaving) * (1 - reflectance(0.5, 1.5))).all()  # no ray enters that steeply
 
 
-def test_what_the_picture_lacks_is_light_reflected_in_the_glass():
+def test_stray_light_in_the_glass_is_the_remaining_difference():
     mean, most = camera_in_scene.stray_light(CAMERA, 8)
     # Reflected by both faces, or once and then totally: at least R² ≈ 0.0016 on the axis, never much of the light.
     assert 0.0015 < mean < 0.02 and mean < most < 0.1

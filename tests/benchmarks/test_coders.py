@@ -19,7 +19,7 @@ ROWS = [
 ]
 
 
-def test_a_mean_is_of_all_scenes_or_there_is_none():
+def test_the_mean_rate_needs_all_scenes():
     """One good scene must not put a scheme before those that were measured on all."""
     found = {row["scheme"]: row for row in summary(ROWS)}
     assert found["everywhere"]["mean"] == pytest.approx(-20) and found["everywhere"]["seconds"] == pytest.approx(2)
@@ -31,7 +31,7 @@ def test_a_scene_that_was_not_measured_is_a_dash():
     assert "| `once` | -90 % | – | – | 2.00 |" in table(ROWS)
 
 
-def test_labels_of_neighbours_stand_apart():
+def test_labels_of_neighbouring_points_do_not_overlap():
     """Eight points on one spot and one far off: no label lies over another, nor over a point."""
     figure = Figure(figsize=(6, 6), dpi=90)
     axes = figure.add_subplot(xscale="log", yscale="log", xlim=(0.1, 10), ylim=(0.1, 10))

@@ -28,30 +28,30 @@ def rows():
         ("radiance_smooth", 0.35),
     ],
 )
-def test_errors_shrink_with_the_order_that_the_mesh_gives(rows, name, within):
+def test_errors_fall_with_the_expected_order_in_mesh_size(rows, name, within):
     assert convergence.order(rows, name, skip=0) == pytest.approx(convergence.ORDERS[name], abs=within)
 
 
-def test_the_picture_of_a_fine_mesh_is_that_of_the_closed_form(rows):
+def test_the_picture_of_a_fine_mesh_equals_the_closed_form(rows):
     """Outlines decide the whole picture: their pixels are wrong by area, h², so their root mean square by h."""
     assert rows[-1]["psnr_smooth"] > 48
     assert rows[-1]["psnr_smooth"] - rows[0]["psnr_smooth"] > 3 * 20 * np.log10(2) * 0.7
     assert all(row["psnr_smooth"] > row["psnr_flat"] + 3 for row in rows)
 
 
-def test_lenses_of_triangles_focus_where_snell_says():
+def test_lenses_of_triangles_focus_by_snell():
     rows = [*convergence.ball_lens([48, 96, 192]), *convergence.plano_convex([8, 16, 32])]
     for orders in convergence.lens_orders(rows).values():
         assert orders["smooth"] == pytest.approx(2, abs=0.3)
         assert orders["flat"] == pytest.approx(1, abs=0.2)
 
 
-def test_a_ball_lens_puts_images_where_gauss_says():
+def test_images_of_a_ball_lens_lie_at_gauss_distance():
     """At a fiftieth of the radius spherical aberration is some 1e-4 of the distance; the mesh of 192 adds as much."""
     assert max(abs(row["off"]) for row in convergence.images(192)) < 4e-3
 
 
-def test_most_rays_see_the_very_same_light_with_and_without_triangles():
+def test_most_rays_have_equal_light_with_and_without_triangles():
     """The floor's rays hit no mesh: float32 hits against float64 in closed form."""
     world = still_life()
     L, D = preset("setup1", scale=32).rays()
@@ -61,7 +61,7 @@ def test_most_rays_see_the_very_same_light_with_and_without_triangles():
     assert np.median(error) < 1e-6 and (error > 1e-2).mean() < 5e-3
 
 
-def test_the_closed_form_itself():
+def test_the_closed_form_tracer_obeys_physical_laws():
     """It must stand without the tracer: Brewster's angle, Beer–Lambert, a shadow's edge, an invisible ball."""
     brewster = np.cos(np.arctan(1.5))
     s = ((1 - 1.5**2) / (1 + 1.5**2)) ** 2  # all that is reflected there is perpendicular

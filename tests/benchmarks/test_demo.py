@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.slow
-def test_the_demo_leaves_everything_it_promises(tmp_path, monkeypatch, capsys):
+def test_the_demo_writes_all_its_files(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["demo", "--scale", "16", "--scenes", "apples", "-o", str(tmp_path)])
     demo.main()
     assert "apples" in capsys.readouterr().out

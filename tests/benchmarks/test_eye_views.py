@@ -42,7 +42,7 @@ def test_observers_are_named_simulated_and_each_measure_has_a_row(rows):
     assert len(lines) == 2 + len(eye_views.MEASURES) + 2 and "`0123456`" in lines[-1]
 
 
-def test_scales_are_apart_and_observers_judge_the_finest_whole_one(rows, monkeypatch):
+def test_simulated_observers_judge_the_finest_complete_scale(rows, monkeypatch):
     coarse = eye_views.rows()
     fine = [{**one, "scale": 2} for one in coarse]
     monkeypatch.setattr(eye_views, "rows", lambda: coarse + fine[:3])  # cuboid is missing

@@ -29,7 +29,7 @@ def test_without_shadows_all_is_lit_and_the_scene_itself_stays_shaded():
     assert trace(ablation.unshadowed(plain), *down).radiance[0] == pytest.approx([1, 1, 1])
 
 
-def test_a_camera_in_glass_still_knows_it_without_shadows():
+def test_a_camera_in_glass_refracts_without_shadows():
     """Its rays ask the same tree as shadow rays through glass do."""
     scene = Scene(
         bodies=[body(sphere(5), transmission=WHITE, absorption_per_mm=(0.2, 0, 0))], background=hall().background
@@ -38,7 +38,7 @@ def test_a_camera_in_glass_still_knows_it_without_shadows():
     np.testing.assert_array_equal(trace(ablation.unshadowed(scene), *rays).radiance, trace(scene, *rays).radiance)
 
 
-def test_what_a_scene_has_is_found_and_left_out():
+def test_features_of_a_scene_are_found_and_left_out():
     parts = ablation.has("objects")
     assert {"shadows", "highlights", "smooth normals", "bounces beyond 5", "triangles, × 0.5"} <= set(parts)
     assert not {"fog", "textures", "texture filtering", "normal maps", "bounces beyond 6"} & set(parts)
@@ -66,7 +66,7 @@ def test_the_limit_is_the_noise_of_the_reference_set(full):
     assert ablation.alike(ablation.compared(full, full), limit)
 
 
-def test_what_is_small_and_far_off_is_seen(full):
+def test_the_criterion_detects_small_distant_details(full):
     """A spot in two of a thousand pixels: 53 dB, better than the noise, and yet told apart."""
     limit = ablation.compared(full, ablation.noisy(full))
     pixels = full.pixels.copy()
@@ -76,7 +76,7 @@ def test_what_is_small_and_far_off_is_seen(full):
     assert found["psnr"] > limit["psnr"] and not ablation.alike(found, limit)
 
 
-def test_the_least_model_keeps_what_can_be_seen(full):
+def test_the_least_model_keeps_visible_features(full):
     limit = ablation.compared(full, ablation.noisy(full))
     rows = [{"what": f"bounces beyond {depth}", "time": -0.1 * depth} for depth in (0, 5)]
     for row in rows:

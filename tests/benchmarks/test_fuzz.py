@@ -10,7 +10,7 @@ from benchmarks.coding import fuzz
 from benchmarks.stability.fuzz_readers import __main__ as readers
 
 
-def test_every_mutation_is_counted_and_the_same_again(capsys):
+def test_mutations_are_counted_and_reproducible(capsys):
     first, second = ([], [])
     for lines in (first, second):
         fuzz.work("si-h264", 7, 0, 60, limit=False)
@@ -46,12 +46,12 @@ def test_cases_of_a_worker_that_dies_once(tmp_path, monkeypatch):
     assert list(workers.cases("worker", (), 4)) == [*good[:2], dead, good[3]]
 
 
-def test_damage_is_damage():
+def test_nearly_all_mutations_differ():
     data, rng = bytes(range(256)), np.random.default_rng(0)
     mutants = {fuzz.damaged(data, [b"stranger"], rng) for _ in range(50)}
     assert len(mutants) > 45
 
 
 @pytest.mark.parametrize("scheme", ["si-h264", "jpeg2000"])
-def test_samples_hold_something(scheme):
+def test_samples_have_a_useful_size(scheme):
     assert 100 < fuzz.sample(scheme).nbytes < 4000

@@ -36,7 +36,7 @@ def refusal(call, *arguments):
     return message
 
 
-def test_libraries_of_pictures_complain_in_one_line(tmp_path):
+def test_errors_of_picture_libraries_have_one_line(tmp_path):
     """OpenImageIO's messages have up to four lines; the command line joined them, the library did not."""
     path = tmp_path / "a.png"
     said = set()
@@ -50,7 +50,7 @@ def test_libraries_of_pictures_complain_in_one_line(tmp_path):
     assert not any("\n" in message for message in said)
 
 
-def test_parameters_cfg_complains_in_one_line(tmp_path):
+def test_errors_in_parameters_cfg_have_one_line(tmp_path):
     for i in range(4):
         write_image(tmp_path / f"input_Cam{i:03}.png", seeds.pixels())
     (tmp_path / "parameters.cfg").write_text("image_resolution_x_px = 16\n")
@@ -82,7 +82,7 @@ def test_pixels_far_larger_than_lenses(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a" * 300, "a\nb", "a" * 5000])
-def test_names_of_maps_are_said_in_one_short_line(name, tmp_path):
+def test_errors_on_names_of_maps_have_one_short_line(name, tmp_path):
     """20 000 cases found what 300 had not: "File name too long", with all of it, and line breaks in names."""
     write_maps([preset("setup1", scale=256)], tmp_path)
     sheet = json.loads((tmp_path / "camera.json").read_text())
@@ -108,13 +108,13 @@ def test_box_of_maps_holds_numbers(box, tmp_path):
 
 
 @pytest.mark.parametrize("claim", [3, None, {"a": 1}])
-def test_claims_of_a_manifest_are_names(claim, tmp_path):
+def test_claims_of_a_manifest_must_be_names(claim, tmp_path):
     (tmp_path / "manifest.json").write_text(json.dumps({**seeds.MANIFEST, "claims": [claim]}))
     assert "is damaged" in refusal(_read_manifest, tmp_path, "reference")
 
 
 @pytest.mark.parametrize("point", [None, 3, [], {"scheme": "si-h264"}, "missing"])
-def test_lines_of_a_point_log_are_points(point, tmp_path):
+def test_lines_of_a_point_log_must_be_points(point, tmp_path):
     line = {**seeds.POINT_LINE, "point": point}
     if point == "missing":
         del line["point"]
@@ -160,7 +160,7 @@ def test_names_in_a_coded_file_are_quoted_in_one_short_line(tmp_path):
         assert "is damaged" in refusal(decode, tmp_path / "p.ii")
 
 
-def test_coded_pictures_are_no_pipes(tmp_path):
+def test_pipes_are_refused_as_coded_pictures(tmp_path):
     """Opening a pipe waits for a writer, for ever."""
     os.mkfifo(tmp_path / "p.ii")
     assert "pipe" in refusal(decode, tmp_path / "p.ii")
@@ -215,7 +215,7 @@ def test_sparse_rows_are_unsigned(kind, tmp_path):
     assert "sparse indices are" in refusal(read_model, tmp_path / "a.gltf")
 
 
-def test_the_number_of_views_is_said_in_one_line(tmp_path):
+def test_errors_on_the_number_of_views_have_one_line(tmp_path):
     for i in range(4):
         write_image(tmp_path / f"view_{i // 2}_{i % 2}.png", seeds.pixels())
     (tmp_path / "structure.json").write_text(json.dumps({"ei_pixels": ["a\nb", "c" * 5000]}))

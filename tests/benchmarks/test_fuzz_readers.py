@@ -45,7 +45,7 @@ def test_valid_seeds_are_read(tmp_path):
         assert read_model(tmp_path / f"part.{suffix}").parts
 
 
-def test_cases_are_made_again_from_their_number(tmp_path):
+def test_cases_are_reproducible_from_their_number(tmp_path):
     for name in READERS:
         made = []
         for folder in (tmp_path / "a", tmp_path / "b"):

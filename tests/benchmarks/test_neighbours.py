@@ -35,7 +35,7 @@ def smooth():
 
 
 @pytest.mark.parametrize("move", [(0, 0), (3, -2), (REACH, -REACH), (0.25, -1.25), (-1.75, 7.25)])
-def test_a_moved_image_is_predicted_by_its_blocks(smooth, move):
+def test_block_matching_predicts_a_moved_image(smooth, move):
     found = compensated(smooth(*move)[None], smooth(0, 0)[None], 0.0)[0][0]
     low, high = ([max(0, int(np.ceil(sign * n))) + 4 for n in move] for sign in (-1, 1))  # content of the reference
     blocks = np.s_[-(-low[0] // BLOCK) * BLOCK : (48 - high[0]) // BLOCK * BLOCK,
@@ -44,7 +44,7 @@ def test_a_moved_image_is_predicted_by_its_blocks(smooth, move):
     assert np.abs(found - smooth(*move))[blocks].max() < 0.5
 
 
-def test_blocks_move_apart():
+def test_blocks_have_motion_vectors_of_their_own():
     rng = np.random.default_rng(1)
     reference = rng.normal(0, 50, (1, 32, 32)).astype(np.float32)
     image = reference.copy()
@@ -85,7 +85,7 @@ def test_neighbours_are_the_last_instant_and_the_last_view():
     np.testing.assert_allclose(now - last["view"], 4, atol=1e-4)
 
 
-def test_likeness_by_hand():
+def test_correlation_and_residual_by_hand():
     a = np.arange(64, dtype=np.float32).reshape(1, 8, 8)
     same, turned, other = likeness(a, a + 5), likeness(a, -a), likeness(np.stack([a[0]] * 2), np.stack([a[0], -a[0]]))
     assert same == {"correlation": pytest.approx(1), "energy": pytest.approx(25)}

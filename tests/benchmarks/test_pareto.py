@@ -13,19 +13,19 @@ def row(seconds, psnr, **more):
     return {"seconds": seconds, "psnr": psnr, "samples": 1, "depth": 0, "error": None, "cut": 1.0, **more}
 
 
-def test_the_front_holds_what_nothing_beats():
+def test_pareto_front_by_hand():
     rows = [row(3, 40), row(1, 20), row(2, 30), row(2.5, 29), row(1, 19), row(4, 40)]
     assert pareto.front(rows) == [1, 2, 0]
 
 
-def test_the_cheapest_below_the_sensors_noise_is_taken_or_the_cheapest_within_1_db():
+def test_recommended_is_the_fastest_setting_below_sensor_noise_or_within_1_db():
     good = [row(1, 20), row(2, 48, samples=4), row(9, 60)]
     assert pareto.recommended(good)["seconds"] == 2
     assert pareto.recommended(good)["setting"] == "4 samples"
     assert pareto.recommended([row(1, 20), row(2, 39.5, depth=2), row(9, 40)])["setting"] == "1 sample, depth 2"
 
 
-def test_shapes_are_cut_as_often_as_asked():
+def test_tessellation_scales_by_the_factor():
     """Twice the segments, and cells half as large: four times the faces, a body's outline where it was."""
     coarse, fine = pareto.cut_scene("apples", 0.5), pareto.cut_scene("apples", 1)
     faces = [sum(len(b.faces) for b in scene.bodies) for scene in (coarse, fine)]

@@ -10,7 +10,7 @@ from benchmarks.accuracy.analytic import still_life
 from ii_core import preset
 
 
-def test_without_povray_the_script_says_so_and_exits_0(monkeypatch, capsys):
+def test_without_povray_the_script_prints_a_message_and_exits_0(monkeypatch, capsys):
     monkeypatch.setattr(povray.shutil, "which", lambda name: None)
     monkeypatch.setattr("sys.argv", ["povray"])
     with pytest.raises(SystemExit) as stop:
@@ -40,7 +40,7 @@ def test_every_solid_and_light_of_the_world_is_described():
     assert any("ior 1.5" in line for line in lines) and any("roughness 0.025" in line for line in lines)
 
 
-def test_what_agrees_to_16_bits_is_said_as_it_was_measured():
+def test_the_page_states_16_bit_agreement_as_measured():
     """On b1dc540 the page said it of "the matt ball"; it holds for POV-Ray and the closed form alone."""
     rounding = 20 * np.log10(65535 * np.sqrt(12))  # PSNR of values rounded to 16 bits, evenly spread errors
     found = {

@@ -34,7 +34,7 @@ def kept(monkeypatch):
     monkeypatch.setattr(records, "RESULTS", ROOT / "benchmarks" / "results")
 
 
-def test_pages_hold_what_the_records_give(kept):
+def test_tables_of_pages_equal_the_records(kept):
     """Every table between marks, on every page. On b1dc540 no test compared coders, volume, cost, headers, speed …"""
     assert tables.stale() == []
 
@@ -51,7 +51,7 @@ def test_a_changed_figure_and_an_unknown_mark_are_found(kept, tmp_path):
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_records_keep_their_rule(path):
+def test_all_record_files_are_valid(path):
     """The stamped-over rows of coders.json, coders_full.json and fuzz.json had no such test."""
     assert check(path) == []
 
@@ -73,7 +73,7 @@ def test_the_stamp_of_one_commit_over_rows_of_another_is_found(tmp_path):
         assert says in line
 
 
-def test_a_row_that_was_committed_stays(tmp_path, monkeypatch):
+def test_committed_rows_must_not_change(tmp_path, monkeypatch):
     """Lines are added; only rows whose commit is unknown may be removed, once they are measured again."""
     for command in (["init", "-q"], ["config", "user.email", "a@b.c"], ["config", "user.name", "a"]):
         git(*command, cwd=tmp_path)
@@ -157,7 +157,7 @@ def test_code_that_changes_within_a_row_is_no_record_either(monkeypatch):
     assert [row["row"] for row in TOY.rows()] == [1]
 
 
-def test_tables_name_the_commits_where_they_differ():
+def test_tables_have_a_column_of_commits_if_they_differ():
     lines = ["| scene | dB |", "|---|---|", "| car | 1 |", "| twins | 2 |"]
     assert with_commits(lines, [["abc"], ["abc"]]) == lines
     assert with_commits(lines, [["abc"], ["def", "unsure"]]) == [
@@ -199,7 +199,7 @@ def test_coders_continue_and_take_subsets(monkeypatch, capsys):
         run("--schemes", "jpg2000")
 
 
-def test_seconds_to_decode_do_not_hold_those_of_the_measure(monkeypatch):
+def test_decode_seconds_exclude_the_measure(monkeypatch):
     """A measure that takes half a second: decoding 128×64 px takes a few milliseconds still."""
     picture = render(load_scene("cuboid"), preset("setup1", scale=64), support=()).picture
     monkeypatch.setattr(coders, "qualities", lambda scheme: [{"qp": 30}])
@@ -227,7 +227,7 @@ def test_fuzz_keeps_a_row_a_scheme_and_continues(monkeypatch):
     assert all(sum(line["result"]["counts"].values()) == 4 for line in lines)
 
 
-def test_the_version_of_povray_is_a_version():
+def test_the_version_of_povray_is_parsed():
     """On b1dc540 the record held "povray: cannot open the user configuration file …"."""
     said = (
         "povray: cannot open the user configuration file /root/.povray/3.7/povray.conf: No such file or directory\n"

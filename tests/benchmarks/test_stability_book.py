@@ -19,12 +19,12 @@ def test_without_a_lift_half_of_all_lit_points_shade_themselves():
     assert geometry.own_shadow(1.0, 1e6, 2000)[:2] == (0, 0)
 
 
-def test_far_from_the_origin_the_form_goes():
+def test_the_form_error_grows_far_from_the_origin():
     near, far = (geometry.own_shadow(1.0, offset, 2000)[2] for offset in (0, 1e6))
     assert near < 1e-3 and 5e-3 < far < 5e-2, "single precision steps by 6e-8 of a million radii"
 
 
-def test_two_walls_are_told_apart_from_a_millionth_of_their_distance_on():
+def test_two_walls_are_resolved_from_a_gap_of_1e_6_of_their_distance():
     rows = {row["gap / distance"]: row["far wall seen"] for row in geometry.coplanar()}
     assert rows[0.0] > 0.9 and rows[1e-6] == rows[1e-5] == 0
 
@@ -33,7 +33,7 @@ def test_a_contact_shadow_begins_at_one_lift():
     assert [row["in shadow"] for row in geometry.contact_shadow()] == [0, 0, 0, 1, 1, 1]
 
 
-def test_small_things_lose_their_shadows_on_huge_faces_alone():
+def test_small_bodies_lose_shadows_only_on_huge_faces():
     rows = {row["floor, mm"]: row for row in geometry.huge_beside_tiny(balls=40, segments=12)}
     assert rows[1e4]["shadows there"] == 1 and rows[2e7]["shadows there"] == 0
     assert len({row["grains seen"] for row in rows.values()}) == 1, "they are seen as before"
@@ -45,7 +45,7 @@ def test_smooth_balls_have_no_band_at_the_terminator():
     assert all(row["band, degrees"] < 0.012 and row["light off by, rms"] < 2e-6 for row in rows)
 
 
-def test_sheets_throw_whole_shadows_from_two_sagittas_on():
+def test_sheets_cast_full_shadows_from_two_sagittas_on():
     """At the corners of a face its smooth surface is the face: shadows begin there."""
     dark = {row["height, sagittas"]: row["in shadow"] for row in light.covered()}
     assert list(dark.values()) == sorted(dark.values()) and dark[0.25] < 0.03 and dark[2.5] == 1
@@ -57,7 +57,7 @@ def test_grazing_light_stays_right_and_hits_drift():
     assert rows[0]["place off by, mm"] < 1e-4 < rows[-1]["place off by, mm"]
 
 
-def test_a_camera_in_glass_is_in_glass_up_to_the_mesh():
+def test_a_camera_in_glass_agrees_with_the_closed_form_up_to_the_mesh():
     """96 segments leave up to 2e-3 mm between them."""
     rows = light.camera_in_glass(segments=96, n=500)
     right = {row["depth in the glass, mm"]: row["rays off by more than 0.02"] for row in rows}
@@ -71,16 +71,16 @@ def test_lamps_light_a_floor_from_one_lift_on():
     assert {row["scene"]: row["lit"] for row in light.camera_in_body()} == {"lamp outside": 0, "lamp within": 1}
 
 
-def test_missing_bounces_are_the_rest_of_the_series():
+def test_light_of_missing_bounces_is_the_rest_of_the_geometric_series():
     assert max(row["largest difference"] for row in light.bounces()) < 1e-6
 
 
-def test_tiny_pictures_are_coded_and_say_that_the_rate_was_missed():
+def test_tiny_pictures_are_coded_and_report_a_missed_rate():
     for row in picture.tiny_frames():
         assert not row["refused"] and not row["said reached"] and row["got, bit/pixel"] > 0.33
 
 
-def test_the_rate_difference_is_right_about_what_is_shared_and_says_less_about_the_rest():
+def test_bd_rate_holds_over_the_overlap_and_less_beyond_it():
     whole, half, little = (row for row in curves.bd_overlap() if row["curves share"] in (1, 0.5, 0.1))
     assert half["at most"] < 1 < 10 < half["most"], (
         "percentage points; the worst pair gains much more at its other end"
@@ -95,7 +95,7 @@ def test_a_dent_moves_the_rate_until_it_is_refused():
     assert rows[3.0]["rate given"].startswith("0 of") and rows[3.0]["PSNR off, dB, most"] < 1
 
 
-def test_more_points_come_nearer():
+def test_bd_rate_error_falls_with_more_points():
     rows = {row["points a curve"]: row["akima, most"] for row in curves.bd_points()}
     assert rows[4] > rows[6] > rows[12] and rows[6] < 1
 
@@ -108,7 +108,7 @@ def test_depth_from_focus_needs_texture_above_the_noise():
     )
 
 
-def test_a_mirrors_picture_takes_the_mirrors_depth():
+def test_a_strong_mirror_has_the_depth_of_the_mirrored_scene():
     (whole,) = depth.depth_two_layers((0.9,))
     for kind in ("mirror", "clear"):
         assert whole[f"{kind}, robust: wall"] < 0.05 and whole[f"{kind}, robust: behind"] > 0.95
@@ -121,7 +121,7 @@ def test_tables_hold_every_row():
     assert book.table(rows, (("b",), "a", ("c",)))[0] == "| b | 1: c |", "columns of numbers"
 
 
-def test_every_case_has_its_place_on_the_page():
+def test_every_case_has_a_table_on_the_page():
     page = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
     for name in [*book.CASES, "convergence"]:
         assert page.count(f"<!-- {name} -->\n") == page.count(f"<!-- /{name} -->") == 1, name

@@ -35,7 +35,7 @@ def toy(**parameters):
     return Step(name="toy", shows="Figure 0", run=counted, parameters=parameters)
 
 
-def test_a_step_is_done_once_and_all_its_records_are_kept(tmp_path):
+def test_a_step_runs_once_and_keeps_all_records(tmp_path):
     calls.clear()
     (first,) = perform([toy(value=1)], tmp_path)
     assert first["result"] == {"number": 1, "pair": [1, "inf"], "nothing": None, "encode_seconds": 1}
@@ -49,7 +49,7 @@ def test_a_step_is_done_once_and_all_its_records_are_kept(tmp_path):
     assert len((tmp_path / "toy.jsonl").read_text().splitlines()) == 3
 
 
-def test_a_forced_run_says_whether_it_was_the_same(tmp_path):
+def test_a_forced_run_reports_whether_results_are_equal(tmp_path):
     calls.clear()
     perform([toy(value=1)], tmp_path)
     (again,) = perform([toy(value=1)], tmp_path, force=True)
@@ -74,7 +74,7 @@ def test_a_file_that_holds_no_records_is_named(tmp_path, line):
         perform([toy(value=1)], tmp_path)
 
 
-def test_times_do_not_count():
+def test_findings_exclude_times():
     assert timeless({"a": [{"codec_seconds": 1, "b": 2}]}) == {"a": [{"b": 2}]}
 
 
@@ -133,7 +133,7 @@ def test_wrong_arguments_are_named(arguments, said, capsys):
     assert stop.value.code == 2 and said in capsys.readouterr().err
 
 
-def test_what_detail_explains_of_a_fluctuation():
+def test_fluctuation_explained_by_detail():
     """Q_depth on a line over detail is explained wholly; a layer of no error counts nowhere."""
     detail = [0.0, 9.0, 99.0, 999.0]  # −10 log₁₀ of one more: 0, −10, −20, −30
     layers = {"depth_mm": [1.0, 2.0, 3.0, 4.0], "detail": detail}
@@ -144,7 +144,7 @@ def test_what_detail_explains_of_a_fluctuation():
 
 
 @pytest.mark.parametrize("encoder", [reasons.H264of2008("si"), reasons.PlainH264("si")])
-def test_the_encoders_of_2008_search_exhaustively_and_know_less(encoder):
+def test_the_encoders_of_2008_search_exhaustively_without_later_features(encoder):
     options = {name: option.default for name, option in encoder.options.items()} | {"rate": "cq"}
     picture = IIPicture(np.zeros((64, 64, 3), np.uint8), (4, 4), (16, 16))
     asked = encoder.constant(30, encoder.film(picture, options), options).parameters["x264-params"].split(":")
@@ -189,7 +189,7 @@ def test_unmet_targets_are_no_gain():
     assert claims.gain([*points("a", 29.0), *missed], "a", "b") == pytest.approx(6)
 
 
-def test_who_gets_lower_wins_where_there_is_no_common_rate():
+def test_the_lower_rate_wins_without_a_common_rate():
     def duel(gain, si, ei):
         return {"ei": {"gain_db": gain, "lowest": {"si": si, "ei": ei}}}
 
@@ -206,7 +206,7 @@ def test_decline_and_fluctuation_over_depth():
     assert claims.decline(np.full(5, 33.0), pixels) == pytest.approx(0)
 
 
-def test_the_search_for_a_quality_goes_straight_to_it():
+def test_the_search_for_a_quality_interpolates_over_log_rate():
     line = [(0.1, 20.0), (0.4, 26.0)]
     assert towards(line, 23.0) == pytest.approx(0.2)
     assert towards(line[:1], 23.0) == pytest.approx(0.2)  # 3 dB for a doubling, to begin with

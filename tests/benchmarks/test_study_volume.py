@@ -28,7 +28,7 @@ def programs(tmp_path, monkeypatch):
     return write
 
 
-def test_every_voxel_comes_back_to_its_pixel(programs):
+def test_voxels_round_trip_to_pixels(programs):
     """Programs that only copy: the sizes written are those of the volume, each colour's bytes are counted once."""
     programs("grep -q 'Dimensions.12.8.16' volume.img && cp volume.bin volume.jp3d", "cp volume.jp3d decoded.bin")
     pixels, size, seconds = volume_model.by_model(PICTURE, 1.0)
@@ -71,7 +71,7 @@ def test_colours_coded_alone_by_ours():
     assert (volume_model.by_ours(PICTURE, 30.0)[0] == PIXELS).all()
 
 
-def test_a_lead_is_taken_at_the_rates_there_are():
+def test_a_lead_is_measured_at_the_rates_of_the_other_scheme():
     """A line of 3 dB an octave is 6 dB above another, at whatever rates that has; beyond the ends nothing counts."""
     mine = [{"scheme": "a", "bpp": rate, "q_global": 30 + 3 * math.log2(rate)} for rate in (0.1, 0.4, 1.6)]
     its = [{"scheme": "b", "bpp": rate, "q_global": 24 + 3 * math.log2(rate)} for rate in (0.15, 0.7, 1.3)]

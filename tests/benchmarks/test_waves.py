@@ -9,7 +9,7 @@ from benchmarks.accuracy import waves
 from benchmarks.records import ROOT
 
 
-def test_the_same_kernel_has_no_error_and_half_a_pixel_off_has_that_of_the_texture():
+def test_error_of_equal_and_of_shifted_kernels_by_hand():
     still = np.eye(1, 5, 2)[0]
     assert waves.error_db(still, still) == 200
     # the mean of neighbours: an edge of a patch, one in 8 pixels, is off by half its step, of mean square 1/6
@@ -26,7 +26,7 @@ def test_crossing_is_interpolated():
     assert waves.crossing(points[1:], "rays_db") == "nowhere: always above"
 
 
-def test_the_rule_of_thumb_is_what_was_measured():
+def test_the_rule_of_thumb_agrees_with_the_records():
     """Of all points in focus: rays above 40 dB with pixels of 5.4 λΛ/δL and more, and not much below."""
     points = [
         p for row in waves.RECORDS.rows() if row.get("sweep") in ("pitch", "gap", "pixels") for p in row["points"]

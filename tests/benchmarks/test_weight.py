@@ -49,7 +49,7 @@ def test_heavy_files_are_named():
     assert line.startswith("tracked files have 15.3 MB, at most 15")
 
 
-def test_no_picture_is_there_twice_and_none_is_wider_than_shown():
+def test_pictures_are_unique_and_not_wider_than_shown():
     """On b1dc540 ten charts stood in benchmarks/results and in docs/images."""
     seen = {}
     for path in tracked():

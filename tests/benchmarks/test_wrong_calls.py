@@ -45,7 +45,7 @@ def test_every_public_function_is_tried_with_every_argument(named):
     assert untried(named) == []
 
 
-def test_judgement():
+def test_classification_of_outcomes():
     def indexes(argument):
         return [1, 2, 3][argument]
 

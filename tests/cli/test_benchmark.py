@@ -89,7 +89,7 @@ def test_the_set_is_rendered_checked_and_used(run, tmp_path):
     assert picture_json("", IIPicture.load(data / "tiny" / "apples.png"))["sha256"] == found
 
 
-def test_a_set_replaces_no_files_of_others_and_takes_no_options(run, refused, tmp_path):
+def test_a_set_keeps_foreign_files_and_refuses_options(run, refused, tmp_path):
     (tmp_path / "tiny.toml").write_text(TINY)
     (tmp_path / "data" / "tiny").mkdir(parents=True)
     (tmp_path / "data" / "tiny" / "apples.png").write_text("mine")

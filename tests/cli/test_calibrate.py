@@ -53,7 +53,7 @@ def test_a_picture_without_lenses_ends_in_one_line(run, refused, tmp_path):
     refused(run("calibrate", tmp_path / "n.png", "--white", tmp_path / "w.png", "-o", tmp_path / "c"), "w.png")
 
 
-def test_files_that_are_there_stay(run, refused, frames, tmp_path):
+def test_existing_files_are_not_replaced(run, refused, frames, tmp_path):
     (tmp_path / "c").mkdir()
     (tmp_path / "c/camera.json").write_text("mine")
     refused(run("calibrate", frames[0] / "raw.png", "-o", tmp_path / "c"), "camera.json is there already")

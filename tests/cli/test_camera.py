@@ -60,7 +60,7 @@ def test_a_camera_file_of_the_users_own(run, refused, tmp_path):
     refused(run("camera", tmp_path / "gone.json", "-o", tmp_path / "c"), "gone.json does not exist")
 
 
-def test_where_a_camera_stands(run, refused, tmp_path):
+def test_position_of_the_camera(run, refused, tmp_path):
     depths = []
     for at in ("0,0,0", "0,0,-10"):
         name = tmp_path / f"{at}.exr"
@@ -71,7 +71,7 @@ def test_where_a_camera_stands(run, refused, tmp_path):
     refused(run("render", "apples", "--at", "1,2", "-o", tmp_path / "x.png"), "three numbers x,y,z are needed")
 
 
-def test_cameras_that_cannot_be(run, refused, tmp_path):
+def test_invalid_cameras_are_refused(run, refused, tmp_path):
     refused(run("camera", "nope", "-o", tmp_path / "c"), "unknown camera 'nope'")
     refused(run("camera"), "a camera is needed")
     refused(run("camera", "setup1", "--scale", 64, "--format", "bmp", "-o", tmp_path / "c"), "unknown format 'bmp'")
@@ -88,7 +88,7 @@ def test_cameras_that_cannot_be(run, refused, tmp_path):
     assert not (tmp_path / "a.png").exists()
 
 
-def test_presets_are_what_the_list_says():
+def test_values_of_presets():
     assert preset("hdtv").pixels == (3840, 2160) and preset("hdtv").lenses == (160, 125)
     assert preset("hdtv").ei_pixels == pytest.approx((24, 17.28))
     assert preset("plenoptic").ei_pixels == pytest.approx((13.84, 13.84), abs=0.005)
@@ -125,7 +125,7 @@ def test_reports(run, name):
         assert what in out
 
 
-def test_solving_for_what_is_missing(run, refused):
+def test_solving_for_missing_lengths(run, refused):
     code, out, _ = run("camera", "--solve", "pitch=0.39,gap=0.73,pixel=0.0061")
     found = {line.split()[0]: float(line.split()[1]) for line in out.splitlines()}
     assert code == 0 and found["view_angle_deg"] == pytest.approx(29.91, abs=0.005)  # to the digits of 0.39 and 0.73

@@ -86,7 +86,7 @@ def test_study_leaves_chart_numbers_and_a_table(run, picture, tmp_path):
     assert read_image(tmp_path / "s" / "small_rd.png").shape[0] > 300
 
 
-def test_several_pictures_an_anchor_and_rates_that_are_found(run, refused, picture, tmp_path):
+def test_study_of_several_pictures_with_anchor_and_default_rates(run, refused, picture, tmp_path):
     other = tmp_path / "other.png"
     IIPicture.load(picture).with_pixels(IIPicture.load(picture).pixels[:, ::-1].copy()).save(other)
     command = [
@@ -159,13 +159,13 @@ def test_points_of_another_picture_or_measure_are_not_taken(tmp_path):
     assert not PointLog(path, a, measures=["q_global", "q_view"], depth=depth).known
 
 
-def test_a_study_that_cannot_be_leaves_nothing(run, refused, picture, tmp_path):
+def test_a_refused_study_writes_nothing(run, refused, picture, tmp_path):
     refused(run("study", picture, "--schemes", "si-h264,si-h26", "-o", tmp_path / "s"), "unknown scheme 'si-h26'")
     refused(run("study", picture, "--rates", "1,two", "-o", tmp_path / "s"), "numbers separated by commas")
     assert not list(tmp_path.iterdir())
 
 
-def test_a_rate_out_of_reach_is_said(run, picture, tmp_path):
+def test_a_missed_rate_is_reported(run, picture, tmp_path):
     code, out, _ = run("encode", picture, "--scheme", "ei-h264", "--bpp", 0.01, "-o", tmp_path / "x.ii")
     assert code == 0 and "cannot reach 0.01 bpp" in out
 
@@ -301,7 +301,7 @@ def test_pictures_that_do_not_fit_their_structure(run, refused, picture, tmp_pat
     )
 
 
-def test_files_that_are_none(run, refused, picture, tmp_path):
+def test_missing_and_foreign_files_are_refused(run, refused, picture, tmp_path):
     coded = tmp_path / "a.ii"
     assert run("encode", picture, "--qp", 30, "-o", coded)[0] == 0
     whole = coded.read_bytes()

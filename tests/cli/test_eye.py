@@ -52,6 +52,6 @@ def test_two_eyes_of_a_faulty_display(run, path, tmp_path):
         (["--size", "big"], "two whole numbers"),
     ],
 )
-def test_the_command_refuses(run, refused, path, tmp_path, options, said):
+def test_invalid_options_are_refused(run, refused, path, tmp_path, options, said):
     refused(run("eye", path, *options, "-o", tmp_path / "e.png"), said)
     assert not list(tmp_path.glob("e*.png"))

@@ -86,14 +86,14 @@ def test_support_images_may_share_a_file(run, tmp_path):
     assert run(*SMALL, "-o", tmp_path / "p.png", *both)[0] == 0
 
 
-def test_sheet_and_components_do_not_meet(run, refused, picture, tmp_path):
+def test_components_and_their_sheet_have_different_names(run, refused, picture, tmp_path):
     command = ("components", picture, "-o", tmp_path / "c", "--sheet", tmp_path / "c" / "si_0_0.png")
     refused(run(*command), "is to be written twice")
     assert not (tmp_path / "c").exists()
 
 
 @pytest.mark.parametrize("force", [(), ("--force",)])
-def test_devices_pipes_and_folders_stay_what_they_are(run, refused, picture, tmp_path, force):
+def test_devices_pipes_and_folders_are_never_replaced(run, refused, picture, tmp_path, force):
     pipe, link, folder = tmp_path / "pipe.ii", tmp_path / "null.ii", tmp_path / "folder.ii"
     os.mkfifo(pipe)
     link.symlink_to("/dev/null")
@@ -131,7 +131,7 @@ cli.main()
 """
 
 
-def test_headers_are_held_against_structures_before_decoding(picture, tmp_path):
+def test_sizes_in_headers_are_checked_before_decoding(picture, tmp_path):
     bomb(picture, 40000, 40000)
     write_image(tmp_path / "small.png", np.zeros((32, 64, 3), np.uint8))
     IIPicture(np.zeros((32, 64, 3), np.uint8), (8, 4), (8, 8)).save(tmp_path / "good.png")
@@ -235,7 +235,7 @@ def test_strange_options_are_one_line(run, refused, picture, tmp_path, monkeypat
     refused(run(*command), said)
 
 
-def test_brackets_in_names_are_names(run, picture, tmp_path, monkeypatch):
+def test_brackets_in_names_are_printed_unchanged(run, picture, tmp_path, monkeypatch):
     """They are markup to the library that draws bars and tables."""
     monkeypatch.chdir(tmp_path)  # a long path would be cut at the terminal's width
     for name in ("[bold]", "[red] x", "a[1]", ":smile:"):

@@ -60,7 +60,7 @@ def test_closing_lines_name_wall_and_cpu_time_and_quiet_leaves_nothing(run, pict
     assert code == 0 and out.startswith("Q_global")  # a result, not progress
 
 
-def test_a_bar_in_a_terminal_counts_and_tells_times(monkeypatch, capsys):
+def test_a_bar_in_a_terminal_shows_counts_and_times(monkeypatch, capsys):
     monkeypatch.setattr(progress, "console", lambda **options: console(**options, force_terminal=True, width=80))
     with progress.progress_bar("render [bold] :smile:") as report:  # no markup
         report(128, 128, "tiles")
@@ -107,7 +107,7 @@ def test_coding_reports_frames_and_runs():
 KERNEL = "from ii_core.jit import kernel\n@kernel\ndef double(x):\n    return 2 * x\n"
 
 
-def test_compilation_is_told_once_and_only_where_the_cache_is_cold(tmp_path):
+def test_compilation_is_reported_once_and_only_with_a_cold_cache(tmp_path):
     file = tmp_path / "kernels.py"
     file.write_text(KERNEL)
     told = []

@@ -69,7 +69,7 @@ def test_a_refused_command_leaves_nothing(run, refused, files, monkeypatch, comm
     assert {*files.rglob("*")} == before
 
 
-def test_a_folder_that_was_there_stays(run, refused, files, tmp_path, monkeypatch):
+def test_an_existing_folder_is_kept(run, refused, files, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()
     refused(run("calibrate", files / "even.png", "-o", "empty/cam/deep"), "the picture is even")

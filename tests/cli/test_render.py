@@ -57,7 +57,7 @@ def test_adaptive_samples(run, tmp_path):
         (("--camera", "pinhole2d", "--disparity", "d.exr"), "has no neighbouring lenses"),
     ],
 )
-def test_what_cannot_be_is_one_line(run, refused, tmp_path, monkeypatch, options, said):
+def test_invalid_values_are_one_line(run, refused, tmp_path, monkeypatch, options, said):
     monkeypatch.chdir(tmp_path)
     refused(run(*OBJECTS, "-o", "p.png", *options), said)
     assert list(tmp_path.iterdir()) == []

@@ -57,7 +57,7 @@ def coded(scheme):
 
 @pytest.mark.parametrize("scheme", VIDEOS)
 @pytest.mark.parametrize("gop", [1, 5, 0])
-def test_one_component_is_that_of_the_whole(scheme, gop):
+def test_a_component_decoded_alone_equals_the_whole_picture(scheme, gop):
     """To the bit: a group decodes alone to what it is among the others."""
     stream = coded(f"{scheme}:gop={gop}" if "gop" in find(scheme).options else scheme)
     gop = gop if "gop" in find(scheme).options else 0
@@ -222,7 +222,7 @@ def test_avif_shows_sub_images_in_their_colours(depth, tmp_path):
         ("ei-mpeg2", "360 frames of 16×16 pixels, the image is the upper left 4×3", (16, 16)),
     ],
 )
-def test_what_frames_show_is_said(scheme, said, size, tmp_path):
+def test_extract_reports_the_component_image_within_frames(scheme, said, size, tmp_path):
     """HEVC frames have at least 24×16 pixels; a test compared them with our padded ones and called that the same."""
     stream = encode(picture(30, 3, 4, 3), scheme, qp=20) if scheme == "ri-hevc" else coded(scheme)
     shown = extract(stream, tmp_path / "x.mkv")
@@ -259,7 +259,7 @@ def test_whole_pictures_are_files_that_open(scheme, tmp_path):
             assert (probe(path)["width"], probe(path)["height"]) == picture().size
 
 
-def test_files_it_does_not_go_into(tmp_path):
+def test_unsuitable_containers_are_refused(tmp_path):
     stream = coded("si-h264")
     with pytest.raises(ValueError, match=r"does not go into x\.webm: possible are \.mkv, \.mp4"):
         extract(stream, tmp_path / "x.webm")

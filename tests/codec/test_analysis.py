@@ -81,7 +81,7 @@ def test_a_constant_picture_and_a_single_frame():
     assert len(one.correlation) == 0 and np.isnan(one.mean) and np.isnan(one.energy)
 
 
-def test_a_hair_of_contrast_on_a_bright_frame_counts():
+def test_low_contrast_on_bright_frames_is_not_cancelled():
     """Nothing is lost to cancellation: one code in 16 bits is enough for a correlation."""
     pixels = np.full((1, 4000, 3), 65000, np.uint16)
     pixels[0, 5], pixels[0, 2005] = 65001, 65001

@@ -122,7 +122,7 @@ def test_larger_pictures_decode_by_an_explicit_limit(run, tmp_path):
 
 
 @pytest.mark.parametrize("chroma", ["444", "420"])
-def test_the_least_that_jpeg_writes_is_taken(chroma):
+def test_the_smallest_jpeg_stream_decodes(chroma):
     picture = IIPicture(np.zeros((1024, 1024, 3), np.uint8), (64, 64), (16, 16))
     assert decode(encode(picture, f"jpeg:chroma={chroma}", quality=1)).pixels.max() <= 1  # a rounding of colour
 

@@ -15,7 +15,7 @@ from ii_core import IIPicture
 pytestmark = pytest.mark.skipif(not os.path.isdir(TASKS), reason="only Linux tells the time of each thread")
 
 
-def test_threads_that_are_not_the_encoders_count_nothing():
+def test_cpu_time_excludes_threads_of_others():
     """One has ended since, one is Python's: taken for the encoder's while they were starting, they are told apart."""
     ended = threading.Thread(target=lambda: None)
     ended.start()

@@ -26,7 +26,7 @@ def test_values_come_back_with_their_types(values):
 
 
 @given(st.binary(max_size=40))
-def test_any_bytes_are_refused_or_the_one_form_of_what_they_say(data):
+def test_any_bytes_are_refused_or_in_canonical_form(data):
     try:
         values = read_values(data)
     except ValueError:

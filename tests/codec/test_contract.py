@@ -143,7 +143,7 @@ def test_eight_bits_come_back_to_the_bit(scheme):
 
 
 @pytest.mark.parametrize("scheme", RATED)
-def test_rate_is_met(scheme):
+def test_target_rates_are_met(scheme):
     picture = large()
     coded = encode(picture, quick(scheme), bpp=1.5)
     assert coded.reached
@@ -163,7 +163,7 @@ def test_all_bytes_are_accounted_for(scheme, tmp_path):
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_same_bytes_again_and_beside_itself(scheme):
+def test_coding_is_reproducible_alone_and_in_parallel(scheme):
     picture, asked = textured(), medium(scheme)
     first = encode(picture, quick(scheme), **asked).payload
     with ThreadPoolExecutor(2) as pool:
@@ -223,13 +223,13 @@ def test_pixel_types_it_does_not_take_are_refused(scheme, dtype):
 
 @pytest.mark.parametrize("scheme", RATED)
 @pytest.mark.parametrize("bpp", [0, -1, np.nan, np.inf, True, "0.1"])
-def test_a_rate_that_is_none_is_refused(scheme, bpp):
+def test_invalid_rates_are_refused(scheme, bpp):
     with pytest.raises(ValueError, match=r"bpp is .*: a positive number is needed"):
         encode(textured(), scheme, bpp=bpp)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_exactly_one_way_to_ask_for_quality(scheme):
+def test_exactly_one_goal_is_allowed(scheme):
     coder = find(scheme)
     bounds = {"qp": coder.qp_range, "quality": coder.quality_range, "bpp": (1, 2) if coder.rate_control else None}
     takes = {} if lossless(scheme) else {name: pair for name, pair in bounds.items() if pair is not None}

@@ -48,7 +48,7 @@ def refused(path, data, match):
     assert path.name in str(caught.value)
 
 
-def test_everything_survives_the_file(coded, tmp_path):
+def test_files_round_trip_all_fields(coded, tmp_path):
     path = tmp_path / "coded.ii"
     coded.save(path)
     back = Encoded.load(path)
@@ -79,11 +79,11 @@ def test_truncated_anywhere(coded, whole, tmp_path, version):
         refused(path, data[:length], "no coded II-picture" if length == 0 else "is truncated")
 
 
-def test_longer_than_it_says(whole, tmp_path):
+def test_files_longer_than_stated_are_refused(whole, tmp_path):
     refused(tmp_path / "long.ii", whole + b"\0", "is damaged")
 
 
-def test_foreign(tmp_path):
+def test_foreign_files_are_refused(tmp_path):
     path = tmp_path / "foreign.ii"
     for data in (
         b"\x89PNG\r\n\x1a\n" + bytes(100),
@@ -164,7 +164,7 @@ def test_hundreds_of_mutations_are_found_fast(whole, tmp_path):
     assert time.perf_counter() - started < 10
 
 
-def test_lengths_are_not_believed(whole, tmp_path):
+def test_false_lengths_are_refused(whole, tmp_path):
     path = tmp_path / "bomb.ii"
     for header_length, payload_length, message in (
         (2**32 - 1, 4, "a header of 4294967295 bytes"),
@@ -214,7 +214,7 @@ def structure(**changes):
         {"unheard": 1},
     ],
 )
-def test_headers_with_a_right_checksum_are_not_believed(coded, tmp_path, change):
+def test_false_headers_with_a_correct_checksum_are_refused(coded, tmp_path, change):
     refused(
         tmp_path / "forged.ii",
         first_file(header_of(coded, **change), coded.payload),
@@ -276,12 +276,12 @@ def test_the_good_header_is_good(coded, tmp_path):
         b"",
     ],
 )
-def test_compact_headers_with_a_right_checksum_are_not_believed(coded, tmp_path, header):
+def test_false_compact_headers_with_a_correct_checksum_are_refused(coded, tmp_path, header):
     refused(tmp_path / "forged.ii", forged(header, coded.payload), "forged.ii is damaged")
 
 
 @pytest.mark.parametrize("text", [b"", b"[1]", b"{", b"\xff", b"[" * 100_000, b'{"scheme": "si-h264"}', b"null"])
-def test_headers_that_are_none(tmp_path, text):
+def test_headers_of_other_types_are_refused(tmp_path, text):
     refused(tmp_path / "forged.ii", first_file(text), "forged.ii is damaged")
 
 

@@ -36,7 +36,7 @@ def test_any_structure_comes_back(lenses, ei_pixels, dtype):
     assert psnr(picture, decode(encode(picture, "ei-dct3d", qp=0))) > 50
 
 
-def test_the_third_dimension_pays():
+def test_the_third_dimension_lowers_the_rate():
     """Against the same transform of single elementary images, at the same step and within 0.5 dB."""
     picture = textured((16, 4), (16, 16))
     flat, deep = (encode(picture, f"ei-dct3d:group={group}", qp=20) for group in (1, 8))

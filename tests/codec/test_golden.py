@@ -52,7 +52,7 @@ def coded(scheme):
     return encode(original(), scheme, quality=type(low)((low + high) / 2))
 
 
-def test_one_has_the_compact_header(request):
+def test_one_golden_file_has_the_compact_header(request):
     path = FOLDER / "compact-header.ii"
     if request.config.getoption("--make-golden") and not path.exists():
         compact().save(path)
@@ -67,7 +67,7 @@ def test_one_has_the_compact_header(request):
 
 
 @pytest.mark.parametrize("scheme", sorted(schemes()))
-def test_every_scheme_has_one(scheme, request):
+def test_every_scheme_has_a_golden_file(scheme, request):
     path = FOLDER / f"{scheme}.ii"
     if request.config.getoption("--make-golden") and not path.exists():
         made = coded(scheme)
@@ -106,5 +106,5 @@ def test_old_ray_space_images_keep_their_order():
     assert Encoded.load(FOLDER / "compact-header.ii").options["by"] == "rows"
 
 
-def test_they_stay_small():
+def test_golden_files_are_small():
     assert sum(path.stat().st_size for path in FOLDER.iterdir()) < TOTAL_BYTES

@@ -97,13 +97,13 @@ def test_fewer_frames_fewer_header_bits_just_as_predicted(side):
     assert si_below_ri(lenses, ei) == (side < 16) == (bits["si"] < bits["ri"])
 
 
-def test_limits_of_the_dissertations_setups():
+def test_header_limits_of_figure_5_12():
     """Figure 5.12: 16², 32² and 64² pixel elementary images of 8192×4096, not 128² and 256²."""
     below = [si_below_ei((8192 // side, 4096 // side), (side, side)) for side in (16, 32, 64, 128, 256)]
     assert below == [True, True, True, False, False]
 
 
-def test_streams_that_are_none():
+def test_invalid_streams_are_refused():
     coded = encode(picture(), "si-h264", qp=30)
     with pytest.raises(ValueError, match="are not parsed: known are those of h264"):
         parts(encode(picture(), "jpeg2000", bpp=1))

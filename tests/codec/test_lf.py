@@ -97,7 +97,7 @@ def test_disparities_of_the_sides_are_within_the_range():
     assert low <= -4 * 256 and high == ranges.MARGIN
 
 
-def test_sky_tells_no_disparity():
+def test_flat_sky_determines_no_disparity():
     """Above a textured ground that does not move, flat sky fits at every disparity."""
     field = shifted_plane((0, 0), grid=(3, 3), height=48, width=48)
     pixels = field.pixels.copy().reshape(48, 3, 48, 3, 3)

@@ -36,7 +36,7 @@ def round_trip(bits, contexts, numbers):
     st.lists(st.tuples(st.integers(0, 1), st.integers(0, 3)), max_size=300),
     st.lists(st.integers(0, (1 << 23) - 1), max_size=20),
 )
-def test_what_is_written_is_read(bits, numbers):
+def test_coded_bits_and_numbers_round_trip(bits, numbers):
     pairs = np.array(bits, np.int64).reshape(-1, 2)
     round_trip(pairs[:, 0].copy(), pairs[:, 1].copy(), np.array(numbers, np.int64))
 
@@ -60,7 +60,7 @@ def test_the_length_is_near_the_entropy():
     assert len(data) < 1.025 * entropy
 
 
-def test_a_reader_of_nothing_notices():
+def test_a_reader_detects_the_end_of_the_code():
     coder = arithmetic.reader(arithmetic.new_contexts(12), b"")
     bits = np.zeros(4000, np.int64)
     coded(coder, bits, np.arange(4000) % 4, np.full(20, 5))

@@ -11,7 +11,7 @@ from ii_core import IIPicture
 PICTURE = IIPicture(np.zeros((4, 4, 3), np.uint8), (2, 2), (2, 2))
 
 
-def test_schemes_tell_their_options_and_defaults():
+def test_schemes_list_their_options_and_defaults():
     told = schemes()
     assert set(told) >= {"ei-h264", "si-h264", "ri-h264", "jpeg2000"}
     for name, line in told.items():
@@ -29,7 +29,7 @@ def test_options_default_and_override():
     assert parse_scheme("jpeg2000")[1] == {}
 
 
-def test_presets_name_options_and_give_way_to_others():
+def test_options_override_presets():
     fast, found = find("si-av1").presets["fast"], parse_scheme("si-av1:preset=5,fast,gop=32")[1]
     assert found["gop"] == 32
     assert found["preset"] == 5 != fast["preset"]
@@ -64,7 +64,7 @@ def test_presets_name_options_and_give_way_to_others():
         ("si-h264:gop=2.5", "option gop is '2.5'"),
     ],
 )
-def test_what_is_wrong_is_said(scheme, message):
+def test_invalid_schemes_are_named(scheme, message):
     with pytest.raises(ValueError) as caught:
         encode(PICTURE, scheme, bpp=1)
     assert message in str(caught.value)
@@ -92,7 +92,7 @@ def test_options_are_keywords_too():
         ("si-av1", {"preset": "swift"}, "option preset is 'swift': a whole number from 0 to 7 is needed"),
     ],
 )
-def test_what_is_wrong_with_keywords_is_said(scheme, keywords, message):
+def test_invalid_keywords_are_named(scheme, keywords, message):
     with pytest.raises(ValueError) as caught:
         encode(PICTURE, scheme, bpp=1, **keywords)
     assert message in str(caught.value)

@@ -26,7 +26,7 @@ class Fake:
         return len(found.run.payload), found.runs
 
 
-def test_an_obedient_coder_runs_once():
+def test_a_proportional_coder_runs_once():
     assert Fake(lambda ask: ask).search(1000) == (1000, 1)
 
 
@@ -38,7 +38,7 @@ def test_a_proportional_miss_is_corrected_once(error):
 
 
 @pytest.mark.parametrize("power", [0.6, 1.6])
-def test_a_crooked_coder_is_met_within_the_reruns(power):
+def test_a_nonlinear_coder_meets_the_target_within_the_runs(power):
     size, runs = Fake(lambda ask: 1.15 * 10_000 * (ask / 10_000) ** power).search(10_000)
     assert abs(size - 10_000) <= 200
     assert runs <= 4
@@ -49,7 +49,7 @@ def test_a_floor_is_settled_by_one_run_at_it():
     assert coder.search(1000) == (4900, 2)
 
 
-def test_a_ceiling_close_by_is_noticed_when_asking_more_gives_no_more():
+def test_a_ceiling_near_the_target_is_found_in_three_runs():
     coder = Fake(lambda ask: min(ask, 900), finest=905)
     assert coder.search(1000) == (905, 3)
 
@@ -65,7 +65,7 @@ def test_a_limit_beyond_the_target_does_not_end_the_search():
     assert abs(size - 10_000) <= 200
 
 
-def test_a_coder_that_never_obeys_is_left_alone_in_time():
+def test_an_erratic_coder_ends_the_search_after_its_runs():
     sizes = iter([1100, 950, 1060, 930, 0, 0])
     size, runs = Fake(lambda ask: next(sizes)).search(1000)
     assert size == 950
@@ -114,7 +114,7 @@ def test_no_bracket_where_all_sizes_lie_on_one_side():
 
 @pytest.mark.parametrize(("octave", "step"), [(3.0, 0.0), (-3.0, 0.0), (7.0, 1.0), (-7.0, 1.0), (-9.0, 0.25)])
 @given(st.floats(100, 1e6), st.floats(0.5, 2.0))
-def test_one_search_serves_both_directions_and_whole_and_real_settings(octave, step, target, slope):
+def test_search_over_rising_falling_whole_and_real_settings(octave, step, target, slope):
     """The mirrored axis is searched by the mirrored settings; on a grid the result is one of the two neighbours."""
 
     def size(setting):
@@ -176,13 +176,13 @@ def test_larger_settings_may_be_coarser():
 
 
 @pytest.mark.parametrize(("target", "kept"), [(1, 100), (5e-324, 100), (1e9, 6400), (np.inf, 6400)])
-def test_ends_are_kept_for_what_lies_beyond(target, kept):
+def test_targets_beyond_the_range_take_its_ends(target, kept):
     found, runs = search(lambda db: 100 * 2 ** (db / 10), target, **DB)
     assert found == kept
     assert runs <= 6
 
 
-def test_what_is_finer_than_the_finest_setting_is_tried_where_it_may_help():
+def test_lossless_coding_is_tried_beyond_the_finest_setting():
     def best():
         return Run(range(9000), 0.0)
 
@@ -195,7 +195,7 @@ def test_what_is_finer_than_the_finest_setting_is_tried_where_it_may_help():
     assert search(size, 3200, **DB, finest=lambda: pytest.fail("not needed"))[0] == pytest.approx(3200, rel=0.02)
 
 
-def test_a_coder_that_jumps_past_the_target_is_left_alone_in_time():
+def test_a_coder_that_jumps_past_the_target_ends_the_search():
     found, runs = search(lambda db: 100 if db < 31.4 else 900, 500, **DB)
     assert found in (100, 900)
     assert runs <= Axis(**DB).runs

@@ -97,7 +97,7 @@ def test_frames_on_their_side():
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
 @pytest.mark.parametrize("more", [(0, 0), (1, 1), (5, 3)])
 @pytest.mark.parametrize("ei_pixels", [(5, 3), (1, 1), (4, 2)])
-def test_frames_filled_up_repeat_their_edge_and_come_back(form, more, ei_pixels):
+def test_padded_frames_repeat_their_edge_and_round_trip(form, more, ei_pixels):
     """Values that 4:2:0 keeps: a grey ramp."""
     u, v = ei_pixels
     top = 65535 if form == RGB16 else 255
@@ -186,7 +186,7 @@ def test_chroma_is_interpolated_between_the_middles():
     assert np.abs(out[..., 0] - (128 + 1.5748 * (expected - 128))).max() < 0.6
 
 
-def test_conversion_rounds_like_real_numbers():
+def test_conversion_is_rounded_to_nearest():
     rgb = np.random.default_rng(1).integers(0, 256, (4000, 3), np.uint8)
     there, back = convert(rgb)
     r, g, b = rgb.T.astype(float)

@@ -79,7 +79,7 @@ def test_a_constant_picture_is_its_means(value, asked):
     assert len(coded.payload) == CONSTANT
 
 
-def test_a_large_picture_of_nothing_takes_the_bytes_that_vouch_for_it():
+def test_a_large_constant_picture_has_the_least_payload():
     picture = IIPicture(np.zeros((1024, 1024, 3), np.uint8), (64, 64), (16, 16))
     coded = encode(picture, "si-sperr", quality=40)
     assert len(coded.payload) == 1024**2 // sperr.PIXELS_A_BYTE
@@ -95,7 +95,7 @@ def test_one_slice_is_coded_as_two():
     assert psnr(picture, decoded) == pytest.approx(40, abs=0.3)
 
 
-def test_it_is_no_sequence_of_frames():
+def test_volumes_decode_no_frames():
     with pytest.raises(ValueError, match="scheme si-sperr codes the picture as a whole"):
         decode_frame(encode(textured(), "si-sperr", quality=20), 0)
 
@@ -110,7 +110,7 @@ def test_it_is_no_sequence_of_frames():
         (30, 0.0, "a step 0"),
     ],
 )
-def test_a_header_that_lies_is_refused(at, value, said):
+def test_false_headers_are_refused(at, value, said):
     coded = encode(textured(), "si-sperr", quality=30)
     payload = bytearray(coded.payload)
     struct.pack_into("<f", payload, at, value)
@@ -118,7 +118,7 @@ def test_a_header_that_lies_is_refused(at, value, said):
         decode(replace(coded, payload=bytes(payload)))
 
 
-def test_what_ends_the_library_ends_not_this_process(monkeypatch):
+def test_an_abort_of_the_library_does_not_end_this_process(monkeypatch):
     """A whole stream of another size makes the library abort."""
     part = sperr_stream.encode_volume(field(), 4.0)
     monkeypatch.setattr(sperr_stream, "_with_header", lambda part, shape: b"\0" * 40)

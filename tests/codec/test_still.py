@@ -44,7 +44,7 @@ def test_subsampled_colour_costs_less_and_is_worse():
     assert psnr(large(), decode(less)) < psnr(large(), decode(full)) - 1
 
 
-def test_what_jpeg_cannot_count_is_refused():
+def test_pictures_beyond_jpeg_sizes_are_refused():
     picture = IIPicture(np.zeros((1, 70_000, 3), np.uint8), (70_000, 1), (1, 1))
     with pytest.raises(ValueError, match="70000×1 pixels: JPEG takes 65500"):
         encode(picture, "jpeg", quality=50)
@@ -60,7 +60,7 @@ def test_jpegxl_distances_are_libjxls():
 @pytest.mark.parametrize(
     "size", [(1, 1), (8, 8), (9, 8), (256, 256), (264, 256), (200, 100), (4096, 3), (70, 1025), (16, 9)]
 )
-def test_jpegxl_says_its_size(size):
+def test_size_of_a_jpegxl_codestream(size):
     stream = imagecodecs.jpegxl_encode(np.zeros((size[1], size[0], 3), np.uint8), usecontainer=False, effort=1)
     assert jpegxl_size(stream) == size
     assert jpegxl_size(b"\xff\xd8" + stream) is None
@@ -94,7 +94,7 @@ def test_another_size_than_the_structures_is_refused(scheme):
         decode(replace(coded, payload=other.payload))
 
 
-def test_an_av1_stream_is_taken_out_of_its_boxes_whole():
+def test_the_av1_stream_of_an_avif_file_is_complete():
     frames = np.random.default_rng(0).integers(0, 256, (5, 16, 24, 3), np.uint8)
     for some in (frames, frames[:1]):
         boxes = bytes(imagecodecs.avif_encode(some, 60, codec="aom", numthreads=1))
@@ -114,7 +114,7 @@ def test_libaom_keeps_all_of_the_colour():
     assert psnr(picture, less) < 25
 
 
-def test_what_openjph_only_prints_is_an_error(capfd):
+def test_errors_that_openjph_only_prints_are_raised(capfd):
     """Its binding would print twice and hand out a picture with whatever the memory held."""
     coded, rng = encode(textured(16, 8, 4, 4), "htj2k", qp=20), np.random.default_rng(0)
     refused = 0

@@ -125,7 +125,7 @@ def test_a_short_last_segment_counts_as_long_as_it_is():
         ({"group": 5}, "group is 5 views: a divisor of their number 12"),
     ],
 )
-def test_what_is_no_plan(change, named):
+def test_invalid_plans_are_refused(change, named):
     with pytest.raises(ValueError, match=named):
         Plan(**change).check(12)
 
@@ -190,7 +190,7 @@ def test_a_target_rate_is_met_over_the_take(rate):
     assert coded.reached and abs(coded.bpp / 0.6 - 1) <= 0.02
 
 
-def test_time_is_used():
+def test_a_still_take_costs_less_than_its_pictures():
     """A still take costs far less than its pictures one by one."""
     still = video_of([take(1)[0]] * 8)
     single = encode_take(still, "si-h264", qp=28, plan=Plan(span=1))
@@ -204,7 +204,7 @@ def test_time_is_used():
     ("si-h264", {"qp": 30, "plan": Plan(group=5)}, "divisor"),
     ("si-avif", {"qp": 30, "plan": Plan(group=3)}, "no groups of pictures"),
 ])  # fmt: skip
-def test_what_cannot_be_coded(scheme, options, named):
+def test_uncodable_takes_are_refused(scheme, options, named):
     with pytest.raises(ValueError, match=named):
         encode_take(take(2), scheme, **options)
 
@@ -220,7 +220,7 @@ def saved(tmp_path_factory):
     return coded, path
 
 
-def test_a_file_holds_everything(saved):
+def test_files_of_takes_round_trip(saved):
     coded, path = saved
     again = EncodedTake.load(path)
     for name in ("scheme", "options", "structure", "dtype", "frames", "fps", "plan", "segments", "qp"):
@@ -247,7 +247,7 @@ def test_frames_before_the_damage_are_decoded_if_asked_for(saved, tmp_path):
             np.testing.assert_array_equal(video[frame].pixels, open_take(coded)[frame].pixels)
 
 
-def test_any_cut_and_any_flipped_byte_is_noticed(saved, tmp_path):
+def test_truncation_and_flipped_bytes_are_detected(saved, tmp_path):
     _, path = saved
     data, file = path.read_bytes(), tmp_path / "bad.ii"
     rng = np.random.default_rng(0)

@@ -22,7 +22,7 @@ def slices(payload):
     return units, "".join(av.video.frame.PictureType(frame.pict_type).name for frame in frames)
 
 
-def test_one_i_picture_then_p_only_and_no_message_to_the_reader():
+def test_default_stream_is_one_i_picture_then_p_pictures_without_messages():
     units, types = slices(encode(textured(), "si-h264", qp=30).payload)
     assert types == "I" + 63 * "P"
     assert units[:3] == [7, 8, 5]
@@ -84,7 +84,7 @@ def test_quality_follows_the_quantiser():
     assert qualities[0] > qualities[1] > qualities[2]
 
 
-def test_one_frame_serves_for_all():
+def test_reusing_one_frame_object_does_not_change_bytes():
     """The encoder's bytes are those it makes from frames of their own, one object each, kept alive."""
     picture = textured()
     coded = encode(picture, "si-h264:bframes=3", qp=30)
@@ -113,7 +113,7 @@ def test_one_frame_serves_for_all():
     assert b"".join(chunks) == coded.payload
 
 
-def test_the_message_is_cut_out_and_nothing_else():
+def test_only_the_sei_message_is_removed():
     sps, pps, idr = b"\0\0\0\1\x67abc", b"\0\0\0\1\x68de", b"\0\0\1\x65slice\0\0\3\1"
     assert without_sei(sps + pps + b"\0\0\1\x06x264" + idr) == sps + pps + idr
     assert without_sei(b"\0\0\0\1\x06x264" + idr) == idr
@@ -121,7 +121,7 @@ def test_the_message_is_cut_out_and_nothing_else():
 
 
 @pytest.mark.parametrize("more", [1.0, 1.2, 1.4])
-def test_rate_control_buys_nothing_worse_than_lossless_for_more_bytes(more):
+def test_high_target_rates_take_lossless_coding(more):
     """At 4:4:4 the quantisers from 1 up take more than lossless coding does."""
     lossless = encode(large(), "ei-h264", qp=0)
     coded = encode(large(), "ei-h264", bpp=more * lossless.bpp)

@@ -26,7 +26,7 @@ def test_planes_come_back_exactly_and_others_read_the_codestream(dtype):
 
 @pytest.mark.parametrize("wavelet", ["5/3", "9/7"])
 @pytest.mark.parametrize("error", [4.0, 100.0, 2500.0])
-def test_the_error_over_all_planes_is_the_one_asked_for(wavelet, error):
+def test_the_error_over_all_planes_meets_its_target(wavelet, error):
     """A rough plane beside smooth ones: one slope for all, not one error."""
     rng = np.random.default_rng(1)
     planes = np.cumsum(np.cumsum(rng.standard_normal((4, 128, 128)), 1), 2) * np.array([1, 1, 4, 30])[:, None, None]
@@ -54,7 +54,7 @@ def dtype_scale(dtype):
     return np.array({"uint8": 1, "uint16": 257}[dtype], dtype)
 
 
-def test_the_wavelet_along_the_slices_is_worth_it():
+def test_the_wavelet_along_the_slices_lowers_the_rate():
     picture = large()
     volume, alone = (encode(picture, s, quality=32) for s in ("si-jp3d", "si-jpeg2000"))
     assert volume.nbytes < 0.9 * alone.nbytes
@@ -81,7 +81,7 @@ def test_more_slices_than_a_codestream_holds_make_several_volumes():
         decode(replace(coded, payload=coded.payload + b"\0"))
 
 
-def test_more_than_lossless_takes_is_lossless():
+def test_rates_above_lossless_coding_are_lossless():
     picture = textured(16, 8, 4, 4)
     coded = encode(picture, "si-jp3d", bpp=100)
     np.testing.assert_array_equal(decode(coded).pixels, picture.pixels)
@@ -122,7 +122,7 @@ def test_a_constant_picture_costs_little_and_comes_back(value):
         (24 + 9, 31, "coding style"),  # levels
     ],
 )
-def test_a_header_that_lies_is_refused(at, value, said):
+def test_false_headers_are_refused(at, value, said):
     coded = encode(textured(16, 8, 4, 4), "si-jp3d", quality=30)
     payload = bytearray(coded.payload)
     payload[at] = value

@@ -168,7 +168,7 @@ def test_every_page_is_in_the_site():
 
 
 @pytest.mark.parametrize("package", [ii_core, raytrace_ii, codec, metrics])
-def test_every_public_function_and_class_says_what_it_is(package):
+def test_every_public_name_has_a_docstring(package):
     """The reference shows no name without a docstring."""
     public = {name: getattr(package, name) for name in package.__all__}
     assert not [name for name, value in public.items() if callable(value) and not value.__doc__]

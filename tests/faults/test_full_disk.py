@@ -128,12 +128,12 @@ def outcomes(tmp_path_factory):
     return {line["name"]: line["found"] for line in map(json.loads, done.stdout.splitlines())}
 
 
-def test_every_writer_is_asked(outcomes):
+def test_every_writer_is_tested(outcomes):
     assert set(outcomes) == set(NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_full_disk_is_said_and_no_broken_file_left(outcomes, name):
+def test_a_full_disk_is_reported_and_no_broken_file_is_left(outcomes, name):
     for outcome in outcomes[name]:
         assert outcome["broken"] == [], outcome
         assert outcome["said"] and "cannot write" in outcome["said"] and "Error(" not in outcome["said"], outcome
@@ -186,7 +186,7 @@ render_sets.render_set("reference", Path("."), [preset("setup1", scale=64)], pos
 """
 
 
-def test_a_set_takes_no_broken_file_for_done(tmp_path):
+def test_a_set_renders_broken_files_again(tmp_path):
     done = subprocess.run([sys.executable, "-c", SET, "12000"], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 1 and "cannot write" in done.stderr
     assert not list(tmp_path.iterdir())  # nothing is done: the manifest goes too

@@ -73,7 +73,7 @@ def test_foreign_files(package):
     assert call(package, "old.kernels") == ["42", "0"]
 
 
-def test_a_cache_that_takes_nothing(package):
+def test_a_cache_that_cannot_be_written(package):
     limited = package / "limited.py"
     limited.write_text("import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n" + KERNEL)
     assert call(package, "limited") == ["42", "0"]

@@ -32,7 +32,7 @@ def picture(lenses=(8, 4), value=None):
 
 
 @pytest.mark.parametrize("end", [".png", ".tif", ".exr", ".hdr"])
-def test_a_pair_holds_together(tmp_path, end):
+def test_picture_and_sidecar_are_bound(tmp_path, end):
     path = tmp_path / f"p{end}"
     one = picture() if end in (".png", ".tif") else picture().with_pixels(np.zeros((32, 64, 3), np.float32) + 0.3)
     one.save(path)
@@ -163,7 +163,7 @@ NEXT = "import sys; from ii_core.files import write_json; write_json(sys.argv[1]
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /proc to tell the dead from the living")
-def test_remains_of_dead_runs_are_removed_and_those_of_the_living_are_not(tmp_path):
+def test_only_temporary_files_of_dead_processes_are_removed(tmp_path):
     mine = tmp_path / ".mine.ii-tmp-notes.txt"
     mine.write_text("a user's")
     dead = subprocess.run([sys.executable, "-c", DIES, tmp_path / "a.txt", "dies"], capture_output=True, text=True)
@@ -205,7 +205,7 @@ def test_a_link_stays_a_link(tmp_path):
 
 
 @pytest.mark.slow
-def test_threads_at_once_give_what_they_give_alone():
+def test_parallel_calls_give_the_same_results():
     camera = preset("setup1", scale=128)
     names = ("objects", "cuboid", "apples", "objects")
 

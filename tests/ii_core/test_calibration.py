@@ -122,7 +122,7 @@ def test_the_picture_itself_serves_in_place_of_a_white_image():
 
 
 @pytest.mark.parametrize("depth", [12, 40, 100])
-def test_micro_images_without_borders_are_refused_rather_than_misjudged(depth):
+def test_micro_images_without_borders_are_refused(depth):
     """Behind pinholes the content repeats from lens to lens by more than the pitch, and borders are edges alone."""
     camera = preset("plenoptic", scale=8)
     L, D = camera.rays()
@@ -259,7 +259,7 @@ def test_marks_stand_on_centres(tmp_path):
     assert back.camera == found.camera and not back.regular
 
 
-def test_lens_types_that_take_turns_are_told():
+def test_alternating_lens_types_are_reported():
     """A 2×2 pattern of sharp and blurred lenses, as of multi-focus arrays."""
     camera, _ = shot(12, size=(500, 500), pitch=16.0)
     rng = np.random.default_rng(3)

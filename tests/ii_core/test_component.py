@@ -24,7 +24,7 @@ def make(lenses, ei_pixels, dtype="uint16"):
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=40, deadline=None)  # the first call compiles
 @given(k=side, l=side, u=side, v=side, dtype=st.sampled_from(["uint8", "uint16", "float32"]))
-def test_there_and_back_is_the_identity(kind, k, l, u, v, dtype):
+def test_rearrangements_are_invertible(kind, k, l, u, v, dtype):
     source = make((k, l), (u, v), dtype)
     stack = component_images(source, kind)
     back = picture_pixels(stack, kind)

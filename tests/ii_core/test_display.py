@@ -43,7 +43,7 @@ def test_a_view_with_one_pixel_a_lens_is_the_view_image(apples, erect):
         assert np.abs(got - wanted)[valid].max() <= 1  # halves are rounded up here, to even there
 
 
-def test_what_lies_on_the_plane_in_focus_is_sharp():
+def test_the_plane_in_focus_is_sharp():
     """Stripes on a plane: focused there a wide aperture changes nothing, focused elsewhere it blurs."""
     k, l, u, shift = 64, 4, 5, 2
     camera = IICamera(pixels=(k * u, l * u), lenses=(k, l), pixel_pitch_mm=0.01, gap_mm=0.2)
@@ -173,7 +173,7 @@ def test_command_refuses(run, refused, apples, tmp_path, arguments, said):
     assert not list(tmp_path.glob("a*"))
 
 
-def test_command_makes_them(run, apples, tmp_path):
+def test_the_command_writes_displays(run, apples, tmp_path):
     apples.save(tmp_path / "p.png")
     for kind in ("quilt", "lenticular", "simulation"):
         assert (

@@ -280,7 +280,7 @@ def test_a_pupil_larger_than_a_lens_and_an_eye_outside_the_zone_are_defined():
         ({"camera": preset("spherical", scale=8)}, "spherical-lenslet"),
     ],
 )
-def test_the_display_refuses(change, said):
+def test_invalid_displays_are_refused(change, said):
     with pytest.raises(ValueError, match=said):
         DisplayModel(**{"camera": camera(), **change})
 
@@ -294,12 +294,12 @@ def test_the_display_refuses(change, said):
         ({"focus_mm": 0.0}, "focus_mm"),
     ],
 )
-def test_the_eye_refuses(change, said):
+def test_invalid_eyes_are_refused(change, said):
     with pytest.raises(ValueError, match=said):
         Eye(**{"position_mm": (0.0, 0.0, -5.0), **change})
 
 
-def test_what_cannot_be_seen_is_refused():
+def test_invalid_views_of_an_eye_are_refused():
     made = camera()
     with pytest.raises(ValueError, match="not before the lens plane"):
         eye_image(noise(made), DisplayModel(camera=made), Eye(position_mm=(0.0, 0.0, 0.2)))

@@ -111,7 +111,7 @@ def test_view_zero_of_a_quilt_is_the_leftmost_and_lies_bottom_left(tmp_path):
     same(picture_of(find_views(tmp_path / f"q_qs{tiles.shape[1]}x{tiles.shape[0]}a1.png"))[0], picture)
 
 
-def test_what_tiles_leave_over_is_cut_off_at_the_right_and_the_top(tmp_path):
+def test_quilts_are_cropped_at_the_right_and_the_top(tmp_path):
     quilt = np.zeros((5, 7, 3), np.uint8)
     quilt[1:, :6] = 9
     write_image(tmp_path / "q_qs3x2a1.png", quilt)
@@ -208,7 +208,7 @@ def test_places_alone_settle_views_without_detail(tmp_path, order):
     assert given.flip_across != order["flip_across"]  # what is given wins
 
 
-def test_without_detail_nothing_is_seen_and_that_is_said():
+def test_views_without_detail_have_an_unknown_order_that_is_reported():
     flat = estimate(lambda a, b: np.full((40, 60, 3), 77, np.uint8), (4, 5), Arrangement())
     assert flat == Arrangement() and flat.describe().endswith("then left to right (assumed)")
 
@@ -348,7 +348,7 @@ def test_hci_with_wrong_parameters(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"ei_pixels": 3}'])
-def test_a_structure_that_is_none(folder, text):
+def test_invalid_structures_are_refused(folder, text):
     (folder / "structure.json").write_text(text)
     refuse("is no structure of an II-picture", folder)
 
@@ -383,7 +383,7 @@ def test_disparity_needs_a_camera_and_its_own_depth(shot, tmp_path):
         ("setup3", (64, 64), False),
     ],
 )
-def test_import_says_what_is_cut_and_what_looks_hexagonal(tmp_path, camera, ei_pixels, hexagonal):
+def test_import_warns_of_cropping_and_hexagonal_lenses(tmp_path, camera, ei_pixels, hexagonal):
     made = render(load_scene("twins"), preset(camera, scale=5 if camera == "hdtv" else 8), support=())
     height, width = made.picture.pixels.shape[:2]
     (u, v), source = ei_pixels, tmp_path / "raw.png"

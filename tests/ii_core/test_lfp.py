@@ -78,7 +78,7 @@ def test_packed_samples_come_back(bits, seed):
 
 @pytest.mark.parametrize("second", [False, True])
 @pytest.mark.parametrize("bits", [10, 12])
-def test_a_container_tells_samples_mosaic_and_camera(tmp_path, bits, second):
+def test_a_container_holds_samples_mosaic_and_camera(tmp_path, bits, second):
     samples = np.random.default_rng(1).integers(0, 1000, (12, 16))
     (tmp_path / "a.lfp").write_bytes(container(samples, bits, second=second))
     raw = read_lfp(tmp_path / "a.lfp")

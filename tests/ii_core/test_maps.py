@@ -155,7 +155,7 @@ def test_extents_of_zero_and_huge_ones(tmp_path):
             np.testing.assert_allclose(stored.stored_rays(0)[0], L, rtol=1e-12)  # every value is an end of its box
 
 
-def test_integers_are_what_the_sheet_says(tmp_path):
+def test_integer_maps_are_scaled_by_the_sheet(tmp_path):
     write_maps([SMALL], tmp_path, format="png16")
     sheet = json.loads((tmp_path / "camera.json").read_text())
     entry = sheet["arrays"][0]["samples"][0]["D"]
@@ -202,7 +202,7 @@ def test_missing_and_mismatched_images(tmp_path):
         read_maps(tmp_path)
 
 
-def test_what_cannot_be_stored(tmp_path):
+def test_unstorable_cameras_are_refused(tmp_path):
     with pytest.raises(ValueError, match="unknown format 'bmp': known are png16"):
         write_maps([SMALL], tmp_path, format="bmp")
     with pytest.raises(ValueError, match="differ in pixels or lenses"):

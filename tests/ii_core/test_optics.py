@@ -76,7 +76,7 @@ def test_gap_of_the_focal_length_makes_parallel_rays():
 
 
 @pytest.mark.parametrize("side", [-1, 1])
-def test_nothing_happens_as_the_gap_passes_the_focal_length(side):
+def test_rays_are_continuous_at_a_gap_of_the_focal_length(side):
     u = under(0.12, -0.07, *disk())
     _, parallel = columns(Lenslet(focal_mm=GAP, aperture_mm=0.3).leave(u))
     for off in (1e-1, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15):
@@ -376,7 +376,7 @@ def test_rays_that_enter_beside_their_lenslet_are_blocked():
     assert (abs(bundle.lx) < 0.2).all() and bundle.weight.tolist() == [0, 1]
 
 
-def test_hexagonal_lenslets_own_what_is_nearest():
+def test_hexagonal_lenslets_own_the_nearest_points():
     lens = SphericalLenslet(radius_mm=0.4, ior=1.5, aperture_mm=0.6)
     for ratio in (0.3, math.sqrt(3) / 2, 2.0):
         cell = (0.4, 0.4 * ratio)
@@ -428,7 +428,7 @@ def test_moving_lenslets_interleave_evenly():
     assert len(pairs) == 4 * 32 * 16  # every place is taken once
 
 
-def test_multi_view_cameras_stand_where_they_are_said_to():
+def test_positions_of_multi_view_cameras():
     for scale in (1, 8):
         cameras = preset_cameras("multi-view", scale=scale)
         L = np.array([camera.rays_at(0, 0)[0] for camera in cameras])
@@ -524,7 +524,7 @@ def test_scale_keeps_every_plane_in_focus(name, scale):
             assert found[key] == pytest.approx(plane, rel=1e-8), key
 
 
-def test_presets_focus_where_they_say():
+def test_focus_planes_of_presets_in_closed_form():
     # Closed form, z from the pixels: Λ + 40; 1/b = 1/50 − 1/(85 − Λ − 10); 1/b = 1/50 − 1/(75 − Λ).
     for name, planes in {
         "resolution-priority": [40.182687],

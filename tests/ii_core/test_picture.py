@@ -72,7 +72,7 @@ def test_pixels_in_any_memory_order_are_written(tmp_path):
         ("", "uint8", "is no known picture type"),
     ],
 )
-def test_types_that_would_lose_are_refused(tmp_path, suffix, dtype, message):
+def test_lossy_pixel_types_are_refused(tmp_path, suffix, dtype, message):
     with pytest.raises(ValueError, match=re.escape(message)):
         picture(dtype).save(tmp_path / f"p{suffix}")
     assert not list(tmp_path.iterdir())

@@ -309,7 +309,7 @@ def test_every_camera_has_a_report(name):
         assert p["characteristic_per_mm"] == pytest.approx(p["pixels_per_mm"], rel=1e-9)
 
 
-def test_report_says_what_is_particular():
+def test_reports_mention_special_elements():
     assert "No parallax down" in design.report(preset("hpo"))
     assert "Not regular" in design.report(preset("hdtv")) and "under no lens" in design.report(preset("hdtv"))
     assert "40 mm from the lenses" in design.report(preset("resolution-priority"))

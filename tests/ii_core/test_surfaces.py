@@ -154,7 +154,7 @@ def test_published_focal_lengths():
     y=st.floats(-2, 2),
     slope=st.floats(-0.1, 0.1),
 )
-def test_light_takes_the_same_way_back(values, y, slope):
+def test_rays_are_reversible(values, y, slope):
     # Turned about, with radii of the other sign, a lens sends the reversed ray back to where it came from.
     surfaces = []
     for radius, hollow, n, conic, thickness in values:
@@ -290,7 +290,7 @@ def test_glasses_have_their_catalogue_values():
     assert glass("SK16") == CATALOGUE["N-SK16"]
 
 
-def test_index_and_abbe_number_are_what_they_say():
+def test_index_and_abbe_number_of_a_glass():
     made = Glass(ior=1.62, abbe=36.4)
     assert made.index(587.5618) == pytest.approx(1.62, abs=1e-15)
     assert 0.62 / (made.index(LINE_F_NM) - made.index(LINE_C_NM)) == pytest.approx(36.4, rel=1e-12)

@@ -62,7 +62,7 @@ def test_access_by_time_and_view():
     (lambda v: v.component(0, "xi", (0, 0)), ValueError), (lambda v: v.component(0, "si", (16, 0)), ValueError),
     (lambda v: video_of([]), ValueError), (lambda v: video_of([v[0]], fps=0), ValueError),
 ])  # fmt: skip
-def test_what_is_not_there(call, error):
+def test_missing_frames_and_views_are_refused(call, error):
     with pytest.raises(error):
         call(video_of(pictures(3)))
 

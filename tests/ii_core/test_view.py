@@ -178,7 +178,7 @@ def test_ties_go_right_and_down():
         ((0, 0, 5.0), "viewpoint z 5 mm"),
     ],
 )
-def test_viewpoints_that_are_none(viewpoint, message):
+def test_invalid_viewpoints_are_refused(viewpoint, message):
     with pytest.raises(ValueError, match=message):
         view_image(coded(), viewpoint)
 

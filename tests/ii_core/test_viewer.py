@@ -37,7 +37,7 @@ def psnr(a, b):
 PLACES = [(0, 0, 1), (0.7, -0.3, 1), (-1, 1, 1), (1.8, 0, 1), (0.2, 0.1, 0.5)]
 
 
-def test_every_place_shows_its_view_image(show, shot, tmp_path):
+def test_every_viewpoint_shows_its_view_image(show, shot, tmp_path):
     write_viewer(tmp_path / "v.html", shot.picture, quality=None)
     tab = show(tmp_path / "v.html")
     for x, y, r in PLACES:
@@ -320,7 +320,7 @@ def test_a_damaged_link_is_ignored(show, shot, tmp_path):
     assert (state["x"], state["r"], state["stereo"], state["mode"]) == (0, 0.35, "off", "original")
 
 
-def test_a_lost_card_is_told(show, shot, tmp_path):
+def test_a_lost_graphics_card_is_reported(show, shot, tmp_path):
     write_viewer(tmp_path / "v.html", shot.picture)
     tab = show(tmp_path / "v.html")
     assert not tab.locator("#failure").is_visible()
@@ -354,7 +354,7 @@ def test_the_largest_picture(show, tmp_path):
     assert psnr(shown, view_image(picture, viewpoint)[0]) >= 35
 
 
-def test_command_refuses_what_it_cannot_show(run, refused, shot, tmp_path, monkeypatch):
+def test_the_command_refuses_invalid_pictures(run, refused, shot, tmp_path, monkeypatch):
     path = tmp_path / "a.png"
     shot.picture.save(path)
     refused(run("view", path), "one of --output and --serve is needed")

@@ -146,7 +146,7 @@ def test_content_before_and_behind_the_display_moves_to_opposite_sides(name):
         assert abs(middle(one, 0) - middle(two, 0)) < 1.0
 
 
-def test_without_start_mm_what_stands_before_the_display_is_not_seen():
+def test_without_start_mm_bodies_before_the_display_are_not_seen():
     shot = render(near_and_far(), CAMERA, support=("depth",))
     assert np.nanmin(shot.depth) == pytest.approx(22)
 
@@ -298,7 +298,7 @@ def test_a_panel_whose_sides_nothing_divides_is_used_in_part():
         ({"size_mm": 0}, "size_mm is 0"),
     ],
 )
-def test_designs_that_cannot_be(change, said):
+def test_impossible_designs_are_refused(change, said):
     with pytest.raises(ValueError, match=said):
         panel_display(**PANEL | change)
 

@@ -108,7 +108,7 @@ def test_wavelengths_must_be_positive(wavelength):
         lens_spread(0.1, 0.2, wavelength)
 
 
-def test_what_makes_no_sense_is_refused():
+def test_invalid_waves_are_refused():
     camera = preset("setup1", scale=32)
     picture = IIPicture(np.zeros((*camera.pixels[::-1], 3), np.uint8), camera.lenses, camera.ei_pixels, camera)
     with pytest.raises(ValueError, match=r"is \d+\.\d pixels wide, an elementary image 16"):

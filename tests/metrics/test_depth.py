@@ -65,7 +65,7 @@ def test_nearest_layer_and_what_lies_beyond(d, layer):
     assert q.outside == (96 if layer is None else 0)
 
 
-def test_nothing_hit_is_nan_throughout():
+def test_q_depth_without_hits_is_nan():
     a = picture()
     q = q_depth(a, a, depth=np.full(a.pixels.shape[:2], np.nan))
     assert np.isnan(q.values).all() and q.counts.sum() == q.outside == 0

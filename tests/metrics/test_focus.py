@@ -262,7 +262,7 @@ def test_default_layers_find_a_wall_near_and_far(d, method):
 
 @pytest.mark.parametrize("make", ["black", "constant", "one lens", "one-pixel images", "layers before the lenses"])
 @pytest.mark.parametrize("method", ["dissertation", "robust"])
-def test_where_nothing_tells_the_layers_apart_there_is_no_depth(make, method):
+def test_indistinguishable_layers_have_no_depth(make, method):
     a, layers = picture(), LAYERS
     if make == "black":
         a = a.with_pixels(np.zeros_like(a.pixels))
@@ -413,7 +413,7 @@ def naive_pass(cost, view, place, slope, leap, alike):
     return total
 
 
-def test_passing_on_is_the_least_over_all_changes():
+def test_aggregated_cost_is_the_minimum_over_all_changes():
     rng = np.random.default_rng(3)
     cost = rng.random((3, 6, 9)).astype(np.float32) * 30
     view = rng.random((3, 6, 3)) * 40

@@ -115,7 +115,7 @@ def test_options_are_refused(change, said):
         Options(**change)
 
 
-def test_a_test_that_nobody_can_take_is_refused():
+def test_too_many_presentations_are_refused():
     with pytest.raises(ValueError, match="at most 1000"):
         planned({"apples": 50}, method="pairs")
     with pytest.raises(ValueError, match="1 references and 0 coded"):
@@ -227,7 +227,7 @@ def test_of_two_files_of_one_observer_and_of_two_tests_the_first_counts(files, t
     assert "is of observer 1" in results.notes[0] and "is of another test" in results.notes[1]
 
 
-def test_nothing_to_read_is_refused(tmp_path):
+def test_no_files_of_observers_are_refused(tmp_path):
     (tmp_path / "a.jsonl").write_text("")
     with pytest.raises(ValueError, match=r"a\.jsonl is empty: nobody answered"):
         read_results([tmp_path / "a.jsonl"])
@@ -237,7 +237,7 @@ def test_nothing_to_read_is_refused(tmp_path):
         read_results([tmp_path / "b.jsonl"])
 
 
-def test_results_on_a_server_are_only_ever_added_to(tmp_path):
+def test_results_on_a_server_are_append_only(tmp_path):
     plan = planned()
     (tmp_path / "s").mkdir()
     source = write_simulated(tmp_path / "s", plan, [3.0] * 15, 1)[0].read_bytes()
@@ -334,7 +334,7 @@ def test_a_scene_without_a_scale_is_one_line(tmp_path):
     assert note.startswith("apples has no scale") and "0 reference" in note
 
 
-def test_who_did_not_see_the_colours_or_takes_5_for_the_worst_is_left_out(tmp_path):
+def test_colour_blind_and_reversed_observers_are_left_out(tmp_path):
     plan = planned({"apples": 13, "car": 13})
     quality = np.tile([1.0, 5.0], 14)  # outliers on both sides alike, as the screening wants them
     files = write_simulated(tmp_path, plan, quality, 31, bias=0.1, spread=0.3, seed=5)
@@ -368,7 +368,7 @@ def test_measures_predict_by_scene_and_scheme(tmp_path):
     assert made.with_measure("q_global", "apples")[0][0] == 28.0  # of the first coded picture; references have none
 
 
-def test_nobody_left_is_refused(tmp_path):
+def test_results_without_valid_observers_are_refused(tmp_path):
     files = write_simulated(tmp_path, planned(), [3.0] * 15, 2)
     for path in files:
         rewritten(path, put(0, colour_vision="failed"))
@@ -385,7 +385,7 @@ def picture(seed=0, scale=32):
     return IIPicture(pixels, camera.lenses, camera.ei_pixels, camera)
 
 
-def test_what_makes_no_test_is_refused(tmp_path, monkeypatch):
+def test_invalid_stimuli_are_refused(tmp_path, monkeypatch):
     a = Stimulus(scene="s", name="reference", picture=picture(), reference=True)
     b = Stimulus(scene="s", name="b", picture=picture(1))
     path = tmp_path / "t.html"
@@ -468,7 +468,7 @@ def test_the_command_serves_the_test_and_keeps_results(coded, tmp_path):
         (["--serve"], "one of --output and --serve"),
     ],
 )
-def test_the_command_refuses(run, refused, coded, tmp_path, options, said):
+def test_invalid_options_are_refused(run, refused, coded, tmp_path, options, said):
     refused(run("subjective", *coded, *options, "-o", tmp_path / "t.html"), said)
     assert not (tmp_path / "t.html").exists()
 

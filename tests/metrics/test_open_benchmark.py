@@ -180,7 +180,7 @@ def test_a_failing_encoder_is_refused(picture, code, message):
     ("code", "message"),
     [("pass", "decoder: view 000_000.ppm is missing"), ("raise SystemExit('damaged')", "ended with code 1: damaged")],
 )
-def test_what_does_not_decode_is_refused(picture, coder, code, message):
+def test_undecodable_files_are_refused(picture, coder, code, message):
     coded = coder.encode(picture, "deflate", bpp=20.0)
     with pytest.raises(Refused, match=message):
         replace(coder, decoder=failing(code)).decode(coded)
@@ -296,7 +296,7 @@ def test_a_coder_that_fails_once_has_no_result(definition, picture, coder):
         run(definition, "deflate", lambda _: picture, encode=coder.encode, decode=decode)
 
 
-def test_pictures_of_other_pixels_are_said(definition, picture, coder):
+def test_pictures_of_other_pixels_are_reported(definition, picture, coder):
     fixed = picture_json("ramp", picture)["sha256"]
     for digest, expected in ((fixed, True), ("0" * 64, False)):
         reference = replace(definition.pictures[0], sha256=digest)

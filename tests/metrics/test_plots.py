@@ -69,14 +69,14 @@ def test_depth_curve_shows_each_layer_that_has_pixels():
 
 
 @pytest.mark.parametrize("kind", ["identical", "no depth"])
-def test_depth_curve_of_nothing_to_show(kind, tmp_path):
+def test_depth_curve_without_values(kind, tmp_path):
     a = picture()
     depth = np.full(a.pixels.shape[:2], 15.0 if kind == "identical" else np.nan)
     plot_depth(q_depth(a, a, depth=depth), tmp_path / "q.png")
     assert (tmp_path / "q.png").stat().st_size > 1000
 
 
-def test_views_and_what_parts_them():
+def test_views_and_their_difference():
     a = picture()
     pixels = a.pixels // 2 + 60
     a = a.with_pixels(pixels)

@@ -126,7 +126,7 @@ def test_angles_are_those_of_the_rays():
 
 
 @pytest.mark.parametrize("dtype", PEAKS)
-def test_a_mask_counts_what_it_says(dtype):
+def test_only_masked_pixels_count(dtype):
     a, b = picture(dtype), picture(dtype, seed=1)
     mask = np.random.default_rng(2).random((21, 20)) < 0.6
     squares = np.square(a.pixels.astype(float) - b.pixels)

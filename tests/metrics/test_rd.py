@@ -93,7 +93,7 @@ def test_little_overlap_is_refused_with_both_intervals():
     ],
 )
 @pytest.mark.parametrize("function", [bd_rate, bd_psnr])
-def test_curves_that_are_none(function, rates, quality, message):
+def test_invalid_curves_are_refused(function, rates, quality, message):
     with pytest.raises(ValueError, match=message):
         function([1, 2, 3, 4], [1, 2, 3, 4], rates, quality)
 
@@ -208,7 +208,7 @@ def test_same_records_whatever_the_workers():
     assert timeless[0] == timeless[1] == timeless[2]
 
 
-def test_no_more_at_a_time_than_asked_for():
+def test_no_more_points_at_a_time_than_workers():
     now, most, lock = 0, 0, threading.Lock()
 
     def counted(*args, **options):
@@ -225,7 +225,7 @@ def test_no_more_at_a_time_than_asked_for():
     assert most == 2
 
 
-def test_a_failing_coder_says_where_and_stops_the_rest():
+def test_a_failing_coder_is_named_and_stops_the_study():
     begun = []
 
     def failing(source, scheme, *, bpp):
@@ -276,7 +276,7 @@ def test_study_round_trip(tmp_path):
     assert read_study(other)["picture"]["sha256"] != study["picture"]["sha256"]
 
 
-def test_what_is_no_study(tmp_path):
+def test_invalid_studies_are_refused(tmp_path):
     path = tmp_path / "s.json"
     for text, message in [
         ("{", "s.json: "),
@@ -341,7 +341,7 @@ def test_bytes_that_are_no_study_are_named(tmp_path, data, message):
         read_study(path)
 
 
-def test_what_cannot_be_written_is_named(tmp_path):
+def test_unwritable_outputs_are_named(tmp_path):
     with pytest.raises(ValueError, match=r"points\[0\] has no bpp"):
         write_study(tmp_path / "t.json", [{"scheme": "x"}])
     assert not (tmp_path / "t.json").exists()

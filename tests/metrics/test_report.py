@@ -43,7 +43,7 @@ def test_all_numbers_are_those_of_the_functions():
     assert "±" in made.rows["Q_angle"] and made.rows["MS-SSIM"].startswith("– needs at least 176×176 lenses")
 
 
-def test_pictures_of_other_tools_give_what_they_can():
+def test_pictures_of_other_tools_have_the_measures_that_apply():
     bare = picture(camera=False)
     made = report(bare, worse(bare), over_depth=True)
     assert set(made.numbers["missing"]) == {"q_view", "q_depth"} and made.depth is None
@@ -163,7 +163,7 @@ def test_groups_of_layers_hold_all_that_have_pixels():
     assert max(sizes) - min(sizes) <= 2 * 50  # a layer more or less at either end
 
 
-def test_the_command_says_what_is_missing_and_takes_bare_pictures(run, refused, tmp_path):
+def test_the_command_names_missing_measures_and_accepts_bare_pictures(run, refused, tmp_path):
     a = picture()
     a.save(tmp_path / "a.png")
     write_image(tmp_path / "b.png", worse(a).pixels)  # no sidecar

@@ -116,7 +116,7 @@ def test_a_table_of_any_measure(study, measure):
     assert float(fine["BD-rate"].removesuffix(" %")) < 0  # a bit less in the far half costs rate
 
 
-def test_a_measure_that_the_study_has_not(study):
+def test_a_missing_measure_is_named(study):
     kept = read_study(study[1])
     for work in (summary_table, draw):
         with pytest.raises(ValueError, match="unknown measure 'q_nope': known are q_global"):
@@ -133,7 +133,7 @@ def test_csv_has_a_column_a_measure(study, tmp_path):
     assert "q_depth" not in rows[0] and "q_depth_mean" in rows[0] and float(rows[0]["depth_outside"]) == 0
 
 
-def test_latex_says_what_the_table_says(study, tmp_path):
+def test_latex_equals_the_table(study, tmp_path):
     rows = summary_table(read_study(study[1]), anchor="coarse")
     write_latex(tmp_path / "t.tex", rows, "50 % of A_b & C")
     text = (tmp_path / "t.tex").read_text()
@@ -198,7 +198,7 @@ def test_the_same_study_gives_the_same_file(study, tmp_path, suffix):
         depth_rate_chart(kept, tmp_path / "x.bmp")
 
 
-def test_what_a_picture_does_not_allow_is_said_before_any_coding():
+def test_inapplicable_measures_are_named_before_coding():
     a = picture()
     bare = IIPicture(a.pixels, a.lenses, a.ei_pixels)
     for names, said in (

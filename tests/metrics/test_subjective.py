@@ -127,6 +127,6 @@ def test_a_measure_without_relation_predicts_nothing():
         (lambda: predicted_scores(np.arange(6.0), np.arange(5.0)), "one for each"),
     ],
 )
-def test_what_cannot_be_analysed_is_refused(call, said):
+def test_invalid_scores_are_refused(call, said):
     with pytest.raises(ValueError, match=said):
         call()

@@ -52,7 +52,7 @@ def test_mssim_falls_with_noise_and_blur_and_forgives_a_shift_of_level():
     assert q[0] > 0.95 > 0.8 > q[1]
 
 
-def test_a_view_image_is_what_rays_from_the_viewpoint_see():
+def test_a_view_image_equals_ray_tracing_from_the_viewpoint():
     """From U·Λ before the lenses every line through a lens ends on a pixel's very centre."""
     scene, camera = load_scene("cuboid"), preset("setup1", scale=16)
     # Two cameras have two ray widths: filtered textures would differ.

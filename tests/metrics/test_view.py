@@ -152,7 +152,7 @@ def test_a_mask_takes_out_what_is_interpolated_from_it():
 
 
 @pytest.mark.parametrize("z", [1.2, 5.0])
-def test_viewpoints_that_are_none(z):
+def test_invalid_viewpoints_are_refused(z):
     a = picture()
     with pytest.raises(ValueError, match=r"viewpoint z .* is not before the lens plane at 1.2 mm"):
         q_view(a, a, viewpoints={"inside": (0, 0, z)})

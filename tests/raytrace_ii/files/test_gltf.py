@@ -227,7 +227,7 @@ def test_cut_outs_are_holes(tmp_path):
 
 
 @pytest.mark.parametrize("turn", [0, 90])
-def test_a_normal_map_leans_the_way_it_says(turn, tmp_path):
+def test_directions_of_a_normal_map(turn, tmp_path):
     """Red is along growing u, green up the image: 45° to the right, or upwards, is brightest lit from there."""
     gltf = Gltf()
     lean = (255 - 37, 128, 255 - 37) if turn == 0 else (128, 255 - 37, 255 - 37)

@@ -115,7 +115,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("path", "value", "says"), WRONG)
-def test_what_is_wrong_is_named_with_its_place(path, value, says, tmp_path):
+def test_faults_are_named_with_their_place(path, value, says, tmp_path):
     file = good().save(tmp_path / "m.gltf")
     tables = json.loads(file.read_text())
     tables["extensionsRequired"] = []
@@ -135,7 +135,7 @@ def test_values_that_are_not_finite_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("count", [3 * 10**8, 10**15, 10**400])
-def test_rows_that_no_byte_answers_for_are_bounded(count, tmp_path):
+def test_accessor_rows_without_data_are_bounded(count, tmp_path):
     """3·10⁸ rows of zeros took 6.9 GB; this test tried 10¹⁵ alone, which no machine gives."""
     gltf = good()
     del gltf.json["accessors"][0]["bufferView"]  # all zero, then, however many
@@ -157,7 +157,7 @@ def test_instances_are_counted_before_they_are_made(tmp_path):
 @pytest.mark.parametrize(
     "uri", ["no.png", "../secret.png", "%2e%2e/secret.png", "/etc/hostname", "http://a.org/b.png"]
 )
-def test_an_image_that_cannot_be_had_is_named_and_left_out(uri, tmp_path):
+def test_an_unavailable_image_is_named_and_left_out(uri, tmp_path):
     """Out of the file's folder nothing is read, by ``..``, percent signs or a link."""
     write_image(tmp_path / "secret.png", np.zeros((2, 2, 3), np.uint8))
     (tmp_path / "in").mkdir()

@@ -22,7 +22,7 @@ three = st.tuples(share, share, share).map(np.array)
 
 
 @given(three, share, share, three, share, st.booleans())
-def test_no_surface_gives_more_than_it_gets(base, metallic, roughness, f0, transmission, thin):
+def test_surfaces_conserve_energy(base, metallic, roughness, f0, transmission, thin):
     """Matt, mirrored and handed on together at most 1 in every channel; nothing negative."""
     s = surface(base, metallic, roughness, f0, transmission, thin=thin)
     colour, mirror, through = (np.array(s[k]) for k in ("colour", "mirror", "transmission"))
@@ -49,7 +49,7 @@ def test_known_limits():
     np.testing.assert_allclose([sheet["transmission"], sheet["mirror"]], [[0.96] * 3, [0.04] * 3])
 
 
-def test_the_highlight_is_as_wide_as_the_roughness_says():
+def test_the_highlight_has_the_width_of_the_roughness():
     """Blinn–Phong's exponent against GGX, whose tails it lacks: at half height it is up to 1.3 times as wide."""
     for roughness in (0.3, 0.5, 0.7):
         alpha = roughness**2

@@ -34,7 +34,7 @@ def load(tmp_path, text):
 # What may stand in a file
 
 
-def test_every_key_does_what_it_says(tmp_path):
+def test_every_key_sets_its_value(tmp_path):
     write_image(tmp_path / "skin.png", np.full((2, 2, 4), (255, 0, 128, 255), np.uint8))
     write_image(tmp_path / "bumps.png", np.full((2, 2, 3), (128, 128, 255), np.uint8))
     scene = load(
@@ -250,7 +250,7 @@ def test_a_sky_from_an_image(tmp_path):
     np.testing.assert_array_equal(sky.image.pixels, np.full((2, 4, 3), 3.0))  # floats are linear
 
 
-def test_little_needs_to_stand_in_a_file(tmp_path):
+def test_a_minimal_file_loads(tmp_path):
     scene = load(tmp_path, BALL)
     assert scene.lights == [] and scene.max_depth == 6
     np.testing.assert_allclose(scene.ambient, 0.1)
@@ -259,7 +259,7 @@ def test_little_needs_to_stand_in_a_file(tmp_path):
     assert even.background.zenith == even.background.nadir == (1, 1, 1)
 
 
-def test_packaged_scenes_load_and_say_what_they_are():
+def test_packaged_scenes_load_and_have_a_description():
     names = scene_names()
     assert "apples" in names
     for name, about in names.items():
@@ -506,7 +506,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_may_not_stand_in_a_file_is_named_in_one_line(case, tmp_path):
+def test_invalid_keys_and_values_are_named_in_one_line(case, tmp_path):
     text, says = WRONG[case]
     path = written(tmp_path, text)
     with pytest.raises(ValueError) as caught:
@@ -529,14 +529,14 @@ def test_what_may_not_stand_in_a_file_is_named_in_one_line(case, tmp_path):
         ('[texture.t]\nkind = "image"\nfile = "no.png"\n' + BALL, "texture.t.file: {}/no.png does not exist"),
     ],
 )
-def test_missing_files_are_named_with_who_asks_for_them(text, says, tmp_path):
+def test_missing_files_are_named_with_the_object_that_needs_them(text, says, tmp_path):
     path = written(tmp_path, text)
     with pytest.raises(FileNotFoundError) as caught:
         load_scene(path)
     assert str(caught.value) == f"{path}: {says.format(tmp_path)}"
 
 
-def test_broken_files_are_named_with_who_asks_for_them(tmp_path):
+def test_broken_files_are_named_with_the_object_that_needs_them(tmp_path):
     (tmp_path / "bad.png").write_bytes(b"no picture")
     with pytest.raises(OSError, match=r"scene\.toml: texture\.t\.file: cannot read .*bad\.png"):
         load(tmp_path, '[texture.t]\nkind = "image"\nfile = "bad.png"\n' + BALL)

@@ -319,7 +319,7 @@ def test_damaged_ply_files(change, says, tmp_path):
     assert str(caught.value).startswith("d.ply: ") and says in str(caught.value), str(caught.value)
 
 
-def test_rows_of_ply_whose_lengths_lie(tmp_path):
+def test_rows_of_ply_with_false_lengths(tmp_path):
     """trimesh gives every binary list the length of the first, and takes ASCII values to the end of their row."""
     head = "ply\nformat {} 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
     head += "element face {}\nproperty list uchar int vertex_indices\nend_header\n"

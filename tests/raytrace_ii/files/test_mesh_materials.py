@@ -208,7 +208,7 @@ def test_colours_of_a_plys_vertices(tmp_path):
     )
 
 
-def test_a_file_that_says_nothing_is_the_default_grey(tmp_path):
+def test_a_file_without_materials_has_the_default_grey(tmp_path):
     trimesh.creation.box((2, 2, 2)).export(tmp_path / "b.stl")
     (tmp_path / "s.toml").write_text('ambient = 1\n[[object]]\nmesh = "b.stl"\n')
     np.testing.assert_allclose(load_scene(tmp_path / "s.toml").bodies[0].material.colour, 0.8)

@@ -91,7 +91,7 @@ def test_keys_move_by_their_tracks(tmp_path):
     np.testing.assert_allclose(take.pose_at(0.25)[:3, 3], [0, 1, 0])
 
 
-def test_a_still_scene_is_what_its_tables_say(tmp_path):
+def test_a_still_scene_has_the_values_of_its_tables(tmp_path):
     take_of(tmp_path, BALLS + MOVES)
     assert middle(body(load_scene(tmp_path / "moving.toml"), "ball a")).tolist() == pytest.approx([0, 0, 0])
 
@@ -147,7 +147,7 @@ values = [[-10, 0, 40], [10, 0, 40]]
         ('how = "step"', 'how = "jump"', "unknown 'jump': known are"),
     ],
 )
-def test_what_is_wrong_is_named_before_anything_is_rendered(tmp_path, old, new, named):
+def test_faults_are_named_before_rendering(tmp_path, old, new, named):
     text = BALLS + MOVES
     assert old in text
     with pytest.raises(ValueError, match=named) as caught:
@@ -261,7 +261,7 @@ def test_morph_targets_are_added_by_their_weights(tmp_path, interpolation):
     np.testing.assert_allclose(moved - still, [[0, 0, -k * share] for k in range(4)], atol=1e-7)
 
 
-def test_what_is_wrong_with_a_clip_is_named(flexed):
+def test_faults_of_a_clip_are_named(flexed):
     with pytest.raises(ValueError, match=r"arm.glb: unknown clip 'Run': known are Flex, Jump"):
         vertices(flexed, 0, "Run")
     with pytest.raises(ValueError, match="unknown clip 'Run'"):

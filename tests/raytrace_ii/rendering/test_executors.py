@@ -232,7 +232,7 @@ def test_an_error_or_an_interrupt_leaves_nothing_running(scene):
         ({"executor": ThreadPoolExecutor(1), "workers": 2}, "workers is 2: an executor has its own"),
     ],
 )
-def test_what_renders_nothing_is_refused(wrong, says):
+def test_invalid_executors_are_refused(wrong, says):
     with pytest.raises(ValueError, match=says):
         render(Scene(bodies=[body(wall(5))]), CAMERA, **wrong)
 

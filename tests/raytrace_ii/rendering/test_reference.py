@@ -97,7 +97,7 @@ def test_only_what_changed_is_made_again(small_set, tmp_path):
     ]
 
 
-def test_files_that_are_gone_or_not_the_same_are_made_again(small_set, tmp_path):
+def test_missing_and_changed_files_are_made_again(small_set, tmp_path):
     make(tmp_path)
     (tmp_path / "one.png").unlink()
     (tmp_path / "two_flat_support.exr").unlink()
@@ -111,7 +111,7 @@ def test_files_that_are_gone_or_not_the_same_are_made_again(small_set, tmp_path)
 
 
 @pytest.mark.parametrize("stop_at", ["one.png", "two_support.exr", "three_flat.png"])
-def test_interrupted_it_goes_on_where_it_was(small_set, tmp_path, stop_at):
+def test_an_interrupted_set_continues(small_set, tmp_path, stop_at):
     made = []
 
     def stop(title, done, total):

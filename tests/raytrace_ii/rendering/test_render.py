@@ -40,7 +40,7 @@ def hall_scene():
 
 
 @pytest.mark.parametrize("which", ["apples", "hall"])
-def test_view_image_is_what_its_rays_see(which, hall_scene):
+def test_view_image_equals_its_traced_rays(which, hall_scene):
     """The chain camera, picture, view against the tracer alone: not one bit may differ."""
     scene = load_scene("apples") if which == "apples" else hall_scene
     camera = preset("setup1", scale=32)
@@ -62,7 +62,7 @@ def test_view_image_is_what_its_rays_see(which, hall_scene):
 
 
 @pytest.mark.parametrize("dtype", ["uint16", "float32"])
-def test_view_image_is_what_its_rays_see_in_every_type(dtype, hall_scene):
+def test_view_image_equals_its_traced_rays_in_every_type(dtype, hall_scene):
     shot = render(hall_scene, SMALL, dtype=dtype)
     viewpoint = five_viewpoints(SMALL)["left"]
     view, valid = view_image(shot.picture, viewpoint, interpolation="nearest")
@@ -384,7 +384,7 @@ def test_under_large_lenses_and_in_plain_pictures_packets_are_neighbouring_pixel
             assert all((np.ptp(p, axis=1) == 3).all() for p in packets)
 
 
-def test_rays_of_maps_without_lenses_are_grouped_by_where_they_go(tmp_path):
+def test_rays_of_maps_without_lenses_are_grouped_by_direction(tmp_path):
     """Maps of an II-camera that tell of no lenses: packets spread little more than those of its own."""
     write_maps([REGULAR], tmp_path, format="exr")
     sheet = json.loads((tmp_path / "camera.json").read_text())

@@ -86,7 +86,7 @@ def test_one_file_for_all_support_images(scene, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["pinhole", "grin"])
-def test_disparity_says_where_the_next_lens_sees_the_point(kind):
+def test_disparity_leads_to_the_pixel_of_the_next_lens(kind):
     """The ray of that pixel under the next lens, right or below, meets the same point."""
     camera = IICamera(
         pixels=(128, 64), lenses=(8, 4), pixel_pitch_mm=0.4, gap_mm=9.0, optics=({"kind": kind},),
@@ -115,7 +115,7 @@ def test_disparity_says_where_the_next_lens_sees_the_point(kind):
     np.testing.assert_allclose(below, here, atol=1e-3)
 
 
-def test_ray_length_is_the_way_from_the_camera_to_the_point():
+def test_ray_length_is_the_distance_from_the_camera_to_the_point():
     shot = render(Scene(bodies=[body(wall(60, 300))]), SMALL, support=("depth", "ray_length"))
     L, D = SMALL.rays()
     way = (60 - L[..., 2]) / D[..., 2] * np.linalg.norm(D, axis=-1)
@@ -169,7 +169,7 @@ def test_no_disparity_where_it_does_not_follow_from_depth(camera, says):
         render(Scene(bodies=[body(wall(60))]), camera, support=("disparity",))
 
 
-def test_interrupted_it_leaves_nothing(scene, tmp_path, monkeypatch):
+def test_an_interrupted_render_leaves_nothing(scene, tmp_path, monkeypatch):
     monkeypatch.setattr(job, "TILE_RAYS", 500)
 
     def stop(done, total):
@@ -198,7 +198,7 @@ def test_interrupted_it_leaves_nothing(scene, tmp_path, monkeypatch):
         ("p.png", {"support": {"dept": "d.exr"}}, ValueError, "unknown support image dept"),
     ],
 )
-def test_what_cannot_be_written_is_refused_at_once(path, options, error, says, tmp_path, monkeypatch):
+def test_unwritable_outputs_are_refused_at_once(path, options, error, says, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(error, match=says):
         render_to(path, Scene(bodies=[body(wall(5))]), SMALL, **options)

@@ -41,7 +41,7 @@ def test_steps_hold_until_the_next_keyframe():
         (([0], [[1]], "cubic"), "linear, smooth, step"),
     ],
 )
-def test_what_is_no_track(arguments, named):
+def test_invalid_tracks_are_refused(arguments, named):
     with pytest.raises(ValueError, match=named):
         Track(*arguments)
 

@@ -108,6 +108,6 @@ def test_no_lens_stands_in_or_under_a_body(name):
         assert not len(near) or near[:, 1].max() < -12.5, body.name
 
 
-def test_the_head_has_as_many_hairs_as_it_says():
+def test_the_head_has_the_stated_number_of_hairs():
     hair = next(body for body in load_scene("hairdo").bodies if body.name == "hair")
     assert len(hair.faces) / (2 * 6) > 20_000

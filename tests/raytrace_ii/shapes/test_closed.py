@@ -26,7 +26,7 @@ def test_shapes_are_closed_whatever_the_numbers_of_their_corners(mesh, at):
     assert flaw(np.where(up, np.nextafter(single, np.float32(np.inf)), single), faces) is None
 
 
-def test_what_is_open_turned_or_inside_out_is_told():
+def test_open_turned_and_inside_out_meshes_are_reported():
     ball = sphere(segments=24)
     assert flaw(wall(10).vertices, wall(10).faces).startswith("4 of its edges are open")
     assert flaw(ball.vertices, ball.faces[1:]).startswith("3 of its edges")

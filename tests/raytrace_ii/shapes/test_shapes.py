@@ -78,7 +78,7 @@ def prism(segments):
         ("cone", prism(48) * 2**2 * 5 / 3),
     ],
 )
-def test_volumes_of_what_has_flat_sides_are_exact(name, volume):
+def test_volumes_of_polyhedra_are_exact(name, volume):
     assert merged(SHAPES[name].mesh()).volume == pytest.approx(volume, rel=1e-12)
 
 

@@ -87,7 +87,7 @@ def test_rays_without_a_direction_miss_and_harm_no_neighbour():
             np.testing.assert_array_equal(a[~bad & (whole[0] >= 0)], b[~bad & (whole[0] >= 0)])
 
 
-def test_threads_do_not_share_room():
+def test_threads_do_not_share_buffers():
     """A shared buffer once gave a thousandth of wrong hits."""
     corners = soup(2000)
     tree = Tree(opened(""), corners, True)
@@ -223,7 +223,7 @@ def test_kernels_are_kept_on_disk(tmp_path, monkeypatch):
     assert (first[1], second[1]) == ("0", "2")
 
 
-def test_a_picture_does_not_hang_on_the_packets(monkeypatch):
+def test_a_picture_is_independent_of_packets(monkeypatch):
     """Every ray alone, or every group a packet however wide: the picture is the same."""
     scene = Scene(
         bodies=[body(sphere(2, 24), at=(0, 0, 12)), body(wall(20, 60))], lights=[sun((1, 2, -3)), lamp((3, 5, 2))]
@@ -237,7 +237,7 @@ def test_a_picture_does_not_hang_on_the_packets(monkeypatch):
         np.testing.assert_array_equal(usual.depth, other.depth)
 
 
-def test_a_scene_keeps_its_corners_once():
+def test_a_scene_stores_its_vertices_once():
     """Embree reads those of the packed scene, all trees the same ones, and nothing behind their room."""
     scene = Scene(bodies=[body(wall(20)), body(sphere(2, 24), at=(0, 0, 12), transmission=(1, 1, 1))])
     packed = packed_scene(scene)

@@ -25,7 +25,7 @@ def faded(colour, distance):
 
 
 @pytest.mark.parametrize("direction", [(0, 0, 1), (0.3, -0.2, 1)])
-def test_what_is_seen_fades_exponentially_into_the_fog(direction):
+def test_light_fades_exponentially_in_fog(direction):
     colour = (0.8, 0.2, 0.1)
     distance = 40 * np.linalg.norm(direction)
     np.testing.assert_allclose(seen([body(wall(40), colour=colour)], direction), faded(colour, distance), rtol=2e-6)

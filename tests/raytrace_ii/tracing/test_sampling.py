@@ -117,7 +117,7 @@ def test_pixels_that_stopped_are_within_the_target(which):
         assert rms[0] < rms[1]
 
 
-def test_what_no_sample_meets_is_missed():
+def test_details_between_all_samples_are_missed():
     """The blind spot that the module names: a speck between all samples of a pixel and its neighbours."""
     speck = body(sphere(0.002, 24), at=(0.05, 0.05, 20), colour=BLACK)
     scene = Scene(bodies=[speck, body(wall(30, 500), colour=WHITE)], ambient=WHITE)

@@ -87,7 +87,7 @@ def test_plane_hits_have_the_closed_form():
     np.testing.assert_allclose(seen.normal, np.broadcast_to(normal, seen.normal.shape), atol=FLOAT32)
 
 
-def test_triangles_are_hit_as_float64_says():
+def test_triangle_hits_agree_with_float64():
     """A soup of triangles, brute force: which is nearest, how far, which way it faces."""
     generator = np.random.default_rng(3)
     corners = generator.uniform(-10, 10, (60, 3, 3)) + np.array([0, 0, 30])
@@ -181,7 +181,7 @@ def test_camera_and_scene_moved_together_see_the_same(turn, shift):
     assert np.quantile(np.abs(turned_back - here.normal)[same], 0.99) < 1e-4
 
 
-def test_a_pose_of_nothing_changes_nothing():
+def test_the_identity_pose_changes_nothing():
     scene, camera = load_scene("apples"), preset("setup1", scale=64)
     a, b = render(scene, camera), render(scene, camera, pose=np.eye(4))
     np.testing.assert_array_equal(a.picture.pixels, b.picture.pixels)

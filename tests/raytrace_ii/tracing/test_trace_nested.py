@@ -147,7 +147,7 @@ def test_a_camera_in_ice_in_water_sees_through_both():
     np.testing.assert_allclose(seen.radiance[0], (1 - reflectance(1.0, WATER)) * np.exp(-20 * absorption), rtol=1e-3)
 
 
-def test_what_is_opaque_in_glass_is_seen_through_it_from_the_start():
+def test_opaque_bodies_in_glass_are_seen_from_inside():
     absorption = np.array([0.02, 0.1, 0.3])
     glass = slab(-20, 30, GLASS, absorption_per_mm=tuple(absorption))
     paper = body(wall(12), colour=WHITE)

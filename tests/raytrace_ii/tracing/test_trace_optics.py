@@ -126,7 +126,7 @@ def test_glass_of_the_airs_own_index_is_not_there():
     )
 
 
-def test_light_is_shut_in_beyond_the_critical_angle():
+def test_total_reflection_beyond_the_critical_angle():
     """From inside a slab: up to 41.8° the sky is seen through the face, beyond it only the slab's own walls."""
     slab = body(box(4000, 4000, 10), transmission=WHITE, ior=1.5)
     scene = Scene(bodies=[slab], background=UNIFORM, max_depth=1)
@@ -185,7 +185,7 @@ def test_a_clear_body_under_an_even_sky_is_invisible():
     assert np.median(radiance) > 1 - 2e-4
 
 
-def test_a_camera_inside_glass_looks_out_through_one_face():
+def test_a_camera_inside_glass_sees_through_one_face():
     """From the middle of a ball every way out is along the normal."""
     absorption, radius = (0.1, 0.2, 0.0), 5.0
     ball = body(sphere(radius, 96), at=(0, 0, 3), transmission=WHITE, ior=1.5, absorption_per_mm=absorption)
@@ -251,7 +251,7 @@ def test_recursion_ends_when_a_weight_is_too_small_to_see():
     assert abs(seen.radiance[0, 0] - 1) < LEAST_WEIGHT
 
 
-def test_no_depth_is_local_light_only():
+def test_depth_zero_has_local_light_only():
     mirror = body(wall(20), mirror=(0.75,) * 3, colour=(0.8, 0.4, 0.2))
     scene = Scene(bodies=[mirror], ambient=WHITE, background=UNIFORM, max_depth=0)
     np.testing.assert_allclose(looked(scene, (0, 0, 0), (0, 0, 1)), 0.25 * np.array([0.8, 0.4, 0.2]), rtol=RTOL)

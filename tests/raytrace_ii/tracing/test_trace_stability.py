@@ -55,7 +55,7 @@ def test_far_from_the_origin_only_the_form_suffers(offset):
     assert hit > 3900 and (acne, leaks) == (0, 0)
 
 
-def test_where_scale_ends():
+def test_limits_of_scale():
     """Embree takes products of three lengths in float32: a size of 1e-12 mm works, and 1e12 mm.
 
     100 000 rays, of which some 350 meet the small faces at the poles: their lift of 4e-18 mm, times twice their area
@@ -288,7 +288,7 @@ def test_needles_and_slivers_give_numbers():
         assert np.isfinite(seen.radiance).all() and (seen.radiance >= 0).all()
 
 
-def test_of_faces_in_one_place_one_is_seen_always():
+def test_the_first_of_coincident_faces_is_always_seen():
     """Two bodies in the same place: the first wins, in packets and alone, and neither shades the other."""
     red, blue = body(wall(20, 30), name="red", colour=(1, 0, 0)), body(wall(20, 30), name="blue", colour=(0, 0, 1))
     directions = np.column_stack([*np.random.default_rng(0).uniform(-0.5, 0.5, (2, 3000)), np.ones(3000)])
