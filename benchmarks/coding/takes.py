@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -102,11 +103,12 @@ def coded(
 def alone(video: IIVideo, scheme: str, quantisers: Sequence[int]) -> list[dict[str, float]]:
     """Return rate and quality of a frame by a coder of pictures, at every quantiser."""
     original = video_of([video[FRAME_ALONE]], fps=video.fps)
-    found = []
+    found: list[dict[str, float | None]] = []
     for qp in quantisers:
         one = encode(original[0], scheme, qp=qp)
         quality = measure_take(original, video_of([decode(one)], fps=video.fps))
-        found.append({"qp": qp, "bpp": one.bpp, "psnr_of_pooled_mse": quality.pooled_psnr})
+        times = {"encode_seconds": one.encode_seconds, "codec_seconds": one.codec_seconds}
+        found.append({"qp": qp, "bpp": one.bpp, "psnr_of_pooled_mse": quality.pooled_psnr, **times})
     return found
 
 
@@ -126,6 +128,8 @@ def points(
                 "psnr_of_pooled_mse": quality.pooled_psnr,
                 "psnr_worst_frame": quality.worst_psnr,
                 "flicker": quality.mean_flicker,
+                "encode_seconds": coded.encode_seconds,
+                "codec_seconds": coded.codec_seconds,
             }
         )
     return found
@@ -200,8 +204,8 @@ def coder_table() -> list[str]:
     if not rows:
         return ["Not measured yet."]
     lines = [
-        "| coder | order | " + " | ".join(f"{take}, own | H.264" for take in TAKES) + " |",
-        "|---|---|" + "---|---|" * len(TAKES),
+        "| coder | order | " + " | ".join(f"{take}, own | H.264" for take in TAKES) + " | CPU over encoder's |",
+        "|---|---|" + "---|---|" * len(TAKES) + "---|",
     ]
     for coder in CODERS:
         for order in ORDERS:
@@ -211,8 +215,10 @@ def coder_table() -> list[str]:
                     pair = [rows.get((name, by, take)) for name, by in ((anchor, ORDERS[0]), (coder, order))]
                     off = None if None in pair else difference(*(row["points"] for row in pair if row))
                     cells.append("anchor" if (anchor, ORDERS[0]) == (coder, order) else rate_text(off))
-            if any((coder, order, take) in rows for take in TAKES):
-                lines.append(f"| {coder} | {order} | " + " | ".join(cells) + " |")
+            there = [rows[coder, order, take] for take in TAKES if (coder, order, take) in rows]
+            times = [p["encode_seconds"] / p["codec_seconds"] for row in there for p in row["points"]]
+            if there:
+                lines.append(f"| {coder} | {order} | " + " | ".join(cells) + f" | {median(times):.3f} |")
     return [origin(rows.values()), "", *lines]
 
 
