@@ -9,7 +9,7 @@ from hypothesis import settings
 from raytrace_ii import cli
 from tests.support.browser import browser, pytest_collection_modifyitems, show, show_once  # noqa: F401
 
-# The first call of a kernel compiles it, which no deadline foresees. On CI the examples are the same every time.
+# The first call of a kernel compiles it, which would exceed any deadline. CI uses the same examples every time.
 settings.register_profile("here", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("here")
 
@@ -21,7 +21,7 @@ def pytest_addoption(parser):
 
 @pytest.fixture
 def run(monkeypatch, capsys):
-    """Run the command in this process; its exit code, output and error output."""
+    """Return a function that runs the command in this process, and returns exit code, output and error output."""
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["raytrace-ii", *map(str, arguments)])
@@ -35,7 +35,7 @@ def run(monkeypatch, capsys):
 
 @pytest.fixture
 def refused():
-    """Check a result of `run`: exit code 2, nothing on the output, one line on the error stream that says why."""
+    """Check a result of `run`: exit code 2, no output, one line on the error stream with the reason."""
 
     def check(result, said):
         code, out, err = result

@@ -44,7 +44,7 @@ def test_every_file_of_results_and_every_picture_has_one_owner():
         there = [
             path.relative_to(ROOT).as_posix()
             for path in (ROOT / folder).rglob("*")
-            if path.suffix in endings and not (path.parent / "LICENSE.txt").exists()  # pictures of others
+            if path.suffix in endings and not (path.parent / "LICENSE.txt").exists()  # pictures of third parties
         ]
         assert sorted(owned) == sorted(there)
 

@@ -19,7 +19,7 @@ SCENE = Scene(bodies=[ramp(wall(20.0, 12.0), 12.0)], ambient=WHITE, max_depth=0)
 
 
 def pictures(segments, scene=SCENE, camera=CAMERA, **options):
-    """Linear light through the meshes and through L/D with Fresnel's losses, along one ray a sample."""
+    """Return linear light through the meshes and through L/D with Fresnel's losses, one ray per sample."""
     meshed, pixels = camera_in_scene.in_scene(scene, camera, segments, **options)
     return [
         render(s, c, samples=4, dtype="float32", support=()).picture.pixels
@@ -32,7 +32,7 @@ def test_same_picture_up_to_tessellation():
     for segments in (4, 8, 16, 32):
         meshed, maps = pictures(segments)
         errors.append(np.sqrt(np.mean((meshed - maps) ** 2)))
-    assert maps.min() > 0.05 and np.ptp(maps[..., 0]) > 0.2  # there is something to see
+    assert maps.min() > 0.05 and np.ptp(maps[..., 0]) > 0.2  # the scene has content
     # A chord misses its arc, and a normal between two vertices the sphere's, by the square of the mesh size.
     order = np.log2(np.divide(errors[:-1], errors[1:]))
     np.testing.assert_allclose(order, 2, atol=0.3)

@@ -20,7 +20,7 @@ ROWS = [
 
 
 def test_the_mean_rate_needs_all_scenes():
-    """One good scene must not put a scheme before those that were measured on all."""
+    """A scheme with one good scene must not rank before schemes measured on all scenes."""
     found = {row["scheme"]: row for row in summary(ROWS)}
     assert found["everywhere"]["mean"] == pytest.approx(-20) and found["everywhere"]["seconds"] == pytest.approx(2)
     assert found["once"]["mean"] is None and found["undefined"]["mean"] is None
@@ -32,12 +32,12 @@ def test_a_scene_that_was_not_measured_is_a_dash():
 
 
 def test_labels_of_neighbouring_points_do_not_overlap():
-    """Eight points on one spot and one far off: no label lies over another, nor over a point."""
+    """Eight points at one position and one far away: no label covers another label or a point."""
     figure = Figure(figsize=(6, 6), dpi=90)
     axes = figure.add_subplot(xscale="log", yscale="log", xlim=(0.1, 10), ylim=(0.1, 10))
     named = [(f"si-coder{i}", (1.0, 1.0), "") for i in range(8)] + [("si-far", (5.0, 5.0), "")]
     found = offsets(named, axes)
-    assert found[-1] == (5, 3)  # nothing in the way
+    assert found[-1] == (5, 3)  # a free position
     boxes = [(x, y, x + 0.55 * LETTERS * 9, y + 1.1 * LETTERS) for x, y in found[:-1]]
     assert not any(touch(a, b) for a, b in combinations(boxes, 2))
     assert not any(touch(box, (-4, -4, 4, 4)) for box in boxes)

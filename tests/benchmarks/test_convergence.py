@@ -16,7 +16,7 @@ def rows():
     return convergence.balls(LEVELS, preset("setup1", scale=32))
 
 
-# Three halvings, sampled at pixels: fits came out within 0.05 of geometry's law, light's within 0.25.
+# Three halvings, sampled at pixels: fitted orders were within 0.05 of theory for geometry, within 0.25 for light.
 @pytest.mark.parametrize(
     ("name", "within"),
     [
@@ -33,7 +33,7 @@ def test_errors_fall_with_the_expected_order_in_mesh_size(rows, name, within):
 
 
 def test_the_picture_of_a_fine_mesh_equals_the_closed_form(rows):
-    """Outlines decide the whole picture: their pixels are wrong by area, h², so their root mean square by h."""
+    """Outlines dominate the error: the share of wrong pixels falls with h², the root mean square error with h."""
     assert rows[-1]["psnr_smooth"] > 48
     assert rows[-1]["psnr_smooth"] - rows[0]["psnr_smooth"] > 3 * 20 * np.log10(2) * 0.7
     assert all(row["psnr_smooth"] > row["psnr_flat"] + 3 for row in rows)
@@ -62,7 +62,7 @@ def test_most_rays_have_equal_light_with_and_without_triangles():
 
 
 def test_the_closed_form_tracer_obeys_physical_laws():
-    """It must stand without the tracer: Brewster's angle, Beer–Lambert, a shadow's edge, an invisible ball."""
+    """Independent of the tracer: Brewster's angle, Beer–Lambert, a shadow's edge, an invisible ball."""
     brewster = np.cos(np.arctan(1.5))
     s = ((1 - 1.5**2) / (1 + 1.5**2)) ** 2  # all that is reflected there is perpendicular
     assert reflectance(np.array([brewster]), 1 / 1.5)[0] == pytest.approx(s / 2)

@@ -28,7 +28,7 @@ def test_the_demo_writes_all_its_files(tmp_path, monkeypatch, capsys):
         assert read_image(tmp_path / f"apples_{name}.png").std() > 1, name
     points = json.loads((tmp_path / "apples_rd.json").read_text())["points"]
     assert [(p["scheme"], p["target_bpp"]) for p in points] == [(s, r) for s in demo.SCHEMES for r in demo.RATES]
-    # elementary images cost ten bytes a frame before they say anything: 10·8/256 bpp
+    # elementary images cost ten bytes of headers per frame: 10·8/256 bpp
     floored = [p for p in points if p["scheme"] == "ei-h264" and p["target_bpp"] < 0.3]
     assert floored and not any(p["reached"] for p in floored)
     best = {s: max(p["q_global"] for p in points if p["scheme"] == s) for s in demo.SCHEMES}
@@ -56,5 +56,5 @@ def test_disparity_between_sub_images():
     assert abs(moved - 3.42) < 0.01  # the hand has three figures
     depth = np.full((2, 1, 4), 5.0, np.float32)
     assert disparity.has_partner(depth, np.ones((1, 1, 4))).tolist() == [[[True, True, True, False]]]
-    depth[1, 0, 2] = 3.0  # something nearer stands where the second point goes
+    depth[1, 0, 2] = 3.0  # a nearer point occludes the place of the second point
     assert disparity.has_partner(depth, np.ones((1, 1, 4))).tolist() == [[[True, False, True, False]]]

@@ -30,7 +30,7 @@ def test_without_shadows_all_is_lit_and_the_scene_itself_stays_shaded():
 
 
 def test_a_camera_in_glass_refracts_without_shadows():
-    """Its rays ask the same tree as shadow rays through glass do."""
+    """Camera rays in glass use the same query as shadow rays through glass."""
     scene = Scene(
         bodies=[body(sphere(5), transmission=WHITE, absorption_per_mm=(0.2, 0, 0))], background=hall().background
     )
@@ -67,7 +67,7 @@ def test_the_limit_is_the_noise_of_the_reference_set(full):
 
 
 def test_the_criterion_detects_small_distant_details(full):
-    """A spot in two of a thousand pixels: 53 dB, better than the noise, and yet told apart."""
+    """A spot in two of a thousand pixels: 53 dB is better than the noise, but the spot is detected."""
     limit = ablation.compared(full, ablation.noisy(full))
     pixels = full.pixels.copy()
     rows, cols = np.unravel_index(np.arange(0, pixels.shape[0] * pixels.shape[1], 500), pixels.shape[:2])

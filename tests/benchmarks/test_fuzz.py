@@ -22,7 +22,7 @@ def test_mutations_are_counted_and_reproducible(capsys):
 
 @pytest.mark.parametrize(("watched", "name"), [(fuzz.watched, "si-h264"), (readers.watched, "PLY")])
 def test_a_dead_worker_is_a_finding(watched, name, monkeypatch):
-    """A worker that cannot start dies at each of its cases; every death is a finding."""
+    """A worker that cannot start ends at each of its cases; every such end is a finding."""
     monkeypatch.setattr("sys.executable", "false")
     outcome = watched(name, 0, 3)
     assert [finding["number"] for finding in outcome["findings"]] == [0, 1, 2]

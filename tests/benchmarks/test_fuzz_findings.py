@@ -83,7 +83,7 @@ def test_pixels_far_larger_than_lenses(tmp_path):
 
 @pytest.mark.parametrize("name", ["a" * 300, "a\nb", "a" * 5000])
 def test_errors_on_names_of_maps_have_one_short_line(name, tmp_path):
-    """20 000 cases found what 300 had not: "File name too long", with all of it, and line breaks in names."""
+    """Found by 20 000 cases, not by 300: "File name too long" quoted the whole name; names had line breaks."""
     write_maps([preset("setup1", scale=256)], tmp_path)
     sheet = json.loads((tmp_path / "camera.json").read_text())
     sheet["arrays"][0]["samples"][0]["L"]["file"] = name
@@ -99,7 +99,7 @@ def test_one_line_keeps_both_ends():
 
 @pytest.mark.parametrize("box", [[["0", "1"]] * 3, [[0, True], [0, None], [0, 1]], [[0, 1e999], [0, 1], [0, 1]]])
 def test_box_of_maps_holds_numbers(box, tmp_path):
-    """numpy takes "0.5" for a number, so a box of texts was loaded and failed with its first rays."""
+    """numpy accepts "0.5" as a number: a box of texts was loaded and failed at its first rays."""
     for name in "LD":
         write_image(tmp_path / f"{name}.png", seeds.pixels(kind="uint16"))
     sample = {name: {"file": f"{name}.png", "C": 65536, "box": box} for name in "LD"}
@@ -161,13 +161,13 @@ def test_names_in_a_coded_file_are_quoted_in_one_short_line(tmp_path):
 
 
 def test_pipes_are_refused_as_coded_pictures(tmp_path):
-    """Opening a pipe waits for a writer, for ever."""
+    """Opening a pipe waits for a writer without a time limit."""
     os.mkfifo(tmp_path / "p.ii")
     assert "pipe" in refusal(decode, tmp_path / "p.ii")
 
 
 def test_normals_that_are_no_numbers_print_nothing(tmp_path, monkeypatch):
-    """trimesh logs a traceback, which Python prints where nobody listens."""
+    """trimesh logs a traceback, which Python prints if no handler is set."""
     monkeypatch.setattr(logging.root, "handlers", [])
     text = seeds.stl_files()[1].decode().replace("facet normal 0 0 1", "facet normal 0 0 up", 1)
     (tmp_path / "a.stl").write_text(text)
@@ -180,7 +180,7 @@ def test_films_have_a_stated_limit():
 
 
 def test_cases_that_failed(tmp_path):
-    """By their numbers, as long as the makers of cases stay as they are; the tests above hold anyhow."""
+    """The numbers reproduce the failures only while the makers of cases do not change; the tests above always do."""
     for name, seed, number in (
         (".ii header", 3, 16),
         ("study", 3, 650),
@@ -193,7 +193,7 @@ def test_cases_that_failed(tmp_path):
 
 @pytest.mark.parametrize("depth", [150, 900, 3000])
 def test_values_nested_deeply_are_refused_where_they_are_read(depth, tmp_path):
-    """20 000 cases of studies found what 300 had not: text that parses, and exhausts the stack of what walks it."""
+    """Found by 20 000 cases of studies, not by 300: text that parses, but exhausts the stack of its readers."""
     nested = "[" * depth + "]" * depth
     log = tmp_path / "points.jsonl"
     log.write_text(json.dumps(seeds.POINT_LINE).replace('"q_depth": [', f'"q_depth": [{nested}, ', 1) + "\n")

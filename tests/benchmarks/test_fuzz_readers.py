@@ -20,7 +20,7 @@ CASES = 100
 
 @pytest.mark.parametrize("name", READERS)
 def test_short_run(name, tmp_path):
-    """On b1dc540 there was no reader of which cases were made but the coders' (benchmarks.coding.fuzz)."""
+    """On b1dc540 only the coders were fuzzed (benchmarks.coding.fuzz)."""
     found = {}
     for number in range(CASES):
         end = fuzz.outcome(fuzz.case(name, 1, number, tmp_path))
@@ -30,7 +30,7 @@ def test_short_run(name, tmp_path):
 
 
 def test_valid_seeds_are_read(tmp_path):
-    """A mutation of a file that is refused as it is says nothing."""
+    """Mutations of a refused seed would test nothing."""
     for name, structure in enumerate(seeds.structures()):
         assert trees.json_text(structure) == json.dumps(structure), name
     tree, chunk = seeds.gltf()
@@ -57,7 +57,7 @@ def test_cases_are_reproducible_from_their_number(tmp_path):
 
 
 def test_outcomes(monkeypatch):
-    monkeypatch.setattr(logging.root, "handlers", [])  # pytest listens, a command does not
+    monkeypatch.setattr(logging.root, "handlers", [])  # pytest sets a handler of logs, a command does not
 
     def failing(error):
         def read():
@@ -78,7 +78,7 @@ def test_outcomes(monkeypatch):
 
 
 def test_limits_of_time_and_memory_are_findings():
-    """A case that takes too much memory is a MemoryError; the system kills one that takes too long."""
+    """A case that takes too much memory raises MemoryError; the system kills a case that takes too long."""
     script = """
 import itertools
 from benchmarks.stability.fuzz_readers import __main__ as fuzz

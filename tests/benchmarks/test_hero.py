@@ -15,7 +15,7 @@ def shape(path):
 
 
 def test_the_readme_opens_with_a_light_film(tmp_path):
-    """It is what the script writes, of a larger picture; b1dc540 had a still of an eighth of the lenses."""
+    """The script writes the film from a larger picture; b1dc540 had a still of an eighth of the lenses."""
     assert hero.PATH.stat().st_size < 1e6
     assert f"]({hero.PATH.relative_to(ROOT).as_posix()})" in (ROOT / "README.md").read_text()[:1200]
     picture = render(load_scene("apples"), preset("setup1", scale=16), support=()).picture

@@ -66,7 +66,7 @@ def test_vectors_cost_bits_and_are_chosen_by_them(smooth):
     _, bits = compensated(image, reference, 0.0)
     assert bits[0, 0, 3] == 2 * SAME and bits[0, 2:5].max() == 2 * SAME
     assert compensated(image[:, 8:16, 8:16], reference[:, 8:16, 8:16], 0.0)[1].shape == (1, 1, 1)
-    still, none = compensated(image, reference, 1e9)  # nothing is worth a vector
+    still, none = compensated(image, reference, 1e9)  # no vector is worth its bits
     np.testing.assert_allclose(still, reference, atol=1e-3)
     assert (none == 2 * SAME).all()
     assert _vector_bits.py_func(3, -5) == 12 and _vector_bits.py_func(0, 0) == 2 * SAME
@@ -93,7 +93,7 @@ def test_correlation_and_residual_by_hand():
 
 
 def test_the_camera_of_the_sweep_moves_and_its_lenses_have_their_pitch():
-    """Sub-images are parallel projections: a way of 4 lenses is a shift by 4 pixels, whatever the depth."""
+    """Sub-images are parallel projections: a camera path of 4 lenses shifts them by 4 pixels at every depth."""
     video = moving(32, 8, 4 * 8 * 0.1952)
     assert video.structure.ei_pixels == (8, 8) and video.structure.lenses == (32, 16)
     a, b = (video.component(t, "si", (4, 4)).astype(int) for t in (1, 2))

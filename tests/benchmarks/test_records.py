@@ -25,7 +25,7 @@ TOY = Records("toy", ("benchmarks.records",))
 
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path, monkeypatch):
-    """What tests measure is no record of ours; files that are there are read where they are."""
+    """Redirect records that tests write; read existing files from their place."""
     monkeypatch.setattr(records, "RESULTS", tmp_path)
 
 
@@ -52,7 +52,7 @@ def test_a_changed_figure_and_an_unknown_mark_are_found(kept, tmp_path):
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_all_record_files_are_valid(path):
-    """The stamped-over rows of coders.json, coders_full.json and fuzz.json had no such test."""
+    """On b1dc540 no test found the rows of coders.json, coders_full.json and fuzz.json with a false commit."""
     assert check(path) == []
 
 
@@ -74,7 +74,7 @@ def test_the_stamp_of_one_commit_over_rows_of_another_is_found(tmp_path):
 
 
 def test_committed_rows_must_not_change(tmp_path, monkeypatch):
-    """Lines are added; only rows whose commit is unknown may be removed, once they are measured again."""
+    """Lines are only added; rows of unknown commit may be removed after they are measured again."""
     for command in (["init", "-q"], ["config", "user.email", "a@b.c"], ["config", "user.name", "a"]):
         git(*command, cwd=tmp_path)
     TOY.measure({"row": 1}, lambda: {"value": 1})
@@ -184,7 +184,7 @@ def test_coders_continue_and_take_subsets(monkeypatch, capsys):
         return capsys.readouterr().out
 
     first = run("--scenes", "cuboid", "--schemes", "jpeg2000")
-    assert "cuboid: 2 of 2 curves to measure" in first  # the anchor besides
+    assert "cuboid: 2 of 2 curves to measure" in first  # with the anchor
     rows = coders.RECORDS.rows()
     assert [(row["scene"], row["scale"], row["scheme"]) for row in rows] == [
         ("cuboid", 64, coders.ANCHOR), ("cuboid", 64, "jpeg2000")
@@ -205,12 +205,12 @@ def test_decode_seconds_exclude_the_measure(monkeypatch):
     monkeypatch.setattr(coders, "qualities", lambda scheme: [{"qp": 30}])
     original = rd.q_global
     monkeypatch.setattr(rd, "q_global", lambda a, b: (spend(0.5), original(a, b))[1])
-    _, (point,) = (coders.curve(picture, "si-h264") for _ in range(2))  # the first compiles
+    _, (point,) = (coders.curve(picture, "si-h264") for _ in range(2))  # the first call compiles kernels
     assert point["decode_seconds"] < 0.3
 
 
 def spend(seconds):
-    """Work for so many CPU seconds."""
+    """Use so many CPU seconds."""
     until = time.thread_time() + seconds
     while time.thread_time() < until:
         pass

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 def test_without_a_lift_half_of_all_lit_points_shade_themselves():
     with geometry.lifted(0.0):
         assert 0.4 < geometry.own_shadow(1.0, 0, 2000)[0] < 0.6
-    with geometry.lifted(1e-6):  # a quarter of ours is still enough
+    with geometry.lifted(1e-6):  # a quarter of our lift still suffices
         assert geometry.own_shadow(1.0, 10, 2000)[:2] == (0, 0)
     assert geometry.own_shadow(1.0, 1e6, 2000)[:2] == (0, 0)
 
@@ -40,7 +40,7 @@ def test_small_bodies_lose_shadows_only_on_huge_faces():
 
 
 def test_smooth_balls_have_no_band_at_the_terminator():
-    """A hundredth of a degree is what float32 hits leave; light of weight 1.5e-4 is not shot at all."""
+    """float32 hits leave a hundredth of a degree; shadow rays of weight below 1.5e-4 are not traced."""
     rows = light.terminator()
     assert all(row["band, degrees"] < 0.012 and row["light off by, rms"] < 2e-6 for row in rows)
 

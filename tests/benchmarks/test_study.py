@@ -24,7 +24,7 @@ calls = []
 
 
 def counted(folder, *, value, drift=0):
-    """A step that counts its runs, with a time that differs and, if asked, a number and a picture that do."""
+    """Return a step that counts its runs; its time differs, and optionally a number and a picture."""
     calls.append(value)
     run = len(calls) * drift
     write_image(folder / "toy.png", np.full((2, 2, 3), value + run, np.uint8))
@@ -41,7 +41,7 @@ def test_a_step_runs_once_and_keeps_all_records(tmp_path):
     assert first["result"] == {"number": 1, "pair": [1, "inf"], "nothing": None, "encode_seconds": 1}
     assert {"git", "machine", "versions", "code", "parameters", "seconds", "when"} <= first.keys()
     assert perform([toy(value=1)], tmp_path) == [] and calls == [1]
-    perform([toy(value=2)], tmp_path)  # other parameters: done, and the older picture is no longer there
+    perform([toy(value=2)], tmp_path)  # other parameters: the step runs, and the older picture is removed
     assert [r["parameters"]["value"] for r in records(tmp_path, "toy")] == [1, 2]
     assert known(toy(value=2), tmp_path) and not known(toy(value=1), tmp_path)
     (tmp_path / "toy.png").unlink()
@@ -93,7 +93,7 @@ def test_a_small_study_resumes_repeats_and_fills_the_page(tmp_path, capsys):
     page.write_text(
         "".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in [mark for _, mark in tables(tmp_path)])
     )
-    for _ in range(2):  # published again, nothing is kept twice
+    for _ in range(2):  # publishing twice adds no record twice
         publish(tmp_path / "out", page=page, images=tmp_path / "images", kept=tmp_path / "kept")
         lines = gzip.decompress((tmp_path / "kept" / "floors.jsonl.gz").read_bytes()).splitlines()
         assert [json.loads(line).get("repeats") for line in lines] == [None, True]
@@ -134,7 +134,7 @@ def test_wrong_arguments_are_named(arguments, said, capsys):
 
 
 def test_fluctuation_explained_by_detail():
-    """Q_depth on a line over detail is explained wholly; a layer of no error counts nowhere."""
+    """Detail explains a linear Q_depth completely; a layer without error does not count."""
     detail = [0.0, 9.0, 99.0, 999.0]  # −10 log₁₀ of one more: 0, −10, −20, −30
     layers = {"depth_mm": [1.0, 2.0, 3.0, 4.0], "detail": detail}
     spread, correlation, left = claims.by_detail([40.0, 35.0, 30.0, 25.0], layers["depth_mm"], layers)
@@ -179,7 +179,7 @@ def test_gain_and_rate_ratio_of_straight_curves():
     assert claims.rate_ratio(both, "a", "b", 30.0) == pytest.approx(4)
     assert claims.rate_ratio(both, "a", "b", None) == pytest.approx(4)  # at b's 32 dB
     assert claims.rate_ratio(both, "a", "b", 60.0) is None
-    # where the better one's worst point is better still, its rate is a bound
+    # if the worst point of the better scheme is still better, its rate is a bound
     assert claims.rate_ratio([*points("a", 40.0), *points("b", 23.0)], "a", "b", None) == pytest.approx(8)
 
 

@@ -17,7 +17,7 @@ PICTURE = IIPicture(PIXELS, (12, 8), (4, 4))
 
 @pytest.fixture
 def programs(tmp_path, monkeypatch):
-    """Programs of those names that do what they are told in shell."""
+    """Create programs of those names from shell code."""
 
     def write(encode, decode):
         for name, text in ((volume_model.ENCODER, encode), (volume_model.DECODER, decode)):
@@ -36,7 +36,7 @@ def test_voxels_round_trip_to_pixels(programs):
 
 
 def test_slices_are_sub_images_in_parallel_order(programs, tmp_path):
-    """Rows to the right and back again: the last sub-image of the first row stands beside that below it."""
+    """Rows alternate in direction: the last sub-image of the first row is followed by the one below it."""
     programs(f"cp volume.bin {tmp_path}/kept.bin; cp volume.bin volume.jp3d", "cp volume.jp3d decoded.bin")
     volume_model.by_model(PICTURE, 1.0)
     slices = np.fromfile(tmp_path / "kept.bin", np.uint8).reshape(16, 8, 12)  # of the last colour
@@ -72,7 +72,7 @@ def test_colours_coded_alone_by_ours():
 
 
 def test_a_lead_is_measured_at_the_rates_of_the_other_scheme():
-    """A line of 3 dB an octave is 6 dB above another, at whatever rates that has; beyond the ends nothing counts."""
+    """A line of 3 dB per octave is 6 dB above another at all rates of that; rates beyond its ends do not count."""
     mine = [{"scheme": "a", "bpp": rate, "q_global": 30 + 3 * math.log2(rate)} for rate in (0.1, 0.4, 1.6)]
     its = [{"scheme": "b", "bpp": rate, "q_global": 24 + 3 * math.log2(rate)} for rate in (0.15, 0.7, 1.3)]
     beyond = [{"scheme": "b", "bpp": rate, "q_global": -99} for rate in (0.09, 1.7)]

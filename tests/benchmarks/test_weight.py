@@ -10,7 +10,7 @@ from PIL import Image
 from benchmarks.pages.pictures import WIDEST, write_picture
 
 ROOT = Path(__file__).parents[2]
-FILE, RECORDS, TREE = 1.0, 2.0, 15.0  # MB
+FILE, RECORDS, TREE = 1.0, 2.0, 15.0  # largest sizes in MB
 
 
 def tracked():
@@ -21,7 +21,7 @@ def tracked():
 
 
 def heavy(sizes):
-    """What is too heavy, a line each, of sizes in bytes by path."""
+    """Return a line for each file that is too large, from sizes in bytes by path."""
     wrong = []
     for path, size in sizes.items():
         record = path.startswith("benchmarks/results/") and path.endswith(".jsonl")
@@ -55,7 +55,7 @@ def test_pictures_are_unique_and_not_wider_than_shown():
     for path in tracked():
         if path.startswith(("docs/", "benchmarks/")) and path.endswith((".png", ".webp", ".jpg")):
             data = (ROOT / path).read_bytes()
-            if path.startswith("docs/images/cameras/"):  # cameras that differ in time or kind alone look alike
+            if path.startswith("docs/images/cameras/"):  # some cameras have similar pictures
                 data += path.encode()
             assert seen.setdefault(data, path) == path, f"{path} is {seen[data]}"
             with Image.open(ROOT / path) as picture:

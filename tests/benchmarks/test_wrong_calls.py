@@ -41,7 +41,7 @@ def test_no_error_is_accidental(named, tmp_path, monkeypatch):
 
 
 def test_every_public_function_is_tried_with_every_argument(named):
-    """It had left out 29 functions by name, and counted the last call of a function alone."""
+    """The first version left out 29 functions, and counted only the last call of each function."""
     assert untried(named) == []
 
 

@@ -53,7 +53,7 @@ def state(folder):
     ],
 )
 def test_nothing_of_the_user_is_replaced(run, refused, picture, tmp_path, monkeypatch, mine, command):
-    """The old test of this name looked at the picture alone, not at what comes with it."""
+    """The old test of this name checked only the picture, not its sidecar and support images."""
     monkeypatch.chdir(tmp_path)
     if "p.ii" in command:
         assert run("encode", picture, "--qp", 40, "-o", "p.ii")[0] == 0
@@ -109,7 +109,7 @@ def test_devices_pipes_and_folders_are_never_replaced(run, refused, picture, tmp
 
 
 def bomb(path, width, height):
-    """A PNG that says it is large, and is not."""
+    """Return a small PNG whose header states a large size."""
 
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
@@ -236,7 +236,7 @@ def test_strange_options_are_one_line(run, refused, picture, tmp_path, monkeypat
 
 
 def test_brackets_in_names_are_printed_unchanged(run, picture, tmp_path, monkeypatch):
-    """They are markup to the library that draws bars and tables."""
+    """The library of bars and tables interprets brackets as markup."""
     monkeypatch.chdir(tmp_path)  # a long path would be cut at the terminal's width
     for name in ("[bold]", "[red] x", "a[1]", ":smile:"):
         coded = tmp_path / f"{name}.ii"
@@ -332,7 +332,7 @@ def asked(port, path, host):
 
 
 def test_only_this_machines_own_names_are_served(served):
-    """A site whose name is made to lead to 127.0.0.1 would read the picture (DNS rebinding)."""
+    """A site whose name resolves to 127.0.0.1 could read the picture (DNS rebinding)."""
     process, port, folder = served
     for host in (f"127.0.0.1:{port}", f"localhost:{port}", f"LOCALHOST:{port}"):
         assert asked(port, "/", host) == 200
@@ -351,7 +351,7 @@ def test_only_this_machines_own_names_are_served(served):
 
 @pytest.mark.parametrize("address", ["tls://", "tls://127.0.0.1:9", "nothing://x"])
 def test_addresses_of_no_scheduler_are_one_line_to_the_end_of_the_process(picture, address):
-    """In this process a client's complaint at its end, nine lines, was not seen."""
+    """Only a separate process shows the nine lines that a client printed at its end."""
     command = [*COMMAND, "study", picture, "-o", picture.parent / "study", "--rates", "1", "--dask", address]
     done = subprocess.run(command, capture_output=True, text=True, timeout=100)
     assert done.returncode == 2 and done.stderr.count("\n") == 1

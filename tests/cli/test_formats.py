@@ -86,7 +86,7 @@ def test_refused(run, refused, shot, tmp_path):
 
 
 def test_imported_views_get_a_camera(run, refused, shot, tmp_path):
-    """By the measures of an array of cameras, or from a file; what is incomplete is refused before any work."""
+    """From the parameters of an array of cameras, or from a file; incomplete ones are refused before any work."""
     views, out = tmp_path / "v", tmp_path / "p.png"
     assert run("export", shot, "--to", "views", "-o", views)[0] == 0
     (views / "structure.json").unlink()

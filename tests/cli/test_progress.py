@@ -1,4 +1,4 @@
-"""What commands tell: version, help, completion, progress, closing lines, tables; and ``--quiet``."""
+"""Output of commands: version, help, completion, progress, closing lines, tables; and ``--quiet``."""
 
 import importlib.util
 import os
@@ -25,7 +25,7 @@ def picture(tmp_path_factory):
 
 
 def test_version_and_bare_command(run):
-    """On b1dc540 the first was no option, the second an error of one line that held the whole help."""
+    """On b1dc540 --version was unknown, and the bare command an error of one line with the whole help."""
     code, out, err = run("--version")
     assert (code, err) == (0, "") and re.fullmatch(r"raytrace-ii \d+\.\d+\.\d+\n", out)
     code, out, err = run()

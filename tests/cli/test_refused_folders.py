@@ -1,6 +1,6 @@
 """Commands that write into folders: a refused one leaves the disk as it was.
 
-The tests of refused commands in `test_faults.py` compared files, so that none saw an empty folder.
+The tests of refused commands in `test_faults.py` compare files, and cannot detect an empty folder.
 """
 
 import numpy as np

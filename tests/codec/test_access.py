@@ -58,7 +58,7 @@ def coded(scheme):
 @pytest.mark.parametrize("scheme", VIDEOS)
 @pytest.mark.parametrize("gop", [1, 5, 0])
 def test_a_component_decoded_alone_equals_the_whole_picture(scheme, gop):
-    """To the bit: a group decodes alone to what it is among the others."""
+    """To the bit: a group decoded alone equals the group in the whole stream."""
     stream = coded(f"{scheme}:gop={gop}" if "gop" in find(scheme).options else scheme)
     gop = gop if "gop" in find(scheme).options else 0
     kind = scheme.partition("-")[0]
@@ -93,7 +93,7 @@ def test_a_component_that_was_coded_on_its_side():
 @pytest.mark.parametrize("options", ["", ":wavelet=53", ":lossless=1"])
 @pytest.mark.parametrize("size", [(20, 18, 4, 3), (150, 270, 2, 2), (1, 5, 3, 2), (3, 2, 37, 37)])
 def test_a_component_of_one_codestream_by_its_own_packets(size, options, dtype, monkeypatch):
-    """To the bit, whatever precincts, code blocks and groups there are, and no other plane is decoded."""
+    """To the bit, for all precincts, code blocks and groups, without decoding another plane."""
     from codec.coders import planes
 
     made = picture(*size)
@@ -129,7 +129,7 @@ def test_b_pictures_and_other_orders():
 
 
 def test_only_its_own_group_is_read():
-    """The rest may be anything: here every other group's slices are zeros."""
+    """The slices of all other groups are replaced by zeros."""
     stream = coded("si-h264:gop=4")
     taken = sequence(stream)
     data = [packet.data for packet in taken.packets]
@@ -191,7 +191,7 @@ def test_streams_are_files_that_ffmpeg_decodes_to_the_same(scheme, tmp_path):
             shown = probe(path)
             assert int(shown["nb_read_frames"]) == len(expected)
             if taken.film.format.chroma in ("444", "420") and not scheme.endswith("mpeg2"):
-                # MPEG-2 has no full range, and its decoders say so whatever the container does.
+                # MPEG-2 has no full range: its decoders report limited range for every container.
                 assert (shown["color_range"], shown["color_space"]) == ("pc", "bt709")
 
 
@@ -204,7 +204,7 @@ def probe(path):
 
 @pytest.mark.parametrize("depth", ["8", "10"])
 def test_avif_shows_sub_images_in_their_colours(depth, tmp_path):
-    """By libavif, which shares nothing with our decoding: within the rounding of its colour conversion."""
+    """Against libavif, which is independent of our decoding, within the rounding of its colour conversion."""
     stream = encode(picture(), f"si-avif:depth={depth}", qp=5)
     assert str(extract(stream, tmp_path / "x.avif")) == "12 frames of 20×18 pixels"
     shown = imagecodecs.avif_decode((tmp_path / "x.avif").read_bytes()).astype(int) >> (int(depth) - 8)
@@ -223,7 +223,7 @@ def test_avif_shows_sub_images_in_their_colours(depth, tmp_path):
     ],
 )
 def test_extract_reports_the_component_image_within_frames(scheme, said, size, tmp_path):
-    """HEVC frames have at least 24×16 pixels; a test compared them with our padded ones and called that the same."""
+    """HEVC frames have at least 24×16 pixels; an earlier test compared padded frames with padded frames."""
     stream = encode(picture(30, 3, 4, 3), scheme, qp=20) if scheme == "ri-hevc" else coded(scheme)
     shown = extract(stream, tmp_path / "x.mkv")
     assert said in str(shown) and shown.size == size
@@ -283,7 +283,7 @@ def test_command(run, refused, tmp_path):
 
 
 def test_the_bare_payload_is_a_stream(tmp_path):
-    """What stands in the file needs no more than to be cut out."""
+    """The payload of the file is a complete stream without changes."""
     stream = coded("si-h264")
     stream.save(tmp_path / "x.ii")
     payload = (tmp_path / "x.ii").read_bytes()[-len(stream.payload) :]
@@ -293,7 +293,7 @@ def test_the_bare_payload_is_a_stream(tmp_path):
 
 
 def test_a_coder_of_another_package_decodes_components_alone(monkeypatch):
-    """The coders that could were a fixed list of classes."""
+    """Earlier, a fixed list of classes could do so."""
 
     class Raw(Coder):
         name, about, kind, components_alone = "test-raw", "sub-images as they are", "si", True

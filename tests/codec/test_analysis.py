@@ -17,7 +17,7 @@ counts = st.integers(1, 6)
 
 
 def direct(picture, kind, order):
-    """(5.3) and (5.7) as they stand."""
+    """Compute (5.3) and (5.7) literally."""
     stack = component_images(picture, kind).astype(np.float64)
     if kind == "ri":  # the stack is [v, l], the grid has v across
         stack = stack.swapaxes(0, 1)
@@ -82,7 +82,7 @@ def test_a_constant_picture_and_a_single_frame():
 
 
 def test_low_contrast_on_bright_frames_is_not_cancelled():
-    """Nothing is lost to cancellation: one code in 16 bits is enough for a correlation."""
+    """Without cancellation, a contrast of one 16-bit code determines a correlation."""
     pixels = np.full((1, 4000, 3), 65000, np.uint16)
     pixels[0, 5], pixels[0, 2005] = 65001, 65001
     (row,) = analyse_orders(IIPicture(pixels, (2, 1), (2000, 1)), kinds=["ei"], orders=["row"])
@@ -90,7 +90,7 @@ def test_low_contrast_on_bright_frames_is_not_cancelled():
 
 
 def test_parallel_by_its_kind_of_neighbour_beats_row_on_a_ramp():
-    """Where views drift across and down, jumps back cost: the order of §5.8.2's table on the simplest picture."""
+    """On a ramp, jumps to the start of the next row cost energy: the orders rank as in the table of §5.8.2."""
     v, u, t, s = 6, 6, 16, 24
     y, x = np.mgrid[:t, :s]
     field = np.empty((t, v, s, u, 3))

@@ -1,6 +1,6 @@
 """Files that state a false size: refused in a second and in bounded memory, with every scheme.
 
-In a process of its own whose address space is limited, with checksums that are right.
+The tests run in a separate process of limited address space, on files with correct checksums.
 """
 
 import json
@@ -96,7 +96,7 @@ assert time.process_time() - started < 1
     ],
 )
 def test_forged_streams_that_agree_with_a_forged_structure_are_refused_small(scheme, side, said, tmp_path):
-    """The test above forges the structure alone, so that streams gave claims away by their own size."""
+    """The test above forges only the structure, which the size of the stream contradicts."""
     path = str(tmp_path / "forged.ii")
     done = subprocess.run(
         [sys.executable, "-c", FORGED, scheme, str(side), path],
@@ -163,7 +163,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before >> 10, time.pr
 
 @pytest.mark.parametrize("how", ["whole", "precincts", "second style", "style of a tile", "tiles"])
 def test_forged_precincts_and_tiles_of_jpeg2000_take_no_memory(how):
-    """Small precincts took 1600 bytes a pixel; the tests above forge sizes alone, whose memory is the picture's."""
+    """Small precincts took 1600 bytes per pixel; the tests above forge only sizes."""
     done = subprocess.run(
         [sys.executable, "-c", PRECINCTS, how], capture_output=True, text=True, timeout=100, check=False
     )
@@ -201,7 +201,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - own >> 10, worker >> 
     ("side", "own", "worker"), [(2048, 22 * 4 + 50, 40 * 4 + 200), (2056, 5, 200), (8192, 5, 200)]
 )
 def test_forged_volumes_of_sperr_take_memory_by_their_bytes(side, own, worker):
-    """A kilobyte stands for 2048² pixels at most: 22 bytes each here and 40 in the decoder's process, in MB."""
+    """A kilobyte allows 2048² pixels at most; 22 bytes per pixel here, 40 in the decoder, in MB."""
     done = subprocess.run(
         [sys.executable, "-c", SPERR, str(side)], capture_output=True, text=True, timeout=100, check=False
     )

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(not os.path.isdir(TASKS), reason="only Linux tel
 
 
 def test_cpu_time_excludes_threads_of_others():
-    """One has ended since, one is Python's: taken for the encoder's while they were starting, they are told apart."""
+    """Threads that have ended, and Python's own threads, are distinguished from those of the encoder."""
     ended = threading.Thread(target=lambda: None)
     ended.start()
     ended.join()
@@ -39,7 +39,7 @@ def test_cpu_time_excludes_threads_of_others():
 
 
 def test_no_encoder_makes_the_process_a_real_time_task():
-    """SVT-AV1 does, where it is run by root: beside a browser, or another of its kind, nothing else came on."""
+    """SVT-AV1 run by root does: other processes of the machine then got no CPU time."""
     coder, options = parse_scheme("si-av1:fast")
     film = coder.film(IIPicture(np.zeros((64, 128, 3), np.uint8), (8, 4), (16, 16)), options)
     context = open_encoder(coder, film, coder.constant(30, film, options))

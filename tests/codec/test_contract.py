@@ -12,13 +12,13 @@ from codec.contract import find, parse_scheme
 from ii_core import IICamera, IIPicture
 
 SCHEMES = sorted(schemes())
-# The most that any value of a noise picture may differ at the finest setting, where that is colour conversion alone.
+# Largest error of a noise picture at the finest setting of schemes whose only loss is colour conversion.
 EXACT = {"jpeg2000": 0} | {f"{kind}-{coder}": 1 for kind in ("ei", "si", "ri") for coder in ("h264", "vp9")}
 
 
 @cache
 def textured(k=32, l=16, u=8, v=8):
-    """A ball before a wall, both textured, with disparity and sensor noise: what coders meet."""
+    """Return a textured ball before a textured wall, with disparity and sensor noise."""
     rng = np.random.default_rng(5)
     wall, ball = (_texture(l + 4 * v + 8, k + 4 * u + 8, rng) for _ in range(2))
     field = np.empty((l, v, k, u, 3), np.uint8)
@@ -35,7 +35,7 @@ def textured(k=32, l=16, u=8, v=8):
 
 
 def _texture(rows, cols, rng):
-    """Grey-ish noise at several scales."""
+    """Return nearly grey noise at several scales."""
     total = np.full((rows, cols, 3), 120.0)
     for scale in (2, 4, 8, 16):
         cells = rng.standard_normal((rows // scale + 2, cols // scale + 2, 1)) + 0.3 * rng.standard_normal(3)
@@ -53,7 +53,7 @@ def _shifted(texture, down, right, rows, cols):
 
 @cache
 def large():
-    """Enough frames of every kind that headers weigh little."""
+    """Return a picture with so many frames of every kind that headers are negligible."""
     return textured(64, 32, 16, 16)
 
 
@@ -63,7 +63,7 @@ def psnr(a, b, peak=255):
 
 
 def quick(scheme):
-    """The scheme at its fastest, where its default is not that of the dissertation."""
+    """Return the scheme at its fastest, unless its default is that of the dissertation."""
     return f"{scheme}:fast" if "fast" in find(scheme).presets and "h264" not in scheme else scheme
 
 
@@ -77,7 +77,7 @@ def subsampled(scheme):
 
 
 def finest(scheme):
-    """What to ask for to get the most a scheme gives."""
+    """Return the goal of a scheme's best quality."""
     coder = parse_scheme(scheme)[0]
     if lossless(scheme):
         return {}
@@ -87,7 +87,7 @@ def finest(scheme):
 
 
 def medium(scheme):
-    """What to ask for to get a picture like others' at a moderate rate."""
+    """Return the goal of a moderate rate, with a quality similar over schemes."""
     coder = find(scheme)
     if coder.rate_control or lossless(scheme):
         return {"bpp": 1.5} if not lossless(scheme) else {}
@@ -111,7 +111,7 @@ def test_round_trip(scheme):
     assert decoded.camera == picture.camera
     if lossless(scheme):
         np.testing.assert_array_equal(decoded.pixels, picture.pixels)
-    else:  # half the colours at 4:2:0, which is what the picture has much of
+    else:  # 4:2:0 halves the resolution of colour, of which the picture has much
         assert psnr(picture, decoded) > (33 if subsampled(scheme) else 38)
     assert decoded.pixels.flags.writeable
 
@@ -258,7 +258,7 @@ def test_costs_are_recorded_apart(scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_damaged_payloads_end_in_a_value_error_or_a_picture(scheme):
-    """Past a file's checksum, as only malice gets: whatever comes, no crash and no other error."""
+    """Damage inside the checksum, as by an attacker: no crash and no other error."""
     coded = encode(textured(16, 8, 4, 4), quick(scheme), **medium(scheme))
     rng = np.random.default_rng(11)
     for _ in range(60):

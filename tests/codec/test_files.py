@@ -28,14 +28,14 @@ def whole(coded, tmp_path):
 
 
 def first_file(header, payload=b"\x00\x00\x00\x01"):
-    """A file of the first version with a right checksum over anything."""
+    """Return a file of the first version with any content and a correct checksum."""
     text = header if isinstance(header, bytes) else json.dumps(header).encode()
     fixed = struct.pack("<8sHIQ", FIRST_MAGIC, 1, len(text), len(payload))
     return fixed + hashlib.sha256(fixed + text + payload).digest() + text + payload
 
 
 def forged(header, payload=b"\x00\x00\x00\x01"):
-    """A file with a right checksum over anything."""
+    """Return a file with any content and a correct checksum."""
     text = header if isinstance(header, bytes) else write_values(header)
     fixed = b"\x89IIC\x02" + leb128(len(text)) + leb128(len(payload))
     return fixed + hashlib.sha256(fixed + text + payload).digest()[:8] + text + payload

@@ -31,7 +31,7 @@ PICTURE = IIPicture(np.random.default_rng(3).integers(0, 256, (32, 64, 3), np.ui
 
 
 class Odd(BaseException):
-    """No Exception."""
+    """An exception that is no subclass of Exception."""
 
 
 def ends(error):
@@ -42,7 +42,7 @@ def ends(error):
 
 
 class Broken(Coder):
-    """Encodes and decodes as it is told."""
+    """A coder whose encoder and decoder are given functions."""
 
     name, about, versions = "broken", "for this test", {}
     rate_control, quality_range = False, (0, 9)

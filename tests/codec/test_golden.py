@@ -1,6 +1,6 @@
 """Golden files: every scheme decodes the streams of earlier versions.
 
-``pytest tests/codec/test_golden.py --make-golden`` codes what a new scheme lacks; what is there is never replaced.
+``pytest tests/codec/test_golden.py --make-golden`` writes missing files of new schemes, and replaces none.
 """
 
 import json
@@ -17,14 +17,14 @@ from ii_core.files import read_image, write_image, write_json
 
 FOLDER = Path(__file__).parents[1] / "golden"
 TOTAL_BYTES = 200_000
-# Codes that a decoder may be off by. The video standards but MPEG-2, and reversible wavelets, say what comes out to
-# the bit; inverse cosine transforms, floating wavelets and colour conversion inside a library may round otherwise
-# with the next version or processor.
+# Tolerance in codes. The video standards except MPEG-2, and reversible wavelets, define decoding to the bit; inverse
+# cosine transforms, floating wavelets and colour conversion inside a library may round differently in another version
+# or on another processor.
 ROUNDING = {"mpeg2": 2, "jpeg": 2, "jpegxl": 2, "avif": 1, "jp3d": 1, "sperr": 1, "htj2k": 1, "jpeg2000": 1}
 
 
 def original():
-    """Something of everything: gradients, an edge, noise; 8×8 lenses of 4×4 px."""
+    """Return a picture with gradients, an edge and noise; 8×8 lenses of 4×4 px."""
     y, x = np.mgrid[:32, :32]
     shade = 128 + 90 * np.sin(x / 6) * np.cos(y / 9) + np.random.default_rng(2).standard_normal((32, 32))
     pixels = np.stack([shade, 255 - shade, np.where(x > y, shade / 2, 200)], axis=-1)
@@ -40,7 +40,7 @@ def compact():
 
 
 def coded(scheme):
-    """At a quality that leaves something to be wrong about."""
+    """Return the picture coded at a quality with visible errors."""
     coder = find(scheme)
     if coder.lossless({key: option.default for key, option in coder.options.items()}):
         return encode(original(), scheme)
@@ -89,7 +89,7 @@ def test_old_files_decode_to_the_same_pixels(path):
 
 @pytest.mark.parametrize("scheme", sorted(schemes()))
 def test_defaults_of_options_stay(scheme, request):
-    """Files leave out options at their default (`codec.file_header`): another default would decode them otherwise."""
+    """Files omit options at their default (`codec.file_header`): another default would decode differently."""
     path = FOLDER / "defaults.json"
     kept = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     now = {name: option.default for name, option in find(scheme).options.items()}

@@ -69,7 +69,7 @@ def test_the_axes_are_those_of_detail_not_of_areas():
 
 
 def test_views_of_one_sample_have_axes():
-    """They have no neighbours to differ from."""
+    """Such views have no neighbouring samples."""
     axes = planes.detail_axes(np.full((3, 4, 3), 7, np.uint8), (3, 4)) / (1 << 14)
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-4)
 
@@ -130,7 +130,7 @@ def test_a_moved_plane_costs_little_more_than_one_view():
 
 
 def test_decoding_repeats_the_encoder_to_the_bit():
-    """The encoder predicts from what the decoder shows, or errors would grow from level to level."""
+    """The encoder predicts from decoded views; else errors would grow from level to level."""
     picture = shifted_plane((1, 1), grid=(4, 3))
     options = checked_options(lf.LightField(), {})
     source = lf._Source(picture, options)
@@ -154,7 +154,7 @@ def test_threads_change_no_byte(scheme):
 
 
 def coloured_noise(seed=2):
-    """Views without anything in common, in a colour for each quarter: their mean is no axis of any."""
+    """Return unrelated views with one colour per quarter: the mean axis is that of none of them."""
     rng = np.random.default_rng(seed)
     light = rng.normal(0, 30, (32, 3, 48, 3, 1))
     colours = np.array([[1, 1, 1], [1, 0.6, 0], [0, 0.6, 1], [0.8, 0, 0.6]])
@@ -178,7 +178,7 @@ def test_streams_without_factors_are_of_the_second_version():
     plain = encode(picture, "si-lf:fast,cross=0", qp=34)
     assert plain.payload[0] == stream.UNCROSSED
     assert encode(picture, "si-lf:fast", qp=34).payload[0] == stream.VERSION
-    # A decoder that looked for factors would lose its place in the bits at once.
+    # A decoder that read factors would lose synchronisation at once.
     error = np.mean((decode(plain).pixels.astype(float) - picture.pixels) ** 2)
     assert 10 * np.log10(255**2 / error) > 30
 
@@ -201,7 +201,7 @@ def test_few_bytes_do_not_claim_a_large_picture():
 
 @pytest.mark.parametrize("place", [(0, 0), (2, 1), (4, 3), (2, 2)])
 def test_one_view_alone_is_that_of_the_whole(place):
-    """And what is decoded for it are the levels above and a part of its own."""
+    """Only the levels above and a part of its own level are decoded."""
     picture = shifted_plane((1, 1), grid=(4, 5))
     coded = encode(picture, "si-lf", qp=34)
     alone = decode_view(coded, place)
@@ -231,7 +231,7 @@ def test_a_view_beyond_the_grid_is_refused():
 
 @pytest.mark.parametrize("scheme", ["si-lf", "si-lf:lossless=1"])
 def test_levels_come_nearer_to_the_picture(scheme):
-    """And the last one is the decoded picture."""
+    """The last level is the decoded picture."""
     picture = shifted_plane((1, 1), grid=(5, 5))
     coded = encode(picture, scheme, **({} if "lossless" in scheme else {"qp": 24}))
     stages = list(decode_levels(coded))
@@ -268,7 +268,7 @@ def test_lossless_keeps_every_bit(dtype, grid):
 
 
 def test_lossless_takes_less_than_general_coders():
-    """Of a textured plane with noise of one code, of which no coder can spare the 2.05 bits a sample."""
+    """A textured plane with noise of one code, whose entropy of 2.05 bits per sample no coder can save."""
     picture = shifted_plane((1, 1), grid=(5, 5))
     noise = np.random.default_rng(8).standard_normal(picture.pixels.shape)
     pixels = np.clip(np.rint(picture.pixels * 0.8 + 20 + noise), 0, 255).astype(np.uint8)

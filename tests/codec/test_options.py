@@ -28,7 +28,7 @@ def extremes():
     for name in SI:
         for key, option in find(name).options.items():
             for value in option.choices or (option.low, option.high):
-                if value not in ("placebo", "veryslow"):  # as good, and long
+                if value not in ("placebo", "veryslow"):  # slow presets test the same
                     yield f"{name}:{key}={value}"
 
 
@@ -51,7 +51,7 @@ def test_every_rate_control_of_x264_meets_a_rate(rate):
 
 @pytest.mark.parametrize("rate", ["cbr", "cq", "crf", "2pass"])
 def test_a_rate_too_low_for_x264_gives_its_least(rate):
-    """After a first pass x264 refuses to open for a rate that it knows to be too low."""
+    """After a first pass x264 fails to open for a rate that is too low."""
     least = encode(textured(), "si-h264:rate=cq", qp=51)
     coded = encode(textured(), f"si-h264:rate={rate}", bpp=0.1 * least.bpp)
     assert not coded.reached and coded.bpp <= 1.1 * least.bpp
@@ -86,7 +86,7 @@ def test_without_a_gop_there_is_one_key_picture(scheme):
 
 @pytest.mark.parametrize("kind", ["ei", "ri"])
 def test_x265_and_the_decoder_agree_on_narrow_frames(kind):
-    """One block wide they do not: 32 dB instead of 44 where it was found."""
+    """With frames one block wide they do not: 32 dB instead of 44 in the case found."""
     picture = textured(16, 16, 16, 16)
     assert psnr(picture, decode(encode(picture, f"{kind}-hevc:fast,rate=cq", qp=8))) > 40
 
@@ -115,7 +115,7 @@ def test_quality_falls_with_the_quantiser_down_to_its_end(scheme):
     assert found[0] > found[1] > found[2] > 8
 
 
-@pytest.mark.parametrize("scheme", [name for name in VIDEO if "ffv1" not in name])  # which tells no size
+@pytest.mark.parametrize("scheme", [name for name in VIDEO if "ffv1" not in name])  # FFV1 states no size
 def test_a_stream_of_other_frames_is_refused(scheme):
     coded = encode(textured(16, 8, 4, 4), quick(scheme), **finest(scheme))
     lenses, ei_pixels = {"ei": ((16, 8), (32, 32)), "si": ((32, 16), (4, 4)), "ri": ((64, 8), (4, 4))}[scheme[:2]]

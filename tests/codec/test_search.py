@@ -142,7 +142,7 @@ def test_search_over_rising_falling_whole_and_real_settings(octave, step, target
 
 
 def search(size, target, **kwargs):
-    """The size found and the runs it took, for a coder that makes ``size(setting)`` bytes (none are really there)."""
+    """Return the size found and the number of runs, for a simulated coder of ``size(setting)`` bytes."""
     finest = kwargs.pop("finest", None)
     found = meet_size(lambda setting: Run(range(int(size(setting))), 0.0), target, Axis(**kwargs), finest=finest)
     return len(found.run.payload), found.runs

@@ -23,7 +23,7 @@ CONSTANT = 54  # bytes of the header
 
 
 def field(shape=(6, 20, 30)):
-    """Something smooth with something rough in it."""
+    """Return a smooth volume with a rough part."""
     z, y, x = np.ogrid[: shape[0], : shape[1], : shape[2]]
     rough = np.random.default_rng(0).standard_normal(shape)
     return (60 * np.sin(x / 5 + z) * np.cos(y / 4) + 8 * rough).astype(np.float32)
@@ -31,7 +31,7 @@ def field(shape=(6, 20, 30)):
 
 @pytest.mark.parametrize("step", [0.5, 4.0, 32.0])
 def test_a_stream_without_its_header_is_decoded_as_the_library_does(step):
-    """Header for header what the library wrote, and the same volume from the other process."""
+    """The rebuilt header equals the library's, and the other process decodes the same volume."""
     volume = field()
     part = sperr_stream.encode_volume(volume, step)
     whole = imagecodecs.sperr_encode(
@@ -134,7 +134,7 @@ def test_a_worker_that_cannot_start_is_not_the_file_s_fault(monkeypatch):
 
 
 def test_the_worker_needs_nothing_of_this_package(tmp_path):
-    """It is run by its path, without the folder it lies in, whose modules have names like `header`."""
+    """The worker runs by its path, without its folder on the module path, which has names like `header`."""
     volume = field()
     part = sperr_stream.encode_volume(volume, 1.0)
     stream = sperr_stream._with_header(part, volume.shape)

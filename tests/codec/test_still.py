@@ -115,7 +115,7 @@ def test_libaom_keeps_all_of_the_colour():
 
 
 def test_errors_that_openjph_only_prints_are_raised(capfd):
-    """Its binding would print twice and hand out a picture with whatever the memory held."""
+    """Its binding would print twice and return a picture of uninitialised memory."""
     coded, rng = encode(textured(16, 8, 4, 4), "htj2k", qp=20), np.random.default_rng(0)
     refused = 0
     for _ in range(60):

@@ -22,7 +22,7 @@ LENSES, EI = (32, 32), (4, 3)  # 12 sub-images of 32×32, 1024 elementary images
 
 
 def take(frames=5, lenses=LENSES, ei=EI):
-    """A pattern that moves by a pixel a frame, and by another from view to view."""
+    """Return a pattern that moves by one pixel per frame, and by one per view."""
     (k, l), (u, v) = lenses, ei
     y, x = np.mgrid[: l * v, : k * u]
     row, col, side, up = y // v, x // u, x % u, y % v

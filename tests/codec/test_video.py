@@ -85,7 +85,7 @@ def test_quality_follows_the_quantiser():
 
 
 def test_reusing_one_frame_object_does_not_change_bytes():
-    """The encoder's bytes are those it makes from frames of their own, one object each, kept alive."""
+    """The bytes equal those from separate frame objects that are kept alive."""
     picture = textured()
     coded = encode(picture, "si-h264:bframes=3", qp=30)
     coder, options = parse_scheme("si-h264")

@@ -41,7 +41,7 @@ def prose(text):
 
 
 def anchors(text):
-    """What headings can be reached by, as code hosts and our site name them."""
+    """Return the anchors of headings, as code hosts and our site name them."""
     heads = re.findall(r"^#+ (.+)$", FENCED.sub("", text), re.M)
     return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
 
@@ -90,7 +90,7 @@ def test_variants_of_a_line():
 
 
 def complaint(words, whole):
-    """What the command says to these words, or None; files and values are not looked at, options and counts are."""
+    """Return the command's error on these words, or None; checks options and counts, not files and values."""
     name, *rest = words
     if name == "COMMAND":
         return None

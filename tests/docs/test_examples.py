@@ -147,7 +147,7 @@ def test_progress_may_be_true(capsys):
 
 
 def test_names_of_schemes_are_as_before():
-    """No notebook leaves its coder behind."""
+    """Notebooks unregister their coders."""
     assert "coarse" not in schemes()
     with pytest.raises(TypeError):
         register(object())

@@ -1,7 +1,7 @@
 """Full disk: every writer reports it and leaves whole files or none.
 
-The limit on the size of a file stands in for the full disk. libpng and libtiff report neither; tests that only
-interrupted a run had not met them.
+A limit on the size of files simulates the full disk. libpng and libtiff report neither of the two; tests that only
+interrupted a run did not find this.
 """
 
 import json
@@ -121,7 +121,7 @@ NAMES = [
 
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory):
-    """What each writer said at four limits, the last one byte short of its largest file."""
+    """Return the outcome of each writer at four limits, the last one byte less than its largest file."""
     folder = tmp_path_factory.mktemp("disk")
     done = subprocess.run([sys.executable, "-c", WRITERS], capture_output=True, text=True, cwd=folder)
     assert done.returncode == 0, done.stderr

@@ -37,7 +37,7 @@ except KeyboardInterrupt:
     print(time.monotonic() - started[0], flush=True)
 """
 WORKS = {
-    # A block of 65536 pixels with 4096 samples takes minutes, and threads wait for nothing else.
+    # A block of 65536 pixels with 4096 samples takes minutes, during which threads do not return to Python.
     "render": ("render(scene, camera, samples=4096)", "render(scene, preset('setup1', scale=128))"),
     # One call of a library that takes many seconds.
     "encode": ("encode(picture, 'jpegxl:effort=9', bpp=2.0)", "encode(small, 'jpegxl', bpp=2.0)"),

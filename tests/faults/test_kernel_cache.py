@@ -61,7 +61,7 @@ def test_a_file_cut_short_is_made_again(package, end, cut):
 
 @pytest.mark.slow
 def test_a_renamed_folder(package):
-    """Its cache names modules that are gone; the source file's time, by which numba goes, is the same."""
+    """The cache names missing modules, but the time stamp of the source file, which numba checks, is unchanged."""
     (package / "old").rename(package / "new")
     assert call(package, "new.kernels")[0] == "42"
     assert call(package, "new.kernels") == ["42", "1"]
@@ -80,7 +80,7 @@ def test_a_cache_that_cannot_be_written(package):
 
 
 def test_an_edit_of_a_file_beside_it(package):
-    """A kernel may call one of another file of its folder; the cache of numba alone would keep the old copy of it."""
+    """A kernel may call a kernel of another file in its folder; numba's own cache would keep the old copy."""
     (package / "old" / "twice.py").write_text(KERNEL.replace("doubled", "twice"))
     (package / "old" / "kernels.py").write_text(
         "from ii_core.jit import kernel\nfrom .twice import twice\n\n@kernel\ndef doubled(x):\n    return twice(x)\n"

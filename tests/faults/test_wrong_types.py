@@ -15,7 +15,7 @@ CAMERA = preset("setup1", scale=128)
 
 
 class Odd:
-    """A thing of no use."""
+    """A class that no function accepts."""
 
 
 ODD = [
@@ -81,7 +81,7 @@ def test_render(scene, argument):
 
 
 def test_an_unknown_option_is_named_with_those_there_are(scene, tmp_path):
-    """One class holds the options of three functions; type checkers read the same names."""
+    """One class defines the options of three functions, also for type checkers."""
     names = [field.name for field in fields(RenderOptions)]
     assert sorted(RenderKeywords.__annotations__) == sorted(names)
     for call in (partial(render, scene, CAMERA), partial(render_to, tmp_path / "p.png", scene, CAMERA)):
