@@ -160,7 +160,7 @@ def _write_pair(
     steps = 2 ** (8 * np.dtype(dtype).itemsize) if dtype != "float32" else 1
     sheet: dict[str, Any] = {}
     for name, box in boxes.items():
-        sheet[name] = {"file": f"{name}{ending}{suffix}", "C": steps, "box": [_widened(b, steps) for b in box]}
+        sheet[name] = {"file": f"{name}{ending}{suffix}", "C": steps, "box": [widened(b, steps) for b in box]}
     for rows, L, D, weight in _blocks(camera, where):
         values = {"L": L, "D": D}
         if weighted:
@@ -198,7 +198,7 @@ def _extremes(camera: IICamera, where: tuple[ArrayLike, ArrayLike]) -> tuple[dic
     return boxes, weighted
 
 
-def _widened(box: Sequence[float], steps: int) -> list[float]:
+def widened(box: Sequence[float], steps: int) -> list[float]:
     """Return the extremes for which the last code is the true maximum."""
     low, high = box
     return [low, low + (high - low) * steps / (steps - 1)] if steps > 1 else [low, high]
@@ -297,7 +297,7 @@ def _map_camera(sheet: Mapping[str, Any], array: Mapping[str, Any], folder: Path
     for pair in array["samples"]:
         if not {"L", "D"} <= set(pair):
             raise ValueError("every sample needs the images L and D")
-    (height, width, _), _ = image_header(_inside(folder, array["samples"][0]["L"]["file"]))
+    (height, width, _), _ = image_header(inside(folder, array["samples"][0]["L"]["file"]))
     lenses = whole_pair("lenses", sheet.get("lenses", (1, 1)))
     model = IICamera.from_json(array["camera"]) if array.get("camera") else None
     if model is not None and (model.pixels, model.lenses) != ((width, height), lenses):
@@ -308,7 +308,7 @@ def _map_camera(sheet: Mapping[str, Any], array: Mapping[str, Any], folder: Path
         else whole_pair("width and height over lenses", (width / lenses[0], height / lenses[1]))
     )
     maps = tuple(
-        {name: _map(pair, name, folder, (width, height)) for name in ("L", "D", "W") if name in pair}
+        {name: stored_map(pair, name, folder, (width, height)) for name in ("L", "D", "W") if name in pair}
         for pair in array["samples"]
     )
     name = str(sheet.get("name", folder.name))
@@ -319,17 +319,17 @@ def _is_finite(value: Any) -> bool:
     return isinstance(value, int | float) and abs(value) < np.inf
 
 
-def _inside(folder: Path, name: str) -> Path:
+def inside(folder: Path, name: str) -> Path:
     """Return the path of a file in the folder; raise ValueError if the name points outside."""
     if not isinstance(name, str) or not (folder / name).resolve().is_relative_to(folder.resolve()):
         raise ValueError(f"file is {name!r}: a name inside {folder} is needed")
     return folder / name
 
 
-def _map(pair: Mapping[str, Any], name: str, folder: Path, size: tuple[int, int]) -> _Map:
+def stored_map(pair: Mapping[str, Any], name: str, folder: Path, size: tuple[int, int]) -> _Map:
     """Read one map; its header is compared with the size of the first L before pixels are decoded."""
     entry = pair[name]
-    stored = read_image(_inside(folder, entry["file"]), size=size)
+    stored = read_image(inside(folder, entry["file"]), size=size)
     if stored.shape[2] < 3:
         raise ValueError(f"{entry['file']} has {stored.shape[2]} channels: x, y and z are needed")
     integer = stored.dtype.kind == "u"

@@ -11,7 +11,7 @@ from .common import Force, app, check_outputs, image_file, pair
 from .progress import say_done, spinner
 
 if TYPE_CHECKING:
-    from ii_core import DisplayModel, Eye
+    from ii_core import DisplayModel, Eye, IIPicture
 
 
 @app.command()
@@ -37,6 +37,10 @@ def eye(
     gap: Annotated[float | None, typer.Option(help="Gap from panel to lens plane, mm.")] = None,
     shift: Annotated[str, typer.Option(help="Shift of the lens array on the panel, mm: x,y.")] = "0,0",
     turn: Annotated[float, typer.Option(help="Rotation of the lens array on the panel, degrees.")] = 0.0,
+    spread: Annotated[
+        str | None,
+        typer.Option(help="Spread light of pixels: auto, by the camera's lenses and the eye, or a folder of maps."),
+    ] = None,
     force: Force = False,
 ) -> None:
     """Compute the view of an eye of a display: pupil, focus, sub-pixels, misaligned lenses.
@@ -62,9 +66,26 @@ def eye(
     viewer = Eye(position_mm=(place[0], place[1], place[2]), pupil_mm=pupil, focus_mm=focus)
     for path, one in zip(paths, viewer.pair(apart) if both else (viewer,), strict=True):
         with spinner(f"eye {picture.name}"):
-            seen = eye_image(shown, display, one, size=points, rays=rays)
+            seen = eye_image(_spread(shown, display, one, spread), display, one, size=points, rays=rays)
             write_image(path, seen.pixels)
         say_done(f"{path}: {seen.seen.mean():.1%} of the rays meet the panel; {_zone(display, one)}")
+
+
+def _spread(picture: IIPicture, display: DisplayModel, eye: Eye, text: str | None) -> IIPicture:
+    """The light of every pixel as the lenses spread it towards the eye."""
+    import numpy as np
+
+    from ii_core.optics import Lenslet
+    from ii_core.spread import spread_picture
+
+    from .spread import AUTO, maps_of
+
+    if text is None:
+        return picture
+    maps = maps_of(text, display.camera, 0, eye.position_mm[2])
+    if text == AUTO and isinstance(display.optics, Lenslet):  # `eye_image` traces its defocus
+        maps = maps._replace(defocus_mm=np.zeros_like(maps.defocus_mm))
+    return spread_picture(picture, maps)
 
 
 def _zone(display: DisplayModel, eye: Eye) -> str:

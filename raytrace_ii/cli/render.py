@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -60,6 +61,10 @@ def render(
     shading_normal: Annotated[Exr, typer.Option(help="Write unit shading normals to this .exr.")] = None,
     object_id: Annotated[Exr, typer.Option(help="Write object numbers to this .exr, −1 for none.")] = None,
     projection: Annotated[Path | None, typer.Option(help="Write the picture of a 2-D camera to this .png.")] = None,
+    spread: Annotated[
+        str | None,
+        typer.Option(help="Spread light by diffraction and defocus: auto, by the depth met, or a folder of maps."),
+    ] = None,
     workers: Workers = None,
     dask: Dask = None,
     force: Force = False,
@@ -91,6 +96,12 @@ def render(
     extra = {name: path for name, path in wanted.items() if path is not None}
     arrays = _cameras(camera, scale)
     poses = [_pose(array, at, look_at, up, turn) for array in arrays]
+    if spread is not None:
+        from .spread import check_spread
+
+        if frames or set_name:
+            raise ValueError("--spread is of one picture: without --frames and --set")
+        check_spread(spread, arrays)
     if frames:
         from ..rendering.executors import identity
         from .take import render_frames, support_files
@@ -123,13 +134,15 @@ def render(
         files += picture_files(numbered(output), dtype)
         files += [file for path in shared for file in image_file(numbered(path), "float32")]
     check_outputs(files, force)
-    _render_scene(scene, output, arrays, poses, names, extra, support, projection, dask, workers, dtype, options)
+    _render_scene(
+        scene, output, arrays, poses, names, extra, support, projection, dask, workers, dtype, options, spread
+    )
 
 
 def _render_scene(
     scene: str, output: Path, arrays: Sequence[Any], poses: Sequence[Any], names: Sequence[Callable[[Path], Path]],
     extra: dict[str, Path], support: Path | None, projection: Path | None, dask: str | None, workers: int | None,
-    dtype: str, options: dict[str, Any],
+    dtype: str, options: dict[str, Any], spread: str | None,
 ) -> None:  # fmt: skip
     """Render one scene through every pixel array, and its projection."""
     from ..files.load import load_scene
@@ -138,13 +151,20 @@ def _render_scene(
     loaded = load_scene(scene)
     with cluster(dask, identity) as executor:
         means = {"workers": workers, "executor": executor}
-        for array, pose, numbered in zip(arrays, poses, names, strict=True):
+        for i, (array, pose, numbered) in enumerate(zip(arrays, poses, names, strict=True)):
             files = {name: [numbered(path)] for name, path in extra.items()}
             for name in _all_support(array) if support else ():
                 files.setdefault(name, []).append(numbered(support))  # type: ignore[arg-type]
             more = {"pose": pose, "upright": array.lenses == (1, 1), "support": files, "dtype": dtype}
             path = numbered(output)
-            say_done(f"{path}: {_told(_shoot(path, loaded, array, **more, **options, **means))}")
+            shoot = partial(_shoot, scene=loaded, camera=array)
+            if spread is None:
+                stats = shoot(path, **more, **options, **means)
+            else:
+                from .spread import shoot_spread
+
+                stats = shoot_spread(shoot, path, array, i, spread, {**more, **options, **means})
+            say_done(f"{path}: {_told(stats)}")
         if projection:
             _save_projection(loaded, arrays[0], poses[0], projection, means)
 

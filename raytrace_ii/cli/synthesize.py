@@ -37,6 +37,10 @@ def camera(
     ] = None,
     scale: Annotated[int, typer.Option(help="Divides the number of lenses.")] = 1,
     format: Annotated[str, typer.Option(help="Format of the maps: png16, png8, exr or hdr.")] = "png16",
+    spread: Annotated[
+        str | None,
+        typer.Option(help="With -o, store point-spread functions, too, for a depth in mm, inf, or a depth .exr."),
+    ] = None,
     report: Annotated[bool, typer.Option("--report", help="Print properties and limits of the camera.")] = False,
     design: Annotated[
         str | None,
@@ -63,15 +67,29 @@ def camera(
         return
     if not name:
         raise ValueError("a camera is needed: `raytrace-ii cameras` lists cameras")
+    if spread is not None and output is None:
+        raise ValueError("--spread stores point-spread functions beside camera maps: -o is needed")
     arrays = preset_cameras(name, scale=scale)
     if output is None or report:
         from ii_core.design import report as describe
 
         say("\n\n".join(describe(array) for array in arrays))
     if output is not None:
-        check_outputs([output / file for file in map_files(arrays, format)], force, make_folder=True)
+        files, maps = map_files(arrays, format), []
+        if spread is not None:
+            from ii_core.spread import spread_maps
+            from ii_core.spread_files import spread_files, write_spread
+
+            from .spread import depth_of
+
+            depth = depth_of(spread)
+            maps = [spread_maps(array, depth) for array in arrays]
+            files += spread_files(len(arrays), format)
+        check_outputs([output / file for file in files], force, make_folder=True)
         with progress_bar(f"write {output}") as tell:
             write_maps(arrays, output, format=format, progress=lambda done, total: tell(done, total, ""))
+            if maps:
+                write_spread(maps, output, format=format)
 
 
 MEASURES = {

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ii_core import Camera, IICamera, preset, preset_cameras, read_maps, write_maps
 from ii_core.files import read_image, write_image
-from ii_core.maps import FORMATS, _widened, decode, encode
+from ii_core.maps import FORMATS, decode, encode, widened
 from raytrace_ii import render
 from tests.support.trace_scenes import hall
 
@@ -26,7 +26,7 @@ FINE = {"png16": 2**16, "png8": 2**8}
 )
 def test_codes_are_right_to_half_a_step_and_exact_at_both_ends(low, extent, share, format):
     steps, high = FINE[format], low + extent
-    box = [_widened([low, high], steps)] * 3
+    box = [widened([low, high], steps)] * 3
     values = np.array([[low, high, low + share * (high - low)]])
     stored = encode(values, box, steps, FORMATS[format][1])
     assert stored[0, 0] == 0
