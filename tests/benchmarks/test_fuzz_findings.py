@@ -166,7 +166,7 @@ def test_pipes_are_refused_as_coded_pictures(tmp_path):
     assert "pipe" in refusal(decode, tmp_path / "p.ii")
 
 
-def test_normals_that_are_no_numbers_print_nothing(tmp_path, monkeypatch):
+def test_nan_normals_print_nothing(tmp_path, monkeypatch):
     """trimesh logs a traceback, which Python prints if no handler is set."""
     monkeypatch.setattr(logging.root, "handlers", [])
     text = seeds.stl_files()[1].decode().replace("facet normal 0 0 1", "facet normal 0 0 up", 1)

@@ -143,14 +143,14 @@ def test_a_broken_line_within_a_file_is_named(tmp_path):
         TOY.rows()
 
 
-def test_code_that_changes_while_it_is_measured_is_no_record(monkeypatch):
+def test_code_changed_before_a_measurement_makes_no_record(monkeypatch):
     TOY.measure({"row": 1}, lambda: {})
     monkeypatch.setattr(records, "code_hash", lambda modules: "1" * 64)
     with pytest.raises(RuntimeError, match="sources changed on disk"):
         TOY.measure({"row": 2}, lambda: {})
 
 
-def test_code_that_changes_within_a_row_is_no_record_either(monkeypatch):
+def test_code_changed_during_a_measurement_makes_no_record(monkeypatch):
     TOY.measure({"row": 1}, lambda: {})
     with pytest.raises(RuntimeError, match="sources changed on disk"):
         TOY.measure({"row": 2}, lambda: monkeypatch.setattr(records, "code_hash", lambda modules: "1" * 64) or {})
@@ -170,7 +170,7 @@ def test_tables_have_a_column_of_commits_if_they_differ():
     assert commit_of({"git": {"commit": "0123456789", "dirty": True}}) == "0123456+"
 
 
-def test_a_measured_row_replaces_an_unsure_one_wherever_it_stands():
+def test_a_measured_row_replaces_an_unsure_one_at_any_position():
     measured = TOY.measure({"row": 1}, lambda: {"value": 1})
     append_record(TOY.path, {**measured, "result": {"value": 0}, "git": None, "unsure": "by hand"})
     assert [row["value"] for row in TOY.rows()] == [1]

@@ -68,7 +68,7 @@ def test_other_code_is_another_step(tmp_path):
 
 
 @pytest.mark.parametrize("line", ["{", "[]", '{"format": "other"}'])
-def test_a_file_that_holds_no_records_is_named(tmp_path, line):
+def test_files_without_records_are_named(tmp_path, line):
     (tmp_path / "toy.jsonl").write_text(line + "\n")
     with pytest.raises(ValueError, match=r"toy\.jsonl, line 1"):
         perform([toy(value=1)], tmp_path)

@@ -198,7 +198,7 @@ def test_a_take_that_states_many_segments_takes_no_memory(tmp_path):
         ("deep.py", b"x = " + b"(" * 5000 + b")" * 5000, "deep.py"),
     ],
 )
-def test_a_plugin_file_that_is_none_is_one_line(run, refused, tmp_path, monkeypatch, name, content, said):
+def test_invalid_plugin_files_are_one_line(run, refused, tmp_path, monkeypatch, name, content, said):
     """`except Exception` had let SystemExit pass: the command ended with exit code 0 and did nothing."""
     monkeypatch.chdir(tmp_path)
     if content == "":

@@ -110,7 +110,7 @@ def test_the_file_of_the_page_is_known_to_every_command_that_it_is_given_to(file
         (None, "bad.py"),
     ],
 )
-def test_a_file_that_is_no_plugin_is_one_line(code, said, tmp_path, capsys, monkeypatch):
+def test_a_file_without_a_plugin_is_one_line(code, said, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     if code is not None:
         Path("bad.py").write_text(code, encoding="utf-8")

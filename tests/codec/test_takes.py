@@ -228,7 +228,7 @@ def test_files_of_takes_round_trip(saved):
     assert again.nbytes == path.stat().st_size
 
 
-def test_frames_before_the_damage_are_decoded_if_asked_for(saved, tmp_path):
+def test_partial_decodes_the_frames_before_the_damage(saved, tmp_path):
     coded, path = saved
     data = path.read_bytes()
     start = len(data) - sum(map(len, coded.segments[2:])) - 30
@@ -273,7 +273,7 @@ def encoder_runs(monkeypatch):
     return runs
 
 
-def test_a_killed_run_goes_on_after_its_last_segment(tmp_path, encoder_runs):
+def test_a_killed_run_continues_after_its_last_segment(tmp_path, encoder_runs):
     take(40).save(tmp_path / "take")
     code = (
         "from ii_core import open_video; from codec import encode_take, Plan\n"

@@ -1,4 +1,4 @@
-"""Cameras found in pictures of cameras that are known."""
+"""Calibration: cameras estimated from pictures of known cameras."""
 
 from dataclasses import replace
 
@@ -109,7 +109,7 @@ def test_dark_and_saturated_lenses_are_counted_and_left_out():
 
 
 def test_the_picture_itself_serves_in_place_of_a_white_image():
-    """Micro-images full of a scene, with dark borders: weaker, and the report says so."""
+    """Micro-images of a scene with dark borders: the estimate is weaker, and the report warns of it."""
     camera, _ = shot(6, size=(400, 400), pitch=16.0)
     rng = np.random.default_rng(0)
     scene = np.exp(0.2 * ndimage.zoom(rng.normal(size=(80, 80)), 5, order=1))
@@ -123,7 +123,7 @@ def test_the_picture_itself_serves_in_place_of_a_white_image():
 
 @pytest.mark.parametrize("depth", [12, 40, 100])
 def test_micro_images_without_borders_are_refused(depth):
-    """Behind pinholes the content repeats from lens to lens by more than the pitch, and borders are edges alone."""
+    """Behind pinholes the content repeats at more than the lens pitch, and micro-images have no dark borders."""
     camera = preset("plenoptic", scale=8)
     L, D = camera.rays()
     at = L + (depth - L[..., 2:]) / D[..., 2:] * D
@@ -211,7 +211,7 @@ def test_colours_do_not_leak_between_lenses():
 
 
 def test_a_calibrated_picture_shows_the_views_of_a_straight_camera():
-    """A turned hexagonal array before a scene, found and made regular: the same views as the straight array's own.
+    """A rotated hexagonal array, calibrated and converted to a regular structure: the same views as a straight array.
 
     The scene lies on a plane, so that views are known in closed form: brightness is a wave over the plane.
     """
@@ -275,7 +275,7 @@ def test_alternating_lens_types_are_reported():
 
 
 def test_a_mosaic_that_does_not_divide_is_cut_with_a_warning(tmp_path):
-    """Also here that no picture of a calibrated size is cropped silently: the report counts pixels outside."""
+    """Pictures are never cropped silently: the report counts the pixels outside."""
     _, image = shot(1)
     outside = calibrate(image).report()["pixels_outside"]
     assert set(outside) == {"left", "right", "top", "bottom"} and max(outside.values()) > 0

@@ -240,7 +240,7 @@ LENGTHS = ("pixel_pitch_mm", "gap_mm", "lens_pitch_mm", "radius_mm", "aperture_m
 @pytest.mark.parametrize("value", [0, -1, 1e-300, 9e-10, 1.1e9, 1e300, math.inf, math.nan])
 @pytest.mark.parametrize("name", LENGTHS)
 def test_lengths_have_bounds(name, value):
-    """On b1dc540 a camera of 1e-300 mm was one, and its views and properties divided by zero."""
+    """On b1dc540 a camera of 1e-300 mm was valid, and its views and properties divided by zero."""
     optics = {
         "radius_mm": {"kind": "spherical-lenslet", "radius_mm": value, "ior": 1.5},
         "aperture_mm": {"kind": "lenslet", "focal_mm": 1, "aperture_mm": value},

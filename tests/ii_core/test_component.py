@@ -15,7 +15,7 @@ side = st.integers(1, 6)
 
 
 def make(lenses, ei_pixels, dtype="uint16"):
-    """Every value different, so that no wrong permutation can pass."""
+    """Return a picture of distinct values, so that every wrong permutation fails."""
     shape = (lenses[1] * ei_pixels[1], lenses[0] * ei_pixels[0], 3)
     values = np.arange(np.prod(shape)).reshape(shape)
     return IIPicture(values.astype(dtype), lenses, ei_pixels)

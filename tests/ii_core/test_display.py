@@ -26,7 +26,7 @@ def apples():
 
 
 def directions(u=12, k=16, l=8):
-    """Every sub-image one colour: red is the pixel's column, green its row."""
+    """Return a picture whose sub-images are uniform: red is the pixel's column, green its row."""
     camera = IICamera(pixels=(k * u, l * u), lenses=(k, l), pixel_pitch_mm=0.01, gap_mm=0.3)
     pixels = np.zeros((l, u, k, u, 3), np.uint8)
     pixels[..., 0] = 20 * np.arange(u)
@@ -83,7 +83,7 @@ def test_quilt_has_the_leftmost_view_at_the_bottom_left(apples):
 
 
 def test_lenticular_shows_the_right_the_left_of_each_lens():
-    """From the right one sees the subpixel on the left of a lens: it must carry the rightmost view."""
+    """A viewer on the right sees the subpixel on the left of a lens: it must show the rightmost view."""
     picture = directions()
     views = [focused_view(picture, place, size=(40, 4)) for place in viewpoints_across(picture, 8)]
     made = lenticular(picture, size=(40, 4), pitch_px=8, centre_px=-1 / 3, views=8)

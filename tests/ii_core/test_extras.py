@@ -1,4 +1,4 @@
-"""Installation without extras: what works, and what the error of a missing library says."""
+"""Installation without extras: rendering, coding and measuring, and errors on missing libraries."""
 
 import subprocess
 import sys

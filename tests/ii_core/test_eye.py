@@ -1,4 +1,4 @@
-"""The model of display and eye: against `view_image`, closed forms, and what it must refuse."""
+"""Model of display and eye: against `view_image` and closed forms, and refused parameters."""
 
 import math
 import time
@@ -85,7 +85,7 @@ def test_kernel_without_compilation(monkeypatch):
 @pytest.mark.parametrize("layout", ["square", "rgb-stripe", "pentile"])
 @pytest.mark.parametrize("fill", [1.0, 0.49])
 def test_layout_and_fill_keep_the_panels_mean_light(layout, fill):
-    """A grey panel through a wide pupil, which spreads over many sub-pixels: grey, of its own brightness."""
+    """A grey panel through a wide pupil, which averages many sub-pixels, has its own brightness."""
     made = camera(6, 4, 16)
     display = DisplayModel(camera=made, layout=layout, fill=fill)
     eye = Eye(position_mm=(0.0, 0.0, -2.0), pupil_mm=0.4)
@@ -180,7 +180,7 @@ def test_a_thin_lens_focused_on_the_panel_shows_one_pixel_and_off_it_many():
 
 
 def test_defocus_of_the_eye_is_the_pupils_geometry():
-    """Focused at F, a point of the lens plane at d spreads over D·|1 − d/F|: the edge of the array blurs so far."""
+    """Focused at F, a point of the lens plane at d spreads over D·|1 − d/F|: the blur at the edge of the array."""
     made = camera(64, 32, 4)
     width, d, pupil, focus = made.size_mm[0], 5.2, 1.0, 4.0
     eye = Eye(position_mm=(0.0, 0.0, made.gap_mm - d), pupil_mm=pupil, focus_mm=focus)
@@ -192,7 +192,7 @@ def test_defocus_of_the_eye_is_the_pupils_geometry():
 
 
 def own_image_seen(display, x):
-    """Whether all lenses in a row show their own elementary image to an eye at x: its red is the lens's number."""
+    """Return whether all lenses in a row show their own elementary image, whose red is the lens's number, at x."""
     made = display.camera
     pixels = np.zeros((made.pixels[1], made.pixels[0], 3), np.uint8)
     pixels[..., 0] = (np.arange(made.pixels[0]) // made.ei_pixels[0] + 1) * 5
@@ -317,7 +317,7 @@ def test_invalid_views_of_an_eye_are_refused():
 
 
 def test_64_rays_cost_no_more_than_30_view_images_and_no_memory():
-    """Of full setup1; the bound in CPU time is the issue's, the memory is that of the result."""
+    """At full setup1; the memory is that of the result."""
     made = preset("setup1")
     pixels = np.broadcast_to(np.arange(made.pixels[0], dtype=np.uint8)[:, None], (*made.pixels[::-1], 3)).copy()
     picture = IIPicture(pixels, made.lenses, made.ei_pixels, made)

@@ -39,7 +39,7 @@ def same(a, b):
 
 @pytest.fixture(scope="module")
 def shot():
-    """A rendered picture with depth; near things in front of far ones."""
+    """A rendered picture with depth; near objects in front of far ones."""
     return render(load_scene("apples"), preset("setup1", scale=4), support=("depth",))
 
 
@@ -52,7 +52,7 @@ def test_view_folders_come_back_to_the_bit(tmp_path_factory, structure, dtype, e
         back, order = picture_of(find_views(folder))
         assert order.basis == "given"
         same(back, picture)
-    else:  # one number varies: the grid is to be said
+    else:  # one number varies: the grid must be given
         with pytest.raises(ValueError, match="do not hold a row and a column number: give the grid"):
             find_views(folder)
         back, _ = picture_of(
@@ -149,7 +149,7 @@ ORDERS = [
 
 @pytest.mark.parametrize("order", ORDERS, ids=str)
 def test_the_order_of_a_rendered_picture_is_found(shot, order):
-    """Seen are the axes and whether they agree; with one flip given the other follows, whatever it is."""
+    """Pictures determine the axes and whether their directions agree; one given flip determines the other."""
     stack = sub_images(shot.picture)
     rows, cols = stack.shape[:2]
     arrangement = Arrangement(**order)
@@ -191,13 +191,13 @@ def test_places_in_names_settle_order_and_180_degrees(shot, tmp_path, order, upw
     made, found = picture_of(find_views(tmp_path))
     assert {key: getattr(found, key) for key in order} == order
     np.testing.assert_array_equal(sub_images(made), stack)
-    assert found.disparity[1] <= 0  # all behind the lenses: of the sign of the truth
+    assert found.disparity[1] <= 0  # the scene lies behind the lenses: the true sign
     assert re.search(r"by camera places in names, 8\.\d+×8\.\d+ mm apart; seen: ", found.describe())
 
 
 @pytest.mark.parametrize("order", ORDERS[::3], ids=str)
 def test_places_alone_settle_views_without_detail(tmp_path, order):
-    """Colours tell the views apart, and no shift is seen."""
+    """The views differ by colour, without shifts."""
     pixels = np.random.default_rng(3).integers(0, 256, (16, 16, 3), np.uint8)
     flat = IIPicture(np.tile(pixels, (12, 9, 1)), (9, 12), (16, 16))
     stack = named_by_places(tmp_path, flat, order, upwards=True)
@@ -205,7 +205,7 @@ def test_places_alone_settle_views_without_detail(tmp_path, order):
     assert {key: getattr(found, key) for key in order} == order and "upwards is assumed" in found.describe()
     np.testing.assert_array_equal(sub_images(made), stack)
     given = picture_of(find_views(tmp_path), flip_across=not order["flip_across"])[1]
-    assert given.flip_across != order["flip_across"]  # what is given wins
+    assert given.flip_across != order["flip_across"]  # given flips take precedence
 
 
 def test_views_without_detail_have_an_unknown_order_that_is_reported():
@@ -216,7 +216,7 @@ def test_views_without_detail_have_an_unknown_order_that_is_reported():
 def test_views_follow_the_viewer_to_the_right(shot):
     """SI_{u+1,v} is what a viewer further to the right sees, by the view image of the same picture."""
     (u, v), camera = shot.picture.ei_pixels, shot.picture.camera
-    far = -1e7  # so far off that all lenses show the same direction
+    far = -1e7  # so far away that all lenses show the same direction
     per_pixel = camera.pixel_pitch_mm / camera.gap_mm * (camera.gap_mm - far)
     stack = sub_images(shot.picture)
     for du, dv in ((0, 0), (3, 0), (0, 2), (-4, -5)):

@@ -11,7 +11,7 @@ from ii_core import IICamera
 from ii_core.lattice import Lattice, nearest_hexagonal
 from ii_core.presets import camera_names, preset_cameras
 
-# Eighths of a pixel make ties that are exact in binary; tenths make ties that rounding blurs; the rest, none.
+# Eighths of a pixel make ties that are exact in binary; tenths make ties with rounding; other values, none.
 LENGTHS = st.one_of(
     st.integers(2, 48).map(lambda i: i / 8), st.integers(2, 60).map(lambda i: i / 10), st.floats(0.3, 7.0)
 )
@@ -19,10 +19,10 @@ COUNTS = st.integers(1, 6)
 
 
 def by_distance(lattice, m, n):
-    """Lenses by brute force, and whether the second best is clearly a tie or clearly none.
+    """Return lenses by brute force, and whether the second best is clearly a tie or clearly none.
 
-    What is equal to 1e-9 px² is a tie (rounding of squares up to 1e3 is 1e-13): then the upper row wins, and in a row
-    the lens to the right. What differs by less than 1e-4 px² but more than that is nobody's to decide.
+    Distances equal to 1e-9 px² are a tie (rounding of squares up to 1e3 is 1e-13): the upper row wins, and in a row
+    the lens to the right. Differences between this and 1e-4 px² are not tested.
     """
     l, k = (i.ravel() for i in np.mgrid[: lattice.lenses[1], : lattice.lenses[0]])
     x, y = lattice.centres(k, l)

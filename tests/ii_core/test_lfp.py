@@ -1,4 +1,4 @@
-"""Raw pictures of Lytro containers, written here by the published description and read back."""
+"""Raw pictures of Lytro containers, written by the published description and read back."""
 
 import hashlib
 import json

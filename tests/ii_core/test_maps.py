@@ -38,7 +38,7 @@ def test_codes_are_right_to_half_a_step_and_exact_at_both_ends(low, extent, shar
 
 
 def test_maps_have_rays_as_any_camera_does(tmp_path):
-    """Half a float32 of 25 mm, which EXR holds; the same block by the same call of the protocol."""
+    """Equal within half a float32 step of 25 mm, which EXR holds, by the same protocol as other cameras."""
     write_maps([SMALL], tmp_path, format="exr")
     block = slice(3, 9), slice(5, 20)
     cameras: list[Camera] = [SMALL, *read_maps(tmp_path)]
@@ -110,7 +110,7 @@ def test_pictures_from_maps_need_no_camera(tmp_path, name):
 
 
 def test_maps_made_by_hand(tmp_path):
-    """Two images and the least of sheets: one pixel looks ahead, one to the right, one up, one nowhere."""
+    """Two images and a minimal sheet: one pixel looks ahead, one right, one up, and one has no ray."""
     L = np.zeros((2, 2, 3), np.float32)
     L[..., 2] = 5
     D = np.array([[[0, 0, 1], [1, 0, 1]], [[0, 1, 1], [0, 0, 0]]], np.float32)

@@ -209,7 +209,7 @@ def turned(array, camera):
 
 
 def stripes(z=20.0, half=30.0):
-    """A plane with colours that run in x and y, and a bar before it: something to see everywhere."""
+    """Return a plane with colours that vary in x and y, and a bar before it."""
     plane = wall(z, half)
     bar = wall(z * 0.7, 1.0)
     return Scene(
@@ -411,7 +411,7 @@ def test_stacked_sensors_share_their_lens_plane():
         gaps = [camera.gap_mm for camera in cameras]
         assert len(set(gaps)) == 3
         # Each focuses elsewhere by (2.3), one lens array for all of them at full size.
-        # On b1dc540 two of the three lay behind it, at −3.4 and −1.5 mm, which their being different did not tell.
+        # On b1dc540 two of the three lay behind it, at −3.4 and −1.5 mm; that they differed did not show this.
         images = [f * g / (g - f) for g, f in ((c.gap_mm, c.lens_model.focal_mm) for c in cameras)]
         np.testing.assert_allclose(np.array(images) + planes[0], np.array([15, 40, 120]) + 0.184088454, rtol=1e-5)
 
@@ -482,8 +482,8 @@ def meeting_mm(L, D):
 
 
 def focus_planes_mm(camera):
-    """Where in the scene, by rays: apertures of four neighbouring lenses image their middle pixel, or inf; and where
-    all rays through one lens centre meet beyond what stands in front."""
+    """Return planes in focus, by rays: the image of the middle pixel by the apertures of four neighbouring lenses,
+    or inf; and the point where all rays through one lens centre meet beyond the lenses in front."""
     planes, (k, l) = {}, (n // 2 for n in camera.lenses)
     radius, angle = np.meshgrid([0.1, 0.2], np.linspace(0, 2 * np.pi, 8, endpoint=False))
     places = np.stack([0.5 + radius * np.cos(angle), 0.5 + radius * np.sin(angle)], axis=-1).reshape(-1, 2)
@@ -663,7 +663,7 @@ def test_elements_survive_json():
         ({"kind": "spherical-lenslet", "radius_mm": None, "ior": 1.5}, "spherical-lenslet: radius_mm is None"),
     ],
 )
-def test_an_element_that_cannot_be_is_refused(data, message):
+def test_invalid_elements_are_refused(data, message):
     with pytest.raises(ValueError, match=message):
         element_of(data)
 
@@ -684,7 +684,7 @@ def lens_at(z):
         ({"optics": [lens_at(9), "grin"]}, "grin is a lens model: it must be the first"),
     ],
 )
-def test_a_camera_that_cannot_be_is_refused(change, message):
+def test_invalid_cameras_are_refused(change, message):
     data = {"pixels": [8, 6], "lenses": [2, 3], "pixel_pitch_mm": 0.1, "gap_mm": 1.0, **change}
     with pytest.raises(ValueError, match=message):
         IICamera.from_json(data)
@@ -730,7 +730,7 @@ def edge_scene(z):
 
 
 def profile(camera, z):
-    """What the middle of each pixel sees of a plane at z, in mm from the edge, and how white it is."""
+    """Return where the middle of each pixel sees a plane at z, in mm from the edge, and the pixel's whiteness."""
     shot = render(edge_scene(z), camera, samples=256, dtype="float32", support=())
     pinhole = replace(camera, optics=())
     x = at_depth(*pinhole.rays(), z)[0, :, 0]
@@ -779,7 +779,7 @@ def test_resolution_priority_is_sharp_at_its_image_plane_alone(z):
 
 
 def width(x, white):
-    """Diameter of the disk whose edge this is: its even spread has the deviation of a quarter of it."""
+    """Return the diameter of the blur disk of an edge, which is four times its standard deviation."""
     step, middle = np.diff(white), (x[1:] + x[:-1]) / 2
     mean = (step * middle).sum() / step.sum()
     return 4 * math.sqrt(max(0.0, (step * (middle - mean) ** 2).sum() / step.sum()))

@@ -142,7 +142,7 @@ def test_unwritable_sidecar_leaves_no_picture_either(tmp_path):
 
 
 class FailingOutput:
-    """Opens, writes part, then fails as a full disk does."""
+    """An output that opens, writes a part, then fails like a full disk."""
 
     def open(self, path, spec):
         self.path = path
@@ -228,7 +228,7 @@ def test_same_structure():
             a.check_same_structure(other)
 
 
-def test_with_pixels_keeps_the_rest():
+def test_with_pixels_keeps_structure_and_camera():
     a = picture("float32")
     b = a.with_pixels(a.pixels * 0)
     assert (b.lenses, b.ei_pixels, b.camera, b.size) == (a.lenses, a.ei_pixels, a.camera, (20, 12))
@@ -238,7 +238,7 @@ def test_with_pixels_keeps_the_rest():
 
 @pytest.mark.parametrize(("dtype", "value"), [("uint8", 128), ("uint16", 30000), ("float32", 0.5)])
 @pytest.mark.parametrize("sigma", [1.0, 2.5])
-def test_noise_is_normal_with_the_sigma_asked_for(dtype, value, sigma):
+def test_noise_is_normal_with_the_given_sigma(dtype, value, sigma):
     code = PEAKS[dtype] / 255
     noise = (add_sensor_noise(flat(dtype, value), sigma).pixels[..., 0].astype(np.float64) - value) / code
     expected = np.sqrt(sigma**2 + (1 / 12 if dtype == "uint8" else 0))  # rounding to whole codes adds 1/12

@@ -49,7 +49,7 @@ def encoded(camera):
 
 @pytest.mark.parametrize(("lattice", "pitch", "offset"), [kind for kind in KINDS if kind != REGULAR])
 def test_rectangles_hold_their_own_lens(lattice, pitch, offset):
-    """Of every kind but the regular one, whose elementary images are rectangles already."""
+    """Structures of every kind except the regular one, whose elementary images are rectangles."""
     camera = camera_of(lattice, pitch, offset)
     assert not camera.regular
     regular, owned = smallest_rectangle(picture_of(camera, encoded(camera)))

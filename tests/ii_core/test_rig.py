@@ -43,7 +43,7 @@ def waves(x, y):
 
 @given(baseline=LENGTHS, focal=LENGTHS, sensor=LENGTHS, focus=st.floats(200, 10000), views=st.integers(2, 9))
 def test_every_view_is_that_of_a_pinhole_camera(baseline, focal, sensor, focus, views):
-    """Camera u stands at (u − (U−1)/2)·B; pixel k looks at the same place of the plane of zero disparity from all."""
+    """Camera u stands at (u − (U−1)/2)·B; pixel k of all cameras sees the same place of the zero-disparity plane."""
     rig = Rig(baseline_mm=baseline, focal_mm=focal, sensor_mm=sensor, focus_mm=focus)
     camera = rig.camera((views, views), (8, 6))
     L, D = camera.rays()
@@ -137,7 +137,7 @@ def test_parameters_of_the_benchmark_are_read(tmp_path):
         find_views(tmp_path)
 
 
-def test_lengths_and_grids_that_make_no_camera_are_refused():
+def test_invalid_lengths_and_grids_are_refused():
     with pytest.raises(ValueError, match="focal_mm is 0"):
         Rig(baseline_mm=1, focal_mm=0, sensor_mm=1)
     with pytest.raises(ValueError, match="5×3"):

@@ -44,7 +44,7 @@ def test_maps_in_closed_form():
 
 @pytest.mark.parametrize("nm", [465.0, 610.0])
 def test_in_focus_the_picture_of_a_point_is_airys_pattern(nm):
-    """Pixels of a tenth of the first ring: what they average over is the pattern within 1 % of its peak."""
+    """Pixels of a tenth of the first ring: averaging over them changes the pattern by 1 % of its peak."""
     width, gap = 0.1, 1.0
     ring = FIRST_ZERO * nm * 1e-6 * gap / width
     made = camera(u=61, pixel=ring / 10, width=width)
@@ -73,7 +73,7 @@ def test_it_is_the_wave_in_focus_and_out_of_it(depth):
 
 
 def test_without_wavelength_it_is_the_disk_of_rays():
-    """Of 6 pixels: each has the share of the disk over it, smoothed by the pixel of the source."""
+    """A disk of 6 pixels: each pixel has its share of the disk, smoothed by the pixel of the source."""
     kernel = _kernel(6.0, 1e-6, 0.0, 15)
     fine = (np.arange(31 * 20) + 0.5) / 20 - 15.5
     disk = (np.hypot(fine[:, None], fine) <= 3).astype(float)
@@ -120,7 +120,7 @@ def test_light_is_linear_and_colours_spread_by_their_wavelengths():
 
 
 def test_depth_differs_from_ray_to_ray():
-    """What lies far stays sharper than what lies near, in one picture."""
+    """In one picture, far parts stay sharper than near ones."""
     made = camera(k=2, pixel=0.01, width=0.15)
     depth = np.where(np.arange(30) < 15, 3.0, 1e6) * np.ones((15, 1))
     light = spread_picture(point(made), spread_maps(made, depth)).pixels
@@ -171,6 +171,6 @@ def test_kernel_without_compilation(monkeypatch):
         (lambda: spread_picture(point(camera(k=2)), spread_maps(camera())), "maps are"),
     ],
 )
-def test_what_cannot_be_spread_is_refused(call, said):
+def test_invalid_spreads_are_refused(call, said):
     with pytest.raises(ValueError, match=said):
         call()

@@ -189,8 +189,8 @@ def test_rays_are_reversible(values, y, slope):
 
 
 # optiland 0.6.3 at 486.1327 nm with our indices: rays from 10 mm before the first vertex, x, y and direction cosines
-# there and in the image plane. `benchmarks/accuracy/lens_rays.py` compares thousands; the library with all it needs
-# weighs 1.3 GB, too much for every test run.
+# there and in the image plane. `benchmarks/accuracy/lens_rays.py` compares thousands; the library with its
+# dependencies takes 1.3 GB, too much for every test run.
 STARTS = ((0.0, 3.0, 0.0, 0.05), (1.0, -2.0, 0.06, 0.0))
 IMAGES = {
     "triplet": (

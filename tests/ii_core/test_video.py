@@ -24,7 +24,7 @@ def pictures(count, seed=0):
 
 
 class Counted:
-    """A source that says which frames it was asked for."""
+    """A source that records the requested frames."""
 
     def __init__(self, pictures):
         self.pictures, self.asked = pictures, []
@@ -91,7 +91,7 @@ def test_folders_give_back_every_bit(write, tmp_path):
     assert open_video(tmp_path / "v", fps=50).fps == 50
 
 
-def test_a_folder_that_is_no_video(tmp_path):
+def test_folders_without_a_take_are_refused(tmp_path):
     with pytest.raises(ValueError, match="holds no frames"):
         open_video(tmp_path)
     with pytest.raises(ValueError, match="is no folder of frames"):
@@ -99,7 +99,7 @@ def test_a_folder_that_is_no_video(tmp_path):
     video_of(pictures(3)).save(tmp_path)
     far = tmp_path / f"frame_{10**20}.png"
     far.write_bytes((tmp_path / "frame_0001.png").read_bytes())
-    with pytest.raises(ValueError, match=rf"lacks frame 3 \({10**20 - 3} missing"):  # it counted to it one by one
+    with pytest.raises(ValueError, match=rf"lacks frame 3 \({10**20 - 3} missing"):  # not by counting
         open_video(tmp_path)
     far.unlink()
     (tmp_path / "frame_0001.png").unlink()
@@ -113,7 +113,7 @@ def test_a_folder_that_is_no_video(tmp_path):
 
 
 def smooth(count):
-    """Frames that video coding changes little."""
+    """Return frames that video coding changes little."""
     (k, l), (u, v) = CAMERA.lenses, CAMERA.ei_pixels
     y, x = np.mgrid[: l * v, : k * u]
     base = np.repeat((x * 100 // (k * u) + y * 100 // (l * v))[..., None], 3, axis=2)

@@ -63,7 +63,7 @@ def test_nearest_picks_the_pixel_on_the_line(viewpoint):
 
 @pytest.mark.parametrize("viewpoint", VIEWPOINTS)
 def test_picked_pixels_look_along_the_line(viewpoint):
-    """From the rays themselves: no ray of the lens's own image lies closer to the line, where it shows its own."""
+    """By rays: no ray of the lens's own elementary image lies closer to the line, if the lens shows its own image."""
     view, valid = view_image(coded(), viewpoint, interpolation="nearest")
     L, D = CAMERA.rays()
     for l in range(5):

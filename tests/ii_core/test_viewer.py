@@ -21,7 +21,7 @@ from raytrace_ii import load_scene, render
 
 
 def snapshot(tab, **state):
-    """What the page shows with one pixel a lens, and from where."""
+    """Return the view of the page with one pixel per lens, and its viewpoint."""
     got = tab.evaluate(
         """state => { ii.viewer.set(state); const s = ii.viewer.snapshot();
                       return [s.width, s.height, Array.from(s.data), ii.viewer.viewpoint()] }""",
@@ -103,7 +103,7 @@ def test_a_mosaic_of_several_pages(show, shot, tmp_path, monkeypatch):
 
 
 def focused(picture, viewpoint, shift, radius):
-    """What the shader does, in numpy: pixels within the aperture, each from the lens that sees the same point."""
+    """Compute the shader's result in numpy: pixels within the aperture, each from the lens of the same point."""
     from ii_core.view import view_positions
 
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
@@ -266,7 +266,7 @@ BACKGROUND = (13, 13, 15)  # of the shader, in steps of 8 bits
 
 
 def screen(tab):
-    """The pane of the picture as pixels, and which of them lie on the array by a pixel's margin, or beside it."""
+    """Return the pane's pixels, and masks of those on the array and beside it, by a margin of one pixel."""
     box = tab.locator("#main").bounding_box()
     tab.evaluate("() => new Promise(done => { ii.viewer.redraw(); setTimeout(done, 200); })")
     pixels = np.asarray(Image.open(io.BytesIO(tab.screenshot(clip=box))).convert("RGB")).astype(int)
@@ -301,7 +301,7 @@ def test_far_scenes_open_without_bands(show, tmp_path, scene, with_map):
 
 
 def test_focus_breaks_nowhere_in_the_picture(show, tmp_path):
-    """A smooth far scene, focused near: where a neighbour's lens left the array a strip began with a step."""
+    """A smooth far scene, focused near: earlier, a step appeared where a neighbour's lens left the array."""
     camera = IICamera(pixels=(256, 128), lenses=(32, 16), pixel_pitch_mm=0.0244, gap_mm=0.73)
     ramp = np.tile(np.linspace(40, 215, 8)[:, None], (16, 256))  # what every lens sees of infinity
     picture = IIPicture(np.repeat(ramp[..., None], 3, axis=2).astype(np.uint8), (32, 16), (8, 8), camera)

@@ -1,4 +1,4 @@
-"""What the viewer's page offers its user, in a real browser."""
+"""Controls of the viewer's page in a real browser."""
 
 import numpy as np
 import pytest
@@ -81,7 +81,7 @@ def test_a_still_has_no_clock(tab):
 
 
 def test_a_drag_on_the_split_line_turns_the_view(tab):
-    """The line lies in the middle of the page as it opens, where the first drag begins: it used to take that drag."""
+    """The line opens in the middle of the page, and earlier took the first drag, which begins there."""
     box = tab.locator("#main").bounding_box()
     drag(tab, box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["width"] / 8, 0)
     assert state(tab)["x"] == pytest.approx(-0.25, abs=0.01) and state(tab)["split"] == 0.5
@@ -144,7 +144,7 @@ def test_sliders_without_effect_are_disabled(tab, show, tmp_path):
 
 
 def test_nothing_is_cut_on_a_small_screen(tab):
-    """The help was the last thing in a column of 880 px."""
+    """Earlier, the help stood at the end of a column of 880 px."""
     tab.set_viewport_size({"width": 1280, "height": 800})
     box = tab.locator(".help").bounding_box()
     assert box["y"] + box["height"] <= 800
@@ -168,7 +168,7 @@ def test_full_screen_shows_the_picture_alone(tab):
     assert state(tab)["x"] == 0
 
 
-# Frames at the pace that a test wants, however long they take to draw.
+# Animation frames at the rate of the test, independent of drawing time.
 PACE = "let now = 0; window.requestAnimationFrame = (f) => setTimeout(() => f((now += %d)), 30);"
 MOVING = {"reduced_motion": "no-preference", "viewport": {"width": 780, "height": 300}}
 

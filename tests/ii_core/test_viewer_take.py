@@ -26,7 +26,7 @@ SMALL = {"width": 480, "height": 240}  # drawn by the processor: few pixels
 
 @pytest.fixture(scope="module")
 def take(shot):
-    """Every frame is another one by whole lenses, in another brightness."""
+    """Return a take whose frames are shifted by whole lenses, each with its own brightness."""
     step = shot.picture.ei_pixels[0]
     frames = [
         shot.picture.with_pixels(np.roll(shot.picture.pixels // 2 + np.uint8(15 * t), 3 * t * step, axis=1))
@@ -66,7 +66,7 @@ def on_screen(tab, frame):
 
 
 def shows(tab, video, frame, **state):
-    """Whether the view is `view_image` of a frame, but for the card's rounding."""
+    """Return whether the view is `view_image` of a frame, up to the rounding of the graphics card."""
     shown, viewpoint = snapshot(tab, **state)
     wanted, valid = view_image(video[frame], viewpoint)
     return np.abs(shown - wanted)[valid].max() <= 1
@@ -159,7 +159,7 @@ def test_keys_step_and_the_address_keeps_the_instant(tab):
 
 @contextlib.contextmanager
 def served(folder):
-    """A server that knows no ranges, as many a simple one."""
+    """A server without range requests, like many simple ones."""
     handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=folder)
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -236,7 +236,7 @@ def test_a_take_too_large_is_refused_by_its_first_frame(take, tmp_path, monkeypa
     assert set(read) == {0} and not list(tmp_path.iterdir())
 
 
-def test_takes_that_cannot_be_shown(run, refused, take, shot, tmp_path):
+def test_invalid_takes_are_refused(run, refused, take, shot, tmp_path):
     take.save(tmp_path / "frames")
     video_of([take[0], take[1]]).save(tmp_path / "short")
     shot.picture.save(tmp_path / "a.png")

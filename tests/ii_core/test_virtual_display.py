@@ -51,7 +51,7 @@ def test_rays_start_behind_the_lenses_on_the_same_lines(optics):
 
 @pytest.mark.parametrize("name", KINDS)
 def test_a_view_takes_the_pixels_whose_rays_run_through_the_viewer(name):
-    """Truth by the camera's own rays: from where the view looks on the array, the ray's line holds the viewpoint."""
+    """By the camera's own rays: the line of each picked pixel's ray passes through the viewpoint."""
     camera, eye = KINDS[name], np.array([3.0, -2.0, -60.0])
     x, y = view_positions(camera, eye, erect=camera.erect)
     (k, l), (u, v) = camera.lenses, camera.ei_pixels
@@ -124,7 +124,7 @@ def middle(view, channel):
 
 @pytest.mark.parametrize("name", [name for name in KINDS if "start 40" in name])
 def test_content_before_and_behind_the_display_moves_to_opposite_sides(name):
-    """A viewer who goes to the right sees what is behind the display go right along it, what is before it go left."""
+    """If the viewer moves right, content behind the display moves right along it, content before it moves left."""
     fine = {"pixels": (336, 240), "lenses": (28, 20), "pixel_pitch_mm": 0.0625, "lens_pitch_mm": None}
     camera = replace(KINDS[name], **fine)
     shot = render(near_and_far(), camera, support=("depth",), samples=4)
@@ -224,7 +224,7 @@ def test_a_camera_looks_at_a_point_with_its_top_up():
 
 
 def test_the_command_turns_the_camera(run, refused, tmp_path):
-    """What stands to the right of the camera fills its picture once it is turned there."""
+    """A body to the right of the camera fills its picture after a rotation to the right."""
     (tmp_path / "s.toml").write_text(
         '[background]\nhorizon = "#000000"\n[material.white]\ncolour = "#ffffff"\nemission = "#ffffff"\n'
         '[[object]]\nshape = "box"\nsize_mm = [20, 200, 200]\nposition_mm = [60, 0, 0]\nmaterial = "white"\n'

@@ -48,7 +48,7 @@ def test_in_focus_it_is_airys_pattern(dimensions, zero):
 
 
 def test_far_out_of_focus_it_is_the_box_of_rays():
-    """Energy within each place of a blur of many Fresnel zones, against the geometric limit."""
+    """Cumulative energy of a blur of many Fresnel zones, against the geometric limit."""
     width, gap, depth = 0.5, 1.0, 3.0
     blur = abs(defocus_mm(width, gap, depth_mm=depth))
     assert blur == pytest.approx(0.5 / 3)

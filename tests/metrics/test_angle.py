@@ -18,7 +18,7 @@ def picture(dtype="uint8", lenses=(24, 22), ei_pixels=(3, 2), seed=0):
 
 
 def worse(a, u, v, offset):
-    """Another value in one sub-image; even values only go up, so that the mean moves."""
+    """Return the picture with other values in one sub-image; even values only rise, so that the mean changes."""
     pixels = a.pixels.copy()
     l, k = a.lenses[::-1]
     field = pixels.reshape(l, a.ei_pixels[1], k, a.ei_pixels[0], 3)

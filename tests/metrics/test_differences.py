@@ -39,7 +39,7 @@ def curve(scheme, offset, rates=RATES_TRIED):
 
 
 def test_a_study_file_holds_gain_and_bjontegaard_differences(tmp_path):
-    """On b1dc540 only the table had them, and against JPEG 2000, which shares no quality with the others."""
+    """On b1dc540 only the table had them, against JPEG 2000, whose qualities do not overlap the others."""
     records = curve("a", 0) + curve("b", 3) + curve("far", 100)
     write_study(tmp_path / "s.json", "x", records, picture=PICTURE)
     study = read_study(tmp_path / "s.json")
@@ -127,7 +127,7 @@ def test_points_of_a_cluster():
 
 
 def test_points_that_are_done_are_kept_when_a_later_one_fails():
-    """Whichever comes first is kept first: the point before it may take for ever."""
+    """Points are stored in the order of completion, since an earlier point may take very long."""
 
     def failing(picture, scheme, *, bpp):
         if bpp == 1.0:

@@ -28,7 +28,7 @@ from tests.support.trace_scenes import UNIFORM, WHITE, body, wall
 
 GAP = 1.5
 PEAKS = {"uint8": 255, "uint16": 65535, "float32": 1.0}
-# No layer puts a line on a border between pixels, where rounding would decide.
+# No line of any layer meets a border between pixels, where rounding would decide.
 LAYERS = GAP * np.array([2.137, 3.219, 4.871, 7.93, 13.37, 29.1])
 
 
@@ -398,7 +398,7 @@ def test_lenses_are_those_with_the_point_on_whole_pixels():
 
 
 def naive_pass(cost, view, place, slope, leap, alike):
-    """Along rows, left to right: each layer's own cost and the least that the lens before it asks."""
+    """Aggregate costs along rows, left to right: each layer's own cost plus the least cost from the lens before."""
     rows, cols, layers = cost.shape
     total = cost.astype(float).copy()
     for l in range(rows):

@@ -126,7 +126,7 @@ def test_too_many_presentations_are_refused():
 
 
 def test_figure_and_ground_differ_in_one_cone():
-    """So that an observer without that cone sees one colour; the other cones' signals are equal to 1e-12."""
+    """An observer without that cone sees one colour: the other cones' signals are equal to 1e-12."""
     for cone, kind in enumerate(("protan", "deutan")):
         figure, ground = (CONES @ light for light in colours(kind))
         for other in range(3):
@@ -141,7 +141,7 @@ def test_plates_show_their_digits_to_those_who_see_all_colours():
     for plate, kind in zip(made, KINDS, strict=True):
         pixels = np.asarray(Image.open(io.BytesIO(plate.png))).astype(float)
         dots = np.abs(pixels - 128).max(axis=2) > 20
-        # red over green tells figure from ground, brightness does not
+        # the ratio of red to green separates figure and ground, brightness does not
         ratio = pixels[..., 0][dots] / pixels[..., 1][dots]
         low, high = np.quantile(ratio, [0.05, 0.95])
         assert (high / low > 1.3) == (kind != "control") and 0.3 < dots.mean() < 0.75
@@ -169,7 +169,7 @@ def rewritten(path, edit):
 
 
 def resealed(edit):
-    """Change records as one would who knows how lines are sealed."""
+    """Change records and renew the seals of all lines."""
 
     def change(lines):
         records = [json.loads(line) for line in lines]
@@ -257,7 +257,7 @@ def test_results_on_a_server_are_append_only(tmp_path):
     assert folder.path(number).read_bytes() == source
     with pytest.raises(FileNotFoundError):
         folder.extend(7, source)
-    assert folder.new_observer() == 2  # who never answers: an empty file
+    assert folder.new_observer() == 2  # an observer who never answers: an empty file
     assert ResultFolder(tmp_path / "r", json.dumps(plan)).new_observer() == 3  # the server starts again
     with pytest.raises(ValueError, match="of another test"):
         ResultFolder(tmp_path / "r", json.dumps(planned(seed=2)))

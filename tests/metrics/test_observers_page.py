@@ -50,7 +50,7 @@ def begun(tab, wrong_plates=0):
 
 
 def vote(tab):
-    """Pass by messages until an answer is wanted."""
+    """Go on through messages until the page waits for an answer."""
     while tab.wait_for_selector("#vote:not([hidden]), #message:not([hidden]) #next").get_attribute("id") == "next":
         tab.click("#next")
         tab.wait_for_selector("#message", state="hidden")
@@ -141,7 +141,7 @@ def test_a_closed_tab_loses_nothing(browser, page, tmp_path):
     tab.close()
     again.goto(f"file://{page}")
     again.wait_for_selector("text=Observer 1: 2 of 4 answers.")
-    assert again.input_value("#observer") == "2"  # who comes now is another
+    assert again.input_value("#observer") == "2"  # the next observer gets another number
     downloaded(again, tmp_path / "half.jsonl")
     half = read_results([tmp_path / "half.jsonl"])
     assert half.notes == [f"{tmp_path / 'half.jsonl'}: stopped after 1 of 3 answers, which count"]
@@ -240,7 +240,7 @@ def test_the_server_has_every_answer_at_once(show, server, tmp_path):
 
 
 def test_answers_given_while_the_server_is_away_arrive_later(browser, server, tmp_path):
-    """Without `show`: the browser complains about a server that is gone, as it should."""
+    """Without `show`, which fails on the browser's error about the stopped server."""
     tab = browser.new_page(viewport={"width": 1000, "height": 700})
     with server:
         tab.goto(f"http://127.0.0.1:{server.port}/")

@@ -308,7 +308,7 @@ def test_pictures_of_other_pixels_are_reported(definition, picture, coder):
 
 
 class Counted:
-    """A coder that fails at its n-th encoding, and counts them."""
+    """A coder that counts its encodings and fails at the n-th."""
 
     def __init__(self, coder, fails_at=0):
         self.coder, self.fails_at, self.count = coder, fails_at, 0
@@ -430,7 +430,7 @@ def test_results_that_cannot_be_compared_are_refused(tmp_path, definition, pictu
 
 
 @pytest.mark.parametrize("text", ["[]", "{}", '{"format": "ii-benchmark", "version": 1}', "not json"])
-def test_files_that_are_no_results_are_refused(tmp_path, text):
+def test_foreign_files_are_refused(tmp_path, text):
     path = tmp_path / "r.json"
     path.write_text(text)
     with pytest.raises(ValueError, match=r"r\.json: "):

@@ -36,7 +36,7 @@ def test_constant_offsets_in_closed_form():
 
 
 def test_flicker_leaves_out_what_moves():
-    """The original changes in the left half, where the error changes by 9; in the right half it is still, by 3."""
+    """The left half moves, and its error changes by 9; the right half is still, and its error changes by 3."""
     reference, decoded = shown([0, 0]), shown([0, 0])
     half = reference[0].pixels.shape[1] // 2
     moved, coded = reference[1].pixels.copy(), decoded[1].pixels.copy()

@@ -117,7 +117,7 @@ def test_all_are_written_and_none_else(dtype, tmp_path):
     assert all(min(read_image(p).shape[:2]) > 200 for p in paths)
 
 
-def test_what_can_be_drawn_depends_on_what_is_known(tmp_path):
+def test_charts_depend_on_the_known_qualities(tmp_path):
     a = picture()
     bare = IIPicture(a.pixels, a.lenses, a.ei_pixels)
     assert plot_all(bare, bare, None, tmp_path) == [tmp_path / "q_angle.png"]

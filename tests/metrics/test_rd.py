@@ -140,7 +140,7 @@ def measure(**options):
     return rate_distortion(picture(), SCHEMES, TARGETS, encode=encode, decode=decode, **options)
 
 
-def test_records_hold_every_point_in_the_order_asked_for():
+def test_records_hold_every_point_in_the_given_order():
     told = []
     records = measure(progress=lambda *args: told.append(args))
     assert [(r["scheme"], r["target_bpp"]) for r in records] == [(s, t) for s in SCHEMES for t in TARGETS]
@@ -158,7 +158,7 @@ def test_records_hold_every_point_in_the_order_asked_for():
 
 
 def test_seconds_to_decode_are_cpu_time_of_the_decoder_alone():
-    """Neither a wait in the decoder, nor the measures count: on b1dc540 the wait did."""
+    """Neither waiting in the decoder nor measuring counts; on b1dc540 waiting did."""
 
     def slow(coded):
         time.sleep(0.2)
@@ -186,7 +186,7 @@ def test_options_of_a_name_keep_its_preset():
 
 
 def test_versions_are_those_of_all_that_results_depend_on():
-    """An upgrade of embreex or imagecodecs undid no step on b1dc540; glymur is not used."""
+    """On b1dc540 an upgrade of embreex or imagecodecs repeated no step; glymur is not used."""
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
     optional = [line for extra in set(extras) - {"all", "dev", "docs"} for line in extras[extra]]
@@ -196,7 +196,7 @@ def test_versions_are_those_of_all_that_results_depend_on():
 
 
 def test_the_commit_is_that_of_the_start_though_the_checkout_moves_on(monkeypatch):
-    """A study of minutes named the commit of its end, to which another had moved the checkout meanwhile."""
+    """Earlier, a long study recorded the commit at its end, after the checkout had changed."""
     before = provenance()["git"]
     moved = subprocess.CompletedProcess([], 0, stdout="f" * 40)
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: moved)
@@ -334,7 +334,7 @@ def test_points_of_other_kinds_are_named(tmp_path, points, message):
         (b'{"format": "ii-rd-study", "version": 1, "picture": 3, "points": []}', "picture is to be an object"),
     ],
 )
-def test_bytes_that_are_no_study_are_named(tmp_path, data, message):
+def test_foreign_bytes_are_named(tmp_path, data, message):
     path = tmp_path / "s.json"
     path.write_bytes(data)
     with pytest.raises(ValueError, match=message):

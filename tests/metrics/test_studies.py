@@ -47,7 +47,7 @@ def picture(lenses=(14, 12)):
 
 
 def encode(source, scheme, *, bpp):
-    """Keeps as many bits of each value as the rate allows; far depth, on the right, one less if coarse."""
+    """Keep as many bits of each value as the rate allows; if coarse, one bit less in the far right half."""
     bits = min(8, max(1, int(bpp / 3)))
     step = np.full(source.pixels.shape[1], 2 ** (8 - bits))
     if scheme == "coarse":

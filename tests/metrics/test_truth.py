@@ -42,7 +42,7 @@ def test_mssim_of_even_images_in_closed_form(a, b):
 
 
 def test_mssim_falls_with_noise_and_blur_and_forgives_a_shift_of_level():
-    """What SSIM was made for (Wang 2004, Figure 2): at equal MSE a shift in level hurts little, noise much."""
+    """Wang 2004, Figure 2: at equal MSE a shift in level lowers SSIM little, noise much."""
     y, x = np.mgrid[0:64, 0:64]
     image = (128 + 50 * np.sin(x / 5) * np.cos(y / 7)).astype(np.uint8)
     sign = np.where(np.random.default_rng(0).random(image.shape) < 0.5, -12, 12)

@@ -1,4 +1,4 @@
-"""A browser for tests of pages. Where none is installed they are skipped, and say so."""
+"""A browser for tests of pages; without one the tests are skipped with a message."""
 
 import shutil
 
@@ -8,7 +8,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 # Its usual shared memory, /dev/shm, is 64 MB in many a container: too little for a large picture.
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"]
 FLAGS += [f"--disable-{what}" for what in ("background-networking", "component-update", "sync", "quic")]
-# A served page has no promise before all its files have come.
+# A served page sets its promise after all its files are loaded.
 READY = """() => Promise.race([
     (async () => { while (!ii.ready) await new Promise((later) => setTimeout(later, 20)); await ii.ready; })(),
     new Promise((_, reject) => setTimeout(() => reject(new Error("the page does not get ready")), 60000))])"""
@@ -34,7 +34,7 @@ def browser():
 
 
 def pages(browser):
-    """Yield what opens a page file, without idle motion; whatever a page complains of fails the test."""
+    """Yield a function that opens a page file without idle motion; errors of the page fail the test."""
     opened, complaints = [], []
 
     def call(path, fragment="", wait=True, script=None, **options):

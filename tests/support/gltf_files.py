@@ -66,7 +66,7 @@ class Gltf:
         return self.add("materials", values)
 
     def matt(self, colour, alpha=1.0):
-        """A material that is nothing but matt."""
+        """Return a purely matt material."""
         return self.material(
             {"KHR_materials_specular": {"specularFactor": 0}},
             pbr={"baseColorFactor": [*colour, alpha], "metallicFactor": 0, "roughnessFactor": 1},

@@ -4,5 +4,5 @@ import signal
 
 
 def hear_interrupts() -> None:
-    """Undo a shell's ``&``, which makes its commands, so the tests and what they start, ignore Ctrl-C."""
+    """Restore the handler of Ctrl-C, which commands started by a shell with ``&`` ignore."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -18,7 +18,7 @@ UNIFORM = Background(horizon=WHITE, zenith=WHITE, nadir=WHITE)
 
 
 def body(mesh, *, name="body", at=(0, 0, 0), turn=(0, 0, 0), scale=1.0, flat=False, coordinates=None, **material):
-    """A mesh set up in a scene; material parameters go to `Material`."""
+    """Return a body of a mesh; material parameters go to `Material`."""
     matrix = rotation(turn)
     return Body(
         name=name,

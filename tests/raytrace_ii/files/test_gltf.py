@@ -38,7 +38,7 @@ def volume(vertices, faces):
 
 @pytest.mark.parametrize("suffix", [".glb", ".gltf"])
 def test_a_file_has_the_geometry_that_trimesh_finds_in_it(suffix, tmp_path):
-    """An independent reader, on a file that another program, trimesh, wrote."""
+    """trimesh, an independent reader and writer, has written the file."""
     ball = trimesh.creation.icosphere(2)
     other = trimesh.Scene()
     rng = np.random.default_rng(1)
@@ -247,7 +247,7 @@ def test_directions_of_a_normal_map(turn, tmp_path):
     assert list(found.values()) == pytest.approx([0.5, 0.5], abs=0.01)
 
 
-def test_the_set_of_coordinates_that_a_texture_asks_for(tmp_path):
+def test_textures_use_their_set_of_coordinates(tmp_path):
     gltf = Gltf()
     flipped = SQUARE_UV[[1, 0, 3, 2]]
     painted(gltf, gltf.texture(CORNERS), uv=flipped, info={"texCoord": 1}, name="TEXCOORD_1")
@@ -268,10 +268,10 @@ def test_a_texture_transform(tmp_path):
     np.testing.assert_allclose(seen(load_scene(tmp_path / "scene.toml"), 0, 0), G, atol=1e-3)
 
 
-def test_images_go_on_beyond_their_border_as_the_sampler_says(tmp_path):
+def test_images_wrap_as_the_sampler_states(tmp_path):
     """Coordinates run from −1 to 2: 3 × 3 tiles, of which each shows its four quarters.
 
-    Mirrored images repeated unmirrored; the test of that name asked for the warning alone.
+    Earlier, mirrored images were repeated unmirrored; the older test of that name checked only the warning.
     """
     for wrap, tile in ((10497, (R, G, B, W)), (33648, (G, R, W, B)), (33071, (R, R, B, B))):
         gltf = Gltf()

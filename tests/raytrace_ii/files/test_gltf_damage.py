@@ -29,7 +29,7 @@ def good():
 
 
 def set_at(tables, path, value):
-    """Replace, or with None remove, what stands at a path of keys and rows."""
+    """Replace the value at a path of keys and rows; None removes it."""
     *way, last = path.split(".")
     for step in way:
         tables = tables[int(step) if isinstance(tables, list) else step]
@@ -136,7 +136,7 @@ def test_values_that_are_not_finite_are_refused(tmp_path):
 
 @pytest.mark.parametrize("count", [3 * 10**8, 10**15, 10**400])
 def test_accessor_rows_without_data_are_bounded(count, tmp_path):
-    """3·10⁸ rows of zeros took 6.9 GB; this test tried 10¹⁵ alone, which no machine gives."""
+    """3·10⁸ rows of zeros took 6.9 GB; an earlier version tested only 10¹⁵, for which no machine has memory."""
     gltf = good()
     del gltf.json["accessors"][0]["bufferView"]  # all zero, then, however many
     gltf.json["accessors"][0]["count"] = count
@@ -145,7 +145,7 @@ def test_accessor_rows_without_data_are_bounded(count, tmp_path):
 
 
 def test_instances_are_counted_before_they_are_made(tmp_path):
-    """A small file may show a large mesh very often."""
+    """A small file may contain very many instances of a large mesh."""
     gltf = Gltf()
     gltf.mesh(np.tile(SQUARE, (5000, 1)), np.arange(20000 * 3) % 20000)
     for _ in range(3000):
@@ -158,7 +158,7 @@ def test_instances_are_counted_before_they_are_made(tmp_path):
     "uri", ["no.png", "../secret.png", "%2e%2e/secret.png", "/etc/hostname", "http://a.org/b.png"]
 )
 def test_an_unavailable_image_is_named_and_left_out(uri, tmp_path):
-    """Out of the file's folder nothing is read, by ``..``, percent signs or a link."""
+    """No file outside the scene's folder is read, by ``..``, percent signs or a link."""
     write_image(tmp_path / "secret.png", np.zeros((2, 2, 3), np.uint8))
     (tmp_path / "in").mkdir()
     gltf = good()
@@ -181,7 +181,7 @@ def test_a_buffer_out_of_the_folder_is_refused(tmp_path):
 
 
 def test_a_texture_of_forged_size_is_refused_by_its_header(tmp_path, monkeypatch):
-    """A PNG of a few bytes that says 40000²: nothing is decoded, no memory is taken."""
+    """A PNG of a few bytes that states 40000² pixels: nothing is decoded, no memory is taken."""
     header = struct.pack(">IIBBBBB", 40000, 40000, 8, 2, 0, 0, 0)
     chunk = b"IHDR" + header
     data = b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
@@ -189,14 +189,14 @@ def test_a_texture_of_forged_size_is_refused_by_its_header(tmp_path, monkeypatch
     gltf = good()
     gltf.json["images"][0] = {"uri": "big.png"}
     with pytest.raises(ValueError, match=r"m\.glb: images\.0: .*header claims a 4577 MB image"):
-        read_model(gltf.save(tmp_path / "m.glb"))  # OpenImageIO's own doubts, of PNG alone
+        read_model(gltf.save(tmp_path / "m.glb"))  # OpenImageIO checks only PNG itself
     monkeypatch.setattr(beside, "MOST_TEXELS", 3)
     with pytest.raises(ValueError, match=r"m\.glb: images\.0: it has 2×2 pixels: at most 3 are read"):
         read_model(good().save(tmp_path / "m.glb"))
 
 
 def test_factors_rounded_past_their_bounds_are_clamped(tmp_path):
-    """Writers in float32 leave 1.0000001; what is further off is an error, as before."""
+    """Writers in float32 produce 1.0000001; larger excess is an error, as before."""
     gltf = good()
     pbr = gltf.json["materials"][0]["pbrMetallicRoughness"]
     pbr |= {"metallicFactor": 1 + 1e-5, "roughnessFactor": -1e-5, "baseColorFactor": [1.000001, 1, 1, 1.00001]}
@@ -254,7 +254,7 @@ def test_a_file_cut_off_or_with_a_wrong_byte_is_read_or_refused_in_words(tmp_pat
 
 
 def rich():
-    """A file with every table in it."""
+    """Return a file with every table."""
     gltf = good()
     extensions = {
         "KHR_materials_transmission": {"transmissionFactor": 0.5},
@@ -277,7 +277,7 @@ def rich():
 
 
 def places(tables, way=()):
-    """Every key and row of a file, as the way to it."""
+    """Return the path of every key and row of a file."""
     rows = tables.items() if isinstance(tables, dict) else enumerate(tables) if isinstance(tables, list) else ()
     for key, value in rows:
         yield (*way, key)

@@ -23,7 +23,7 @@ three = st.tuples(share, share, share).map(np.array)
 
 @given(three, share, share, three, share, st.booleans())
 def test_surfaces_conserve_energy(base, metallic, roughness, f0, transmission, thin):
-    """Matt, mirrored and handed on together at most 1 in every channel; nothing negative."""
+    """Matt, mirrored and transmitted shares sum to at most 1 in every channel, and none is negative."""
     s = surface(base, metallic, roughness, f0, transmission, thin=thin)
     colour, mirror, through = (np.array(s[k]) for k in ("colour", "mirror", "transmission"))
     left = max(0.0, 1 - mirror.max() - through.max())
@@ -42,7 +42,7 @@ def test_known_limits():
     assert metal["specular"] == 0
     lacquer = surface(base, 0.0, 0.0, glass, 0.0)
     np.testing.assert_allclose(lacquer["mirror"], 0.04)
-    np.testing.assert_allclose(np.array(lacquer["colour"]) * 0.96, base * 0.96)  # what is left, with what goes in
+    np.testing.assert_allclose(np.array(lacquer["colour"]) * 0.96, base * 0.96)  # the rest
     clear = surface(np.ones(3), 0.0, 0.0, glass, 1.0)
     assert (clear["transmission"], clear["mirror"]) == ((1, 1, 1), (0, 0, 0))  # Fresnel is the tracer's own
     sheet = surface(np.ones(3), 0.0, 0.0, glass, 1.0, thin=True)
@@ -61,7 +61,7 @@ def test_the_highlight_has_the_width_of_the_roughness():
 
 
 def material_of(tmp_path, gltf, index, **attributes):
-    """What a material of a file becomes on a square."""
+    """Return our material of a glTF material on a square."""
     gltf.node(mesh=gltf.mesh(SQUARE, SQUARE_FACES, material=index, TEXCOORD_0=SQUARE_UV, **attributes))
     model = read_model(gltf.save(tmp_path / "m.glb"))
     return model.parts[0].material, model.left_out
@@ -150,7 +150,7 @@ def test_unlit_gives_off_its_colour(tmp_path):
 
 
 def test_metal_and_roughness_of_a_texture(tmp_path):
-    """A map where it lies as the base colour does; its mean where it does not."""
+    """A map if it has the base colour's coordinates, else its mean."""
     gltf = Gltf()
     picture = gltf.texture(np.full((2, 2, 3), (0, 51, 255)))  # roughness 0.2, all metal
     pbr = {"baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicRoughnessTexture": {"index": picture}}
@@ -170,7 +170,7 @@ def test_metal_and_roughness_of_a_texture(tmp_path):
 
 
 def test_light_of_a_texture_elsewhere_is_left_out(tmp_path):
-    """A mean emission is farther from Cycles than none."""
+    """Mean emission differs more from Cycles than no emission."""
     gltf = Gltf()
     picture = gltf.texture(np.full((2, 2, 3), 128))
     index = gltf.material(
@@ -345,7 +345,7 @@ material = "lamp"
 
 
 def stored(gltf, mesh, material):
-    """One of our meshes as a file has it: right-handed, v down."""
+    """Return one of our meshes as stored in a file: right-handed, v down."""
     flip = np.array([1, 1, -1])
     more = {} if mesh.normals is None else {"NORMAL": (mesh.normals * flip).astype(np.float32)}
     uv = np.column_stack([mesh.uv[:, 0], 1 - mesh.uv[:, 1]]).astype(np.float32)
@@ -353,7 +353,7 @@ def stored(gltf, mesh, material):
 
 
 def test_the_same_scene_in_toml_and_in_gltf(tmp_path):
-    """All but single pixels alike within a step of 8 bits: positions are stored in float32."""
+    """Equal within an 8-bit step, except single pixels: positions are stored in float32."""
     pixels = np.random.default_rng(3).integers(0, 256, (8, 8, 3)).astype(np.uint8)
     write_image(tmp_path / "t.png", pixels)
     (tmp_path / "a.toml").write_text(TOML)

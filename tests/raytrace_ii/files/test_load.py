@@ -228,7 +228,7 @@ def test_every_key_sets_its_value(tmp_path):
     own = (ball.vertices - [10, 20, 30])[:, [1, 0, 2]] * [1, -1, 1]
     gradient = own / np.square([1.0, 2, 3])
     gradient = gradient[:, [1, 0, 2]] * [-1, 1, 1]
-    # of length 1 as they are: this test once brought them to it itself and so missed that they were not
+    # of length 1 as loaded: this test once normalised them itself, and missed that they were not
     np.testing.assert_allclose(ball.normals, gradient / np.linalg.norm(gradient, axis=1, keepdims=True), atol=1e-9)
 
     board = by_name["plane 2"]
@@ -570,7 +570,7 @@ def test_unknown_and_missing_scenes(tmp_path):
 
 
 def test_a_ball_is_the_same_whatever_part_of_its_size_is_scale(tmp_path):
-    """The lift to the smooth surface holds for unit normals alone: scale 0.125 leaked light, 8 brought teeth."""
+    """The lift to the smooth surface needs unit normals: scale 0.125 leaked light, 8 gave a jagged terminator."""
 
     def picture(scale):
         text = f"""
@@ -625,7 +625,7 @@ material = "m"
     ],
 )
 def test_shapes_are_counted_before_they_are_made(shape, says, tmp_path):
-    """Each took all memory, or a traceback."""
+    """Earlier, each took all memory or ended in a traceback."""
     with pytest.raises(ValueError) as caught:
         load(tmp_path, ball('shape = "sphere"\nradius_mm = 1', shape))
     assert "object.0" in str(caught.value) and says in str(caught.value) and "\n" not in str(caught.value)

@@ -16,7 +16,7 @@ from raytrace_ii.scene.textures import linear
 from raytrace_ii.shapes.primitives import Sphere, rotation
 from tests.raytrace_ii.files.test_load import CHECKER, ball, load
 
-# A foot with four toes of different lengths: like none of its mirror images. Right-handed, as files are.
+# A foot with four toes of different lengths, unlike all its mirror images. Right-handed, as in files.
 CORNERS = np.array([[0, 0, 0], [3, 0, 0], [0, 2, 0], [0, 0, 1.0]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 
@@ -61,7 +61,7 @@ def test_mesh_files_are_not_mirrored(kind, tmp_path):
     assert (seen.normal[:3, 2] < 0).all(), "the side seen faces the viewer"
 
 
-def test_meshes_shade_flat_if_asked_to(tmp_path):
+def test_meshes_shade_flat_on_request(tmp_path):
     path = mesh_file(tmp_path, "ply")
     assert read_model(path).parts[0].mesh.normals is not None
     flat = load(tmp_path, ball('shape = "sphere"\nradius_mm = 1', 'mesh = "foot.ply"\nsmooth = false'))
@@ -107,7 +107,7 @@ def test_a_meshs_texture_coordinates_are_kept(tmp_path):
 
 @pytest.mark.parametrize("kind", ["stl", "obj", "ply", "glb"])
 def test_a_file_of_triangles_without_area_is_refused(kind, tmp_path):
-    """It rendered an empty picture without a word, and this test called that right."""
+    """Earlier it rendered an empty picture without a warning, and this test accepted that."""
     line = np.array([[0, 0, 0], [1, 1, 1], [3, 3, 3.0]])
     path = tmp_path / f"line.{kind}"
     trimesh.Trimesh(line, [[0, 1, 2], [0, 0, 1]], process=False).export(path)
@@ -139,7 +139,7 @@ def ball_file(path, segments=24):
 
 
 def test_a_seam_of_texture_coordinates_does_not_show(tmp_path):
-    """Normals were averaged over the corners of one (u, v) alone and leant to either side at the seam."""
+    """Earlier, normals were averaged only over corners of one (u, v), and were tilted at the seam."""
     mesh = read_model(ball_file(tmp_path / "ball.obj")).parts[0].mesh
     off = angles(mesh, mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True))
     assert off.max() < 0.7  # of 15° from face to face: the triangles of a place are not symmetric about it
@@ -148,7 +148,7 @@ def test_a_seam_of_texture_coordinates_does_not_show(tmp_path):
 
 @pytest.mark.parametrize("kind", ["stl", "ply", "obj"])
 def test_files_without_normals_are_smooth_up_to_an_edge(kind, tmp_path):
-    """A cylinder's side is round and its rims are sharp; STL stayed flat although smooth = true."""
+    """A cylinder's side is smooth and its rims are sharp; earlier STL stayed flat with smooth = true."""
     path = tmp_path / f"c.{kind}"
     made = trimesh.creation.cylinder(radius=1, height=2, sections=32)
     made.export(path, **({"include_normals": False} if kind == "obj" else {}))
@@ -213,7 +213,7 @@ CONCAVE = {
 @pytest.mark.parametrize("kind", ["obj", "ply"])
 @pytest.mark.parametrize("name", CONCAVE)
 def test_concave_polygons_have_their_area(name, kind, tmp_path):
-    """A fan from the first corner covers what lies outside too: +20 % on a public model."""
+    """A fan from the first corner also covers area outside the polygon: +20 % on a public model."""
     outline, expected = CONCAVE[name]
     turn = rotation((20, -35, 50))  # in no plane of the axes
     for points in (outline, outline[2:] + outline[:2]):
@@ -238,7 +238,7 @@ def test_concave_polygons_have_their_area(name, kind, tmp_path):
 @settings(max_examples=100)
 @given(st.lists(st.floats(0.2, 1), min_size=3, max_size=40), st.integers(0, 360))
 def test_star_shaped_polygons_of_any_outline_have_their_area(radii, lean):
-    """Corners at equal angles around a middle that sees them all."""
+    """Corners at equal angles around a centre from which all are visible."""
     angle = np.linspace(0, 2 * np.pi, len(radii), endpoint=False)
     points = np.column_stack([radii * np.cos(angle), radii * np.sin(angle), np.zeros(len(radii))])
     exact = 0.5 * np.sum(np.array(radii) * np.roll(radii, -1)) * np.sin(2 * np.pi / len(radii))
@@ -253,7 +253,7 @@ def test_star_shaped_polygons_of_any_outline_have_their_area(radii, lean):
 
 
 def test_triangle_strips_of_ply(tmp_path):
-    """As scanners' files have them: every other triangle turned over, −1 between strips."""
+    """As in files of scanners: every second triangle reversed, −1 between strips."""
     places = [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1), (5, 0), (5, 1), (6, 0)]
     strip = [0, 2, 1, 3, -1, 6, 8, 7]
     head = "ply\nformat {}\nelement vertex 9\nproperty float x\nproperty float y\nproperty float z\n"
@@ -271,7 +271,7 @@ def test_triangle_strips_of_ply(tmp_path):
 
 
 def test_polygons_of_ply_of_different_sizes_in_any_coding(tmp_path):
-    """A triangle beside a square, with values between that are not needed."""
+    """A triangle and a square, with unneeded values between them."""
     corners = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 3)]
     head = "ply\nformat {}\ncomment by hand\nelement vertex 5\n"
     head += "property float x\nproperty float y\nproperty double z\n"
@@ -320,7 +320,7 @@ def test_damaged_ply_files(change, says, tmp_path):
 
 
 def test_rows_of_ply_with_false_lengths(tmp_path):
-    """trimesh gives every binary list the length of the first, and takes ASCII values to the end of their row."""
+    """trimesh gives every binary list the length of the first, and reads ASCII values to the end of their row."""
     head = "ply\nformat {} 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
     head += "element face {}\nproperty list uchar int vertex_indices\nend_header\n"
     corners = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 3)]

@@ -128,7 +128,7 @@ LOST = "materials that no MTL file has"
 
 
 def test_missing_materials_and_pictures_are_named_and_the_rest_is_shown(tmp_path):
-    """They refused the whole file. What is missing has the default grey, or no picture."""
+    """Earlier they were an error. Missing materials get the default grey, missing pictures are left out."""
     for obj, mtl, names, lost in (
         (
             OBJ.replace("a.mtl", "b.mtl"),
@@ -161,14 +161,14 @@ def test_a_picture_without_texture_coordinates_is_left_out(tmp_path):
 
 
 def test_d_wins_over_tr(tmp_path):
-    """Many exporters write `d 1` and `Tr 1` for what is opaque: by Tr alone it would not be there."""
+    """Many exporters write `d 1` and `Tr 1` for opaque materials: by Tr they would be invisible."""
     for lines, gone in (("d 1\nTr 1", 0), ("Tr 1\nd 1", 0), ("Tr 0\nd 0.25", 0.75), ("d 1.000001", 0)):
         path = saved(tmp_path, OBJ, MTL.replace("Tr 0.8", lines).replace("Tf 1 0.5 0.25\n", ""))
         assert read_model(path).parts[-1].material.transmission == (gone,) * 3
 
 
 def test_colours_of_an_objs_vertices(tmp_path):
-    """Three more numbers of a v, sRGB; they were dropped without a word. They multiply Kd."""
+    """Three more numbers of a v are sRGB and multiply Kd; earlier they were dropped without a warning."""
     codes = [(1, 0, 0), (0, 0.5, 0), (0, 0, 1), (1, 1, 1)]
     obj = "\n".join(f"v {x} {y} 0 {r} {g} {b}" for (x, y), (r, g, b) in zip(
         ((0, 0), (1, 0), (1, 1), (0, 1)), codes, strict=True)) + "\nf 1 2 3\nf 1 3 4\n"  # fmt: skip

@@ -1,4 +1,4 @@
-"""Takes: what moves in a scene file and in a glTF file, against the places it must have."""
+"""Takes: motion in scene files and in glTF files, against known positions."""
 
 import numpy as np
 import pytest
@@ -302,7 +302,7 @@ def test_damaged_keyframes_are_refused(tmp_path):
 
 
 def test_tables_nested_too_deeply(tmp_path):
-    """Of still scenes this was an error of one line; a take ended in a RecursionError."""
+    """For still scenes this was an error of one line; a take ended in a RecursionError."""
     (tmp_path / "deep.toml").write_text(f"{BALLS}{MOVES}x = {'[' * 5000}\n")
     with pytest.raises(ValueError, match="nested too deeply"):
         load_take(tmp_path / "deep.toml")

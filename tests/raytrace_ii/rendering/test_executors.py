@@ -59,7 +59,7 @@ def test_threads_of_ones_own(scene, whole):
 
 
 def test_processes_read_the_scene_once_and_a_broken_pool_is_one_line(scene, whole, monkeypatch):
-    # forkserver: what the parent changed does not reach the children, as on other systems
+    # forkserver: changes in the parent do not reach the children, as on other systems
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("forkserver")) as pool:
         assert_same(whole, render(scene, CAMERA, executor=pool, **OPTIONS))
         assert pool.submit(_opened).result() == 1
@@ -160,7 +160,7 @@ def test_a_worker_with_other_code_is_refused_by_name(cluster, run, refused, tmp_
 
 @pytest.mark.parametrize("name", ["code", "embreex", "numba", "numpy"])
 def test_a_worker_that_differs_renders_no_block(scene, name, monkeypatch, tmp_path):
-    """One that joins late meets no check but this."""
+    """This is the only check of a worker that joins late."""
     ours = executors.identity()
     assert set(ours) == {"code", "embreex", "numba", "numpy"} and len(ours["code"]) == 12
     monkeypatch.setattr(executors, "identity", lambda: {**ours, name: "0"})
@@ -190,7 +190,7 @@ def test_a_scene_travels_without_its_trees(scene):
 
 
 def test_few_blocks_are_under_way_at_a_time(scene):
-    """However large the picture, a slow first block holds up all but a few."""
+    """A slow first block delays all but a few others, at any size of the picture."""
 
     class Counting(ThreadPoolExecutor):
         most = now = 0
@@ -213,7 +213,7 @@ def test_few_blocks_are_under_way_at_a_time(scene):
     assert pool.most == 2 * calls.AHEAD
 
 
-def test_an_error_or_an_interrupt_leaves_nothing_running(scene):
+def test_an_error_or_an_interrupt_stops_all_work(scene):
     def stop(done, total):
         raise KeyboardInterrupt
 
@@ -237,7 +237,7 @@ def test_invalid_executors_are_refused(wrong, says):
         render(Scene(bodies=[body(wall(5))]), CAMERA, **wrong)
 
 
-def test_a_cluster_that_is_not_there_is_one_line(run, refused, tmp_path, monkeypatch):
+def test_a_missing_cluster_is_one_line(run, refused, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
     command = ("render", "objects", "--scale", 128, "-o", tmp_path / "p.png", "--dask")
     refused(run(*command, "127.0.0.1:1"), "no dask scheduler answers at 127.0.0.1:1")

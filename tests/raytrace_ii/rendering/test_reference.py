@@ -26,7 +26,7 @@ NAMES = ("one", "two", "three")
 
 @pytest.fixture
 def small_set(monkeypatch):
-    """Three quick scenes as a set of their own; yields what is loaded, to be changed."""
+    """Replace the set by three quick scenes; yield the loaded scenes, which tests may change."""
     scenes = {name: dataclasses.replace(hall(), ambient=(0.1 * i,) * 3, name=name) for i, name in enumerate(NAMES)}
     monkeypatch.setitem(reference.SETS, "small", NAMES)
     monkeypatch.setattr(reference, "load_scene", scenes.get)
@@ -35,7 +35,7 @@ def small_set(monkeypatch):
 
 
 def make(folder, **options):
-    """Render the set; the manifest, and which files were made."""
+    """Render the set; return the manifest, and the files made."""
     made = []
 
     def tell(title, done, total):
@@ -132,7 +132,7 @@ def test_an_interrupted_set_continues(small_set, tmp_path, stop_at):
 
 
 def test_an_interrupt_from_outside(tmp_path):
-    """The command on the real scenes: after Ctrl-C what is finished is in the manifest, and nothing is half made."""
+    """The command on the real scenes: after Ctrl-C the manifest lists all finished files, and all are whole."""
     out = tmp_path / "set"
     command = [sys.executable, "-m", "raytrace_ii.cli", "render", "--set", "reference", "--scale", "128", "-o", out]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts)

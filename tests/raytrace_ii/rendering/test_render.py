@@ -21,7 +21,7 @@ ONE_LENS = IICamera(pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2
 
 
 def encoded(radiance, dtype="uint8"):
-    """Codes as `render` stores them."""
+    """Return codes as stored by `render`."""
     out = np.empty(radiance.shape, dtype)
     encode_srgb(radiance, np.arange(len(radiance)), 1.0, job.CURVES[dtype], out)
     return out
@@ -41,7 +41,7 @@ def hall_scene():
 
 @pytest.mark.parametrize("which", ["apples", "hall"])
 def test_view_image_equals_its_traced_rays(which, hall_scene):
-    """The chain camera, picture, view against the tracer alone: not one bit may differ."""
+    """Camera, picture and view against the tracer alone, to the bit."""
     scene = load_scene("apples") if which == "apples" else hall_scene
     camera = preset("setup1", scale=32)
     shot = render(scene, camera)
@@ -95,7 +95,7 @@ def test_tiles_cover_every_pixel_once():
         assert (seen == 1).all()
 
 
-def test_support_images_are_those_of_the_first_sample_and_only_those_asked_for(hall_scene):
+def test_support_images_are_of_the_first_sample_and_as_requested(hall_scene):
     full = render(hall_scene, SMALL, samples=3, seed=1)
     some = render(hall_scene, SMALL, samples=3, seed=1, support=("object_id",))
     assert some.depth is None and some.normal is None
@@ -189,7 +189,7 @@ def test_rays_by_row_and_column_make_the_same_picture(monkeypatch):
 
 
 class Watched(IICamera):
-    """A camera that keeps what it is asked for."""
+    """A camera that records the requested rays."""
 
     asked = None
 
@@ -233,7 +233,7 @@ def test_samples_stay_in_their_pixel_under_their_lens_one_in_each_stratum(sample
         assert (asked[0][2] == 0.5).all()
 
 
-def test_samples_depend_on_seed_pixel_and_nothing_else():
+def test_samples_depend_on_seed_and_pixel_alone():
     stacks = [np.stack([a[2] for a in places(4, seed)[1]]) for seed in (3, 3, 4)]
     np.testing.assert_array_equal(stacks[0], stacks[1])
     assert (stacks[0] != stacks[2]).mean() > 0.99
@@ -385,7 +385,7 @@ def test_under_large_lenses_and_in_plain_pictures_packets_are_neighbouring_pixel
 
 
 def test_rays_of_maps_without_lenses_are_grouped_by_direction(tmp_path):
-    """Maps of an II-camera that tell of no lenses: packets spread little more than those of its own."""
+    """Maps of an II-camera without its lenses: packets spread little more than those of the camera."""
     write_maps([REGULAR], tmp_path, format="exr")
     sheet = json.loads((tmp_path / "camera.json").read_text())
     bare = {"arrays": [{"samples": array["samples"]} for array in sheet["arrays"]]}

@@ -1,4 +1,4 @@
-"""Takes in a folder: the frames they must hold, what is made again, and what a kill leaves."""
+"""Takes in a folder: frames, repeated frames, and interrupted runs."""
 
 import json
 import os
@@ -116,7 +116,7 @@ def test_a_folder_holds_one_take(take, tmp_path):
         render_take(load_take(tmp_path / "other.toml"), tmp_path / "out", CAMERA)
 
 
-def test_frames_that_are_not_there(take, tmp_path, run):
+def test_missing_frames_are_named(take, tmp_path, run):
     with pytest.raises(ValueError, match="frames holds 11: moving has 11, from 0 to 10"):
         render_take(take, tmp_path / "out", CAMERA, frames=[11])
     for frames, named in (("0..11", "LAST <= 10"), ("x", "one number, two like"), ("5..3", "FIRST <= LAST")):

@@ -140,7 +140,7 @@ def test_one_image_in_several_files(scene, tmp_path):
 def test_shading_normals_are_the_balls_own():
     """A ball of 24 segments: the faces' normals are up to 7° off the radius, the interpolated ones hardly.
 
-    On the rim an interpolated normal that faces away gives way to the face's: the innermost 60° are looked at.
+    On the rim the face's normal replaces an interpolated one that faces away: the innermost 60° are tested.
     """
     ball = Scene(bodies=[body(sphere(8, 24), at=(0, 0, 30))])
     shot = render(ball, SMALL, support=("normal", "shading_normal", "ray_length"))
@@ -233,7 +233,7 @@ print("done")
 def test_a_picture_larger_than_memory(tmp_path):
     """5.2 million pixels of 32 bytes, 168 MB, written with 96 MB to spare; in memory they do not fit.
 
-    Less would not do for sure: a thread that starts late takes 8 MB for its stack and its own heap.
+    A smaller limit is not reliable: a thread that starts late takes 8 MB for its stack and its own heap.
     """
     runs = {
         how: subprocess.run([sys.executable, "-c", LIMITED, how], capture_output=True, text=True, cwd=tmp_path)

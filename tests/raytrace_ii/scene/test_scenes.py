@@ -101,7 +101,7 @@ def test_scenes_load_the_same_every_time_and_are_no_burden(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_lens_stands_in_or_under_a_body(name):
-    """What lies at z < 8 mm stays below the lowest lens."""
+    """Bodies at z < 8 mm stay below the lowest lens."""
     for body in load_scene(name).bodies:
         near = body.vertices[body.vertices[:, 2] < 8]
         near = near[(np.abs(near[:, 0]) < 25) & (near[:, 2] > 0)]

@@ -47,7 +47,7 @@ def test_checker_parity(x, y, z):
 
 
 def test_a_border_belongs_to_the_cell_after_it():
-    """Also where rounding puts it a little before: 1e-6 of a cell is the border's own."""
+    """Also if rounding puts it slightly before: 1e-6 of a cell counts as the border."""
     for border in (-4, -2, 0, 2, 4, 100):
         after = red(BOARD, (border + 1, 1, 1))[0]
         for x in (border, np.nextafter(border, -np.inf), border - 1e-6, float(np.float32(border) * (1 - 1e-8))):
@@ -57,7 +57,7 @@ def test_a_border_belongs_to_the_cell_after_it():
 
 @pytest.mark.parametrize("size", [2.0, 0.1, 1 / 3, 0.7])
 def test_a_face_on_a_border_has_no_noise(size):
-    """A wall just at a border of cells in z is a plain board in x and y, whatever its rounding."""
+    """A wall at a border of cells in z is a plain checkerboard in x and y, for any rounding."""
     for cells in (1, 3, 7, 10):
         z = cells * size
         mesh = wall(z, 20 * size)
@@ -114,7 +114,7 @@ def test_noise_is_decided_by_place_and_seed_and_well_spread():
 @given(st.integers(-20, 20), st.integers(0, 2), st.floats(-9, 9), st.floats(-9, 9), st.integers(0, 1000))
 @settings(max_examples=100)
 def test_noise_runs_on_over_the_borders_of_cells(border, axis, a, b, seed):
-    """Value and slope: a step of 1e-6 across changes it by no more than its slope, below 4, says, on both sides."""
+    """Value and slope: a step of 1e-6 across changes the value by at most the slope, below 4, on both sides."""
     step = 1e-6
     points = np.insert(np.array([[a, b]] * 4), axis, border + step * np.array([-2, -1, 1, 2.0]), axis=1)
     before, just_before, just_after, after = noise(points, seed)

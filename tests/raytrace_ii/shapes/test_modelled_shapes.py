@@ -122,7 +122,7 @@ def test_parts_give_their_vertices_colours():
     assert implicit(ball(2)).mesh().colours is None
 
 
-def test_a_front_texture_is_thrown_along_z():
+def test_a_front_texture_is_projected_along_z():
     mesh = implicit(ball(2), front_mm=(-1, -2, 3, 2)).mesh()
     np.testing.assert_allclose(mesh.uv, (mesh.vertices[:, :2] - [-1, -2]) / [4, 4])
 

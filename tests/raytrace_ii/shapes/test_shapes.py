@@ -35,7 +35,7 @@ CLOSED = [name for name in SHAPES if name != "grid"]
 
 
 def merged(mesh):
-    """The mesh with its seams sewn, right-handed as trimesh wants it."""
+    """Return the mesh with merged seams, right-handed as trimesh needs it."""
     flipped = trimesh.Trimesh(mesh.vertices * [1, 1, -1], mesh.faces[:, ::-1], process=False)
     flipped.merge_vertices(merge_norm=True, merge_tex=True)
     return flipped
@@ -149,7 +149,7 @@ def test_a_plane_lies_in_y_0_and_faces_up():
     mesh = Plane(shape="plane", size_mm=(4, 10)).mesh()
     np.testing.assert_array_equal(np.ptp(mesh.vertices, axis=0), [4, 0, 10])
     np.testing.assert_allclose(face_normals(mesh), [[0, 1, 0]] * 2)
-    # seen by someone who stands on it and looks along z: u to the right, v away
+    # for a viewer who stands on it and looks along z: u to the right, v away
     np.testing.assert_allclose(mesh.uv, mesh.vertices[:, [0, 2]] / [4, 10] + 0.5)
 
 

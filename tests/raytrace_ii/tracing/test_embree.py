@@ -209,7 +209,7 @@ def test_processes_give_the_same_picture(start):
 
 
 def test_kernels_are_kept_on_disk(tmp_path, monkeypatch):
-    """They call addresses of this process, which must not get into the cache: another process would crash."""
+    """Kernels call addresses of this process, which must not be cached: another process would crash."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     lines = (
         "from raytrace_ii.tracing.kernels.packets import packet_kernels",
@@ -224,7 +224,7 @@ def test_kernels_are_kept_on_disk(tmp_path, monkeypatch):
 
 
 def test_a_picture_is_independent_of_packets(monkeypatch):
-    """Every ray alone, or every group a packet however wide: the picture is the same."""
+    """Single rays, and packets of any width, give the same picture."""
     scene = Scene(
         bodies=[body(sphere(2, 24), at=(0, 0, 12)), body(wall(20, 60))], lights=[sun((1, 2, -3)), lamp((3, 5, 2))]
     )
@@ -238,7 +238,7 @@ def test_a_picture_is_independent_of_packets(monkeypatch):
 
 
 def test_a_scene_stores_its_vertices_once():
-    """Embree reads those of the packed scene, all trees the same ones, and nothing behind their room."""
+    """All trees of Embree read the vertices of the packed scene, and nothing behind their buffer."""
     scene = Scene(bodies=[body(wall(20)), body(sphere(2, 24), at=(0, 0, 12), transmission=(1, 1, 1))])
     packed = packed_scene(scene)
     trees = [packed.intersector._all, packed.intersector._opaque, packed.intersector._clear]

@@ -118,14 +118,14 @@ def test_pixels_that_stopped_are_within_the_target(which):
 
 
 def test_details_between_all_samples_are_missed():
-    """The blind spot that the module names: a speck between all samples of a pixel and its neighbours."""
+    """The limit that the module states: a speck between all samples of a pixel and its neighbours."""
     speck = body(sphere(0.002, 24), at=(0.05, 0.05, 20), colour=BLACK)
     scene = Scene(bodies=[speck, body(wall(30, 500), colour=WHITE)], ambient=WHITE)
     assert set(adaptive(scene, ONE_LENS).stats.samples) == {4}
 
 
 def test_aperture_and_pixel_are_sampled_together():
-    """Out of focus an edge is soft over many pixels: they get samples where a pinhole's do not."""
+    """Out of focus an edge blurs over many pixels, which get more samples than with a pinhole."""
     lens = optics.Lenslet(focal_mm=1.2, aperture_mm=1.0)
     soft = IICamera(pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0, optics=(lens,))
     sharp_count = (adaptive(half_plane(), ONE_LENS).samples > 4).sum()
@@ -180,7 +180,7 @@ def test_support_images_are_those_of_the_first_sample():
         ((4, 16), float("nan"), "error is nan"),
     ],
 )
-def test_what_cannot_be_is_refused(samples, error, says):
+def test_invalid_parameters_are_refused(samples, error, says):
     with pytest.raises(ValueError, match=says):
         render(Scene(bodies=[body(wall(5))], background=UNIFORM), ONE_LENS, samples=samples, error=error)
 

@@ -93,7 +93,7 @@ def test_the_footprint_of_a_camera_is_its_pixel():
 
 
 def test_a_checker_finer_than_pixels_is_grey():
-    """Cells of 0.3 mm at 60 mm, where a pixel is 1.6 mm wide; read at points it is anything."""
+    """Cells of 0.3 mm at 60 mm, where a pixel is 1.6 mm wide; point samples are arbitrary."""
     board = Image(np.tile(BOARD.pixels, (2, 2, 1)))
     scene = Scene(bodies=[glowing(wall(60, 20), board)])
     kept = np.s_[20:-20, 40:-40]
@@ -106,7 +106,7 @@ def test_a_checker_finer_than_pixels_is_grey():
 
 @pytest.mark.parametrize("kind", ["slanted", "mirrored", "sky", "normals", "blended"])
 def test_errors_against_many_samples_fall(kind):
-    """Of one sample and of four, by at least a third, wherever an image is read."""
+    """Errors of one and of four samples fall by at least a third wherever an image is read."""
     size = (512, 1024) if kind == "sky" else (128, 256)
     dots = np.random.default_rng(7).random(size) > 0.5
     noise = np.repeat((dots * 0.8 + 0.1)[..., None], 3, axis=2).astype(np.float32)

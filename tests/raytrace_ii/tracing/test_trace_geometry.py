@@ -101,7 +101,7 @@ def test_triangle_hits_agree_with_float64():
     for i in range(len(start)):
         t, least = moller_trumbore(start[i], direction[i], corners)
         order = np.argsort(t)
-        # Rays that pass an edge within 1e-4, or two triangles within 1e-4 of each other, are float32's to decide.
+        # Rays within 1e-4 of an edge, and triangles within 1e-4 of each other, depend on float32 rounding.
         near_edge = (np.abs(least) < 1e-4).any()
         if near_edge or (np.isfinite(t[order[1]]) and t[order[1]] - t[order[0]] < 1e-3):
             continue

@@ -48,7 +48,7 @@ def lobe_mean(roughness, elevation, value, steps=1500):
 
 
 def reflected(roughness, elevation, background, n=40000):
-    """Mean light, and its standard error, that a rough floor in empty space sends back along one ray."""
+    """Return mean light, and its standard error, that a rough floor in empty space reflects along one ray."""
     ground = Scene(bodies=[body(floor(), mirror=WHITE, roughness=roughness)], background=background, max_depth=1)
     ahead = np.array([-math.cos(elevation), -math.sin(elevation), 0.0])
     seen = trace(ground, np.broadcast_to(-9 * ahead, (n, 3)), np.broadcast_to(ahead, (n, 3))).radiance.astype(float)
@@ -57,7 +57,7 @@ def reflected(roughness, elevation, background, n=40000):
 
 @pytest.mark.parametrize("elevation", [0.1, 0.6, math.pi / 2])
 @pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
-def test_a_rough_mirror_gives_back_what_the_lobe_holds(roughness, elevation):
+def test_a_rough_mirror_reflects_the_integral_of_the_lobe(roughness, elevation):
     """In a white furnace the single-scattering albedo; under a sky that grows with height the lobe's mean height."""
     albedo = lobe_mean(roughness, elevation, lambda out: 1.0)
     got, error = reflected(roughness, elevation, UNIFORM)
@@ -90,7 +90,7 @@ def test_a_nearly_smooth_mirror_shows_the_mirrors_picture():
     assert np.abs(shot(0.0) - shot(0.5)).max() > 50
 
 
-def test_glossy_pictures_are_the_same_whatever_renders_them(monkeypatch):
+def test_glossy_pictures_are_independent_of_workers_and_tiles(monkeypatch):
     """To the bit, by workers and tiles; another seed gives other noise; more samples less."""
     camera = preset("setup1", scale=64)
     rough = body(wall(30), mirror=WHITE, roughness=0.6)
@@ -134,7 +134,7 @@ def test_an_emission_map_gives_off_its_texels():
 
 
 def test_metal_of_a_map_mirrors_the_texture():
-    """Texels of metal mirror their colour, the others are matt; none gives more than it gets."""
+    """Texels of metal mirror their colour, the others are matt; all conserve energy."""
     rng = np.random.default_rng(2)
     colours, metal = rng.random((3, 5, 3), np.float32), rng.random((3, 5)).astype(np.float32)
     look = Image(np.stack([np.zeros_like(metal), np.zeros_like(metal), metal], axis=-1))
@@ -231,7 +231,7 @@ def test_the_last_generation_takes_a_blended_surface_as_there():
         ({"metallic_roughness_map": GREY}, "a metallic-roughness map needs texture coordinates"),
     ],
 )
-def test_what_cannot_be_is_refused(material, says):
+def test_invalid_parameters_are_refused(material, says):
     with pytest.raises(ValueError, match=says):
         body(wall(20), **material)
 

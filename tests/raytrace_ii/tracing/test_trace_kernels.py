@@ -58,9 +58,9 @@ def crowded():
 
 @pytest.mark.parametrize("glass", [True, False])
 def test_tracing_in_python_sees_the_same(glass, monkeypatch):
-    """Python keeps float32 where numba goes on in float64: the same rays but for a rare one on an edge."""
+    """Python keeps float32 where numba continues in float64: the same rays, except rare ones on an edge."""
     scene = hall(max_depth=4)
-    if not glass:  # without it shadows take the shorter way
+    if not glass:  # without glass, shadow rays take the shorter path
         bodies = [body for body in scene.bodies if not body.material.transmissive]
         scene = replace(scene, bodies=bodies)
     assert (agree(scene, monkeypatch).count.rays["refraction"] > 0) == glass
@@ -90,7 +90,7 @@ def test_a_scene_compiles_only_the_stages_it_needs(scene, stages):
 
 
 def agree(scene, monkeypatch):
-    """Trace with compiled kernels and with their source; the first comes back."""
+    """Trace with compiled kernels and with their source, compare, and return the first."""
     camera = preset("setup1", scale=64)
     m, n = np.random.default_rng(0).integers(0, camera.pixels, (600, 2)).T
     compiled = trace(scene, *camera.rays_at(m, n))
@@ -133,7 +133,7 @@ def test_start_rays_name_the_first_bad_one():
 
 def test_rays_without_light_are_left_out():
     locations, directions = np.arange(12.0).reshape(4, 3), np.ones((4, 3))
-    directions[1] = 0  # blocked: nobody asks where it goes
+    directions[1] = 0  # blocked: its direction is not used
     rows = [np.empty((4, 3), np.float32) for _ in range(3)]
     pixels, inside = np.empty(4, np.int32), np.empty((4, 0), np.int32)
     for function in (start_rays, start_rays.py_func):
@@ -165,7 +165,7 @@ def test_rays_by_row_and_column_are_those_one_by_one():
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e200])
-def test_rows_and_columns_of_unusable_rays_are_told(wrong):
+def test_rows_and_columns_of_unusable_rays_are_reported(wrong):
     room = [np.empty((15, 3), np.float32) for _ in range(2)]
     sizes, order = (10, 6, 2), (np.zeros(15, np.int32),) * 2
     for where in range(18):

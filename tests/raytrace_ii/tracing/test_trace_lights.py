@@ -11,7 +11,7 @@ from tests.support.trace_scenes import BLACK, UNIFORM, WHITE, body, floor, spher
 
 
 def spot_on_floor(x, *, cone_deg=(20, 30), colour=WHITE):
-    """What a floor shows at x under a spot light 10 mm up that shines straight down."""
+    """Return the light of a floor at x under a spot light 10 mm above that shines straight down."""
     light = Light(kind="spot", vector=(0, 10, 0), colour=colour, direction=(0, -3, 0), cone_deg=cone_deg)
     scene = Scene(bodies=[body(floor(400), colour=WHITE)], lights=[light])
     starts = np.column_stack([x, np.full_like(x, 5.0), np.full_like(x, 0.1)])
@@ -53,7 +53,7 @@ def test_a_surface_gives_off_light_on_both_sides_and_lights_nothing_else():
 
 @pytest.mark.parametrize("albedo", [0.0, 0.5, 1.0])
 def test_a_furnace_of_glowing_walls_is_even(albedo):
-    """A wall that gives off what it does not reflect of surroundings of 1 shows 1, also seen in a mirror ball."""
+    """A wall that emits the share that it does not reflect shows 1 in surroundings of 1, also in a mirror ball."""
     room = body(sphere(50, 32), colour=(albedo,) * 3, emission=(1 - albedo,) * 3)
     ball = body(sphere(5, 48), at=(0, 0, 20), mirror=WHITE)
     matt = body(sphere(5, 48), at=(20, 0, 0), colour=WHITE)
@@ -67,7 +67,7 @@ def test_a_furnace_of_glowing_walls_is_even(albedo):
 
 
 def sky(pixels, **options):
-    """What is seen of an image all around, and nothing else."""
+    """Return the light of a scene of a surrounding image alone."""
     image = Image(np.asarray(pixels, np.float32))
     nothing = body(sphere(1), at=(1e3, 2e3, 3.3e3), scale=1e-3)
     scene = Scene(bodies=[nothing], background=Background(image=image, **options))

@@ -36,7 +36,7 @@ def slab(near, far, ior, *, half=300.0, **more):
 
 
 def passed(angle, *iors):
-    """What a stack of parallel media lets through on its straight way: Fresnel at each face, at Snell's angles."""
+    """Return the transmittance of a stack of parallel media: Fresnel at each face, at Snell's angles."""
     share = 1.0
     for n1, n2 in zip((1.0, *iors), (*iors, 1.0), strict=True):
         share *= 1 - reflectance(math.cos(math.asin(math.sin(angle) / n1)), n2 / n1)
@@ -44,7 +44,7 @@ def passed(angle, *iors):
 
 
 def shifted(angle, *layers):
-    """How far to the side a stack of (thickness, ior) moves a ray."""
+    """Return the lateral shift of a ray by a stack of (thickness, ior)."""
     return sum(t * (math.tan(angle) - math.tan(math.asin(math.sin(angle) / n))) for t, n in layers)
 
 
@@ -90,7 +90,7 @@ def test_glass_water_glass_is_the_product_of_its_four_faces(stack, degrees, orde
     np.testing.assert_allclose(trace(white, [start], [direction]).radiance[0], share, rtol=1e-5)
 
 
-def test_which_body_fills_an_overlap_is_told_by_absorption():
+def test_absorption_in_overlapping_bodies():
     """Bodies of the air's own index absorb along their part of the way: 4 mm shared by two of 10 mm."""
     red, blue = np.array([0.1, 0.0, 0.02]), np.array([0.0, 0.05, 0.2])
     for first, second, own in ((1, 0, (10, 6)), (0, 1, (6, 10)), (0, 0, (10, 6)), (5, 5, (10, 6)), (-1, -2, (10, 6))):
@@ -118,7 +118,7 @@ def test_ice_in_water_in_a_bowl():
     assert whole.max() <= 1 + 1e-5 and np.median(whole) > 1 - 1e-3
 
 
-def test_a_ray_keeps_count_of_as_many_bodies_as_can_meet():
+def test_a_ray_tracks_all_bodies_that_can_overlap():
     plain = body(wall(50))
     ball = [body(sphere(2, 12), at=(x, 0, 20), transmission=WHITE) for x in (0, 10, 20)]
     touching = body(sphere(3, 12), at=(5, 0, 20), transmission=WHITE)  # both neighbours at once
@@ -191,7 +191,7 @@ def test_total_reflection_begins_at_the_critical_angle(inner, outer):
 
 @pytest.mark.parametrize("degrees", [0.0, 40.0, 65.0])
 def test_a_shadow_through_glass_water_glass_is_that_of_the_bent_way(degrees):
-    """The light goes straight on, but each face takes what it takes of the light that Snell bends."""
+    """Shadow rays are straight, but each face has the Fresnel loss of the refracted path."""
     angle = math.radians(degrees)
     towards = (math.sin(angle), math.cos(angle), 0)
     ground = body(floor(1000), colour=WHITE)
@@ -275,7 +275,7 @@ def test_a_dispersing_furnace_stays_white():
     assert seen.max() <= 1 + 1e-5 and np.median(seen) > 1 - 1e-3
 
 
-# What is not shot
+# Rays that are not traced
 
 
 def test_weak_rays_are_counted_and_strong_light_makes_them_count():

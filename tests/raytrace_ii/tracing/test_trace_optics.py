@@ -258,7 +258,7 @@ def test_depth_zero_has_local_light_only():
 
 
 def bent(mesh, normal):
-    """A mesh that pretends to have one normal all over."""
+    """Return a mesh with the same vertex normal everywhere."""
     return Mesh(mesh.vertices, mesh.faces, np.broadcast_to(np.asarray(normal, float), mesh.vertices.shape))
 
 
@@ -522,6 +522,6 @@ def test_kernels_of_light_equal_their_python_source():
     np.testing.assert_array_equal(a, b)
 
 
-def test_more_light_than_there_is_is_refused():
+def test_materials_of_more_than_all_light_are_refused():
     with pytest.raises(ValueError, match=r"mirror 0\.7 and transmission 0\.4 are more than all the light"):
         Material(mirror=(0.1, 0.7, 0), transmission=(0.4, 0, 0))

@@ -99,7 +99,7 @@ def test_a_closed_room_is_dark(scale, at):
 
 
 def test_a_closed_room_of_mirrors_is_dark():
-    """Bounce after bounce, none gets out."""
+    """No light enters over any number of bounces."""
     room = body(ROOM, mirror=WHITE)
     scene = Scene(bodies=[room], background=UNIFORM, lights=[lamp((5, 6, 7))], max_depth=12)
     edges, vertices = on_edges_and_vertices(ROOM, 5000)
@@ -370,7 +370,7 @@ def test_the_length_of_a_direction_does_not_matter():
 
 
 def test_black_is_black():
-    """Without any light there is none, whatever the materials."""
+    """A scene without light is black, for all materials."""
     bodies = [body(sphere(3), at=(0, 0, 20), mirror=(0.5,) * 3, transmission=(0.5,) * 3), body(wall(40), specular=1)]
     directions = np.column_stack([*np.random.default_rng(0).uniform(-0.3, 0.3, (2, 500)), np.ones(500)])
     seen = trace(Scene(bodies=bodies, lights=[lamp((0, 0, 1), BLACK)]), np.zeros_like(directions), directions)

@@ -15,7 +15,7 @@ FLAT = Image(np.full((2, 2, 3), (0.5, 0.5, 1.0), np.float32))
 
 
 def tilted(x, y, z):
-    """A map of one tangent-space normal all over, stored as 0…1."""
+    """Return a map with a single tangent-space normal, stored as 0…1."""
     vector = np.array([x, y, z]) / math.sqrt(x * x + y * y + z * z)
     return Image(np.broadcast_to((vector + 1) / 2, (2, 2, 3)).astype(np.float32))
 
