@@ -38,6 +38,7 @@ _NEAR, _DIRECTION, _TIME, _FAR, _MASK, _FLAGS, _U, _V, _FACE, _GEOMETRY, _INSTAN
 _CORNERS = 24  # the hit ends with `instPrimID`, row 20; behind it room for the nine coordinates of the faces hit
 PACKET_ROWS = _CORNERS + 9
 _NO_END = np.float32(1e37)
+_LEAST_GROUP = 3  # rays that are traced as a packet rather than one by one
 
 
 class Calls(NamedTuple):
@@ -171,22 +172,73 @@ def _take(packet, numbers, width, lane, i, primitives, u, v, distances):
     u[i], v[i], distances[i] = packet[_U * width + lane], packet[_V * width + lane], packet[_FAR * width + lane]
 
 
+@stage_kernel
+def _choose(packet, active, chosen, calls, width):
+    """Set as active those lanes of ``chosen`` that are near its first one in place and direction.
+
+    Returns
+    -------
+    active, first : int
+        How many lanes are active, and the first one.
+    """
+    first = 0
+    while chosen[first] == 0:
+        first += 1
+    x, y, z = packet[first], packet[width + first], packet[2 * width + first]
+    dx, dy, dz = packet[4 * width + first], packet[5 * width + first], packet[6 * width + first]
+    narrow = calls.narrow * (abs(dx) + abs(dy) + abs(dz))
+    count = 0
+    for lane in range(width):
+        away = abs(packet[lane] - x) + abs(packet[width + lane] - y) + abs(packet[2 * width + lane] - z)
+        turned = (
+            abs(packet[4 * width + lane] - dx)
+            + abs(packet[5 * width + lane] - dy)
+            + abs(packet[6 * width + lane] - dz)
+        )
+        near = (away <= calls.near) & (turned <= narrow) & (chosen[lane] != 0)
+        active[lane] = -1 if near else 0
+        count += near
+    return count, first
+
+
+@stage_kernel
+def _trace_groups(calls, active, chosen, packet, numbers, one, one_numbers, lanes, width):
+    """Trace a packet whose rays spread too far: groups of near lanes as packets, few lanes as single rays."""
+    for lane in range(width):
+        chosen[lane] = lane < lanes
+    left = lanes
+    while left > 0:
+        count, first = _choose(packet, active, chosen, calls, width)
+        if count >= _LEAST_GROUP:
+            call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
+            for lane in range(width):
+                chosen[lane] = 0 if active[lane] != 0 else chosen[lane]
+            left -= count
+        else:
+            for row in range(_CORNERS):
+                one_numbers[row] = numbers[row * width + first]
+            call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
+            for row in range(_FAR, _CORNERS):
+                numbers[row * width + first] = one_numbers[row]
+            chosen[first] = 0
+            left -= 1
+
+
 @cache
 def packet_kernels(width: int) -> tuple[Any, Any]:
     """The kernels for packets of so many rays: nearest hit, and whether anything is hit.
 
-    Rays go in groups of ``width`` in their order; a group that spreads too far is traced ray by ray. u, v and
-    distance of misses mean nothing.
+    Rays go in packets of ``width`` in their order; a packet that spreads too far is traced in groups of near rays.
+    u, v and distance of misses mean nothing.
     """
 
     @kernel
     def nearest(
-        calls, active, packet, numbers, one, one_number, origins, directions, reach, corners,
+        calls, active, chosen, packet, numbers, one, one_numbers, origins, directions, reach, corners,
         primitives, u, v, distances,
     ):  # fmt: skip
-        n, wide, narrow = origins.shape[0], np.int64(width), np.int64(1)  # no literals: parts are compiled once
+        n, wide = origins.shape[0], np.int64(width)  # no literal: parts are compiled once
         _begin(packet, numbers, wide)
-        _begin(one, one_number, narrow)
         for first in range(0, n, width):
             lanes = min(width, n - first)
             for lane in range(width):
@@ -196,24 +248,18 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 _fill(packet, numbers, wide, lane, origins, directions, i, far)
             if _together(packet, calls, wide):
                 call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
-                _place(packet, numbers, wide, corners)
-                for lane in range(lanes):
-                    _take(packet, numbers, wide, lane, first + lane, primitives, u, v, distances)
             else:
-                for i in range(first, first + lanes):
-                    far = reach[i] if reach.shape[0] > 0 else _NO_END
-                    _fill(one, one_number, narrow, 0, origins, directions, i, far)
-                    call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
-                    _place(one, one_number, narrow, corners)
-                    _take(one, one_number, narrow, 0, i, primitives, u, v, distances)
+                _trace_groups(calls, active, chosen, packet, numbers, one, one_numbers, lanes, wide)
+            _place(packet, numbers, wide, corners)
+            for lane in range(lanes):
+                _take(packet, numbers, wide, lane, first + lane, primitives, u, v, distances)
 
     @kernel
     def occluded(
-        calls, active, packet, numbers, one, one_number, origins, directions, reach, found
+        calls, active, chosen, packet, numbers, one, one_numbers, origins, directions, reach, found
     ):  # fmt: skip
-        n, wide, narrow = origins.shape[0], np.int64(width), np.int64(1)  # no literals: parts are compiled once
+        n, wide = origins.shape[0], np.int64(width)  # no literal: parts are compiled once
         _begin(packet, numbers, wide)
-        _begin(one, one_number, narrow)
         for first in range(0, n, width):
             lanes = min(width, n - first)
             for lane in range(width):
@@ -222,12 +268,9 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 _fill(packet, numbers, wide, lane, origins, directions, i, reach[i])
             if _together(packet, calls, wide):
                 call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
-                for lane in range(lanes):
-                    found[first + lane] = 0 if packet[_FAR * width + lane] < 0 else -1
             else:
-                for i in range(first, first + lanes):
-                    _fill(one, one_number, narrow, 0, origins, directions, i, reach[i])
-                    call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
-                    found[i] = 0 if one[_FAR] < 0 else -1
+                _trace_groups(calls, active, chosen, packet, numbers, one, one_numbers, lanes, wide)
+            for lane in range(lanes):
+                found[first + lane] = 0 if packet[_FAR * width + lane] < 0 else -1
 
     return nearest, occluded

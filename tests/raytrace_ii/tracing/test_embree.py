@@ -1,9 +1,11 @@
 """Embree in packets: equal to single rays for every width, order, thread and process; fallback."""
 
+import ctypes
 import os
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
@@ -69,6 +71,50 @@ def test_hits_are_those_of_single_rays(configuration, spread, n):
             single.occluded(origins, directions, reach, expected_blocked)
             np.testing.assert_array_equal(blocked, expected_blocked)
             np.testing.assert_array_equal(blocked == 0, hit)
+
+
+class CountedSingles:
+    """Embree's functions, of which those for single rays count their calls."""
+
+    def __init__(self, functions):
+        self.functions, self.calls = functions, 0
+        self.rtcIntersect1, self.rtcOccluded1 = map(self.counted, (functions.rtcIntersect1, functions.rtcOccluded1))
+
+    def __getattr__(self, name):
+        return getattr(self.functions, name)
+
+    def counted(self, function):
+        address = ctypes.cast(function, ctypes.c_void_p).value
+        kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
+
+        def call(*arguments):
+            self.calls += 1
+            kind(address)(*arguments)
+
+        return kind(call)
+
+
+def test_bundles_that_share_a_packet_are_traced_as_packets():
+    """Rays of two bundles in turn, as at the edge of a body: no single rays, and their hits."""
+    n = 64
+    corners, (origins, directions) = soup(), camera_rays(n, 0.2)
+    directions *= 0.02
+    directions[:, 2] = 1
+    origins[1::2, 0] += 12  # 28 median edges of the faces
+    directions[1::2, 0] -= 2
+    counted = CountedSingles(opened("").functions)
+    packets, single = Tree(replace(opened(""), functions=counted), corners, True), SingleRays(corners, True)
+    found, expected = room(n), room(n)
+    packets.nearest(origins, directions, NO_REACH, found)
+    single.nearest(origins, directions, NO_REACH, expected)
+    np.testing.assert_array_equal(found[0], expected[0])
+    assert len(set(found[0])) > 4 and (found[0] >= 0).any()
+    blocked = np.full(n, -7, np.int32)
+    packets.occluded(origins, directions, np.full(n, 100, np.float32), blocked)
+    np.testing.assert_array_equal(blocked == 0, expected[0] >= 0)
+    assert counted.calls == 0
+    packets.nearest(*camera_rays(n, 1.0), NO_REACH, found)
+    assert counted.calls > 0
 
 
 def test_rays_without_a_direction_miss_and_harm_no_neighbour():
