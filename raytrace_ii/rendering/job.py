@@ -18,7 +18,7 @@ from ..scene.scene import Scene
 from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb
 from ..tracing.packing import packed
-from ..tracing.sampling import Adaptive, Sampling, adaptive_mean, fixed_places
+from ..tracing.sampling import Adaptive, Sampling, Shoot, adaptive_mean, fixed_sum
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
 from .tiles import Order, Tile, ray_order, tiles
 
@@ -137,7 +137,7 @@ class Job:
         """Return the width of a sample's ray at its origin in mm, and its growth per mm: its part of the pixel."""
         if not self.texture_filter or not packed(self.scene).images:
             return 0.0, 0.0
-        samples = self.sampling.least if isinstance(self.sampling, Adaptive) else self.sampling
+        samples = self.sampling.most if isinstance(self.sampling, Adaptive) else self.sampling
         width, spread = footprint(self.camera)
         return width / samples**0.5, spread / samples**0.5
 
@@ -150,22 +150,26 @@ class Job:
     def _fixed(
         self, tracer: Tracer, samples: int, rows: slice, cols: slice, order: Order, support: Support | None
     ) -> NDArray[np.float32]:
-        """Return the summed radiance of a tile at a fixed number of samples, in the order of the rays."""
-        radiance = np.zeros((len(order.pixels), 3), np.float32)
-        keys = self._keys(cols.start + order.columns, rows.start + order.rows, 0, 1)
-        if samples == 1 and isinstance(self.camera, IICamera):
+        """Return the summed radiance of a tile with a fixed number of samples, in the order of the rays."""
+        m, n = cols.start + order.columns, rows.start + order.rows
+        if isinstance(self.camera, IICamera):
+            if samples > 1:
+                return fixed_sum(self.camera, samples, self.seed, m, n, TILE_RAYS, self._shoot(tracer, support))
             rays = self.camera.separable_rays(rows, cols)
-            if rays is not None and tracer.run_separable(rays, radiance, support, order.rows, order.columns, keys):
-                return radiance
+        else:
+            rays = None
+        radiance = np.zeros((len(order.pixels), 3), np.float32)
+        keys = self._keys(m, n, 0, 1)
+        if rays is not None and tracer.run_separable(rays, radiance, support, order.rows, order.columns, keys):
+            return radiance
         for sample in range(samples):
             self._check_stopped()
             if isinstance(self.camera, MapCamera):
                 L, D, shares = self.camera.stored_rays(sample, rows, cols)
             else:
-                where = fixed_places(self.camera, samples, self.seed, sample, rows, cols)
-                L, D, shares = self.camera.weighted_rays(rows, cols, *where)
+                L, D, shares = self.camera.weighted_rays(rows, cols)
             if sample > 0:
-                keys = self._keys(cols.start + order.columns, rows.start + order.rows, sample, 1)
+                keys = self._keys(m, n, sample, 1)
             tracer.run(L, D, radiance, support if sample == 0 else None, shares, keys, order.pixels)
         return radiance
 
@@ -182,6 +186,13 @@ class Job:
     ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Return the mean radiance of a tile and the number of samples per pixel, in the order of the rays."""
         assert isinstance(self.camera, IICamera)
+        codes = CURVES["uint8"]
+        assert codes is not None
+        shoot = self._shoot(tracer, support)
+        return adaptive_mean(self.camera, wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, shoot)
+
+    def _shoot(self, tracer: Tracer, support: Support | None) -> Shoot:
+        """Return the function that traces samples of pixels and keeps support arrays of the first ones."""
 
         def shoot(L: Any, D: Any, shares: Any, *, numbers: Any, first: slice | None) -> NDArray[np.float32]:
             self._check_stopped()
@@ -195,9 +206,7 @@ class Job:
                         array[first] = getattr(room, name)[::every]
             return radiance
 
-        codes = CURVES["uint8"]
-        assert codes is not None
-        return adaptive_mean(self.camera, wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, shoot)
+        return shoot
 
 
 def footprint(camera: Camera) -> tuple[float, float]:

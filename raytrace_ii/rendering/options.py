@@ -46,10 +46,11 @@ class RenderOptions:
     Parameters
     ----------
     samples : int or (least, most)
-        Rays per pixel. One ray starts at the pixel's centre. Several are stratified: one in each cell of a grid over
-        the pixel, at a position hashed from ``seed`` and the pixel, and likewise over an aperture. All pass the lens
-        of the pixel. A pair selects adaptive sampling: pixels get the least number, then more up to the most, until
-        they meet ``error``. Stored maps fix the number of samples.
+        Rays per pixel. One ray starts at the pixel's centre. Several are the first of a scrambled (0, 2)-sequence,
+        which ``seed`` and the pixel select: any power of 2 has one in each cell of every grid of as many equal cells,
+        over the pixel and likewise over an aperture. All pass the lens of the pixel. A pair selects adaptive
+        sampling: pixels get the least number, then more up to the most, until they meet ``error``. Stored maps fix
+        the number of samples.
     error : float
         Target of adaptive sampling: standard error of a pixel in 8-bit steps, estimated from its samples and from its
         neighbours under the same lens; see `sampling` for the estimate and its limits.

@@ -1,7 +1,8 @@
 """Supersampling: positions and number of the samples of a pixel.
 
-A fixed number is one sample in each cell of a grid. An adaptive number starts with the least, then doubles, pixel by
-pixel, until the estimated standard error of the pixel is within a target or the most is reached. The estimate is
+The samples of a pixel are the first of a (0, 2)-sequence, see `kernels.sampling.places`. Their number is fixed, or
+adaptive: it starts with the least, then doubles, pixel by pixel, until the estimated standard error of the pixel is
+within a target or the most is reached. The estimate is
 
     error² = Σ(qᵢ − x̄)² / 12 + d² / n³
 
@@ -22,6 +23,7 @@ guards against both.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -31,9 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 from ii_core import IICamera
 
 from .kernels import sampling as sample_kernels
-from .kernels.start import jitter
 
-APERTURE_SEED = 1 << 40  # apart from all seeds a person gives
 MOST_SAMPLES = 1 << 16
 
 Floats = NDArray[np.float64]
@@ -73,24 +73,6 @@ def sampling(samples: Any, error: float) -> Sampling:
     return Adaptive(int(pair[0]), int(pair[1]), float(error))
 
 
-def fixed_places(camera: IICamera, samples: int, seed: int, sample: int, rows: slice, cols: slice) -> list[ArrayLike]:
-    """Return the positions in pixel and aperture of one of a fixed number of samples, for a block of pixels."""
-    if samples == 1:
-        return [(0.5, 0.5), (0.5, 0.5)]
-    down = max(d for d in range(1, math.isqrt(samples) + 1) if samples % d == 0)
-    places: list[ArrayLike] = []
-    for aperture in (False, True):
-        out = np.empty((rows.stop - rows.start, cols.stop - cols.start, 2))
-        jitter(
-            seed + APERTURE_SEED * aperture, sample, samples // down, down, aperture,
-            camera.pixels[0], rows.start, cols.start, out,
-        )  # fmt: skip
-        places.append(out)
-        if not camera.samples_aperture:
-            return [out, (0.5, 0.5)]
-    return places
-
-
 class Shoot(Protocol):
     """Traces rays of a camera; ``first`` says that these begin their pixels.
 
@@ -101,6 +83,29 @@ class Shoot(Protocol):
         self, L: Floats, D: Floats, shares: Floats | None, *,
         numbers: tuple[NDArray[Any], NDArray[Any], int, int], first: slice | None,
     ) -> NDArray[np.float32]: ...  # fmt: skip
+
+
+def fixed_sum(
+    camera: IICamera, samples: int, seed: int, m: NDArray[Any], n: NDArray[Any], batch: int, shoot: Shoot
+) -> Radiance:
+    """Return the summed radiance (p, 3) of pixels in columns m and rows n, all with the same number of samples.
+
+    The samples of a pixel stand together: they share packets, and are as close as its own width.
+    """
+    total = np.zeros((len(m), 3), np.float32)
+    for some, first, many in _portions(len(m), 0, samples, batch):
+        numbers = m[some], n[some], first, many
+        radiance = shoot(*_rays(camera, seed, *numbers), numbers=numbers, first=some if first == 0 else None)
+        total[some] += radiance.reshape(-1, many, 3).sum(axis=1)
+    return total
+
+
+def _portions(pixels: int, start: int, count: int, batch: int) -> Iterator[tuple[slice, int, int]]:
+    """Yield batches of samples start … start + count: a slice of pixels, the first sample, samples per pixel."""
+    for first in range(start, start + count, batch):
+        many = min(start + count - first, batch)
+        for i in range(0, pixels, batch // many):
+            yield slice(i, min(i + batch // many, pixels)), first, many
 
 
 def adaptive_mean(
@@ -132,15 +137,12 @@ def adaptive_mean(
 
     def add(which: NDArray[np.int64], start: int, count: int, begins: bool = False) -> None:
         """Samples start … start + count of some pixels, to the four quarters of all so far."""
-        many = min(count, batch)
-        for first in range(start, start + count, many):
-            for i in range(0, len(which), batch // many):
-                some = which[i : i + batch // many]
-                numbers = m[some], n[some], first, many
-                rays = _rays(camera, seed, *numbers)
-                block = slice(i, i + len(some)) if begins and first == 0 else None
-                radiance = shoot(*rays, numbers=numbers, first=block)
-                sample_kernels.add_samples(radiance, some, first, many, (start + count) // 4, quarters)
+        for block, first, many in _portions(len(which), start, count, batch):
+            some = which[block]
+            numbers = m[some], n[some], first, many
+            rays = _rays(camera, seed, *numbers)
+            radiance = shoot(*rays, numbers=numbers, first=block if begins and first == 0 else None)
+            sample_kernels.add_samples(radiance, some, first, many, (start + count) // 4, quarters)
 
     inside, rim = np.flatnonzero(own), np.flatnonzero(~own & _needed(lens, own))
     corner = int(inside[0]) // lens.shape[1], int(inside[0]) % lens.shape[1]

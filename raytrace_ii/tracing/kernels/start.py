@@ -1,15 +1,10 @@
-"""Camera rays: origins, directions and sample positions within a pixel."""
+"""Camera rays: origins and directions."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ii_core.jit import lean_kernel as kernel
-from ii_core.jit import part_kernel
-
-from .vectors import mix_bits
 
 _LEAST, _MOST = 1e-150, 1e150  # between them squares and their sums neither vanish nor overflow
 
@@ -87,33 +82,3 @@ def start_separable_rays(x, y, z, rows, columns, rotation, shift, out_origins, o
         out_directions[i, 1] = (r10 * dx + r11 * dy + r12 * dz) * inverse
         out_directions[i, 2] = (r20 * dx + r21 * dy + r22 * dz) * inverse
     return sure
-
-
-@kernel
-def jitter(seed, sample, across, down, shuffle, columns, first_row, first_column, out):
-    """A place in one stratum of across × down, for each pixel its own: a hash of seed, pixel and sample.
-
-    The stratum is ``sample``, or, if ``shuffle``, one of a walk through all that starts elsewhere in every pixel:
-    places on the aperture must not follow those in the pixel.
-    """
-    strata = across * down
-    stride = max(1, int(0.618 * strata)) if shuffle else 1
-    while _common_divisor(stride, strata) > 1:
-        stride += 1
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            pixel = np.uint64(first_row + i) * np.uint64(columns) + np.uint64(first_column + j)
-            own = mix_bits(np.uint64(seed) ^ mix_bits(pixel))
-            h = mix_bits(own + np.uint64(sample))
-            stratum = (sample * stride + int(own >> np.uint64(33))) % strata if shuffle else sample
-            x = (stratum % across + (h >> np.uint64(40)) * (1.0 / 16777216.0)) / across
-            y = (stratum // across + ((h >> np.uint64(8)) & np.uint64(16777215)) * (1.0 / 16777216.0)) / down
-            out[i, j, 0] = x
-            out[i, j, 1] = y
-
-
-@part_kernel
-def _common_divisor(a, b):
-    while b:
-        a, b = b, a % b
-    return a

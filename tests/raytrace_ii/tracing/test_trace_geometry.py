@@ -252,14 +252,15 @@ def test_a_point_moves_from_elementary_image_to_image_by_the_disparity():
     z, radius = 40.0, 1.2  # 1.2 mm is 3 pixels
     ball = body(sphere(radius, 64), at=(0.4, -0.3, z), colour=WHITE)
     scene = Scene(bodies=[ball], ambient=WHITE)
-    eis = elementary_images(render(scene, camera, dtype="float32", samples=16).picture)[..., 0]
+    eis = elementary_images(render(scene, camera, dtype="float32", samples=64).picture)[..., 0]
     mass = eis.sum(axis=(2, 3))
     assert (mass > 20).all(), "every lens sees it"
     u = (eis.sum(axis=2) @ np.arange(64)) / mass
     v = (eis.sum(axis=3) @ np.arange(64)) / mass
     step = camera.gap_mm * camera.lens_pitch_mm[0] / ((z - camera.gap_mm) * camera.pixel_pitch_mm)
     assert step == pytest.approx(3.37, abs=0.01)
-    # 16 samples a pixel round a disc of 3 pixels' radius put its centroid to a few hundredths of a pixel
+    # 64 samples per pixel of a disc of 3 pixels' radius put its centroid to a few hundredths of a pixel; 16 samples
+    # passed by the choice of the seed: with other seeds, 5 of 12 exceeded the tolerance (largest of 18 differences)
     np.testing.assert_allclose(np.diff(u, axis=1), step, atol=0.05)
     np.testing.assert_allclose(np.diff(v, axis=0), step, atol=0.05)
     np.testing.assert_allclose(np.diff(u, axis=0), 0, atol=0.05)
