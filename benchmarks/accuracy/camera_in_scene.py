@@ -28,7 +28,7 @@ from metrics import q_global
 from raytrace_ii import Background, Body, Material, Scene, Shot, load_scene, render
 from raytrace_ii.tracing.packing import packed
 
-RECORDS, SCALE = Records("camera_in_scene", ("benchmarks.accuracy.camera_in_scene",)), 16  # of the page
+RECORDS, SCALE = Records("camera_in_scene", ("benchmarks.accuracy.camera_in_scene",)), 16  # scale on the page
 GLASS = (1.0, 1.0, 1.0)
 BLACK = Material(colour=(0.0, 0.0, 0.0))
 REPEATS = 5

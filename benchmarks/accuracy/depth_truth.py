@@ -33,7 +33,7 @@ from metrics.depth.virtual_camera import virtual_camera_pixels
 from raytrace_ii import Scene, Shot, load_scene, render
 
 RECORDS, CHART = Records("depth_truth", ("benchmarks.accuracy.depth_truth",)), ROOT / "docs/images/depth_truth.png"
-SCALE = 2  # of the page
+SCALE = 2  # scale on the page
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
 KINDS = ("textured", "flat", "edge", "mirror", "clear")
 NOISES = (0, 1, 2, 4, 8)

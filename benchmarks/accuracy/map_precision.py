@@ -24,7 +24,7 @@ from metrics import q_global
 from raytrace_ii import load_scene, render
 
 RECORDS = Records("map_precision", ("benchmarks.accuracy.map_precision",))
-SCALE = 4  # of the pages
+SCALE = 4  # scale on the pages
 SCENES = ("apples", "cuboid")
 CAMERAS = ("setup1", "setup3", "spherical")
 

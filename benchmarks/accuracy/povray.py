@@ -34,7 +34,7 @@ from raytrace_ii import Light, Material, trace
 
 RECORDS = Records("povray", ("benchmarks.accuracy.povray", "benchmarks.accuracy.analytic"))
 DOCS = ROOT / "docs"
-SCALE = 16  # of the page
+SCALE = 16  # scale on the page
 SEGMENTS = 384
 SIDE = 1.0  # mm from corner to centroid of a triangle that stands for a ray; POV-Ray drops very small ones
 

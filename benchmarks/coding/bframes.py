@@ -1,4 +1,4 @@
-"""B pictures: loss in Table 5.5 of the dissertation, gain elsewhere; one condition changed at a time.
+"""B pictures: gain or loss against none, with one condition of Table 5.5 changed at a time.
 
 ``python -m benchmarks run bframes --scale 4`` codes sub-images of four scenes with 0 to 3 and 7 B pictures between P
 pictures under several conditions. The result is the Bjøntegaard difference in PSNR to the same condition without B
@@ -19,7 +19,7 @@ from metrics.rd import UndefinedDifference
 from raytrace_ii import load_scene, render
 
 RECORDS = Records("bframes", ("benchmarks.coding.bframes", "benchmarks.coding.rd"))
-SCALE = 4  # of the page
+SCALE = 4  # scale on the page
 COUNTS = (1, 2, 3, 7)
 QUANTISERS = (21, 27, 33, 39, 45)
 RATES = (0.1, 0.2, 0.4, 0.8, 1.6)

@@ -30,7 +30,7 @@ from metrics import q_global
 from raytrace_ii import load_scene, render
 
 RECORDS = Records("cost", ("benchmarks.coding.cost", "benchmarks.coding.fuzz"))
-SCENE, SCALE, RUNS = "apples", 2, 3  # of the page
+SCENE, SCALE, RUNS = "apples", 2, 3  # conditions on the page
 PAGES = Path("/proc/self/statm")
 
 

@@ -1,4 +1,4 @@
-"""Header portions: measured, by purpose, predicted; and the kind of component image that codes best.
+"""Header portions, measured and predicted, and the best kind of component image at equal rates.
 
     python -m benchmarks run headers [--scale 4] [--scene apples] [--schemes si-hevc,...] [--sides 16,64]
 

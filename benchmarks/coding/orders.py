@@ -19,7 +19,7 @@ from ii_core import preset
 from raytrace_ii import load_scene, render
 
 RECORDS = Records("orders", ("benchmarks.coding.orders",))
-SCALE = 2  # of the page
+SCALE = 2  # scale on the page
 
 
 def main() -> None:

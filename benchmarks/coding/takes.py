@@ -25,7 +25,7 @@ from metrics.rd import UndefinedDifference
 from raytrace_ii import load_take, render_take
 
 RECORDS = Records("takes", ("benchmarks.coding.takes",))
-SCALE = 8  # of the page
+SCALE = 8  # scale on the page
 TAKES = ("apples", "car", "cuboid")
 SCHEME = "si-h264:rate=cq,refs=8"
 QPS = (22, 27, 32, 37)

@@ -26,7 +26,7 @@ from metrics import bd_rate
 from raytrace_ii import load_scene, render
 
 RECORDS = Records("volume", ("benchmarks.coding.volume", "benchmarks.coding.rd"))
-SCALE = 4  # of the page
+SCALE = 4  # scale on the page
 ANCHOR = "si-h264:rate=cq,chroma=420"
 # Settings by scheme: PSNR in dB, or quantisers.
 CURVES: dict[str, list[dict[str, Any]]] = {

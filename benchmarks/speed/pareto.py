@@ -33,7 +33,7 @@ from metrics import q_global
 from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.tracing.packing import packed, share
 
-RECORDS, SCALE = Records("pareto", ("benchmarks.speed.pareto",)), 32  # of the page
+RECORDS, SCALE = Records("pareto", ("benchmarks.speed.pareto",)), 32  # scale on the page
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
 SAMPLES = (1, 2, 4, 9, 16)
 AT_DEPTHS = (1, 4, 16)  # samples at which other depths are tried

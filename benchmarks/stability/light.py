@@ -14,9 +14,8 @@ from raytrace_ii.shapes.primitives import Box, Mesh
 from raytrace_ii.tracing.lift import LIFT
 
 ONES = (1.0, 1.0, 1.0)
-TERMINATOR = np.array(
-    [1.0, 0.37, -0.43]
-)  # direction of a light that is not aligned with any ring of a ball's vertices
+# Direction of a light, not aligned with any ring of a ball's vertices.
+TERMINATOR = np.array([1.0, 0.37, -0.43])
 
 
 def terminator_scene(segments: int) -> Scene:

@@ -1,4 +1,4 @@
-"""All steps of the study in their order: quick steps, and steps that others need, first."""
+"""All steps of the study in order: quick steps and steps that others depend on come first."""
 
 from __future__ import annotations
 

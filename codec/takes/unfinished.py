@@ -18,7 +18,7 @@ from . import container
 
 
 class Unfinished:
-    """Coded segments in ``path.part``, and in ``path.part.json`` what each was made of.
+    """Coded segments in ``path.part``, and in ``path.part.json`` their keys: number, settings and hash of the pixels.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Data card of a profile: what each picture is for, how it is made, and the hash of its pixels."""
+"""Data card of a profile: purpose, scene, camera and hash of each picture."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ FORMAT, VERSION = "ii-benchmark-run", 1
 
 
 class RunLog:
-    """File of the points of one run.
+    """Log file of the points of one run.
 
     Parameters
     ----------
@@ -33,12 +33,12 @@ class RunLog:
     commands : sequence of str, optional
         External commands; files that they name are compared by their hashes.
     restart : bool
-        Remove a log that is there.
+        Remove an existing log.
 
     Raises
     ------
     ValueError
-        If the log is there and belongs to another definition, coder, commit, code or libraries, or is damaged.
+        If the log belongs to another definition, coder, commit, code or libraries, or is damaged.
     """
 
     def __init__(

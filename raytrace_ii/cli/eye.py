@@ -72,7 +72,7 @@ def eye(
 
 
 def _spread(picture: IIPicture, display: DisplayModel, eye: Eye, text: str | None) -> IIPicture:
-    """The light of every pixel as the lenses spread it towards the eye."""
+    """Return the light of every pixel, spread by the lenses towards the eye."""
     import numpy as np
 
     from ii_core.optics import Lenslet

@@ -1,4 +1,4 @@
-"""Table and chart of coders, with schemes that were not measured on every scene."""
+"""Table and chart of coders, also with schemes not measured on every scene."""
 
 from itertools import combinations
 

@@ -50,7 +50,7 @@ def test_a_coder_is_run_and_ranked(run, tmp_path):
         (("small",), "output is missing"),
         (("small", "-o", "r.json"), "coder is missing: either --scheme or --external"),
         (("small", "-o", "r.json", "--scheme", "h264"), "unknown scheme"),
-        (("small", "-o", "r.json", "--external", "python3 {in} {out}", "python3 {in} {out}"), "--name says"),
+        (("small", "-o", "r.json", "--external", "python3 {in} {out}", "python3 {in} {out}"), "--name gives"),
         (("small", "-o", "r.json", "--name", "x", "--external", "python3 {in}", "python3 {in} {out}"), "no {out}"),
         (("large", "-o", "r.json", "--scheme", "jpeg"), "unknown profile 'large'"),
     ],

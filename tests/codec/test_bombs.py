@@ -1,4 +1,4 @@
-"""Files that state a false size: refused in a second and in bounded memory, with every scheme.
+"""Files with false sizes: refused in a second and in bounded memory, with every scheme.
 
 The tests run in a separate process of limited address space, on files with correct checksums.
 """

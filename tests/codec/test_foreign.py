@@ -1,4 +1,4 @@
-"""Coders and measures of other packages that fail or return something else; coded pictures put together by hand."""
+"""Coders and measures of other packages that fail or return wrong values; coded pictures constructed by hand."""
 
 import sys
 import tracemalloc

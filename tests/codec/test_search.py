@@ -1,4 +1,4 @@
-"""Search of a setting whose stream has a target size, on coders that are formulas."""
+"""Search of a setting whose stream has a target size, with coders simulated by formulas."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""SPERR decoder process; test_contract.py tests what all schemes share."""
+"""SPERR decoder process; test_contract.py has the tests common to all schemes."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""Coders of single pictures; test_contract.py tests what all schemes share."""
+"""Coders of single pictures; test_contract.py has the tests common to all schemes."""
 
 import io
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Volumes and component images coded alone; test_contract.py tests what all schemes share."""
+"""Volumes and component images coded alone; test_contract.py has the tests common to all schemes."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Pages of cameras: every key, element and camera is there; numbers of the worked display are those of the design."""
+"""Pages of cameras: every key, element and camera, and the numbers of the worked display."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""Notebooks and programs of ``examples/`` run; what a notebook shows of our objects is small and right."""
+"""Notebooks and programs of ``examples/``: they run, and notebooks show objects small and correctly."""
 
 import ast
 import io

@@ -1,4 +1,4 @@
-"""Ctrl-C while the library works: control returns within two seconds, whatever compiled code is doing."""
+"""Ctrl-C while the library works: control returns within two seconds, even from compiled code."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Cache of compiled kernels: kernels run whatever the cache holds, and it is repaired."""
+"""Cache of compiled kernels: kernels run with any content of the cache, which is repaired."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Small valid files of every kind, from which cases are made; equal on every machine."""
+"""Small valid files of every kind as seeds of cases; equal on every machine."""
 
 from __future__ import annotations
 

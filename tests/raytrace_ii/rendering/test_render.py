@@ -1,4 +1,4 @@
-"""Rendered pictures: equal to the bit whatever the tiles and threads; counts of rays."""
+"""Rendered pictures: equal to the bit for all tiles and numbers of threads; counts of rays."""
 
 import json
 
