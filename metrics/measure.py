@@ -56,8 +56,9 @@ class Needs:
         if min(picture.lenses) < self.lenses:
             (k, l), least = picture.lenses, self.lenses
             return f"needs at least {least}×{least} lenses, the picture has {k}×{l}"
-        if self.depth and pair.depth is None and camera is not None and camera.viewer_mm is not None:
-            return "the viewing zones meet, so that equal disparity is not equal depth: give a depth map"
+        flat = camera is not None and camera.viewer_mm is not None and not camera.lens_model.vertical_parallax
+        if self.depth and pair.depth is None and flat:
+            return "viewing zones that meet without vertical parallax have no disparity down: give a depth map"
         if self.depth and pair.depth is None and camera is not None and camera.front:
             return f"a {camera.front[0].kind} before the lenses bends lines of sight: give a depth map"
         return None

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IICamera, IIPicture, checks
+from ii_core import IICamera, IIPicture, checks, depth_of_disparity, disparity_of_depth
 from ii_core.parallel import over_rows
 from ii_core.picture import peak
 from ii_core.view import camera_of, view_image, view_positions
 
 from . import kernels
 from .layers import Floats, check_layers, virtual_viewpoint
+from .views import near_and_far, place_of, view_steps, view_tables, views_side_by_side
 
 
 def _square(step: int) -> NDArray[np.int64]:
@@ -35,6 +36,11 @@ RINGS, NOWHERE = 7, 1 << 24
 # by how much a neighbour's colour differs when it counts e times less; what a depth e times as great costs from one
 # lens to the next, and a leap to any depth.
 OTHER_SURFACE, ALIKE, SLOPE, LEAP = 30.0, 60.0, 60.0, 30.0
+# Of `judge`. Independent differences in a cost: on even walls with noise of σ = 0.3–8 codes, behind five cameras,
+# the least of up to 768 000 costs fits 7 and 14 or more (2026-11-22). Cost of rounding to whole codes,
+# summed over R, G and B.
+COMPARISONS = {"dissertation": 6.0, "robust": 12.0}
+QUANTISATION = {"dissertation": 0.2, "robust": 1.0}
 # Costs that differ less, in shares of the peak, differ by rounding: an even picture must not have a depth.
 ROUNDING = 1e-6
 
@@ -51,8 +57,10 @@ class FocusDepth:
     layer : ndarray of int64, (L, K)
         Row of ``layers_mm``, −1 where the depth is NaN.
     confidence : ndarray of float32, (L, K)
-        1 − (cost of the chosen layer)/(mean cost of all): 1 where one layer fits exactly and others do not, near
-        0 where all fit alike, 0 where the depth is NaN.
+        1/(1 + N·(c/m)ⁿ), in [0, 1]: c is the cost of the chosen layer before it is passed on, m the mean over all
+        layers, N the number of costs of all lenses, and n that of independent differences in a cost (6 and 12).
+        N·(c/m)ⁿ is the number of costs as low that noise alone is expected to give in the whole picture. Above 0.5
+        this is less than one: an even wall with noise has no such lens. 0 where the depth is NaN.
     layers_mm : ndarray of float64, (layers,)
     method : str
     """
@@ -79,8 +87,8 @@ def depth_from_focus(
     *,
     layers_mm: ArrayLike | None = None,
     method: str = "dissertation",
-    base: ArrayLike = BASE,
-    reference: ArrayLike = REFERENCE,
+    base: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
     weights: ArrayLike = FILTER,
     interpolation: str = "linear",
     workers: int | None = None,
@@ -112,13 +120,18 @@ def depth_from_focus(
     point in its own elementary image, or that is not there, is left out of the mean: the pixel across the border
     belongs to another lens and looks elsewhere.
 
+    Views whose viewing zones meet see points on both sides of the lens plane. There, B and R are views around the
+    middle one, interpolated between their pixels: a point of disparity D at pixel x of the middle view is at x − p·D
+    in the view p steps to the right.
+
     Parameters
     ----------
     picture : IIPicture
         Regular, with its camera.
     layers_mm : array_like, (layers,), optional
-        Depths to try, increasing; `covering_layers` if not given. The dissertation's are `linear_layers`, see also
-        `logarithmic_layers`. None but those beyond the lens plane can be chosen.
+        Depths to try, increasing; `covering_layers` if not given, or `field_layers` if viewing zones meet. The
+        dissertation's are `linear_layers`, see also `logarithmic_layers` and `disparity_layers`. None but those
+        beyond the lens plane can be chosen, unless viewing zones meet.
     method : {"dissertation", "robust"}
         How alike the lenses see a layer. ``robust`` follows the ray of the very pixel that `q_depth` measures,
         compares its colour with that of lenses in which the ray's point falls on whole pixels (`whole_pixel_steps`,
@@ -128,8 +141,9 @@ def depth_from_focus(
         costs are passed on along rows and columns, both ways, so that even areas take the depth of what bounds
         them: from lens to lens a depth e times as great costs 60 steps of 8 bits, any other 30, less where the
         view's colour changes.
-    base, reference : array_like of int, (n, 2)
-        Lenses of B and R, to the right and down from the one looked through; of the dissertation's method alone.
+    base, reference : array_like of int, (n, 2), optional
+        Lenses of B and R, to the right and down from the one looked through; of the dissertation's method alone. If
+        viewing zones meet: views, to the right and down from the middle one; 3×3 and 5×5 over all by default.
     weights : array_like, (odd, odd)
         h, not negative; each layer's cost becomes the weighted mean over those neighbours that have one. 5×5 equal
         weights by default: the size of B.
@@ -174,12 +188,15 @@ def depth_from_focus(
         raise ValueError(f"unknown method {method!r}: known are {', '.join(METHODS)}")
     camera = camera_of(picture)
     picture.check_regular()
-    if camera.viewer_mm is not None:
-        raise ValueError("viewing zones that meet bend the planes of equal disparity: give depth=")
+    converged = camera.viewer_mm is not None
+    if converged and not camera.lens_model.vertical_parallax:
+        raise ValueError("viewing zones that meet without vertical parallax have no disparity down: give depth=")
     if camera.front:
         raise ValueError(f"{camera.front[0].kind} before the lens array bends lines of sight: give depth=")
     layers = check_layers(layers_mm, camera)
-    b, r = _pattern("base", base), _pattern("reference", reference)
+    usual = near_and_far(camera.ei_pixels) if converged else (BASE, REFERENCE)
+    b = _pattern("base", usual[0] if base is None else base)
+    r = _pattern("reference", usual[1] if reference is None else reference)
     h = np.asarray(weights, dtype=np.float64)
     if h.ndim != 2 or not (h.shape[0] % 2 and h.shape[1] % 2) or not (np.isfinite(h) & (h >= 0)).all() or not h.any():
         raise ValueError("weights must be of two odd sides, finite, not negative and not all 0")
@@ -187,14 +204,18 @@ def depth_from_focus(
 
     nearest = interpolation == "nearest"
     if method == "dissertation":
-        cost = _dissertation(picture, layers, b, r, h, nearest, workers)
+        cost = local = _dissertation(picture, layers, b, r, h, nearest, workers)
     else:
-        cost = _robust(picture, layers, h, nearest, workers)
+        cost, local = _robust(picture, layers, h, nearest, workers)
     (k, l) = picture.lenses
     layer, fit, confidence = np.empty((l, k), np.int64), np.empty((l, k)), np.empty((l, k), np.float32)
-    _by_rows(workers, l, kernels.choose, cost, ROUNDING * peak(picture.pixels.dtype), layer, fit, confidence)
+    _by_rows(workers, l, kernels.choose, cost, ROUNDING * peak(picture.pixels.dtype), layer, fit)
+    floor = QUANTISATION[method] if picture.pixels.dtype.kind in "iu" else ROUNDING * peak(picture.pixels.dtype)
+    _by_rows(workers, l, kernels.judge, local, layer, floor, COMPARISONS[method], l * k * layers.size, confidence)
     place = layer + (fit if method == "robust" else 0.0)
-    depth = np.where(layer < 0, np.nan, np.interp(place, np.arange(layers.size), layers))
+    scale = disparity_of_depth(camera, layers) if converged else layers
+    depth = np.where(layer < 0, np.nan, np.interp(place, np.arange(layers.size), scale))
+    depth = depth_of_disparity(camera, depth) if converged else depth
     return FocusDepth(depth, layer, confidence, layers, method)
 
 
@@ -206,39 +227,49 @@ def _dissertation(
     (k, l) = picture.lenses
     lenses = np.unique(np.concatenate([base, reference]), axis=0)
     across, down = np.unique(lenses[:, 0]), np.unique(lenses[:, 1])
-    cols, rows = pixel_tables(camera, layers, across, down, erect=picture.erect, nearest=nearest)
+    if camera.viewer_mm is None:
+        pixels = picture.pixels
+        cols, rows = pixel_tables(camera, layers, across, down, erect=picture.erect, nearest=nearest)
+    else:
+        pixels = views_side_by_side(picture)
+        cols, rows = view_tables(camera, layers, across, down, erect=picture.erect, nearest=nearest)
     where = np.column_stack([np.searchsorted(across, lenses[:, 0]), np.searchsorted(down, lenses[:, 1])])
     members = np.stack([(lenses[:, None] == p).all(axis=2).any(axis=1) for p in (base, reference)], axis=1)
     cost, smooth = (np.empty((l, k, layers.size), np.float32) for _ in range(2))
-    _by_rows(workers, l, kernels.focus_cost, picture.pixels, *cols, *rows, where, members, cost)
+    _by_rows(workers, l, kernels.focus_cost, pixels, *cols, *rows, where, members, cost)
     _by_rows(workers, l, kernels.weigh, cost, h, np.zeros((l, k, 3)), np.inf, smooth)
     return smooth
 
 
-def _robust(picture: IIPicture, layers: Floats, h: Floats, nearest: bool, workers: int | None) -> Costs:
-    """Halves of neighbours ∗ h by likeness, passed on along rows and columns; (L, K, layers)."""
+def _robust(picture: IIPicture, layers: Floats, h: Floats, nearest: bool, workers: int | None) -> tuple[Costs, Costs]:
+    """Halves of neighbours ∗ h by likeness, passed on along rows and columns, and before; (L, K, layers)."""
     camera = camera_of(picture)
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
-    shift = pixels_per_lens(camera, layers)
-    across, down = whole_pixel_steps(shift * u, u), whole_pixel_steps(shift * v, v)
-    cols, rows = pixel_tables(camera, layers, across, down, erect=picture.erect, nearest=nearest, snap=True)
-    middle = across.shape[1] // 2, down.shape[1] // 2
+    if camera.viewer_mm is None:
+        pixels, shift = picture.pixels, pixels_per_lens(camera, layers)
+        across, down = whole_pixel_steps(shift * u, u), whole_pixel_steps(shift * v, v)
+        cols, rows = pixel_tables(camera, layers, across, down, erect=picture.erect, nearest=nearest, snap=True)
+        place = np.log(np.maximum(layers - camera.origin_mm[2] - camera.gap_mm, camera.gap_mm / 1e9))
+    else:
+        pixels, place = views_side_by_side(picture), place_of(camera, layers)
+        across, down = view_steps(u, RINGS), view_steps(v, RINGS)
+        cols, rows = view_tables(camera, layers, across, down, erect=picture.erect, nearest=nearest)
+    middle = across.shape[-1] // 2, down.shape[-1] // 2
     where = star(*middle)
     sides = np.column_stack([where < middle, where > middle])
     step = peak(picture.pixels.dtype) / 255
     cost, smooth = (np.empty((l, k, layers.size), np.float32) for _ in range(2))
     partners, limit = (where, sides, len(where) - 1), OTHER_SURFACE * step
-    _by_rows(workers, l, kernels.half_cost, picture.pixels, *cols, *rows, *partners, limit, cost)
+    _by_rows(workers, l, kernels.half_cost, pixels, *cols, *rows, *partners, limit, cost)
     view = view_image(picture, virtual_viewpoint(camera), interpolation="nearest")[0].astype(np.float64)
     _by_rows(workers, l, kernels.weigh, cost, h, view, ALIKE * step, smooth)
     total = cost  # its memory
     total[:] = 0
-    place = np.log(np.maximum(layers - camera.origin_mm[2] - camera.gap_mm, camera.gap_mm / 1e9))
     prices = place, SLOPE * step, LEAP * step, ALIKE * step
     for columns, back in product((False, True), repeat=2):
         _by_rows(workers, k if columns else l, kernels.pass_on, smooth, view, *prices, columns, back, total)
     total[np.isnan(smooth)] = np.nan
-    return total
+    return total, smooth
 
 
 def whole_pixel_steps(shift: Floats, ei: int) -> NDArray[np.int64]:

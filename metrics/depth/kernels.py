@@ -168,7 +168,33 @@ def pass_on(cost, view, place, slope, leap, alike, down, back, total, first, las
 
 
 @kernel
-def choose(cost, tie, layer, fit, confidence, first, last):
+def judge(cost, layer, floor, comparisons, trials, confidence, first, last):
+    """Confidence of the chosen layers for lens rows ``first`` to ``last``, by a likelihood ratio against noise.
+
+    The null hypothesis is that noise alone makes the costs of a pixel differ. A mean of ``comparisons`` differences
+    of pure noise is below a share s of its expectation with a probability of about s to the power ``comparisons``.
+    The confidence is 1/(1 + expected number of such costs among ``trials``); costs below ``floor`` count as
+    ``floor``.
+    """
+    for l in range(first, last):
+        for k in range(cost.shape[1]):
+            confidence[l, k] = 0.0
+            if layer[l, k] < 0:
+                continue
+            total, count = 0.0, 0
+            for d in range(cost.shape[2]):
+                if not np.isnan(cost[l, k, d]):
+                    total += cost[l, k, d]
+                    count += 1
+            if count == 0:
+                continue
+            share = max(np.float64(cost[l, k, layer[l, k]]), floor) / max(total / count, floor)
+            if share < 1:
+                confidence[l, k] = 1 / (1 + trials * share**comparisons)
+
+
+@kernel
+def choose(cost, tie, layer, fit, first, last):
     """Choose the layer of least cost for lens rows ``first`` to ``last``, the nearest of equals.
 
     The layer is −1 if all costs are equal within ``tie``. ``fit`` is the offset, −½ to ½ layers, of the minimum of
@@ -176,19 +202,17 @@ def choose(cost, tie, layer, fit, confidence, first, last):
     """
     for l in range(first, last):
         for k in range(cost.shape[1]):
-            best, low, high, total, count = -1, np.inf, -np.inf, 0.0, 0
+            best, low, high = -1, np.inf, -np.inf
             for d in range(cost.shape[2]):
                 c = np.float64(cost[l, k, d])
                 if np.isnan(c):
                     continue
-                total += c
-                count += 1
                 high = max(high, c)
                 if c < low:
                     best, low = d, c
-            layer[l, k], fit[l, k], confidence[l, k] = -1, 0.0, 0.0
+            layer[l, k], fit[l, k] = -1, 0.0
             if high - low > tie:
-                layer[l, k], confidence[l, k] = best, 1 - low * count / total
+                layer[l, k] = best
                 if 0 < best < cost.shape[2] - 1:
                     before, after = np.float64(cost[l, k, best - 1]), np.float64(cost[l, k, best + 1])
                     bend = before - 2 * low + after

@@ -7,9 +7,10 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IICamera, checks, depth_of_disparity
+from ii_core import IICamera, checks, depth_of_disparity, disparity_of_depth
 
 LAYERS = 250
+FIELD_SPAN, FARTHEST = 16.0, 100.0  # pixels; distances at which viewing zones meet
 ALIKE = 1e-6  # relative tolerance of equal depths: rounding of a float32 map
 Floats = NDArray[np.float64]
 
@@ -98,6 +99,25 @@ def disparity_layers(camera: IICamera, low: float, high: float, count: int = LAY
     return layers
 
 
+@checks.checked(camera=checks.instance(IICamera), count=checks.whole)
+def field_layers(camera: IICamera, count: int = LAYERS) -> Floats:
+    """Return layers of equal steps in disparity, of both signs, for views whose viewing zones meet, mm.
+
+    A point of the nearest layer moves by `FIELD_SPAN` pixels from the middle view to the outermost. The farthest
+    layer has the opposite disparity, or ends before infinity.
+
+    Raises
+    ------
+    ValueError
+        If the viewing zones of the camera are parallel.
+    """
+    if camera.viewer_mm is None:
+        raise ValueError("viewing zones are parallel: layers of disparity are for views that meet")
+    high = FIELD_SPAN / max((max(camera.ei_pixels) - 1) // 2, 1)
+    infinity = float(disparity_of_depth(camera, FARTHEST * (camera.viewer_mm + camera.gap_mm) + camera.origin_mm[2]))
+    return disparity_layers(camera, max(-high, infinity), high, count)
+
+
 def logarithmic(layers_mm: Floats) -> bool:
     """Return whether layers have equal ratios and span more than a factor of ten, for a logarithmic axis."""
     z = np.asarray(layers_mm)
@@ -105,13 +125,15 @@ def logarithmic(layers_mm: Floats) -> bool:
 
 
 def check_layers(layers_mm: ArrayLike | None, camera: IICamera, depth_mm: ArrayLike | None = None) -> Floats:
-    """Return the given layers, or by default `covering_layers`.
+    """Return the given layers, or by default `covering_layers`; of converged views without depth, `field_layers`.
 
     Raises
     ------
     ValueError
         If the layers are not positive, finite and increasing.
     """
+    if layers_mm is None and depth_mm is None and camera.viewer_mm is not None:
+        return field_layers(camera)
     if layers_mm is None:
         return covering_layers(camera, depth_mm)
     layers = np.asarray(layers_mm, dtype=np.float64)

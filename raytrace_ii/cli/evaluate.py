@@ -27,7 +27,8 @@ Layers = Annotated[
     str | None,
     typer.Option(
         help="Depth layers: NEAR:FAR:COUNT in mm, spaced in equal ratios; or COUNT layers one gap apart, from the "
-        "pixel plane on; or dissertation, 250 of the latter. Default: 250 layers over all depths of the picture."
+        "pixel plane on; or dissertation, 250 of the latter; or px:LOW:HIGH:COUNT in equal steps of disparity, in "
+        "pixels a view. Default: 250 layers over all depths of the picture."
     ),
 ]
 Method = Annotated[str, typer.Option(help="Method of depth from focus: dissertation or robust.")]
@@ -119,22 +120,27 @@ def _judged(path: Path, reference: IIPicture) -> IIPicture:
 
 
 def _layers(text: str | None, picture: IIPicture) -> Any:
-    """Return depths of layers from ``dissertation``, ``250`` or ``5:200:60``; None for the default."""
+    """Return depths of layers from ``dissertation``, ``250``, ``5:200:60`` or ``px:-2:2:60``; None if no text."""
     from ii_core.view import camera_of
-    from metrics import linear_layers, logarithmic_layers
+    from metrics import disparity_layers, linear_layers, logarithmic_layers
 
     if text is None:
         return None
     if text == "dissertation":
         return linear_layers(camera_of(picture))
-    *span, count = text.split(":")
+    in_pixels = text.startswith("px:")
+    *span, count = text.removeprefix("px:").split(":")
     try:
         ends, number = [float(end) for end in span], int(count)
     except ValueError:
         ends, number = [], 0
-    if len(ends) not in (0, 2) or not number:
-        raise ValueError(f"layers are {text!r}: dissertation, a number or NEAR:FAR:COUNT is needed")
+    if len(ends) not in (0, 2) or not number or (in_pixels and not ends):
+        raise ValueError(
+            f"layers are {text!r}: dissertation, a number, NEAR:FAR:COUNT or px:LOW:HIGH:COUNT is needed"
+        )
     try:
+        if in_pixels:
+            return disparity_layers(camera_of(picture), ends[0], ends[1], number)
         return logarithmic_layers(ends[0], ends[1], number) if ends else linear_layers(camera_of(picture), number)
     except ValueError as error:
         raise ValueError(f"layers are {text!r}: {error}") from None

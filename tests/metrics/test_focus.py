@@ -19,7 +19,7 @@ from metrics.depth.focus import (
     star,
     whole_pixel_steps,
 )
-from metrics.depth.kernels import choose, focus_cost, half_cost, pass_on, weigh
+from metrics.depth.kernels import choose, focus_cost, half_cost, judge, pass_on, weigh
 from metrics.depth.layers import nearest_layer
 from metrics.depth.virtual_camera import virtual_camera_pixels
 from raytrace_ii import Scene, render
@@ -189,7 +189,7 @@ def test_against_the_naive_sum_over_rays(dtype, erect, interpolation):
     f = depth_from_focus(a, layers_mm=LAYERS, reference=reference, weights=h, interpolation=interpolation)
     np.testing.assert_array_equal(f.layer, expected)
     np.testing.assert_array_equal(f.depth_mm, LAYERS[expected])
-    assert (f.confidence > 0).all() and (f.confidence < 1).all()
+    assert (f.confidence >= 0).all() and (f.confidence <= 1).all()
 
 
 def test_cost_is_that_of_the_naive_sum():
@@ -224,7 +224,8 @@ def test_kernels_against_their_python():
         for down, back in product((False, True), repeat=2):
             lines = 5 if down else 4
             getattr(pass_on, kind)(smooth, view, np.log(LAYERS[:3]), 60.0, 30.0, 60.0, down, back, total, 0, lines)
-        getattr(choose, kind)(total, 1e-4, layer, fit, confidence, 0, 4)
+        getattr(choose, kind)(total, 1e-4, layer, fit, 0, 4)
+        getattr(judge, kind)(halves, layer, 1.0, 7.0, 60, confidence, 0, 4)
         results.append((cost, smooth, halves, total, layer, fit, confidence))
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_allclose(compiled, plain, rtol=1e-5)  # plain Python adds what is kept in float32

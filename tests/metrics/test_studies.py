@@ -243,7 +243,7 @@ def test_the_command_charts_all_measures(run, refused, tmp_path):
     kept = read_study(tmp_path / "d" / "a_rd.json")
     np.testing.assert_array_equal(kept["points"][0]["depth_mm"], linear_layers(a.camera))
     refused(
-        run(*command, *more[:-1], tmp_path / "x", "--layers", "all"), "layers are 'all': dissertation, a number or"
+        run(*command, *more[:-1], tmp_path / "x", "--layers", "all"), "layers are 'all': dissertation, a number, NEAR"
     )
     refused(run(*command, "--measures", "q_best", "-o", tmp_path / "t"), "unknown measure 'q_best'")
     assert not (tmp_path / "t").exists()
