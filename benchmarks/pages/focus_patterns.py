@@ -16,7 +16,8 @@ from benchmarks.records import ROOT
 from ii_core import preset
 from ii_core.display.figure import COLOURS, new_figure, save
 from metrics import linear_layers
-from metrics.depth.focus import BASE, FILTER, NOWHERE, REFERENCE, pixels_per_lens, whole_pixel_steps
+from metrics.depth.focus import BASE, FILTER, REFERENCE
+from metrics.depth.lens_tables import NOWHERE, pixels_per_lens, whole_pixel_steps
 
 CHART = ROOT / "docs/images/focus_patterns.png"
 

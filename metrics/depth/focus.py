@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IICamera, IIPicture, checks, depth_of_disparity, disparity_of_depth
+from ii_core import IIPicture, checks, depth_of_disparity, disparity_of_depth
 from ii_core.parallel import over_rows
 from ii_core.picture import peak
-from ii_core.view import camera_of, view_image, view_positions
+from ii_core.view import camera_of, view_image
 
 from . import kernels
 from .layers import Floats, check_layers, virtual_viewpoint
+from .lens_tables import RINGS, pixel_tables, pixels_per_lens, star, whole_pixel_steps
 from .views import near_and_far, place_of, view_steps, view_tables, views_side_by_side
 
 
@@ -30,8 +31,6 @@ BASE = _square(1)
 REFERENCE = _square(7)
 FILTER = np.ones((5, 5))
 METHODS = ("dissertation", "robust")
-# The robust method: lenses in each direction, at most; a step to no lens.
-RINGS, NOWHERE = 7, 1 << 24
 # In steps of 8 bits, summed over R, G and B: from where on a difference is that of another surface, however large;
 # by how much a neighbour's colour differs when it counts e times less; what a depth e times as great costs from one
 # lens to the next, and a leap to any depth.
@@ -272,117 +271,8 @@ def _robust(picture: IIPicture, layers: Floats, h: Floats, nearest: bool, worker
     return total, smooth
 
 
-def whole_pixel_steps(shift: Floats, ei: int) -> NDArray[np.int64]:
-    """Steps to lenses in which the points of each layer fall on whole pixels, as nearly as lenses stand.
-
-    Where a picture has detail finer than its pixels, a value between two pixels is that of neither: only whole
-    pixels can be compared. So the farther a layer, the farther the lenses.
-
-    Parameters
-    ----------
-    shift : ndarray of float64, (layers,)
-        Pixels that a point moves in its elementary image from one lens to the next.
-    ei : int
-        The side of the elementary image, in pixels.
-
-    Returns
-    -------
-    ndarray of int64, (layers, 2·n + 1)
-        To the left, 0, to the right; n is up to RINGS, fewer for small elementary images. A lens that stands for
-        two of them counts once: the other step leads nowhere.
-    """
-    half = max((ei - 1) // 2, min(ei - 1, 1))
-    pixels = np.unique(np.rint(np.linspace(1, half, RINGS))) if half else np.empty(0)
-    steps = np.maximum(np.rint(pixels / shift[:, None]), 1).astype(np.int64)
-    again = np.zeros(steps.shape, bool)
-    again[:, 1:] = steps[:, 1:] == steps[:, :-1]
-    steps[again] = NOWHERE
-    return np.concatenate([-steps[:, ::-1], np.zeros((len(shift), 1), np.int64), steps], axis=1)
-
-
-def star(middle_x: int, middle_y: int) -> NDArray[np.int64]:
-    """Columns of two tables of steps, (n, 2): in eight directions from their middles, which come last."""
-    rings = max(middle_x, middle_y)
-    found = [
-        (middle_x + i * r, middle_y + j * r)
-        for r in range(1, rings + 1)
-        for i in (-1, 0, 1)
-        for j in (-1, 0, 1)
-        if (i or j) and abs(i) * r <= middle_x and abs(j) * r <= middle_y
-    ]
-    return np.array([*found, (middle_x, middle_y)])
-
-
-Table = tuple[NDArray[np.int32], Floats]
 Steps = NDArray[np.int64]
 Costs = NDArray[np.float32]
-
-
-def pixel_tables(
-    camera: IICamera,
-    layers_mm: Floats,
-    across: NDArray[Any],
-    down: NDArray[Any],
-    *,
-    erect: bool = False,
-    nearest: bool = False,
-    snap: bool = False,
-) -> tuple[Table, Table]:
-    """Which pixel under each neighbour sees the point of each layer that the virtual camera sees through a lens.
-
-    Parameters
-    ----------
-    across, down : ndarray of int, (n,) or (layers, n)
-        Neighbours' steps i to the right and j down.
-    nearest : bool
-        Take the pixel in whose square the line ends, instead of going between pixels.
-    snap : bool
-        Follow the ray of the very pixel that `q_depth` measures rather than the line through the lens centre.
-
-    Returns
-    -------
-    cols : (ndarray of int32, ndarray of float64), (layers, n, K)
-        The pixel left of where the line ends, −1 if the neighbour does not see the point, and the weight of the
-        pixel right of it; with ``nearest`` the weight is 0.
-    rows : likewise, (layers, n, L)
-        The pixel above, and the weight of the one below.
-    """
-    (u, v) = camera.ei_pixels
-    per_lens = pixels_per_lens(camera, layers_mm)
-    x, y = view_positions(camera, virtual_viewpoint(camera), erect=erect)
-    if snap:
-        x, y = np.floor(x + 0.5), np.floor(y + 0.5)
-    sign = -1.0 if erect else 1.0
-    # Without vertical parallax one row of pixels, under whatever lens, sees one row of the scene.
-    vertical = sign * per_lens if camera.lens_model.vertical_parallax else np.full_like(per_lens, -1.0)
-    return _table(x, u, sign * per_lens * u, across, nearest), _table(y, v, vertical * v, down, nearest)
-
-
-def pixels_per_lens(camera: IICamera, layers_mm: Floats) -> Floats:
-    """Return the shift of a point of each layer from lens to lens, in sides of the elementary image: Λ/z'."""
-    beyond = np.asarray(layers_mm) - camera.origin_mm[2] - camera.gap_mm
-    with np.errstate(divide="ignore"):
-        # At the lens plane and before it nothing is in focus: infinitely far off through all but the own lens.
-        return np.where(beyond > 0, camera.gap_mm / beyond, np.inf)
-
-
-def _table(position: Floats, ei: int, per_step: Floats, steps: NDArray[Any], nearest: bool) -> Table:
-    """Along one axis: own lens's pixel position, EI side, pixels a step by layer → pixel by layer, step and lens."""
-    lens = np.arange(position.size)
-    step = np.atleast_2d(steps)[:, :, None]
-    with np.errstate(invalid="ignore"):
-        moved = np.where(step == 0, 0.0, step * per_step[:, None, None])
-    inside = position - lens * ei + moved
-    centre = np.floor(inside + 0.5)
-    other = lens + step
-    seen = (centre >= 0) & (centre < ei) & (other >= 0) & (other < position.size)
-    if nearest:
-        low, weight = centre, np.zeros(seen.shape)
-    else:
-        inside = np.where(seen, np.clip(inside, 0, ei - 1), 0.0)
-        low = np.floor(inside)
-        weight = inside - low
-    return np.where(seen, other * ei + np.where(seen, low, 0), -1).astype(np.int32), weight
 
 
 def _pattern(name: str, value: ArrayLike) -> Steps:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ii_core import IICamera, IIPicture, disparity_of_depth
 
 from .layers import Floats
+from .lens_tables import Table
 
-Table = tuple[NDArray[np.int32], Floats]
 SLOPE_OF_PIXELS = 1.0  # of a change of disparity by one pixel a view, in changes of depth by e
 
 
