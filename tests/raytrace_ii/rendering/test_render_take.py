@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -97,6 +98,22 @@ def test_a_killed_take_goes_on(tmp_path):
     after = stamps(tmp_path / "out")
     assert all(after[f"frame_{int(number):04}.png"] == before[f"frame_{int(number):04}.png"] for number in recorded)
     assert len([name for name in after if name.endswith(".png")]) == count
+
+
+def test_memory_is_that_of_a_still_however_many_frames(take, tmp_path):
+    """Peaks of numpy's and Python's allocations, after a first frame has filled the caches."""
+    camera = preset("setup1", scale=32)
+
+    def peak(count):
+        tracemalloc.start()
+        render_take(take, tmp_path / f"{count}", camera, frames=range(count), workers=1)
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return most
+
+    peak(1)
+    frame = 3 * camera.pixels[0] * camera.pixels[1]
+    assert peak(5) <= peak(2) + frame
 
 
 def test_other_files_are_not_overwritten(take, tmp_path):
