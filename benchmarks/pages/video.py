@@ -39,6 +39,12 @@ from ii_core.display.look import viewpoints_around
 from metrics import measure_take, time_chart
 
 SHOWN = (0, 5, 10, 15)
+USE_WHEN = {  # words above the plan that serves best
+    "time-first, groups of 1 view": "any image at once:\nfilms of one view",
+    "interleaved, groups of 16 views": "small file, quick access:\ninterleaved, groups of 16 views",
+    "stills": "each instant alone",
+    "time-first": "smallest file:\ntime-first",
+}
 HEIGHT = 180
 
 
@@ -64,6 +70,11 @@ def access_chart() -> None:
                 axes.plot(cost, off, marker=MARKERS[j], color=COLOURS[i], linestyle="none", markersize=8)
     for j, plan in enumerate(PLANS):
         axes.plot([], [], marker=MARKERS[j], color="0.3", linestyle="none", label=plan)
+    for plan, words in USE_WHEN.items():
+        place = component_cost(PLANS[plan], 256, FRAMES).mean, 4 if plan == "stills" else 29
+        side = {"stills": "left", "time-first": "right"}.get(plan, "left" if place[0] < 10 else "center")
+        axes.text(*place, words, ha=side, va="bottom", fontsize=9)
+    axes.set_ylim(top=40)
     axes.axhline(0, color="0.5", linewidth=0.8)
     axes.set_xscale("log")
     axes.set_xlabel("frames decoded for one SI at one instant, mean")
