@@ -176,6 +176,7 @@ BENCHMARKS = {
         ),
         Benchmark("accuracy.field_depth", records=OWN, fills=("docs/metrics.md",)),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
+        Benchmark("speed.eye", records=OWN, fills=("docs/display.md",)),
         Benchmark(
             "accuracy.eye_views",
             records=OWN,

@@ -1,11 +1,12 @@
-"""Ray optics against wave optics: error of pictures by rays and by a point-spread model.
+"""Ray optics against wave optics: error of pictures by rays and by point-spread models.
 
     python -m benchmarks run waves
 
-A row of pixels under one slit lens shows a texture of uniform patches with a mean length of 8 pixels. The truth is
-the wave's point-spread function, summed over pixels. The ray model does not change the texture, the point-spread
-model convolves the geometric blur with sinc². Errors are PSNR of linear light. The last rows blur *Apples* and
-*Cuboid* like the lenses of full setup1, and code them.
+A row of pixels under one lens shows a texture of even stripes, 8 pixels wide in the mean. The truth is the wave's
+point-spread function, summed over pixels: of a round lens by its angular spectrum, or Airy's closed form where the
+field would be too large. The model by rays leaves the texture as it is. The point-spread maps of `ii_core.spread` are
+the model of round lenses, the box of rays folded with sinc² that of slits. Errors are PSNR of linear light. The last
+rows spread *Apples* and *Cuboid* as ideal and as glass lenses of full setup1 do, and code them (`lens_setup1`).
 """
 
 from __future__ import annotations
@@ -16,25 +17,28 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from benchmarks.accuracy.lens_setup1 import LENSES, oblique, spread_scene
 from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, number, origin
-from codec import decode, encode
-from ii_core import preset
-from ii_core.wave import lens_blurred, lens_spread, model_spread, pixel_kernel
-from metrics import q_global, q_view
+from ii_core import IICamera, IIPicture
+from ii_core.optics import Lenslet
+from ii_core.spread import spread_maps, spread_picture
+from ii_core.wave import diffraction_limit, lens_spread, model_spread, pixel_kernel
 from metrics.plots.rd_chart import COLOURS, MARKERS, new_figure, save
-from raytrace_ii import load_scene, render
 
-RECORDS = Records("waves", ("benchmarks.accuracy.waves",))
-PIXELS = 16  # per lens
+RECORDS = Records("waves", ("benchmarks.accuracy.waves", "benchmarks.accuracy.lens_setup1"))
+PIXELS = 16  # under a lens
+REACH = 2 * PIXELS  # of a kernel
 PITCH, RATIO, WAVELENGTH = 0.0976, 1.8718, 550.0  # of setup1: mm, gap over pitch, nm
 WAVELENGTHS = (450.0, 550.0, 650.0)
 ENOUGH_DB = 40.0
-SCENES, SCALE, RATES = ("apples", "cuboid"), 8, (0.1, 0.2, 0.4, 0.8)
-TEXTURE, PATCH = 4096, 8  # lengths in pixels of the texture, and of a patch in the mean
+SCENES, SCALE = ("apples", "cuboid"), 8
+TEXTURE, PATCH = 4096, 8  # pixels of the texture, and of a stripe in the mean
+SHAPES = ("round", "slit")
 # Sweeps: values, and label of the axis.
 SWEEPS: dict[str, tuple[tuple[float, ...], str]] = {
     "pitch": (tuple(float(x) for x in np.geomspace(0.02, 2.0, 13)), "lens pitch [mm], 16 pixels a lens"),
@@ -45,46 +49,92 @@ SWEEPS: dict[str, tuple[tuple[float, ...], str]] = {
 
 
 def main() -> None:
-    """Measure, record, draw, fill the page."""
+    """Measure, keep, draw, fill the page."""
     asked = command_line(__doc__).parse_args()
-    keys = [{"sweep": name, "wavelength_nm": wavelength} for name in SWEEPS for wavelength in WAVELENGTHS]
+    keys = [{"sweep": n, "wavelength_nm": w, "lens": lens} for lens in SHAPES for n in SWEEPS for w in WAVELENGTHS]
     for key in RECORDS.todo(keys, asked.again):
-        RECORDS.measure(key, lambda key=key: {"points": sweep(key["sweep"], key["wavelength_nm"])})
-    for key in RECORDS.todo(({"scene": name, "scale": SCALE} for name in SCENES), asked.again):
-        RECORDS.measure(key, lambda key=key: blurred(key["scene"], key["scale"]))
+        RECORDS.measure(key, lambda key=key: {"points": sweep(key["sweep"], key["wavelength_nm"], key["lens"])})
+    for key in RECORDS.todo([{"lens": "glass", "field": "diagonal"}], asked.again):
+        RECORDS.measure(key, lambda: {"pixels": oblique()})
+    keys = [{"scene": name, "scale": SCALE, "lens": lens} for name in SCENES for lens in LENSES]
+    for key in RECORDS.todo(keys, asked.again):
+        RECORDS.measure(key, lambda key=key: spread_scene(**key))
     path = IMAGES / "waves.png"
     save(draw(), path)
     write_picture(path, path)
     publish(tables())
 
 
-def sweep(name: str, wavelength_nm: float) -> list[dict[str, float]]:
-    """Return errors and cost of both models at each value."""
+def sweep(name: str, wavelength_nm: float, shape: str) -> list[dict[str, float]]:
+    """Errors of both models and their cost at each value."""
     points = []
+    kernels = round_kernels if shape == "round" else slit_kernels
     for value in SWEEPS[name][0]:
         pitch = value if name == "pitch" else PITCH
         gap = pitch * (value if name == "gap" else RATIO)
         pixel = pitch / (value if name == "pixels" else PIXELS)
         depth = value * gap if name == "depth" else math.inf
-        started = time.process_time()
-        x, intensity = lens_spread(pitch, gap, wavelength_nm, depth_mm=depth)
-        between = time.process_time()
-        spread = model_spread(x, pitch, gap, wavelength_nm, depth_mm=depth)
-        done = time.process_time()
-        reach = 2 * PIXELS
-        true, model = (pixel_kernel(x, one, pixel, reach) for one in (intensity, spread))
+        true, model, wave_seconds, model_seconds = kernels(pitch, gap, pixel, wavelength_nm, depth)
         points.append(
             {
                 "value": value,
                 "pixel_over_spread": pixel / (wavelength_nm * 1e-6 * gap / pitch),
                 "blur_px": pitch * gap / depth / pixel,
-                "rays_db": error_db(np.eye(1, 2 * reach + 1, reach)[0], true),
+                "rays_db": error_db(np.eye(1, 2 * REACH + 1, REACH)[0], true),
                 "model_db": error_db(model, true),
-                "wave_seconds": between - started,
-                "model_seconds": done - between,
+                "wave_seconds": wave_seconds,
+                "model_seconds": model_seconds,
             }
         )
     return points
+
+
+def slit_kernels(pitch: float, gap: float, pixel: float, nm: float, depth: float) -> tuple[Any, Any, float, float]:
+    """Light on pixels by the wave and by the model, and the CPU seconds of both, under a slit."""
+    started = time.process_time()
+    x, intensity = lens_spread(pitch, gap, nm, depth_mm=depth)
+    between = time.process_time()
+    spread = model_spread(x, pitch, gap, nm, depth_mm=depth)
+    done = time.process_time()
+    true, model = (pixel_kernel(x, one, pixel, REACH) for one in (intensity, spread))
+    return true, model, between - started, done - between
+
+
+def round_kernels(pitch: float, gap: float, pixel: float, nm: float, depth: float) -> tuple[Any, Any, float, float]:
+    """Light on columns of pixels by the wave and by point-spread maps, and the CPU seconds of both; round lenses.
+
+    The seconds of the model are those of one colour of a picture of one lens, maps and kernels included.
+    """
+    started = time.process_time()
+    x, columns = round_wave(pitch, gap, nm, depth, pixel)
+    between = time.process_time()
+    side = 2 * REACH + 1
+    lens = Lenslet(focal_mm=gap, aperture_mm=pitch)
+    camera = IICamera(pixels=(side, side), lenses=(1, 1), pixel_pitch_mm=pixel, gap_mm=gap, optics=(lens,))
+    light = np.zeros((side, side, 3), np.float32)
+    light[REACH, REACH] = 1
+    maps = spread_maps(camera, depth + gap, wavelengths_nm=(nm, nm, nm))
+    got = spread_picture(IIPicture(light, (1, 1), (side, side), camera), maps).pixels[..., 1].sum(axis=0)
+    done = time.process_time()
+    return pixel_kernel(x, columns, pixel, REACH), got, between - started, (done - between) / 3
+
+
+def round_wave(
+    pitch: float, gap: float, nm: float, depth: float, pixel: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places, and light summed over columns, of a round lens; of Airy's pattern where a field would be too large."""
+    from scipy.signal import resample
+
+    try:
+        x, field = lens_spread(pitch, gap, nm, depth_mm=depth, dimensions=2)
+    except ValueError:
+        if math.isfinite(depth):
+            raise
+        # rings are far narrower than pixels: a window of 200 of them holds all but 1/300 of the light
+        x = np.linspace(-100, 100, 2001) * nm * 1e-6 * gap / pitch
+        return x, diffraction_limit(np.hypot(x, x[:, None]), pitch, gap, nm, 2).sum(axis=0)
+    rows, places = resample(field.sum(axis=0), 8 * len(x), x)  # it is coarse beside a pixel
+    return np.asarray(places), np.asarray(rows)
 
 
 def error_db(kernel: Any, true: Any) -> float:
@@ -96,33 +146,17 @@ def error_db(kernel: Any, true: Any) -> float:
     return float(-10 * math.log10(max(float(np.mean(off**2)), 1e-20)))
 
 
-def blurred(scene: str, scale: int) -> dict[str, Any]:
-    """Return the effect of diffraction at full setup1 on a picture: error, views, coding gain of SI-PVS."""
-    sharp = render(load_scene(scene), preset("setup1", scale=scale), samples=4, noise=1.0, support=()).picture
-    soft = lens_blurred(sharp, preset("setup1"))
-    found = {"psnr": q_global(sharp, soft), "q_view": q_view(sharp, soft).mean}
-    for name, picture in (("rays", sharp), ("waves", soft)):
-        gains = []
-        for rate in RATES:
-            ours, theirs = (
-                q_global(picture, decode(encode(picture, scheme, bpp=rate))) for scheme in ("si-h264", "jpeg2000")
-            )
-            gains.append(ours - theirs)
-        found[f"gain_{name}"] = float(np.mean(gains))
-    return found
-
-
 def draw() -> Any:
     """Draw one panel per sweep: rays as solid lines, the point-spread model as dotted lines."""
     figure = new_figure(8.5, 7.5)
     for axes, (name, (_, label)) in zip(figure.subplots(2, 2).flat, SWEEPS.items(), strict=True):
         for i, wavelength in enumerate(WAVELENGTHS):
-            rows = RECORDS.rows(sweep=name, wavelength_nm=wavelength)
+            rows = RECORDS.rows(sweep=name, wavelength_nm=wavelength, lens="round")
             points = rows[0]["points"] if rows else []
             x = [p["value"] for p in points]
             for model, line in (("rays", "-"), ("model", ":")):
                 y = [p[f"{model}_db"] for p in points]
-                what = "rays" if model == "rays" else "rays and point-spread model"
+                what = "rays" if model == "rays" else "point-spread maps"
                 axes.plot(
                     x,
                     y,
@@ -144,24 +178,28 @@ def draw() -> Any:
 
 
 def tables() -> Tables:
-    """Return the tables of the limits of each model at 40 dB, and of the effect on setup1."""
-    return {("docs/waves.md", "limits"): limits_table(), ("docs/waves.md", "setup1"): setup1_table()}
+    """Return where each model leaves 40 dB, what becomes of setup1, and what maps of glass lenses leave out."""
+    page = "docs/waves.md"
+    return {(page, "limits"): limits_table(), (page, "setup1"): setup1_table(), (page, "field"): field_table()}
 
 
 def limits_table() -> list[str]:
     """Return the value at which each model crosses `ENOUGH_DB`, by sweep, at 550 nm, and the pixels there."""
-    rows = [row for row in RECORDS.rows(wavelength_nm=WAVELENGTH) if "sweep" in row]
+    if not (rows := RECORDS.rows(wavelength_nm=WAVELENGTH, lens="round")):
+        return []
+    slits = RECORDS.by("sweep", SWEEPS, wavelength_nm=WAVELENGTH, lens="slit")
     lines = [
-        "| varied | rays: 40 dB at | model: 40 dB at | worst of the model | wave | model |",
-        "|---|---|---|---|---|---|",
+        "| varied | rays: 40 dB at | maps: 40 dB at | worst of maps | slit: rays at, worst of model | wave | maps |",
+        "|---|---|---|---|---|---|---|",
     ]
     for row in rows:
-        points = row["points"]
+        points, slit = row["points"], slits[row["sweep"]]["points"]
         wave, model = (1e3 * float(np.median([p[f"{k}_seconds"] for p in points])) for k in ("wave", "model"))
         crossed = [crossing(points, f"{k}_db") for k in ("rays", "model")]
-        worst = min(p["model_db"] for p in points)
+        worst, narrow = (min(p["model_db"] for p in one) for one in (points, slit))
         lines.append(
-            f"| {row['sweep']} | {crossed[0]} | {crossed[1]} | {worst:.1f} dB | {wave:.1f} ms | {model:.1f} ms |"
+            f"| {row['sweep']} | {crossed[0]} | {crossed[1]} | {worst:.1f} dB | "
+            f"{crossing(slit, 'rays_db')}, {narrow:.1f} dB | {wave:.0f} ms | {model:.1f} ms |"
         )
     return [*lines, "", origin(rows)]
 
@@ -180,12 +218,30 @@ def crossing(points: list[dict[str, float]], key: str) -> str:
 
 
 def setup1_table() -> list[str]:
-    """Return a table of the error by diffraction, and of the coding gain with and without it."""
-    rows = [row for row in RECORDS.rows(scale=SCALE) if "scene" in row]
-    lines = ["| scene | PSNR | Q_view | gain of SI-PVS, rays | gain, waves |", "|---|---|---|---|---|"] + [
-        f"| {row['scene']} | {row['psnr']:.1f} dB | {row['q_view']:.4f} | {row['gain_rays']:+.2f} dB | "
-        f"{row['gain_waves']:+.2f} dB |"
-        for row in rows
+    """Error by spread light, disparity, and the coding gain, of each lens."""
+    if not (rows := [row for row in RECORDS.rows(scale=SCALE) if "lens" in row]):
+        return []
+    lines = [
+        "| scene | lens | PSNR | Q_view | disparity: median change | error, median | gain of SI-PVS |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        same = row["lens"] == "rays"
+        head = "– | –" if same else f"{row['psnr']:.1f} dB | {row['q_view']:.4f}"
+        moved = "–" if same else f"{row['disparity_change']:.3f}"
+        tail = f"{moved} | {row['disparity_error']:.3f} | {row['gain']:+.2f} dB"
+        lines.append(f"| {row['scene']} | {row['lens']} | {head} | {tail} |")
+    return [*lines, "", origin(rows)]
+
+
+def field_table() -> list[str]:
+    """Rms radius of the rays' spot along the diagonal of a lens, and that of maps."""
+    rows = RECORDS.rows(field="diagonal")
+    if not rows:
+        return []
+    lines = ["| pixels from the axis | all rays | maps |", "|---|---|---|"]
+    lines += [
+        f"| {p['from_axis_px']:.1f} | {p['traced_px']:.2f} px | {p['maps_px']:.2f} px |" for p in rows[0]["pixels"]
     ]
     return [*lines, "", origin(rows)]
 
