@@ -16,7 +16,7 @@ from ii_core.colour import srgb
 
 from ..scene.scene import Scene
 from ..tracing.kernels.sampling import lobe_keys
-from ..tracing.kernels.srgb import encode_srgb
+from ..tracing.kernels.srgb import encode_srgb, encode_steps
 from ..tracing.packing import packed
 from ..tracing.sampling import Adaptive, Sampling, Shoot, adaptive_mean, fixed_sum
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
@@ -34,12 +34,23 @@ def _curve(peak: int, samples: int) -> NDArray[np.float64]:
 CURVES = {"uint8": _curve(255, 4097), "uint16": _curve(65535, 65537), "float32": None}
 
 
+def code_steps(curve: NDArray[np.float64]) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    """Return rounded 8-bit codes at the samples of a curve, and where each code ends, in steps between samples."""
+    ends = np.interp(np.arange(255) + 0.5, curve, np.arange(len(curve)))
+    return (curve + 0.5).astype(np.uint8), np.append(ends, np.inf)
+
+
+STEPS = code_steps(_curve(255, 4097))
+
+
 def encoded(radiance: NDArray[np.float32], rows: NDArray[np.int32], divisor: int, dtype: str) -> NDArray[Any]:
     """Return pixels of summed radiance (n, 3), each at its row: integers are sRGB, floats linear light."""
     out = np.empty(radiance.shape, dtype)
     curve = CURVES[dtype]
     if curve is None:
         out[rows] = radiance / divisor
+    elif dtype == "uint8":
+        encode_steps(radiance, rows, 1 / divisor, *STEPS, out)
     else:
         encode_srgb(radiance, rows, 1 / divisor, curve, out)
     return out

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from ii_core.files import read_image
 from raytrace_ii import Scene, trace
-from raytrace_ii.rendering.job import CURVES
+from raytrace_ii.rendering.job import CURVES, STEPS
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, image_texture, linear, normal_map
 from raytrace_ii.shapes.primitives import rotation
 from raytrace_ii.tracing.kernels.noise import gradient_noise
-from raytrace_ii.tracing.kernels.srgb import encode_srgb
+from raytrace_ii.tracing.kernels.srgb import encode_srgb, encode_steps
 from raytrace_ii.tracing.packing import packed
 from raytrace_ii.tracing.texture_table import TextureTable
 from tests.support.trace_scenes import BLACK, WHITE, body, box, octaves, sphere, texture_at, wall
@@ -271,6 +271,23 @@ def test_encoding_is_the_standards_curve(dtype):
     assert np.abs(out[:, 0] - exact).max() <= 0.52
     assert (np.diff(out[:, 0].astype(int)) >= 0).all()
     assert out[0, 0] == 0 and out[-1, 0] == peak
+
+
+def test_steps_of_codes_are_those_of_the_curve():
+    """Light on both sides of every code's end, beyond both ends of the curve, and none."""
+    curve = CURVES["uint8"]
+    ends = (STEPS[1][:-1] / (len(curve) - 1)).astype(np.float32)
+    sides = [np.nextafter(ends, np.float32(side)) for side in (0, 1)]
+    rest = [np.random.default_rng(0).uniform(-0.1, 1.1, 30_000), [np.nan, np.inf, -np.inf, 0, 1]]
+    x = np.concatenate([ends, *sides, *rest]).astype(np.float32).reshape(-1, 1).repeat(3, axis=1)
+    rows = np.random.default_rng(1).permutation(len(x)).astype(np.int32)
+    for scale in (1.0, 1 / 3):
+        by_curve, by_steps = np.empty((2, *x.shape), np.uint8)
+        encode_srgb(x, rows, scale, curve, by_curve)
+        encode_steps(x, rows, scale, *STEPS, by_steps)
+        np.testing.assert_array_equal(by_steps, by_curve)
+        encode_steps.py_func(x[:900].astype(float), rows, scale, *STEPS, by_steps)
+        np.testing.assert_array_equal(by_steps, by_curve)
 
 
 def test_linear_inverts_the_standards_curve():
