@@ -36,7 +36,7 @@ def nanoseconds(scene: str, repeats: int) -> dict[str, list[float]]:
     bands = BANDS.get(scene, USUAL_BANDS)
     pixels = 8192 * BAND * len(bands)
     found: dict[str, list[float]] = {"now": [], "before": [], "bare": []}
-    with _process(ROOT, scene, bands) as now, _process(_worktree(), scene, bands) as before:
+    with _process(ROOT, scene, bands) as now, _process(worktree(), scene, bands) as before:
         for _ in range(repeats):
             for name, measure in (("now", now), ("before", before), ("bare", before)):
                 found[name].append(measure("bare" if name == "bare" else "render") / pixels * 1e9)
@@ -44,7 +44,7 @@ def nanoseconds(scene: str, repeats: int) -> dict[str, list[float]]:
 
 
 @cache
-def _worktree() -> Path:
+def worktree() -> Path:
     """Return a work tree of the earlier code, kept until this process ends, so that its kernels are compiled once."""
     folder = tempfile.mkdtemp()
     tree = Path(folder) / COMMIT

@@ -2,19 +2,26 @@
 
     python -m benchmarks run pareto [--scale 32] [--scenes apples,car]
 
-The error is PSNR in 16-bit sRGB against a reference of 64 samples per pixel and 12 bounces, with triangles half as
+The error is PSNR in 16-bit sRGB against a reference of 256 samples per pixel and 12 bounces, with triangles half as
 large where the scene file sets the tessellation. Time is CPU seconds of `render` without support images, the least of
-two or three. Samples per pixel, adaptive sampling, recursion depth and tessellation are varied. Numbers and chart go
-to ``benchmarks/results/pareto.jsonl`` and tables to ``docs/speed_accuracy.md``, the chart to
-``docs/images/pareto.png``.
+two or three. Samples per pixel, adaptive sampling, recursion depth and tessellation are varied. The code of an
+earlier commit makes the same study, right before, in a process of its own and against its own reference. A band of
+lenses stands for pictures with more rows of them. Records go to ``benchmarks/results/pareto.jsonl``, tables to
+``docs/speed_accuracy.md``, the chart to ``docs/images/pareto.png``.
 """
 
 from __future__ import annotations
 
+import json
+import math
+import os
 import re
 import shutil
+import subprocess
+import sys
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -27,13 +34,14 @@ from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, by_scene, origin
+from benchmarks.speed.before import COMMIT, worktree
 from ii_core import IICamera, IIPicture, preset
 from ii_core.display.figure import COLOURS
 from metrics import q_global
 from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.tracing.packing import packed, share
 
-RECORDS, SCALE = Records("pareto", ("benchmarks.speed.pareto",)), 32  # scale on the page
+RECORDS, SCALE = Records("pareto", ("benchmarks.speed.pareto", "benchmarks.speed.before")), 32  # scale on the page
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
 SAMPLES = (1, 2, 4, 9, 16)
 AT_DEPTHS = (1, 4, 16)  # samples at which other depths are tried
@@ -42,7 +50,9 @@ ERRORS = (8.0, 4.0, 2.0, 1.0, 0.5)  # of adaptive sampling between LEAST and MOS
 LEAST, MOST = 4, 16
 FINER = 2.0  # tessellation of the reference
 CUTS = (0.25, 0.5, 1.0, FINER)
-TRUE = {"samples": 64, "depth": 12}
+TRUE = {"samples": 256, "depth": 12}
+TRUE_SEED = 1  # not that of the settings: their samples would be among the reference's
+BAND = 16  # rows of lenses
 SENSOR_DB = 47.5  # PSNR of the sensor's own noise of one 8-bit step
 BASE = 4  # samples at which depth and cut are compared
 
@@ -50,10 +60,10 @@ BASE = 4  # samples at which depth and cut are compared
 def main() -> None:
     """Measure, print, record, draw and fill the page."""
     asked = command_line(__doc__, scale=SCALE, scenes=SCENES).parse_args()
-    camera = preset("setup1", scale=asked.scale)
+    camera = band(preset("setup1", scale=asked.scale))
     keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
-        record = RECORDS.measure(key, lambda key=key: study(key["scene"], camera))
+        record = RECORDS.measure(key, lambda key=key: both(key["scene"], camera))
         best = record["result"]["recommended"]
         print(f"{key['scene']}: {best['setting']}, {best['psnr']:.1f} dB, {record['seconds']:.0f} s", flush=True)
     if set(scenes := measured()) == set(SCENES):
@@ -72,7 +82,12 @@ def tables() -> Tables:
     (k, l), (m, n) = camera.lenses, camera.pixels
     page = "docs/speed_accuracy.md"
     return {
-        (page, "size"): [f"`setup1` at `scale={SCALE}`: {m}×{n} pixels, {k}×{l} lenses.", by_scene(data)],
+        (page, "size"): [
+            f"`setup1` at `scale={SCALE}`: {m}×{n} pixels, {k}×{l} lenses. The reference has "
+            f"{' or '.join(sorted({str(one.get('truth_samples', 64)) for one in data.values()}))} samples per pixel.",
+            by_scene(data),
+        ],
+        (page, "fronts"): fronts_table(data),
         (page, "recommended"): recommended_table(data),
         (page, "samples"): samples_table(data),
         (page, "depth"): depth_table(data),
@@ -81,11 +96,57 @@ def tables() -> Tables:
     }
 
 
+def band(camera: IICamera) -> IICamera:
+    """Return the camera of the middle rows of lenses; the camera itself if it has no more than BAND."""
+    (columns, rows), (across, down) = camera.pixels, camera.lenses
+    if down <= BAND:
+        return camera
+    height = rows // down
+    shift = (rows / 2 - ((down - BAND) // 2 + BAND / 2) * height) * camera.pixel_pitch_mm
+    x, y, z = camera.origin_mm
+    return replace(
+        camera, name="band", pixels=(columns, BAND * height), lenses=(across, BAND), origin_mm=(x, y + shift, z)
+    )
+
+
+def both(name: str, camera: IICamera) -> dict[str, Any]:
+    """Return the study of one scene, with that of the earlier code as ``before``."""
+    before = study_before(name, camera)
+    return {**study(name, camera), "before": before}
+
+
+def study_before(name: str, camera: IICamera) -> dict[str, Any]:
+    """Return the study of one scene by the code of COMMIT, with as many samples in its own reference."""
+    program = (
+        "import json, sys\nfrom benchmarks import pareto\nfrom ii_core import IICamera\n"
+        "name, camera, samples = json.load(sys.stdin)\npareto.TRUE['samples'] = samples\n"
+        "json.dump(pareto.study(name, IICamera.from_json(camera)), sys.stdout, default=float)"
+    )
+    tree = worktree()
+    run = subprocess.run(
+        [sys.executable, "-c", program], input=json.dumps([name, camera.to_json(), TRUE["samples"]]), text=True,
+        stdout=subprocess.PIPE, check=True, cwd=tree,
+        env={**os.environ, "PYTHONPATH": str(tree), "PYTHONSAFEPATH": "1"},
+    )  # fmt: skip
+    found: dict[str, Any] = json.loads(run.stdout)
+    return found
+
+
+def speedup(one: dict[str, Any]) -> float:
+    """Return how many times faster the front reaches the PSNR of the earlier code's recommended setting.
+
+    NaN if no setting reaches it.
+    """
+    aim = one["before"]["recommended"]
+    reached = [row["seconds"] for row in one["rows"] if row["psnr"] >= aim["psnr"]]
+    return aim["seconds"] / min(reached) if reached else math.nan
+
+
 def study(name: str, camera: IICamera) -> dict[str, Any]:
     """Return the results of all settings of one scene."""
     scenes = {cut: cut_scene(name, cut) for cut in CUTS} if sizes(scene_text(name)) else {1.0: load_scene(name)}
     finest, scene = scenes[max(scenes)], scenes[1.0]
-    truth = shoot(at_depth(finest, TRUE["depth"]), camera, TRUE["samples"])[0]
+    truth = shoot(at_depth(finest, TRUE["depth"]), camera, TRUE["samples"], seed=TRUE_SEED)[0]
     bounces = packed(scene).mirrors or packed(scene).transmits
     rows: list[dict[str, Any]] = []
 
@@ -106,7 +167,8 @@ def study(name: str, camera: IICamera) -> dict[str, Any]:
         "max_depth": scene.max_depth,
         "bounces": bounces,
         "faces": {str(cut): sum(len(body.faces) for body in other.bodies) for cut, other in scenes.items()},
-        "truth_repeats_to": q_global(truth, shoot(at_depth(finest, TRUE["depth"]), camera, 36, seed=1)[0]),
+        "truth_samples": TRUE["samples"],
+        "truth_repeats_to": q_global(truth, shoot(at_depth(finest, TRUE["depth"]), camera, 64, seed=2)[0]),
         "rows": rows,
         "front": (best := front(rows)),
         "recommended": recommended([rows[i] for i in best]),
@@ -202,6 +264,7 @@ def setting(row: dict[str, Any]) -> str:
 
 
 SWEEPS = {"samples": "o", "adaptive": "D", "depth": "v", "cut": "s"}
+OLD, NEW = ("0.8", 4), ("0.35", 2)  # grey level and line width of fronts
 NAMES = {
     "samples": "1, 2, 4, 9, 16 samples", "adaptive": f"adaptive, {LEAST} to {MOST} samples",
     "depth": "other recursion depths", "cut": f"triangles × ¼, ½, {FINER:g}, {BASE} samples",
@@ -219,9 +282,12 @@ def chart(data: dict[str, Any], target: Path) -> None:
     for axes, (name, one) in zip(figure.subplots(4, 2).flat, data.items(), strict=True):
         rows = one["rows"]
         best = [rows[i] for i in one["front"]]
-        axes.step(
-            [r["seconds"] for r in best], [r["psnr"] for r in best], where="post", color="0.75", linewidth=4, zorder=1
-        )
+        earlier = [one["before"]["rows"][i] for i in one["before"]["front"]] if "before" in one else []
+        for steps, (color, width) in ((earlier, OLD), (best, NEW)):
+            axes.step(
+                [r["seconds"] for r in steps], [r["psnr"] for r in steps], where="post", color=color, linewidth=width,
+                zorder=1,
+            )  # fmt: skip
         for i, (sweep, marker) in enumerate(SWEEPS.items()):
             chosen = [r for r in rows if r["sweep"] == sweep]
             joined = "-" if sweep in ("samples", "adaptive") else ""
@@ -246,12 +312,36 @@ def chart(data: dict[str, Any], target: Path) -> None:
     for axes in figure.axes[::2]:
         axes.set_ylabel("PSNR [dB]")
     handles = {label: h for axes in figure.axes for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    for label, (color, width) in ((f"Pareto front of {COMMIT}", OLD), ("Pareto front", NEW)):
+        handles[label] = figure.axes[0].plot([], [], color=color, linewidth=width)[0]
     figure.legend(
-        [*handles.values(), figure.axes[0].plot([], [], color="0.75", linewidth=4)[0]], [*handles, "Pareto front"],
-        loc="outside lower center", ncols=3, frameon=False, fontsize=9,
+        [*handles.values()], [*handles], loc="outside lower center", ncols=3, frameon=False, fontsize=9
     )  # fmt: skip
     figure.savefig(target, dpi=150)
     write_picture(target, target)
+
+
+def fronts_table(data: dict[str, Any]) -> list[str]:
+    """Return the caption of the chart and, if the earlier code was measured, the times at equal PSNR."""
+    rule = "no other setting is both faster and nearer to the reference."
+    if not all("before" in one for one in data.values()):
+        return [f"The grey staircase is the Pareto front: {rule}"]
+    lines = [
+        f"The dark staircase is the Pareto front: {rule} The light one is the front of commit `{COMMIT}`, "
+        "measured in the same run.",
+        "",
+        f"| scene | setting of `{COMMIT}` | PSNR | CPU time | times faster at this PSNR or more |",
+        "|---|---|---|---|---|",
+    ]
+    for name, one in data.items():
+        aim, times = one["before"]["recommended"], speedup(one)
+        reached = f"{times:.2f}" if math.isfinite(times) else "not reached"
+        lines.append(f"| {name} | {aim['setting']} | {aim['psnr']:.1f} dB | {aim['seconds']:.2f} s | {reached} |")
+    mean = math.exp(sum(math.log(speedup(one)) for one in data.values()) / len(data))
+    return [
+        *lines,
+        f"| geometric mean | | | | {mean:.2f} |" if math.isfinite(mean) else "| geometric mean | | | | – |",
+    ]
 
 
 def recommended_table(data: dict[str, Any]) -> list[str]:

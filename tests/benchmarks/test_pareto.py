@@ -5,6 +5,7 @@ import pytest
 
 from benchmarks.pages import coding_docs
 from benchmarks.speed import metrics_speed, pareto
+from ii_core import preset
 from raytrace_ii import load_scene
 from raytrace_ii.tracing.packing import packed
 
@@ -43,3 +44,32 @@ def test_another_depth_shares_the_tree():
 def test_one_setting_of_coding_and_of_evaluation_is_recommended():
     fronts = (coding_docs.front_table(coding_docs.studied(4)), metrics_speed.front_table(metrics_speed.data()))
     assert all(sum("**" in line for line in lines) >= 1 for lines in fronts)
+
+
+def test_a_band_is_the_middle_rows_of_lenses():
+    """Its rays are those of the whole camera's rows, to rounding of the shifted origin (1e-12 of 50 mm)."""
+    whole = preset("setup1", scale=4)
+    band = pareto.band(whole)
+    assert band.lenses == (128, pareto.BAND) and band.ei_pixels == whole.ei_pixels
+    top = (64 - pareto.BAND) // 2 * 16
+    for found, expected in zip(band.rays(), whole.rays(rows=slice(top, top + pareto.BAND * 16)), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-10)
+    small = preset("setup1", scale=32)
+    assert pareto.band(small) is small
+
+
+def studied(before, now):
+    return {"before": {"recommended": {**before, "setting": "9 samples"}}, "rows": now, "commit": "abc1234"}
+
+
+def test_speedup_is_the_ratio_of_times_at_the_earlier_recommended_psnr_or_more():
+    one = studied(row(6, 40), [row(1, 30), row(2, 41), row(3, 45), row(2.5, 40)])
+    assert pareto.speedup(one) == 3
+    assert np.isnan(pareto.speedup(studied(row(6, 46), one["rows"])))
+    lines = pareto.fronts_table({"apples": one, "car": studied(row(24, 40), one["rows"])})
+    assert lines[-3:] == [
+        "| apples | 9 samples | 40.0 dB | 6.00 s | 3.00 |",
+        "| car | 9 samples | 40.0 dB | 24.00 s | 12.00 |",
+        "| geometric mean | | | | 6.00 |",
+    ]
+    assert len(pareto.fronts_table({"apples": {"rows": one["rows"]}})) == 1, "nothing of the earlier code"
