@@ -94,7 +94,7 @@ def disparity_layers(camera: IICamera, low: float, high: float, count: int = LAY
     if not low < high or count < 2:
         raise ValueError(f"low is {low}, high {high}, count {count}: low < high and at least 2 layers are needed")
     layers = depth_of_disparity(camera, np.linspace(high, low, count))
-    if not (np.isfinite(layers).all() and layers[0] > 0 and (np.diff(layers) > 0).all()):
+    if not (np.isfinite(layers).all() and layers[0] > first_mm(camera) and (np.diff(layers) > 0).all()):
         raise ValueError(f"no depth before the camera has a disparity from {low:g} to {high:g} px")
     return layers
 
@@ -124,13 +124,18 @@ def logarithmic(layers_mm: Floats) -> bool:
     return bool(z.size > 2 and z[0] > 0 and z[-1] / z[0] > 10 and np.ptp(np.diff(np.log(z))) < 1e-6)
 
 
+def first_mm(camera: IICamera) -> float:
+    """Return the z before which no layer lies: that of the cameras of converged views, else 0."""
+    return camera.origin_mm[2] + camera.gap_mm - camera.start_mm if camera.start_mm else 0.0
+
+
 def check_layers(layers_mm: ArrayLike | None, camera: IICamera, depth_mm: ArrayLike | None = None) -> Floats:
     """Return the given layers, or by default `covering_layers`; of converged views without depth, `field_layers`.
 
     Raises
     ------
     ValueError
-        If the layers are not positive, finite and increasing.
+        If the layers are not beyond `first_mm`, finite and increasing.
     """
     if layers_mm is None and depth_mm is None and camera.viewer_mm is not None:
         return field_layers(camera)
@@ -139,8 +144,9 @@ def check_layers(layers_mm: ArrayLike | None, camera: IICamera, depth_mm: ArrayL
     layers = np.asarray(layers_mm, dtype=np.float64)
     if layers.ndim != 1 or not layers.size:
         raise ValueError(f"layers_mm is of shape {layers.shape}: a list of depths is needed")
-    if not (np.isfinite(layers).all() and layers[0] > 0 and (np.diff(layers) > 0).all()):
-        raise ValueError("layers_mm must be finite, positive and increase")
+    if not (np.isfinite(layers).all() and layers[0] > first_mm(camera) and (np.diff(layers) > 0).all()):
+        where = "positive" if first_mm(camera) == 0 else f"beyond {first_mm(camera):g} mm"
+        raise ValueError(f"layers_mm must be finite, {where} and increase")
     return layers
 
 

@@ -88,6 +88,18 @@ def test_views_side_by_side_and_steps():
     assert near.shape == (9, 2) and far.shape == (25, 2) and far.max(0).tolist() == [4, 2]
 
 
+def test_layers_may_lie_before_the_pixel_plane():
+    """Views as in the profile jpeg-pleno: the cameras stand 120 mm before the lens plane, at negative z."""
+    camera = IICamera(
+        pixels=(144, 144), lenses=(16, 16), pixel_pitch_mm=0.3472, gap_mm=44.74, start_mm=120, viewer_mm=120
+    )
+    picture = seen(camera, texture(5, 8.0), -10.0)
+    found = depth_from_focus(picture, method="robust")
+    assert found.layers_mm[0] < 0 and np.median(np.abs(found.depth_mm + 10)) < 1
+    with pytest.raises(ValueError, match=r"layers_mm must be finite, beyond -75\.26 mm and increase"):
+        depth_from_focus(picture, layers_mm=[-80.0, 10.0])
+
+
 def test_default_layers_have_both_signs():
     layers = field_layers(CAMERA)
     d = disparity_of_depth(CAMERA, layers)
