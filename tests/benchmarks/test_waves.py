@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy import lens_setup1, waves
+from benchmarks.records import ROOT
 
 
 def test_error_of_equal_and_of_shifted_kernels_by_hand():
@@ -40,3 +41,15 @@ def test_spot_off_the_axis_is_that_of_all_rays_in_the_middle():
     spots = lens_setup1.oblique()
     assert spots[0]["maps_px"] == pytest.approx(spots[0]["traced_px"], rel=0.1)
     assert spots[-1]["traced_px"] > spots[0]["traced_px"]
+
+
+def test_the_rule_of_thumb_is_what_was_measured():
+    """Of all points in focus: rays above 40 dB from the rule's pixels on, and not much below; maps above theirs."""
+    page = " ".join((ROOT / "docs/waves.md").read_text().split())
+    least = float(page.split("at least ")[1].split(" λΛ/δL")[0])
+    floor = float(page.split("stay above ")[1].split(" dB")[0])
+    rows = [row for row in waves.RECORDS.rows(lens="round") if "sweep" in row]
+    points = [p for row in rows if row["sweep"] != "depth" for p in row["points"]]
+    assert min(p["rays_db"] for p in points if p["pixel_over_spread"] >= least) >= 39.9
+    assert max(p["rays_db"] for p in points if p["pixel_over_spread"] <= least - 0.9) < 40
+    assert min(p["model_db"] for row in rows for p in row["points"]) > floor
