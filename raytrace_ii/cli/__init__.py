@@ -86,7 +86,8 @@ def _run() -> None:
 def _warn(
     message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None
 ) -> None:
-    print(f"warning: {one_line(str(message))}", file=sys.stderr)
+    if not issubclass(category, DeprecationWarning):  # for programmers: of libraries that dask makes audible
+        print(f"warning: {one_line(str(message))}", file=sys.stderr)
 
 
 def _fail(message: str) -> None:
