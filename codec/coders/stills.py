@@ -6,7 +6,6 @@ None has usable rate control: a target rate is met by a search of the quality.
 from __future__ import annotations
 
 import io
-import itertools
 import re
 import struct
 import sys
@@ -312,14 +311,13 @@ def _htj2k_head(blank: IIPicture) -> re.Pattern[bytes]:
     size = struct.pack(">HH8IH", 47, 0x4000, width, height, 0, 0, width, height, 0, 0, 3)
     size += bytes((bits - 1, 1, 1)) * 3
     ways = []
-    # The codec of imagecodecs 2026.10 divides small pictures fewer times.
-    for levels, (reversible, guard, band) in itertools.product(
-        range(Htj2k.levels + 1), ((0, 0x22, b"[\x08-\xa7]."), (1, 0x20, b"[\x08-\xa7]"))  # exponents 1 to 20
-    ):
+    for levels in range(Htj2k.levels + 1):  # imagecodecs 2026.10 divides small pictures fewer times
         bands = 3 * levels + 1
-        style = struct.pack(">HHBBHBBBBBB", 0xFF52, 12, 0, 2, 1, 1, levels, 4, 4, 0x40, reversible)
-        steps = struct.pack(">HHB", 0xFF5C, 3 + (1 if reversible else 2) * bands, guard)
-        ways.append(re.escape(style + steps) + b"(?:%s){%d}" % (band, bands))
+        least = b"\x08" if levels == Htj2k.levels else b"\x00"  # exponents from 1 or 0 up to 20
+        for reversible, guard, rest in ((0, 0x22, b"."), (1, 0x20, b"")):
+            style = struct.pack(">HHBBHBBBBBB", 0xFF52, 12, 0, 2, 1, 1, levels, 4, 4, 0x40, reversible)
+            steps = struct.pack(">HHB", 0xFF5C, 3 + (1 if reversible else 2) * bands, guard)
+            ways.append(re.escape(style + steps) + b"(?:[%s-\xa7]%s){%d}" % (least, rest, bands))
     capabilities = b"\xff\x50\x00\x08\x00\x02\x00\x00\x00[\x00-\x3f]"
     pattern = re.escape(b"\xff\x4f\xff\x51" + size) + capabilities + b"(?:" + b"|".join(ways) + b")\xff\x90"
     return re.compile(pattern, re.DOTALL)
