@@ -6,8 +6,8 @@ Power spectra and coherence between sub-images one and four steps apart are meas
 samples by classes of detail, as they are; and how well the eight views around a view predict it by the renderer's
 disparity. `rate_model` gives the rate of Gaussian views of these statistics. A second measurement displaces views by
 a random error, and compares the rate by the coherence then measured with that by the closed form. Numbers go to
-``benchmarks/results/light_field_bounds.jsonl``,
-tables to ``docs/lf_bounds.md``; ``benchmarks run lf_bounds_chart`` draws the chart.
+``benchmarks/results/light_field_bounds.jsonl``, tables to ``docs/lf_bounds.md``; ``benchmarks run lf_bounds_chart``
+draws the chart.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ SCHEME = "si-lf"
 BLOCK, CLASSES = 16, 8
 FAR = 4  # steps on the grid, beside 1
 PAIRS = 24  # of views by direction and distance
+DRAWS = 12  # errors of disparity for each pair; the mean of n random phases has a magnitude of about 1/√n
 SAME, PHASE = 0.8, 0.08  # disparities that differ less, in samples, are of one surface; see docs/lf.md, Synthesis
 QUANTISERS = (22, 30, 38, 44, 50)
 AT = 38  # quantiser of the measurement by number of views
@@ -155,12 +156,12 @@ class LightField:
         rows, cols = self.views.shape[:2]
         one, other = [], []
         for v, u in [p for p in self.places if p[0] + down < rows and p[1] + across < cols][:PAIRS]:
-            there = self.views[v + down, u + across]
-            if kind == "moved":
-                error = rng.normal(0, sigma)
-                there = moved(there, *(self.moves[v, u] * part + error * np.sign(part) for part in (down, across)))
-            one.append(self.tool.blocks(self.views[v, u]))
-            other.append(self.tool.blocks(there))
+            there, move = self.views[v + down, u + across], self.moves[v, u]
+            errors = rng.normal(0, sigma, DRAWS if sigma > 0 else 1) if kind == "moved" else ()
+            shown = [moved(there, *(move * part + e * np.sign(part) for part in (down, across))) for e in errors]
+            for view in shown or [there]:
+                one.append(self.tool.blocks(self.views[v, u]))
+                other.append(self.tool.blocks(view))
         return self.by_class(np.concatenate(one), np.concatenate(other))
 
     def shared(self) -> NDArray[np.float64]:
