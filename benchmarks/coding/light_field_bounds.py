@@ -107,10 +107,9 @@ def coded_at(picture: IIPicture, qp: int) -> tuple[float, float]:
 def middle_views(picture: IIPicture, side: int) -> IIPicture:
     """Square of neighbouring views in the middle of the grid."""
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
-    views = picture.pixels.reshape(l, v, k, u, 3)
     top, left = (v - side) // 2, (u - side) // 2
-    cut = views[:, top : top + side, :, left : left + side]
-    return IIPicture(np.ascontiguousarray(cut).reshape(l * side, k * side, 3), (k, l), (side, side))
+    cut = picture.light_field[:, :, top : top + side, left : left + side].transpose(0, 2, 1, 3, 4)
+    return IIPicture(cut.reshape(l * side, k * side, 3), (k, l), (side, side))
 
 
 class LightField:

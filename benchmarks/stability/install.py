@@ -57,9 +57,7 @@ def main() -> None:
     """Install, try, record and fill the table."""
     asked = command_line(__doc__, pythons=(sys.executable,), extras=(NONE, "all")).parse_args()
     for python in asked.pythons:
-        version = output(
-            python, "-c", "import platform; print(*platform.python_version_tuple()[:2], sep='.')"
-        ).strip()
+        version = output(python, "-c", "import sys; print(*sys.version_info[:2], sep='.')").strip()
         for key in RECORDS.todo([{"python": version, "extras": extras} for extras in asked.extras], asked.again):
             RECORDS.measure(key, lambda key=key, python=python: measured(python, key["extras"]))
             print(key, flush=True)
@@ -77,13 +75,13 @@ def measured(python: str, extras: str) -> dict[str, Any]:
         output(inside, "-m", "pip", "install", "-q", "--no-compile", "--disable-pip-version-check", what)
         output(inside, "-m", "pip", "check", "--disable-pip-version-check")
         site = output(inside, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip()
-        sizes = Counter({found.name: size(found) for found in distributions(path=[site])})
-        kept = Counter({name: count for name, count in sizes.items() if name not in INSTALLERS})
+        kept = [found for found in distributions(path=[site]) if found.name not in INSTALLERS]
+        sizes = Counter({found.name: size(found) for found in kept})
         trial = json.loads(output(inside, "-c", TRIAL, folder=folder))
     return {
-        "bytes": kept.total(),
-        "distributions": len(kept),
-        "largest": dict(kept.most_common(LARGEST)),
+        "bytes": sizes.total(),
+        "distributions": {found.name: found.version for found in kept},
+        "largest": dict(sizes.most_common(LARGEST)),
         "trial": trial,
     }
 

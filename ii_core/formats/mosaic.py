@@ -40,7 +40,7 @@ def load_mosaic(path: str | os.PathLike[str], ei_pixels: Pair) -> IIPicture:
     if (k * u, l * v) != (width, height):
         warnings.warn(
             f"{path} has {width}×{height} px, {k}×{l} lenses of {u}×{v} px fill {k * u}×{l * v}: "
-            f"{width - k * u} columns at the right and {height - l * v} rows at the bottom are cut off",
+            f"{width - k * u} px at the right and {height - l * v} px at the bottom are cut off",
             stacklevel=2,
         )
     if looks_hexagonal(pixels, ei_pixels):

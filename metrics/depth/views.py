@@ -16,14 +16,11 @@ from ii_core import IICamera, IIPicture, disparity_of_depth
 from .layers import Floats
 from .lens_tables import Table
 
-SLOPE_OF_PIXELS = 1.0  # of a change of disparity by one pixel a view, in changes of depth by e
-
 
 def views_side_by_side(picture: IIPicture) -> NDArray[np.generic]:
     """Return the pixels of a regular picture as a mosaic of its views: view (v, u) at row v·L, column u·K."""
-    (k, l), (u, v) = picture.lenses, picture.ei_pixels
-    pixels = picture.pixels.reshape(l, v, k, u, 3).transpose(1, 0, 3, 2, 4)
-    return np.ascontiguousarray(pixels).reshape(v * l, u * k, 3)
+    height, width = picture.pixels.shape[:2]
+    return picture.light_field.transpose(2, 0, 3, 1, 4).reshape(height, width, 3)
 
 
 def view_tables(
@@ -91,5 +88,8 @@ def near_and_far(views: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.
 
 
 def place_of(camera: IICamera, layers_mm: Floats) -> Floats:
-    """Return the position of layers for `pass_on`: their disparity, which decreases with depth, in slopes."""
-    return -disparity_of_depth(camera, layers_mm) * SLOPE_OF_PIXELS
+    """Return the position of layers for `pass_on`: minus the disparity in pixels a view, which grows with depth.
+
+    One pixel a view then weighs as much as a change of depth by the factor e does in the method by lenses.
+    """
+    return -disparity_of_depth(camera, layers_mm)

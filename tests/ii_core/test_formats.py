@@ -362,7 +362,7 @@ def test_lenses_that_do_not_fit_a_mosaic(tmp_path):
     write_image(tmp_path / "m.png", np.zeros((7, 9, 3), np.uint8))
     with pytest.raises(ValueError, match="lenses of 10×2 px do not fit"):
         load_mosaic(tmp_path / "m.png", (10, 2))
-    with pytest.warns(UserWarning, match="1 columns at the right and 1 rows at the bottom are cut off"):
+    with pytest.warns(UserWarning, match="1 px at the right and 1 px at the bottom are cut off"):
         assert load_mosaic(tmp_path / "m.png", (4, 3)).lenses == (2, 2)
 
 
@@ -393,7 +393,7 @@ def test_import_warns_of_cropping_and_hexagonal_lenses(tmp_path, camera, ei_pixe
         warnings.simplefilter("always")
         load_mosaic(source, ei_pixels)
     texts = [str(warning.message) for warning in told]
-    assert any("5 columns at the right and 3 rows at the bottom are cut off" in text for text in texts)
+    assert any("5 px at the right and 3 px at the bottom are cut off" in text for text in texts)
     assert any("looks hexagonal" in text for text in texts) == hexagonal
     write_image(source, pixels[:-3, :-5])
     with warnings.catch_warnings(record=True) as told:

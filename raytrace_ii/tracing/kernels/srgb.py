@@ -23,10 +23,19 @@ def encode_srgb(radiance, rows, scale, curve, out):
 
 @kernel
 def encode_steps(radiance, rows, scale, codes, edges, out):
-    """Linear light as `encode_srgb` gives it, by a table of steps: a third of its time.
+    """Write the same 8-bit codes as `encode_srgb`, by a table of steps, in a third of its time.
 
-    ``codes`` are those at even steps over [0, 1], at most one code apart; ``edges`` are where, in steps, each code
-    ends, of the last one nowhere.
+    Parameters
+    ----------
+    radiance : (n, 3)
+        Sums of linear light; times ``scale`` they are from 0 to 1.
+    rows : (n,) of int
+        Row of ``out`` for each ray.
+    codes : (samples,) of uint8
+        sRGB codes of evenly spaced light from 0 to 1; neighbours differ by one at most.
+    edges : (256,)
+        Light at which each code ends, in spacings of the samples; infinity for 255.
+    out : (n, 3) of uint8
     """
     last = float(codes.shape[0] - 1)
     steps = scale * last
