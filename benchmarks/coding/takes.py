@@ -1,9 +1,9 @@
 """Coding of takes in every order over view and time: rate against stills, random access, CPU time.
 
-    python -m benchmarks run takes [--scale 8] [--takes apples,car,cuboid]
+    python -m benchmarks run takes [--scale 8] [--takes apples,car,cuboid] [--coders HEVC,AV1]
 
 Takes are rendered once into ``out/takes``. Numbers go to ``benchmarks/results/takes.jsonl``, the tables into
-``docs/video.md``; `benchmarks.pages.video` draws them.
+``docs/video.md``; `benchmarks.pages.video` draws them. With ``--coders`` only orders of these coders are measured.
 """
 
 from __future__ import annotations
@@ -55,16 +55,18 @@ FRAME_ALONE = 4
 
 def main() -> None:
     """Measure, print, record, and fill tables."""
-    asked = command_line(__doc__, scale=SCALE, takes=TAKES).parse_args()
+    asked = command_line(__doc__, scale=SCALE, takes=TAKES, coders=tuple(CODERS)).parse_args()
     takes = asked.takes
     keys: list[dict[str, Any]] = [
         {"take": take, "scale": asked.scale, "plan": plan} for plan in PLANS for take in takes
     ]
     keys += [{"take": take, "scale": asked.scale, "step": step} for step in STEPS for take in takes]
+    if asked.coders != list(CODERS):
+        keys = []
     keys += [
         {"take": take, "scale": asked.scale, "coder": coder, "order": order}
         for order in ORDERS
-        for coder in CODERS
+        for coder in asked.coders
         for take in takes
         if coder != "si-lf" or order == "stills"
     ]
