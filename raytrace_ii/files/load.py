@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tomllib
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -30,7 +31,7 @@ from ..scene.textures import (
     metallic_roughness_map,
     normal_map,
 )
-from ..shapes.primitives import Mesh, rotation
+from ..shapes.primitives import MOST_TRIANGLES, Mesh, rotation
 from ..shapes.watertight import flaw
 from .beside import read_texture
 from .mesh_model import Model, Part
@@ -256,6 +257,7 @@ class SceneLoader:
     def __init__(self, path: Path, files: MeshFiles) -> None:
         self.path, self.files = path, files
         self._made: dict[Any, tuple[Any, Any, Any]] = {}
+        self._triangles: Counter[int] = Counter()  # of each object's shape
 
     def scene(self, file: SceneFile, seconds: float = 0.0) -> Scene:
         """The scene at an instant, which clips of mesh files show."""
@@ -320,7 +322,7 @@ class SceneLoader:
             raise ValueError(f"unknown material {value.material!r}: known are {_known(materials)}")
         material = materials[value.material] if value.material is not None else None
         if "mesh" not in parameters:
-            mesh, label = self._once(("shape", i), parameters, None, partial(parse_shape, parameters))
+            mesh, label = self._once(("shape", i), parameters, None, partial(self._shape, i, parameters))
             if material is None:
                 raise ValueError("material: is missing")
             return Model([Part("", mesh, material)]), label, 0.0
@@ -335,6 +337,17 @@ class SceneLoader:
         if not file.smooth:
             parts = [replace(part, mesh=replace(part.mesh, normals=None)) for part in parts]
         return Model(parts, model.lights), path.stem, file.lights
+
+    def _shape(self, i: int, parameters: dict[str, Any]) -> tuple[Mesh, str]:
+        """Return the mesh and the name of an object's shape; the triangles of all shapes are bounded before."""
+        shape = parse_shape(parameters)
+        self._triangles[i] = shape.triangles()
+        if self._triangles.total() > MOST_TRIANGLES:
+            raise ValueError(
+                f"about {self._triangles.total():.3g} triangles with the shapes before it: "
+                f"at most {MOST_TRIANGLES} are allowed"
+            )
+        return shape.mesh(), shape.shape
 
     def _image(self, where: str, name: str, make: Any = image_texture) -> Image:
         try:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloa
 from ..scene.textures import Colour, srgb_colour
 from ..shapes.any_shape import AnyShape
 from ..shapes.implicit_parts import PARTS
-from ..shapes.primitives import Mesh, Point3
+from ..shapes.primitives import Point3
 from .validation_messages import line, words
 
 
@@ -287,10 +287,10 @@ def check_shape(parameters: dict[str, Any]) -> None:
         _checked(_ShapeHolder, {"value": parameters})
 
 
-def parse_shape(parameters: dict[str, Any]) -> tuple[Mesh, str]:
-    """Return the mesh of an object's own parameters, and the shape's name."""
-    shape = _checked(_ShapeHolder, {"value": parameters}).value
-    return shape.mesh(), shape.shape
+def parse_shape(parameters: dict[str, Any]) -> AnyShape:
+    """Return the shape of an object's own parameters."""
+    shape: AnyShape = _checked(_ShapeHolder, {"value": parameters}).value
+    return shape
 
 
 def _checked(model: Any, data: dict[str, Any]) -> Any:

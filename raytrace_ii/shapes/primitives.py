@@ -34,7 +34,8 @@ class Mesh:
     colours: NDArray[np.float64] | None = None
 
 
-MOST_TRIANGLES = 8_000_000  # of one shape; a heightfield of this size takes 7 s and 1.2 GB, and 1.6 GB in tracing
+MOST_TRIANGLES = 8_000_000  # of all shapes of a scene; a surface of revolution of this size takes 8 s and 1.6 GB
+MOST_SEGMENTS = 1 << 16  # around an axis: the polygon is within 1.2·10⁻⁹ radii of the circle, float32 within 6·10⁻⁸
 
 
 class Shape(BaseModel):
@@ -55,6 +56,8 @@ class Shape(BaseModel):
             raise ValueError(
                 f"about {float(min(count, 10**300)):.2g} triangles: at most {MOST_TRIANGLES} are allowed"
             )
+        if (segments := getattr(self, "segments", 0)) > MOST_SEGMENTS:
+            raise ValueError(f"segments is {segments}: at most {MOST_SEGMENTS} are allowed")
         return self
 
 

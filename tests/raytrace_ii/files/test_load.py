@@ -622,6 +622,7 @@ material = "m"
         ),
         ('shape = "sphere"\nradius_mm = 1\nsegments = ' + "9" * 400, "triangles: at most 8000000 are allowed"),
         ('shape = "sphere"\nradius_mm = ' + "9" * 400, "radius_mm: "),
+        ('shape = "cylinder"\nradius_mm = 1\nheight_mm = 1\nsegments = 70000', "segments is 70000: at most 65536"),
     ],
 )
 def test_shapes_are_counted_before_they_are_made(shape, says, tmp_path):
@@ -629,6 +630,13 @@ def test_shapes_are_counted_before_they_are_made(shape, says, tmp_path):
     with pytest.raises(ValueError) as caught:
         load(tmp_path, ball('shape = "sphere"\nradius_mm = 1', shape))
     assert "object.0" in str(caught.value) and says in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_triangles_of_all_shapes_of_a_scene_are_bounded_together(tmp_path):
+    """Earlier the limit was that of one shape: 30 of them took all memory."""
+    large = BALL.replace("radius_mm = 1", "radius_mm = 1\nsegments = 2828")[BALL.index("[[object]]") :]
+    with pytest.raises(ValueError, match=r"object\.1: about 8\.01e\+06 triangles with the shapes before it"):
+        load(tmp_path, BALL + large)
 
 
 def test_deep_nesting_pipes_and_other_codings_are_refused_in_one_line(tmp_path):
