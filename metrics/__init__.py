@@ -6,6 +6,7 @@ from .against_anchor import differences, mean_differences
 from .angle import q_angle_ssim, q_angle_ycbcr
 from .batch import measuring
 from .builtin_measures import MEASURES
+from .ctc import q_ctc_psnr, q_ctc_ssim
 from .depth.focus import FocusDepth, depth_from_focus
 from .depth.layers import covering_layers, disparity_layers, linear_layers, logarithmic_layers
 from .depth.q_depth import q_depth
@@ -86,6 +87,8 @@ __all__ = [
     "q_angle",
     "q_angle_ssim",
     "q_angle_ycbcr",
+    "q_ctc_psnr",
+    "q_ctc_ssim",
     "q_depth",
     "q_global",
     "q_view",

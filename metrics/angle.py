@@ -61,12 +61,16 @@ def angle_ycbcr(pair: PicturePair) -> AngleQuality:
     """Return `q_angle_ycbcr` of a pair."""
 
     def measure(a: Floats, b: Floats) -> float:
-        mse = np.square((b - a) @ YCBCR.T).mean(axis=(0, 1))
         if np.array_equal(a, b):
             return float("inf")
-        return float(np.dot([6, 1, 1], -10 * np.log10(np.maximum(mse, 1e-12))) / 8)
+        return weighted_psnr(np.square((b - a) @ YCBCR.T).mean(axis=(0, 1)))
 
-    return _each(pair, measure)
+    return each_view(pair, measure)
+
+
+def weighted_psnr(mse: Floats) -> float:
+    """Return (6·PSNR_Y + PSNR_Cb + PSNR_Cr)/8 of mean squared errors (3,) against a peak of 1; 120 dB a channel."""
+    return float(np.dot([6, 1, 1], -10 * np.log10(np.maximum(mse, 1e-12))) / 8)
 
 
 @checks.checked(scales=checks.whole)
@@ -131,10 +135,10 @@ def angle_ssim(pair: PicturePair, *, scales: int = 1) -> AngleQuality:
                 a, b = (_halved(x) for x in (a, b))
         return product
 
-    return _each(pair, measure)
+    return each_view(pair, measure)
 
 
-def _each(pair: PicturePair, measure: Callable[[Floats, Floats], float]) -> AngleQuality:
+def each_view(pair: PicturePair, measure: Callable[[Floats, Floats], float]) -> AngleQuality:
     """Return a measure of each pair of sub-images; pixels are divided by the peak."""
     pair.reference.check_regular()
     if pair.dtype.kind == "f":
@@ -150,18 +154,27 @@ def _each(pair: PicturePair, measure: Callable[[Floats, Floats], float]) -> Angl
 
 def _ssim(a: Floats, b: Floats) -> tuple[float, float]:
     """Return mean SSIM, and mean of its contrast–structure term, where the whole window fits."""
+    side = WINDOW // 2
+    luminance, contrast = (x[side:-side, side:-side] for x in ssim_maps(a, b, peak=255.0, border="reflect"))
+    return float((luminance * contrast).mean()), float(contrast.mean())
+
+
+def ssim_maps(a: Floats, b: Floats, *, peak: float, border: str) -> tuple[Floats, Floats]:
+    """Return the luminance term and the contrast–structure term of SSIM at every pixel.
+
+    ``border`` is the mode of `skimage.filters.gaussian` beyond the picture.
+    """
     from skimage.filters import gaussian
 
     def mean(x: Floats) -> Floats:
-        side = WINDOW // 2
-        return gaussian(x, sigma=1.5, truncate=side / 1.5, mode="reflect")[side:-side, side:-side]
+        return gaussian(x, sigma=1.5, truncate=(WINDOW // 2) / 1.5, mode=border)
 
-    c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
+    c1, c2 = (0.01 * peak) ** 2, (0.03 * peak) ** 2
     ma, mb = mean(a), mean(b)
     va, vb, both = mean(a * a) - ma * ma, mean(b * b) - mb * mb, mean(a * b) - ma * mb
     contrast = (2 * both + c2) / (va + vb + c2)
     luminance = (2 * ma * mb + c1) / (ma * ma + mb * mb + c1)
-    return float((luminance * contrast).mean()), float(contrast.mean())
+    return luminance, contrast
 
 
 def _halved(x: Floats) -> Floats:

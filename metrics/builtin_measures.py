@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from .angle import SCALES, angle_ssim, angle_ycbcr
+from .ctc import ctc_psnr, ctc_ssim
 from .depth.q_depth import depth_quality
 from .global_angle import angle_psnr, global_psnr
 from .measure import MEASURES, Measure, Needs, register_measure
@@ -47,6 +48,22 @@ _db("q_global", Needs(), global_psnr, float, _named("global"), "PSNR of the whol
 _db("q_angle_mean", ANGLES, angle_psnr, _mean, _named("angle", "mean"), "mean of the sub-images' PSNRs")
 _db("q_angle_min", ANGLES, angle_psnr, _worst, _named("angle", "worst"), "PSNR of the worst sub-image")
 _db("q_ycbcr", ALL_ANGLES, angle_ycbcr, _mean, "YCbCr 6:1:1 PSNR", "mean of the sub-images' YCbCr 6:1:1 PSNRs")
+_db(
+    "q_ctc_psnr",
+    ALL_ANGLES,
+    ctc_psnr,
+    _mean,
+    "PSNR-YUV of the CTC",
+    "mean of the views' PSNR-YUV by JPEG Pleno's CTC",
+)
+_share(
+    "q_ctc_ssim",
+    ALL_ANGLES,
+    ctc_ssim,
+    _mean,
+    "SSIM of the CTC",
+    "mean of the views' SSIM of luma by JPEG Pleno's CTC",
+)
 _share(
     "q_ssim",
     Needs(regular=True, all_pixels=True, lenses=WINDOW),

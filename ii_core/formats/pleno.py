@@ -1,7 +1,8 @@
-"""Views for the programs of JPEG Pleno: ``RRR_CCC.ppm`` of 10 bit, or the same names as PNG.
+"""Views for the programs of JPEG Pleno: ``CCC_RRR.ppm`` of 10 bit, the same names as PGX, or as PNG.
 
-Rows and columns count from the top left, in camera order. 8-bit codes become the nearest of the 1024 codes and return
-unchanged.
+Columns and rows count from the top left, in camera order; the column comes first, as in JPEG Pleno's pictures and
+reference software. A view in PGX is three files of one name in folders 0, 1 and 2: red, green and blue. 8-bit codes
+become the nearest of the 1024 codes and return unchanged.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from numpy.typing import NDArray
 
 from ..files import check_file, write_image
 from ..picture import IIPicture
+from .pgx import Component, read_pgx, write_pgx
 from .views import camera_views, read_view
 
 TEN_BIT = 1023
-KINDS = ("ppm", "png")
+KINDS = ("ppm", "pgx", "png")
+COMPONENTS = ("0", "1", "2")  # folders of red, green and blue in PGX
 MAX_HEADER = 256  # bytes
 Pixels = NDArray[Any]
 
@@ -31,7 +34,7 @@ def write_pleno_views(picture: IIPicture, folder: Path, kind: str) -> int:
         Regular, uint8.
     folder : Path
         Created if missing.
-    kind : {"ppm", "png"}
+    kind : {"ppm", "pgx", "png"}
 
     Raises
     ------
@@ -40,16 +43,25 @@ def write_pleno_views(picture: IIPicture, folder: Path, kind: str) -> int:
     """
     if picture.pixels.dtype != np.uint8:
         raise ValueError(f"picture is {picture.pixels.dtype}: views for other programs are made of uint8")
-    folder.mkdir(parents=True, exist_ok=True)
+    make_view_folder(folder, kind)
     count = 0
     for row, col, view in camera_views(picture):
-        path = folder / view_name(row, col, kind)
+        name = view_name(row, col, kind)
         if kind == "ppm":
-            write_ppm(path, _ten_bit(view))
+            write_ppm(folder / name, ten_bit(view))
+        elif kind == "pgx":
+            for part, codes in zip(COMPONENTS, np.moveaxis(ten_bit(view), 2, 0), strict=True):
+                write_pgx(folder / part / name, Component(codes.astype(np.int32), 10, signed=False))
         else:
-            write_image(path, view)
+            write_image(folder / name, view)
         count += 1
     return count
+
+
+def make_view_folder(folder: Path, kind: str) -> None:
+    """Create a folder for views with the folders of its components."""
+    for part in COMPONENTS if kind == "pgx" else (".",):
+        (folder / part).mkdir(parents=True, exist_ok=True)
 
 
 def read_pleno_views(folder: Path, like: IIPicture, kind: str) -> IIPicture:
@@ -70,22 +82,38 @@ def read_pleno_views(folder: Path, like: IIPicture, kind: str) -> IIPicture:
     out = np.empty_like(like.pixels)
     empty = like.with_pixels(out)
     for row, col, view in camera_views(empty):  # views of `out`, in place
-        path = folder / view_name(row, col, kind)
-        if not path.is_file():
-            raise ValueError(f"view {path.name} is missing")
-        found = _eight_bit(read_ppm(path)) if kind == "ppm" else read_view(path)
-        if found.shape != view.shape or found.dtype != np.uint8:
-            raise ValueError(
-                f"view {path.name} is {found.shape[1]}×{found.shape[0]} px of {found.dtype}: "
-                f"{view.shape[1]}×{view.shape[0]} px of uint8 are needed"
-            )
-        view[...] = found
+        name = view_name(row, col, kind)
+        if kind == "pgx":
+            for channel, part in enumerate(COMPONENTS):
+                view[..., channel] = _read_codes(folder, f"{part}/{name}", kind, view[..., channel].shape)
+        else:
+            view[...] = _read_codes(folder, name, kind, view.shape)
     return empty
+
+
+def _read_codes(folder: Path, name: str, kind: str, shape: tuple[int, ...]) -> Pixels:
+    """Return the 8-bit codes of a view or of one component of it."""
+    path = folder / name
+    if not path.is_file():
+        raise ValueError(f"view {name} is missing")
+    if kind == "ppm":
+        found = _eight_bit(read_ppm(path), TEN_BIT)
+    elif kind == "pgx":
+        component = read_pgx(path)
+        found = _eight_bit(component.codes - component.lowest, (1 << component.bits) - 1)
+    else:
+        found = read_view(path)
+    if found.shape != shape or found.dtype != np.uint8:
+        raise ValueError(
+            f"view {name} is {found.shape[1]}×{found.shape[0]} px of {found.dtype}: "
+            f"{shape[1]}×{shape[0]} px of uint8 are needed"
+        )
+    return found
 
 
 def view_name(row: int, col: int, kind: str) -> str:
     """Return the name of a view's file."""
-    return f"{row:03}_{col:03}.{kind}"
+    return f"{col:03}_{row:03}.{kind}"
 
 
 def write_ppm(path: Path, codes: Pixels) -> None:
@@ -134,9 +162,10 @@ def _header(data: bytes) -> tuple[list[bytes], int]:
     return words, at + 1  # one white space ends the head
 
 
-def _ten_bit(codes: Pixels) -> Pixels:
+def ten_bit(codes: Pixels) -> Pixels:
+    """Return the nearest of the 1024 codes of 8-bit codes."""
     return (codes.astype(np.uint32) * TEN_BIT * 2 + 255) // 510
 
 
-def _eight_bit(codes: Pixels) -> Pixels:
-    return ((codes.astype(np.uint32) * 255 * 2 + TEN_BIT) // (2 * TEN_BIT)).astype(np.uint8)
+def _eight_bit(codes: Pixels, highest: int) -> Pixels:
+    return ((codes.astype(np.uint32) * 255 * 2 + highest) // (2 * highest)).astype(np.uint8)

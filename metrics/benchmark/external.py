@@ -21,7 +21,7 @@ from pathlib import Path
 
 from ii_core import IIPicture
 from ii_core.files import one_line
-from ii_core.formats.pleno import KINDS, read_pleno_views, write_pleno_views
+from ii_core.formats.pleno import KINDS, make_view_folder, read_pleno_views, write_pleno_views
 
 KNOWN = ("{in}", "{out}", "{bpp}", "{bytes}", "{rows}", "{columns}", "{width}", "{height}")
 MAX_OUTPUT = 300  # characters of a failed command's output that the message quotes
@@ -65,8 +65,9 @@ class External:
         Commands, split by a shell's rules, but run without one. Both need ``{in}`` and ``{out}``: for the encoder the
         folder of views and the coded file, for the decoder the coded file and the folder of views. Optional are
         ``{bpp}``, ``{bytes}`` (the target), ``{rows}``, ``{columns}`` (views), ``{width}``, ``{height}`` (of a view).
-    kind : {"ppm", "png"}
-        Files of the views: binary PPM of 10 bit, or PNG of 8 bit; named RRR_CCC.
+    kind : {"ppm", "pgx", "png"}
+        Files of the views: binary PPM of 10 bit, PGX of 10 bit in folders 0, 1 and 2 of red, green and blue, or PNG
+        of 8 bit; named CCC_RRR, the column first.
     seconds : float
         Limit of each command.
     rate_tolerance : float
@@ -133,7 +134,7 @@ class External:
         with _folder() as folder:
             source, views = folder / "coded", folder / "views"
             source.write_bytes(coded.data)
-            views.mkdir()
+            make_view_folder(views, self.kind)
             values = self._values(coded.like) | {"{in}": str(source), "{out}": str(views)}
             seconds = self._run("decoder", self.decoder, values, folder)
             try:

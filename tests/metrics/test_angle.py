@@ -7,7 +7,8 @@ import pytest
 from skimage.metrics import structural_similarity
 
 from ii_core import IIPicture
-from metrics import q_angle_ssim, q_angle_ycbcr
+from metrics import q_angle_ssim, q_angle_ycbcr, q_ctc_psnr, q_ctc_ssim
+from metrics.ctc import codes
 
 PEAKS = {"uint8": 255, "uint16": 65535, "float32": 1.0}
 
@@ -118,3 +119,50 @@ def test_refusals():
     for measure in (q_angle_ycbcr, q_angle_ssim):
         with pytest.raises(ValueError, match=r"decoded pixel \(9, 4\)"):
             measure(f, f.with_pixels(bad))
+
+
+# -- JPEG Pleno's common test conditions
+
+
+def test_codes_of_ten_bit_are_those_of_colour_bars():
+    """Bars of 100 % in 10 bit: the values of BT.709's colour bars in every waveform manual."""
+    bars = {
+        (1, 1, 1): (940, 512, 512), (1, 1, 0): (877, 64, 553), (0, 1, 1): (754, 615, 64), (0, 1, 0): (691, 167, 105),
+        (1, 0, 1): (313, 857, 919), (1, 0, 0): (250, 409, 960), (0, 0, 1): (127, 960, 471), (0, 0, 0): (64, 512, 512),
+    }  # fmt: skip
+    for rgb, expected in bars.items():
+        assert tuple(codes(np.array(rgb, float))) == expected
+
+
+def test_psnr_of_the_conditions_by_hand():
+    a = picture().with_pixels(np.full((44, 72, 3), 100, np.uint8))
+    b = a.with_pixels((a.pixels + np.array([7, 0, 3])).astype(np.uint8))
+    steps = []
+    for pixels in (a.pixels, b.pixels):
+        r, g, blue = (round(1023 * int(c) / 255) / 1023 for c in pixels[0, 0])
+        y = 0.2126 * r + 0.7152 * g + 0.0722 * blue
+        steps.append(
+            (round(64 + 876 * y), round(512 + 896 * (blue - y) / 1.8556), round(512 + 896 * (r - y) / 1.5748))
+        )
+    parts = [20 * math.log10(1023 / abs(x - y)) for x, y in zip(*steps, strict=True)]
+    np.testing.assert_allclose(q_ctc_psnr(a, b).values, np.dot([6, 1, 1], parts) / 8, rtol=1e-12)
+    assert (q_ctc_psnr(a, a).values == math.inf).all()
+    # Against full-range, unrounded values: 20·log10 of 1023/876 for luma and 1023/896 for chroma. Rounding moves a
+    # code by 0.4 rms, errors are 20 codes and more, and 528 pixels average their product to 0.2 %: 0.01 dB.
+    a = picture(seed=3)
+    noisy = worse(a, 2, 1, np.random.default_rng(1).normal(0, 8, (22, 24, 3)))
+    higher = q_ctc_psnr(a, noisy).values[1, 2] - q_angle_ycbcr(a, noisy).values[1, 2]
+    expected = (6 * 20 * math.log10(1023 / 876) + 2 * 20 * math.log10(1023 / 896)) / 8
+    assert higher == pytest.approx(expected, abs=0.02)
+
+
+def test_ssim_of_the_conditions_is_that_of_another_implementation():
+    a, b = picture(), picture(seed=1)
+    b = a.with_pixels((0.7 * a.pixels + 0.3 * b.pixels).astype(np.uint8))
+    assert (q_ctc_ssim(a, a).values == 1).all()
+    q = q_ctc_ssim(a, b).values
+    for v, u in np.ndindex(2, 3):
+        # The border repeats; this implementation leaves five pixels of border out of its mean.
+        x, y = (np.pad(codes(p.pixels[v::2, u::3] / 255)[..., 0] / 1023, 5, mode="edge") for p in (a, b))
+        expected = structural_similarity(x, y, data_range=1, gaussian_weights=True, use_sample_covariance=False)
+        assert q[v, u] == pytest.approx(expected, abs=1e-9)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture
-from ii_core.formats.pleno import read_pleno_views, read_ppm, write_pleno_views, write_ppm
+from ii_core.formats.pgx import Component, read_pgx, write_pgx
+from ii_core.formats.pleno import COMPONENTS, read_pleno_views, read_ppm, write_pleno_views, write_ppm
 from metrics.benchmark.external import External, Refused
 from metrics.benchmark.profile import profile, profile_names
 from metrics.benchmark.ranking import chart_path, ranked, write_page
@@ -95,9 +96,9 @@ def test_every_8_bit_code_survives_10_bits(tmp_path):
     pixels = np.repeat(codes, 2, axis=1)
     shown = IIPicture(pixels, (256, 2), (2, 1))
     assert write_pleno_views(shown, tmp_path, "ppm") == 2
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["000_000.ppm", "000_001.ppm"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["000_000.ppm", "001_000.ppm"]
     np.testing.assert_array_equal(read_pleno_views(tmp_path, shown, "ppm").pixels, pixels)
-    ten = read_ppm(tmp_path / "000_001.ppm")[0, :, 0]
+    ten = read_ppm(tmp_path / "001_000.ppm")[0, :, 0]
     assert (ten[0], ten[128], ten[255]) == (0, round(128 * 1023 / 255), 1023)
 
 
@@ -117,7 +118,99 @@ def test_first_view_is_that_from_the_top_left(tmp_path, picture):
     from ii_core.files import read_image
 
     np.testing.assert_array_equal(read_image(tmp_path / "a" / "000_000.png"), picture.pixels[0::3, 0::3])
-    np.testing.assert_array_equal(read_image(tmp_path / "a" / "002_001.png"), picture.pixels[2::3, 1::3])
+    # Column 2, row 1: "S_T" of JPEG Pleno's reference software. This test wanted the row first until the names were
+    # compared with that software; round trips and square fields had hidden it.
+    np.testing.assert_array_equal(read_image(tmp_path / "a" / "002_001.png"), picture.pixels[1::3, 2::3])
+
+
+def test_views_of_pgx_are_three_files_each(tmp_path, picture):
+    assert write_pleno_views(picture, tmp_path, "pgx") == 9
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["0", "1", "2"]
+    np.testing.assert_array_equal(read_pleno_views(tmp_path, picture, "pgx").pixels, picture.pixels)
+    blue = read_pgx(tmp_path / "2" / "002_001.pgx")
+    assert (blue.bits, blue.signed) == (10, False)
+    np.testing.assert_array_equal(blue.codes, np.rint(picture.pixels[1::3, 2::3, 2] * (1023 / 255)))
+    # A decoder may write another depth, sign and byte order: 8 bit or more return every code.
+    for bits, signed, little in ((8, True, False), (12, False, True), (16, True, True)):
+        for part in COMPONENTS:
+            for path in (tmp_path / part).iterdir():
+                shade = read_pleno_views(tmp_path, picture, "pgx").pixels[1::3, 2::3, int(part)]
+                if path.name == "002_001.pgx":
+                    codes = np.rint(shade * ((2**bits - 1) / 255)).astype(np.int32)
+                    write_pgx(
+                        path, Component(codes - (2 ** (bits - 1) if signed else 0), bits, signed), little=little
+                    )
+        np.testing.assert_array_equal(read_pleno_views(tmp_path, picture, "pgx").pixels, picture.pixels)
+    (tmp_path / "1" / "000_002.pgx").unlink()
+    with pytest.raises(ValueError, match=r"view 1/000_002\.pgx is missing"):
+        read_pleno_views(tmp_path, picture, "pgx")
+
+
+@pytest.mark.parametrize("bits", range(1, 17))
+@pytest.mark.parametrize("signed", [False, True])
+@pytest.mark.parametrize("little", [False, True])
+def test_pgx_of_every_depth_survives(tmp_path, bits, signed, little):
+    codes = np.random.default_rng(bits).integers(0, 1 << bits, (3, 5))
+    codes[0, :2] = 0, (1 << bits) - 1
+    component = Component((codes - ((1 << bits - 1) if signed else 0)).astype(np.int32), bits, signed)
+    write_pgx(tmp_path / "a.pgx", component, little=little)
+    again = read_pgx(tmp_path / "a.pgx")
+    np.testing.assert_array_equal(again.codes, component.codes)
+    assert again[1:] == (bits, signed)
+    assert len((tmp_path / "a.pgx").read_bytes().partition(b"\n")[2]) == 15 * (1 if bits <= 8 else 2)
+
+
+def test_bytes_of_a_pgx_are_the_format_s(tmp_path):
+    path = tmp_path / "a.pgx"
+    write_pgx(path, Component(np.array([[0, 1023]], np.int32), 10, signed=False))
+    assert path.read_bytes() == b"PG ML +10 2 1\n\0\0\3\xff"
+    write_pgx(path, Component(np.array([[-2, 513]], np.int32), 12, signed=True), little=True)
+    assert path.read_bytes() == b"PG LM -12 2 1\n\xfe\xff\1\2"
+    # Heads of JPEG Pleno's reference software, OpenJPEG and Kakadu: a space before the line feed, no sign, a space
+    # after the sign, a carriage return.
+    for head in (b"PG ML +10 2 1 \n", b"PG ML 10 2 1\n", b"PG ML + 10 2 1\n", b"PG ML +10 2 1\r\n"):
+        path.write_bytes(head + b"\0\0\3\xff")
+        assert read_pgx(path).codes.tolist() == [[0, 1023]]
+    path.write_bytes(b"PG ML +8 2 1\n\n\n")  # pixels that look like the end of the header
+    assert read_pgx(path).codes.tolist() == [[10, 10]]
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"", "is no PGX file"),
+        (b"QG ML +10 2 1\n\0\0\0\0", "is no PGX file"),
+        (b"PG L= +10 2 1\n\0\0\0\0", "is no PGX file"),
+        (b"PG ML *10 2 1\n\0\0\0\0", "is no PGX file"),
+        (b"PG ML +10 2\n\0\0\0\0", "is no PGX file"),
+        (b"PG ML +10 2 1", "is no PGX file"),
+        (b"PG ML +10 99999999 1\n", "is no PGX file"),
+        (b"PG ML +0 2 1\n\0\0", "has 0 bit: 1 to 16"),
+        (b"PG ML +17 2 1\n" + bytes(8), "has 17 bit: 1 to 16"),
+        (b"PG ML +10 2 1\n\0\0\0", "has 3 bytes of pixels: 4"),
+        (b"PG ML +8 2 1\n\0\0\0", "has 3 bytes of pixels: 2"),
+        (b"PG ML +10 9999999 9999999\n\0", "has 1 bytes of pixels"),
+        (b"PG ML +10 2 1\n\0\0\4\0", "has a code of 1024: 0 to 1023"),
+        (b"PG ML -4 2 1\n\0\xf7", "has a code of -9: -8 to 7"),
+    ],
+)
+def test_wrong_pgx_files_are_refused(tmp_path, data, message):
+    (tmp_path / "a.pgx").write_bytes(data)
+    with pytest.raises(ValueError, match=rf"a\.pgx {message}"):
+        read_pgx(tmp_path / "a.pgx")
+
+
+def test_codes_that_do_not_fit_are_not_written(tmp_path):
+    for codes, bits, signed, message in (
+        (1024, 10, False, "1024: 0 to 1023"),
+        (-1, 8, False, "-1"),
+        (8, 4, True, "8"),
+    ):
+        with pytest.raises(ValueError, match=f"a code of {message}"):
+            write_pgx(tmp_path / "a.pgx", Component(np.array([[codes]], np.int32), bits, signed))
+    with pytest.raises(ValueError, match="bits is 17"):
+        write_pgx(tmp_path / "a.pgx", Component(np.zeros((1, 1), np.int32), 17, signed=False))
+    assert not (tmp_path / "a.pgx").exists()
 
 
 @pytest.mark.parametrize(
@@ -151,6 +244,20 @@ def test_commands_code_and_decode(picture, coder):
     coarse = coder.encode(picture, "deflate", bpp=6.0)
     assert coarse.bpp <= 6.0 and abs(coder.decode(coarse).picture.pixels.astype(int) - picture.pixels).max() > 0
     assert not coder.encode(picture, "deflate", bpp=0.01).reached
+
+
+def test_commands_get_and_return_pgx(picture):
+    """A tar of the folder: three files a view, in folders that the decoder finds there."""
+    code = (
+        "import sys, tarfile, os; a, b = sys.argv[1:]; packs = os.path.isdir(a);"
+        "t = tarfile.open(b if packs else a, 'w' if packs else 'r');"
+        "t.add(a, '.') if packs else t.extractall(b); t.close()"
+    )
+    start = f"{PYTHON} -c {shlex.quote(code)} {{in}} {{out}}"
+    plain = External(encoder=start, decoder=start, kind="pgx")
+    coded = plain.encode(picture, "tar", bpp=1e6)
+    assert coded.data.count(b"PG ML +10 6 5\n") == 27
+    np.testing.assert_array_equal(plain.decode(coded).picture.pixels, picture.pixels)
 
 
 def failing(code):
@@ -226,7 +333,9 @@ def test_wrong_commands_are_refused_before_work(encoder, message):
 def test_profiles_of_the_package():
     assert set(profile_names()) == {"dissertation", "jpeg-pleno", "small"}
     pleno, own = profile("jpeg-pleno"), profile("dissertation")
-    assert pleno.rates_bpp == (0.001, 0.005, 0.02, 0.1, 0.75) and {"q_ycbcr", "q_ssim"} <= set(pleno.measures)
+    assert pleno.rates_bpp == (0.001, 0.005, 0.02, 0.1, 0.75) and {"q_ctc_psnr", "q_ctc_ssim"} <= set(pleno.measures)
+    # Version 1 measured PSNR of full-range values and SSIM of BT.601 luma: other figures than the conditions have.
+    assert pleno.version == 2 and pleno.rank_by == "q_ctc_psnr"
     assert len(own.pictures) == 8 and {p.scale for p in own.pictures} == {1}
     for made in (pleno, own, profile("small")):
         for reference in made.pictures:
