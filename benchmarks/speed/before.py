@@ -36,10 +36,13 @@ def nanoseconds(scene: str, repeats: int) -> dict[str, list[float]]:
     bands = BANDS.get(scene, USUAL_BANDS)
     pixels = 8192 * BAND * len(bands)
     found: dict[str, list[float]] = {"now": [], "before": [], "bare": []}
-    with _process(ROOT, scene, bands) as now, _process(worktree(), scene, bands) as before:
+    arguments = (Path(__file__), scene, *map(str, bands))
+    with process(ROOT, *arguments) as now, process(worktree(), *arguments) as before:
+        for measure in (now, before):
+            measure("render")  # compiles the kernels
         for _ in range(repeats):
             for name, measure in (("now", now), ("before", before), ("bare", before)):
-                found[name].append(measure("bare" if name == "bare" else "render") / pixels * 1e9)
+                found[name].append(float(measure("bare" if name == "bare" else "render")) / pixels * 1e9)
     return found
 
 
@@ -59,26 +62,25 @@ def worktree() -> Path:
 
 
 @contextmanager
-def _process(code: Path, scene: str, bands: tuple[int, ...]) -> Iterator[Callable[[str], float]]:
-    """Start a process with the code of a tree; return a function that measures a task in it."""
+def process(code: Path, script: Path, *arguments: str) -> Iterator[Callable[[str], str]]:
+    """Start a script with the code of a tree; return a function that sends it a line and returns its answer."""
     run = subprocess.Popen(
-        [sys.executable, str(Path(__file__)), scene, *map(str, bands)],
+        [sys.executable, str(script), *arguments],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=code,
         env={**os.environ, "PYTHONPATH": str(code), "PYTHONSAFEPATH": "1"},
     )  # fmt: skip
     assert run.stdin is not None and run.stdout is not None
     to, back = run.stdin, run.stdout
 
-    def measure(task: str) -> float:
+    def ask(task: str) -> str:
         print(task, file=to, flush=True)
         line = back.readline()
         if not line:
             raise RuntimeError(f"the process with the code of {code} died on the task {task!r}")
-        return float(line)
+        return line
 
     try:
-        measure("render")  # compiles the kernels
-        yield measure
+        yield ask
     finally:
         to.close()
         run.wait()

@@ -5,22 +5,19 @@
 The error is PSNR in 16-bit sRGB against a reference of 256 samples per pixel and 12 bounces, with triangles half as
 large where the scene file sets the tessellation. Time is CPU seconds of `render` without support images, the least of
 two or three. Samples per pixel, adaptive sampling, recursion depth and tessellation are varied. The code of an
-earlier commit makes the same study, right before, in a process of its own and against its own reference. A band of
-lenses stands for pictures with more rows of them. Records go to ``benchmarks/results/pareto.jsonl``, tables to
-``docs/speed_accuracy.md``, the chart to ``docs/images/pareto.png``.
+earlier commit renders each setting in turn with the present one, each in a process of its own and against its own
+reference. A band of lenses stands for pictures with more rows of them. Records go to
+``benchmarks/results/pareto.jsonl``, tables to ``docs/speed_accuracy.md``, the chart to ``docs/images/pareto.png``.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import os
 import re
 import shutil
-import subprocess
-import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -33,18 +30,19 @@ from benchmarks.accuracy.map_precision import SCALE as MAPS_SCALE
 from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, by_scene, origin
+from benchmarks.records import ROOT, Records, by_scene, origin
 from benchmarks.speed.before import COMMIT, worktree
-from ii_core import IICamera, IIPicture, preset
+from benchmarks.speed.shots import Shots, shots
+from ii_core import IICamera, preset
 from ii_core.display.figure import COLOURS
-from metrics import q_global
-from raytrace_ii import Scene, load_scene, render
+from raytrace_ii import Scene, load_scene
 from raytrace_ii.tracing.packing import packed, share
 
-RECORDS, SCALE = Records("pareto", ("benchmarks.speed.pareto", "benchmarks.speed.before")), 32  # scale on the page
+MODULES = ("benchmarks.speed.pareto", "benchmarks.speed.shots", "benchmarks.speed.before")
+RECORDS, SCALE = Records("pareto", MODULES), 32  # scale on the page
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
 SAMPLES = (1, 2, 4, 9, 16)
-AT_DEPTHS = (1, 4, 16)  # samples at which other depths are tried
+AT_DEPTHS = (1, 4)  # samples at which other depths are tried
 DEPTHS = (0, 1, 2, 3, 4, 6, 8)
 ERRORS = (8.0, 4.0, 2.0, 1.0, 0.5)  # of adaptive sampling between LEAST and MOST, steps of 8 bits
 LEAST, MOST = 4, 16
@@ -52,7 +50,7 @@ FINER = 2.0  # tessellation of the reference
 CUTS = (0.25, 0.5, 1.0, FINER)
 TRUE = {"samples": 256, "depth": 12}
 TRUE_SEED = 1  # not that of the settings: their samples would be among the reference's
-BAND = 16  # rows of lenses
+BAND = 8  # rows of lenses
 SENSOR_DB = 47.5  # PSNR of the sensor's own noise of one 8-bit step
 BASE = 4  # samples at which depth and cut are compared
 
@@ -110,26 +108,12 @@ def band(camera: IICamera) -> IICamera:
 
 
 def both(name: str, camera: IICamera) -> dict[str, Any]:
-    """Return the study of one scene, with that of the earlier code as ``before``."""
-    before = study_before(name, camera)
-    return {**study(name, camera), "before": before}
-
-
-def study_before(name: str, camera: IICamera) -> dict[str, Any]:
-    """Return the study of one scene by the code of COMMIT, with as many samples in its own reference."""
-    program = (
-        "import json, sys\nfrom benchmarks import pareto\nfrom ii_core import IICamera\n"
-        "name, camera, samples = json.load(sys.stdin)\npareto.TRUE['samples'] = samples\n"
-        "json.dump(pareto.study(name, IICamera.from_json(camera)), sys.stdout, default=float)"
-    )
-    tree = worktree()
-    run = subprocess.run(
-        [sys.executable, "-c", program], input=json.dumps([name, camera.to_json(), TRUE["samples"]]), text=True,
-        stdout=subprocess.PIPE, check=True, cwd=tree,
-        env={**os.environ, "PYTHONPATH": str(tree), "PYTHONSAFEPATH": "1"},
-    )  # fmt: skip
-    found: dict[str, Any] = json.loads(run.stdout)
-    return found
+    """Return the study of one scene, with that of the earlier code as ``before``: each setting by both in turn."""
+    cuts = [*CUTS] if sizes(scene_text(name)) else [1.0]
+    start = name, json.dumps(camera.to_json()), cuts
+    with shots(ROOT, *start) as (now, facts), shots(worktree(), *start) as (before, _):
+        studies = study(name, facts, (now, before))
+    return {**studies[0], "before": studies[1]}
 
 
 def speedup(one: dict[str, Any]) -> float:
@@ -142,59 +126,44 @@ def speedup(one: dict[str, Any]) -> float:
     return aim["seconds"] / min(reached) if reached else math.nan
 
 
-def study(name: str, camera: IICamera) -> dict[str, Any]:
-    """Return the results of all settings of one scene."""
-    scenes = {cut: cut_scene(name, cut) for cut in CUTS} if sizes(scene_text(name)) else {1.0: load_scene(name)}
-    finest, scene = scenes[max(scenes)], scenes[1.0]
-    truth = shoot(at_depth(finest, TRUE["depth"]), camera, TRUE["samples"], seed=TRUE_SEED)[0]
-    bounces = packed(scene).mirrors or packed(scene).transmits
-    rows: list[dict[str, Any]] = []
+def study(name: str, facts: dict[str, Any], codes: Sequence[Shots]) -> list[dict[str, Any]]:
+    """Return the results of all settings of one scene, by each code; references first."""
+    most_depth, cuts = facts["max_depth"], [float(cut) for cut in facts["faces"]]
+    scene = packed(load_scene(name))
+    bounces = scene.mirrors or scene.transmits
+    repeats_to = []
+    for options in ({"samples": TRUE["samples"], "seed": TRUE_SEED}, {"samples": 64, "seed": TRUE_SEED + 1}):
+        repeats_to = [shoot(cut=max(cuts), depth=TRUE["depth"], repeats=1, options=options)[1] for shoot in codes]
+    rows: list[list[dict[str, Any]]] = [[] for _ in codes]
+    for sweep, cut, depth, samples, error in settings(most_depth, bounces, cuts):
+        how: dict[str, Any] = {"samples": samples} if error is None else {"samples": (LEAST, samples), "error": error}
+        shown = {"sweep": sweep, "samples": samples, "depth": depth if bounces else 0, "error": error, "cut": cut}
+        for shoot, found in zip(codes, rows, strict=True):
+            seconds, psnr = shoot(
+                cut=cut, depth=depth, repeats=3 if samples <= 2 else 2, options={**how, "workers": 1}
+            )
+            found.append({**shown, "seconds": seconds, "psnr": psnr})
+    return [
+        {
+            **facts, "bounces": bounces, "truth_samples": TRUE["samples"], "truth_repeats_to": repeats, "rows": found,
+            "front": (best := front(found)), "recommended": recommended([found[i] for i in best]),
+        }
+        for repeats, found in zip(repeats_to, rows, strict=True)
+    ]  # fmt: skip
 
-    def add(sweep: str, scene: Scene, samples: int, error: float | None = None, cut: float = 1.0) -> None:
-        picture, seconds = shoot(scene, camera, samples if error is None else (LEAST, samples), error or 0.5)
-        setting = {"samples": samples, "depth": scene.max_depth if bounces else 0, "error": error, "cut": cut}
-        rows.append({"sweep": sweep, **setting, "seconds": seconds, "psnr": q_global(truth, picture)})
 
-    for depth in sorted({*DEPTHS, scene.max_depth}) if bounces else (scene.max_depth,):
-        for samples in SAMPLES if depth == scene.max_depth else AT_DEPTHS:
-            add("samples" if depth == scene.max_depth else "depth", at_depth(scene, depth), samples)
+def settings(
+    most_depth: int, bounces: bool, cuts: Sequence[float]
+) -> Iterator[tuple[str, float, int, int, float | None]]:
+    """Yield sweep, tessellation, depth, samples and error of every setting; with an error, the most samples."""
+    for depth in sorted({*DEPTHS, most_depth}) if bounces else (most_depth,):
+        for samples in SAMPLES if depth == most_depth else AT_DEPTHS:
+            yield "samples" if depth == most_depth else "depth", 1.0, depth, samples, None
     for error in ERRORS:
-        add("adaptive", scene, MOST, error)
-    for cut, other in scenes.items():
+        yield "adaptive", 1.0, most_depth, MOST, error
+    for cut in cuts:
         if cut != 1:
-            add("cut", other, BASE, cut=cut)
-    return {
-        "max_depth": scene.max_depth,
-        "bounces": bounces,
-        "faces": {str(cut): sum(len(body.faces) for body in other.bodies) for cut, other in scenes.items()},
-        "truth_samples": TRUE["samples"],
-        "truth_repeats_to": q_global(truth, shoot(at_depth(finest, TRUE["depth"]), camera, 64, seed=2)[0]),
-        "rows": rows,
-        "front": (best := front(rows)),
-        "recommended": recommended([rows[i] for i in best]),
-    }
-
-
-def shoot(
-    scene: Scene, camera: IICamera, samples: int | tuple[int, int], error: float = 0.5, seed: int = 0
-) -> tuple[IIPicture, float]:
-    """Return the picture and its CPU seconds: the least of two, or of three for fast renders; one for references."""
-    most = samples if isinstance(samples, int) else samples[1]
-    timed = most <= max(SAMPLES)
-    shots = [
-        render(
-            scene,
-            camera,
-            samples=samples,
-            error=error,
-            seed=seed,
-            dtype="uint16",
-            support=(),
-            workers=1 if timed else None,
-        )
-        for _ in range((3 if most <= 2 else 2) if timed else 1)
-    ]
-    return shots[0].picture, min(shot.stats.cpu_seconds for shot in shots)
+            yield "cut", cut, most_depth, BASE, None
 
 
 def at_depth(scene: Scene, depth: int) -> Scene:

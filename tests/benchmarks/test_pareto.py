@@ -73,3 +73,24 @@ def test_speedup_is_the_ratio_of_times_at_the_earlier_recommended_psnr_or_more()
         "| geometric mean | | | | 6.00 |",
     ]
     assert len(pareto.fronts_table({"apples": {"rows": one["rows"]}})) == 1, "nothing of the earlier code"
+
+
+def test_each_setting_is_rendered_by_both_codes_in_turn_after_their_references():
+    """The earlier study ran before the present one: what else the machine did changed the ratios."""
+    calls = []
+
+    def code(name, seconds):
+        def shoot(**setting):
+            calls.append((name, setting["options"]))
+            return seconds, 30.0 + setting["options"].get("error", 0)
+
+        return shoot
+
+    facts = {"faces": {"1.0": 12}, "max_depth": 6}
+    now, before = pareto.study("cuboid", facts, (code("now", 1.0), code("before", 2.0)))
+    assert [options["samples"] for _, options in calls[:4]] == [pareto.TRUE["samples"]] * 2 + [64] * 2
+    assert [name for name, _ in calls] == ["now", "before"] * (len(calls) // 2)
+    assert all(one == other for (_, one), (_, other) in zip(calls[::2], calls[1::2], strict=True))
+    assert len(now["rows"]) == len(pareto.SAMPLES) + len(pareto.ERRORS), "nothing mirrors, one tessellation"
+    assert before["recommended"]["setting"] == "4 to 16 samples, error 8"
+    assert {row["seconds"] for row in now["rows"]} == {1.0} and {row["seconds"] for row in before["rows"]} == {2.0}
