@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -252,10 +252,13 @@ MAPS: dict[str, Callable[[NDArray[Any]], Image]] = {
 
 
 class SceneLoader:
-    """Makes scenes of one file's tables; what stays the same from scene to scene is made once."""
+    """Makes scenes of one file's tables; what stays the same from scene to scene is made once.
 
-    def __init__(self, path: Path, files: MeshFiles) -> None:
-        self.path, self.files = path, files
+    With ``moves`` meshes of bodies are kept at their size and turn, too, which takes their memory once more.
+    """
+
+    def __init__(self, path: Path, files: MeshFiles, *, moves: bool = False) -> None:
+        self.path, self.files, self.moves = path, files, moves
         self._made: dict[Any, tuple[Any, Any, Any]] = {}
         self._triangles: Counter[int] = Counter()  # of each object's shape
 
@@ -310,8 +313,13 @@ class SceneLoader:
     ) -> tuple[list[Body], list[Light]]:
         """An object's bodies and lights."""
         model, label, strength = self._model(i, value, materials, seconds)
-        bodies = list(_bodies(value, model.parts, f"{label} {i}"))
+        bodies = list(_bodies(value, model.parts, f"{label} {i}", partial(self._turned, i, value)))
         return bodies, [_placed(light, value, strength) for light in model.lights if strength > 0]
+
+    def _turned(self, i: int, value: ObjectTable, part: int, mesh: Mesh) -> _Turned:
+        """Return a part's mesh at the object's size and turn, before its place is added."""
+        make = partial(_turned, value, mesh)
+        return self._once(("turned", i, part), (value.scale, value.rotate_deg), mesh, make) if self.moves else make()
 
     def _model(
         self, i: int, value: ObjectTable, materials: dict[str, Material], seconds: float
@@ -432,23 +440,40 @@ def _light(index: int, value: AnyLight) -> Light:
         raise ValueError(f"light.{index}: {error}") from None
 
 
-def _bodies(value: ObjectTable, parts: list[Part], label: str) -> Iterator[Body]:
+class _Turned(NamedTuple):
+    """Mesh at an object's size and turn: vertices, their normals, and positions in the object's own frame."""
+
+    vertices: NDArray[np.float64]
+    normals: NDArray[np.float64] | None
+    positions: NDArray[np.float64]
+
+
+def _turned(value: ObjectTable, mesh: Mesh) -> _Turned:
+    size, turn = np.array(value.scale), rotation(value.rotate_deg)
+    positions = mesh.vertices * size
+    normals = None if mesh.normals is None else unit_rows(mesh.normals / size) @ turn.T
+    return _Turned(positions @ turn.T, normals, positions)
+
+
+def _bodies(
+    value: ObjectTable, parts: list[Part], label: str, turned: Callable[[int, Mesh], _Turned]
+) -> Iterator[Body]:
     """Return the parts of an object in its pose."""
     size = np.array(value.scale)
-    turn = rotation(value.rotate_deg)
     name = value.name or label
     shared: dict[Any, NDArray[np.float64]] = {}
-    for part in parts:
+    for i, part in enumerate(parts):
         mesh, material = part.mesh, part.material if part.material is not None else Material()
         if part.material is not None and value.material is None:  # a file's own material counts in its own units
             material = _scaled(material, float(np.prod(size) ** (1 / 3)))
+        placed = turned(i, mesh)
         yield Body(
             name=f"{name}/{part.name}" if part.name else name,
-            vertices=(mesh.vertices * size) @ turn.T + value.position_mm,
+            vertices=placed.vertices + value.position_mm,
             faces=mesh.faces,
             material=material,
-            normals=None if mesh.normals is None else unit_rows(mesh.normals / size) @ turn.T,
-            texture_coordinates=_coordinates(material, mesh, size, shared),
+            normals=placed.normals,
+            texture_coordinates=_coordinates(material, mesh, placed.positions, shared),
         )
 
 
@@ -457,7 +482,7 @@ def _scaled(material: Material, size: float) -> Material:
     return replace(material, absorption_per_mm=(r, g, b)) if max(r, g, b) > 0 else material
 
 
-def _coordinates(material: Material, mesh: Mesh, size: NDArray[np.float64], shared: dict[Any, Any]) -> Any:
+def _coordinates(material: Material, mesh: Mesh, positions: NDArray[np.float64], shared: dict[Any, Any]) -> Any:
     """Return the coordinates of a body's textures; ``shared`` holds those that instances share."""
     texture = material.texture
     if isinstance(texture, VertexColours):
@@ -467,7 +492,7 @@ def _coordinates(material: Material, mesh: Mesh, size: NDArray[np.float64], shar
     if not material.textures:
         return None
     if texture is not None and not texture.on_surface:
-        return mesh.vertices * size
+        return positions
     if mesh.uv is None:
         what = next((what for what, image in material.maps.items() if image is not None), "")
         what = what if texture is None else "a texture on the surface"
@@ -522,6 +547,6 @@ def _alone(path: Path, model: Model, value: ObjectTable) -> Scene:
         Light(kind="directional", vector=(0.5, -1.0, 0.8), colour=(0.7, 0.7, 0.7)),
         Light(kind="directional", vector=(-0.8, -0.2, 0.6), colour=(0.25, 0.25, 0.25)),
     ]
-    bodies = list(_bodies(value, model.parts, path.stem))
+    bodies = list(_bodies(value, model.parts, path.stem, lambda _, mesh: _turned(value, mesh)))
     grey = Background(horizon=(0.6, 0.62, 0.65), zenith=(0.25, 0.35, 0.55), nadir=(0.3, 0.29, 0.28), spread_deg=60)
     return Scene(name=path.stem, bodies=bodies, lights=lights, background=grey, ambient=(0.25, 0.25, 0.25))

@@ -113,7 +113,7 @@ class Take:
             raise ValueError(f"{self._path}: the scene does not move: an [animation] is needed")
         self.frames, self.fps = tables.animation.frames, tables.animation.fps if fps is None else _rate(fps)
         self._has_clips = any((value.model_extra or {}).get("clip") for value in tables.object)
-        self._loader = SceneLoader(self._path, self._files)
+        self._loader = SceneLoader(self._path, self._files, moves=True)
         self._motions = built(self._path, self._checked_tracks, tables.animation.track)
         for frame in sorted({float(f) for motion in self._motions for f in motion.track.frames}):
             built(self._path, self._check_frame, frame)

@@ -109,8 +109,9 @@ def render_take(
             scene, stands = take.scene_at(number / take.fps), take.pose_at(number / take.fps) @ base
             scene_hash = hashes.of(scene)
             product = _product(
-                folder, number, scene, scene_hash, stands, camera, support or {}, suffix, of_pictures, means
-            )
+                folder, number, scene, (manifest["raytrace_ii"], scene_hash), stands, camera, support or {}, suffix,
+                of_pictures, means,
+            )  # fmt: skip
             if is_done(product, manifest["frames"].get(str(number))):
                 continue
             report = partial(progress, number) if progress else None
@@ -126,10 +127,10 @@ def frame_file(folder: Path, number: int, suffix: str) -> Path:
 
 
 def _product(
-    folder: Path, number: int, scene: Scene, scene_hash: str, pose: Any, camera: Any,
+    folder: Path, number: int, scene: Scene, made_by: tuple[str, str], pose: Any, camera: Any,
     support: Mapping[str, Sequence[str]], suffix: str, options: dict[str, Any], means: dict[str, Any],
 ) -> Product:  # fmt: skip
-    """Return a frame's files and the hash of their inputs."""
+    """Return a frame's files and the hash of their inputs; ``made_by`` holds program version and scene hash."""
     picture = frame_file(folder, number, suffix)
     images: dict[str, list[Path]] = {}
     for name, kinds in support.items():
@@ -137,7 +138,7 @@ def _product(
             images.setdefault(kind, []).append(_beside(picture, name))
     files = (picture, *dict.fromkeys(path for paths in images.values() for path in paths))
     key = content_hash(
-        "frame", version("raytrace-ii"), scene_hash, camera, pose, options, suffix,
+        "frame", *made_by, camera, pose, options, suffix,
         {name: list(kinds) for name, kinds in support.items()},
     )  # fmt: skip
     make = partial(

@@ -331,8 +331,9 @@ class Body:
         vertices, faces = np.asarray(self.vertices), np.asarray(self.faces)
         if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
             raise ValueError(f"object {self.name!r} has no geometry: triangles are needed")
-        bad = ~(np.abs(vertices) <= np.finfo(np.float32).max).all(axis=1)
-        if bad.any():
+        most = np.finfo(np.float32).max
+        if len(vertices) and not (-most <= vertices.min() and vertices.max() <= most):  # NaN, too
+            bad = ~(np.abs(vertices) <= most).all(axis=1)
             at = int(np.argmax(bad))
             raise ValueError(
                 f"object {self.name!r}: vertex {at} is {vertices[at].tolist()}: finite float32 numbers are needed"

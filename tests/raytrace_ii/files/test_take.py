@@ -306,3 +306,16 @@ def test_tables_nested_too_deeply(tmp_path):
     (tmp_path / "deep.toml").write_text(f"{BALLS}{MOVES}x = {'[' * 5000}\n")
     with pytest.raises(ValueError, match="nested too deeply"):
         load_take(tmp_path / "deep.toml")
+
+
+def test_a_body_that_only_changes_its_place_keeps_its_normals(tmp_path):
+    """Its normals are hashed once and turned once; ball a changes its size too, and gets new ones."""
+    text = BALLS + MOVES.replace("[1, 3]", "[[1, 1, 1], [1, 2, 3]]")
+    take = take_of(tmp_path, text)
+    early, late = take.scene_at(0.1), take.scene_at(0.7)
+    a, b = ((body(early, name), body(late, name)) for name in ("ball a", "ball b"))
+    assert b[0].normals is b[1].normals and a[0].normals is not a[1].normals
+    again = take_of(tmp_path, text).scene_at(0.7)
+    for moved, alone in zip(late.bodies, again.bodies, strict=True):
+        np.testing.assert_array_equal(moved.vertices, alone.vertices)
+        np.testing.assert_array_equal(moved.normals, alone.normals)
