@@ -32,7 +32,7 @@ from .checks import (
     within,
 )
 from .elements import Bundle, Element, FrontElement, LensModel, Under
-from .lattice import LATTICES, Lattice, axes_of
+from .lattice import DRIFT_TERMS, LATTICES, STEEPEST, Drift, Lattice, axes_of
 from .optics import Pinhole, chain, unit_disk
 
 LEAST_PITCH = 1e-6  # pixels from lens to lens: shorter ones are rounded to nothing
@@ -93,6 +93,10 @@ class IICamera:
     lens_shear : float
         Lean of the columns of lenses against the rows: how far a row stands further right than the one above, in
         shares of the distance of rows; at most `MOST_SHEAR` either way.
+    lens_drift_mm : (7 numbers, 7 numbers), optional
+        Smooth shift of the lens centres off their grid, to the right and up, as a main lens shifts the middles of
+        micro-images towards the border. The seven are the factors of ξ², ξη, η², ξ³, ξ²η, ξη², η³; ξ and η are the
+        place of the lens right and up from the middle of the pixel array, in halves of the array's width.
     origin_mm : (x, y, z)
         Centre of the pixel array, for stacks of sensors and arrays of cameras.
     start_mm : float
@@ -125,6 +129,7 @@ class IICamera:
     lens_offset_mm: tuple[float, float] = (0.0, 0.0)
     lens_turn_deg: float = 0.0
     lens_shear: float = 0.0
+    lens_drift_mm: tuple[tuple[float, ...], tuple[float, ...]] | None = None
     origin_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_mm: float = 0.0
     viewer_mm: float | None = None
@@ -165,6 +170,8 @@ class IICamera:
             put(field, number(field, getattr(self, field)))
             if not abs(getattr(self, field)) <= most:
                 raise ValueError(f"{field} is {getattr(self, field):g}: at most {most:g} either way is needed")
+        if self.lens_drift_mm is not None:
+            put("lens_drift_mm", _drift(self.lens_drift_mm, self.size_mm))
         if hasattr(model, "thickness"):
             model.thickness(self.lens_pitch_mm)  # raises ValueError if the sphere is too small for its cell
         behind = self.gap_mm
@@ -226,7 +233,23 @@ class IICamera:
         shift[1] *= -1  # rows run down
         origin = [(m - k * p) / 2 + s for m, k, p, s in zip(self.pixels, self.lenses, pitch, shift, strict=True)]
         axes = axes_of(self.lens_turn_deg, self.lens_shear)
-        return Lattice(self.lenses, (pitch[0], pitch[1]), (origin[0], origin[1]), self.lattice == "hexagonal", axes)
+        return Lattice(
+            self.lenses, (pitch[0], pitch[1]), (origin[0], origin[1]), self.lattice == "hexagonal", axes, self._drift
+        )
+
+    @property
+    def _drift(self) -> Drift | None:
+        """``lens_drift_mm`` in pixels, with y down."""
+        if self.lens_drift_mm is None:
+            return None
+        right, up = self.lens_drift_mm
+        flips = [(-1) ** j / self.pixel_pitch_mm for _, j in DRIFT_TERMS]
+        return Drift(
+            middle=(self.pixels[0] / 2, self.pixels[1] / 2),
+            reach=self.pixels[0] / 2,
+            right=tuple(a * flip for a, flip in zip(right, flips, strict=True)),
+            down=tuple(-b * flip for b, flip in zip(up, flips, strict=True)),
+        )
 
     @property
     def regular(self) -> bool:
@@ -235,7 +258,8 @@ class IICamera:
         whole = all(
             p == round(p) and k * p == m for p, k, m in zip(lattice.pitch, self.lenses, self.pixels, strict=True)
         )
-        return whole and not lattice.hexagonal and lattice.axes is None and lattice.origin == (0.0, 0.0)
+        straight = lattice.axes is None and lattice.drift is None
+        return whole and straight and not lattice.hexagonal and lattice.origin == (0.0, 0.0)
 
     @property
     def ei_pixels(self) -> tuple[Any, Any]:
@@ -406,6 +430,8 @@ class IICamera:
             value = getattr(self, field)
             if value != (self._shared_pitch_mm if field == "lens_pitch_mm" else getattr(IICamera, field)):
                 data[field] = list(value) if isinstance(value, tuple) else value
+        if self.lens_drift_mm is not None:
+            data["lens_drift_mm"] = [list(factors) for factors in self.lens_drift_mm]
         if self.optics != (Pinhole(),):
             data["optics"] = [e.to_json() for e in self.optics]
         return data
@@ -429,6 +455,7 @@ class IICamera:
             "lens_offset_mm",
             "lens_turn_deg",
             "lens_shear",
+            "lens_drift_mm",
             "origin_mm",
             "start_mm",
             "viewer_mm",
@@ -457,6 +484,27 @@ def _started(rays: Bundle, z_mm: float) -> Bundle:
     lx, ly, lz, dx, dy, dz, weight = rays
     back = (z_mm - lz) / np.where(dz > 0, dz, 1.0)  # blocked rays may go anywhere
     return Bundle(lx + dx * back, ly + dy * back, np.float64(z_mm), dx, dy, dz, weight)
+
+
+def _drift(value: Any, size_mm: tuple[float, float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return a drift as tuples of floats; ValueError if it has another form or grows too fast anywhere."""
+    name, count = "lens_drift_mm", len(DRIFT_TERMS)
+    sequence(name, value)
+    for factors in value:
+        sequence(name, factors)
+    if [len(factors) for factors in value] != [count, count]:
+        raise ValueError(f"{name} is {value!r}: two lists of {count} numbers, to the right and up, are needed")
+    right, up = (
+        tuple(within(name, factor, -MOST_MM, MOST_MM, unit=" mm") for factor in factors) for factors in value
+    )
+    half, tall = size_mm[0] / 2, max(1.0, size_mm[1] / size_mm[0])
+    for factors in (right, up):
+        slope = sum(abs(a) * (i + j) * tall ** (i + j - 1) for a, (i, j) in zip(factors, DRIFT_TERMS, strict=True))
+        if slope > STEEPEST * half:
+            raise ValueError(
+                f"{name} may grow by {slope / half:.3g} mm within 1 mm: at most {STEEPEST:g} keeps lenses in order"
+            )
+    return right, up
 
 
 def _inside(name: str, value: ArrayLike) -> Floats:

@@ -18,6 +18,45 @@ from .jit import kernel
 LATTICES = ("rectangular", "hexagonal")
 TIE = 1e-6  # pixels
 Axes = tuple[float, float, float, float]
+# Exponents (i, j) of the terms of a drift; constant and linear terms are offset, pitch, turn and shear.
+DRIFT_TERMS = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
+STEEPEST = 0.2  # greatest drift between two neighbours, in shares of their distance
+STEPS = 12  # of the inverse of a drift; each leaves at most a fifth of the error
+
+
+class Drift(NamedTuple):
+    """Smooth shift of lens centres off the straight grid: quadratic and cubic over the pixel array, in pixels.
+
+    A centre at (x, y) of the straight grid is shifted by Σ aₜ·ξⁱ·ηʲ to the right and by Σ bₜ·ξⁱ·ηʲ down, with (i, j)
+    of `DRIFT_TERMS`, ξ = (x − x₀)/r and η = (y − y₀)/r. ``middle`` is (x₀, y₀), ``reach`` is r.
+    """
+
+    middle: tuple[float, float]
+    reach: float
+    right: tuple[float, ...]
+    down: tuple[float, ...]
+
+    def at(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Return the shift at places of the straight grid."""
+        terms = drift_terms((x - self.middle[0]) / self.reach, (y - self.middle[1]) / self.reach)
+        return (
+            sum(a * term for a, term in zip(self.right, terms, strict=True)),
+            sum(b * term for b, term in zip(self.down, terms, strict=True)),
+        )
+
+    def undone(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Return the places of the straight grid whose shifted places are (x, y)."""
+        straight = x, y
+        for _ in range(STEPS):
+            right, down = self.at(*straight)
+            straight = x - right, y - down
+        return straight
+
+
+def drift_terms(xi: Any, eta: Any) -> list[Any]:
+    """Return ξⁱ·ηʲ for all of `DRIFT_TERMS`."""
+    xx, ee = xi * xi, eta * eta
+    return [xx, xi * eta, ee, xx * xi, xx * eta, xi * ee, ee * eta]
 
 
 class Lattice(NamedTuple):
@@ -25,7 +64,8 @@ class Lattice(NamedTuple):
 
     ``axes`` (xx, xy, yx, yy), None for a straight grid, turn and shear it about the middle of the array: what is
     (dx, dy) off the middle of the straight grid is (xx·dx + xy·dy, yx·dx + yy·dy) off it on the pixels. Cells are
-    those of the straight grid, turned and sheared with it. ``axes`` have the determinant 1; see `axes_of`.
+    those of the straight grid, turned and sheared with it. ``axes`` have the determinant 1; see `axes_of`. ``drift``
+    shifts the centres of the turned grid, and its cells with them.
     """
 
     lenses: tuple[int, int]
@@ -33,6 +73,7 @@ class Lattice(NamedTuple):
     origin: tuple[float, float]
     hexagonal: bool
     axes: Axes | None = None
+    drift: Drift | None = None
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -46,10 +87,13 @@ class Lattice(NamedTuple):
         if self.hexagonal:
             x = x + 0.5 * self.pitch[0] * (l % 2)
         y = (l + 0.5) * self.pitch[1] + self.origin[1]
-        if self.axes is None:
+        if self.axes is not None:
+            dx, dy = self.offsets(x - self.middle[0], y - self.middle[1])
+            x, y = dx + self.middle[0], dy + self.middle[1]
+        if self.drift is None:
             return x, y
-        dx, dy = self.offsets(x - self.middle[0], y - self.middle[1])
-        return dx + self.middle[0], dy + self.middle[1]
+        right, down = self.drift.at(x, y)
+        return x + right, y + down
 
     def offsets(self, dx: Any, dy: Any) -> tuple[Any, Any]:
         """Return the offset on the pixel array of an offset in the straight grid."""
@@ -59,7 +103,9 @@ class Lattice(NamedTuple):
         return xx * dx + xy * dy, yx * dx + yy * dy
 
     def straight(self, x: Any, y: Any) -> tuple[Any, Any]:
-        """A place on the pixels in the straight grid; the inverse of the turn and the shear."""
+        """A place on the pixels in the straight grid; the inverse of the turn, the shear and the drift."""
+        if self.drift is not None:
+            x, y = self.drift.undone(x, y)
         if self.axes is None:
             return x, y
         xx, xy, yx, yy = self.axes
@@ -71,7 +117,7 @@ class Lattice(NamedTuple):
 
         A pixel halfway between two lenses belongs to the right one, or to the upper one if rows differ.
         """
-        if self.axes is not None:
+        if self.axes is not None or self.drift is not None:
             x, y = self.straight(m + 0.5, n + 0.5)
             m, n = x - 0.5, y - 0.5
         if not self.hexagonal:

@@ -153,6 +153,7 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
         start_mm=start,
         viewer_mm=viewer,
         lens_offset_mm=_times(camera.lens_offset_mm, scale),
+        lens_drift_mm=camera.lens_drift_mm and tuple(_times(factors, scale) for factors in camera.lens_drift_mm),
         origin_mm=(*camera.origin_mm[:2], camera.origin_mm[2] + forward),
         optics=optics,
     )

@@ -1,7 +1,8 @@
 """Lens grid of a picture: centres of micro-images, and the straight, turned or sheared lattice fitted to them.
 
 In the fit, lens (k, l) has its centre at c + (k + ½·(l mod 2))·a + l·b, the half only in a hexagonal lattice, with
-a along the rows and b from row to row; six numbers in all.
+a along the rows and b from row to row; six numbers in all. If centres drift off such a grid beyond noise, 14 more are
+fitted with them: quadratic and cubic terms over the picture (`lattice.Drift`).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..extras import Lazy
-from ..lattice import Lattice, axes_of
+from ..lattice import DRIFT_TERMS, Drift, Lattice, axes_of, drift_terms
 from .peaks import FEWEST, SMOOTH, Floats, Summits, Vectors, lattice_vectors, middle_of_one
 from .refusal import NoLenses
 
@@ -26,6 +27,7 @@ LOOSE, LOOSE_YET = 0.05, 0.13  # of the pitch, median miss of centres: more, in 
 BAD_SIGMAS = 3.5  # beyond this many robust standard deviations a centre is thrown out
 BORDER = 0.93  # of the light of the middle: borders of micro-images are darker
 DARK = 0.3  # of the light of the lenses around: less, and the lens is dark
+NOTED_DRIFT = 0.02  # pixels, and three times its own error: less is not fitted
 INSIDE = 0.45  # of the pitch, how far the picture must reach beyond a lens's centre for the lens to count
 Bools = NDArray[np.bool_]
 
@@ -47,6 +49,8 @@ class LensGrid:
     dark, saturated : ndarray of bool, (n,)
     turn_deg, shear : float
         See `IICamera`.
+    drift_px : float
+        Greatest shift of the centres used off the straight grid; 0 if there is none beyond its error.
     """
 
     lattice: Lattice
@@ -57,6 +61,7 @@ class LensGrid:
     saturated: Bools
     turn_deg: float
     shear: float
+    drift_px: float
 
     @property
     def residuals(self) -> Floats:
@@ -71,17 +76,22 @@ class LensGrid:
 
 @dataclass(frozen=True)
 class _Affine:
-    """c, a and b as rows (3, 2), and whether odd rows stand half a pitch aside."""
+    """c, a and b as rows (3, 2), whether odd rows stand half a pitch aside, and the drift off this grid."""
 
     rows: Floats
     hexagonal: bool
+    drift: Drift | None = None
 
     def indices(self, k: Floats, l: Floats) -> Floats:
         half = 0.5 * (l % 2) if self.hexagonal else 0.0
         return np.stack([np.ones(len(k)), k + half, l], axis=1)
 
-    def places(self, k: Floats, l: Floats) -> Floats:
+    def straight(self, k: Floats, l: Floats) -> Floats:
         return self.indices(k, l) @ self.rows
+
+    def places(self, k: Floats, l: Floats) -> Floats:
+        places = self.straight(k, l)
+        return places if self.drift is None else places + np.stack(self.drift.at(*places.T), axis=1)
 
     @property
     def pitch(self) -> tuple[float, float]:
@@ -147,9 +157,16 @@ def lens_grid(grey: NDArray[np.float32], lattice: str | None = None, clipped: Bo
         dark = heights < DARK * level.at(places)
         summits = Summits(grey / level.picture(), sigma)
     fit, found, used = _fitted(fit, summits, k, l, left_out=dark | saturated, loose=LOOSE)
+    if _drifts(places[used], (found - fit.places(k, l))[used]):
+        fit = replace(fit, drift=_no_drift((width, height)))
+        fit, found, used = _fitted(fit, summits, k, l, left_out=dark | saturated, loose=LOOSE)
     _check_borders(fit, summits, k, l)
     places = fit.places(k, l)
-    return _result(fit, (width, height), places=places, found=found, used=used, dark=dark, saturated=saturated)
+    off = np.hypot(*(places - fit.straight(k, l))[used].T)
+    return _result(
+        fit, (width, height), float(off.max()),
+        places=places, found=found, used=used, dark=dark, saturated=saturated,
+    )  # fmt: skip
 
 
 def _named(vectors: Vectors, lattice: str | None) -> _Affine:
@@ -201,16 +218,15 @@ def _fitted(
     left_out: Bools | None = None,
     loose: float = LOOSE_YET,
 ) -> tuple[_Affine, Floats, Bools]:
-    """The grid through the centres near its places, the centres, and which of them were used."""
+    """The grid through the centres near its places, with a drift if it has one, the centres, and those used."""
     found, good = summits.near(fit.places(k, l), REACH * fit.nearest_px)
     if left_out is not None:
         good &= ~left_out
-    indices = fit.indices(k, l)
     for _ in range(10):
         if good.sum() < FEWEST * 2:
             raise NoLenses(f"no lenses are found: {int(good.sum())} of {len(k)} centres are where a grid has them")
-        rows = np.asarray(np.linalg.lstsq(indices[good], found[good], rcond=None)[0], np.float64)
-        miss = np.hypot(*(found - indices @ rows).T)
+        fit = _least_squares(fit, k, l, found, good)
+        miss = np.hypot(*(found - fit.places(k, l)).T)
         typical = float(np.median(miss[good])) / 1.1774  # of a Rayleigh distribution: one axis's σ
         keep = good & (miss <= max(BAD_SIGMAS * typical * math.sqrt(2), 1e-3))
         if (keep == good).all():
@@ -221,7 +237,40 @@ def _fitted(
             f"no lenses are found: centres lie {typical * 1.1774:.2f} px off the best grid of {fit.pitch[0]:.1f}×"
             f"{fit.pitch[1]:.1f} px, and {int(good.sum())} of {len(k)} are used"
         )
-    return replace(fit, rows=rows), found, good
+    return fit, found, good
+
+
+def _least_squares(fit: _Affine, k: Floats, l: Floats, found: Floats, good: Bools) -> _Affine:
+    """Fit the straight grid to centres, and with it the drift, with its terms at the grid of the step before."""
+    indices = fit.indices(k, l)[good]
+    if fit.drift is None:
+        return replace(fit, rows=np.asarray(np.linalg.lstsq(indices, found[good], rcond=None)[0], np.float64))
+    (x0, y0), reach = fit.drift.middle, fit.drift.reach
+    for _ in range(3):
+        x, y = (indices @ fit.rows).T
+        columns = np.column_stack([indices, *drift_terms((x - x0) / reach, (y - y0) / reach)])
+        factors = np.asarray(np.linalg.lstsq(columns, found[good], rcond=None)[0], np.float64)
+        right, down = (tuple(map(float, axis)) for axis in factors[3:].T)
+        fit = replace(fit, rows=factors[:3], drift=fit.drift._replace(right=right, down=down))
+    return fit
+
+
+def _no_drift(size: tuple[int, int]) -> Drift:
+    zero = (0.0,) * len(DRIFT_TERMS)
+    return Drift(middle=(size[0] / 2, size[1] / 2), reach=size[0] / 2, right=zero, down=zero)
+
+
+def _drifts(places: Floats, residuals: Floats) -> bool:
+    """Return whether a cubic explains residuals of the straight grid beyond what noise alone would give it."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    x, y = (2 * (places - low) / np.maximum(high - low, 1) - 1).T
+    terms = np.stack([x**i * y**j for i in range(4) for j in range(4 - i)], axis=1)
+    if len(places) < 5 * terms.shape[1]:
+        return False
+    weights, *_ = np.linalg.lstsq(terms, residuals, rcond=None)
+    smooth = terms @ weights
+    noise = math.sqrt(terms.shape[1] / len(places)) * float((residuals - smooth).std())
+    return bool(np.sqrt((smooth**2).mean()) > max(NOTED_DRIFT / 2, 3 * noise))
 
 
 def _check_borders(fit: _Affine, summits: Summits, k: Floats, l: Floats) -> None:
@@ -279,7 +328,7 @@ class _Level:
         return np.maximum(level, 0.02 * level.max()).astype(np.float32)
 
 
-def _result(fit: _Affine, size: tuple[int, int], **centres: NDArray[Any]) -> LensGrid:
+def _result(fit: _Affine, size: tuple[int, int], drift_px: float, **centres: NDArray[Any]) -> LensGrid:
     options = [fit]
     if fit.hexagonal:  # an odd row first: half a pitch to the right of it is then a lens of the next
         c, a, b = fit.rows
@@ -297,8 +346,8 @@ def _result(fit: _Affine, size: tuple[int, int], **centres: NDArray[Any]) -> Len
     # The middle of the array, about which axes turn, is half of all pitches from half a pitch before the first lens.
     middle = first + (lenses[0] - 1) / 2 * a + (lenses[1] - 1) / 2 * b
     origin = float(middle[0] - lenses[0] * across / 2), float(middle[1] - lenses[1] * down / 2)
-    lattice = Lattice(lenses, (across, down), origin, best.hexagonal, axes)
-    return LensGrid(lattice=lattice, turn_deg=math.degrees(turn), shear=shear, **centres)
+    lattice = Lattice(lenses, (across, down), origin, best.hexagonal, axes, best.drift)
+    return LensGrid(lattice=lattice, turn_deg=math.degrees(turn), shear=shear, drift_px=drift_px, **centres)
 
 
 def _range(fit: _Affine, size: tuple[int, int]) -> tuple[int, int, int, int]:

@@ -13,7 +13,7 @@ from .. import checks
 from ..camera import IICamera
 from ..checks import length
 from ..colour import linear, srgb
-from ..lattice import LATTICES
+from ..lattice import DRIFT_TERMS, LATTICES, Drift
 from ..picture import IIPicture
 from ..regular import owners
 from .demosaic import MOSAICS, demosaiced, evened
@@ -26,7 +26,6 @@ if TYPE_CHECKING:  # scipy takes a third of a second
 PIXEL_MM = 0.0061  # where nothing is known: that of the presets, and their viewing angle
 HALF_ANGLE_TAN = math.tan(math.radians(29.9 / 2))
 CURVES = ("linear", "srgb")
-NOTED_DRIFT = 0.02  # pixels, and three times its own error: less is not reported
 MOST_LEAN = 20.0  # degrees that rows of a hexagonal lattice may rise before columns are taken for rows
 
 
@@ -48,9 +47,6 @@ class Calibration:
         The picture must be turned by 90° (`numpy.rot90`) first, because its rows of lenses run down.
     assumed : tuple of str
         Measures of the camera that no picture tells, and that were not given.
-    drift_px : float
-        Greatest distance, in the picture, of a smooth drift of centres that the straight grid does not follow; 0 if
-        there is none beyond its error.
     """
 
     camera: IICamera
@@ -59,7 +55,6 @@ class Calibration:
     types: LensTypes
     turned: bool
     assumed: tuple[str, ...]
-    drift_px: float
 
     def report(self) -> dict[str, Any]:
         """Everything that was found, as plain values: pixels, degrees, counts, and what could not be told."""
@@ -85,7 +80,7 @@ class Calibration:
             "centres_used": int(grid.used.sum()),
             "dark_lenses": int(grid.dark.sum()),
             "saturated_lenses": int(grid.saturated.sum()),
-            "drift_px": self.drift_px,
+            "drift_px": grid.drift_px,
             "lens_types": self.types.describe(),
             "pixels_outside": {
                 "left": max(0.0, left),
@@ -104,17 +99,13 @@ class Calibration:
             notes.append(
                 "centres: found in the picture itself, whose content pulls them about; a white image is surer"
             )
-        if self.drift_px:
-            notes.append(
-                f"drift: centres move by up to {self.drift_px:.2f} px off any straight grid; it is not undone"
-            )
         return notes
 
     def describe(self) -> str:
         """The report in a few lines."""
         r, lattice = self.report(), self.grid.lattice
         (k, l), (across, down), outside = lattice.lenses, lattice.pitch, r["pixels_outside"]
-        errors = r["pitch_error_px"]
+        errors, drift = r["pitch_error_px"], self.grid.drift_px
         return "\n".join(
             [
                 f"{r['lattice']}, {k}×{l} lenses of {across:.4f}×{down:.4f} px (± {errors[0]:.4f}, {errors[1]:.4f}), "
@@ -122,6 +113,11 @@ class Calibration:
                 f"centres lie {r['residual_rms_px']:.3f} px rms off the grid, at most "
                 f"{r['residual_greatest_px']:.2f}; {r['centres_used']} of {r['centres']} used, "
                 f"{r['dark_lenses']} dark, {r['saturated_lenses']} saturated",
+                *(
+                    [f"centres drift by up to {drift:.2f} px off a straight grid: the camera follows"]
+                    if drift
+                    else []
+                ),
                 f"beyond the lenses lie {outside['left']:.1f} px at the left, {outside['right']:.1f} at the right, "
                 f"{outside['top']:.1f} at the top, {outside['bottom']:.1f} at the bottom: no view shows them",
                 f"lens types: {r['lens_types']}",
@@ -209,7 +205,6 @@ def calibrate(
         types=lens_types(np.rot90(content) if turned else content, grid),
         turned=turned,
         assumed=tuple(w for w, v in (("pixel_pitch_mm", pixel_pitch_mm), ("gap_mm", gap_mm)) if v is None),
-        drift_px=_drift(grid),
     )
 
 
@@ -264,22 +259,15 @@ def _camera(
         lens_offset_mm=(float(x) * pixel, -float(y) * pixel),
         lens_turn_deg=grid.turn_deg,
         lens_shear=grid.shear,
+        lens_drift_mm=None if lattice.drift is None else _drift_mm(lattice.drift, pixel),
     )
 
 
-def _drift(grid: LensGrid) -> float:
-    """See `Calibration.drift_px`: a cubic through the residuals, less what noise alone would give it."""
-    places, residuals = grid.places[grid.used], grid.residuals
-    low, high = places.min(axis=0), places.max(axis=0)
-    x, y = (2 * (places - low) / np.maximum(high - low, 1) - 1).T
-    terms = np.stack([x**i * y**j for i in range(4) for j in range(4 - i)], axis=1)
-    if len(places) < 5 * terms.shape[1]:
-        return 0.0
-    weights, *_ = np.linalg.lstsq(terms, residuals, rcond=None)
-    smooth = terms @ weights
-    noise = math.sqrt(terms.shape[1] / len(places)) * float((residuals - smooth).std())
-    greatest = float(np.hypot(*smooth.T).max())
-    return greatest if np.sqrt((smooth**2).mean()) > max(NOTED_DRIFT / 2, 3 * noise) else 0.0
+def _drift_mm(drift: Drift, pixel_mm: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return a drift over the picture in millimetres, with y up: see `IICamera`."""
+    flips = [(-1) ** j * pixel_mm for _, j in DRIFT_TERMS]
+    right, down = (tuple(a * flip for a, flip in zip(row, flips, strict=True)) for row in (drift.right, drift.down))
+    return right, tuple(-b for b in down)
 
 
 @checks.checked(

@@ -246,6 +246,74 @@ def test_a_calibrated_picture_shows_the_views_of_a_straight_camera():
         assert np.abs(si - expected).mean() < 0.03  # of noise and interpolation
 
 
+DRIFT = (  # mm; up to 2 px at the corners of 320×280 px of 5 µm
+    (0.0010, -0.0008, 0.0006, -0.0030, 0.0004, -0.0026, -0.0006),
+    (-0.0004, 0.0010, 0.0008, 0.0005, -0.0028, 0.0007, -0.0030),
+)
+
+
+def off_the_middle(regular):
+    """Return how far the light of each elementary image lies from its middle, (L·K, 2) pixels."""
+    (k, l), (u, v) = regular.lenses, regular.ei_pixels
+    light = regular.pixels[..., 0].astype(float).reshape(l, v, k, u)
+    light = np.maximum(light - 0.3 * light.max(), 0)  # borders hold noise of neighbours
+    across, down = light.sum(axis=1), light.sum(axis=3).transpose(0, 2, 1)
+    middles = ((np.arange(n) - (n - 1) / 2) for n in (u, v))
+    return np.stack([(a @ m / a.sum(axis=-1)).ravel() for a, m in zip((across, down), middles, strict=True)], axis=1)
+
+
+@pytest.mark.parametrize("hexagonal", [False, True])
+def test_a_drift_is_found_and_undone(hexagonal):
+    """Before, a drift was reported and left in the picture."""
+    rng = np.random.default_rng(21)
+    camera = replace(random_camera(rng, (320, 280), 12.4, hexagonal), lens_drift_mm=DRIFT)
+    share = white_image(camera)
+    found = calibrate(exposed(share, camera, rng), pixel_pitch_mm=camera.pixel_pitch_mm)
+    assert 1.0 < found.report()["drift_px"] < 2.5 and "the camera follows" in found.describe()
+    assert errors(camera, found)["centres_px"] < 0.02
+    # The image of a drift by the main lens is as much larger as that of the pitch. A factor's error is ten times
+    # that of a centre's place, 0.02 px, as terms of the third degree are alike.
+    true, seen = growth(camera) * np.array(DRIFT), np.array(found.camera.lens_drift_mm)
+    np.testing.assert_allclose(seen, true, atol=0.2 * camera.pixel_pitch_mm)
+    made = calibrated_picture(found, 2000 * share, bits=16, full_scale=2000.0)
+    regular, _ = resampled(made)
+    straight, _ = resampled(replace_camera(made, lens_drift_mm=None))
+    undone, left = (np.sqrt((off_the_middle(p) ** 2).sum(axis=1).mean()) for p in (regular, straight))
+    # Borders of cells cut the discs of light, more so without the drift: the true shift is three times ``left``.
+    assert undone < 0.1 and 3 * undone < left
+
+
+def replace_camera(picture, **values):
+    camera = replace(picture.camera, **values)
+    return IIPicture(picture.pixels, camera.lenses, camera.ei_pixels, camera)
+
+
+def test_the_drift_of_a_real_main_lens_is_followed():
+    """A double Gauss: its pupil moves with the field, and micro-images with it. Truth is the light without noise."""
+    camera = preset("plenoptic1-double-gauss", scale=16)
+    lens = camera.optics[2]
+    stopped = [replace(s, diameter_mm=0.8 * s.diameter_mm) if s.stop else s for s in lens.surfaces]
+    camera = replace(camera, optics=(*camera.optics[:2], replace(lens, surfaces=tuple(stopped))))
+    white = white_image(camera)
+    cells = white.reshape(16, 16, 32, 16).transpose(0, 2, 1, 3)
+    places = np.arange(16) + 0.5
+    light = cells.sum(axis=(2, 3))
+    k, l = np.meshgrid(np.arange(32), np.arange(16))
+    true = np.stack(
+        [16 * k + cells.sum(axis=2) @ places / light, 16 * l + cells.sum(axis=3) @ places / light], axis=-1
+    )
+    found = calibrate(exposed(white, camera, np.random.default_rng(0)))
+    got = np.stack(found.grid.lattice.centres(k, l), axis=-1)
+    grid = np.stack([np.ones(k.size), k.ravel(), l.ravel()], axis=1)
+    rest = true.reshape(-1, 2) - grid @ np.linalg.lstsq(grid, true.reshape(-1, 2), rcond=None)[0]
+    followed, straight = (np.sqrt((off**2).sum(axis=-1).mean()) for off in (got - true, rest))
+    assert followed < 0.015 < 0.025 < straight  # px; no straight grid is nearer than the last
+
+
+def test_without_drift_none_is_fitted():
+    assert all(calibrate(shot(seed)[1]).camera.lens_drift_mm is None for seed in (4, 9))
+
+
 def test_marks_stand_on_centres(tmp_path):
     _, image = shot(7)
     found = calibrate(image)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ii_core import IICamera
 from ii_core.lattice import Lattice, nearest_hexagonal
-from ii_core.presets import camera_names, preset_cameras
+from ii_core.presets import camera_names, preset_cameras, scaled
 
 # Eighths of a pixel make ties that are exact in binary; tenths make ties with rounding; other values, none.
 LENGTHS = st.one_of(
@@ -173,3 +173,70 @@ def test_any_whole_structure_is_regular(structure, pitch, given_in_mm):
     columns, rows = camera.lens_lattice.nearest(np.arange(k * u), np.arange(l * v))
     np.testing.assert_array_equal(columns, np.arange(k * u) // u)
     np.testing.assert_array_equal(rows, np.arange(l * v) // v)
+
+
+# -- drift
+
+DRIFTS = st.tuples(*[st.tuples(*[st.floats(-1, 1)] * 7)] * 2)
+
+
+def drifting(factors, *, lattice="rectangular", turn=2.0):
+    """Return a camera of 200×120 px with a drift of some tenths of a pixel per factor."""
+    return IICamera(
+        pixels=(200, 120), lenses=(14, 8), pixel_pitch_mm=0.01, gap_mm=0.5, lens_pitch_mm=0.14, lattice=lattice,
+        lens_turn_deg=turn, lens_shear=0.01, lens_drift_mm=[[0.006 * a for a in row] for row in factors],
+    )  # fmt: skip
+
+
+@settings(max_examples=40, deadline=None)
+@given(factors=DRIFTS, lattice=st.sampled_from(("rectangular", "hexagonal")))
+def test_pixels_at_drifted_centres_are_those_lenses(factors, lattice):
+    grid = drifting(factors, lattice=lattice).lens_lattice
+    k, l = (i.ravel() for i in np.meshgrid(np.arange(14), np.arange(8)))
+    x, y = grid.centres(k, l)
+    np.testing.assert_array_equal(np.stack(grid.nearest(x - 0.5, y - 0.5)), [k, l])
+    straight = grid._replace(drift=None)
+    # A fifth of the error is left by each of twelve steps: 1e-8 of a drift of less than 10 px.
+    np.testing.assert_allclose(grid.drift.undone(x, y), straight.centres(k, l), atol=1e-6)
+
+
+def test_signs_of_a_drift():
+    """By hand: 0.02 mm to the right times ξ², 0.01 mm up times η³; at the right edge ξ is 1, at the top η is 0.6."""
+    camera = drifting([[10 / 3, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0, 10 / 6]], turn=0.0)
+    plain = IICamera(
+        pixels=(200, 120), lenses=(14, 8), pixel_pitch_mm=0.01, gap_mm=0.5, lens_pitch_mm=0.14, lens_shear=0.01
+    )
+    k, l = np.array([13, 0]), np.array([0, 7])  # top right, bottom left
+    x, y = plain.lens_lattice.centres(k, l)
+    right, down = camera.lens_lattice.centres(k, l) - np.stack([x, y])
+    np.testing.assert_allclose(right, 2 * ((x - 100) / 100) ** 2, rtol=1e-12)
+    np.testing.assert_allclose(down, -(((60 - y) / 100) ** 3), rtol=1e-12)
+    assert right.min() > 0 and down[0] < 0 < down[1]
+    # Rays start at the drifted lens: 2 px to the right is 0.02 mm, up is positive.
+    L, _ = camera.rays_at(np.floor(x[:1]), np.floor(y[:1]))
+    at = camera.lens_lattice.centres(k[:1], l[:1])
+    np.testing.assert_allclose(L[0, :2], [(at[0][0] - 100) * 0.01, (60 - at[1][0]) * 0.01], rtol=1e-12)
+
+
+def test_a_drift_survives_files_and_scale():
+    camera = drifting([[1, -1, 0.5, 0.2, 0, 0, 1], [0, 1, 0, -1, 0.3, 0.1, 0.7]])
+    assert IICamera.from_json(camera.to_json()) == camera and not camera.regular
+    coarse = scaled(camera, 2)
+    a, b = camera.lens_lattice.drift, coarse.lens_lattice.drift
+    np.testing.assert_allclose([b.right, b.down], [a.right, a.down], rtol=1e-9)  # as many pixels at the border
+
+
+@pytest.mark.parametrize(
+    ("drift", "message"),
+    [
+        ([[0] * 7], "two lists of 7 numbers"),
+        ([[0] * 7, [0] * 6], "two lists of 7 numbers"),
+        ("0000000", "lens_drift_mm"),
+        ([[0] * 7, "0000000"], "lens_drift_mm"),
+        ([[math.nan] * 7, [0] * 7], "lens_drift_mm is nan"),
+        ([[0] * 7, [0, 0, 0, 1, 0, 0, 0]], r"may grow by 3 mm within 1 mm: at most 0\.2"),
+    ],
+)
+def test_wrong_drifts_are_refused(drift, message):
+    with pytest.raises((ValueError, TypeError), match=message):
+        IICamera(pixels=(200, 120), lenses=(14, 8), pixel_pitch_mm=0.01, gap_mm=0.5, lens_drift_mm=drift)
