@@ -27,7 +27,8 @@ def unspelt(point: Mapping[str, Any]) -> dict[str, Any]:
     """Return a point as `rate_distortion` gave it, from what `spelt` and JSON made of it."""
     point = dict(point)
     lossless = point.pop("lossless", False)
-    for name in measures_of([point]) + ["q_depth"] * ("q_depth" in point):
+    numbers = ("bpp", "target_bpp", "encode_seconds", "decode_seconds")
+    for name in (*measures_of([point]), *("q_depth",) * ("q_depth" in point), *set(numbers) & set(point)):
         point[name] = _read(name, point[name])
     if lossless:
         point["q_global"] = math.inf
@@ -71,7 +72,9 @@ def _read(name: str, value: Any) -> Any:
 
 
 def check_points(records: Any) -> None:
-    """Raise ValueError unless every record has all FIELDS, each of its kind."""
+    """Raise ValueError unless this is a list of records that have all FIELDS, each of its kind."""
+    if not isinstance(records, Sequence):
+        raise ValueError(f"points of the records are {_short(records)}: a list is needed")
     for i, record in enumerate(records):
         if not isinstance(record, Mapping):
             raise ValueError(f"points[{i}] of the records is {_short(record)}: an object is needed")
@@ -87,12 +90,22 @@ def _rate(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and 0 < value < 1e300
 
 
+def _number(value: Any) -> bool:
+    """Return whether a value is a number, or null for an unknown one."""
+    return value is None or (
+        isinstance(value, int | float) and not isinstance(value, bool) and not abs(value) > 1e300
+    )
+
+
 KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "scheme": ("a name", lambda value: isinstance(value, str)),
     "options": ("an object", lambda value: isinstance(value, Mapping)),
     "target_bpp": ("a positive number", _rate),
     "bpp": ("a positive number", _rate),
     "reached": ("true or false", lambda value: isinstance(value, bool)),
+    "encode_seconds": ("a number", _number),
+    "decode_seconds": ("a number", _number),
+    "nbytes": ("a number", _number),
 }
 
 

@@ -123,7 +123,7 @@ def read_lfp(path: str | os.PathLike[str]) -> RawPicture:
         frame = _frame(table)
         metadata = _object(_section(sections, frame["metadataRef"], "metadata"))
         return _picture(_section(sections, frame["imageRef"], "picture"), metadata)
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
         text = f"{error.args[0]} missing" if isinstance(error, KeyError) and error.args else error
         raise ValueError(f"{os.fspath(path)} is no raw picture of a Lytro camera: {one_line(text)}") from None
 
@@ -134,7 +134,7 @@ def read_packed(path: str | os.PathLike[str], metadata: str | os.PathLike[str]) 
     check_file(path)
     try:
         return _picture(Path(path).read_bytes(), read_json(metadata))
-    except (TypeError, KeyError, IndexError, AttributeError) as error:
+    except (TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
         raise ValueError(f"{os.fspath(metadata)} does not describe a raw picture: {one_line(repr(error))}") from None
 
 

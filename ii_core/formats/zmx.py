@@ -34,7 +34,7 @@ def read_zmx(path: str | os.PathLike[str]) -> dict[str, Any]:
     head, blocks = _blocks(_text(path))
     if len(blocks) < 3:
         raise ValueError(f"{len(blocks)} surfaces: a lens between an object and an image is needed")
-    unit = head.get("UNIT", ["MM"])[0]
+    unit = _first(head, "UNIT", "MM")
     if unit not in UNITS_MM:
         raise ValueError(f"unit {unit!r}: known are {', '.join(UNITS_MM)}")
     found = [_surface(i, block, UNITS_MM[unit]) for i, block in enumerate(blocks[:-1])][1:]
@@ -98,7 +98,7 @@ def _blocks(text: str) -> tuple[dict[str, list[str]], list[dict[str, list[str]]]
 
 
 def _surface(index: int, block: dict[str, list[str]], unit_mm: float) -> dict[str, Any]:
-    kind = block.get("TYPE", ["STANDARD"])[0]
+    kind = _first(block, "TYPE", "STANDARD")
     named = f"surface {index}"
     if kind not in KNOWN_TYPES:
         raise ValueError(f"{named} is of type {kind}: {' and '.join(KNOWN_TYPES)} are read")
@@ -139,12 +139,17 @@ def _glass(named: str, words: list[str]) -> Any:
 
 def _wavelength_nm(head: dict[str, list[str]]) -> float | None:
     """Return the primary wavelength; None if the file has none."""
-    primary = head.get("PWAV", ["1"])[0]
+    primary = _first(head, "PWAV", "1")
     if f"WAVM {primary}" in head:
         return 1000 * _number("wavelength", head[f"WAVM {primary}"])
     values = head.get("WAVL", [])
-    position = int(_number("PWAV", [primary])) - 1
-    return 1000 * _number("wavelength", values[position:]) if 0 <= position < len(values) else None
+    place = _number("PWAV", [primary])
+    return 1000 * _number("wavelength", values[int(place) - 1 :]) if place in range(1, len(values) + 1) else None
+
+
+def _first(block: dict[str, list[str]], key: str, usual: str) -> str:
+    """Return the first word of a line, or the usual one without a line or a word."""
+    return (block.get(key) or [usual])[0]
 
 
 def _number(named: str, words: list[str]) -> float:

@@ -49,6 +49,8 @@ def check_comparable(profile: Profile, results: Sequence[tuple[str, Result]]) ->
         for row in result["pictures"]:
             if [point["target_bpp"] for point in row["points"]] != list(profile.rates_bpp):
                 raise ValueError(f"{name}: {row['name']} is not measured at the rates of the profile")
+            if not all(isinstance(point.get(profile.rank_by), float) for point in row["points"]):
+                raise ValueError(f"{name}: {row['name']} has no {profile.rank_by} at every rate: a number is needed")
         if result["coder"] in seen:
             raise ValueError(
                 f"{name} and {seen[result['coder']]} are both of {result['coder']}: one of them is needed"

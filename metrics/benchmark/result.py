@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ii_core import IIPicture
+from ii_core import IIPicture, checks
 from ii_core.files import one_line, read_json, write_json
 
 from ..batch import measuring
@@ -156,6 +156,10 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
             row["points"] = [unspelt(point) for point in row["points"]]
         if not isinstance(data["profile"], dict) or not {"name", "version", "sha256"} <= set(data["profile"]):
             raise ValueError("no result of the benchmark: profile needs name, version and sha256")
+        named = [data, *data["pictures"], data["profile"]]
+        for key in ("coder", "name", "sha256"):
+            if wrong := [one[key] for one in named if not isinstance(one.get(key, ""), str)]:
+                raise ValueError(f"no result of the benchmark: {key} is {checks.shown(wrong[0])}: text is needed")
     except ValueError as error:
         raise ValueError(f"{path}: {one_line(error)}") from None
     return data

@@ -11,6 +11,7 @@ import pytest
 from benchmarks.stability.fuzz_readers import seeds
 from benchmarks.stability.fuzz_readers.__main__ import case, outcome
 from benchmarks.stability.fuzz_readers.containers import png_changed
+from benchmarks.stability.fuzz_readers.measurements import ABOUT, ZMX, _result
 from codec import Encoded, decode, encode
 from codec.container import write
 from codec.file_header import values
@@ -18,9 +19,14 @@ from ii_core import IIPicture, preset
 from ii_core.display.look import MOST_FRAMES, viewpoints_around
 from ii_core.files import MAX_MESSAGE, one_line, read_image, write_image
 from ii_core.formats.find import find_views
+from ii_core.formats.lfp import read_packed
 from ii_core.json_lines import read_records
 from ii_core.maps import read_maps, write_maps
+from ii_core.prescriptions import lens
 from ii_core.presets import preset_cameras
+from metrics.benchmark.profile import profile
+from metrics.benchmark.ranking import check_comparable
+from metrics.benchmark.result import read_result
 from metrics.point_log import read_points
 from metrics.study import read_study
 from raytrace_ii.files.load import read_model
@@ -220,3 +226,61 @@ def test_errors_on_the_number_of_views_have_one_line(tmp_path):
         write_image(tmp_path / f"view_{i // 2}_{i % 2}.png", seeds.pixels())
     (tmp_path / "structure.json").write_text(json.dumps({"ei_pixels": ["a\nb", "c" * 5000]}))
     assert "2×2 are there" in refusal(find_views, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("UNIT MM X W X CM MR CPMM", "UNIT", ""),
+        ("TYPE STANDARD", "TYPE", ""),
+        ("PWAV 1", "PWAV", ""),
+        ("SURF 1", "SURF", ""),
+    ]
+    + [("WAVM 1 0.5876 1.0\nPWAV 1", f"WAVL 0.5\nPWAV {n}", "") for n in ("inf", "nan", "1e30", "-1")]
+    + [("UNIT MM", "UNIT FT", "unit 'FT'"), ("CURV 0.016", "CURV", "nothing"), ("PWAV 1", "PWAV x", "is no number")],
+)
+def test_lines_of_lens_files_without_words(old, new, said, tmp_path):
+    """IndexErrors and OverflowErrors; no reader of lenses had been fuzzed."""
+    (tmp_path / "a.zmx").write_text(ZMX.replace(old, new, 1))
+    if said:
+        assert said in refusal(lens, tmp_path / "a.zmx")
+    else:
+        assert len(lens(tmp_path / "a.zmx").surfaces) == 2
+
+
+@pytest.mark.parametrize("key", ["width", "height"])
+def test_sizes_of_raw_pictures_are_finite(key, tmp_path):
+    (tmp_path / "a.raw").write_bytes(bytes(72))
+    (tmp_path / "a.json").write_text(json.dumps({**ABOUT, "image": {**ABOUT["image"], key: 1e999}}))
+    assert "infinity" in refusal(read_packed, tmp_path / "a.raw", tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"coder": ["a"]}, "coder is ['a']: text is needed"),
+        ({"profile": {**_result()["profile"], "sha256": 7}}, "sha256 is 7: text is needed"),
+        ({"pictures": [{**_result()["pictures"][0], "points": 7}]}, "points of the records are 7: a list"),
+        ({"pictures": [{**_result()["pictures"][0], "name": None}]}, "name is None: text is needed"),
+    ],
+)
+def test_damaged_results_of_the_benchmark(change, said, tmp_path):
+    """Results of another hand ended in TypeErrors where they were ranked."""
+    (tmp_path / "a.json").write_text(json.dumps({**_result(), **change}))
+    assert said in refusal(read_result, tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("encode_seconds", "a", "encode_seconds is 'a': a number is needed"),
+        ("nbytes", [1], "nbytes is [1]: a number is needed"),
+        ("q_global", "a", "q_global is 'a': a number is needed"),
+        ("q_global", [1], "has no q_global at every rate"),
+    ],
+)
+def test_damaged_points_of_the_benchmark(name, value, said, tmp_path):
+    result = json.loads(json.dumps(_result()))
+    result["pictures"][0]["points"][1][name] = value
+    (tmp_path / "a.json").write_text(json.dumps(result))
+    assert said in refusal(lambda: check_comparable(profile("small"), [("a", read_result(tmp_path / "a.json"))]))

@@ -1,6 +1,5 @@
 """Raw pictures of Lytro containers, written by the published description and read back."""
 
-import hashlib
 import json
 
 import numpy as np
@@ -9,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.accuracy.calibration import exposed, random_camera, white_image
+from benchmarks.stability.fuzz_readers.measurements import lfp_container
 from ii_core import IIPicture
 from ii_core.formats.lfp import read_lfp, read_raw, unpacked
 
@@ -28,12 +28,6 @@ def packed(samples, bits):
             out += bytes(value >> 2 for value in four)
             out.append(sum((value & 3) << 2 * j for j, value in enumerate(four)))
     return bytes(out)
-
-
-def section(kind, content):
-    name = b"sha1-" + hashlib.sha1(content).hexdigest().encode()
-    head = b"\x89LF" + kind + b"\r\n\x1a\n" + (0).to_bytes(4, "big") + len(content).to_bytes(4, "big")
-    return head + name.ljust(80, b"\0") + content + b"\0" * (-len(content) % 16), name.decode()
 
 
 def metadata(samples, bits, **more):
@@ -62,12 +56,8 @@ def metadata(samples, bits, **more):
 
 
 def container(samples, bits, *, second=True):
-    image, image_name = section(b"C", packed(samples, bits))
-    about, about_name = section(b"C", json.dumps(metadata(samples, bits)).encode())
-    frame = {"frame": {"imageRef": image_name, "metadataRef": about_name}}
-    table = {"frames": [frame]} if second else {"picture": {"frameArray": [frame]}}
-    contents, _ = section(b"M", json.dumps(table).encode())
-    return b"\x89LFP\r\n\x1a\n" + b"\0\0\0\1\0\0\0\0" + contents + about + image
+    about = json.dumps(metadata(samples, bits)).encode()
+    return lfp_container(packed(samples, bits), about, second=second)
 
 
 @given(st.sampled_from((10, 12, 16)), st.integers(0, 2**32 - 1))
