@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .files.load import load_scene, scene_names
     from .files.take import Take, load_take
+    from .rendering.audit import Audit
     from .rendering.options import RenderOptions
     from .rendering.render import Shot, Stats, render, render_to
     from .rendering.render_take import render_take
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from .tracing.tracer import trace
 
 __all__ = [
+    "Audit",
     "Background",
     "Body",
     "Fog",
@@ -41,6 +43,7 @@ _HOMES = {
     "Take": "files.take",
     "load_take": "files.take",
     "trace": "tracing.tracer",
+    "Audit": "rendering.audit",
     "RenderOptions": "rendering.options",
     "render_take": "rendering.render_take",
 }

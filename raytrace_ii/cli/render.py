@@ -52,6 +52,9 @@ def render(
     texture_filter: Annotated[
         bool, typer.Option(help="Read image textures over a ray's width; --no-texture-filter reads them at a point.")
     ] = True,
+    audit: Annotated[
+        float, typer.Option(help="Share of pixels to render again in full, such as 0.001, to measure the error.")
+    ] = 0.0,
     bits: Annotated[int, typer.Option(help="Bits per channel: 8, or 16 for .png and .tif.")] = 8,
     support: Annotated[Exr, typer.Option(help="Write all support images to this .exr, as named channels.")] = None,
     depth: Annotated[Exr, typer.Option(help="Write z in mm from the pixel plane to this .exr.")] = None,
@@ -91,6 +94,8 @@ def render(
     if dask and workers is not None:
         raise ValueError("--workers is for threads of this machine: leave it out with --dask")
     options = {**_sampling(samples, error), "seed": seed, "noise": noise, "texture_filter": texture_filter}
+    if audit and (set_name or frames):
+        raise ValueError("--audit is of one picture: without --frames and --set")
     wanted = {"depth": depth, "ray_length": ray_length, "disparity": disparity, "normal": normal}
     wanted |= {"object_id": object_id, "shading_normal": shading_normal}
     extra = {name: path for name, path in wanted.items() if path is not None}
@@ -135,8 +140,9 @@ def render(
         files += [file for path in shared for file in image_file(numbered(path), "float32")]
     check_outputs(files, force)
     _render_scene(
-        scene, output, arrays, poses, names, extra, support, projection, dask, workers, dtype, options, spread
-    )
+        scene, output, arrays, poses, names, extra, support, projection, dask, workers, dtype,
+        {**options, "audit": audit}, spread,
+    )  # fmt: skip
 
 
 def _render_scene(
@@ -285,4 +291,5 @@ def _told(s: Stats) -> str:
     spread = f" ({s.mean_samples:.1f} per pixel)" if len(s.samples) > 1 else ""
     weak = sum(s.skipped.values()) / 1e6
     left_out = f", {weak:.2f} M too weak to trace" if weak else ""
-    return f"{counts} rays{spread}{left_out}; {s.embree_seconds:.1f} of {s.cpu_seconds:.1f} CPU s in Embree"
+    audit = f"; {s.audit.about}" if s.audit else ""
+    return f"{counts} rays{spread}{left_out}; {s.embree_seconds:.1f} of {s.cpu_seconds:.1f} CPU s in Embree{audit}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from concurrent.futures import CancelledError
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,10 @@ from ii_core.colour import srgb
 from ..scene.scene import Scene
 from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb, encode_steps
-from ..tracing.packing import packed
+from ..tracing.packing import packed, share
 from ..tracing.sampling import Adaptive, Sampling, Shoot, adaptive_mean, fixed_sum
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
+from .audit import FULL_DEPTH, FULL_SAMPLES, Audit, chosen, compared
 from .tiles import Order, Tile, ray_order, tiles
 
 TILE_RAYS = 65536  # many enough to hide the overhead of numpy, few enough for work arrays to stay in cache
@@ -65,6 +66,7 @@ class Block:
     arrays: dict[str, NDArray[Any]]
     count: RayCount
     samples: dict[int, int]
+    audit: Audit | None
     cpu_seconds: float
 
 
@@ -80,13 +82,14 @@ class Job:
     dtype: str
     support: tuple[str, ...]
     texture_filter: bool = True
+    audit: float = 0.0
     _local: threading.local = field(default_factory=threading.local, compare=False, repr=False)
     _stopped: threading.Event = field(default_factory=threading.Event, compare=False, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (
             self.scene, self.camera, self.sampling, self.seed, self.pose, self.dtype, self.support,
-            self.texture_filter,
+            self.texture_filter, self.audit,
         )  # fmt: skip
 
     def tiles(self) -> list[Tile]:
@@ -125,7 +128,45 @@ class Job:
             image[order.pixels] = values
             image = image.reshape(*shape, *values.shape[1:])
             arrays[name] = disparity(self.camera, image) if name == "disparity" else image
-        return Block(rows, cols, arrays, tracer.count, histogram, time.thread_time() - started)
+        audit = self._audited(rows, cols, arrays["pixels"]) if self.audit else None
+        return Block(rows, cols, arrays, tracer.count, histogram, audit, time.thread_time() - started)
+
+    def _audited(self, rows: slice, cols: slice, pixels: NDArray[Any]) -> Audit:
+        """Return the differences of the audited pixels of a tile from the same pixels in full."""
+        m, n = chosen(self.seed, self.audit, self.camera.pixels[0], rows, cols)
+        full: Job | None = getattr(self._local, "full", None)
+        if full is None:
+            full = self._local.full = self.in_full()
+        return compared(pixels[n - rows.start, m - cols.start], full.pixels_at(m, n, rows, cols))
+
+    def in_full(self) -> Job:
+        """Return the job of the same picture in full.
+
+        It has as many samples per pixel as the picture has at most, but at least FULL_SAMPLES, or all of stored maps;
+        at least FULL_DEPTH bounces; and filtered textures.
+        """
+        most = self.sampling.most if isinstance(self.sampling, Adaptive) else self.sampling
+        scene = self.scene.with_depth(max(self.scene.max_depth, FULL_DEPTH))
+        share(self.scene, scene)
+        return replace(
+            self, scene=scene, sampling=max(most, FULL_SAMPLES) if isinstance(self.camera, IICamera) else most,
+            support=(), texture_filter=True, audit=0.0, _local=threading.local(),
+        )  # fmt: skip
+
+    def pixels_at(self, m: NDArray[Any], n: NDArray[Any], rows: slice, cols: slice) -> NDArray[Any]:
+        """Return pixels (n, 3) in some columns m and rows n of a tile, with a fixed number of samples."""
+        assert isinstance(self.sampling, int)
+        tracer = self._tracer()
+        if isinstance(self.camera, IICamera):
+            radiance = fixed_sum(self.camera, self.sampling, self.seed, m, n, TILE_RAYS, self._shoot(tracer, None))
+        else:
+            radiance = np.zeros((len(m), 3), np.float32)
+            at = n - rows.start, m - cols.start
+            for sample in range(self.sampling):
+                L, D, shares = self.camera.stored_rays(sample, rows, cols)
+                some = None if shares is None else shares[at]
+                tracer.run(L[at], D[at], radiance, None, some, self._keys(m, n, sample, 1))
+        return encoded(radiance, np.arange(len(m), dtype=np.int32), self.sampling, self.dtype)
 
     def _tracer(self) -> Tracer:
         """Return this thread's own tracer, with counts reset."""

@@ -36,6 +36,7 @@ class RenderKeywords(SetKeywords, total=False):
     """Keywords of `render` and `render_to` for the fields of `RenderOptions`."""
 
     dtype: str
+    audit: float
     pose: ArrayLike | None
 
 
@@ -69,6 +70,10 @@ class RenderOptions:
     texture_filter : bool
         Filter image textures, maps and skies over the width of a ray at its hit point; each sample covers its part
         of the pixel, see `job.footprint`. The alternative, point sampling, shows texels finer than pixels as noise.
+    audit : float
+        Share of pixels, from 0 to 1, that are rendered again in full to measure the error of the picture: with 256
+        samples or more, at least 12 bounces, and filtered textures; stored maps with all their samples. The seed
+        selects the pixels. The result is `Stats.audit`. Noise is not audited.
 
     Raises
     ------
@@ -85,11 +90,12 @@ class RenderOptions:
     executor: Any = None
     pose: ArrayLike | None = None
     texture_filter: bool = True
+    audit: float = 0.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.seed, int | np.integer) or not 0 <= self.seed < 1 << 63:
             raise ValueError(f"seed is {_short(self.seed)}: a whole number of at least 0 and below 2⁶³ is needed")
-        for name in ("error", "noise"):
+        for name in ("error", "noise", "audit"):
             if not isinstance(getattr(self, name), int | float | np.number):
                 raise TypeError(f"{name} is {getattr(self, name)!r}: a number is needed")
         if not 0 < self.error < math.inf or self.error > sys.float_info.max:
@@ -97,6 +103,8 @@ class RenderOptions:
         sampling(self.samples, self.error)
         if not 0 <= self.noise <= MOST_NOISE:
             raise ValueError(f"noise sigma is {_short(self.noise)}: a number from 0 to {MOST_NOISE} is needed")
+        if isinstance(self.audit, bool) or not 0 <= self.audit <= 1:
+            raise ValueError(f"audit is {_short(self.audit)}: a share of the pixels, from 0 to 1, is needed")
         if not isinstance(self.dtype, str):
             raise TypeError(f"dtype is {self.dtype!r}: one of the names {', '.join(CURVES)} is needed")
         if self.dtype not in CURVES:

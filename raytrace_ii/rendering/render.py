@@ -25,6 +25,7 @@ from ..scene.scene import Scene
 from ..tracing.sampling import sampling
 from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES, UNITS
 from ..tracing.tracer import RayCount, check_scene, rigid
+from .audit import Audit
 from .executors import Tile, run
 from .job import Block, Job, check_disparity
 from .options import RenderKeywords, RenderOptions, check_keywords
@@ -40,7 +41,8 @@ class Stats:
     ``rays`` counts rays by kind (primary, shadow, reflection, refraction), ``skipped`` the rays too weak to change
     an 8-bit pixel. ``seconds`` is wall-clock time. ``embree_seconds`` and ``cpu_seconds`` are sums over all threads
     and processes. ``samples`` counts pixels by their number of samples. ``embree`` is Embree's version and packet
-    size, or the reason for single rays.
+    size, or the reason for single rays. ``audit`` is the result of the audit, None without one; its rays are not
+    counted, its CPU seconds are.
     """
 
     rays: dict[str, int]
@@ -50,6 +52,7 @@ class Stats:
     cpu_seconds: float
     samples: dict[int, int]
     embree: str
+    audit: Audit | None = None
 
     @property
     def mean_samples(self) -> float:
@@ -130,7 +133,7 @@ def render(
         Called in the calling thread with the number of finished tiles and of all tiles.
     **options
         Fields of `RenderOptions`: ``samples``, ``error``, ``seed``, ``noise``, ``dtype``, ``workers``, ``executor``,
-        ``pose`` and ``texture_filter``.
+        ``pose``, ``texture_filter`` and ``audit``.
 
     Returns
     -------
@@ -264,8 +267,11 @@ class _Tally:
     count: RayCount = field(default_factory=RayCount)
     samples: Counter[int] = field(default_factory=Counter)
     block_seconds: float = 0.0
+    audit: Audit | None = None
 
     def add(self, block: Block) -> None:
+        if block.audit is not None:
+            self.audit = (self.audit or Audit()) + block.audit
         self.count.add(block.count)
         self.samples.update(block.samples)
         self.block_seconds += block.cpu_seconds
@@ -279,6 +285,7 @@ class _Tally:
             cpu_seconds=self.block_seconds + time.thread_time() - self.cpu,
             samples=dict(sorted(self.samples.items())),
             embree="; ".join(sorted(self.count.embree)),
+            audit=self.audit,
         )
 
 
@@ -360,7 +367,7 @@ def _job(scene: Scene, camera: IICamera | MapCamera, options: RenderOptions, sup
         check_disparity(camera)
     return Job(
         scene, camera, sampling(samples, options.error), int(options.seed), rigid(options.pose), options.dtype,
-        support, bool(options.texture_filter),
+        support, bool(options.texture_filter), float(options.audit),
     )  # fmt: skip
 
 

@@ -43,6 +43,14 @@ def test_adaptive_samples(run, tmp_path):
     np.testing.assert_array_equal(IIPicture.load(tmp_path / "p.png").pixels, shot.picture.pixels)
 
 
+def test_audit(run, refused, tmp_path):
+    code, out, _ = run(*OBJECTS, "-o", tmp_path / "p.png", "--audit", 0.1)
+    shot = render(load_scene("objects"), CAMERA, audit=0.1)
+    assert code == 0 and f"; measured at {shot.stats.audit.pixels} pixels: {shot.stats.audit.wrong} wrong by" in out
+    moving = ("render", "objects", "--frames", "0", "-o", tmp_path / "frames", "--audit", 0.1)
+    refused(run(*moving), "--audit is of one picture: without --frames and --set")
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -52,6 +60,7 @@ def test_adaptive_samples(run, tmp_path):
         (("--samples", "64..4"), "two powers of 2 are needed, at least 4 and the second not less"),
         (("--samples", "4", "--error", "1"), "error is 1, but the number of samples is fixed"),
         (("--samples", "4..8", "--error", "0"), "error is 0.0: a positive number"),
+        (("--audit", "2"), "audit is 2.0: a share of the pixels, from 0 to 1, is needed"),
         (("--support", "all.tif"), "only .exr has named channels"),
         (("--support", "gone/all.exr"), "is no folder"),
         (("--camera", "pinhole2d", "--disparity", "d.exr"), "has no neighbouring lenses"),

@@ -69,7 +69,7 @@ def check(call, argument, value):
     assert any(name in said for name in NAMED.get(argument, (argument,))), said
 
 
-RENDER = ("scene", "camera", "samples", "seed", "noise", "dtype", "workers", "executor", "pose", "progress")
+RENDER = ("scene", "camera", "samples", "seed", "noise", "audit", "dtype", "workers", "executor", "pose", "progress")
 
 
 @pytest.mark.parametrize("argument", [*RENDER, "support"])
