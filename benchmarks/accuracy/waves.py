@@ -1,6 +1,6 @@
 """Ray optics against wave optics: error of pictures by rays and by point-spread models.
 
-    python -m benchmarks run waves
+    python -m benchmarks run waves [--parts field,setup1] [--again all]
 
 A row of pixels under one lens shows a texture of even stripes, 8 pixels wide in the mean. The truth is the wave's
 point-spread function, summed over pixels: of a round lens by its angular spectrum, or Airy's closed form where the
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -50,22 +51,42 @@ SWEEPS: dict[str, tuple[tuple[float, ...], str]] = {
 
 def main() -> None:
     """Measure, keep, draw, fill the page."""
-    asked = command_line(__doc__).parse_args()
-    keys = [{"sweep": n, "wavelength_nm": w, "lens": lens} for lens in SHAPES for n in SWEEPS for w in WAVELENGTHS]
-    for key in RECORDS.todo(keys, asked.again):
-        RECORDS.measure(key, lambda key=key: {"points": sweep(key["sweep"], key["wavelength_nm"], key["lens"])})
-    for key in RECORDS.todo([{"lens": "glass", "field": "diagonal"}], asked.again):
-        RECORDS.measure(key, lambda: {"pixels": oblique()})
-    keys = [{"scene": name, "scale": SCALE, "lens": lens} for name in SCENES for lens in LENSES]
-    for key in RECORDS.todo(keys, asked.again):
-        RECORDS.measure(key, lambda key=key: spread_scene(**key))
+    parser = command_line(__doc__, parts=tuple(PARTS))
+    asked = parser.parse_args()
+    if unknown := set(asked.parts) - set(PARTS):
+        parser.error(f"no part {min(unknown)!r}: known are {', '.join(PARTS)}")
+    for part in asked.parts:
+        keys, measured = PARTS[part]
+        for key in RECORDS.todo(keys, asked.again):
+            RECORDS.measure(key, lambda key=key, measured=measured: measured(**key))
     path = IMAGES / "waves.png"
     save(draw(), path)
     write_picture(path, path)
     publish(tables())
 
 
-def sweep(name: str, wavelength_nm: float, shape: str) -> list[dict[str, float]]:
+def swept(sweep: str, wavelength_nm: float, lens: str) -> dict[str, Any]:
+    """Return the result of a sweep by its key."""
+    return {"points": sweep_points(sweep, wavelength_nm, lens)}
+
+
+def diagonal(lens: str, field: str) -> dict[str, Any]:
+    """Return the spots along the diagonal of a lens of setup1, by the key of their row."""
+    return {"pixels": oblique()}
+
+
+# Parts of the run: the keys of the rows, and the function that measures one.
+PARTS: dict[str, tuple[list[dict[str, Any]], Callable[..., dict[str, Any]]]] = {
+    "sweeps": (
+        [{"sweep": n, "wavelength_nm": w, "lens": s} for s in SHAPES for n in SWEEPS for w in WAVELENGTHS],
+        swept,
+    ),
+    "field": ([{"lens": "glass", "field": "diagonal"}], diagonal),
+    "setup1": ([{"scene": name, "scale": SCALE, "lens": lens} for name in SCENES for lens in LENSES], spread_scene),
+}
+
+
+def sweep_points(name: str, wavelength_nm: float, shape: str) -> list[dict[str, float]]:
     """Errors of both models and their cost at each value."""
     points = []
     kernels = round_kernels if shape == "round" else slit_kernels

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -29,9 +30,12 @@ def depth_of(text: str) -> Any:
     if text.endswith(".exr"):
         return read_depth(text)
     try:
-        return float(text)
+        depth = float(text)
     except ValueError:
-        raise ValueError(f"spread is {text!r}: a depth in mm, inf, or a depth image .exr is needed") from None
+        depth = math.nan
+    if math.isnan(depth):
+        raise ValueError(f"spread is {text!r}: a depth in mm, inf, or a depth image .exr is needed")
+    return depth
 
 
 def maps_of(text: str, camera: IICamera | None, index: int, depth_mm: Any) -> SpreadMaps:

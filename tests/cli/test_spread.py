@@ -89,6 +89,7 @@ def test_arrays_of_a_set_have_their_own_and_bad_input_is_one_line(run, refused, 
     for command, said in (
         (("camera", "setup1", "--scale", 64, "-o", tmp_path / "n", "--spread", "near"), "spread is 'near': a depth"),
         (("camera", "setup1", "--scale", 64, "-o", tmp_path / "n", "--spread", tmp_path / "gone.exr"), "gone.exr"),
+        (("camera", "setup1", "--scale", 64, "-o", tmp_path / "n", "--spread", "nan"), "spread is 'nan': a depth"),
         (("camera", "setup1", "--scale", 64, "--spread", "inf"), "-o is needed"),
         (("camera", "hexagonal", "--scale", 8, "-o", tmp_path / "n", "--spread", "inf"), "not regular"),
         (("render", "apples", "--scale", 64, "--spread", "all", *out), "spread is 'all': auto, or a folder"),
@@ -97,6 +98,11 @@ def test_arrays_of_a_set_have_their_own_and_bad_input_is_one_line(run, refused, 
         (("render", "apples", "--camera", "pinhole2d", "--spread", "auto", *out), "this camera has one lens"),
         (("render", "apples", "--camera", "hexagonal", "--scale", 8, "--spread", "auto", *out), "not regular"),
         (("render", "apples", "--scale", 64, "--frames", "0..1", "--spread", "auto", *out), "--frames"),
+        (
+            ("render", "--set", "reference", "--scale", 64, "--spread", "auto", "-o", tmp_path / "n"),
+            "without --frames",
+        ),
+        (("render", "--set", "benchmark:small", "--spread", "auto", "-o", tmp_path / "n"), "leave out --spread"),
     ):
         refused(run(*command), said)
     assert not (tmp_path / "n").exists() and not (tmp_path / "x.png").exists()

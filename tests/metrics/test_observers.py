@@ -183,6 +183,12 @@ def resealed(edit):
     return change
 
 
+def turned(line):
+    """Change the first digit of a line's SHA-256, and nothing else."""
+    at = line.index('"check":"') + len('"check":"')
+    return line[:at] + format(15 - int(line[at], 16), "x") + line[at + 1 :]
+
+
 def put(line, **change):
     return resealed(lambda records: [records[line].update(change), records][1])
 
@@ -196,6 +202,10 @@ def put(line, **change):
         (lambda lines: lines[:5] + lines[6:], "line 6 was changed, or a line before it removed"),
         (lambda lines: [*lines[:5], lines[4], *lines[5:]], "line 6 was changed"),
         (lambda lines: ['{"kind": "begin"}\n', *lines[1:]], "line 1 has no seal"),
+        (lambda lines: [*lines[:5], turned(lines[5]), *lines[6:]], "line 6 was changed"),
+        (lambda lines: [*lines[:-1], turned(lines[-1])], "line 20 was changed"),
+        (lambda lines: [*lines[:5], lines[5].replace('"check":"', '"check":"0'), *lines[6:]], "line 6 has no seal"),
+        (lambda lines: [line.replace('"at": "2000', '"at": "2001') for line in lines], "line 1 was changed"),
         (put(6, answer=6), "answer 6: 6 is no answer of this test"),
         (put(6, answer=True), "answer 6: True is no answer"),
         (put(6, answer="left"), "'left' is no answer"),
@@ -482,3 +492,7 @@ def test_the_commands_refuse_files(run, refused, coded, tmp_path):
     refused(run("opinions", tmp_path / "r"), "holds no file of an observer")
     (tmp_path / "r" / "a.jsonl").touch()
     refused(run("opinions", tmp_path / "r"), "a.jsonl is empty: nobody answered")
+    (tmp_path / "r" / "a.jsonl").unlink()
+    (only,) = write_simulated(tmp_path / "r", planned(), [3.0] * 15, 1)
+    rewritten(only, lambda lines: [*lines[:9], turned(lines[9]), *lines[10:]])
+    refused(run("opinions", tmp_path / "r"), "observer-001.jsonl, line 10 was changed, or a line before it removed")
