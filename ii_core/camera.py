@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -281,6 +281,11 @@ class IICamera:
     def model(self) -> IICamera | None:
         """The camera itself; see `Camera`."""
         return self
+
+    def channel_cameras(self) -> tuple[IICamera, ...]:
+        """Return the camera itself; if an element has three wavelengths, those of red, green and blue light."""
+        chains = [tuple(element.of_channel(channel) for element in self.optics) for channel in range(3)]
+        return (self,) if chains[0] == self.optics else tuple(replace(self, optics=optics) for optics in chains)
 
     @property
     def size_mm(self) -> tuple[float, float]:

@@ -123,6 +123,10 @@ class Element:
     def to_json(self) -> dict[str, Any]:
         return {"kind": self.kind, **{k: v for k, v in asdict(self).items() if v is not None}}
 
+    def of_channel(self, channel: int) -> Element:
+        """Return the element for the light of one channel: 0 is red, 1 green, 2 blue."""
+        return self
+
 
 class LensModel(Element):
     """Model of the lenslets."""

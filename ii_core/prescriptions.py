@@ -43,10 +43,16 @@ class Prescription:
     about: str = ""
     source: str = ""
 
-    def at(self, z_mm: float, *, enlarge: float = 1.0, wavelength_nm: float | None = None) -> Surfaces:
-        """Return the lens with its last vertex at ``z_mm``, all its lengths times ``enlarge``."""
+    def at(
+        self, z_mm: float, *, enlarge: float = 1.0, wavelength_nm: float | None = None,
+        wavelengths_nm: Any = None,
+    ) -> Surfaces:  # fmt: skip
+        """Return the lens with its last vertex at ``z_mm``, all its lengths times ``enlarge``; see `Surfaces`."""
         wavelength = self.wavelength_nm if wavelength_nm is None else wavelength_nm
-        return Surfaces(z_mm=z_mm, surfaces=self.surfaces, wavelength_nm=wavelength).enlarged(enlarge)
+        if wavelengths_nm is not None and wavelength_nm is None:
+            wavelength = LINE_D_NM  # that of the prescription gives way
+        made = Surfaces(z_mm=z_mm, surfaces=self.surfaces, wavelength_nm=wavelength, wavelengths_nm=wavelengths_nm)
+        return made.enlarged(enlarge)
 
 
 def lens_names() -> dict[str, str]:
@@ -118,7 +124,8 @@ def placed(element: Any, folder: Path) -> Any:
     """
     if not isinstance(element, Mapping) or "prescription" not in element:
         return element
-    known = {"kind", "prescription", "z_mm", "enlarge", "wavelength_nm"}
+    options = ("enlarge", "wavelength_nm", "wavelengths_nm")
+    known = {"kind", "prescription", "z_mm", *options}
     if element.get("kind") != Surfaces.kind or (unknown := set(element) - known):
         extra = f" and no {', '.join(sorted(unknown))}" if element.get("kind") == Surfaces.kind else ""
         raise ValueError(f'an element with a prescription has "kind": "surfaces"{extra}')
@@ -129,7 +136,7 @@ def placed(element: Any, folder: Path) -> Any:
     if len(str(name)) > MOST_NAME:
         raise ValueError(f"surfaces: prescription is {checks.shown(name)}: at most {MOST_NAME} characters are needed")
     is_file = Path(name).suffix.lower() in (".json", ".zmx")
-    rest = {key: value for key, value in element.items() if key in ("enlarge", "wavelength_nm")}
+    rest = {key: value for key, value in element.items() if key in options}
     return lens(folder / name if is_file else name).at(element["z_mm"], **rest)
 
 

@@ -119,6 +119,9 @@ class Surfaces(FrontElement):
         From the scene to the pixels. One is the stop. Both ends stand in air.
     wavelength_nm : float
         Of the light, in vacuum; from 200 to 2500.
+    wavelengths_nm : (red, green, blue), optional
+        Of the three channels of a rendered picture, which then has the lens's colour aberrations. Maps of rays,
+        support images and paraxial values are those of green: ``wavelength_nm`` is left out.
 
     Raises
     ------
@@ -135,6 +138,7 @@ class Surfaces(FrontElement):
     z_mm: float
     surfaces: tuple[Surface, ...]
     wavelength_nm: float = LINE_D_NM
+    wavelengths_nm: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         within("surfaces: z_mm", self.z_mm, -MOST_MM, MOST_MM, unit=" mm")
@@ -156,11 +160,37 @@ class Surfaces(FrontElement):
             )
         for i, (near, far) in enumerate(pairwise(built), 1):
             _check_apart(i, near, far)
+        if self.wavelengths_nm is not None:
+            self._check_channels(self.wavelengths_nm)
         _ = self._indices  # raises ValueError for a wavelength that a glass does not have
         self._check_open()
 
+    def _check_channels(self, given: Any) -> None:
+        """Take three wavelengths, and that of green as the lens's own."""
+        sequence("surfaces: wavelengths_nm", given)
+        if len(given) != 3:
+            raise ValueError(f"surfaces: wavelengths_nm is {given!r}: three, of red, green and blue, are needed")
+        for name, wavelength in zip(("red", "green", "blue"), given, strict=True):
+            number(f"surfaces: wavelengths_nm of {name}", wavelength)
+            for surface in self.surfaces:
+                _ = 1.0 if surface.glass is None else surface.glass.index(wavelength)
+        red, green, blue = map(float, given)
+        if self.wavelength_nm not in (LINE_D_NM, green):
+            raise ValueError(
+                f"surfaces: wavelength_nm is {self.wavelength_nm:g} beside wavelengths_nm: one of them is needed"
+            )
+        object.__setattr__(self, "wavelength_nm", green)
+        object.__setattr__(self, "wavelengths_nm", (red, green, blue))
+
+    def of_channel(self, channel: int) -> Surfaces:
+        if self.wavelengths_nm is None:
+            return self
+        return replace(self, wavelength_nm=self.wavelengths_nm[channel], wavelengths_nm=None)
+
     def to_json(self) -> dict[str, Any]:
         data = {"kind": self.kind, "z_mm": self.z_mm, "surfaces": [surface.to_json() for surface in self.surfaces]}
+        if self.wavelengths_nm is not None:
+            return {**data, "wavelengths_nm": list(self.wavelengths_nm)}
         return data if self.wavelength_nm == LINE_D_NM else {**data, "wavelength_nm": self.wavelength_nm}
 
     @cached_property

@@ -72,7 +72,11 @@ class Block:
 
 @dataclass(frozen=True)
 class Job:
-    """Picture to render. `tile` runs on any thread of any process; pickling omits working arrays."""
+    """Picture to render. `tile` runs on any thread of any process; pickling omits working arrays.
+
+    A camera whose lens has three wavelengths has a job per channel: red and blue give their channel of the pixels,
+    green all else.
+    """
 
     scene: Scene
     camera: IICamera | MapCamera
@@ -85,6 +89,17 @@ class Job:
     audit: float = 0.0
     _local: threading.local = field(default_factory=threading.local, compare=False, repr=False)
     _stopped: threading.Event = field(default_factory=threading.Event, compare=False, repr=False)
+    _channels: tuple[Job, ...] = field(default=(), init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        cameras = self.camera.channel_cameras() if isinstance(self.camera, IICamera) else ()
+        if len(cameras) == 3:
+            supports = ((), self.support, ())
+            jobs = [
+                replace(self, camera=camera, support=support, _local=threading.local())
+                for camera, support in zip(cameras, supports, strict=True)
+            ]
+            object.__setattr__(self, "_channels", tuple(jobs))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (
@@ -106,6 +121,8 @@ class Job:
 
     def tile(self, rows: slice, cols: slice) -> Block:
         """Render one tile."""
+        if self._channels:
+            return _merged([job.tile(rows, cols) for job in self._channels])
         started = time.thread_time()
         tracer = self._tracer()
         shape = rows.stop - rows.start, cols.stop - cols.start
@@ -259,6 +276,17 @@ class Job:
             return radiance
 
         return shoot
+
+
+def _merged(blocks: list[Block]) -> Block:
+    """Return the tile of three channels: a channel of each, all other images of green, and the cost of all."""
+    green = blocks[1]
+    pixels = np.stack([block.arrays["pixels"][..., channel] for channel, block in enumerate(blocks)], axis=-1)
+    count = RayCount()
+    for block in blocks:
+        count.add(block.count)
+    seconds = sum(block.cpu_seconds for block in blocks)
+    return replace(green, arrays={**green.arrays, "pixels": pixels}, count=count, cpu_seconds=seconds)
 
 
 def footprint(camera: Camera) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from benchmarks.accuracy.lens_rays import cases
 from ii_core import IICamera, preset
 from ii_core.elements import Bundle
-from ii_core.glass import CATALOGUE, LINE_C_NM, LINE_F_NM, Glass, glass
+from ii_core.glass import CATALOGUE, LINE_C_NM, LINE_D_NM, LINE_F_NM, Glass, glass
 from ii_core.prescriptions import lens, lens_names
 from ii_core.properties import image_planes, through_front_mm
 from ii_core.surfaces import Surface, Surfaces
@@ -311,6 +311,108 @@ def test_wavelengths_focus_apart():
     ]  # fmt: skip
     assert single[0] < single[1] < single[2]  # blue bends more
     assert abs(focus[2] - focus[0]) < 0.2 * abs(single[2] - single[0])
+
+
+# -- three wavelengths
+
+CHANNELS_NM = (LINE_C_NM, LINE_D_NM, LINE_F_NM)
+CROWN, FLINT = CATALOGUE["N-BK7"], CATALOGUE["F2"]
+POWER, AHEAD = 1 / 50.0, 20.0  # of the lens, per mm, and its distance from a pinhole, the stop
+
+
+def through(lenses, slope):
+    """Return the slope ahead of a lens of the ray of a slope through the pinhole, for red, green and blue."""
+    camera = IICamera(
+        pixels=(1, 1), lenses=(1, 1), pixel_pitch_mm=0.01, gap_mm=1.0,
+        optics=("pinhole", Surfaces(z_mm=1.0 + AHEAD, surfaces=lenses, wavelengths_nm=CHANNELS_NM)),
+    )  # fmt: skip
+    slopes = []
+    for channel in camera.channel_cameras():
+        out = channel.front[0].pass_on(rays_at(0, 0, 1, 0, slope, 1))
+        slopes.append(float(np.ravel(out.dy / out.dz)[0]))
+    return np.array(slopes)
+
+
+def thin(power, glass, radius=None):
+    """Return the two radii of a thin lens of a power at line d; ``radius`` is that of its scene side."""
+    bend = power / (glass.index(LINE_D_NM) - 1)
+    radius = 2 / bend if radius is None else radius
+    return radius, 1 / (1 / radius - bend)
+
+
+def test_lateral_colour_of_a_singlet_is_one_over_its_abbe_number():
+    """The ray meets a thin lens at height y: lines F and C part by y·φ/V, and nothing else does."""
+    front, back = thin(POWER, CROWN)
+
+    def singlet(thickness, diameter):
+        scene_side = {"radius_mm": front, "thickness_mm": thickness, "glass": CROWN}
+        return {**scene_side, "diameter_mm": diameter, "stop": True}, {"radius_mm": back}
+
+    slope = 0.002  # y = 0.04 mm: aberrations of the third order are 1e-6 of the bend
+    red, green, blue = through(singlet(2e-4, 0.1), slope)
+    y = AHEAD * slope
+    assert slope - green == pytest.approx(y * POWER, rel=1e-4)
+    assert red - blue == pytest.approx(y * POWER / CROWN.abbe_number, rel=1e-4)
+    # On a screen a focal length away, for the ray at 5.7 degrees: 31 µm, the bend's 2 mm over V.
+    red, green, blue = through(singlet(0.2, 5.0), 0.1)
+    assert 50 * (red - blue) == pytest.approx(2.0 / 64.17, rel=0.05)
+
+
+def test_an_achromat_corrects_lateral_colour():
+    """Powers of the two glasses as V₁ to −V₂: lines F and C agree, line d keeps the secondary spectrum."""
+    v1, v2 = CROWN.abbe_number, FLINT.abbe_number
+    first, second = POWER * v1 / (v1 - v2), -POWER * v2 / (v1 - v2)
+    front, joined = thin(first, CROWN)
+    _, back = thin(second, FLINT, radius=joined)
+    doublet = (
+        {"radius_mm": front, "thickness_mm": 2e-4, "glass": CROWN, "diameter_mm": 0.1, "stop": True},
+        {"radius_mm": joined, "thickness_mm": 2e-4, "glass": FLINT},
+        {"radius_mm": back},
+    )
+    slope = 0.002
+    red, green, blue = through(doublet, slope)
+    y = AHEAD * slope
+    assert slope - green == pytest.approx(y * POWER, rel=1e-4)
+    assert abs(red - blue) < 1e-3 * y * POWER / v1  # of the singlet's
+    assert 0.01 < abs(red - green) / (y * POWER / v1) < 0.05  # secondary spectrum, f/2000: a thirtieth
+
+
+def test_channels_are_the_lens_at_their_wavelengths():
+    """So `benchmarks run lens_rays` compares the rays of each channel with optiland."""
+    for name in ("triplet", "double-gauss"):
+        three = lens(name).at(40.0, wavelengths_nm=CHANNELS_NM)
+        for channel, wavelength in enumerate(CHANNELS_NM):
+            assert three.of_channel(channel) == lens(name).at(40.0, wavelength_nm=wavelength)
+        assert three.focal_mm == lens(name).at(40.0, wavelength_nm=LINE_D_NM).focal_mm
+        assert three.enlarged(2.0).moved(1.0).wavelengths_nm == CHANNELS_NM
+
+
+def test_cameras_of_three_wavelengths_survive_their_file(tmp_path):
+    element = {"kind": "surfaces", "z_mm": 60, "prescription": "triplet", "wavelengths_nm": [610, 550, 465]}
+    path = tmp_path / "c.json"
+    path.write_text(
+        json.dumps({"pixels": [64, 32], "lenses": [8, 4], "pixel_pitch_mm": 0.1, "gap_mm": 1, "optics": [element]})
+    )
+    camera = preset(path)
+    assert IICamera.from_json(camera.to_json()) == camera and camera.front[0].wavelength_nm == 550
+    assert [c.front[0].wavelength_nm for c in camera.channel_cameras()] == [610, 550, 465]
+    plain = preset("plenoptic1-double-gauss", scale=32)
+    assert plain.channel_cameras() == (plain,)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"wavelengths_nm": [610, 550]}, "wavelengths_nm is .610, 550.: three"),
+        ({"wavelengths_nm": [610, 550, 100]}, "wavelength_nm is 100"),
+        ({"wavelengths_nm": [610, 550, 465], "wavelength_nm": 500}, "one of them is needed"),
+        ({"wavelengths_nm": [610, "d", 465]}, "wavelengths_nm of green is 'd'"),
+        ({"wavelengths_nm": "rgb"}, "wavelengths_nm is 'rgb'"),
+    ],
+)
+def test_wrong_wavelengths_are_refused(values, message):
+    with pytest.raises((ValueError, TypeError), match=message):
+        Surfaces(z_mm=0, surfaces=[GOOD, LAST], **values)
 
 
 # -- cameras

@@ -1,6 +1,9 @@
 """Rendered pictures: equal to the bit for all tiles and numbers of threads; counts of rays."""
 
 import json
+import pickle
+from concurrent.futures import CancelledError
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -404,3 +407,38 @@ def test_rays_of_maps_without_lenses_are_grouped_by_direction(tmp_path):
     assert near < 2 * own_near and narrow <= own_narrow + 1e-6
     scene = hall()
     np.testing.assert_array_equal(render(scene, camera).picture.pixels, render(scene, REGULAR).picture.pixels)
+
+
+# -- three wavelengths
+
+
+@pytest.mark.parametrize("samples", [1, (4, 8)])
+def test_each_channel_has_the_rays_of_its_wavelength(hall_scene, samples):
+    camera = preset("plenoptic1-double-gauss", scale=64)
+    model, field_lens, glass = camera.optics
+    three = replace(camera, optics=(model, field_lens, replace(glass, wavelengths_nm=(640.0, 550.0, 450.0))))
+    support = ("depth", "samples")
+    shot, rays = render(hall_scene, three, support=support, samples=samples), 0
+    for channel, wavelength in enumerate((640.0, 550.0, 450.0)):
+        alone = replace(camera, optics=(model, field_lens, replace(glass, wavelength_nm=wavelength)))
+        single = render(hall_scene, alone, support=support, samples=samples)
+        np.testing.assert_array_equal(shot.picture.pixels[..., channel], single.picture.pixels[..., channel])
+        if channel == 1:
+            np.testing.assert_array_equal(shot.depth, single.depth)
+            np.testing.assert_array_equal(shot.samples, single.samples)
+        rays += single.stats.rays["primary"]
+    assert shot.stats.rays["primary"] == rays
+    assert (shot.picture.pixels != single.picture.pixels).any() and shot.picture.camera == three
+
+
+def test_a_job_of_three_wavelengths_reaches_worker_processes(hall_scene):
+    camera = preset("plenoptic1-double-gauss", scale=128)
+    model, field_lens, glass = camera.optics
+    three = replace(camera, optics=(model, field_lens, replace(glass, wavelengths_nm=(640.0, 550.0, 450.0))))
+    made = job.Job(hall_scene, three, 1, 0, np.eye(4), "uint8", ())
+    rows, cols = made.tiles()[0]
+    pixels = [j.tile(rows, cols).arrays["pixels"] for j in (made, pickle.loads(pickle.dumps(made)))]
+    np.testing.assert_array_equal(*pixels)
+    made.stop()  # all channels leave their tiles
+    with pytest.raises(CancelledError):
+        made.tile(rows, cols)
