@@ -4,14 +4,20 @@ Two processes, one for each code, render the same bands of full ``setup1`` with 
 time. The earlier code comes from a git worktree in a temporary folder. Its process also repeats the calls of
 ``EmbreeScene.run`` of its render, on the same rays in the same order: this is Embree's bare time.
 
-As a script, ``python before.py SCENE BAND …``, it is one of these processes: a line of input is a task, "render" or
-"bare", the line of output its CPU seconds.
+The earlier code reads image textures at points. The present code therefore renders twice: as by default, with its
+textures filtered, and with the filter off, which is the earlier code's picture but for the pixels that `difference`
+counts: ties, and mended vertex normals.
+
+As a script, ``python before.py SCENE BAND …``, it is one of these processes: a line of input is a task, "render",
+"plain" for a render without the filter, "bare", or "save FILE" for the pixels of "plain"; the line of output its CPU
+seconds.
 """
 
 from __future__ import annotations
 
 import atexit
 import importlib
+import inspect
 import os
 import shutil
 import subprocess
@@ -20,9 +26,11 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 COMMIT = "b1dc540"  # the last commit that traced single rays in rows of pixels
 ROOT = Path(__file__).parents[2]
@@ -32,18 +40,39 @@ USUAL_BANDS = (2, 7, 12)
 
 
 def nanoseconds(scene: str, repeats: int) -> dict[str, list[float]]:
-    """Return CPU nanoseconds per pixel of ``now`` and ``before``, and of the earlier code's ``bare`` Embree calls."""
+    """Return CPU nanoseconds per pixel of ``now``, ``plain`` (now, without texture filter), ``before``, and ``bare``.
+
+    ``bare`` are the Embree calls of the earlier code.
+    """
     bands = BANDS.get(scene, USUAL_BANDS)
     pixels = 8192 * BAND * len(bands)
-    found: dict[str, list[float]] = {"now": [], "before": [], "bare": []}
+    found: dict[str, list[float]] = {"now": [], "plain": [], "before": [], "bare": []}
     arguments = (Path(__file__), scene, *map(str, bands))
     with process(ROOT, *arguments) as now, process(worktree(), *arguments) as before:
         for measure in (now, before):
             measure("render")  # compiles the kernels
         for _ in range(repeats):
-            for name, measure in (("now", now), ("before", before), ("bare", before)):
-                found[name].append(float(measure("bare" if name == "bare" else "render")) / pixels * 1e9)
+            for name, measure, task in (
+                ("now", now, "render"),
+                ("plain", now, "plain"),
+                ("before", before, "render"),
+                ("bare", before, "bare"),
+            ):
+                found[name].append(float(measure(task)) / pixels * 1e9)
     return found
+
+
+def difference(scene: str) -> float:
+    """Return the percentage of pixels in which the picture without texture filter is not the earlier code's."""
+    bands = BANDS.get(scene, USUAL_BANDS)
+    with tempfile.TemporaryDirectory() as folder:
+        pictures = []
+        for code in (ROOT, worktree()):
+            file = Path(folder) / f"{len(pictures)}.npy"
+            with process(code, Path(__file__), scene, *map(str, bands)) as measure:
+                measure(f"save {file}")
+            pictures.append(np.load(file))
+    return 100 * float((pictures[0] != pictures[1]).any(axis=-1).mean())
 
 
 @cache
@@ -96,9 +125,11 @@ def _serve(scene_name: str, bands: list[int]) -> None:
     job.Job.tiles = lambda self: [tile for tile in whole(self) if tile[0].start // BAND in bands]
     scene, camera = raytrace_ii.load_scene(scene_name), ii_core.preset("setup1")
 
-    def shoot() -> None:
-        raytrace_ii.render(scene, camera, workers=1, support=())
+    def shoot(**options: Any) -> Any:
+        return raytrace_ii.render(scene, camera, workers=1, support=(), **options).picture.pixels
 
+    filtering = "texture_filter" in inspect.signature(raytrace_ii.render).parameters
+    plain = partial(shoot, texture_filter=False) if filtering else shoot
     calls: list[Callable[[], object]] = []
     for task in map(str.strip, sys.stdin):
         if task == "bare" and not calls:
@@ -107,8 +138,13 @@ def _serve(scene_name: str, bands: list[int]) -> None:
         if task == "bare":
             for call in calls:
                 call()
-        else:
+        elif task == "render":
             shoot()
+        else:
+            pixels = plain()
+            if task != "plain":
+                rows = pixels.reshape(-1, BAND, *pixels.shape[1:])[bands]
+                np.save(task.removeprefix("save "), rows)
         print(time.process_time() - start, flush=True)
 
 

@@ -15,7 +15,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from fnmatch import fnmatch
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ import numpy as np
 from benchmarks.arguments import command_line
 from benchmarks.records import Records
 from benchmarks.speed.bare import bare_encoder
-from benchmarks.speed.before import COMMIT, nanoseconds
+from benchmarks.speed.before import COMMIT, difference, nanoseconds
 from codec import encode
 from ii_core import IIPicture, component_images, preset
 from raytrace_ii import load_scene, render, scene_names
@@ -32,6 +32,7 @@ from raytrace_ii import load_scene, render, scene_names
 RECORDS = Records("speed", ("benchmarks.speed.ratios", "benchmarks.speed.bare", "benchmarks.speed.before"))
 REPEATS = 7
 LEAST_GAIN = {"apples": "≥ 2.8", "cuboid": "≥ 2.8"}
+PLAIN = " without texture filter"
 
 
 def main() -> None:
@@ -64,15 +65,26 @@ def targets() -> dict[str, tuple[str, Callable[[], list[float]]]]:
     """Return target and measurement of each ratio."""
     every: list[tuple[str, str, Callable[[], list[float]]]] = [
         *(
-            (f"render {name}: speed / {COMMIT}", LEAST_GAIN.get(name, "≥ 1.4"), lambda name=name: gain(name))
+            row
+            for kind, of in (("", gain), (PLAIN, plain_gain))
+            for row in (
+                *(
+                    (f"render {name}{kind}: speed / {COMMIT}", LEAST_GAIN.get(name, "≥ 1.4"), partial(of, name))
+                    for name in scene_names()
+                ),
+                (f"render, mean of all{kind}: speed / {COMMIT}", "≥ 2.2", partial(gains, of)),
+            )
+        ),
+        *(
+            (f"render {name}{PLAIN}: pixels unlike {COMMIT}, %", "", lambda name=name: [difference(name)])
             for name in scene_names()
         ),
-        (f"render, mean of all: speed / {COMMIT}", "≥ 2.2", lambda: gains(gain)),
         *(
             (f"render {name}: CPU time / EmbreeScene.run", "", lambda name=name: bare_ratio(name))
             for name in scene_names()
         ),
         ("render, mean of all: CPU time / EmbreeScene.run", "≤ 0.6", lambda: gains(bare_ratio)),
+        (f"render, mean of all{PLAIN}: CPU time / EmbreeScene.run", "≤ 0.6", lambda: gains(plain_bare_ratio)),
         ("render apples: speed of 2 workers / 1 worker", "≥ 1.9", lambda: workers_ratio("apples")),
         ("render cuboid: speed of 2 workers / 1 worker", "≥ 1.9", lambda: workers_ratio("cuboid")),
         ("first picture of apples, nothing compiled, CPU s", "≤ 15", lambda: first_picture(cached=False)),
@@ -99,6 +111,18 @@ def gain(name: str) -> list[float]:
     """Return the speed of a render over that of the commit `before.COMMIT`, in CPU time."""
     found = rendered(name)
     return [before / now for before, now in zip(found["before"], found["now"], strict=True)]
+
+
+def plain_gain(name: str) -> list[float]:
+    """Return `gain` with textures read at points, as that commit reads them."""
+    found = rendered(name)
+    return [before / plain for before, plain in zip(found["before"], found["plain"], strict=True)]
+
+
+def plain_bare_ratio(name: str) -> list[float]:
+    """Return `bare_ratio` with textures read at points."""
+    found = rendered(name)
+    return [plain / bare for plain, bare in zip(found["plain"], found["bare"], strict=True)]
 
 
 def bare_ratio(name: str) -> list[float]:

@@ -13,7 +13,7 @@ from .addresses import value_at
 from .glossy import highlight
 from .lanes import BLOCK
 from .media import clearness, enter, medium_of
-from .noise import fractal_lanes
+from .noise import fractal_lanes, vectors
 from .tables import (
     ABSORPTION,
     ALPHA_BLEND,
@@ -142,7 +142,7 @@ def look_closely(generation, first, lanes, _):
                 _gild(k, g.surfaces, g.work)
 
 
-@part_kernel
+@stage_kernel
 def _take_images(k, surfaces, filtering, blending, work, noisy):
     """Read the images of one lane's body.
 
@@ -182,7 +182,7 @@ def _take_images(k, surfaces, filtering, blending, work, noisy):
     return 0
 
 
-@part_kernel
+@stage_kernel
 def _take_pattern(k, row, surfaces, work, noisy):
     """Colour one lane by a pattern, or note the place where its noise is wanted as number ``noisy``: 1 then."""
     single, double, whole, table = work.single, work.double, work.whole, surfaces.textures
@@ -229,7 +229,7 @@ def _gild(k, surfaces, work):
 def _colour_by_noise(many, surfaces, work):
     """Colours of the lanes whose texture is noise."""
     double, whole = work.double, work.whole
-    for k in range(many, BLOCK):  # lanes to spare: far places would overflow
+    for k in range(many, vectors(many)):  # lanes to spare: far places would overflow
         whole[at.OCTAVES + k], double[at.SX + k], double[at.SY + k], double[at.SZ + k] = 0, 0.0, 0.0, 0.0
     fractal_lanes(many, whole, double)
     for j in range(many):

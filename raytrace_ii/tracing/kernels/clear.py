@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ii_core.jit import lean_kernel as kernel
-from ii_core.jit import part_kernel
+from ii_core.jit import stage_kernel
 
 from .fresnel import fresnel
 from .media import cross, enter, leave, media_at, medium_of, refractive_index, transmits
@@ -132,7 +132,7 @@ def pass_clear_face(
     return kept
 
 
-@part_kernel
+@stage_kernel
 def _straight_reflectance(materials, before, after, c, faces, f, dx, dy, dz, length):
     """Return the Fresnel reflectance of a face for light that passes unrefracted, at its angle in air."""
     cosine = (faces[f, 0] * dx + faces[f, 1] * dy + faces[f, 2] * dz) / length

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.jit import inline_kernel, part_kernel
+from ii_core.jit import inline_kernel, part_kernel, stage_kernel
 
 from .tables import IOR, PRIORITY, TRANSMISSION
 
 
-@part_kernel
+@stage_kernel
 def medium_of(inside, i, materials, without):
     """The body of highest priority that a ray is in, of equal ones the first entered; −1 for none.
 
@@ -27,7 +27,7 @@ def medium_of(inside, i, materials, without):
     return best
 
 
-@part_kernel
+@stage_kernel
 def media_at(inside, i, materials, body, entering):
     """What is before and behind a face of a body; the same if another body hides the face (Schmidt, Budge 2002)."""
     if entering:

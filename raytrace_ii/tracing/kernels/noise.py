@@ -10,7 +10,6 @@ from ii_core.jit import inline_kernel, inner_kernel, stage_kernel
 from ii_core.jit import lean_kernel as kernel
 
 from . import lanes as at
-from .lanes import BLOCK
 
 # Odd multipliers of the noise lattice's hash.
 _PX, _PY, _PZ, _SEED, _GOLDEN = 73856093, 19349663, 83492791, 2654435761, np.uint64(0x1E3779B97F4A7C15)
@@ -38,6 +37,12 @@ def gradient_noise(x, y, z, seed):
     return _lerp(w, near, far)
 
 
+@inline_kernel
+def vectors(lanes):
+    """So many lanes, up to whole vectors of eight."""
+    return (lanes + 7) // 8 * 8
+
+
 @stage_kernel
 def fractal_lanes(many, whole, double):
     """Sums of octaves of gradient noise, each of half the size and strength, for many places: to ``TOTAL``.
@@ -47,11 +52,12 @@ def fractal_lanes(many, whole, double):
     most = 0
     for k in range(many):
         most = max(most, whole[at.OCTAVES + k])
-    for k in range(BLOCK):
+    lanes = vectors(many)
+    for k in range(lanes):
         double[at.TOTAL + k] = 0.0
         double[at.STRENGTH + k] = 1.0 if whole[at.OCTAVES + k] > 0 else 0.0
     for octave in range(most):
-        for k in range(BLOCK):
+        for k in range(lanes):
             x, y, z, strength = double[at.SX + k], double[at.SY + k], double[at.SZ + k], double[at.STRENGTH + k]
             double[at.TOTAL + k] += strength * gradient_noise(x, y, z, whole[at.SEED + k] + octave)
             double[at.SX + k], double[at.SY + k], double[at.SZ + k] = 2.03 * x, 2.03 * y, 2.03 * z

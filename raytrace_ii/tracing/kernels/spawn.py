@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel, late_kernel, part_kernel
+from ii_core.jit import inline_kernel, late_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
@@ -44,7 +44,10 @@ def reflect(generation, first, lanes, _):
 
 @late_kernel
 def spawn(generation, first, lanes, _):
-    """Write the rays that the hits of a block send on, over mirrors and through what is clear."""
+    """Write the rays that the hits of a block send on: first through what is clear, then over mirrors.
+
+    So packets hold rays of one kind, which run side by side.
+    """
     g = value_at(generation)
     rays, passage, following, work, counts = g.rays, g.passage, g.following, g.work, g.counts
     for k in range(lanes):
@@ -55,6 +58,9 @@ def spawn(generation, first, lanes, _):
                 _pass_through(k, rays, g.surfaces, passage, following, work, counts)
             if work.double[at.CLEAR + k] > 0.0:
                 m0, m1, m2 = _refract(k, m0, m1, m2, rays, g.surfaces.materials, passage, following, work, counts)
+        work.double[at.K0 + k], work.double[at.K1 + k], work.double[at.K2 + k] = m0, m1, m2
+    for k in range(lanes):
+        m0, m1, m2 = three(work.double, at.K0, k)
         if max(m0, m1, m2) < passage.least:
             counts[WEAK_REFLECTION] += max(m0, m1, m2) > 0.0
         elif work.double[at.ROUGH + k] > 0.0:
@@ -73,7 +79,7 @@ def _mirrored(k, double):
     )
 
 
-@part_kernel
+@stage_kernel
 def _send(k, kind, ox, oy, oz, dx, dy, dz, w0, w1, w2, rays, following, work, counts):
     """Write a ray that a lane sends on, with the pixel, bodies around it and place in lobes of the ray before.
 
@@ -113,7 +119,7 @@ def _pass_through(k, rays, surfaces, passage, following, work, counts):
     _send(k, PASSED, x, y, z, dx, dy, dz, b0, b1, b2, rays, following, work, counts)
 
 
-@part_kernel
+@stage_kernel
 def _refract(k, m0, m1, m2, rays, materials, passage, following, work, counts):
     """The rays through a face of glass, one a channel where it disperses, by Fresnel's formulas.
 
@@ -183,7 +189,7 @@ def _reflect_over_lobe(k, m0, m1, m2, rays, passage, following, work, counts):
         following.keys[row] = mix_bits(key + np.uint64(j))
 
 
-@part_kernel
+@stage_kernel
 def _reflect(k, m0, m1, m2, rays, following, work, counts):
     """The ray over a smooth mirror."""
     double = work.double

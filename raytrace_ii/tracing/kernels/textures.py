@@ -10,10 +10,12 @@ from ii_core.colour import LINEAR
 from ii_core.jit import inline_kernel, part_kernel, stage_kernel
 
 from .tables import ALPHA_BLEND, CHECKER, CUTOFF, IMAGE, LEVELS, MIRROR, REPEAT, TEXTURE, VERTEX
+from .texels import mixed
 from .vectors import interpolate
 
 MOST_TAPS = 8  # along the longer axis of a filtered ellipse
 SHARPER = 0.5  # levels finer than the filter's width: bilinear reading of a level widens it again
+_LINEAR = LINEAR.astype(np.float64)  # float32's values: a bilinear reading converts twelve of them else
 _1, _2, _3, _4 = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
 
 
@@ -58,24 +60,21 @@ def _between(table, row, t):
 
 
 @stage_kernel
-def _image(table, row, texels, u, v):
-    """Colour of an image at (u, v), bilinear."""
-    a, b, c, d, fx, fy = _texels_at(table, row, u, v)
+def _image(level, wraps, texels, x, y):
+    """Colour of an image's level at a place folded into the image, bilinear."""
+    a, b, c, d, fx, fy = _texels_at(level, wraps, x, y)
     w00, w10, w01, w11 = (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy
     pixels, codes = texels
-    if table[row, 5] != 0.0:
+    if level[3]:
         a, b, c, d = a * _4, b * _4, c * _4, d * _4
         k, m, n, o = codes[a], codes[b], codes[c], codes[d]
-        red = w00 * LINEAR[k] + w10 * LINEAR[m] + w01 * LINEAR[n] + w11 * LINEAR[o]
+        red = w00 * _LINEAR[k] + w10 * _LINEAR[m] + w01 * _LINEAR[n] + w11 * _LINEAR[o]
         k, m, n, o = codes[a + _1], codes[b + _1], codes[c + _1], codes[d + _1]
-        green = w00 * LINEAR[k] + w10 * LINEAR[m] + w01 * LINEAR[n] + w11 * LINEAR[o]
+        green = w00 * _LINEAR[k] + w10 * _LINEAR[m] + w01 * _LINEAR[n] + w11 * _LINEAR[o]
         k, m, n, o = codes[a + _2], codes[b + _2], codes[c + _2], codes[d + _2]
-        blue = w00 * LINEAR[k] + w10 * LINEAR[m] + w01 * LINEAR[n] + w11 * LINEAR[o]
+        blue = w00 * _LINEAR[k] + w10 * _LINEAR[m] + w01 * _LINEAR[n] + w11 * _LINEAR[o]
     else:
-        a, b, c, d = a * _3, b * _3, c * _3, d * _3
-        red = w00 * pixels[a] + w10 * pixels[b] + w01 * pixels[c] + w11 * pixels[d]
-        green = w00 * pixels[a + _1] + w10 * pixels[b + _1] + w01 * pixels[c + _1] + w11 * pixels[d + _1]
-        blue = w00 * pixels[a + _2] + w10 * pixels[b + _2] + w01 * pixels[c + _2] + w11 * pixels[d + _2]
+        red, green, blue = mixed(pixels, (a * _3, b * _3, c * _3, d * _3), (w00, w10, w01, w11))
     return red, green, blue
 
 
@@ -128,38 +127,53 @@ def filter_taps(table, row, au, av, bu, bv):
 
 
 @inline_kernel
-def _levels(row, level):
-    """Rows of the levels above and below, and how far it is to the second."""
+def _levels(table, row, level):
+    """The levels above and below, and how far it is to the second; the first twice where it is none."""
     near = int(level)
-    return row + near, row + near + 1, level - near
+    part = level - near
+    return _level(table, row + near), _level(table, row + near + (1 if part > 0.0 else 0)), part
+
+
+@inline_kernel
+def _level(table, row):
+    """A level's first texel, width, height, and whether it is of codes."""
+    return int(table[row, 1]), int(table[row, 2]), int(table[row, 3]), table[row, 5] != 0.0
+
+
+@inline_kernel
+def _wraps(table, row):
+    """How an image and its levels go on across and down."""
+    return int(table[row, 6]), int(table[row, 7])
 
 
 @part_kernel
 def filtered(table, row, texels, u, v, au, av, bu, bv):
     """Colour of an image over an ellipse about (u, v) of two diameters: means of its pyramid (Williams 1983)."""
     taps, level, bu, bv = filter_taps(table, row, au, av, bu, bv)
-    near, far, part = _levels(row, level)
-    if taps == 1 and level == 0.0:
-        return _image(table, row, texels, u, v)
+    near, far, part = _levels(table, row, level)
+    wraps = _wraps(table, row)
     red, green, blue = 0.0, 0.0, 0.0
     for tap in range(taps):
         s = (tap + 0.5) / taps - 0.5
-        r, g, b = _image(table, near, texels, u + s * bu, v + s * bv)
+        x, y = _folded(u + s * bu, wraps[0]), 1.0 - _folded(v + s * bv, wraps[1])
+        r, g, b = _image(near, wraps, texels, x, y)
         if part > 0.0:
-            r1, g1, b1 = _image(table, far, texels, u + s * bu, v + s * bv)
+            r1, g1, b1 = _image(far, wraps, texels, x, y)
             r, g, b = r + part * (r1 - r), g + part * (g1 - g), b + part * (b1 - b)
         red, green, blue = red + r, green + g, blue + b
     return red / taps, green / taps, blue / taps
 
 
 @stage_kernel
-def _texels_at(table, row, u, v):
-    """The four texels about (u, v): left and right above, left and right below, and how far to right and down."""
-    first, width, height = int(table[row, 1]), int(table[row, 2]), int(table[row, 3])
-    across, down = int(table[row, 6]), int(table[row, 7])
-    x = _folded(u, across) * width - 0.5
-    y = (1.0 - _folded(v, down)) * height - 0.5
-    i, j = math.floor(x), math.floor(y)
+def _texels_at(level, wraps, x, y):
+    """The four texels about a place folded into the image, from its upper left corner in widths and heights.
+
+    Left and right above, left and right below, and how far it is to right and down.
+    """
+    first, width, height, _ = level
+    across, down = wraps
+    x, y = x * width - 0.5, y * height - 0.5
+    i, j = np.floor(x), np.floor(y)
     i0, i1 = _wrap(int(i), width, across)
     j0, j1 = _wrap(int(j), height, down)
     a, b = first + j0 * width, first + j1 * width
@@ -178,13 +192,13 @@ def _wrap(i, n, wrap):
 def _folded(t, wrap):
     """A texture coordinate taken into the image, [0, 1]."""
     if wrap == REPEAT:
-        return t - math.floor(t)
+        return t - np.floor(t)
     if wrap == MIRROR:
-        return abs(t - 2.0 * math.floor(0.5 * t + 0.5))  # from the nearest even number
+        return abs(t - 2.0 * np.floor(0.5 * t + 0.5))  # from the nearest even number
     return min(max(t, 0.0), 1.0)
 
 
-@part_kernel
+@stage_kernel
 def is_cut_out(coordinates, textures, alphas, materials, body, f, u, v):
     """Whether the texture's alpha leaves no surface at a place of a face."""
     if materials[body, CUTOFF] == 0.0:
@@ -201,12 +215,13 @@ def share_there(coordinates, textures, alphas, materials, body, f, u, v, au, av,
         x, y, _ = interpolate(coordinates, f, u, v)
         taps, level, bu, bv = filter_taps(textures, row, au, av, bu, bv)
         total = 0.0
+        near = int(level)
+        part = level - near
         for tap in range(taps):
             s = (tap + 0.5) / taps - 0.5
-            near, far, part = _levels(row, level)
-            here = _alpha(textures, near, alphas, x + s * bu, y + s * bv)
+            here = _alpha(textures, row + near, alphas, x + s * bu, y + s * bv)
             if part > 0.0:
-                here += part * (_alpha(textures, far, alphas, x + s * bu, y + s * bv) - here)
+                here += part * (_alpha(textures, row + near + 1, alphas, x + s * bu, y + s * bv) - here)
             total += here
         share *= total / taps
     return share
@@ -215,7 +230,9 @@ def share_there(coordinates, textures, alphas, materials, body, f, u, v, au, av,
 @part_kernel
 def _alpha(textures, row, alphas, x, y):
     """Alpha of an image at (u, v), bilinear."""
-    a, b, c, d, fx, fy = _texels_at(textures, row, x, y)
+    wraps = _wraps(textures, row)
+    x, y = _folded(x, wraps[0]), 1.0 - _folded(y, wraps[1])
+    a, b, c, d, fx, fy = _texels_at(_level(textures, row), wraps, x, y)
     first = np.uint64(int(textures[row, 4]) - int(textures[row, 1]))  # wraps round as an index does
     upper = (1 - fx) * alphas[first + a] + fx * alphas[first + b]
     lower = (1 - fx) * alphas[first + c] + fx * alphas[first + d]

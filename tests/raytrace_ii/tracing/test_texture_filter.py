@@ -2,6 +2,7 @@
 
 import math
 
+import numba
 import numpy as np
 import pytest
 
@@ -9,6 +10,7 @@ from ii_core import IICamera, preset
 from raytrace_ii import Background, Scene, render
 from raytrace_ii.rendering.job import footprint
 from raytrace_ii.scene.textures import Image
+from raytrace_ii.tracing.kernels.texels import mixed
 from raytrace_ii.tracing.kernels.textures import filter_taps, filtered
 from raytrace_ii.tracing.kernels.textures import footprint as face_footprint
 from raytrace_ii.tracing.texture_table import TextureTable, pyramid
@@ -41,6 +43,21 @@ def test_a_width_of_a_texel_or_less_reads_the_image_itself():
     packed = TextureTable([BOARD])
     assert filter_taps(packed.table, 0, 1 / 64, 0.0, 0.0, 0.5 / 64)[:2] == (1, 0.0)
     assert filter_taps(packed.table, 0, 0.0, 0.0, 0.0, 0.0)[:2] == (1, 0.0)
+
+
+def test_four_texels_are_mixed_alike_in_vectors():
+    """Compiled, the channels of a texel go together; b1dc540 read them one by one. The last texel has its spare."""
+    rng = np.random.default_rng(0)
+    texels = TextureTable([Image(rng.random((5, 4, 3), np.float32))]).texels[0]
+    last = len(texels) - 2 * 3  # the row of the spare number follows
+    weights = tuple(rng.random(4))
+    together = numba.njit(lambda texels, places, weights: mixed(texels, places, weights))
+    for places in ((0, 3, 12, 15), (last, last - 3, last, 0)):
+        places = tuple(map(np.uint64, places))
+        single = mixed(texels, places, weights)
+        assert len(set(single)) == 3
+        # float64's rounding: products and sums may fuse
+        np.testing.assert_allclose(together(texels, places, weights), single, rtol=4e-16)
 
 
 def test_a_wide_ray_sees_the_mean():
