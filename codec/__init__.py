@@ -22,6 +22,7 @@ from .inspect.random_access import decode_component, decode_frame
 from .search import Axis, CodingResult, Run, meet_size
 from .takes.api import EncodedTake, encode_take, open_take
 from .takes.container import DamagedTake, is_take
+from .takes.field_cost import light_field_cost
 from .takes.header import TakeFloor, take_floor
 from .takes.order import AccessCost, Plan, component_cost, view_cost
 
@@ -64,6 +65,7 @@ __all__ = [
     "encode_take",
     "extract",
     "is_take",
+    "light_field_cost",
     "meet_size",
     "open_take",
     "options",

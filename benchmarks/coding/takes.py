@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, origin, with_commits
-from codec import Plan, component_cost, decode, encode, encode_take, open_take
+from codec import Plan, component_cost, encode_take, open_take
 from ii_core import IIVideo, open_video, preset, sub_images, video_of
 from metrics import bd_rate, measure_take
 from metrics.rd import UndefinedDifference
@@ -43,14 +43,14 @@ PLANS = {
 }
 ONE_WAY = ("view-first", "time-first")
 ORDERS = ("view-first", "time-first", "interleaved", "stills")  # orders of every coder; the first is its anchor
-# Scheme and quantisers by coder. `si-lf` codes pictures alone: the frame FRAME_ALONE.
+# Scheme and quantisers by coder.
 CODERS = {
     "H.264": (SCHEME, QPS),
     "HEVC": ("si-hevc:rate=cq,refs=8", QPS),
     "AV1": ("si-av1:rate=cq", (24, 35, 46, 57)),
     "si-lf": ("si-lf", (26, 32, 38, 44)),
 }
-FRAME_ALONE = 4
+WHOLE_INSTANTS = ("view-first", "stills")  # orders of `si-lf`
 
 
 def main() -> None:
@@ -68,7 +68,7 @@ def main() -> None:
         for order in ORDERS
         for coder in asked.coders
         for take in takes
-        if coder != "si-lf" or order == "stills"
+        if coder != "si-lf" or order in WHOLE_INSTANTS
     ]
     for key in RECORDS.todo(keys, asked.again):
         video = rendered(key["take"], asked.scale)
@@ -90,8 +90,6 @@ def coded(
     video: IIVideo, take: str, scale: int, plan: str = "", step: int = 0, coder: str = "", order: str = ""
 ) -> dict[str, Any]:
     """Return points of one plan, of a coder in one order, or of both one-way orders on every step-th frame."""
-    if coder == "si-lf":
-        return {"points": alone(video, *CODERS[coder])}
     if coder:
         some = video_of([video[i] for i in range(INSTANTS)], fps=video.fps)
         return {"points": points(some, PLANS[order], *CODERS[coder])}
@@ -100,18 +98,6 @@ def coded(
     some = video_of([video[step * i] for i in range(INSTANTS)], fps=video.fps / step)
     curves = {name: points(some, PLANS[name]) for name in ONE_WAY}
     return {"curves": curves, **correlations(some)}
-
-
-def alone(video: IIVideo, scheme: str, quantisers: Sequence[int]) -> list[dict[str, float]]:
-    """Return rate and quality of a frame by a coder of pictures, at every quantiser."""
-    original = video_of([video[FRAME_ALONE]], fps=video.fps)
-    found: list[dict[str, float | None]] = []
-    for qp in quantisers:
-        one = encode(original[0], scheme, qp=qp)
-        quality = measure_take(original, video_of([decode(one)], fps=video.fps))
-        times = {"encode_seconds": one.encode_seconds, "codec_seconds": one.codec_seconds}
-        found.append({"qp": qp, "bpp": one.bpp, "psnr_of_pooled_mse": quality.pooled_psnr, **times})
-    return found
 
 
 def points(

@@ -19,14 +19,13 @@ from .. import file_header
 from ..api import blank_picture, check_coded
 from ..checks import check_type, whole
 from ..clock import cpu_seconds
-from ..coders.pseudo_video import PseudoVideo, Source
 from ..contract import MAX_DECODED_PIXELS, Goal, Value, check_picture, checked_goal, find, parse_scheme
 from ..search import Axis, Run, Trial, bracket, nearest, trials, within
 from . import container
+from .coding import SegmentCoder, segment_coder
 from .container import DamagedTake
 from .decoding import CodedFrames
 from .order import Plan
-from .segments import SegmentFilm, segment_film, segment_options
 from .unfinished import Unfinished
 
 RATES = ("take", "segment")
@@ -74,7 +73,7 @@ class EncodedTake:
 
     def __post_init__(self) -> None:
         check_coded(self)
-        _coder_of(self.scheme)
+        find(self.scheme)
         check_type("plan", self.plan, Plan, "a Plan")
         whole("frames", self.frames, 1, MAX_FRAMES)
         if not 0 < checks.number("fps", self.fps) < math.inf:
@@ -175,19 +174,12 @@ def _from_values(values: list[Any]) -> EncodedTake:
     whole("its number of frames", frames, 1, MAX_FRAMES)
     if not isinstance(fps, int | float) or not 0 < fps < math.inf:
         raise ValueError(f"its frame rate is {fps!r}: a number above 0 is needed")
-    coder, plan = _coder_of(fields["scheme"]), Plan(walk=walk, span=span, group=group, strip=strip)
-    plan.check(coder.film(blank, fields["options"]).layout.frames)
+    plan = Plan(walk=walk, span=span, group=group, strip=strip)
+    segment_coder(fields["scheme"], blank, fields["options"], plan).check()
     known = {name: fields[name] for name in ("scheme", "options", "dtype", "target_bpp", "qp", "quality")}
     return EncodedTake(
         **known, structure=blank.structure_json(), frames=frames, fps=float(fps), plan=plan, segments=[]
     )
-
-
-def _coder_of(name: str) -> PseudoVideo[Any]:
-    coder = find(name)
-    if not isinstance(coder, PseudoVideo):
-        raise ValueError(f"scheme {name} codes no takes: a pseudo video sequence, as si-h264, is needed")
-    return coder
 
 
 def encode_take(
@@ -202,7 +194,7 @@ def encode_take(
     progress: Progress | None = None,
     **options: Value,
 ) -> EncodedTake:
-    """Code an II-video by a pseudo video scheme.
+    """Code an II-video by a pseudo video scheme, or by ``si-lf`` with references in time.
 
     Memory holds the frames of one segment.
 
@@ -210,7 +202,7 @@ def encode_take(
     ----------
     video : IIVideo
     scheme : str
-        A pseudo video scheme with options after a colon, as for `encode`.
+        A pseudo video scheme or ``si-lf``, with options after a colon, as for `encode`.
     bpp : float
         Target: bits of the file per pixel of all frames.
     qp : int
@@ -250,24 +242,23 @@ def encode_take(
         checks.callable_("progress", progress)
     if not isinstance(rate, str) or rate not in RATES:
         raise ValueError(f"unknown rate {rate!r}: known are {', '.join(RATES)}")
-    parsed, settings = parse_scheme(scheme, **options)
-    coder = _coder_of(parsed.name)
+    coder, settings = parse_scheme(scheme, **options)
     if settings.get("gop"):
         raise ValueError(f"gop is {settings['gop']}: the plan's span and group set the groups of a take")
+    segment_coder(coder.name, video.structure, settings, plan)
     goal = checked_goal(coder, settings, bpp, qp, None)
     if goal.bpp is not None and rate == "take" and settings.get("rate") in ("cbr", "2pass"):
         settings = {**settings, "rate": "cq"}  # the take's own search is the rate control
     check_picture(coder, settings, video.structure)
-    views = coder.film(video.structure, settings).layout.frames
-    plan.check(views)
-    segment_options(coder, settings, plan, views, 1)
+    segments = segment_coder(coder.name, video.structure, settings, plan)
+    segments.check()
     coded = EncodedTake(
         scheme=coder.name, options=settings, structure=video.structure.structure_json(),
         dtype=video.structure.pixels.dtype.name, frames=video.frames, fps=float(video.fps), plan=plan, segments=[],
         target_bpp=goal.bpp, qp=goal.qp,
     )  # fmt: skip
     kept = None if path is None else Unfinished(Path(os.fspath(path)), container.head(_values(coded)))
-    work = _Work(video, coder, settings, plan, views, coded, kept)
+    work = _Work(video, segments, plan, coded, kept)
     if goal.bpp is not None and rate == "take":
         runs, times = work.search(goal.bpp, progress)
     else:
@@ -286,20 +277,14 @@ class _Work:
     """A take to be coded, segment by segment."""
 
     video: IIVideo
-    coder: PseudoVideo[Any]
-    options: Mapping[str, Value]
+    coder: SegmentCoder
     plan: Plan
-    views: int
     coded: EncodedTake
     kept: Unfinished | None
 
     def segments(self) -> list[range]:
         """Instants of each segment."""
         return self.plan.segments(self.video.frames)
-
-    def film(self, instants: int) -> SegmentFilm:
-        """Frames of a segment."""
-        return segment_film(self.coder, self.video.structure, self.options, self.plan, instants)
 
     def stack(self, part: range) -> NDArray[Any]:
         """Pictures of a segment, one below the other."""
@@ -309,12 +294,10 @@ class _Work:
             pixels[i * height : (i + 1) * height] = self.video[frame].pixels
         return pixels
 
-    def run(self, number: int, part: range, settings: str, code: Callable[[Source[Any]], Run]) -> Run:
+    def run(self, number: int, part: range, settings: str, code: Callable[[NDArray[Any]], Run]) -> Run:
         """Code a segment; use the one of an earlier run if its pixels and settings are the same."""
-        pixels, film = self.stack(part), self.film(len(part))
-        options = segment_options(self.coder, self.options, self.plan, self.views, len(part))
-        source = Source(coder=self.coder, pixels=pixels, film=film, options=options)
-        return self.kept.run(number, pixels, settings, lambda: code(source)) if self.kept else code(source)
+        pixels = self.stack(part)
+        return self.kept.run(number, pixels, settings, lambda: code(pixels)) if self.kept else code(pixels)
 
     def one_by_one(self, goal: Goal, progress: Progress | None) -> list[Run]:
         """Code every segment at the goal."""
@@ -322,8 +305,8 @@ class _Work:
         if goal.bpp is not None:
             goal = Goal(bpp=max(goal.bpp - self.framing(len(parts)), goal.bpp / 2))
 
-        def code(source: Source[Any]) -> Run:
-            return self.coder.encode_film(source.pixels, source.film, source.options, goal).run
+        def code(pixels: NDArray[Any]) -> Run:
+            return self.coder.run(pixels, goal)
 
         for number, part in enumerate(parts):
             runs.append(self.run(number, part, "goal", code))
@@ -347,7 +330,9 @@ class _Work:
             nonlocal done
             runs = []
             for number, part in enumerate(parts):
-                runs.append(self.run(number, part, f"at {quantiser!r}", lambda source: source.run_at(quantiser)))
+                runs.append(
+                    self.run(number, part, f"at {quantiser!r}", lambda pixels: self.coder.run_at(pixels, quantiser))
+                )
                 done += 1
                 if progress:
                     progress(min(done, len(parts) * QUANTISER_RUNS - 1), len(parts) * QUANTISER_RUNS)
@@ -368,7 +353,7 @@ class _Work:
 
     def axis(self) -> Axis:
         """Quantisers to search over the take."""
-        return replace(self.coder.axis(self.options), runs=QUANTISER_RUNS)
+        return replace(self.coder.axis, runs=QUANTISER_RUNS)
 
 
 def _mixtures(pair: tuple[Trial[list[Run]], Trial[list[Run]]]) -> Iterator[list[Run]]:
@@ -417,8 +402,8 @@ def open_take(
     if len(coded.segments) != needed:
         raise ValueError(f"{name} has {len(coded.segments)} segments: {needed} are needed for {coded.frames} frames")
     blank = blank_picture(coded.structure, coded.dtype)
-    coder = _coder_of(coded.scheme)
-    source = CodedFrames(coder, coded.options, coded.plan, coded.segments, coded.frames, blank, name)
+    coder = segment_coder(coded.scheme, blank, coded.options, coded.plan)
+    source = CodedFrames(coder, coded.plan, coded.segments, coded.frames, blank, name)
     return IIVideo(coded.frames, coded.fps, source, blank)
 
 

@@ -78,7 +78,7 @@ def test_views_of_one_sample_have_axes():
 def test_the_range_of_disparity_is_found(disparity, down):
     """If the texture moves by d a column, the next view shows at x - d what this one shows at x."""
     picture = shifted_plane(disparity)
-    source = lf._Source(picture, checked_options(lf.LightField(), {}))
+    source = lf.Source(picture, checked_options(lf.LightField(), {}))
     low, high, found = ranges.estimated(source.view, source.grid)
     assert found == down
     assert low <= -256 * disparity[1] <= high
@@ -92,7 +92,7 @@ def test_disparities_of_the_sides_are_within_the_range():
     moved = shifted_plane((4, 4), grid=(7, 7), height=48, width=48)
     pixels = moved.pixels.copy().reshape(48, 7, 48, 7, 3)
     pixels[:, 2:5, :, 2:5] = 90
-    source = lf._Source(moved.with_pixels(pixels.reshape(336, 336, 3)), checked_options(lf.LightField(), {}))
+    source = lf.Source(moved.with_pixels(pixels.reshape(336, 336, 3)), checked_options(lf.LightField(), {}))
     low, high, _ = ranges.estimated(source.view, source.grid)
     assert low <= -4 * 256 and high == ranges.MARGIN
 
@@ -103,7 +103,7 @@ def test_flat_sky_determines_no_disparity():
     pixels = field.pixels.copy().reshape(48, 3, 48, 3, 3)
     sky = 200 + np.random.default_rng(7).integers(-1, 2, (24, 3, 48, 3, 3))
     pixels[:24] = sky
-    source = lf._Source(field.with_pixels(pixels.reshape(144, 144, 3)), checked_options(lf.LightField(), {}))
+    source = lf.Source(field.with_pixels(pixels.reshape(144, 144, 3)), checked_options(lf.LightField(), {}))
     low, high, _ = ranges.estimated(source.view, source.grid)
     assert (low, high) == (-ranges.MARGIN, ranges.MARGIN)
 
@@ -113,7 +113,7 @@ def test_small_things_before_a_far_ground_are_within_the_range():
     ground = shifted_plane((9, 9), grid=(3, 3), height=48, width=48)
     pixels = ground.pixels.copy().reshape(48, 3, 48, 3, 3)
     pixels[20:26, :, 20:26] = np.random.default_rng(5).integers(0, 256, (6, 1, 6, 1, 3))
-    source = lf._Source(ground.with_pixels(pixels.reshape(144, 144, 3)), checked_options(lf.LightField(), {}))
+    source = lf.Source(ground.with_pixels(pixels.reshape(144, 144, 3)), checked_options(lf.LightField(), {}))
     low, high, _ = ranges.estimated(source.view, source.grid)
     assert low <= -9 * 256 <= 0 <= high
 
@@ -133,7 +133,7 @@ def test_decoding_repeats_the_encoder_to_the_bit():
     """The encoder predicts from decoded views; else errors would grow from level to level."""
     picture = shifted_plane((1, 1), grid=(4, 3))
     options = checked_options(lf.LightField(), {})
-    source = lf._Source(picture, options)
+    source = lf.Source(picture, options)
     payload, encoded = source.coded(30 * lf.FRACTIONS)
     header, levels = stream.unpack(payload, picture.pixels.size // 3)
     field = lf.Field(header, source.grid, source.height, source.width, np.uint8)

@@ -1,7 +1,8 @@
 """Blocks of a view: a quadtree from 32 to 4 samples, three kinds of prediction, and a residual.
 
 A block is predicted by *synthesis* (the picture the decoder makes of other views by itself, `synthesis`), by an
-*explicit* disparity between the view and up to four others, or from its surroundings (`intra`).
+*explicit* disparity between the view and up to four others, or from its surroundings (`intra`). In takes it may also
+be predicted *in time* (`motion`), or by the mean of that and synthesis (*mixed*).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import contexts as at
+from . import motion
 from .arithmetic import DECODING, Arithmetic, bit_cost, code_bit, code_number, code_raw, number_cost
 from .coefficients import code_coefficients
 from .cross import code_cross, keep_first, rebuild
@@ -20,7 +22,7 @@ from .transform import LARGEST
 from .warp import moved_block
 
 LOG_LARGEST, LOG_LEAST = 5, 2
-INTRA, EXPLICIT, SYNTHESIS = 0, 1, 2
+INTRA, EXPLICIT, SYNTHESIS, TIMED, MIXED = range(5)
 MOST_REFERENCES = 4
 LIMIT = 8191  # of a decoded sample's magnitude, in eighths of an 8-bit code
 MOST_INDEX = 1 << 14
@@ -61,6 +63,10 @@ class Job(NamedTuple):
     blocks : ndarray of int16, (FIELDS, H / 4, W / 4)
     levels : ndarray of int16, (3, H, W)
         The encoder's quantised coefficients.
+    past : ndarray of int16, (P, 3, H, W)
+        The same view at earlier instants of a take, the latest first; P is 0 for pictures alone.
+    motions : ndarray of int16, (J, motion.FIELDS, H / 4, W / 4)
+        Vectors of decoded views, if there are earlier instants.
     """
 
     views: Any
@@ -78,6 +84,8 @@ class Job(NamedTuple):
     step: Any
     blocks: Any
     levels: Any
+    past: Any = motion.NOTHING
+    motions: Any = motion.NOTHING
 
 
 class Work(NamedTuple):
@@ -168,6 +176,8 @@ def residual_context(job, by, bx, log, kind):
     """By size, kind, how many of the blocks above and left have a residual, and doubt."""
     other = 0 if kind == SYNTHESIS else 1
     like = neighbours(job.blocks, np.int64(CODED), np.int64(1), by, bx)
+    if kind >= TIMED:
+        return at.RESIDUAL_IN_TIME + ((log - 2) * 2 + (1 if kind == MIXED else 0)) * 3 + like
     return at.RESIDUAL + (((log - 2) * 2 + other) * 3 + like) * 4 + doubt_class(job, by, bx, log)
 
 
@@ -266,9 +276,24 @@ def likely_directions(blocks, by, bx):
 
 
 @lean
+def mixed_context(job, by, bx, log):
+    """By size, and how many of the blocks above and left are mixed."""
+    return at.MIXED + (log - 2) * 3 + neighbours(job.blocks, np.int64(KIND), np.int64(MIXED), by, bx)
+
+
+@lean
 def code_kind(coder, job, by, bx, log, kind, index, mask, direction):
-    """Write or read how a block is predicted; return kind, index, mask and direction."""
+    """Write or read how a block is predicted; return kind, index, mask and direction.
+
+    The index of a block predicted in time is its vector.
+    """
     blocks, count = job.blocks, job.references.shape[0]
+    if job.past.shape[0] and code_bit(coder, motion.time_context(job, by, bx, log), 1 if kind >= TIMED else 0):
+        mixed = 0
+        if job.synthesised:
+            mixed = code_bit(coder, mixed_context(job, by, bx, log), 1 if kind == MIXED else 0)
+        vector = motion.code_vector(coder, job, by, bx, log, index)
+        return np.int64(MIXED if mixed else TIMED), vector, mask, direction
     if count == 0:
         kind = INTRA
     else:
@@ -354,6 +379,12 @@ def kind_cost(contexts, job, by, bx, log, kind, index, mask, direction):
     """Bits that `code_kind` would take; those of the references left out if the mask is 0."""
     blocks, count = job.blocks, job.references.shape[0]
     bits = np.float32(0)
+    if job.past.shape[0]:
+        bits += bit_cost(contexts, motion.time_context(job, by, bx, log), 1 if kind >= TIMED else 0)
+    if kind >= TIMED:
+        if job.synthesised:
+            bits += bit_cost(contexts, mixed_context(job, by, bx, log), 1 if kind == MIXED else 0)
+        return bits + motion.vector_cost(contexts, job, by, bx, log, index)
     if count and job.synthesised:
         bits += bit_cost(contexts, synthesis_context(job, by, bx, log), 1 if kind == SYNTHESIS else 0)
     if count and kind != SYNTHESIS:
@@ -502,6 +533,15 @@ def mark(blocks, by, bx, log, kind, index, mask, direction, coded):
 
 
 @lean
+def mark_block(job, by, bx, log, kind, index, mask, direction, coded):
+    """Note a block as decoded, and its vector if there are earlier instants."""
+    if job.past.shape[0]:
+        vector = index if kind >= TIMED else motion.inherited(job, by, bx, log)[0]
+        motion.note(job, by, bx, log, 1 if kind >= TIMED else 0, vector)
+    mark(job.blocks, by, bx, log, kind, 0 if kind >= TIMED else index, mask, direction, coded)
+
+
+@lean
 def _load_levels(job, work, plane, y0, x0, n):
     """work.levels = the encoder's; return whether one is not zero."""
     found = 0
@@ -529,12 +569,16 @@ def code_block(coder, job, work, y0, x0, log):
     decoding = coder.state[DECODING]
     kind, index = np.int64(blocks[KIND, by, bx]), np.int64(blocks[INDEX, by, bx])
     mask, direction = np.int64(blocks[MASK, by, bx]), np.int64(blocks[DIRECTION, by, bx])
+    if kind >= TIMED:
+        index = motion.noted(job, job.at, by, bx)
     kind, index, mask, direction = code_kind(coder, job, by, bx, log, kind, index, mask, direction)
     if decoding:
         if kind == SYNTHESIS:
             predict_synthesis(job, work, y0, x0, n)
         elif kind == EXPLICIT:
             predict_explicit(job, work, y0, x0, n, index, mask)
+        elif kind >= TIMED:
+            motion.predict_in_time(job, work, y0, x0, n, index, kind == MIXED)
         else:
             for p in range(3):
                 predict_direction(job, work, p, y0, x0, n, direction)
@@ -561,7 +605,7 @@ def code_block(coder, job, work, y0, x0, log):
                     keep_first(work, rows, cols)
             store(job, work, p, y0, x0, n, some or cross)
     if decoding:
-        mark(blocks, by, bx, log, kind, index, mask, direction, coded)
+        mark_block(job, by, bx, log, kind, index, mask, direction, coded)
 
 
 @kernel

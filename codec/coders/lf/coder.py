@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar
@@ -19,7 +19,7 @@ from ...contract import Coder, Goal, Option, Options, Pixels
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
 from . import arithmetic, planes, ranges, search, stream, synthesis
 from .blocks import Job, code_blend, new_work
-from .contexts import starting_contexts
+from .contexts import Contexts
 from .field import EIGHTH, Field
 from .pyramid import Node, Place
 from .search import Search
@@ -41,6 +41,8 @@ WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 FINER_A_LEVEL, FINER_FIRST = 1.5, 14.0
 MOST_VIEWS = 1 << 14
 VIEW_BYTES, EXACT_BYTES = 24, 96  # a sample's most
+# Settings that meet a size.
+SIZES = Axis(low=FINEST * FRACTIONS, high=COARSEST * FRACTIONS, start=START, octave=OCTAVE, step=1)
 FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
 
 
@@ -78,11 +80,11 @@ class LightField(Coder):
 
     def check(self, picture: IIPicture, options: Options) -> None:
         """Any size will do that has no more views than there is patience for."""
-        _check_views(picture)
+        check_views(picture)
 
     def encode(self, picture: IIPicture, options: Options, goal: Goal) -> CodingResult:
         """Meet a rate or a quality by a search of the quantiser."""
-        source = _Source(picture, options)
+        source = Source(picture, options)
         if self.lossless(options):
             runs = [source.run(setting) for setting in EXACT_SETTINGS]
             return CodingResult(run=min(runs, key=lambda run: len(run.payload)), runs=len(runs))
@@ -92,20 +94,16 @@ class LightField(Coder):
             return _meet_quality(source, goal.quality)
         assert goal.bpp is not None
         start = START + OCTAVE * math.log2(min(max(goal.bpp, 1e-3), 100) * 10)
-        axis = Axis(low=FINEST * FRACTIONS, high=COARSEST * FRACTIONS, start=start, octave=OCTAVE, step=1)
-        return meet_size(source.run, goal.bpp * source.count / 8, axis)
+        return meet_size(source.run, goal.bpp * source.count / 8, replace(SIZES, start=start))
 
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
         """Level by level; a level that ends early is damage."""
         started = clock.cpu_seconds()
         field, levels = _opened(payload, blank)
-        for _ in decoded_batches(field, levels, _threads(options)):
+        for _ in decoded_batches(field, levels, threads_of(options)):
             pass
-        rows, cols = field.grid
         pixels = np.empty(blank.pixels.shape, blank.pixels.dtype)
-        for number in range(len(field.views)):
-            row, col = divmod(number, cols)
-            pixels[row::rows, col::cols] = field.view_pixels(number)
+        field.show(pixels)
         return pixels, clock.cpu_seconds() - started
 
     def decode_component(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
@@ -124,7 +122,7 @@ class LightField(Coder):
         """
         field, levels = _opened(payload, blank)
         views = 0
-        for _, nodes, read in decoded_batches(field, levels, _threads(options)):
+        for _, nodes, read in decoded_batches(field, levels, threads_of(options)):
             views += len(nodes)
             if any((node.row, node.col) == place for node in nodes):
                 return field.view_pixels(field.number(place)).copy(), read, views
@@ -134,7 +132,7 @@ class LightField(Coder):
         """Decode level by level; yield the level, all views decoded so far, and the bytes read."""
         field, levels = _opened(payload, blank)
         views = 0
-        for level, nodes, read in decoded_batches(field, levels, _threads(options)):
+        for level, nodes, read in decoded_batches(field, levels, threads_of(options)):
             views += len(nodes)
             if views == len(field.levels[level]):
                 views = 0
@@ -142,23 +140,26 @@ class LightField(Coder):
 
 
 def _opened(payload: bytes, blank: IIPicture) -> tuple[Field, list[bytes]]:
-    _check_views(blank)
+    check_views(blank)
     header, levels = stream.unpack(payload, blank.pixels.size // 3)
-    height, width, grid = _shape(blank)
+    height, width, grid = shape(blank)
     return Field(header, grid, height, width, blank.pixels.dtype), levels
 
 
-def _threads(options: Options) -> int:
+def threads_of(options: Options) -> int:
+    """Return the number of threads."""
     return int(options.get("threads", 1))
 
 
-def decoded_batches(field: Field, levels: list[bytes], threads: int = 1) -> Iterator[tuple[int, list[Node], int]]:
+def decoded_batches(
+    field: Field, levels: list[bytes], threads: int = 1, contexts: Contexts | None = None
+) -> Iterator[tuple[int, list[Node], int]]:
     """Decode one batch of views after another; yield the level, the views, and the bytes read so far."""
-    contexts, work = starting_contexts(), new_work()
+    contexts, work = contexts or Contexts(), new_work()
     before = stream.head_bytes(len(levels))
     with Workers(threads) as workers:
         for level, data in enumerate(levels):
-            coder = arithmetic.reader(contexts, data)
+            coder = arithmetic.reader(contexts.of(level), data)
             for nodes in field.batches(level):
                 jobs, made = zip(*workers.map(field.job, nodes), strict=True)
                 blends = [code_blend(coder, 0) if job.synthesised else 0 for job in jobs]
@@ -170,6 +171,7 @@ def decoded_batches(field: Field, levels: list[bytes], threads: int = 1) -> Iter
                 workers.map(field.refine, nodes, jobs, made)
                 field.finish(nodes)
                 yield level, nodes, before + min(int(coder.state[arithmetic.AT]), len(data))
+            contexts.after(level)
             before += len(data)
 
 
@@ -178,20 +180,20 @@ def _blended(job: Job, made: synthesis.Synthesis, nearest: int) -> None:
         synthesis.blend(made, nearest)
 
 
-def _check_views(picture: IIPicture) -> None:
+def check_views(picture: IIPicture) -> None:
     """Each view takes a millisecond, however small it is."""
     u, v = picture.ei_pixels
     if u * v > MOST_VIEWS:
         raise ValueError(f"the picture has {u}×{v} views: at most {MOST_VIEWS} are coded as a light field")
 
 
-def _shape(picture: IIPicture) -> tuple[int, int, tuple[int, int]]:
+def shape(picture: IIPicture) -> tuple[int, int, tuple[int, int]]:
     """Height and width of a view, rows and columns of views."""
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
     return l, k, (v, u)
 
 
-def _meet_quality(source: _Source, quality: float) -> CodingResult:
+def _meet_quality(source: Source, quality: float) -> CodingResult:
     """Meet a PSNR in dB; the first quantiser is that of which half the uniform error is the one allowed."""
 
     def try_at(setting: float) -> tuple[Run, float]:
@@ -215,13 +217,13 @@ def _meet_quality(source: _Source, quality: float) -> CodingResult:
     return CodingResult(run=nearest(tried).result[0], runs=len(tried))
 
 
-class _Source:
+class Source:
     """A picture to be coded at one quantiser after another."""
 
     def __init__(self, picture: IIPicture, options: Options) -> None:
         self.pixels = np.ascontiguousarray(picture.pixels)
         self.count = self.pixels.size // 3
-        self.height, self.width, self.grid = _shape(picture)
+        self.height, self.width, self.grid = shape(picture)
         self.effort, self.threads = int(options["effort"]), int(options["threads"])
         self.axes = planes.detail_axes(self.pixels, self.grid)
         low, high, down = ranges.estimated(self.view, self.grid)
@@ -263,26 +265,38 @@ class _Source:
 
     def coded(self, setting: float) -> tuple[bytes, Field]:
         """The payload at a quantiser, and what the decoder will make of it."""
+        field = self.field(replace(self.header, steps=self.steps(setting)))
+        levels = self.levels(field, Contexts())
+        return stream.pack(field.header, levels, self.count), field
+
+    def steps(self, setting: float) -> tuple[int, ...]:
+        """Return the quantiser's step of each level."""
         last = self.header.log_stride
         if self.header.exact:
             offsets = [0.0] * (last + 2)
         else:
             offsets = [FINER_FIRST, *(FINER_A_LEVEL * (last - level) for level in range(last + 1))]
-        steps = tuple(max(1, round(128 * 2 ** ((setting / FRACTIONS - 8 - less) / 6))) for less in offsets)
-        header = replace(self.header, steps=steps)
-        field = Field(header, self.grid, self.height, self.width, self.pixels.dtype)
-        if self.header.exact:
+        return tuple(max(1, round(128 * 2 ** ((setting / FRACTIONS - 8 - less) / 6))) for less in offsets)
+
+    def field(self, header: Header, past: Sequence[Field] = ()) -> Field:
+        """Return the views to be coded: nothing yet, but the pixels if coding is lossless."""
+        field = Field(header, self.grid, self.height, self.width, self.pixels.dtype, past)
+        if header.exact:
             rows, cols = self.grid
             by_view = self.pixels.reshape(self.height, rows, self.width, cols, 3).transpose(1, 3, 0, 2, 4)
             field.pixels[:] = by_view.reshape(field.pixels.shape)
-        contexts, work = starting_contexts(), new_work()
-        levels = []
+        return field
+
+    def levels(self, field: Field, contexts: Contexts) -> list[bytes]:
+        """Return the bytes of each level; the field then holds what the decoder will make of them."""
+        work, levels = new_work(), []
         with Workers(self.threads) as workers:
             for number in range(len(field.levels)):
-                room = (EXACT_BYTES if header.exact else VIEW_BYTES) * field.shape[0] * field.shape[1] + 1024
-                coder = arithmetic.writer(contexts, room)
+                room = (EXACT_BYTES if field.header.exact else VIEW_BYTES) * field.shape[0] * field.shape[1] + 1024
+                coder = arithmetic.writer(contexts.of(number), room)
                 for nodes in field.batches(number):
-                    jobs, made, blends = zip(*workers.map(partial(self._found, field, contexts), nodes), strict=True)
+                    found = partial(self._found, field, coder.contexts)
+                    jobs, made, blends = zip(*workers.map(found, nodes), strict=True)
                     for job, nearest in zip(jobs, blends, strict=True):
                         if job.synthesised:
                             code_blend(coder, nearest)
@@ -292,7 +306,8 @@ class _Source:
                     workers.map(field.refine, nodes, jobs, made)
                     field.finish(nodes)
                 levels.append(arithmetic.finish(coder))
-        return stream.pack(header, levels, self.count), field
+                contexts.after(number)
+        return levels
 
     def _found(self, field: Field, contexts: NDArray[np.int32], node: Node) -> tuple[Job, synthesis.Synthesis, int]:
         """A view's blocks, found and decoded; its synthesis, and in which way that is blended."""

@@ -29,7 +29,14 @@ WEIGHTS = ABOVE_ONE_THERE + 96  # of SIGNIFICANT plane 3 × block size 4, of ABO
 EXACT = WEIGHTS + 15  # colour 3 × activity 16 × (zero 1, sign 3, prefix 12)
 EXACT_REST = EXACT + 768  # 16 digits
 CROSS = EXACT_REST + 16  # plane 2 × (not zero by block size 4, sign, above 1, 2 and 3)
-COUNT = CROSS + 16
+# Of prediction in time.
+IN_TIME = CROSS + 16  # block size 4 × such neighbours 3 × inherited: none, no, yes 3
+MIXED = IN_TIME + 36  # block size 4 × such neighbours 3
+VECTOR = MIXED + 12  # block size 4 × (inherited by left: none, same, other 3; left; above)
+INSTANT = VECTOR + 20  # 3 digits
+COMPONENT = INSTANT + 3  # down, across 2 × (14 digits and 1 sign)
+RESIDUAL_IN_TIME = COMPONENT + 30  # block size 4 × mixed 2 × neighbours with a residual 3
+COUNT = RESIDUAL_IN_TIME + 24
 
 # Probabilities to begin with: log(p / (1 - p)) from -6.2 up in steps of 0.2, by its digit; * where none is known. The
 # mean over eight coded pictures: three scenes and a flower of a real light field camera, at two quantisers each.
@@ -128,3 +135,25 @@ def starting_contexts() -> NDArray[np.int32]:
     weights = np.full((EXACT - WEIGHTS, 3), 1 << 15)
     unknown = np.tile([1 << 15, 1 << 15, 0], (COUNT - EXACT, 1))
     return np.concatenate([found, weights, unknown]).astype(np.int32)
+
+
+class Contexts:
+    """Contexts of each level of a picture, or of the instants of a take one after the other.
+
+    Those of the first instant go on from level to level, those of a later one from the same level of the instant
+    before: a view needs no levels beyond its own.
+    """
+
+    def __init__(self) -> None:
+        self._latest, self._ended = starting_contexts(), dict[int, NDArray[np.int32]]()
+
+    def of(self, level: int) -> NDArray[np.int32]:
+        """Return the contexts with which a level begins; coding changes them."""
+        if level in self._ended:
+            self._latest = self._ended[level]
+        return self._latest
+
+    def after(self, level: int) -> None:
+        """Keep the contexts of a level that has ended."""
+        if level not in self._ended:
+            self._ended[level] = self._latest.copy()

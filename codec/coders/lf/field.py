@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import groupby
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import synthesis
+from . import motion, synthesis
 from .arithmetic import Arithmetic
 from .blocks import DONE, MOST_INDEX, MOST_REFERENCES, UNKNOWN, Job, Work, code_view, new_blocks
 from .exact import code_exact, new_exact, prepare
 from .planes import gather, scatter
-from .pyramid import Node, Place, pyramid
+from .pyramid import Node, Place, batches, pyramid
 from .stream import Header
 from .synthesis import Synthesis, new_synthesis
 
 EIGHTH = 32  # of a sample, in units of disparity
 MOST_SEARCHED = 800  # disparities of one view
-BATCH = 16  # views that are held in memory at once
 FIRST_AGAIN = 0, 2  # views of the second level after which the first view's disparity is found anew
 
 
@@ -36,9 +34,13 @@ class Field:
         Of a view.
     dtype : numpy type
         Of a pixel.
+    past : sequence of Field
+        Earlier instants of a take, the latest first.
     """
 
-    def __init__(self, header: Header, grid: Place, height: int, width: int, dtype: Any) -> None:
+    def __init__(
+        self, header: Header, grid: Place, height: int, width: int, dtype: Any, past: Sequence[Field] = ()
+    ) -> None:
         self.header = header
         self.grid = grid
         self.levels = pyramid(*grid, header.log_stride, MOST_REFERENCES, header.sources)
@@ -49,6 +51,10 @@ class Field:
         self.pixels = np.zeros((len(self.views) if header.exact else 0, height, width, 3), dtype)
         self._exact = new_exact(height, width, dtype)
         self.decoded = np.zeros(grid, bool)
+        self.past = tuple(past)
+        self.motions = motion.NOTHING
+        if past:
+            self.motions = np.zeros((len(self.views), motion.FIELDS, *(side // 4 for side in self.shape)), np.int16)
         nodes = [node for level in self.levels for node in level]
         self.used = {place for node in nodes for place in (*node.references, *node.sources)}
 
@@ -58,7 +64,8 @@ class Field:
 
     def job(self, node: Node) -> tuple[Job, Synthesis]:
         """All that coding of a view needs, its synthesis' disparity included."""
-        self.disparities[self.number((node.row, node.col))] = UNKNOWN
+        at = self.number((node.row, node.col))
+        self.disparities[at] = UNKNOWN
         references, sources = (self._offsets(node, places) for places in (node.references, node.sources))
         unit = self._unit(references)
         made = new_synthesis(self.views, self.disparities, sources)
@@ -66,7 +73,7 @@ class Field:
         job = Job(
             views=self.views,
             disparities=self.disparities,
-            at=self.number((node.row, node.col)),
+            at=at,
             references=references,
             unit=unit,
             low=self.header.low // unit,
@@ -79,6 +86,8 @@ class Field:
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),
             levels=np.zeros((3, *self.shape), np.int16),
+            past=np.stack([field.views[at] for field in self.past]) if self.past else motion.NOTHING,
+            motions=self.motions,
         )
         return job, made
 
@@ -102,10 +111,22 @@ class Field:
         scatter(self.views, number, (1, 1), 0, 0, self.header.axes, pixels.itemsize == 2, pixels)
         return pixels
 
+    def show(self, pixels: NDArray[Any]) -> None:
+        """Write all views into a picture's pixels (N, M, 3)."""
+        rows, cols = self.grid
+        for number in range(len(self.views)):
+            row, col = divmod(number, cols)
+            pixels[row::rows, col::cols] = self.view_pixels(number)
+
     def refine(self, node: Node, job: Job, made: Synthesis) -> None:
         """Note the disparity of a decoded view, for those that follow."""
-        if len(made.sources) and (node.row, node.col) in self.used:
-            synthesis.start(made, job.at, job.blocks, job.unit, job.synthesised)
+        if (node.row, node.col) not in self.used or not (len(made.sources) or self.past):
+            return
+        synthesis.start(made, job.at, job.blocks, job.unit, job.synthesised)
+        if self.past and not job.synthesised:
+            known = np.stack([field.disparities[job.at] for field in self.past])
+            motion.carry(job, known, self.disparities[job.at])
+        if len(made.sources):
             synthesis.refine(made, job.at, False)
             synthesis.refine(made, job.at, True)
 
@@ -118,11 +139,8 @@ class Field:
             self._first()
 
     def batches(self, level: int) -> Iterator[list[Node]]:
-        """Views of a level that do not depend on each other, `BATCH` at most at a time."""
-        for _, nodes in groupby(self.levels[level], key=lambda node: node.phase):
-            phase = list(nodes)
-            for start in range(0, len(phase), BATCH):
-                yield phase[start : start + BATCH]
+        """Views of a level that are coded together."""
+        return batches(self.levels[level])
 
     def _first(self) -> None:
         """The first view had no other: its disparity comes from those after it."""

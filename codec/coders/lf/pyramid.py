@@ -5,10 +5,13 @@ A level has *phases*: views of one phase do not predict each other, so that they
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import groupby
 
 Place = tuple[int, int]
+BATCH = 16  # views that are held in memory at once
 NEAREST = 24  # decoded views among which references are looked for
 ALIKE = 81, 95  # hundredths of the squared cosine between two directions that are alike: of references, of sources
 
@@ -61,6 +64,14 @@ def pyramid(rows: int, cols: int, log_stride: int, references: int, sources: int
             done.update(dict.fromkeys(places))
         levels.append(tuple(nodes))
     return tuple(levels)
+
+
+def batches(level: Sequence[Node]) -> Iterator[list[Node]]:
+    """Views of a level that do not depend on each other, `BATCH` at most at a time."""
+    for _, nodes in groupby(level, key=lambda node: node.phase):
+        phase = list(nodes)
+        for start in range(0, len(phase), BATCH):
+            yield phase[start : start + BATCH]
 
 
 def _amid(place: Place, stride: int) -> bool:

@@ -16,13 +16,15 @@ from .blocks import (
     LIMIT,
     LOG_LARGEST,
     LOG_LEAST,
+    MIXED,
     SYNTHESIS,
+    TIMED,
     Job,
     coded_context,
     from_where,
     guesses,
     kind_cost,
-    mark,
+    mark_block,
     mask_cost,
     new_work,
     predict_direction,
@@ -36,6 +38,8 @@ from .coefficients import quantise
 from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
 from .intra import MODES
 from .jit import inner, kernel, lean
+from .motion import predict_in_time
+from .motion_search import best_vector
 from .transform import LARGEST, forward
 from .warp import clamped, moved_block
 
@@ -78,7 +82,7 @@ class Search(NamedTuple):
 class Trial(NamedTuple):
     """Memory of the search, by block size."""
 
-    decoded: Any  # (6, 3, 32, 32) of the best way found
+    decoded: Any  # (6, 3, 32, 32) of the best way found; slot 0 for another one
     levels: Any
     trial_decoded: Any  # (3, 32, 32) of the way tried
     trial_levels: Any
@@ -435,6 +439,66 @@ def best_block(contexts, job, search, work, trial, y0, x0, log):
     return best, kind, index, mask, direction, coded
 
 
+@lean
+def best_in_time(contexts, job, search, work, trial, y0, x0, log, good):
+    """Try a block in time, alone and mixed with synthesis; return cost, kind, vector, and if it has a residual."""
+    n = 1 << log
+    vector = best_vector(contexts, job, search, work, y0, x0, log, good)
+    best, kind, coded = HUGE, TIMED, 0
+    for way in range(TIMED, TIMED + 1 + job.synthesised):
+        side = kind_cost(contexts, job, y0 >> 2, x0 >> 2, log, way, vector, np.int64(0), np.int64(0))
+        predict_in_time(job, work, y0, x0, n, vector, way == MIXED)
+        bits, error, some = try_residual(contexts, job, search, work, trial, y0, x0, log, way)
+        total = error + search.weight * (bits + side)
+        if total < best:
+            best, kind, coded = total, way, some
+            _keep(trial, log)
+    return best, kind, vector, coded
+
+
+@kernel
+def best_of_all(contexts, job, search, work, trial, y0, x0, log):
+    """As `best_block`, with the ways in time if there are earlier instants."""
+    if job.past.shape[0] == 0:
+        return best_block(contexts, job, search, work, trial, y0, x0, log)
+    n = 1 << log
+    good = search.good * search.weight * np.float32(n * n)
+    best, kind, vector, coded = best_in_time(contexts, job, search, work, trial, y0, x0, log, good)
+    if best > good:
+        _copy(
+            trial.decoded[log],
+            trial.levels[log],
+            trial.cross[log],
+            trial.decoded[0],
+            trial.levels[0],
+            trial.cross[0],
+            n,
+        )
+        found = best_block(contexts, job, search, work, trial, y0, x0, log)
+        if found[0] < best:
+            return found
+        _copy(
+            trial.decoded[0],
+            trial.levels[0],
+            trial.cross[0],
+            trial.decoded[log],
+            trial.levels[log],
+            trial.cross[log],
+            n,
+        )
+    return best, kind, vector, 0, 0, coded
+
+
+@inner
+def _copy(decoded, levels, cross, to_decoded, to_levels, to_cross, n):
+    to_cross[0], to_cross[1] = cross[0], cross[1]
+    for p in range(3):
+        for y in range(n):
+            for x in range(n):
+                to_decoded[p, y, x] = decoded[p, y, x]
+                to_levels[p, y, x] = levels[p, y, x]
+
+
 @kernel
 def search_tree(contexts, job, search, work, trial, y0, x0, log):
     """Find, mark and decode the blocks of a square; return the cost."""
@@ -450,7 +514,7 @@ def search_tree(contexts, job, search, work, trial, y0, x0, log):
                 contexts, job, search, work, trial, y0 + (part >> 1) * half, x0 + (part & 1) * half, log - 1
             )
         return total
-    best, kind, index, mask, direction, coded = best_block(contexts, job, search, work, trial, y0, x0, log)
+    best, kind, index, mask, direction, coded = best_of_all(contexts, job, search, work, trial, y0, x0, log)
     if log > LOG_LEAST:
         context = split_context(job, by, bx, log)
         best += search.weight * bit_cost(contexts, context, np.int64(0))
@@ -469,7 +533,7 @@ def search_tree(contexts, job, search, work, trial, y0, x0, log):
             for x in range(n):
                 job.views[job.at, p, y0 + y, x0 + x] = trial.decoded[log, p, y, x]
                 job.levels[p, y0 + y, x0 + x] = trial.levels[log, p, y, x]
-    mark(job.blocks, by, bx, log, kind, index, mask, direction, coded)
+    mark_block(job, by, bx, log, kind, index, mask, direction, coded)
     job.blocks[CROSS_1, by, bx], job.blocks[CROSS_2, by, bx] = trial.cross[log, 0], trial.cross[log, 1]
     return best
 

@@ -1,0 +1,212 @@
+"""Prediction of a block in time: from the same view at earlier instants of a take, moved by a vector.
+
+A vector holds the instant, 0 for the latest, and a motion down and across in quarters of a sample. It is one number:
+``instant · 2²⁴ + (down + 2¹¹) · 2¹² + across + 2¹¹``. Blocks that are not predicted in time note the vector that they
+would inherit, so that neighbours find one everywhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import contexts as at
+from .arithmetic import bit_cost, code_bit, code_number, number_cost
+from .jit import inner, lean
+from .warp import clamped, moved_block
+
+MOST_PAST = 4  # earlier instants
+QUARTER = 64  # of a sample, in 2^-8
+HALF = 1 << 11
+MOST = HALF - 1  # of a motion, in quarters
+STILL = (HALF << 12) + HALF  # the vector of no motion since the latest instant
+NONE = -1
+# What is known of each 4×4: whether it is predicted in time, and its vector.
+IN_TIME, PAST, DOWN, ACROSS, FIELDS = range(5)
+NOTHING = np.zeros((0, 1, 1, 1), np.int16)  # earlier instants of a picture alone
+
+
+@inner
+def packed(past, down, across):
+    """A vector as one number."""
+    return (past << 24) + ((down + HALF) << 12) + across + HALF
+
+
+@inner
+def unpacked(vector):
+    """Instant, motion down, motion across."""
+    return vector >> 24, ((vector >> 12) & 4095) - HALF, (vector & 4095) - HALF
+
+
+@inner
+def noted(job, view, by, bx):
+    """The vector that a view notes at a 4×4."""
+    motions = job.motions
+    return packed(
+        np.int64(motions[view, PAST, by, bx]),
+        np.int64(motions[view, DOWN, by, bx]),
+        np.int64(motions[view, ACROSS, by, bx]),
+    )
+
+
+@lean
+def note(job, by, bx, log, in_time, vector):
+    """Note the vector of a decoded block."""
+    past, down, across = unpacked(vector)
+    size = 1 << (log - 2)
+    for y in range(by, by + size):
+        for x in range(bx, bx + size):
+            job.motions[job.at, IN_TIME, y, x] = in_time
+            job.motions[job.at, PAST, y, x] = past
+            job.motions[job.at, DOWN, y, x] = down
+            job.motions[job.at, ACROSS, y, x] = across
+
+
+@lean
+def inherited(job, by, bx, log):
+    """Vector of the nearest view of the same instant at what the block shows; and whether it is predicted in time.
+
+    Without such a view: no motion, and 0; else 1 or 2.
+    """
+    if job.references.shape[0] == 0:
+        return np.int64(STILL), 0
+    height, width = job.blocks.shape[1:]
+    half = (1 << log) >> 1
+    y, x = 4 * by + half, 4 * bx + half
+    if job.synthesised:
+        d = np.int64(job.disparity[y, x])
+        x += (d * job.references[0, 1] + 128) >> 8
+        y += (d * job.references[0, 2] + 128) >> 8
+    j, i = clamped(y >> 2, height), clamped(x >> 2, width)
+    view = job.references[0, 0]
+    return noted(job, view, j, i), 1 + np.int64(job.motions[view, IN_TIME, j, i])
+
+
+@lean
+def guesses(job, by, bx, log):
+    """Vectors inherited, of the block left and of the block above; `NONE` where these are not predicted in time."""
+    left = above = np.int64(NONE)
+    if bx > 0 and job.motions[job.at, IN_TIME, by, bx - 1]:
+        left = noted(job, job.at, by, bx - 1)
+    if by > 0 and job.motions[job.at, IN_TIME, by - 1, bx]:
+        above = noted(job, job.at, by - 1, bx)
+    return inherited(job, by, bx, log)[0], left, above
+
+
+@lean
+def time_context(job, by, bx, log):
+    """By size, how many of the blocks above and left are predicted in time, and the inherited block."""
+    motions, like = job.motions, 0
+    if by > 0 and motions[job.at, IN_TIME, by - 1, bx]:
+        like += 1
+    if bx > 0 and motions[job.at, IN_TIME, by, bx - 1]:
+        like += 1
+    return at.IN_TIME + ((log - 2) * 3 + like) * 3 + inherited(job, by, bx, log)[1]
+
+
+@lean
+def code_vector(coder, job, by, bx, log, vector):
+    """Write or read a vector."""
+    first, left, above = guesses(job, by, bx, log)
+    context = at.VECTOR + (log - 2) * 5
+    if code_bit(coder, _first_context(context, first, left), 1 if vector == first else 0):
+        return first
+    if left != NONE and left != first and code_bit(coder, context + 3, 1 if vector == left else 0):
+        return left
+    new = above != NONE and above != first and above != left
+    if new and code_bit(coder, context + 4, 1 if vector == above else 0):
+        return above
+    past, down, across = unpacked(vector)
+    base = left if left != NONE else (above if above != NONE else first)
+    _, base_down, base_across = unpacked(base)
+    found = 0
+    while found < job.past.shape[0] - 1 and code_bit(coder, at.INSTANT + found, 1 if past > found else 0):
+        found += 1
+    down = _code_component(coder, at.COMPONENT, down - base_down) + base_down
+    across = _code_component(coder, at.COMPONENT + 15, across - base_across) + base_across
+    return packed(found, min(max(down, -MOST), MOST), min(max(across, -MOST), MOST))
+
+
+@inner
+def _first_context(context, first, left):
+    """Whether the block left has the inherited vector, another, or none."""
+    return context + (0 if left == NONE else (1 if left == first else 2))
+
+
+@lean
+def _code_component(coder, first, value):
+    size = code_number(coder, np.int64(first), np.int64(14), np.int64(1), abs(value))
+    if size:
+        size = -size if code_bit(coder, np.int64(first + 14), 1 if value < 0 else 0) else size
+    return size
+
+
+@lean
+def vector_cost(contexts, job, by, bx, log, vector):
+    """Bits that `code_vector` would take."""
+    first, left, above = guesses(job, by, bx, log)
+    context = at.VECTOR + (log - 2) * 5
+    bits = bit_cost(contexts, _first_context(context, first, left), 1 if vector == first else 0)
+    if vector == first:
+        return bits
+    if left != NONE and left != first:
+        bits += bit_cost(contexts, context + 3, 1 if vector == left else 0)
+        if vector == left:
+            return bits
+    if above != NONE and above != first and above != left:
+        bits += bit_cost(contexts, context + 4, 1 if vector == above else 0)
+        if vector == above:
+            return bits
+    past, down, across = unpacked(vector)
+    base = left if left != NONE else (above if above != NONE else first)
+    _, base_down, base_across = unpacked(base)
+    for i in range(job.past.shape[0] - 1):
+        if i <= past:
+            bits += bit_cost(contexts, at.INSTANT + i, 1 if past > i else 0)
+    bits += _component_cost(contexts, at.COMPONENT, down - base_down)
+    return bits + _component_cost(contexts, at.COMPONENT + 15, across - base_across)
+
+
+@lean
+def _component_cost(contexts, first, value):
+    bits = number_cost(contexts, np.int64(first), np.int64(14), np.int64(1), abs(value))
+    return bits + bit_cost(contexts, first + 14, 1 if value < 0 else 0) if value else bits
+
+
+@lean
+def move(job, work, planes, y0, x0, n, vector):
+    """work.predicted = the first planes of the same view at an earlier instant, moved by a vector."""
+    past, down, across = unpacked(vector)
+    predicted = work.predicted
+    for p in range(planes):
+        for y in range(n):
+            for x in range(n):
+                predicted[p, y, x] = 0
+        moved_block(job.past, past, p, y0, x0, n, down * QUARTER, across * QUARTER, work.rows, predicted)
+        for y in range(n):
+            for x in range(n):
+                predicted[p, y, x] = np.int32(predicted[p, y, x] + np.int32(2048)) >> 12
+
+
+@lean
+def predict_in_time(job, work, y0, x0, n, vector, mixed):
+    """work.predicted = the view at an earlier instant; ``mixed``: its mean with the synthesised view."""
+    move(job, work, 3, y0, x0, n, vector)
+    if mixed:
+        for p in range(3):
+            for y in range(n):
+                for x in range(n):
+                    work.predicted[p, y, x] = (
+                        work.predicted[p, y, x] + np.int32(job.made[p, y0 + y, x0 + x]) + 1
+                    ) >> 1
+
+
+@lean
+def carry(job, past, out):
+    """Disparity of blocks that are predicted in time: that of the earlier instant, moved with the samples."""
+    height, width = out.shape
+    for y in range(height):
+        for x in range(width):
+            if job.motions[job.at, IN_TIME, y >> 2, x >> 2]:
+                instant, down, across = unpacked(noted(job, job.at, y >> 2, x >> 2))
+                j, i = clamped(y + ((down + 2) >> 2), height), clamped(x + ((across + 2) >> 2), width)
+                out[y, x] = past[instant, j, i]

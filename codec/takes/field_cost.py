@@ -1,0 +1,42 @@
+"""Random access to takes of `si-lf`: views decoded to show one view at one instant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..checks import whole
+from ..coders.lf.coder import MOST_VIEWS, LightField
+from ..coders.lf.pyramid import batches, pyramid
+from .order import MOST_FRAMES, AccessCost, Plan
+
+
+def light_field_cost(plan: Plan, ei_pixels: tuple[int, int], instants: int) -> AccessCost:
+    """Return the cost of one sub-image of a take coded by ``si-lf`` at its default stride.
+
+    Of each earlier instant of its segment the levels up to that of the view are decoded, of its own instant the
+    views up to its batch.
+
+    Parameters
+    ----------
+    ei_pixels : (int, int)
+        Columns U and rows V of views.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is of another type or out of range.
+    """
+    cols, rows = (whole("ei_pixels", side, 1, MOST_VIEWS) for side in ei_pixels)
+    whole("ei_pixels (views)", rows * cols, 1, MOST_VIEWS)
+    whole("instants", instants, 1, MOST_FRAMES // (rows * cols))
+    own, before = [], []  # of each view
+    done = 0
+    for level in pyramid(rows, cols, int(LightField.options["stride"].default), 1, 0):
+        end = done + len(level)
+        for batch in batches(level):
+            done += len(batch)
+            own += len(batch) * [done]
+            before += len(batch) * [end]
+    each = [np.array(own) + at * np.array(before) for part in plan.segments(instants) for at in range(len(part))]
+    costs = np.concatenate(each)
+    return AccessCost(mean=float(costs.mean()), worst=int(costs.max()))
