@@ -96,7 +96,7 @@ class Job:
         if len(cameras) == 3:
             supports = ((), self.support, ())
             jobs = [
-                replace(self, camera=camera, support=support, _local=threading.local())
+                replace(self, camera=camera, support=support, audit=0.0, _local=threading.local())
                 for camera, support in zip(cameras, supports, strict=True)
             ]
             object.__setattr__(self, "_channels", tuple(jobs))
@@ -120,9 +120,18 @@ class Job:
             raise CancelledError("the picture was cancelled")
 
     def tile(self, rows: slice, cols: slice) -> Block:
-        """Render one tile."""
+        """Render one tile, and audit it."""
         if self._channels:
-            return _merged([job.tile(rows, cols) for job in self._channels])
+            block = _merged([job.tile(rows, cols) for job in self._channels])
+        else:
+            block = self._tile(rows, cols)
+        if not self.audit:
+            return block
+        started = time.thread_time()
+        audit = self._audited(rows, cols, block.arrays["pixels"])
+        return replace(block, audit=audit, cpu_seconds=block.cpu_seconds + time.thread_time() - started)
+
+    def _tile(self, rows: slice, cols: slice) -> Block:
         started = time.thread_time()
         tracer = self._tracer()
         shape = rows.stop - rows.start, cols.stop - cols.start
@@ -145,8 +154,7 @@ class Job:
             image[order.pixels] = values
             image = image.reshape(*shape, *values.shape[1:])
             arrays[name] = disparity(self.camera, image) if name == "disparity" else image
-        audit = self._audited(rows, cols, arrays["pixels"]) if self.audit else None
-        return Block(rows, cols, arrays, tracer.count, histogram, audit, time.thread_time() - started)
+        return Block(rows, cols, arrays, tracer.count, histogram, None, time.thread_time() - started)
 
     def _audited(self, rows: slice, cols: slice, pixels: NDArray[Any]) -> Audit:
         """Return the differences of the audited pixels of a tile from the same pixels in full."""
@@ -172,6 +180,9 @@ class Job:
 
     def pixels_at(self, m: NDArray[Any], n: NDArray[Any], rows: slice, cols: slice) -> NDArray[Any]:
         """Return pixels (n, 3) in some columns m and rows n of a tile, with a fixed number of samples."""
+        if self._channels:
+            each = [job.pixels_at(m, n, rows, cols)[:, channel] for channel, job in enumerate(self._channels)]
+            return np.stack(each, axis=-1)
         assert isinstance(self.sampling, int)
         tracer = self._tracer()
         if isinstance(self.camera, IICamera):

@@ -96,7 +96,7 @@ def fixed_sum(
     for some, first, many in _portions(len(m), 0, samples, batch):
         numbers = m[some], n[some], first, many
         radiance = shoot(*_rays(camera, seed, *numbers), numbers=numbers, first=some if first == 0 else None)
-        total[some] += radiance.reshape(-1, many, 3).sum(axis=1)
+        sample_kernels.sum_samples(radiance, many, total[some])
     return total
 
 
@@ -150,9 +150,7 @@ def adaptive_mean(
     add(inside, 0, wanted.least, begins=True)
     add(rim, 0, wanted.least)
     step = np.empty((height, width, 3))
-    sample_kernels.steps_to_neighbours(
-        quarters.sum(axis=1).reshape(*lens.shape, 3) / wanted.least, lens, *corner, step
-    )
+    sample_kernels.steps_to_neighbours(_whole(quarters).reshape(*lens.shape, 3) / wanted.least, lens, *corner, step)
     step = step.reshape(-1, 3)[order]
     counts = np.full(len(inside), wanted.least, np.int32)
     unsure, count = np.arange(len(inside)), wanted.least
@@ -166,7 +164,13 @@ def adaptive_mean(
         add(inside[unsure], count, count)
         count *= 2
         counts[unsure] = count
-    return (quarters[inside].sum(axis=1) / counts[:, None]).astype(np.float32), counts
+    return (_whole(quarters)[inside] / counts[:, None]).astype(np.float32), counts
+
+
+def _whole(quarters: Floats) -> Floats:
+    """Sum of the four quarters; by slices, since numpy sums short axes slowly."""
+    total: Floats = quarters[:, 0] + quarters[:, 1] + quarters[:, 2] + quarters[:, 3]
+    return total
 
 
 def _with_rim(camera: IICamera, rows: slice, cols: slice) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.int64]]:
@@ -193,10 +197,11 @@ def _needed(lens: NDArray[np.int64], own: NDArray[np.bool_]) -> NDArray[np.bool_
 def _rays(
     camera: IICamera, seed: int, m: NDArray[Any], n: NDArray[Any], first: int, count: int
 ) -> tuple[Floats, Floats, Floats | None]:
-    """Rays of ``count`` samples of each pixel, pixel by pixel."""
+    """Rays of ``count`` samples of each pixel, pixel by pixel; what a pixel's samples share is computed once."""
     where: list[ArrayLike] = []
     for pair in range(1 + camera.samples_aperture):
-        out = np.empty((len(m) * count, 2))
-        sample_kernels.places(seed, m, n, camera.pixels[0], first, count, pair, out)
+        out = np.empty((len(m), count, 2))
+        sample_kernels.places(seed, m, n, camera.pixels[0], first, count, pair, out.reshape(-1, 2))
         where.append(out)
-    return camera.weighted_rays_at(np.repeat(m, count), np.repeat(n, count), *where)
+    L, D, shares = camera.weighted_rays_at(m[:, None], n[:, None], *where)
+    return L.reshape(-1, 3), D.reshape(-1, 3), None if shares is None else shares.reshape(-1)

@@ -60,6 +60,17 @@ def merge_quarters(which, quarters):
 
 
 @kernel
+def sum_samples(radiance, count, out):
+    """Add to each row of ``out`` the next ``count`` rows of ``radiance``, in their order."""
+    for i in range(out.shape[0]):
+        for c in range(3):
+            total = radiance[i * count, c]
+            for j in range(1, count):
+                total += radiance[i * count + j, c]
+            out[i, c] += total
+
+
+@kernel
 def add_samples(radiance, which, first, count, quarter, quarters):
     """Add rows of ``radiance``, ``count`` samples from ``first`` on of each pixel named, to its sums of a quarter."""
     for i in range(which.shape[0]):

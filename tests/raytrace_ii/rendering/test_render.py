@@ -10,7 +10,7 @@ import pytest
 
 from ii_core import IICamera, add_sensor_noise, five_viewpoints, preset, read_maps, view_image, write_maps
 from ii_core.view import view_positions
-from raytrace_ii import Background, Scene, load_scene, render, trace
+from raytrace_ii import Audit, Background, Scene, load_scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.rendering.tiles import ray_order, tiles
 from raytrace_ii.tracing.kernels.sampling import places as sample_places
@@ -202,7 +202,7 @@ class Watched(IICamera):
 
     def weighted_rays_at(self, m, n, sample=(0.5, 0.5), place=(0.5, 0.5)):
         L, D, weight = super().weighted_rays_at(m, n, sample, place)
-        m, n = np.broadcast_arrays(m, n)
+        m, n = np.broadcast_arrays(m, n, np.asarray(sample)[..., 0])[:2]
         self.asked.append((m.ravel(), n.ravel(), np.broadcast_to(sample, (*m.shape, 2)).reshape(-1, 2), L - D))
         return L, D, weight
 
@@ -442,3 +442,16 @@ def test_a_job_of_three_wavelengths_reaches_worker_processes(hall_scene):
     made.stop()  # all channels leave their tiles
     with pytest.raises(CancelledError):
         made.tile(rows, cols)
+
+
+def test_three_wavelengths_are_audited_channel_by_channel(hall_scene, monkeypatch):
+    """The audit of green's own pixels said nothing of red and blue."""
+    monkeypatch.setattr(job, "FULL_SAMPLES", 4)
+    camera, deep = preset("plenoptic1-double-gauss", scale=64), hall_scene.with_depth(12)
+    model, field_lens, glass = camera.optics
+    three = replace(camera, optics=(model, field_lens, replace(glass, wavelengths_nm=(640.0, 550.0, 450.0))))
+    exact = render(deep, three, samples=4, audit=1, support=())
+    assert exact.stats.audit == Audit(pixels=exact.picture.pixels[..., 0].size), "no difference"
+    one = render(deep, three, audit=1, support=())
+    off = np.abs(one.picture.pixels.astype(int) - exact.picture.pixels).max(axis=2)
+    assert one.stats.audit.wrong == (off > 2).sum() > 0 and one.stats.audit.worst == off.max()

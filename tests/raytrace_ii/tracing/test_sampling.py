@@ -62,6 +62,14 @@ def test_places_come_in_any_portions_and_differ_by_seed_pixel_and_pair():
     assert np.abs(np.corrcoef(both.T)[:2, 2:]).max() < 5 / np.sqrt(640)
 
 
+def test_sums_of_samples_are_those_in_their_order_to_the_bit():
+    radiance = np.random.default_rng(3).random((60, 3), np.float32)
+    total = np.ones((12, 3), np.float32)
+    sample_kernels.sum_samples(radiance, 5, total)
+    one_by_one = np.cumsum(radiance.reshape(12, 5, 3), axis=1, dtype=np.float32)[:, -1]
+    np.testing.assert_array_equal(total, 1 + one_by_one)
+
+
 def test_a_flat_scene_stays_at_the_least():
     shot = adaptive(Scene(bodies=[body(wall(20, 100), colour=(0.3, 0.6, 0.9))], ambient=WHITE), SMALL)
     assert shot.stats.samples == {4: 128 * 64} and shot.stats.mean_samples == 4
