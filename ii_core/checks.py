@@ -14,6 +14,7 @@ import numpy as np
 Pair = tuple[int, int]
 Rule = Callable[[str, Any], Any]  # raises TypeError or ValueError that names the argument
 LEAST_MM, MOST_MM = 1e-9, 1e9  # of a length: a hundredth of an atom, and a thousand kilometres
+VIEW_BYTES = 64  # of a pixel of a view: colours as floats, places, weights
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -282,3 +283,22 @@ def whole_pair(name: str, value: Any) -> Pair:
     if (across, down) != (a, b) or across < 1 or down < 1:
         raise ValueError(f"{name} is {a}×{b}: two whole numbers of at least 1 are needed")
     return across, down
+
+
+def view_size(name: str, value: Any, count: int = 1) -> Pair:
+    """Return the size of a view in pixels, of which ``count`` fit into memory with the arrays of its computation.
+
+    Raises
+    ------
+    ValueError
+        If the value is no pair of whole numbers, or too large; the message names the argument.
+    """
+    from .files import memory_bytes
+
+    width, height = whole_pair(name, value)
+    if count * width * height * VIEW_BYTES > (memory := memory_bytes()):
+        raise ValueError(
+            f"{name} is {width}×{height}: at most {memory // VIEW_BYTES / count:.2g} pixels fit into the "
+            f"{memory / 1e9:.1f} GB of memory of this machine"
+        )
+    return width, height

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,7 +47,8 @@ class Glass:
         if self.sellmeier is not None:
             if self.abbe is not None:
                 raise ValueError("glass: sellmeier and abbe are given: one of them is needed")
-            if isinstance(self.sellmeier, str) or len(tuple(self.sellmeier)) != 6:
+            listed = isinstance(self.sellmeier, Sequence) and not isinstance(self.sellmeier, str)
+            if not listed or len(self.sellmeier) != 6:
                 raise ValueError(
                     f"glass: sellmeier is {self.sellmeier!r}: six numbers, B1 to B3 and C1 to C3, are needed"
                 )

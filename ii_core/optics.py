@@ -216,10 +216,10 @@ class Lens(FrontElement):
         length("lens: the size of focal_mm", abs(number("lens: focal_mm", self.focal_mm)))
 
     def moved(self, by_mm: float) -> Lens:
-        return replace(self, z_mm=self.z_mm + by_mm)
+        return replace(self, z_mm=self.z_mm + number("by_mm", by_mm))
 
     def image_mm(self, z_mm: float) -> float:
-        a = z_mm - self.z_mm
+        a = number("z_mm", z_mm) - self.z_mm
         power = 1 / self.focal_mm + (1 / a if a else math.inf)  # 1/b = 1/f + 1/a
         return self.z_mm + (1 / power if power else math.inf)
 

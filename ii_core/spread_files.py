@@ -22,6 +22,7 @@ from .spread import SpreadMaps
 NAMES = ("S", "A")
 
 
+@checks.checked(count=checks.whole_from(1, 1 << 16), format=checks.text)
 def spread_files(count: int, format: str = "png16") -> list[str]:
     """Return the names of the images that `write_spread` writes for this number of pixel arrays."""
     check_format(format)

@@ -209,7 +209,7 @@ class Surfaces(FrontElement):
         return self._vertices[0]
 
     def moved(self, by_mm: float) -> Surfaces:
-        return replace(self, z_mm=self.z_mm + by_mm)
+        return replace(self, z_mm=self.z_mm + number("by_mm", by_mm))
 
     def enlarged(self, factor: float) -> Surfaces:
         """Return the lens with all its lengths times ``factor``; ``z_mm`` does not change."""
@@ -246,7 +246,7 @@ class Surfaces(FrontElement):
 
     def image_mm(self, z_mm: float) -> float:
         m = self.paraxial()
-        from_vertex = self.z_mm - z_mm
+        from_vertex = self.z_mm - number("z_mm", z_mm)
         height, slope = (m.a, m.c) if math.isinf(from_vertex) else (m.a * from_vertex + m.b, m.c * from_vertex + m.d)
         return self.end_mm - height / slope if slope else math.inf
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .camera import IICamera
-from .checks import array, checked, instance, length, number, within
+from .checks import MOST_MM, array, checked, instance, length, number, numbers_in_a_row, place, whole_from, within
 from .colour import linear, srgb
 from .extras import Lazy
 from .picture import IIPicture
@@ -54,9 +54,12 @@ def angular_spectrum(
     """
     step, wavelength = length("step_mm", step_mm), length("wavelength_mm", wavelength_mm)
     distance = length("distance_mm", distance_mm)
-    field = np.asarray(field)
-    if field.ndim not in (1, 2):
-        raise ValueError(f"field has {field.ndim} dimensions: one or two are needed")
+    try:
+        field = np.asarray(field, np.complex128)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise TypeError(f"field is no array of numbers: {error}") from None
+    if field.ndim not in (1, 2) or not field.size:
+        raise ValueError(f"field is {field.shape}: samples in one or two dimensions are needed")
     squared, inside = np.zeros(()), np.ones((), bool)
     for axis, count in enumerate(field.shape):
         frequency = np.fft.fftfreq(count, step).reshape([-1 if a == axis else 1 for a in range(field.ndim)])
@@ -67,7 +70,7 @@ def angular_spectrum(
     return np.fft.ifftn(np.fft.fftn(field) * turned)
 
 
-@checked(width_mm=number, gap_mm=number, wavelength_nm=number)
+@checked(width_mm=number, gap_mm=number, wavelength_nm=number, dimensions=whole_from(1, 2))
 def lens_spread(
     width_mm: float,
     gap_mm: float,
@@ -113,10 +116,7 @@ def lens_spread(
     """
     width, gap, wavelength = length("width_mm", width_mm), length("gap_mm", gap_mm), _mm(wavelength_nm)
     focal = gap if focal_mm is None else length("focal_mm", focal_mm)
-    if not depth_mm > 0:
-        raise ValueError(f"depth_mm is {depth_mm}: a positive distance, or infinity, is needed")
-    if dimensions not in (1, 2):
-        raise ValueError(f"dimensions is {dimensions}: 1 for a slit, 2 for a round lens, is needed")
+    depth_mm = _depth(depth_mm)
     error = within("spherical_mm", spherical_mm, -width, width)
     blur = abs(defocus_mm(width, gap, focal_mm=focal, depth_mm=depth_mm)) + 16 * abs(error) * gap / width
     slope = 8 * abs(error) / width  # of the phases of lens, source and aberration at the rim
@@ -142,11 +142,12 @@ def lens_spread(
 @checked(width_mm=number, gap_mm=number)
 def defocus_mm(width_mm: float, gap_mm: float, *, focal_mm: float | None = None, depth_mm: float = math.inf) -> float:
     """Width of a point's image by rays: δL·(1 − Λ/z'), 1/z' = 1/f − 1/z; negative if it is in focus behind Λ."""
-    vergence = 1 / (gap_mm if focal_mm is None else focal_mm) - 1 / depth_mm
-    return width_mm * (gap_mm * vergence - 1)
+    width, gap = length("width_mm", width_mm), length("gap_mm", gap_mm)
+    vergence = 1 / (gap if focal_mm is None else length("focal_mm", focal_mm)) - 1 / _depth(depth_mm)
+    return width * (gap * vergence - 1)
 
 
-@checked(x=array, width_mm=number, gap_mm=number, wavelength_nm=number)
+@checked(x=array, width_mm=number, gap_mm=number, wavelength_nm=number, dimensions=whole_from(1, 2))
 def diffraction_limit(
     x: NDArray[Any], width_mm: float, gap_mm: float, wavelength_nm: float, dimensions: int = 1
 ) -> Floats:
@@ -181,7 +182,13 @@ def model_spread(
     ndarray, (n,)
         Of sum 1.
     """
-    step, blur = x[1] - x[0], abs(defocus_mm(width_mm, gap_mm, focal_mm=focal_mm, depth_mm=depth_mm))
+    x = _places(x)
+    step = length("x: step", x[1] - x[0])
+    blur = abs(defocus_mm(width_mm, gap_mm, focal_mm=focal_mm, depth_mm=depth_mm))
+    if blur / step > MOST[1]:
+        raise ValueError(
+            f"x has a step of {step:g} mm, the disk of defocus is {blur:g} mm wide: a wider step is needed"
+        )
     limit = diffraction_limit(x, width_mm, gap_mm, wavelength_nm)
     # the box has the width of the blur to a fraction of a sample
     reach = math.ceil(blur / 2 / step) + 1
@@ -190,6 +197,7 @@ def model_spread(
     return folded / folded.sum()
 
 
+@checked(pixel_mm=number, reach=whole_from(0, MOST[2]))
 def pixel_kernel(x: NDArray[Any], intensity: NDArray[Any], pixel_mm: float, reach: int) -> Floats:
     """Light of a pixel-wide stripe on the pixels beside it, (2·reach + 1,), the stripe's own in the middle.
 
@@ -199,10 +207,11 @@ def pixel_kernel(x: NDArray[Any], intensity: NDArray[Any], pixel_mm: float, reac
     Raises
     ------
     ValueError
-        If the pixel is not positive.
+        If the pixel is not positive, or places and intensities are not as many finite numbers.
     """
-    length("pixel_mm", pixel_mm)
-    offsets = np.arange(-reach, reach + 1) * pixel_mm
+    x = _places(x)
+    intensity = _intensity(x, intensity)
+    offsets = np.arange(-reach, reach + 1) * length("pixel_mm", pixel_mm)
     triangles = np.clip(1 - abs(x - offsets[:, None]) / pixel_mm, 0, None)
     kernel = triangles @ intensity
     return kernel / kernel.sum()
@@ -210,6 +219,8 @@ def pixel_kernel(x: NDArray[Any], intensity: NDArray[Any], pixel_mm: float, reac
 
 def spread_width(x: NDArray[Any], intensity: NDArray[Any]) -> float:
     """Width, mm, about the axis that holds `ENERGY` of a point-spread function."""
+    x = _places(x)
+    intensity = _intensity(x, intensity)
     order = np.argsort(abs(x), kind="stable")
     last = int(np.searchsorted(np.cumsum(intensity[order]), ENERGY))
     return 2 * float(abs(x[order[min(last, len(x) - 1)]]))
@@ -246,18 +257,19 @@ def lens_blurred(
         raise ValueError(
             f"camera has {camera.ei_pixels} pixels a lens, the picture {picture.ei_pixels}: the same is needed"
         )
-    if len(wavelengths_nm) != 3:
-        raise ValueError(f"wavelengths_nm are {wavelengths_nm}: three, of red, green and blue, are needed")
+    waves = place("wavelengths_nm", wavelengths_nm, 3, 1e15)
+    if min(waves) < 1e-3:
+        raise ValueError(f"wavelengths_nm are {waves}: three of at least 0.001 nm are needed")
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
     kernels = []
-    for wavelength in wavelengths_nm:
+    for wavelength in waves:
         for width, size in zip(camera.lens_pitch_mm, (u, v), strict=True):
             x, spread = lens_spread(width, camera.gap_mm, wavelength, depth_mm=depth_mm)
             wide = spread_width(x, spread) / camera.pixel_pitch_mm
             if wide > size:
                 raise ValueError(
                     f"point-spread function at {wavelength:g} nm is {wide:.1f} pixels wide, an elementary image "
-                    f"{size}: a wider lens, a smaller gap or a scene farther away is needed"
+                    f"{size}: a wider lens, a smaller gap or a larger depth_mm is needed"
                 )
             kernels.append(pixel_kernel(x, spread, camera.pixel_pitch_mm, size))
     out = np.empty_like(picture.pixels)
@@ -276,3 +288,29 @@ def lens_blurred(
 
 def _mm(wavelength_nm: float) -> float:
     return within("wavelength_nm", wavelength_nm, 1e-3, 1e15) * 1e-6
+
+
+def _depth(depth_mm: float) -> float:
+    """Return the distance to a point; infinity beyond the range of lengths."""
+    depth = number("depth_mm", depth_mm)
+    if not depth > 0:
+        raise ValueError(f"depth_mm is {depth:g}: a positive distance, or infinity, is needed")
+    return math.inf if depth > MOST_MM else length("depth_mm", depth)
+
+
+def _places(x: Any) -> Floats:
+    """Return places on the pixel plane as floats."""
+    numbers_in_a_row("x", x)
+    places = np.asarray(x, np.float64)
+    if len(places) < 2 or not np.isfinite(places).all():
+        raise ValueError(f"x has {len(places)} places: at least two finite numbers are needed")
+    return places
+
+
+def _intensity(x: Floats, intensity: Any) -> Floats:
+    """Return the light at places as floats."""
+    numbers_in_a_row("intensity", intensity)
+    light = np.asarray(intensity, np.float64)
+    if light.shape != x.shape or not np.isfinite(light).all():
+        raise ValueError(f"intensity is {light.shape}, x {x.shape}: a finite number for every place is needed")
+    return light

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import IICamera
-from ..checks import MOST_MM, Pair, checked, instance, length, place, whole, whole_pair, within
+from ..checks import MOST_MM, Pair, checked, instance, length, place, view_size, whole, within
 from ..colour import linear, srgb
 from ..jit import exact_kernel
 from ..optics import Lenslet, unit_disk
@@ -128,7 +128,7 @@ def eye_image(
     count = (RAYS if eye.pupil_mm > 0 else 1) if rays is None else rays
     if not 1 <= count <= MOST_RAYS:
         raise ValueError(f"rays is {rays!r}: a whole number from 1 to {MOST_RAYS} is needed")
-    width, height = camera.lenses if size is None else whole_pair("size", size)
+    width, height = camera.lenses if size is None else view_size("size", size)
     half = _half(display)
     step = 2 * half / (width, height)
     light, seen = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)

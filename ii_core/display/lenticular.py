@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Pair, checked, instance, number, whole, whole_pair, within
+from ..checks import Pair, checked, instance, number, view_size, whole, whole_pair, within
 from ..picture import IIPicture
 from .look import display_views
 
@@ -53,7 +53,7 @@ def lenticular(
     ValueError
         If a parameter is out of range.
     """
-    width, height = whole_pair("size", size)
+    width, height = view_size("size", size)
     if max(width, height) > MOST_ALONG:
         raise ValueError(f"size is {width}×{height}: at most {MOST_ALONG} a side is needed")
     within("pitch_px", pitch_px, 1e-3, MOST)

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..camera import IICamera, Pair, whole_pair
+from ..camera import IICamera, Pair
+from ..checks import view_size
 from ..jit import kernel
 from ..picture import IIPicture, codes8
 from ..view import camera_of, five_viewpoints, view_positions, widening
@@ -62,7 +63,7 @@ def focused_view(
     picture.check_regular()
     camera = camera_of(picture)
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
-    width, height = whole_pair("size", (k, l) if size is None else size)
+    width, height = view_size("size", (k, l) if size is None else size)
     if not aperture_px >= 1:
         raise ValueError(f"aperture is {aperture_px} px: at least 1 is needed")
     x, y = view_positions(camera, viewpoint_mm, erect=picture.erect)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Pair, whole_pair
+from ..checks import Pair, view_size, whole_pair
 from ..formats.quilt import quilt_pixels
 from ..picture import IIPicture
 from .look import display_views
@@ -31,6 +31,6 @@ def quilt(
     ndarray of uint8, (rows · height, columns · width, 3)
     """
     columns, rows = whole_pair("tiles", tiles)
-    width, height = whole_pair("size", size)
+    width, height = view_size("size", size, columns * rows)
     views = display_views(picture, columns * rows, size=(width, height), depth_mm=depth_mm, cone=cone)
     return quilt_pixels(views, (columns, rows))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..camera import IICamera, Pair, whole_pair
+from ..camera import IICamera, Pair
+from ..checks import view_size
 from ..picture import IIPicture, codes8
 from ..view import camera_of, lens_array_mm, view_positions
 
@@ -34,7 +35,7 @@ def display_simulation(
     """
     picture.check_regular()
     camera = camera_of(picture)
-    width, height = whole_pair("size", size)
+    width, height = view_size("size", size)
     if not 0 < fill <= 1:
         raise ValueError(f"fill is {fill}: a share from 0 to 1 is needed")
     x, y = view_positions(camera, viewpoint_mm, erect=picture.erect)

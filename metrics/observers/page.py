@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ii_core import checks
-from ii_core.checks import Pair, whole_pair
+from ii_core.checks import Pair, view_size
 from ii_core.display.look import focused_view, viewpoints_across, viewpoints_around, with_assumed_camera
 from ii_core.files import atomic_path
 from ii_core.picture import IIPicture
@@ -60,6 +60,17 @@ class Stimulus:
     bpp: float | None = None
     measures: Mapping[str, float] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        text, flag = checks.text, checks.flag
+        picture, measures = checks.instance(IIPicture), checks.mapping
+        checks.check_fields(
+            self, scene=text, name=text, picture=picture, reference=flag, scheme=text, bpp=checks.number,
+            measures=measures,
+        )  # fmt: skip
+        for name, value in self.measures.items():
+            checks.text("measures", name)
+            checks.number(f"measures: {name}", value)
+
     @property
     def entry(self) -> dict[str, Any]:
         """Entry of the plan; measures without a finite value are left out."""
@@ -68,7 +79,10 @@ class Stimulus:
         return {**plain, "bpp": self.bpp, "measures": finite}
 
 
-@checks.checked(path=checks.path, stimuli=checks.list_of(Stimulus), options=checks.instance(Options))
+@checks.checked(
+    path=checks.path, stimuli=checks.list_of(Stimulus), options=checks.instance(Options), title=checks.text,
+    served=checks.flag, progress=checks.callable_,
+)  # fmt: skip
 def write_test(
     path: str | os.PathLike[str],
     stimuli: Sequence[Stimulus],
@@ -110,9 +124,11 @@ def write_test(
     OSError
         If the file cannot be written.
     """
+    if not title.isprintable():
+        raise ValueError(f"title is {title!r}: one line without control characters is needed")
     asked = options or Options()
     _check(stimuli)
-    width, height = whole_pair("size", stimuli[0].picture.lenses if size is None else size)
+    width, height = view_size("size", stimuli[0].picture.lenses if size is None else size)
     count, sequence = frame_order(asked.show, asked.frames)
     made = plates(asked.seed)
     plan = make_plan(

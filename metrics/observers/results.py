@@ -82,6 +82,8 @@ def read_results(paths: Sequence[str | os.PathLike[str]]) -> Results:
     OSError
         If a file cannot be read.
     """
+    for one in paths:
+        checks.path("paths", one)
     notes: list[str] = []
     found: dict[int, tuple[str, Observer]] = {}
     text = ""
@@ -102,7 +104,7 @@ def read_results(paths: Sequence[str | os.PathLike[str]]) -> Results:
             order = json.loads(text)["orders"][0]
             notes.append(f"{path}: stopped after {len(observer.answers)} of {len(order)} answers, which count")
     if not found:
-        raise ValueError(notes[0] if notes else "there are no files of observers: at least one is needed")
+        raise ValueError(notes[0] if notes else "paths: there are no files of observers: at least one is needed")
     return Results(json.loads(text), [observer for _, (_, observer) in sorted(found.items())], notes)
 
 

@@ -10,11 +10,18 @@ from typing import Any
 
 import numpy as np
 
+from ii_core import checks
+
+from . import plan as plans
 from .results import FORMAT, VERSION, sealed
 
 AT = "2000-01-01T00:00:00.000Z"  # date of all simulated answers
 
 
+@checks.checked(
+    folder=checks.path, plan=checks.mapping, quality=checks.numbers_in_a_row, observers=checks.whole_from(1, 1000),
+    bias=checks.number_from(0, 100), spread=checks.number_from(0, 100), seed=checks.whole_from(0, 2**63 - 1),
+)  # fmt: skip
 def write_simulated(
     folder: str | os.PathLike[str],
     plan: Mapping[str, Any],
@@ -42,7 +49,18 @@ def write_simulated(
     bias, spread : float
         Standard deviations of the observers' biases and of the noise of each answer.
     seed : int
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is out of range, this is no plan of a test, or there is not one finite quality for each stimulus.
+    OSError
+        If the folder is missing or cannot be written.
     """
+    if (plan.get("format"), plan.get("version")) != (plans.FORMAT, plans.VERSION):
+        raise ValueError("plan is none of a test: that of `write_test` is needed")
+    if len(quality) != len(plan["stimuli"]) or not np.isfinite(quality).all():
+        raise ValueError(f"quality has {len(quality)} values: {len(plan['stimuli'])} finite ones are needed")
     generator = np.random.default_rng(seed)
     text, paths = json.dumps(plan, ensure_ascii=False), []
     for number in range(1, observers + 1):

@@ -70,6 +70,8 @@ class Verdict(NamedTuple):
 
     def with_measure(self, measure: str, group: str = EVERYTHING) -> list[tuple[float, Judged]]:
         """Return value and score of the stimuli of a group that the measure has a value for."""
+        checks.text("measure", measure)
+        checks.text("group", group)
         stimuli = self.plan["stimuli"]
         pairs = [(stimuli[one.stimulus], one) for one in self.judged]
         return [(s["measures"][measure], one) for s, one in pairs if _in_group(s, group) and measure in s["measures"]]

@@ -41,7 +41,11 @@ def test_no_error_is_accidental(named, tmp_path, monkeypatch):
 
 
 def test_every_public_function_is_tried_with_every_argument(named):
-    """The first version left out 29 functions, and counted only the last call of each function."""
+    """The first version left out 29 functions, and counted only the last call of each function.
+
+    The second left out all modules with a page of the API of their own: waves, point-spread functions, glasses,
+    elements, observers. 371 calls of the functions of waves alone ended in accidental errors.
+    """
     assert untried(named) == []
 
 

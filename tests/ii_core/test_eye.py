@@ -10,7 +10,10 @@ import pytest
 from ii_core import IICamera, IIPicture, five_viewpoints, preset, view_image
 from ii_core.colour import LINEAR, linear
 from ii_core.display.eye import Eye, eye_image, see
+from ii_core.display.look import focused_view
 from ii_core.display.model import DisplayModel
+from ii_core.display.quilt import quilt
+from ii_core.display.simulate import display_simulation
 from ii_core.display.zones import converging_distance, crosstalk, viewing_zone
 from ii_core.optics import Lenslet
 
@@ -314,6 +317,21 @@ def test_invalid_views_of_an_eye_are_refused():
         converging_distance(DisplayModel(camera=made, lens_pitch_mm=0.081))
     with pytest.raises(ValueError, match="pupil_mm"):
         crosstalk(-1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "view",
+    [
+        lambda picture, size: eye_image(picture, DisplayModel(camera=picture.camera), FRONT, size=size),
+        lambda picture, size: focused_view(picture, (0, 0, -100), size=size),
+        lambda picture, size: quilt(picture, (2, 2), size=size),
+        lambda picture, size: display_simulation(picture, (0, 0, -100), size=size),
+    ],
+)
+def test_views_larger_than_memory_are_refused_before_it_is_taken(view):
+    """The command's largest size, 65536×65536, took 51 GB; here it would be 12 TB."""
+    with pytest.raises(ValueError, match=r"size is 1000000×1000000: at most .* GB of memory of this machine"):
+        view(noise(camera()), (10**6, 10**6))
 
 
 def test_64_rays_cost_no_more_than_30_view_images_and_no_memory():

@@ -113,7 +113,7 @@ def test_invalid_waves_are_refused():
     picture = IIPicture(np.zeros((*camera.pixels[::-1], 3), np.uint8), camera.lenses, camera.ei_pixels, camera)
     with pytest.raises(ValueError, match=r"is \d+\.\d pixels wide, an elementary image 16"):
         lens_blurred(picture, preset("setup1"), depth_mm=0.1)
-    with pytest.raises(ValueError, match="wavelength_nm is 0"):
+    with pytest.raises(ValueError, match=r"wavelengths_nm are \(610.0, 0.0, 465.0\)"):  # the argument's own name
         lens_blurred(picture, camera, wavelengths_nm=(610, 0, 465))
     with pytest.raises(ValueError, match="the same is needed"):
         lens_blurred(picture, preset("setup3", scale=8))

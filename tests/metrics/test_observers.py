@@ -483,6 +483,20 @@ def test_invalid_options_are_refused(run, refused, coded, tmp_path, options, sai
     assert not (tmp_path / "t.html").exists()
 
 
+def test_a_title_of_control_characters_is_refused(coded, tmp_path):
+    """A NUL split the page in three: a ValueError about values to unpack."""
+    picture = IIPicture.load(coded[0])
+    stimuli = [Stimulus(scene="a", name=name, picture=picture, reference=name == "r") for name in ("r", "b")]
+    for title in ("a\0b", "a\nb", "\x1b[31m"):
+        with pytest.raises(ValueError, match="title is"):
+            write_test(tmp_path / "t.html", stimuli, title=title)
+    for wrong, said in (({"scene": 3}, "scene"), ({"picture": None}, "picture"), ({"bpp": "1"}, "bpp")):
+        with pytest.raises(TypeError, match=said):
+            Stimulus(**{"scene": "a", "name": "b", "picture": picture, **wrong})
+    with pytest.raises(TypeError, match="q_global"):
+        Stimulus(scene="a", name="b", picture=picture, measures={"q_global": "30"})
+
+
 def test_the_commands_refuse_files(run, refused, coded, tmp_path):
     refused(run("subjective", *coded, "-o", tmp_path / "t.txt"), ".html is needed")
     refused(run("subjective", *coded[1:], "-o", tmp_path / "t.html"), "comes before any picture")

@@ -32,10 +32,12 @@ SAID = {
     "path": "path|text|name|file|known \\w+ type|possible are", "folder": "folder|text|name",
     "source": "source|text|name|holds one view", "bodies": "bodies|object", "size_mm": "size_mm|lens of",
     "lenses": "lenses|lens",
-    "name": "name|camera|scene", "kind": "kind|component image", "viewpoints": "viewpoint", "names": "names|measure",
+    "name": "name|camera|scene|lens",
+    "by_mm": "by_mm|z_mm", "value": "value|glass|ior",
+    "kind": "kind|component image", "viewpoints": "viewpoint", "names": "names|measure",
     "low": "low|disparity",
     "high": "high|disparity", "kinds": "kinds|component image", "orders": "orders?",
-    "data": "data|camera|picture|structure|lenses|ei_pixels",
+    "data": "data|optical element|camera|picture|structure|lenses|ei_pixels",
     "dtype": "dtype|pixel type", "index": "index|frame", "place": "place|component image",
     "vertices": "vertices|vertex|object", "faces": "faces|face|object", "count": "count|viewpoints",
     "depth_mm": "depth_mm|depth", "views": "views|viewpoints", "cone": "cone|zone", "directions": "directions?|ray",
@@ -63,7 +65,7 @@ def outcome(call: Call, argument: str, value: Any) -> str:
     except IndexError as error:
         return "refused" if ": there are " in str(error) else f"IndexError: {str(error)[:120]}"
     except OSError as error:
-        named = isinstance(value, str | os.PathLike | bytes) or argument in str(error)
+        named = isinstance(value, str | os.PathLike | bytes) or value == ["a", "b"] or argument in str(error)
         return "path" if named else f"{type(error).__name__}: {str(error)[:120]}"
     except Exception as error:
         return f"{type(error).__name__}: {str(error)[:120]}"

@@ -37,6 +37,8 @@ def metrics_calls(folder: Path) -> dict[str, Call]:
         "mean_q_angle": (m.mean_q_angle, {**PAIR, "mask": MASK, "structure": None}),
         "q_angle_ycbcr": (m.q_angle_ycbcr, {**PAIR, "structure": None}),
         "q_angle_ssim": (m.q_angle_ssim, {**PAIR, "scales": 1, "structure": None}),
+        "q_ctc_psnr": (m.q_ctc_psnr, {**PAIR, "structure": None}),
+        "q_ctc_ssim": (m.q_ctc_ssim, {**PAIR, "structure": None}),
         "q_view": (m.q_view, {**PAIR, "viewpoints": {"front": FRONT}, "mask": MASK, "structure": None}),
         "q_depth": (m.q_depth, {**PAIR, **layers, "depth": DEPTH, "mask": MASK, "structure": None}),
         "error_map": (m.error_map, {**PAIR, "viewpoint_mm": FRONT}),
