@@ -60,22 +60,30 @@ def atomic_paths(paths: Sequence[str | os.PathLike[str]]) -> Iterator[list[Path]
             raise ValueError(f"{os.fspath(paths[i])} is to be written twice: every output needs a name of its own")
     temporaries: list[Path] = []
     try:
-        for target in targets:
-            temporaries.append(_create(target))  # noqa: PERF401 - those made are removed if one fails
-        yield temporaries
+        with disk_errors(*paths):
+            for target in targets:
+                temporaries.append(_create(target))  # noqa: PERF401 - those made are removed if one fails
+            yield temporaries
+            for temporary in temporaries:
+                _flush(temporary)
+            for temporary, target in zip(temporaries, targets, strict=True):
+                os.replace(temporary, target)
+    finally:
         for temporary in temporaries:
-            _flush(temporary)
-        for temporary, target in zip(temporaries, targets, strict=True):
-            os.replace(temporary, target)
+            temporary.unlink(missing_ok=True)
+            _live.discard(temporary)
+
+
+@contextlib.contextmanager
+def disk_errors(*paths: str | os.PathLike[str]) -> Iterator[None]:
+    """Name the files in errors of a full or broken disk."""
+    try:
+        yield
     except OSError as error:
         if error.errno not in DISK:
             raise
         named = ", ".join(os.fspath(path) for path in paths)
         raise OSError(f"cannot write {named}: {error.strerror}") from error
-    finally:
-        for temporary in temporaries:
-            temporary.unlink(missing_ok=True)
-            _live.discard(temporary)
 
 
 def remove_temporaries() -> None:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from .atomic import disk_errors
 from .files import check_file, parse_json
 
 try:
@@ -21,7 +22,7 @@ def append_record(path: Path, record: Mapping[str, Any]) -> None:
     """Append a record and flush it to disk; an incomplete last line of a killed writer is removed first."""
     path.parent.mkdir(parents=True, exist_ok=True)
     line = json.dumps(record, ensure_ascii=False) + "\n"
-    with path.open("a+b") as file:
+    with disk_errors(path), path.open("a+b") as file:
         if fcntl is not None:
             fcntl.flock(file, fcntl.LOCK_EX)  # other processes may append, too
         file.seek(0)

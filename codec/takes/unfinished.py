@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core.atomic import disk_errors
 from ii_core.files import read_json, write_json
 
 from ..search import Run
@@ -50,7 +51,7 @@ class Unfinished:
             return Run(self._payloads[key], 0.0)
         run = code()
         framed = container.framed(len(self._payloads), run.payload)
-        with open(self.path, "r+b" if self._end else "wb") as file:
+        with disk_errors(self.path), open(self.path, "r+b" if self._end else "wb") as file:
             file.seek(self._end)
             file.write(framed)
             file.truncate()

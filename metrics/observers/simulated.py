@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ii_core import checks
+from ii_core.atomic import atomic_path
 
 from . import plan as plans
 from .results import FORMAT, VERSION, sealed
@@ -78,7 +79,8 @@ def write_simulated(
             lines.append(sealed(record, lines[-1]))
         lines.append(sealed({"kind": "end", "at": AT}, lines[-1]))
         path = Path(folder) / f"observer-{number:03d}.jsonl"
-        path.write_text("".join(lines), encoding="utf-8")
+        with atomic_path(path) as temporary:
+            temporary.write_text("".join(lines), encoding="utf-8")
         paths.append(path)
     return paths
 

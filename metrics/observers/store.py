@@ -7,6 +7,8 @@ import re
 import threading
 from pathlib import Path
 
+from ii_core.atomic import disk_errors
+
 from .results import MOST_BYTES, checked_lines, read_observer
 
 NAME = re.compile(r"observer-(\d+)\.jsonl")
@@ -77,7 +79,7 @@ class ResultFolder:
         first = checked_lines(data, "result")[0]
         if (first.get("plan"), first.get("observer")) != (self.plan, number):
             raise ValueError("result is of another test or observer")
-        with self._lock, path.open("r+b") as file:
+        with self._lock, disk_errors(path), path.open("r+b") as file:
             held = file.read()
             if not data.startswith(held):
                 if held.startswith(data):  # a late request: the file holds these lines already
