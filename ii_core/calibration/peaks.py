@@ -19,6 +19,7 @@ CROP = 2048  # pixels a side, in the middle, whose spectrum is taken
 CLEAR = 0.06  # autocorrelation, less than which is noise; what repeats by chance does not fit a grid
 NEARLY = 0.6  # of the highest peak of the autocorrelation: lower ones are no period of their own
 SMOOTH = 0.2  # of the pitch, σ of the Gauss kernel that makes one peak of a micro-image
+STEP = 0.4  # σ, from the centre to the samples round it: with 0.6 they met the light of saturated neighbours
 KERNEL = 2.5  # σ, where the kernel ends: half a pitch, short of the neighbours' light
 Floats = NDArray[np.float64]
 Vectors = tuple[Floats, Floats]
@@ -187,7 +188,7 @@ class Summits:
         Newton's method on the parabola through nine samples round the place: it ends where they balance, which
         symmetry makes the centre, however the peak is shaped.
         """
-        h = max(0.5, 0.6 * self.sigma)
+        h = max(0.5, STEP * self.sigma)
         found, good = places.copy(), np.ones(len(places), bool)
         for _ in range(6):
             f = {
