@@ -91,7 +91,7 @@ def crossing_chart() -> None:
             rows = [row for row in crossing.rows() if (row["refs"], row["pitch_px"]) == (refs, pitch)]
             for kind, face in (("plain", "0.35"), ("compensated", "none")):
                 places = [(crossing.ratios(row, kind)[0], row["rate"]) for row in rows]
-                label = f"apples, lens pitch {pitch} px" if (refs, kind) == (8, "plain") else None
+                label = f"apples, lens pitch {pitch} px" if (refs, kind) == (1, "plain") else None
                 drawn(axes, places, MARKERS[i], "0.35", label=label, markerfacecolor=face)
         for i, take in enumerate(TAKES):
             drawn(axes, take_places(take, refs), "o", COLOURS[i], label=f"take {take}" if refs == 8 else None)

@@ -159,7 +159,7 @@ class FieldSegments(SegmentCoder):
         """Instants follow one another, and all views of one are a group."""
         if self.plan.walk != "view-first" or self.plan.group:
             plan = f"walk is {self.plan.walk!r} and group {self.plan.group}"
-            raise ValueError(f"{plan}: scheme {self.coder.name} codes whole instants, view-first and 0 are needed")
+            raise ValueError(f"{plan}: scheme {self.coder.name} codes whole instants and needs 'view-first' and 0")
 
     @property
     def axis(self) -> Axis:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .common import check_folder, check_outputs, columns, image_file, picture_files
 from .progress import progress_bar, say_done, spinner
 from .words import say
+
+if TYPE_CHECKING:
+    from ii_core import IIVideo
 
 
 def render_frames(
@@ -113,22 +116,34 @@ def measure_frames(reference: Path, decoded: Path, json: Path | None, plots: Pat
     chart = plots / "time.png" if plots else None
     check_outputs([*([json] if json else []), *([chart] if chart else [])], force, make_folder=True)
     a, b = opened(reference), opened(decoded)
-    path = viewpoints_around(a.structure, b.frames) if a.camera is not None and min(a.structure.lenses) > 10 else None
+    missing = _no_viewer(a)
+    path = None if missing else viewpoints_around(a.structure, b.frames)
     with progress_bar(f"measure {decoded.name}") as report:
         quality = measure_take(a, b, viewpoints_mm=path, progress=lambda done, total: report(done, total, ""))
     if chart:
         time_chart({decoded.stem: quality}, chart)
     numbers = quality.to_json()
     if json:
-        write_json(json, {"reference": str(reference), "decoded": str(decoded), **numbers})
+        without = {"missing": {"view_ssim": missing, "view_psnr": missing}} if missing else {}
+        write_json(json, {"reference": str(reference), "decoded": str(decoded), **numbers, **without})
     rows = {
         "frames": f"{numbers['frames']}, {quality.fps:g} per second",
         "Q_global": f"{quality.pooled_psnr:.2f} dB of the pooled error, {quality.mean_psnr:.2f} dB mean of frames, "
         f"{quality.worst_psnr:.2f} dB worst frame",
         "flicker": f"{quality.mean_flicker:.3f} 8-bit steps, mean of frames, where the original is still",
     }
+    if missing:
+        rows["moving viewer"] = f"not measured: {missing}"
     if quality.view_ssim is not None and quality.view_psnr is not None:
         rows["moving viewer"] = (
             f"MSSIM {quality.view_ssim.mean():.4f}, {quality.view_psnr.mean():.2f} dB, means of frames"
         )
     columns(rows)
+
+
+def _no_viewer(video: IIVideo) -> str:
+    """Return why a moving viewer is not measured; empty if it is."""
+    if video.camera is None:
+        return "the take has no camera"
+    across, down = video.structure.lenses
+    return f"view images have {across}×{down} pixels, SSIM needs 11×11" if min(across, down) < 11 else ""

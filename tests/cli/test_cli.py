@@ -12,7 +12,7 @@ import pytest
 
 import codec
 from codec import encode
-from ii_core import IIPicture, preset
+from ii_core import IICamera, IIPicture, preset, video_of
 from ii_core.files import read_image
 from metrics import PointLog
 from metrics.points import FIELDS
@@ -332,3 +332,18 @@ def test_as_a_process(tmp_path):
     )
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr.startswith("error: unknown scene 'nope'") and done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("lenses", "camera", "reason"),
+    [((8, 6), True, "view images have 8×6 pixels, SSIM needs 11×11"), ((12, 12), False, "the take has no camera")],
+)
+def test_a_take_without_a_moving_viewer_says_why(run, tmp_path, lenses, camera, reason):
+    """The rows were left out in silence; the test of measures over time gave viewpoints itself."""
+    size = 4 * lenses[0], 4 * lenses[1]
+    known = IICamera(pixels=size, lenses=lenses, pixel_pitch_mm=0.1, gap_mm=0.8) if camera else None
+    picture = IIPicture(np.zeros((*size[::-1], 3), np.uint8), lenses, (4, 4), known)
+    video_of([picture, picture], fps=5).save(tmp_path / "take")
+    code, out, _ = run("measure", tmp_path / "take", tmp_path / "take", "--json", tmp_path / "m.json")
+    assert code == 0 and f"not measured: {reason}" in out
+    assert json.loads((tmp_path / "m.json").read_text())["missing"]["view_ssim"] == reason
