@@ -194,7 +194,7 @@ def draw() -> Any:
     for axes in figure.axes[::2]:
         axes.set_ylabel("PSNR against the wave [dB]")
     handles, names = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=2, frameon=False)
+    figure.legend(handles, names, loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 
