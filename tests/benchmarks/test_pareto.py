@@ -66,13 +66,22 @@ def test_speedup_is_the_ratio_of_times_at_the_earlier_recommended_psnr_or_more()
     one = studied(row(6, 40), [row(1, 30), row(2, 41), row(3, 45), row(2.5, 40)])
     assert pareto.speedup(one) == 3
     assert np.isnan(pareto.speedup(studied(row(6, 46), one["rows"])))
-    lines = pareto.fronts_table({"apples": one, "car": studied(row(24, 40), one["rows"])})
+    coarse = {"apples": one, "car": studied(row(24, 40), one["rows"])}
+    lines = pareto.fronts_table(coarse, {})
     assert lines[-3:] == [
         "| apples | 9 samples | 40.0 dB | 6.00 s | 3.00 |",
         "| car | 9 samples | 40.0 dB | 24.00 s | 12.00 |",
         "| geometric mean | | | | 6.00 |",
     ]
-    assert len(pareto.fronts_table({"apples": {"rows": one["rows"]}})) == 1, "nothing of the earlier code"
+    fine = {"apples": studied(row(4, 40), one["rows"]), "car": studied(row(6, 46), one["rows"])}
+    lines = pareto.fronts_table(coarse, fine)
+    assert lines[-5:-2] == [
+        "| apples | 9 samples | 40.0 dB | 6.00 s | 3.00 | 2.00 |",
+        "| car | 9 samples | 40.0 dB | 24.00 s | 12.00 | not reached |",
+        "| geometric mean | | | | 6.00 | not reached |",
+    ]
+    assert lines[-1].endswith("middle 8 rows of lenses (2048×128). Measured by `abc1234`.")
+    assert len(pareto.fronts_table({"apples": {"rows": one["rows"]}}, {})) == 1, "nothing of the earlier code"
 
 
 def test_each_setting_is_rendered_by_both_codes_in_turn_after_their_references():
