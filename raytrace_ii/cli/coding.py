@@ -53,8 +53,11 @@ def encode(
     """Code an II-picture, or a folder of frames as II-video."""
     from codec import Plan, encode
     from ii_core import IIPicture
+    from ii_core.files import IMAGE_TYPES
 
     load_plugins(plugin)
+    if output.suffix.lower() in IMAGE_TYPES:
+        raise ValueError(f"{output} is a picture's name: .ii is needed")
     check_outputs([output], force)
     if picture.is_dir():
         from .take import encode_frames

@@ -122,6 +122,9 @@ def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = Fal
         if (real := os.path.realpath(path)) in seen:
             raise ValueError(f"{path} is to be written twice: every output needs a name of its own")
         seen.add(real)
+    for path in files:
+        if os.path.realpath(path.parent) in seen:
+            raise ValueError(f"{path.parent} is to be a file and a folder: every output needs a name of its own")
     for path in files if make_folder else ():
         create_folder(path.parent)
 

@@ -81,6 +81,20 @@ def test_two_outputs_of_one_name_are_refused(run, refused, tmp_path, monkeypatch
     assert [path.name for path in tmp_path.iterdir()] == ["link"]
 
 
+def test_a_file_is_no_folder_of_other_outputs(run, refused, picture, tmp_path):
+    """The plots were made, and a folder under the name of the numbers, before the error came."""
+    name = tmp_path / "m.json"
+    refused(run("measure", picture, picture, "--json", name, "--plots", name), "is to be a file and a folder")
+    assert not name.exists()
+
+
+def test_a_coded_file_takes_no_name_of_a_picture(run, refused, picture):
+    """With --force the coded file replaced the picture that it was made of."""
+    before = picture.read_bytes()
+    refused(run("encode", picture, "--bpp", 1, "-o", picture, "--force"), "is a picture's name: .ii is needed")
+    assert picture.read_bytes() == before
+
+
 def test_support_images_may_share_a_file(run, tmp_path):
     both = ("--depth", tmp_path / "both.exr", "--normal", tmp_path / "both.exr")
     assert run(*SMALL, "-o", tmp_path / "p.png", *both)[0] == 0
