@@ -76,7 +76,8 @@ def targets() -> dict[str, tuple[str, Callable[[], list[float]]]]:
             )
         ),
         *(
-            (f"render {name}{PLAIN}: pixels unlike {COMMIT}, %", "", lambda name=name: [difference(name)])
+            (f"render {name}{PLAIN}: pixels unlike {COMMIT}{by}, %", "", partial(unlike, name, kind))
+            for kind, by in enumerate(("", " by more than 1 code"))
             for name in scene_names()
         ),
         *(
@@ -111,6 +112,11 @@ def gain(name: str) -> list[float]:
     """Return the speed of a render over that of the commit `before.COMMIT`, in CPU time."""
     found = rendered(name)
     return [before / now for before, now in zip(found["before"], found["now"], strict=True)]
+
+
+def unlike(name: str, kind: int) -> list[float]:
+    """Return one of the percentages of `before.difference`."""
+    return [difference(name)[kind]]
 
 
 def plain_gain(name: str) -> list[float]:

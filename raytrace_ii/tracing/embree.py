@@ -22,6 +22,9 @@ from numpy.typing import NDArray
 from .kernels.packets import PACKET_ROWS, Calls, packet_kernels
 
 CONFIGURATION = "RAYTRACE_II_EMBREE"  # environment variable: Embree's device configuration, or "embreex"
+# Trees of eight children a node: Embree keeps to four on CPUs that slow down under wide vectors, and takes 5 % longer
+# (CPU time of *Car* and *Hairdo*, full setup1, 2026-11-22). The environment variable may say otherwise.
+WIDE_TREES = "frequency_level=simd256"
 KNOWN_VERSIONS = range(40300, 50000)  # major·10000 + minor·100 + patch; layouts of rtcore_ray.h are those of 4.x
 _VERSION, _NATIVE = 0, {16: 34, 8: 33, 4: 32}  # RTCDeviceProperty
 _ROBUST, _TRIANGLE, _INDEX, _VERTEX, _UINT3, _FLOAT3 = 1 << 2, 0, 0, 1, 0x5003, 0x9003
@@ -71,7 +74,7 @@ def _opened(configuration: str, process: int) -> Library | str:
         functions = _declared(ctypes.CDLL(str(_file())))
     except (OSError, AttributeError) as error:
         return f"single rays by embreex: its Embree library cannot be called directly ({error})"
-    device = functions.rtcNewDevice(configuration.encode())
+    device = functions.rtcNewDevice(f"{WIDE_TREES},{configuration}".strip(",").encode())
     if not device:
         return f"single rays by embreex: Embree refuses the configuration {configuration!r} of {CONFIGURATION}"
     version = functions.rtcGetDeviceProperty(device, _VERSION)
