@@ -228,6 +228,7 @@ BENCHMARKS = {
         ),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
         Benchmark("speed.before_after", needs="git history", records=OWN),
+        Benchmark("speed.mitsuba", needs="Mitsuba 3 and an LLVM library", records=OWN),
         Benchmark("speed.take_cost", records=OWN, fills=("docs/video.md",)),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
         Benchmark("pages.display_pictures", writes=(f"{IMAGES}/display_*",)),
