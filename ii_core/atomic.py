@@ -8,6 +8,7 @@ import hashlib
 import os
 import re
 import secrets
+import shutil
 import socket
 import stat
 from collections.abc import Iterator, Sequence
@@ -75,6 +76,17 @@ def atomic_paths(paths: Sequence[str | os.PathLike[str]]) -> Iterator[list[Path]
 
 
 @contextlib.contextmanager
+def folder_beside(path: Path) -> Iterator[Path]:
+    """A folder for work beside a file, removed with its content; the next run removes that of a killed one."""
+    folder = _create(path, folder=True)
+    try:
+        yield folder
+    finally:
+        _remove(folder)
+        _live.discard(folder)
+
+
+@contextlib.contextmanager
 def disk_errors(*paths: str | os.PathLike[str]) -> Iterator[None]:
     """Name the files in errors of a full or broken disk."""
     try:
@@ -90,7 +102,15 @@ def remove_temporaries() -> None:
     """Remove this process's unfinished files, for an exit that runs no cleanup."""
     for temporary in list(_live):
         with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
+            _remove(temporary)
+
+
+def _remove(temporary: Path) -> None:
+    """Remove a temporary file, or a folder with its content."""
+    if temporary.is_dir():
+        shutil.rmtree(temporary, ignore_errors=True)
+    else:
+        temporary.unlink(missing_ok=True)
 
 
 def _target(path: Path) -> Path:
@@ -107,16 +127,19 @@ def _target(path: Path) -> Path:
     return real
 
 
-def _create(target: Path) -> Path:
-    """An empty temporary file beside the target."""
-    folder = target.parent
+def _create(target: Path, *, folder: bool = False) -> Path:
+    """An empty temporary file or folder beside the target."""
+    place = target.parent
     suffix = target.suffix if re.fullmatch(r"\.\w{1,15}", target.suffix) else ""
     pid = os.getpid()
     mark = f"ii-tmp-{_machine()}-{pid}-{_started(pid) or 0}-{secrets.token_hex(4)}"
-    temporary = folder / f".{target.stem[:STEM]}.{mark}{suffix}"
+    temporary = place / f".{target.stem[:STEM]}.{mark}{suffix}"
     try:
-        _sweep(folder)
-        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        _sweep(place)
+        if folder:
+            temporary.mkdir()
+        else:
+            os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     except OSError as error:
         raise type(error)(f"cannot write {target}: {error.strerror}") from None
     _live.add(temporary)
@@ -134,7 +157,7 @@ def _flush(temporary: Path) -> None:
 
 
 def _sweep(folder: Path) -> None:
-    """Remove temporary files in a folder whose writers are dead, once in the life of a process."""
+    """Remove temporary files and folders in a folder whose writers are dead, once in the life of a process."""
     if folder in _swept:
         return
     _swept.add(folder)
@@ -145,7 +168,7 @@ def _sweep(folder: Path) -> None:
         # Without a start time, or from another machine, nobody can say whether the writer lives.
         if machine == _machine() and started != "0" and _started(pid) != started:
             with contextlib.suppress(OSError):
-                os.unlink(path)
+                _remove(Path(path))
 
 
 def _machine() -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -94,12 +93,13 @@ def shoot_spread(
         ``shoot(path, **options)`` renders into a file.
     """
     from ii_core import IIPicture
+    from ii_core.atomic import folder_beside
     from ii_core.files import read_depth
     from ii_core.spread import spread_picture
 
     dtype, noise = options.pop("dtype"), options.pop("noise", 0.0)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".spread-") as folder:
-        light, depth = Path(folder) / "light.exr", Path(folder) / "depth.exr"
+    with folder_beside(path) as folder:
+        light, depth = folder / "light.exr", folder / "depth.exr"
         files = dict(options.pop("support"))
         if text == AUTO:
             files["depth"] = [*files.get("depth", ()), depth]

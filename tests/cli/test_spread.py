@@ -48,7 +48,7 @@ def test_pictures_are_spread_by_a_folder_and_by_the_depth_met(run, tmp_path):
         wanted = spread_picture(shot.picture, spread_maps(camera, depth)).pixels
         np.testing.assert_allclose(IIPicture.load(path).pixels, wanted, atol=1e-5)
         assert abs(wanted - shot.picture.pixels).max() > 0.05
-    assert not list(tmp_path.glob(".spread-*"))
+    assert not list(tmp_path.glob(".soft.*"))
     # the camera of maps, 8 bit, with its noise after the spread
     command = ("render", "apples", "--camera", folder, "--spread", folder, "--noise", "1", "--seed", "3")
     assert run(*command, "-o", tmp_path / "a.png", "--depth", tmp_path / "d.exr")[0] == 0

@@ -152,9 +152,11 @@ def test_equal_content_makes_equal_files(tmp_path, name):
 
 DIES = """
 import os, sys, signal
-from ii_core.files import atomic_path
-with atomic_path(sys.argv[1]) as temporary:
+from pathlib import Path
+from ii_core.atomic import atomic_path, folder_beside
+with atomic_path(sys.argv[1]) as temporary, folder_beside(Path(sys.argv[1])) as folder:
     temporary.write_text("half")
+    (folder / "light.exr").write_text("half")
     print(temporary.name, flush=True)
     os.kill(os.getpid(), signal.SIGKILL) if sys.argv[2] == "dies" else sys.stdin.read()
 """
@@ -168,15 +170,18 @@ def test_only_temporary_files_of_dead_processes_are_removed(tmp_path):
     mine.write_text("a user's")
     dead = subprocess.run([sys.executable, "-c", DIES, tmp_path / "a.txt", "dies"], capture_output=True, text=True)
     assert dead.returncode == -signal.SIGKILL and (tmp_path / dead.stdout.strip()).exists()
+    (left,) = (path for path in tmp_path.iterdir() if path.is_dir())  # `render --spread` works in such a folder
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen([sys.executable, "-c", DIES, tmp_path / "b.txt", "lives"], text=True, **pipes) as alive:
         held = tmp_path / alive.stdout.readline().strip()
         other = held.with_name(re.sub(r"ii-tmp-[0-9a-f]{8}", "ii-tmp-00000000", dead.stdout.strip()))
         other.write_text("of another machine, whose processes nobody here can see")
         subprocess.run([sys.executable, "-c", NEXT, tmp_path / "c.json"], check=True)
-        assert not (tmp_path / dead.stdout.strip()).exists()
+        assert not (tmp_path / dead.stdout.strip()).exists() and not left.exists()
         assert held.exists() and mine.exists() and other.exists()
+        assert any(path.is_dir() for path in tmp_path.iterdir())  # that of the living process
         alive.communicate("")
+    assert not any(path.is_dir() for path in tmp_path.iterdir())
     assert (tmp_path / "b.txt").read_text() == "half"
 
 
