@@ -141,11 +141,17 @@ def probability(contexts, context):
     return min(max(p, LEAST), ONE - LEAST)
 
 
+def bit_costs(contexts: NDArray[np.int32]) -> NDArray[np.float32]:
+    """Bits (contexts, 2) that a zero and a one would take in each context."""
+    means = (contexts[:, 0].astype(np.int64) + contexts[:, 1]) >> 1
+    p = (np.clip(means, LEAST, ONE - LEAST) + 8) >> 4
+    return np.stack([COSTS[4096 - p], COSTS[p]], axis=1)
+
+
 @inner
-def bit_cost(contexts, context, bit):
-    """Bits that a bit would take."""
-    p = (probability(contexts, context) + 8) >> 4
-    return COSTS[p] if bit else COSTS[4096 - p]
+def bit_cost(costs, context, bit):
+    """Bits that a bit would take, of the table by `bit_costs`."""
+    return costs[context, bit]
 
 
 @inner
@@ -233,12 +239,12 @@ def code_number(coder, first, count, order, value):
 
 
 @lean
-def number_cost(contexts, first, count, order, value):
+def number_cost(costs, first, count, order, value):
     """Bits that `code_number` would take."""
     total = value + (1 << order)
     bits = np.float32(0)
     digits = order
     while total >> (digits + 1):
-        bits += bit_cost(contexts, first + min(digits - order, count - 1), 1)
+        bits += bit_cost(costs, first + min(digits - order, count - 1), 1)
         digits += 1
-    return bits + bit_cost(contexts, first + min(digits - order, count - 1), 0) + np.float32(digits)
+    return bits + bit_cost(costs, first + min(digits - order, count - 1), 0) + np.float32(digits)

@@ -115,7 +115,7 @@ def new_work() -> Work:
         first=np.zeros(square, np.int32),
         reach=np.zeros(2, np.int64),
         spare=np.zeros(square, np.int32),
-        border=np.zeros((2, 2 * LARGEST + 1), np.int32),
+        border=np.zeros((2, 2 * LARGEST + 2), np.int32),
         rows=np.zeros((LARGEST + 5, LARGEST), np.int32),
     )
 
@@ -375,67 +375,67 @@ def _code_mask(coder, job, by, bx, where, seen, mask):
 
 
 @lean
-def kind_cost(contexts, job, by, bx, log, kind, index, mask, direction):
+def kind_cost(costs, job, by, bx, log, kind, index, mask, direction):
     """Bits that `code_kind` would take; those of the references left out if the mask is 0."""
     blocks, count = job.blocks, job.references.shape[0]
     bits = np.float32(0)
     if job.past.shape[0]:
-        bits += bit_cost(contexts, motion.time_context(job, by, bx, log), 1 if kind >= TIMED else 0)
+        bits += bit_cost(costs, motion.time_context(job, by, bx, log), 1 if kind >= TIMED else 0)
     if kind >= TIMED:
         if job.synthesised:
-            bits += bit_cost(contexts, mixed_context(job, by, bx, log), 1 if kind == MIXED else 0)
-        return bits + motion.vector_cost(contexts, job, by, bx, log, index)
+            bits += bit_cost(costs, mixed_context(job, by, bx, log), 1 if kind == MIXED else 0)
+        return bits + motion.vector_cost(costs, job, by, bx, log, index)
     if count and job.synthesised:
-        bits += bit_cost(contexts, synthesis_context(job, by, bx, log), 1 if kind == SYNTHESIS else 0)
+        bits += bit_cost(costs, synthesis_context(job, by, bx, log), 1 if kind == SYNTHESIS else 0)
     if count and kind != SYNTHESIS:
         context = at.INTRA + neighbours(blocks, np.int64(KIND), np.int64(INTRA), by, bx)
-        bits += bit_cost(contexts, context, 1 if kind == INTRA else 0)
+        bits += bit_cost(costs, context, 1 if kind == INTRA else 0)
     if kind == INTRA:
         first, second = likely_directions(blocks, by, bx)
-        bits += bit_cost(contexts, np.int64(at.INTRA_MODE), 1 if direction == first else 0)
+        bits += bit_cost(costs, np.int64(at.INTRA_MODE), 1 if direction == first else 0)
         if direction != first:
-            bits += bit_cost(contexts, np.int64(at.INTRA_MODE + 1), 1 if direction == second else 0)
+            bits += bit_cost(costs, np.int64(at.INTRA_MODE + 1), 1 if direction == second else 0)
             if direction != second:
-                bits += bit_cost(contexts, np.int64(at.INTRA_MODE + 2), 1 if direction <= SMOOTH else 0)
+                bits += bit_cost(costs, np.int64(at.INTRA_MODE + 2), 1 if direction <= SMOOTH else 0)
                 bits += np.float32(1) if direction <= SMOOTH else np.float32(5.1)
     elif kind == EXPLICIT:
-        bits += _index_cost(contexts, job, by, bx, log, index)
+        bits += _index_cost(costs, job, by, bx, log, index)
         if count > 1 and mask:
             seen = seen_mask(job, by, bx, log, index)
-            bits += mask_cost(contexts, job, by, bx, from_where(job, by, bx, log, index), seen, mask)
+            bits += mask_cost(costs, job, by, bx, from_where(job, by, bx, log, index), seen, mask)
     return bits
 
 
 @lean
-def _index_cost(contexts, job, by, bx, log, index):
+def _index_cost(costs, job, by, bx, log, index):
     made, left, above = guesses(job, by, bx, log)
     none = job.low - 1
     bits = np.float32(0)
     if made > none:
-        bits += bit_cost(contexts, _made_context(made, left, none, log), 1 if index == made else 0)
+        bits += bit_cost(costs, _made_context(made, left, none, log), 1 if index == made else 0)
         if index == made:
             return bits
     context = at.MERGE + (log - 2) * 5 + 3
     if left > none and left != made:
-        bits += bit_cost(contexts, context, 1 if index == left else 0)
+        bits += bit_cost(costs, context, 1 if index == left else 0)
         if index == left:
             return bits
     if above > none and above != made and above != left:
-        bits += bit_cost(contexts, context + 1, 1 if index == above else 0)
+        bits += bit_cost(costs, context + 1, 1 if index == above else 0)
         if index == above:
             return bits
     base = left if left > none else (above if above > none else (made if made > none else 0))
-    bits += number_cost(contexts, np.int64(at.DELTA), np.int64(14), np.int64(1), abs(index - base))
+    bits += number_cost(costs, np.int64(at.DELTA), np.int64(14), np.int64(1), abs(index - base))
     if index != base:
-        bits += bit_cost(contexts, np.int64(at.DELTA + 14), 1 if index < base else 0)
+        bits += bit_cost(costs, np.int64(at.DELTA + 14), 1 if index < base else 0)
     return bits
 
 
 @lean
-def mask_cost(contexts, job, by, bx, where, seen, mask):
+def mask_cost(costs, job, by, bx, where, seen, mask):
     """Bits that a set of references would take."""
     expected, context = expected_mask(job, by, bx, where, seen)
-    bits = bit_cost(contexts, context, 1 if mask == expected else 0)
+    bits = bit_cost(costs, context, 1 if mask == expected else 0)
     if mask == expected:
         return bits
     count = job.references.shape[0]
@@ -444,7 +444,7 @@ def mask_cost(contexts, job, by, bx, where, seen, mask):
         bit = (mask >> i) & 1
         if i < count - 1 or found:
             context = at.MASK + (((count - 1) * 4 + i) * 2 + (1 if found else 0)) * 2 + ((seen >> i) & 1)
-            bits += bit_cost(contexts, context, bit)
+            bits += bit_cost(costs, context, bit)
         found |= bit
     return bits
 

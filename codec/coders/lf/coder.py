@@ -20,7 +20,7 @@ from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
 from . import arithmetic, planes, ranges, search, stream, synthesis
 from .blocks import Job, code_blend, new_work
 from .contexts import Contexts
-from .field import EIGHTH, Field
+from .field import Field
 from .pyramid import Node, Place
 from .search import Search
 from .stream import Header
@@ -43,7 +43,6 @@ MOST_VIEWS = 1 << 14
 VIEW_BYTES, EXACT_BYTES = 24, 96  # a sample's most
 # Settings that meet a size.
 SIZES = Axis(low=FINEST * FRACTIONS, high=COARSEST * FRACTIONS, start=START, octave=OCTAVE, step=1)
-FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
 
 
 class LightField(Coder):
@@ -295,7 +294,7 @@ class Source:
                 room = (EXACT_BYTES if field.header.exact else VIEW_BYTES) * field.shape[0] * field.shape[1] + 1024
                 coder = arithmetic.writer(contexts.of(number), room)
                 for nodes in field.batches(number):
-                    found = partial(self._found, field, coder.contexts)
+                    found = partial(self._found, field, arithmetic.bit_costs(coder.contexts))
                     jobs, made, blends = zip(*workers.map(found, nodes), strict=True)
                     for job, nearest in zip(jobs, blends, strict=True):
                         if job.synthesised:
@@ -309,31 +308,23 @@ class Source:
                 contexts.after(number)
         return levels
 
-    def _found(self, field: Field, contexts: NDArray[np.int32], node: Node) -> tuple[Job, synthesis.Synthesis, int]:
+    def _found(self, field: Field, costs: NDArray[np.float32], node: Node) -> tuple[Job, synthesis.Synthesis, int]:
         """A view's blocks, found and decoded; its synthesis, and in which way that is blended."""
         job, made = field.job(node)
         original = self.view(node.row, node.col)
         nearest = _nearer_blend(made, original) if job.synthesised else 0
-        search.find_blocks(contexts, job, self._search(job, original))
+        search.find_blocks(costs, job, self._search(job, original))
         return job, made, nearest
 
     def _search(self, job: Any, original: NDArray[np.int16]) -> Search:
-        references = len(job.references)
-        every = 2 if job.unit <= EIGHTH // 2 or job.high - job.low > FEW else 1
-        indices = (job.high - job.low) // every + 1 if references else 1
-        height, width = original.shape[1:]
-        volume = np.zeros((indices, max(references, 1), height // 4, width // 4), np.float32)
-        if references:
-            search.fill_volume(job, original, volume, every)
         return Search(
             original=original,
-            volume=volume,
-            every=every,
             weight=np.float32(WEIGHT * (job.step / 16) ** 2),
             least=3 if self.effort == 0 else 2,
-            intra_tries=(1, 2, 3)[self.effort] if not references else 1,
+            intra_tries=(1, 2, 3)[self.effort],
             good=np.float32(GOOD[self.effort]),
             planes=1 if self.effort == 0 else 3,
+            hurried=int(self.effort < 2),
         )
 
 

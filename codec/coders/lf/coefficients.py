@@ -80,24 +80,24 @@ def code_coefficients(coder, levels, plane, log, intra):
 
 
 @inner
-def _level_cost(contexts, size, near, place, plane, log, last):
+def _level_cost(costs, size, near, place, plane, log, last):
     bits = np.float32(0)
     if not last:
-        bits += bit_cost(contexts, SIGNIFICANT + ((plane * 4 + log - 2) * 4 + place) * 8 + near, 1 if size else 0)
+        bits += bit_cost(costs, SIGNIFICANT + ((plane * 4 + log - 2) * 4 + place) * 8 + near, 1 if size else 0)
         if size == 0:
             return bits
     bits += np.float32(1)
     context = (plane * 8 + near) * 2 + (1 if place == 0 else 0)
-    bits += bit_cost(contexts, ABOVE_ONE + context, 1 if size > 1 else 0)
+    bits += bit_cost(costs, ABOVE_ONE + context, 1 if size > 1 else 0)
     if size > 1:
-        bits += bit_cost(contexts, ABOVE_TWO + context, 1 if size > 2 else 0)
+        bits += bit_cost(costs, ABOVE_TWO + context, 1 if size > 2 else 0)
         if size > 2:
-            bits += number_cost(contexts, REST + plane * 16, np.int64(16), np.int64(0), size - 3)
+            bits += number_cost(costs, REST + plane * 16, np.int64(16), np.int64(0), size - 3)
     return bits
 
 
 @lean
-def quantise(contexts, coefficients, plane, log, step, weight, levels):
+def quantise(costs, coefficients, plane, log, step, weight, levels):
     """Fill levels[:n, :n]; return the bits, those of "coded or not" left out, and the squared error.
 
     Parameters
@@ -108,19 +108,18 @@ def quantise(contexts, coefficients, plane, log, step, weight, levels):
         Squared error that a bit is worth.
     """
     n = 1 << log
-    nothing = np.float32(0)
-    first = -1
+    nothing, greatest = np.float32(0), np.int32(0)
     for y in range(n):
+        row, into = coefficients[y], levels[y]
         for x in range(n):
-            levels[y, x] = 0
-    for k in range(n * n):
-        place = SCANS[log, k]
-        size = abs(np.float32(coefficients[place >> 5, place & 31]))
-        nothing += size * size
-        if size > NEVER * step:
-            first = k
-    if first < 0:
+            into[x] = 0
+            nothing += np.float32(row[x]) * np.float32(row[x])
+            greatest = max(greatest, abs(row[x]))
+    if np.float32(greatest) <= np.float32(NEVER) * step:
         return np.float32(0), nothing
+    first = n * n - 1
+    while abs(np.float32(coefficients[SCANS[log, first] >> 5, SCANS[log, first] & 31])) <= np.float32(NEVER) * step:
+        first -= 1
     error, bits, last = nothing, np.float32(0), -1
     for k in range(first, -1, -1):
         y, x = SCANS[log, k] >> 5, SCANS[log, k] & 31
@@ -130,7 +129,7 @@ def quantise(contexts, coefficients, plane, log, step, weight, levels):
         if last < 0:
             if level == 0:
                 continue
-            cost = _level_cost(contexts, level, 0, _place(y, x), plane, log, True)
+            cost = _level_cost(costs, level, 0, _place(y, x), plane, log, True)
             missed = size - np.float32(level) * step
             gain = size * size - missed * missed
             if level == 1 and gain < weight * (cost + HOPE):
@@ -141,11 +140,11 @@ def quantise(contexts, coefficients, plane, log, step, weight, levels):
         else:
             near, where = _neighbourhood(levels, y, x, n), _place(y, x)
             best = 0
-            cost = _level_cost(contexts, 0, near, where, plane, log, False)
+            cost = _level_cost(costs, 0, near, where, plane, log, False)
             least = size * size + weight * cost
             kept, missed2 = cost, size * size
             for tried in range(max(1, level - 1), level + 1):
-                cost = _level_cost(contexts, tried, near, where, plane, log, False)
+                cost = _level_cost(costs, tried, near, where, plane, log, False)
                 missed = size - np.float32(tried) * step
                 total = missed * missed + weight * cost
                 if total < least:
@@ -155,7 +154,7 @@ def quantise(contexts, coefficients, plane, log, step, weight, levels):
         levels[y, x] = -best if value < 0 else best
     if last < 0:
         return np.float32(0), nothing
-    bits += number_cost(contexts, LAST + (plane * 4 + log - 2) * 12, np.int64(12), np.int64(0), last)
+    bits += number_cost(costs, LAST + (plane * 4 + log - 2) * 12, np.int64(12), np.int64(0), last)
     if error + weight * bits >= nothing:
         for y in range(n):
             for x in range(n):

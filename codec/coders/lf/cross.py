@@ -30,14 +30,14 @@ def code_cross(coder, plane, log, cross):
 
 
 @lean
-def cross_cost(contexts, plane, log, cross):
+def cross_cost(costs, plane, log, cross):
     """Bits that `code_cross` would take."""
     context = at.CROSS + (plane - 1) * 8
-    bits = bit_cost(contexts, context + log - 2, 1 if cross else 0)
+    bits = bit_cost(costs, context + log - 2, 1 if cross else 0)
     if cross:
-        bits += bit_cost(contexts, context + 4, 1 if cross < 0 else 0)
+        bits += bit_cost(costs, context + 4, 1 if cross < 0 else 0)
         for size in range(1, min(abs(cross) + 1, MOST_CROSS)):
-            bits += bit_cost(contexts, context + 4 + size, 1 if abs(cross) > size else 0)
+            bits += bit_cost(costs, context + 4 + size, 1 if abs(cross) > size else 0)
     return bits
 
 

@@ -63,16 +63,25 @@ def predict_intra(border, mode, n, out, plane):
         slope = (mode - 2) % (DIRECTIONS // 2) - 8
         one, other = (1, 0) if from_left else (0, 1)
         for along in range(n):  # the distance from the border
-            for across in range(n):
-                at, side = 8 * (across + 1) + (along + 1) * slope, one
-                if at < 0:
-                    at, side = max(0, 8 * (along + 1) - 64 * (across + 1) // -slope), other
+            shift = (along + 1) * slope
+            across = 0
+            while across < n and 8 * (across + 1) + shift < 0:  # beyond the corner
+                at = max(0, 8 * (along + 1) - 64 * (across + 1) // -slope)
                 i, part = at >> 3, at & 7
-                value = (border[side, i] * (8 - part) + border[side, min(i + 1, 2 * n)] * part + 4) >> 3
+                value = (border[other, i] * (8 - part) + border[other, i + 1] * part + 4) >> 3
                 if from_left:
                     out[plane, across, along] = value
                 else:
                     out[plane, along, across] = value
+                across += 1
+            start, part, side = 1 + (shift >> 3), np.int32(shift & 7), border[one]
+            if from_left:
+                for i in range(across, n):
+                    out[plane, i, along] = (side[start + i] * (8 - part) + side[start + i + 1] * part + 4) >> 3
+            else:
+                row = out[plane, along]
+                for i in range(across, n):
+                    row[i] = (side[start + i] * (8 - part) + side[start + i + 1] * part + 4) >> 3
 
 
 assert np.iinfo(np.int32).max > 64 * 64 * (1 << 14)  # the largest sum above

@@ -141,19 +141,19 @@ def _code_component(coder, first, value):
 
 
 @lean
-def vector_cost(contexts, job, by, bx, log, vector):
+def vector_cost(costs, job, by, bx, log, vector):
     """Bits that `code_vector` would take."""
     first, left, above = guesses(job, by, bx, log)
     context = at.VECTOR + (log - 2) * 5
-    bits = bit_cost(contexts, _first_context(context, first, left), 1 if vector == first else 0)
+    bits = bit_cost(costs, _first_context(context, first, left), 1 if vector == first else 0)
     if vector == first:
         return bits
     if left != NONE and left != first:
-        bits += bit_cost(contexts, context + 3, 1 if vector == left else 0)
+        bits += bit_cost(costs, context + 3, 1 if vector == left else 0)
         if vector == left:
             return bits
     if above != NONE and above != first and above != left:
-        bits += bit_cost(contexts, context + 4, 1 if vector == above else 0)
+        bits += bit_cost(costs, context + 4, 1 if vector == above else 0)
         if vector == above:
             return bits
     past, down, across = unpacked(vector)
@@ -161,15 +161,15 @@ def vector_cost(contexts, job, by, bx, log, vector):
     _, base_down, base_across = unpacked(base)
     for i in range(job.past.shape[0] - 1):
         if i <= past:
-            bits += bit_cost(contexts, at.INSTANT + i, 1 if past > i else 0)
-    bits += _component_cost(contexts, at.COMPONENT, down - base_down)
-    return bits + _component_cost(contexts, at.COMPONENT + 15, across - base_across)
+            bits += bit_cost(costs, at.INSTANT + i, 1 if past > i else 0)
+    bits += _component_cost(costs, at.COMPONENT, down - base_down)
+    return bits + _component_cost(costs, at.COMPONENT + 15, across - base_across)
 
 
 @lean
-def _component_cost(contexts, first, value):
-    bits = number_cost(contexts, np.int64(first), np.int64(14), np.int64(1), abs(value))
-    return bits + bit_cost(contexts, first + 14, 1 if value < 0 else 0) if value else bits
+def _component_cost(costs, first, value):
+    bits = number_cost(costs, np.int64(first), np.int64(14), np.int64(1), abs(value))
+    return bits + bit_cost(costs, first + 14, 1 if value < 0 else 0) if value else bits
 
 
 @lean

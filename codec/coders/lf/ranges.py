@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .blocks import Job
-from .search import fill_volume
+from .matching import DIAGONAL, fill_products, new_match
+from .transform import LARGEST
 
 REACH = 32  # samples between neighbouring views
 UNIT = 64
@@ -58,7 +59,7 @@ def _errors(
     original, views = view(row, col), np.stack([view(r, c) for r, c in near])
     reach = min(REACH, max(original.shape[1:]) // 2) * 256 // UNIT
     height, width = original.shape[1:]
-    volume = np.zeros((2 * reach + 1, len(references), height // 4, width // 4), np.float32)
+    errors = np.zeros((2 * reach + 1, height // 4, width // 4), np.float32)
     blank = np.zeros((1, 1, 1), np.int16)
     job = Job(
         views=views,
@@ -77,8 +78,14 @@ def _errors(
         blocks=blank,
         levels=blank,
     )
-    fill_volume(job, original, volume, 1)
-    return volume.sum(axis=1)
+    match = new_match(2 * reach + 1, 1)
+    for y0 in range(0, height, LARGEST):
+        for x0 in range(0, width, LARGEST):
+            fill_products(job, original, y0, x0, match)
+            rows, cols = min(LARGEST, height - y0) // 4, min(LARGEST, width - x0) // 4
+            squares = match.products[:rows, :cols, DIAGONAL[: len(references)]].sum(axis=2)
+            errors[:, y0 // 4 : y0 // 4 + rows, x0 // 4 : x0 // 4 + cols] = squares.transpose(2, 0, 1)
+    return errors
 
 
 def _cells(errors: NDArray[np.float32], size: int) -> NDArray[np.float32]:

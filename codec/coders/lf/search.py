@@ -11,9 +11,11 @@ from .arithmetic import bit_cost
 from .blocks import (
     CROSS_1,
     CROSS_2,
+    DONE,
     EXPLICIT,
     INTRA,
     LIMIT,
+    LOG,
     LOG_LARGEST,
     LOG_LEAST,
     MIXED,
@@ -21,31 +23,30 @@ from .blocks import (
     TIMED,
     Job,
     coded_context,
-    from_where,
     guesses,
     kind_cost,
     mark_block,
-    mask_cost,
     new_work,
     predict_direction,
     predict_explicit,
     predict_synthesis,
     residual_context,
-    seen_mask,
     split_context,
 )
 from .coefficients import quantise
 from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
-from .intra import MODES
+from .field import EIGHTH
+from .intra import DIRECTIONS, MODES, fill_border, predict_intra
 from .jit import inner, kernel, lean
+from .matching import MOST_BEST, best_explicit, fill_products, new_match
 from .motion import predict_in_time
 from .motion_search import best_vector
 from .transform import LARGEST, forward
-from .warp import clamped, moved_block
 
 HUGE = np.float32(1e30)
-ZERO = 0
-MOST_GUESSES = 16
+FIRST_DIRECTION = MODES - DIRECTIONS
+BEST = 2  # disparities by the table that a hurried search compares as decoded
+FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
 
 
 class Search(NamedTuple):
@@ -54,9 +55,6 @@ class Search(NamedTuple):
     Parameters
     ----------
     original : ndarray of int16, (3, H, W)
-    volume : ndarray of float32, (indices, R, H / 4, W / 4)
-        Squared error of the first plane for each reference and every ``every``-th index.
-    every : int
     weight : float32
         Squared error that a bit is worth.
     least : int
@@ -65,17 +63,18 @@ class Search(NamedTuple):
         Intra modes that are coded on trial.
     planes : int
         Planes that count in the choice of disparity and references.
+    hurried : int
+        Whether intra directions are found coarse to fine, and sizes and disparities that hardly ever pay left out.
     good : float32
         A block whose cost a sample is less, in units of the weight, is not split, and not tried in other ways.
     """
 
     original: Any
-    volume: Any
-    every: Any
     weight: Any
     least: Any
     intra_tries: Any
     planes: Any
+    hurried: Any
     good: Any
 
 
@@ -88,7 +87,7 @@ class Trial(NamedTuple):
     trial_levels: Any
     cross: Any  # (6, 2) factors of `cross`
     trial_cross: Any
-    moved: Any  # (4, 3, 32, 32)
+    errors: Any  # (MODES,) of intra prediction
 
 
 def new_trial() -> Trial:
@@ -100,78 +99,40 @@ def new_trial() -> Trial:
         trial_levels=np.zeros((3, LARGEST, LARGEST), np.int16),
         cross=np.zeros((6, 2), np.int64),
         trial_cross=np.zeros(2, np.int64),
-        moved=np.zeros((4, 3, LARGEST, LARGEST), np.int32),
+        errors=np.zeros(MODES, np.float32),
     )
 
 
 @lean
-def fill_volume(job, original, volume, every):
-    """Squared error of each 4×4 of the first plane, for indices and references, between samples bilinearly."""
-    height, width = original.shape[1:]
-    views = job.views
-    for k in range(volume.shape[0]):
-        d = (job.low + k * every) * job.unit
-        for r in range(volume.shape[1]):
-            view = job.references[r, 0]
-            dx, dy = d * job.references[r, 1], d * job.references[r, 2]
-            ix, iy = dx >> 8, dy >> 8
-            fx, fy = np.float32((dx & 255) / 256), np.float32((dy & 255) / 256)
-            a, b = (np.float32(1) - fx) * (np.float32(1) - fy), fx * (np.float32(1) - fy)
-            c, e = (np.float32(1) - fx) * fy, fx * fy
-            from_, to = min(max(0, -ix), width), max(min(width, width - 1 - ix), 0)
-            for by in range(height >> 2):
-                for bx in range(width >> 2):
-                    volume[k, r, by, bx] = 0
-                for y in range(4 * by, 4 * by + 4):
-                    y0, y1 = clamped(y + iy, height), clamped(y + iy + 1, height)
-                    for bx in range(width >> 2):
-                        total = np.float32(0)
-                        if 4 * bx >= from_ and 4 * bx + 4 <= to:
-                            for x in range(4 * bx, 4 * bx + 4):
-                                value = a * views[view, 0, y0, x + ix] + b * views[view, 0, y0, x + ix + 1]
-                                value += c * views[view, 0, y1, x + ix] + e * views[view, 0, y1, x + ix + 1]
-                                value -= original[0, y, x]
-                                total += value * value
-                        else:
-                            for x in range(4 * bx, 4 * bx + 4):
-                                x0, x1 = clamped(x + ix, width), clamped(x + ix + 1, width)
-                                value = a * views[view, 0, y0, x0] + b * views[view, 0, y0, x1]
-                                value += c * views[view, 0, y1, x0] + e * views[view, 0, y1, x1]
-                                value -= original[0, y, x]
-                                total += value * value
-                        volume[k, r, by, bx] += total
-
-
-@lean
-def _try_plane(contexts, work, plane, log, step, weight, kind, first, crossed, error):
+def _try_plane(costs, work, plane, log, step, weight, kind, first, crossed, error):
     """Quantise work.block; return bits, whether there are levels, which array has them, and the factor of `cross`.
 
     ``first`` says whether the first plane has a residual, ``error`` is the squared error without one.
     """
     context = coded_context(plane, log, kind, first)
-    free, full = bit_cost(contexts, context, np.int64(0)), bit_cost(contexts, context, np.int64(1))
+    free, full = bit_cost(costs, context, np.int64(0)), bit_cost(costs, context, np.int64(1))
     predictable = plane > 0 and first and crossed
-    none = cross_cost(contexts, plane, log, np.int64(0)) if predictable else np.float32(0)
+    none = cross_cost(costs, plane, log, np.int64(0)) if predictable else np.float32(0)
     bits, some, cross = free + none, 0, np.int64(0)
     if error <= np.float32(0.2) * step * step:
         return bits, some, cross
     forward(work.block, log, work.half, work.coefficients)
-    more, missed = quantise(contexts, work.coefficients, plane, log, step, weight, work.levels)
+    more, missed = quantise(costs, work.coefficients, plane, log, step, weight, work.levels)
     best = error + weight * bits
     if more > 0 and missed + weight * (more + full + none) < best:
         best, bits, some = missed + weight * (more + full + none), more + full + none, 1
     factor = best_cross(work) if predictable else np.int64(0)
     if factor:
         subtract_cross(work, factor)
-        more, missed = quantise(contexts, work.coefficients, plane, log, step, weight, work.spare)
-        more += (full if more > 0 else free) + cross_cost(contexts, plane, log, factor)
+        more, missed = quantise(costs, work.coefficients, plane, log, step, weight, work.spare)
+        more += (full if more > 0 else free) + cross_cost(costs, plane, log, factor)
         if missed + weight * more < best:
             bits, some, cross = more, 1, factor
     return bits, some, cross
 
 
 @lean
-def try_residual(contexts, job, search, work, trial, y0, x0, log, kind):
+def try_residual(costs, job, search, work, trial, y0, x0, log, kind):
     """Code the difference to work.predicted; return bits, error and whether there is a residual."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
     step = np.float32(job.step / 16)
@@ -185,7 +146,7 @@ def try_residual(contexts, job, search, work, trial, y0, x0, log, kind):
                 work.block[y, x] = difference
                 least += np.float32(difference * difference)
         without += least
-        more, some, cross = _try_plane(contexts, work, p, log, step, search.weight, kind, first, job.crossed, least)
+        more, some, cross = _try_plane(costs, work, p, log, step, search.weight, kind, first, job.crossed, least)
         bits += more
         if p:
             trial.trial_cross[p - 1] = cross
@@ -207,9 +168,9 @@ def try_residual(contexts, job, search, work, trial, y0, x0, log, kind):
             _leave(trial, work, p, n)
             error += least
     context = residual_context(job, by, bx, log, kind)
-    empty = bit_cost(contexts, context, np.int64(0))
+    empty = bit_cost(costs, context, np.int64(0))
     if coded:
-        bits += bit_cost(contexts, context, 1)
+        bits += bit_cost(costs, context, 1)
         if error + search.weight * bits < without + search.weight * empty:
             return bits, error, 1
         for p in range(3):
@@ -238,200 +199,96 @@ def _keep(trial, log):
 
 
 @lean
-def _best_disparities(job, search, y0, x0, log, found):
-    """Fill ``found`` with indices worth trying; return their number."""
-    by, bx, size = y0 >> 2, x0 >> 2, 1 << (log - 2)
-    count = job.references.shape[0]
-    made, left, above = guesses(job, by, bx, log)
-    number = 0
-    for guess in (made, left, above):
-        if guess >= job.low:
-            found[number] = guess
-            number += 1
-    b0 = b1 = b2 = b3 = best_all = best_two = HUGE
-    k0 = k1 = k2 = k3 = k_all = k_two = job.low - 1
-    for k in range(search.volume.shape[0]):
-        total, least, second = np.float32(0), HUGE, HUGE
-        for r in range(count):
-            error = np.float32(0)
-            for i in range(by, by + size):
-                for j in range(bx, bx + size):
-                    error += search.volume[k, r, i, j]
-            total += error
-            if error < least:
-                least, second = error, least
-            elif error < second:
-                second = error
-            if r == 0 and error < b0:
-                b0, k0 = error, job.low + k * search.every
-            elif r == 1 and error < b1:
-                b1, k1 = error, job.low + k * search.every
-            elif r == 2 and error < b2:
-                b2, k2 = error, job.low + k * search.every
-            elif r == 3 and error < b3:
-                b3, k3 = error, job.low + k * search.every
-        if total < best_all:
-            best_all, k_all = total, job.low + k * search.every
-        if least + second < best_two:
-            best_two, k_two = least + second, job.low + k * search.every
-    for k in (k_all, k_two, k0, k1, k2, k3):
-        seen = k < job.low
-        for i in range(number):
-            if found[i] == k:
-                seen = True
-        if not seen:
-            found[number] = k
-            number += 1
-    return number
+def _add_magnitudes(search, work, y0, x0, n, plane, modes, errors):
+    """errors[mode] += sum of magnitudes of a plane's difference from the intra prediction."""
+    first, last, step = modes
+    predicted = work.predicted[plane]
+    for mode in range(first, last, step):
+        if mode < 0 or mode >= MODES:
+            continue
+        predict_intra(work.border, mode, n, work.predicted, plane)
+        total = np.float32(0)
+        for y in range(n):
+            own, row = search.original[plane, y0 + y, x0 : x0 + n], predicted[y]
+            for x in range(n):
+                total += np.float32(abs(np.int32(own[x]) - row[x]))
+        errors[mode] += total
 
 
 @lean
-def _best_explicit(contexts, job, search, work, trial, y0, x0, log, tried):
-    """Index and mask of the least squared error + weight · bits, before any residual."""
+def _rank_directions(costs, job, search, work, y0, x0, log, errors):
+    """errors[:MODES] = sums of magnitudes and weighted bits; a hurried search leaves out unlikely directions."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
-    count = job.references.shape[0]
-    moved = trial.moved
-    number = _best_disparities(job, search, y0, x0, log, tried)
-    best, best_index, best_mask = HUGE, job.low, 1
-    t, between = 0, False
-    while t < number:
-        index = tried[t]
-        d = index * job.unit
-        where = from_where(job, by, bx, log, index)
-        for r in range(count):
-            for p in range(search.planes):
-                for y in range(n):
-                    for x in range(n):
-                        work.predicted[p, y, x] = 0
-                moved_block(
-                    job.views,
-                    job.references[r, 0],
-                    p,
-                    y0,
-                    x0,
-                    n,
-                    d * job.references[r, 2],
-                    d * job.references[r, 1],
-                    work.rows,
-                    work.predicted,
-                )
-                for y in range(n):
-                    for x in range(n):
-                        moved[r, p, y, x] = search.original[p, y0 + y, x0 + x] - (
-                            np.int32(work.predicted[p, y, x] + 2048) >> 12
-                        )
-        index_bits = kind_cost(contexts, job, by, bx, log, np.int64(EXPLICIT), index, np.int64(0), np.int64(0))
-        seen = seen_mask(job, by, bx, log, index)
-        products = _products(moved, count, n, search.planes)
-        for mask in range(1, 1 << count):
-            members = 0
-            error = np.float32(0)
-            at = 0
-            for r in range(count):
-                for s in range(r + 1):
-                    if (mask >> r) & 1 and (mask >> s) & 1:
-                        error += products[at] if r == s else 2 * products[at]
-                    at += 1
-                members += (mask >> r) & 1
-            total = error / np.float32(members * members) + search.weight * index_bits
-            if total < best and count > 1:
-                total += search.weight * mask_cost(contexts, job, by, bx, where, seen, mask)
-            if total < best:
-                best, best_index, best_mask = total, index, mask
-        t += 1
-        if t == number and not between and search.every > 1:
-            # Then the two indices beside the best that the volume leaves out.
-            between = True
-            for index in (best_index - 1, best_index + 1):
-                fresh = job.low <= index <= job.high
-                for i in range(number):
-                    if tried[i] == index:
-                        fresh = False
-                if fresh:
-                    tried[number] = index
-                    number += 1
-    return best_index, best_mask
+    every = 4 if search.hurried and job.references.shape[0] else 1
+    for mode in range(MODES):
+        errors[mode] = HUGE
+    _add_planes(job, search, work, y0, x0, n, (0, FIRST_DIRECTION, 1), errors)
+    _add_planes(job, search, work, y0, x0, n, (FIRST_DIRECTION, MODES, every), errors)
+    while every > 1:
+        every >>= 1
+        best = _least(errors)
+        if best >= FIRST_DIRECTION:
+            for mode in (best - every, best + every):
+                if FIRST_DIRECTION <= mode < MODES:
+                    _add_planes(job, search, work, y0, x0, n, (mode, mode + 1, 1), errors)
+    weight = np.float32(np.sqrt(search.weight))
+    for mode in range(MODES):
+        if errors[mode] < HUGE:
+            errors[mode] += weight * kind_cost(costs, job, by, bx, log, INTRA, 0, 0, mode)
+
+
+@lean
+def _add_planes(job, search, work, y0, x0, n, modes, errors):
+    """errors[mode] = sum of magnitudes of the difference from the intra prediction, for modes of a range."""
+    first, last, step = modes
+    for mode in range(first, last, step):
+        errors[max(mode, 0)] = 0
+    for p in range(3):
+        fill_border(job.views, job.at, p, job.blocks, np.int64(DONE), y0, x0, n, work.border)
+        _add_magnitudes(search, work, y0, x0, n, p, modes, errors)
 
 
 @inner
-def _dot(moved, r, s, n, planes):
-    total = np.float32(0)
-    for p in range(planes):
-        for y in range(n):
-            for x in range(n):
-                total += np.float32(moved[r, p, y, x]) * np.float32(moved[s, p, y, x])
-    return total
-
-
-@lean
-def _products(moved, count, n, planes):
-    """Inner products of the references' differences, the lower triangle by rows."""
-    p00 = _dot(moved, 0, 0, n, planes)
-    p10 = p11 = p20 = p21 = p22 = p30 = p31 = p32 = p33 = np.float32(0)
-    if count > 1:
-        p10, p11 = _dot(moved, 1, 0, n, planes), _dot(moved, 1, 1, n, planes)
-    if count > 2:
-        p20, p21, p22 = _dot(moved, 2, 0, n, planes), _dot(moved, 2, 1, n, planes), _dot(moved, 2, 2, n, planes)
-    if count > 3:
-        p30, p31 = _dot(moved, 3, 0, n, planes), _dot(moved, 3, 1, n, planes)
-        p32, p33 = _dot(moved, 3, 2, n, planes), _dot(moved, 3, 3, n, planes)
-    return p00, p10, p11, p20, p21, p22, p30, p31, p32, p33
-
-
-@lean
-def _best_direction(contexts, job, search, work, y0, x0, log, rank, errors):
-    """The intra mode with the rank-th least sum of magnitudes; ``errors`` is filled at rank 0."""
-    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
-    if rank == 0:
-        for mode in range(MODES):
-            total = np.float32(0)
-            for p in range(3):
-                predict_direction(job, work, p, y0, x0, n, mode)
-                for y in range(n):
-                    for x in range(n):
-                        total += np.float32(abs(search.original[p, y0 + y, x0 + x] - work.predicted[p, y, x]))
-            errors[mode] = total + np.float32(np.sqrt(search.weight)) * kind_cost(
-                contexts, job, by, bx, log, INTRA, 0, 0, mode
-            )
+def _least(errors):
     best = 0
     for mode in range(MODES):
         if errors[mode] < errors[best]:
             best = mode
-    errors[best] = HUGE
     return best
 
 
-@kernel
-def best_block(contexts, job, search, work, trial, y0, x0, log):
+@lean
+def best_block(costs, job, search, match, work, trial, y0, x0, log):
     """Try the ways to code a block and note the best; return its cost and whether it has a residual."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
     best, kind, index, mask, direction, coded = HUGE, INTRA, 0, 0, 0, 0
     good = search.good * search.weight * np.float32(n * n)
     if job.synthesised:
-        side = kind_cost(contexts, job, by, bx, log, np.int64(SYNTHESIS), np.int64(0), np.int64(0), np.int64(0))
+        side = kind_cost(costs, job, by, bx, log, np.int64(SYNTHESIS), np.int64(0), np.int64(0), np.int64(0))
         predict_synthesis(job, work, y0, x0, n)
-        bits, error, some = try_residual(contexts, job, search, work, trial, y0, x0, log, np.int64(SYNTHESIS))
+        bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, np.int64(SYNTHESIS))
         best, kind, coded = error + search.weight * (bits + side), SYNTHESIS, some
         index = guesses(job, by, bx, log)[0]
         _keep(trial, log)
     if job.references.shape[0] and best > good:
-        tried = np.zeros(MOST_GUESSES, np.int64)
-        k, m = _best_explicit(contexts, job, search, work, trial, y0, x0, log, tried)
-        side = kind_cost(contexts, job, by, bx, log, np.int64(EXPLICIT), k, m, np.int64(0))
+        k, m = best_explicit(costs, job, match, work, search.original, search.weight, search.planes, y0, x0, log)
+        side = kind_cost(costs, job, by, bx, log, np.int64(EXPLICIT), k, m, np.int64(0))
         predict_explicit(job, work, y0, x0, n, k, m)
-        bits, error, some = try_residual(contexts, job, search, work, trial, y0, x0, log, np.int64(EXPLICIT))
+        bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, np.int64(EXPLICIT))
         total = error + search.weight * (bits + side)
         if total < best:
             best, kind, index, mask, coded = total, EXPLICIT, k, m, some
             _keep(trial, log)
     if job.references.shape[0] == 0 or best > 2 * good:
-        errors = np.zeros(MODES, np.float32)
-        for rank in range(search.intra_tries):
-            mode = _best_direction(contexts, job, search, work, y0, x0, log, rank, errors)
-            side = kind_cost(contexts, job, by, bx, log, np.int64(INTRA), np.int64(0), np.int64(0), mode)
+        errors = trial.errors
+        _rank_directions(costs, job, search, work, y0, x0, log, errors)
+        for _ in range(search.intra_tries):
+            mode = _least(errors)
+            errors[mode] = HUGE
+            side = kind_cost(costs, job, by, bx, log, np.int64(INTRA), np.int64(0), np.int64(0), mode)
             for p in range(3):
                 predict_direction(job, work, p, y0, x0, n, mode)
-            bits, error, some = try_residual(contexts, job, search, work, trial, y0, x0, log, np.int64(INTRA))
+            bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, np.int64(INTRA))
             total = error + search.weight * (bits + side)
             if total < best:
                 best, kind, index, mask, direction, coded = total, INTRA, 0, 0, mode, some
@@ -440,15 +297,15 @@ def best_block(contexts, job, search, work, trial, y0, x0, log):
 
 
 @lean
-def best_in_time(contexts, job, search, work, trial, y0, x0, log, good):
+def best_in_time(costs, job, search, work, trial, y0, x0, log, good):
     """Try a block in time, alone and mixed with synthesis; return cost, kind, vector, and if it has a residual."""
     n = 1 << log
-    vector = best_vector(contexts, job, search, work, y0, x0, log, good)
+    vector = best_vector(costs, job, search, work, y0, x0, log, good)
     best, kind, coded = HUGE, TIMED, 0
     for way in range(TIMED, TIMED + 1 + job.synthesised):
-        side = kind_cost(contexts, job, y0 >> 2, x0 >> 2, log, way, vector, np.int64(0), np.int64(0))
+        side = kind_cost(costs, job, y0 >> 2, x0 >> 2, log, way, vector, np.int64(0), np.int64(0))
         predict_in_time(job, work, y0, x0, n, vector, way == MIXED)
-        bits, error, some = try_residual(contexts, job, search, work, trial, y0, x0, log, way)
+        bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, way)
         total = error + search.weight * (bits + side)
         if total < best:
             best, kind, coded = total, way, some
@@ -456,14 +313,14 @@ def best_in_time(contexts, job, search, work, trial, y0, x0, log, good):
     return best, kind, vector, coded
 
 
-@kernel
-def best_of_all(contexts, job, search, work, trial, y0, x0, log):
+@lean
+def best_of_all(costs, job, search, match, work, trial, y0, x0, log):
     """As `best_block`, with the ways in time if there are earlier instants."""
     if job.past.shape[0] == 0:
-        return best_block(contexts, job, search, work, trial, y0, x0, log)
+        return best_block(costs, job, search, match, work, trial, y0, x0, log)
     n = 1 << log
     good = search.good * search.weight * np.float32(n * n)
-    best, kind, vector, coded = best_in_time(contexts, job, search, work, trial, y0, x0, log, good)
+    best, kind, vector, coded = best_in_time(costs, job, search, work, trial, y0, x0, log, good)
     if best > good:
         _copy(
             trial.decoded[log],
@@ -474,7 +331,7 @@ def best_of_all(contexts, job, search, work, trial, y0, x0, log):
             trial.cross[0],
             n,
         )
-        found = best_block(contexts, job, search, work, trial, y0, x0, log)
+        found = best_block(costs, job, search, match, work, trial, y0, x0, log)
         if found[0] < best:
             return found
         _copy(
@@ -499,30 +356,53 @@ def _copy(decoded, levels, cross, to_decoded, to_levels, to_cross, n):
                 to_levels[p, y, x] = levels[p, y, x]
 
 
-@kernel
-def search_tree(contexts, job, search, work, trial, y0, x0, log):
+@inner
+def _much_smaller(blocks, by, bx, log):
+    """Whether all blocks above and to the left have a quarter of the side at most."""
+    if by == 0 or bx == 0:
+        return False
+    for i in range(1 << (log - 2)):
+        above = blocks[LOG, by - 1, bx + i] if bx + i < blocks.shape[2] else 0
+        left = blocks[LOG, by + i, bx - 1] if by + i < blocks.shape[1] else 0
+        if above > log - 2 or left > log - 2:
+            return False
+    return True
+
+
+@lean
+def search_tree(costs, job, search, match, work, trial, y0, x0, log):
     """Find, mark and decode the blocks of a square; return the cost."""
     height, width = job.levels.shape[1:]
     if y0 >= height or x0 >= width:
         return np.float32(0)
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
     half = n >> 1
-    if y0 + n > height or x0 + n > width:
-        total = np.float32(0)
+    total, split = np.float32(0), y0 + n > height or x0 + n > width
+    if not split and search.hurried and log > 3 and job.past.shape[0] == 0 and _much_smaller(job.blocks, by, bx, log):
+        total, split = search.weight * bit_cost(costs, split_context(job, by, bx, log), 1), True
+    if split:
         for part in range(4):
             total += search_tree(
-                contexts, job, search, work, trial, y0 + (part >> 1) * half, x0 + (part & 1) * half, log - 1
+                costs, job, search, match, work, trial, y0 + (part >> 1) * half, x0 + (part & 1) * half, log - 1
             )
         return total
-    best, kind, index, mask, direction, coded = best_of_all(contexts, job, search, work, trial, y0, x0, log)
+    best, kind, index, mask, direction, coded = best_of_all(costs, job, search, match, work, trial, y0, x0, log)
     if log > LOG_LEAST:
         context = split_context(job, by, bx, log)
-        best += search.weight * bit_cost(contexts, context, np.int64(0))
+        best += search.weight * bit_cost(costs, context, np.int64(0))
         if log > search.least and (coded or best > search.good * search.weight * np.float32(n * n)):
-            total = search.weight * bit_cost(contexts, context, 1)
+            total = search.weight * bit_cost(costs, context, 1)
             for part in range(4):
                 total += search_tree(
-                    contexts, job, search, work, trial, y0 + (part >> 1) * half, x0 + (part & 1) * half, log - 1
+                    costs,
+                    job,
+                    search,
+                    match,
+                    work,
+                    trial,
+                    y0 + (part >> 1) * half,
+                    x0 + (part & 1) * half,
+                    log - 1,
                 )
                 if total > best:
                     break
@@ -538,11 +418,21 @@ def search_tree(contexts, job, search, work, trial, y0, x0, log):
     return best
 
 
-def find_blocks(contexts: NDArray[np.int32], job: Job, search: Search) -> None:
-    """Find, mark and decode all blocks of a view; contexts stay as they are."""
-    work, trial = new_work(), new_trial()
+@kernel
+def _search_view(costs, job, search, match, work, trial):
     height, width = job.levels.shape[1:]
-    size = 1 << LOG_LARGEST
-    for y0 in range(0, height, size):
-        for x0 in range(0, width, size):
-            search_tree(contexts, job, search, work, trial, y0, x0, LOG_LARGEST)
+    for y0 in range(0, height, 1 << LOG_LARGEST):
+        for x0 in range(0, width, 1 << LOG_LARGEST):
+            if job.references.shape[0]:
+                fill_products(job, search.original, y0, x0, match)
+            search_tree(costs, job, search, match, work, trial, y0, x0, np.int64(LOG_LARGEST))
+
+
+def find_blocks(costs: NDArray[np.float32], job: Job, search: Search) -> None:
+    """Find, mark and decode all blocks of a view."""
+    references = len(job.references)
+    every = 2 if job.unit <= EIGHTH // 2 or job.high - job.low > FEW else 1
+    match = new_match(
+        (job.high - job.low) // every + 1 if references else 1, every, BEST if search.hurried else MOST_BEST
+    )
+    _search_view(costs, job, search, match, new_work(), new_trial())

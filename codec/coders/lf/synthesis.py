@@ -13,16 +13,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .blocks import DIFFERENT, EXPLICIT, INDEX, KIND, UNKNOWN
+from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, between, disagreement
+from .blocks import EXPLICIT, INDEX, KIND, UNKNOWN
 from .jit import inner, kernel, lean
 from .warp import FILTERS, TAPS, clamped
 
 CANDIDATES = 8
 MOST_SOURCES = 8
-REMEMBERED = 4  # disparities of a sample
-MATCHED = 4  # sources that take part in matching
-TRUNCATED = 40 * 8  # eighths of a code: a larger difference tells no more
-LONELY = 22 * 8  # cost of a sample that only one source sees
+RUN = 32  # samples of a row that are blended together, if their disparity is the same
 SMOOTH = 8  # cost of a step of disparity
 
 
@@ -52,9 +50,15 @@ class Synthesis(NamedTuple):
     disparity : ndarray of int16, (H, W)
     doubt : ndarray of int16, (H / 4, W / 4)
         Mean difference of a source from the one most like the others.
-    scratch : ndarray of int64, (8, MOST_SOURCES)
-    memory : ndarray of int16, (H, W, REMEMBERED, 2)
-        Disparities and how far the sources differ there.
+    scratch : ndarray of int64, (10, MOST_SOURCES)
+    tried : ndarray of int64, (16,)
+    span : ndarray of int32, (MATCHED, SPAN)
+    kept : ndarray of int16, (ROWS, W / SPAN, SLOTS, SPAN)
+        How far the sources differ, by row, position and disparity.
+    marks : ndarray of int64, (ROWS, W / SPAN, SLOTS)
+        Row and disparity of what is kept.
+    taken : ndarray of int32, (MOST_SOURCES, 3, RUN)
+        Samples of the sources for a run of samples of one disparity.
     """
 
     views: Any
@@ -66,7 +70,11 @@ class Synthesis(NamedTuple):
     disparity: Any
     doubt: Any
     scratch: Any
-    memory: Any
+    tried: Any
+    span: Any
+    kept: Any
+    marks: Any
+    taken: Any
 
 
 def new_synthesis(views: Any, disparities: Any, sources: Any) -> Synthesis:
@@ -81,8 +89,12 @@ def new_synthesis(views: Any, disparities: Any, sources: Any) -> Synthesis:
         made=np.zeros((3, height, width), np.int16),
         disparity=np.zeros((height, width), np.int16),
         doubt=np.zeros((height // 4, width // 4), np.int16),
-        scratch=np.zeros((8, MOST_SOURCES), np.int64),
-        memory=np.full((height, width, REMEMBERED, 2), UNKNOWN, np.int16),
+        scratch=np.zeros((10, MOST_SOURCES), np.int64),
+        tried=np.zeros(16, np.int64),
+        span=np.zeros((MATCHED, SPAN), np.int32),
+        kept=np.zeros((ROWS, -(-width // SPAN), SLOTS, SPAN), np.int16),
+        marks=np.full((ROWS, -(-width // SPAN), SLOTS), -1),
+        taken=np.zeros((MOST_SOURCES, 3, RUN), np.int32),
     )
 
 
@@ -116,113 +128,35 @@ def project(s, apart):
                     _insert(s, to_y, to_x, d, apart)
 
 
-@inner
-def _between(views, view, p, y, x, py, px):
-    """A plane at (y, x), between samples bilinearly by sixteenths, times 256."""
-    height, width = views.shape[2:]
-    x0, x1, y0, y1 = clamped(x, width), clamped(x + 1, width), clamped(y, height), clamped(y + 1, height)
-    upper = np.int64(views[view, p, y0, x0]) * (16 - px) + np.int64(views[view, p, y0, x1]) * px
-    lower = np.int64(views[view, p, y1, x0]) * (16 - px) + np.int64(views[view, p, y1, x1]) * px
-    return upper * (16 - py) + lower * py
-
-
-@lean
-def _difference(s, y, x, d):
-    """Return the difference of the sources at a sample for a disparity, in eighths of a code; see `_remembered`."""
-    height, width = s.counts.shape
-    count = min(s.sources.shape[0], MATCHED)
-    seen = 0
-    for r in range(count):
-        at_x, at_y = 256 * x + d * s.sources[r, 1], 256 * y + d * s.sources[r, 2]
-        if -128 <= at_x <= 256 * width - 128 and -128 <= at_y <= 256 * height - 128:
-            part_y, part_x = (at_y >> 4) & 15, (at_x >> 4) & 15
-            value = _between(s.views, s.sources[r, 0], 0, at_y >> 8, at_x >> 8, part_y, part_x)
-            s.scratch[0, seen] = value >> 8
-            seen += 1
-    if seen < 2:
-        return np.int64(LONELY)
-    least = np.int64(1 << 40)
-    for a in range(seen):
-        differs = np.int64(0)
-        for b in range(seen):
-            differs += min(abs(s.scratch[0, a] - s.scratch[0, b]), TRUNCATED)
-        least = min(least, differs)
-    return least // (seen - 1) + (count - seen) * 16
-
-
-@inner
-def _remembered(s, y, x, d):
-    """`_difference`, from memory if it has been found for this sample lately: five samples ask for the same."""
-    height, width = s.counts.shape
-    if y < 0 or x < 0 or y >= height or x >= width:
-        return _difference(s, y, x, d)
-    slot = (d ^ (d >> 2) ^ (d >> 5)) & (REMEMBERED - 1)
-    if s.memory[y, x, slot, 0] != d:
-        s.memory[y, x, slot, 0] = d
-        s.memory[y, x, slot, 1] = _difference(s, y, x, d)
-    return np.int64(s.memory[y, x, slot, 1])
-
-
-@lean
-def _disagreement(s, y, x, d, enough):
-    """Return the difference of the sources around a sample for a disparity, in eighths of a code.
-
-    A sum that is known to reach ``enough`` is not finished.
-    """
-    total = 2 * _remembered(s, y, x, d)
-    for place in range(1, 5):
-        if total >= 6 * enough:
-            return enough
-        j = y + (1 if place == 3 else (-1 if place == 4 else 0))
-        i = x + (1 if place == 1 else (-1 if place == 2 else 0))
-        total += _remembered(s, j, i, d)
-    agreeing = 0
-    for r in range(min(s.sources.shape[0], MATCHED)):
-        if _agrees(s, r, y, x, d):
-            agreeing += 1
-    return total // 6 + (64 if agreeing == 0 else 32 // agreeing)
-
-
-@inner
-def _agrees(s, r, y, x, d):
-    """Whether a source's own disparity says that it sees the same."""
-    height, width = s.counts.shape
-    across, down = s.sources[r, 1], s.sources[r, 2]
-    i, j = x + ((d * across + 128) >> 8), y + ((d * down + 128) >> 8)
-    if i < 0 or j < 0 or i >= width or j >= height:
-        return False
-    other = np.int64(s.disparities[s.sources[r, 0], j, i])
-    return other != UNKNOWN and abs(other - d) * max(abs(across), abs(down)) < DIFFERENT
-
-
 @lean
 def choose(s, apart):
     """s.disparity = of the candidates around each sample the one on which the sources agree best."""
     height, width = s.counts.shape
-    tried = s.scratch[1:3].size
+    tried = s.tried
     for y in range(height):
         for x in range(width):
-            number = 0
+            number, last = 0, np.int64(UNKNOWN)
             for j in range(max(y - 1, 0), min(y + 2, height)):
                 for i in range(max(x - 1, 0), min(x + 2, width)):
                     for c in range(s.counts[j, i]):
                         d = np.int64(s.candidates[c, j, i])
-                        new = True
+                        if d == last:
+                            continue
+                        last, new = d, True
                         for k in range(number):
-                            if abs(s.scratch[1 + (k >> 3), k & 7] - d) <= apart:
+                            if abs(tried[k] - d) <= apart:
                                 new = False
-                        if new and number < tried:
-                            s.scratch[1 + (number >> 3), number & 7] = d
+                        if new and number < tried.size:
+                            tried[number] = d
                             number += 1
             best, least = np.int64(UNKNOWN), np.int64(1 << 40)
             if number == 1:
-                best = s.scratch[1, 0]
+                best = tried[0]
             else:
                 for k in range(number):
-                    d = s.scratch[1 + (k >> 3), k & 7]
-                    cost = _disagreement(s, y, x, d, least)
+                    cost = disagreement(s, y, x, tried[k], least)
                     if cost < least:
-                        least, best = cost, d
+                        least, best = cost, tried[k]
             s.disparity[y, x] = best
     _fill(s.disparity)
 
@@ -253,12 +187,24 @@ def blend(s, nearest):
     """
     height, width = s.counts.shape
     count = s.sources.shape[0]
+    for r in range(count):
+        # Weights of a source that agrees, that does not, and that does not see the sample.
+        far = 8 + s.sources[r, 1] * s.sources[r, 1] + s.sources[r, 2] * s.sources[r, 2]
+        for kind, weight in enumerate((64, 8, 1)):
+            s.scratch[6 + kind, r] = weight if nearest else weight * 64 // far
     for y in range(height >> 2):
         for x in range(width >> 2):
             s.doubt[y, x] = 0
     for y in range(height):
-        for x in range(width):
+        x = start = end = 0
+        while x < width:
             d = np.int64(s.disparity[y, x])
+            if x == end and not nearest:
+                end = x + 1
+                while end < width and end - x < RUN and s.disparity[y, end] == s.disparity[y, x]:
+                    end += 1
+                start = x
+                _interpolate(s, y, x, end - x, np.int64(0) if d == UNKNOWN else d, count)
             if d == UNKNOWN:
                 d = np.int64(0)
             most = np.int64(-1)
@@ -266,7 +212,7 @@ def blend(s, nearest):
                 across, down = s.sources[r, 1], s.sources[r, 2]
                 at_x, at_y = 256 * x + d * across, 256 * y + d * down
                 inside = -128 <= at_x <= 256 * width - 128 and -128 <= at_y <= 256 * height - 128
-                weight = np.int64(64 if _agrees(s, r, y, x, d) else 8) if inside else np.int64(1)
+                weight = s.scratch[(6 if agrees(s, r, y, x, d) else 7) if inside else 8, r]
                 if nearest:
                     i, j = (at_x + 128) >> 8, (at_y + 128) >> 8
                     fx, fy = at_x - (i << 8), at_y - (j << 8)
@@ -276,8 +222,8 @@ def blend(s, nearest):
                     for p in range(3):
                         s.scratch[1 + p, r] = s.views[s.sources[r, 0], p, j, i]
                 else:
-                    weight = weight * 64 // (8 + across * across + down * down)
-                    _interpolate(s, r, at_y, at_x)
+                    for p in range(3):
+                        s.scratch[1 + p, r] = s.taken[r, p, x - start]
                 s.scratch[4, r] = weight
                 if weight > most:
                     most = weight
@@ -289,35 +235,81 @@ def blend(s, nearest):
                 for r in range(count):
                     s.scratch[4, r] = s.scratch[4, r] * PHASE[max(s.scratch[5, r] - closest, 0)]
             s.doubt[y >> 2, x >> 2] += (_weighted(s, y, x, count) + 8) >> 4
+            x += 1
 
 
 @lean
-def _six_taps(views, view, p, iy, ix, py, px):
-    height, width = views.shape[2:]
+def _six_taps(plane, iy, ix, py, px):
+    height, width = plane.shape
     total = np.int64(0)
     inside = ix >= 2 and ix + 3 < width
+    across = FILTERS[px]
     for k in range(TAPS):
         f = np.int64(FILTERS[py, k])
         if f:
-            j = clamped(iy + k - 2, height)
+            line = plane[clamped(iy + k - 2, height)]
             row = np.int64(0)
             if inside:
+                taken = line[ix - 2 : ix + 4]
                 for m in range(TAPS):
-                    row += np.int64(FILTERS[px, m]) * np.int64(views[view, p, j, ix + m - 2])
+                    row += np.int64(across[m]) * np.int64(taken[m])
             else:
                 for m in range(TAPS):
-                    row += np.int64(FILTERS[px, m]) * np.int64(views[view, p, j, clamped(ix + m - 2, width)])
+                    row += np.int64(across[m]) * np.int64(line[clamped(ix + m - 2, width)])
             total += f * row
     return (total + 2048) >> 12
 
 
+@lean
+def _six_taps_run(plane, iy, ix, py, px, count, out):
+    """out[:count] = `_six_taps` of samples that follow each other, four at a time inside the plane."""
+    height, width = plane.shape
+    length = (count + 3) & ~3
+    if ix < 2 or ix + length + 3 > width:
+        for j in range(count):
+            out[j] = _six_taps(plane, iy, ix + j, py, px)
+        return
+    a, b, c, d, e, f = FILTERS[px, 0], FILTERS[px, 1], FILTERS[px, 2], FILTERS[px, 3], FILTERS[px, 4], FILTERS[px, 5]
+    for j in range(length):
+        out[j] = 2048
+    for k in range(TAPS):
+        g = FILTERS[py, k]
+        if g:
+            t = plane[clamped(iy + k - 2, height), ix - 2 : ix + length + 3]
+            if px == 0:
+                for first in range(0, length, 4):
+                    for j in range(first, first + 4):
+                        out[j] = np.int32(out[j] + np.int32(np.int32(64 * g) * t[j + 2]))
+            else:
+                for first in range(0, length, 4):
+                    for j in range(first, first + 4):
+                        row = a * t[j] + b * t[j + 1] + c * t[j + 2] + d * t[j + 3] + e * t[j + 4] + f * t[j + 5]
+                        out[j] = np.int32(out[j] + np.int32(g * np.int32(row)))
+    for j in range(length):
+        out[j] >>= 12
+
+
+@lean
+def _interpolate(s, y, x, length, d, count):
+    """s.taken[:count, :, :length] = samples of the sources along a disparity."""
+    for r in range(count):
+        dx, dy = d * s.sources[r, 1], d * s.sources[r, 2]
+        ix, iy, px, py = x + (dx >> 8), y + (dy >> 8), (dx >> 4) & 15, (dy >> 4) & 15
+        for p in range(3):
+            _six_taps_run(s.views[s.sources[r, 0], p], iy, ix, py, px, length, s.taken[r, p])
+
+
 @inner
-def _interpolate(s, r, at_y, at_x):
-    """s.scratch[1:4, r] = the three planes at a position."""
-    view = s.sources[r, 0]
-    iy, ix, py, px = at_y >> 8, at_x >> 8, (at_y >> 4) & 15, (at_x >> 4) & 15
-    for p in range(3):
-        s.scratch[1 + p, r] = _six_taps(s.views, view, p, iy, ix, py, px)
+def _quotient(a, b):
+    """a // b by a division of floating point, which is exact while a has at most 52 bits, and four times as fast."""
+    return np.int64(np.floor(np.float64(a) / np.float64(b)))
+
+
+@inner
+def _apart(s, a, b):
+    """Difference of two sources' samples."""
+    differs = abs(s.scratch[1, a] - s.scratch[1, b])
+    return differs + abs(s.scratch[2, a] - s.scratch[2, b]) + abs(s.scratch[3, a] - s.scratch[3, b])
 
 
 @inner
@@ -326,23 +318,24 @@ def _weighted(s, y, x, count):
 
     Return the mean difference from that source.
     """
-    best, least = 0, 1 << 60
+    totals, weights = s.scratch[9], s.scratch[4]
     for a in range(count):
-        total = -160 * s.scratch[4, a]
-        for b in range(count):
-            differs = abs(s.scratch[1, a] - s.scratch[1, b])
-            differs += abs(s.scratch[2, a] - s.scratch[2, b]) + abs(s.scratch[3, a] - s.scratch[3, b])
-            total += min(differs, TRUNCATED) * s.scratch[4, b]
-        if total < least:
-            least, best = total, a
+        totals[a] = -160 * weights[a]
+        for b in range(a):
+            differs = min(_apart(s, a, b), TRUNCATED)
+            totals[a] += differs * weights[b]
+            totals[b] += differs * weights[a]
+    best = 0
+    for a in range(1, count):
+        if totals[a] < totals[best]:
+            best = a
     sum0 = sum1 = sum2 = sum_ = all_ = spread = np.int64(0)
     for b in range(count):
-        differs = abs(s.scratch[1, best] - s.scratch[1, b])
-        differs += abs(s.scratch[2, best] - s.scratch[2, b]) + abs(s.scratch[3, best] - s.scratch[3, b])
-        weight = s.scratch[4, b] * OUTLYING[min(differs >> 4, 63)]
+        differs = _apart(s, best, b)
+        weight = weights[b] * OUTLYING[min(differs >> 4, 63)]
         sum_ += weight
-        all_ += s.scratch[4, b]
-        spread += min(differs, TRUNCATED) * s.scratch[4, b]
+        all_ += weights[b]
+        spread += min(differs, TRUNCATED) * weights[b]
         sum0 += weight * s.scratch[1, b]
         sum1 += weight * s.scratch[2, b]
         sum2 += weight * s.scratch[3, b]
@@ -351,10 +344,10 @@ def _weighted(s, y, x, count):
             s.made[p, y, x] = s.scratch[1 + p, best]
         return np.int64(0)
     half = sum_ >> 1
-    s.made[0, y, x] = (sum0 + half) // sum_
-    s.made[1, y, x] = (sum1 + half) // sum_
-    s.made[2, y, x] = (sum2 + half) // sum_
-    return spread // all_
+    s.made[0, y, x] = _quotient(sum0 + half, sum_)
+    s.made[1, y, x] = _quotient(sum1 + half, sum_)
+    s.made[2, y, x] = _quotient(sum2 + half, sum_)
+    return _quotient(spread, all_)
 
 
 @lean
@@ -363,17 +356,30 @@ def _mismatch(s, at, y, x, d):
     height, width = s.counts.shape
     count = min(s.sources.shape[0], MATCHED)
     least, second = 1 << 40, 1 << 40
+    within = 0 < x < width - 1 and 0 < y < height - 1
     for r in range(count):
-        total = 0
+        total = np.int64(0)
         dx, dy = d * s.sources[r, 1], d * s.sources[r, 2]
         ix, iy, px, py = dx >> 8, dy >> 8, (dx >> 4) & 15, (dy >> 4) & 15
+        own, other = s.views[at, 0], s.views[s.sources[r, 0], 0]
         if x + ix < -1 or y + iy < -1 or x + ix > width or y + iy > height:
-            total = 9 * LONELY
+            total = np.int64(9 * LONELY)
+        elif within and 0 < x + ix < width - 2 and 0 < y + iy < height - 2:
+            a, b, c, e = (16 - px) * (16 - py), px * (16 - py), (16 - px) * py, px * py
+            for j in range(3):
+                mine = own[y + j - 1, x - 1 : x + 2]
+                upper = other[y + iy + j - 1, x + ix - 1 : x + ix + 3]
+                lower = other[y + iy + j, x + ix - 1 : x + ix + 3]
+                for i in range(3):
+                    value = (a * upper[i] + b * upper[i + 1] + c * lower[i] + e * lower[i + 1]) >> 8
+                    total += min(abs(value - np.int64(mine[i])), TRUNCATED)
+                if total >= second:
+                    break
         else:
             for j in range(max(y - 1, 0), min(y + 2, height)):
                 for i in range(max(x - 1, 0), min(x + 2, width)):
-                    value = _between(s.views, s.sources[r, 0], 0, j + iy, i + ix, py, px) >> 8
-                    total += min(abs(value - np.int64(s.views[at, 0, j, i])), TRUNCATED)
+                    value = between(other, j + iy, i + ix, py, px) >> 8
+                    total += min(abs(value - np.int64(own[j, i])), TRUNCATED)
         if total < least:
             least, second = total, least
         elif total < second:

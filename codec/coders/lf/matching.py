@@ -1,0 +1,280 @@
+"""Encoder search of a block's explicit disparity and references: first by table, then between samples as decoded.
+
+`fill_products` compares a square of 32×32 samples with every reference at every disparity. Its table holds inner
+products of the references' differences, so that the error of the mean of any set of references is a sum of them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .blocks import EXPLICIT, MOST_REFERENCES, from_where, guesses, kind_cost, mask_cost, seen_mask
+from .jit import inner, lean
+from .transform import LARGEST
+from .warp import clamped, moved_block
+
+PAIRS = MOST_REFERENCES * (MOST_REFERENCES + 1) // 2  # the lower triangle by rows
+DIAGONAL = 0, 2, 5, 9
+CELLS = LARGEST // 4
+HUGE = np.float32(1e30)
+MOST_BEST = 6
+MOST_TRIED = MOST_BEST + 3 + 2
+
+
+class Match(NamedTuple):
+    """Memory of the search of disparities.
+
+    Parameters
+    ----------
+    every : int
+        The table holds every so many-th index.
+    best : int
+        Disparities of the least error that are compared as decoded, beside those of neighbours.
+    products : ndarray of float32, (CELLS, CELLS, PAIRS, indices)
+        Of the first plane, by 4×4 samples.
+    total, errors : ndarray of float32, (PAIRS, indices) and (2, indices)
+        Sums over a block; errors of the best and of one set of references.
+    missed : ndarray of float32, (MOST_REFERENCES + 1, LARGEST + 1)
+        A row of differences.
+    sums : ndarray of float32, (PAIRS, LARGEST)
+    moved : ndarray of int32, (MOST_REFERENCES, 3, LARGEST, LARGEST)
+        Differences between a block and its references as decoded.
+    tried : ndarray of int64, (MOST_TRIED,)
+    """
+
+    every: Any
+    best: Any
+    products: Any
+    total: Any
+    errors: Any
+    missed: Any
+    sums: Any
+    moved: Any
+    tried: Any
+
+
+def new_match(indices: int, every: int, best: int = 1) -> Match:
+    """Memory for one square after another."""
+    return Match(
+        every=every,
+        best=best,
+        products=np.zeros((CELLS, CELLS, PAIRS, indices), np.float32),
+        total=np.zeros((PAIRS, indices), np.float32),
+        errors=np.zeros((2, indices), np.float32),
+        missed=np.zeros((MOST_REFERENCES + 1, LARGEST + 1), np.float32),
+        sums=np.zeros((PAIRS, LARGEST), np.float32),
+        moved=np.zeros((MOST_REFERENCES, 3, LARGEST, LARGEST), np.int32),
+        tried=np.zeros(MOST_TRIED, np.int64),
+    )
+
+
+@lean
+def _missed_row(plane, original, y, x0, dy, dx, between, missed):
+    """missed[:32] = a row of the plane moved, between samples bilinearly, less that of the original."""
+    height, width = plane.shape
+    iy, ix = dy >> 8, dx >> 8
+    fx, fy = np.float32((dx & 255) / 256), np.float32((dy & 255) / 256)
+    upper, lower = plane[clamped(y + iy, height)], plane[clamped(y + iy + 1, height)]
+    start = x0 + ix
+    if start >= 0 and start + LARGEST + 1 <= width:
+        one, other = upper[start : start + LARGEST + 1], lower[start : start + LARGEST + 1]
+        for x in range(LARGEST + 1):
+            between[x] = (np.float32(1) - fy) * np.float32(one[x]) + fy * np.float32(other[x])
+    else:
+        for x in range(LARGEST + 1):
+            at = clamped(start + x, width)
+            between[x] = (np.float32(1) - fy) * np.float32(upper[at]) + fy * np.float32(lower[at])
+    if x0 + LARGEST <= width:
+        own = original[y, x0 : x0 + LARGEST]
+        for x in range(LARGEST):
+            missed[x] = (np.float32(1) - fx) * between[x] + fx * between[x + 1] - np.float32(own[x])
+    else:
+        for x in range(width - x0):
+            missed[x] = (np.float32(1) - fx) * between[x] + fx * between[x + 1] - np.float32(original[y, x0 + x])
+
+
+@lean
+def fill_products(job, original, y0, x0, match):
+    """match.products = inner products of the references' differences from the square at (y0, x0)."""
+    height, width = original.shape[1:]
+    rows, cols = min(CELLS, (height - y0) >> 2), min(CELLS, (width - x0) >> 2)
+    count = job.references.shape[0]
+    between = match.missed[MOST_REFERENCES]
+    sums, products = match.sums, match.products
+    for k in range(products.shape[3]):
+        d = (job.low + k * match.every) * job.unit
+        for by in range(rows):
+            for at in range(PAIRS):
+                for x in range(LARGEST):
+                    sums[at, x] = 0
+            for y in range(y0 + 4 * by, y0 + 4 * by + 4):
+                at = 0
+                for r in range(count):
+                    dx, dy = d * job.references[r, 1], d * job.references[r, 2]
+                    own = match.missed[r]
+                    _missed_row(job.views[job.references[r, 0], 0], original[0], y, x0, dy, dx, between, own)
+                    for s in range(r + 1):
+                        other, into = match.missed[s], sums[at]
+                        for x in range(LARGEST):
+                            into[x] += own[x] * other[x]
+                        at += 1
+            for bx in range(cols):
+                for at in range(count * (count + 1) >> 1):
+                    x = 4 * bx
+                    total = (sums[at, x] + sums[at, x + 1]) + (sums[at, x + 2] + sums[at, x + 3])
+                    products[by, bx, at, k] = total
+
+
+@lean
+def _add_cells(match, by, bx, size, pairs):
+    """match.total = products summed over a block."""
+    for at in range(pairs):
+        into = match.total[at]
+        indices = into.shape[0]
+        for k in range(indices):
+            into[k] = 0
+        for i in range(by, by + size):
+            for j in range(bx, bx + size):
+                cell = match.products[i, j, at]
+                for k in range(indices):
+                    into[k] += cell[k]
+
+
+@lean
+def _set_errors(match, count):
+    """match.errors[0] = of each index the error of the best set of references."""
+    least, error = match.errors[0], match.errors[1]
+    indices = least.shape[0]
+    for k in range(indices):
+        least[k] = HUGE
+    for mask in range(1, 1 << count):
+        for k in range(indices):
+            error[k] = 0
+        members, at = 0, 0
+        for r in range(count):
+            members += (mask >> r) & 1
+            for s in range(r + 1):
+                if (mask >> r) & 1 and (mask >> s) & 1:
+                    pair, factor = match.total[at], np.float32(1 if r == s else 2)
+                    for k in range(indices):
+                        error[k] += factor * pair[k]
+                at += 1
+        share = np.float32(1) / np.float32(members * members)
+        for k in range(indices):
+            least[k] = min(least[k], share * error[k])
+
+
+@inner
+def _add_index(job, tried, number, index):
+    if index < job.low or index > job.high:
+        return number
+    for i in range(number):
+        if tried[i] == index:
+            return number
+    tried[number] = index
+    return number + 1
+
+
+@lean
+def _likely_indices(job, match, y0, x0, log):
+    """Fill match.tried with indices worth comparing as decoded; return their number."""
+    by, bx = y0 >> 2, x0 >> 2
+    number = 0
+    for guess in guesses(job, by, bx, log):
+        number = _add_index(job, match.tried, number, guess)
+    count = job.references.shape[0]
+    _add_cells(match, by & (CELLS - 1), bx & (CELLS - 1), 1 << (log - 2), count * (count + 1) >> 1)
+    _set_errors(match, count)
+    errors = match.errors[0]
+    for _ in range(match.best):
+        best = 0
+        for k in range(errors.shape[0]):
+            if errors[k] < errors[best]:
+                best = k
+        number = _add_index(job, match.tried, number, job.low + best * match.every)
+        for k in range(max(best - 1, 0), min(best + 2, errors.shape[0])):
+            errors[k] = HUGE
+    return number
+
+
+@lean
+def _compare(job, match, work, original, y0, x0, n, index, planes):
+    """match.moved = the block's differences from each reference as decoded."""
+    d = index * job.unit
+    for r in range(job.references.shape[0]):
+        for p in range(planes):
+            into = work.predicted[p]
+            for y in range(n):
+                for x in range(n):
+                    into[y, x] = 0
+            dy, dx = d * job.references[r, 2], d * job.references[r, 1]
+            moved_block(job.views, job.references[r, 0], p, y0, x0, n, dy, dx, work.rows, work.predicted)
+            for y in range(n):
+                own, moved, missed = original[p, y0 + y, x0 : x0 + n], into[y], match.moved[r, p, y]
+                for x in range(n):
+                    missed[x] = np.int32(own[x]) - (np.int32(moved[x] + 2048) >> 12)
+
+
+@inner
+def _dot(moved, r, s, n, planes):
+    total = np.float32(0)
+    for p in range(planes):
+        for y in range(n):
+            one, other = moved[r, p, y], moved[s, p, y]
+            for x in range(0, n, 4):
+                a, b = np.float32(one[x]) * np.float32(other[x]), np.float32(one[x + 1]) * np.float32(other[x + 1])
+                c = np.float32(one[x + 2]) * np.float32(other[x + 2])
+                total += (a + b) + (c + np.float32(one[x + 3]) * np.float32(other[x + 3]))
+    return total
+
+
+@lean
+def _best_set(costs, job, match, work, original, weight, planes, y0, x0, log, index):
+    """Squared error + weight · bits of an index by the best set of references, and that set."""
+    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    count, total = job.references.shape[0], match.total
+    where, seen = from_where(job, by, bx, log, index), seen_mask(job, by, bx, log, index)
+    _compare(job, match, work, original, y0, x0, n, index, planes)
+    at = 0
+    for r in range(count):
+        for s in range(r + 1):
+            total[at, 0] = _dot(match.moved, r, s, n, planes)
+            at += 1
+    side = weight * kind_cost(costs, job, by, bx, log, np.int64(EXPLICIT), index, np.int64(0), np.int64(0))
+    best, best_mask = HUGE, 1
+    for mask in range(1, 1 << count):
+        members, at, error = 0, 0, np.float32(0)
+        for r in range(count):
+            for s in range(r + 1):
+                if (mask >> r) & 1 and (mask >> s) & 1:
+                    error += total[at, 0] if r == s else 2 * total[at, 0]
+                at += 1
+            members += (mask >> r) & 1
+        cost = error / np.float32(members * members) + side
+        if cost < best and count > 1:
+            cost += weight * mask_cost(costs, job, by, bx, where, seen, mask)
+        if cost < best:
+            best, best_mask = cost, mask
+    return best, best_mask
+
+
+@lean
+def best_explicit(costs, job, match, work, original, weight, planes, y0, x0, log):
+    """Index and set of references of the least squared error + weight · bits, before any residual."""
+    tried = match.tried
+    number = _likely_indices(job, match, y0, x0, log)
+    best, best_index, best_mask = HUGE, job.low, 1
+    t, between = 0, match.every == 1
+    while t < number:
+        cost, mask = _best_set(costs, job, match, work, original, weight, planes, y0, x0, log, tried[t])
+        if cost < best:
+            best, best_index, best_mask = cost, tried[t], mask
+        t += 1
+        if t == number and not between:
+            # Then the two indices beside the best that the table leaves out.
+            between = True
+            number = _add_index(job, tried, number, best_index - 1)
+            number = _add_index(job, tried, number, best_index + 1)
+    return best_index, best_mask
