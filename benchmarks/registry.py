@@ -164,6 +164,7 @@ BENCHMARKS = {
         Benchmark("pages.video", needs="records of takes and crossing", writes=(f"{IMAGES}/takes_*",)),
         Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
+        Benchmark("coding.light_field_threads", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.light_field_bounds", records=OWN, fills=("docs/lf_bounds.md",)),
         Benchmark("pages.lf_bounds_chart", needs="records of light_field_bounds", writes=(f"{IMAGES}/lf_bounds.*",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),

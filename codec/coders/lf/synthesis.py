@@ -355,7 +355,8 @@ def _mismatch(s, at, y, x, d):
     """Return the difference of the best two sources from the decoded view around a sample, in eighths of a code."""
     height, width = s.counts.shape
     count = min(s.sources.shape[0], MATCHED)
-    least, second = 1 << 40, 1 << 40
+    least: Any = np.int64(1 << 40)
+    second: Any = np.int64(1 << 40)
     within = 0 < x < width - 1 and 0 < y < height - 1
     for r in range(count):
         total = np.int64(0)
