@@ -11,6 +11,7 @@ views of a light field camera from a folder. Every scheme is run at five quantis
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.arguments import command_line
+from benchmarks.coding import coders
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
 from codec import encode, timed_decode
@@ -40,6 +42,7 @@ QUANTISERS = {
 }
 OTHERS = ("si-avif:best", "si-hevc:best")
 LOSSLESS = ("si-lf:lossless=1", "si-ffv1", "jpegxl:lossless=1")
+TARGET_SCALE = 4  # of the records of `coders`
 VIEWS, GAP = 9, 6  # views per side; factor on disparity, by a larger gap
 
 
@@ -126,8 +129,9 @@ def tables() -> Tables:
     exact = {(row["picture"], row["scheme"]): row["bpp"] for row in rows if "bpp" in row}
     names = [name for name in (*SCENES, *FIELDS, IMPORTED) if (name, OURS) in curves]
     marks = ("lf-against", "lf-tools", "lf-lossless")
+    against_all = {("docs/lf.md", "lf-targets"): targets(coders.comparable(TARGET_SCALE))}
     if not names:
-        return {("docs/lf.md", mark): ["Not measured yet."] for mark in marks}
+        return against_all | {("docs/lf.md", mark): ["Not measured yet."] for mark in marks}
     against = ["| picture | " + " | ".join(f"`{other}`" for other in OTHERS) + " | encode µs | decode µs |"]
     against.append("|---|" + "---|" * (len(OTHERS) + 2))
     tools = ["| picture | " + " | ".join(TOOLS.values()) + " |", "|---|" + "---|" * len(TOOLS)]
@@ -144,21 +148,54 @@ def tables() -> Tables:
         rates = [exact.get((name, scheme)) for scheme in LOSSLESS]
         lossless.append(f"| {name} | " + " | ".join("–" if rate is None else f"{rate:.2f}" for rate in rates) + " |")
     said = [origin(rows)]
-    return {
+    return against_all | {
         ("docs/lf.md", mark): [*lines, "", *said]
         for mark, lines in zip(marks, (against, tools, lossless), strict=True)
     }
 
 
+def targets(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a table of `si-lf` against the best of all other schemes, by comparable records of `coders`.
+
+    Schemes are in order of their Bjøntegaard rate against the anchor of `coders`; each then meets the best so far.
+    """
+    lines = ["| scene | `si-lf` | least rate of all other schemes | rate of `si-lf` |", "|---|---|---|---|"]
+    for scene in SCENES:
+        curves = {row["scheme"]: row["points"] for row in rows if row["scene"] == scene}
+        anchor = curves.get(coders.ANCHOR)
+        rates = {name: _rate(anchor, points) for name, points in curves.items() if anchor and not _is_ours(name)}
+        known = {name: rate for name, rate in rates.items() if rate is not None}
+        best = min(known, key=known.__getitem__, default="")
+        for other in sorted(known, key=known.__getitem__):
+            if (_rate(curves[best], curves[other]) or 0) < 0:
+                best = other
+        lines += [
+            f"| {scene} | `{name}` | `{best}` | {_difference(curves[best], curves[name])} |"
+            for name in filter(_is_ours, curves if known else ())
+        ]
+    return [*lines, "", origin(rows)] if len(lines) > 2 else ["Not measured yet."]
+
+
+def _is_ours(scheme: str) -> bool:
+    return scheme.partition(":")[0] == OURS
+
+
 def _difference(anchor: Any, tested: Any) -> str:
-    """Return the Bjøntegaard rate of ``tested``."""
-    if anchor is None or tested is None:
-        return "–"
+    """Return the Bjøntegaard rate of ``tested`` as text."""
+    rate = None if anchor is None or tested is None else _rate(anchor, tested)
+    return "–" if rate is None else _percent(rate)
+
+
+def _rate(anchor: Any, tested: Any) -> float | None:
+    """Return the Bjøntegaard rate of ``tested`` in per cent; None if the curves hardly overlap."""
     try:
-        difference = bd_rate(*((_column(points, key)) for points in (anchor, tested) for key in ("bpp", "psnr")))
+        return bd_rate(*((_column(points, key)) for points in (anchor, tested) for key in ("bpp", "psnr")))
     except UndefinedDifference:
-        return "–"
-    return f"{difference:+.0f} %".replace("-", "−")
+        return None
+
+
+def _percent(rate: float) -> str:
+    return f"{rate:+.0f} %".replace("-", "−")
 
 
 def _column(points: list[dict[str, float]], key: str) -> list[float]:
