@@ -88,7 +88,7 @@ def report(
     mask : array_like of bool, (N, M), optional
         Which pixels count; see `q_global`. YCbCr and SSIM of sub-images need all pixels and are missing with a mask.
     ssim : bool
-        Also SSIM and MS-SSIM of every sub-image, which take longest.
+        Also SSIM, MS-SSIM and the measures of JPEG Pleno's conditions of every sub-image, which take longest.
     over_depth : bool
         Also Q_depth.
     depth, layers_mm, method
@@ -202,7 +202,12 @@ def _depth(quality: DepthQuality) -> tuple[str, Any]:
 
 
 DEPTH = Row("Q_depth", "q_depth", "q_depth_mean", _depth)
-SLOW = (Row("SSIM", "ssim", "q_ssim", _ssim), Row("MS-SSIM", "ms_ssim", "q_ms_ssim", _ssim))
+SLOW = (
+    Row("SSIM", "ssim", "q_ssim", _ssim),
+    Row("MS-SSIM", "ms_ssim", "q_ms_ssim", _ssim),
+    Row("CTC PSNR-YUV", "ctc_psnr", "q_ctc_psnr", _ycbcr),
+    Row("CTC SSIM of luma", "ctc_ssim", "q_ctc_ssim", _ssim),
+)
 ROWS = (
     Row("Q_global", "q_global", "q_global", _global),
     Row("Q_angle", "q_angle", "q_angle_mean", _angle),
