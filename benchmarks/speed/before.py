@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import atexit
 import importlib
-import inspect
 import os
 import shutil
 import subprocess
@@ -26,7 +25,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -122,10 +121,11 @@ def process(code: Path, script: Path, *arguments: str) -> Iterator[Callable[[str
 
 def _serve(scene_name: str, bands: list[int]) -> None:
     ii_core, raytrace_ii = importlib.import_module("ii_core"), importlib.import_module("raytrace_ii")
+    unfiltered: dict[str, Any] = {"texture_filter": False}
     try:
         job: Any = importlib.import_module("raytrace_ii.rendering.job")
-    except ModuleNotFoundError:
-        job = importlib.import_module("raytrace_ii.job")
+    except ModuleNotFoundError:  # the earlier code, which has no filter
+        job, unfiltered = importlib.import_module("raytrace_ii.job"), {}
     whole = job.Job.tiles
     job.Job.tiles = lambda self: [tile for tile in whole(self) if tile[0].start // BAND in bands]
     scene, camera = raytrace_ii.load_scene(scene_name), ii_core.preset("setup1")
@@ -133,8 +133,6 @@ def _serve(scene_name: str, bands: list[int]) -> None:
     def shoot(**options: Any) -> Any:
         return raytrace_ii.render(scene, camera, workers=1, support=(), **options).picture.pixels
 
-    filtering = "texture_filter" in inspect.signature(raytrace_ii.render).parameters
-    plain = partial(shoot, texture_filter=False) if filtering else shoot
     calls: list[Callable[[], object]] = []
     for task in map(str.strip, sys.stdin):
         if task == "bare" and not calls:
@@ -146,7 +144,7 @@ def _serve(scene_name: str, bands: list[int]) -> None:
         elif task == "render":
             shoot()
         else:
-            pixels = plain()
+            pixels = shoot(**unfiltered)
             if task != "plain":
                 rows = pixels.reshape(-1, BAND, *pixels.shape[1:])[bands]
                 np.save(task.removeprefix("save "), rows)
