@@ -186,11 +186,12 @@ class IIVideo:
         self.write_index(folder)
         return folder
 
-    def write_index(self, folder: Path) -> None:
+    @checks.checked(folder=checks.path)
+    def write_index(self, folder: str | os.PathLike[str]) -> None:
         """Write ``video.json``: rate, number of frames, poses."""
         poses = None if self.poses is None else np.asarray(self.poses).tolist()
         write_json(
-            folder / INDEX,
+            Path(folder) / INDEX,
             {"format": FORMAT, "version": VERSION, "frames": self.frames, "fps": self.fps, "poses": poses},
         )
 

@@ -51,6 +51,7 @@ def take_calls(folder: Path) -> dict[str, Call]:
         "IIVideo.component": (video.component, {"frame": 0, "kind": "si", "place": (0, 0)}),
         "IIVideo.view": (video.view, {"frame": 0, "viewpoint_mm": FRONT, "interpolation": "linear"}),
         "IIVideo.save": (video.save, {"folder": folder / "frames", "progress": None}),
+        "IIVideo.write_index": (video.write_index, {"folder": folder / "frames"}),
         "video_of": (ii_core.video_of, {"pictures": [PICTURE, PICTURE], "fps": 24.0}),
         "open_video": (ii_core.open_video, {"source": video.save(folder / "video"), "fps": 24.0}),
         "write_view_folders": (ii_core.write_view_folders, {"video": video, "folder": folder / "films",
