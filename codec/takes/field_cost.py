@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..checks import whole
+from ..checks import check_type, whole, whole_pair
 from ..coders.lf.coder import MOST_VIEWS, LightField
 from ..coders.lf.pyramid import batches, pyramid
 from .order import MOST_FRAMES, AccessCost, Plan
@@ -26,7 +26,8 @@ def light_field_cost(plan: Plan, ei_pixels: tuple[int, int], instants: int) -> A
     TypeError, ValueError
         If an argument is of another type or out of range.
     """
-    cols, rows = (whole("ei_pixels", side, 1, MOST_VIEWS) for side in ei_pixels)
+    check_type("plan", plan, Plan, "a Plan")
+    cols, rows = (whole("ei_pixels", side, 1, MOST_VIEWS) for side in whole_pair("ei_pixels", ei_pixels))
     whole("ei_pixels (views)", rows * cols, 1, MOST_VIEWS)
     whole("instants", instants, 1, MOST_FRAMES // (rows * cols))
     own, before = [], []  # of each view

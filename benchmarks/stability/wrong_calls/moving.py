@@ -58,6 +58,7 @@ def take_calls(folder: Path) -> dict[str, Call]:
             "progress": None}),
         "Plan": (codec.Plan, {"walk": "view-first", "span": 2, "group": 4, "strip": 2}),
         "component_cost": (codec.component_cost, {"plan": plan, "views": 16, "instants": 2}),
+        "light_field_cost": (codec.light_field_cost, {"plan": plan, "ei_pixels": (2, 2), "instants": 2}),
         "view_cost": (codec.view_cost, {"plan": plan, "views": 16, "instants": 2, "needed": [0, 3]}),
         "encode_take": (codec.encode_take, {"video": video, "scheme": "si-h264", "qp": 40, "plan": plan,
             "rate": "take", "path": folder / "take.ii", "progress": None}),
