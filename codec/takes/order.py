@@ -72,10 +72,12 @@ class Plan:
 
     def count(self, instants: int) -> int:
         """Number of segments of a take."""
+        whole("instants", instants, 1, 1 << 30)
         return -(-instants // (self.span or instants))
 
     def segments(self, instants: int) -> list[range]:
         """Instants of each segment of a take."""
+        whole("instants", instants, 1, 1 << 30)
         span = self.span or instants
         return [range(first, min(first + span, instants)) for first in range(0, instants, span)]
 

@@ -57,7 +57,12 @@ def measure(
     focus: Annotated[bool, typer.Option("--focus", help="Measure Q_depth with depth from focus.")] = False,
     method: Method = "dissertation",
     layers: Layers = None,
-    ssim: Annotated[bool, typer.Option("--ssim", help="Also measure SSIM and MS-SSIM of every sub-image.")] = False,
+    ssim: Annotated[
+        bool,
+        typer.Option(
+            "--ssim", help="Also measure SSIM and MS-SSIM of every sub-image, and JPEG Pleno's PSNR-YUV and SSIM."
+        ),
+    ] = False,
     mask: Annotated[Path | None, typer.Option(help="Measure only the pixels that are white in this picture.")] = None,
     plugin: Plugins = None,
     force: Force = False,

@@ -413,3 +413,10 @@ def test_headers_of_a_take_follow_from_its_numbers_of_pictures():
             assert bits(frames, walk=walk, **plan) == pytest.approx(expected, rel=0.03), (plan, walk)
     floor = take_floor("si-h264", lenses, ei, frames=6, plan=Plan(span=6))
     assert floor.portion(floor.bpp) == 1 and floor.portion(2 * floor.bpp) == 0.5
+
+
+def test_a_take_has_an_instant():
+    """Segments of no instants divided by zero."""
+    for ask in (Plan().count, Plan().segments):
+        with pytest.raises(ValueError, match="instants"):
+            ask(0)
