@@ -19,10 +19,10 @@ from .. import file_header
 from ..api import blank_picture, check_coded
 from ..checks import check_type, whole
 from ..clock import cpu_seconds
-from ..contract import MAX_DECODED_PIXELS, Goal, Value, check_picture, checked_goal, find, parse_scheme
+from ..contract import MAX_DECODED_PIXELS, Goal, Value, check_picture, checked_goal, parse_scheme
 from ..search import Axis, Run, Trial, bracket, nearest, trials, within
 from . import container
-from .coding import SegmentCoder, segment_coder
+from .coding import SegmentCoder, segment_coder, take_coder
 from .container import DamagedTake
 from .decoding import CodedFrames
 from .order import Plan
@@ -73,7 +73,7 @@ class EncodedTake:
 
     def __post_init__(self) -> None:
         check_coded(self)
-        find(self.scheme)
+        take_coder(self.scheme)
         check_type("plan", self.plan, Plan, "a Plan")
         whole("frames", self.frames, 1, MAX_FRAMES)
         if not 0 < checks.number("fps", self.fps) < math.inf:

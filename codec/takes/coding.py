@@ -32,12 +32,18 @@ def segment_coder(
     name: str, structure: IIPicture, options: Mapping[str, Value], plan: Plan
 ) -> FilmSegments | FieldSegments:
     """Return what codes the segments of a take; ValueError if the scheme codes no takes or not by this plan."""
-    coder = find(name)
-    if isinstance(coder, PseudoVideo):
-        return FilmSegments(coder, structure, options, plan)
+    coder = take_coder(name)
     if isinstance(coder, LightField):
         return FieldSegments(coder, structure, options, plan)
-    raise ValueError(f"scheme {name} codes no takes: a pseudo video sequence, as si-h264, or si-lf is needed")
+    return FilmSegments(coder, structure, options, plan)
+
+
+def take_coder(name: str) -> PseudoVideo[Any] | LightField:
+    """Return the coder of a scheme; ValueError if it codes no takes."""
+    coder = find(name)
+    if not isinstance(coder, PseudoVideo | LightField):
+        raise ValueError(f"scheme {name} codes no takes: a pseudo video sequence, as si-h264, or si-lf is needed")
+    return coder
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,7 +53,8 @@ class TextureTable:
         self.table = np.zeros((len(rows), COLUMNS))
         for row, values in zip(self.table, rows, strict=True):
             row[: len(values)] = values
-        self._pixels.append(np.zeros((1, 3), np.float32))  # `texels.mixed` reads beyond the last texel
+        if len(self._pixels) > 1:
+            self._pixels.append(np.zeros((1, 3), np.float32))  # `texels.mixed` reads beyond the last texel
         self.texels = np.concatenate(self._pixels).reshape(-1), np.concatenate(self._codes).reshape(-1)
         self.alphas = np.concatenate(self._alphas)
         del self._pixels, self._codes, self._alphas

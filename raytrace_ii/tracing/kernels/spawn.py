@@ -44,9 +44,9 @@ def reflect(generation, first, lanes, _):
 
 @late_kernel
 def spawn(generation, first, lanes, _):
-    """Write the rays that the hits of a block send on: first through what is clear, then over mirrors.
+    """Write the rays that the hits of a block send on, over mirrors and through what is clear.
 
-    So packets hold rays of one kind, which run side by side.
+    All rays of a hit stand side by side: the order in which a pixel's light is added depends on no block.
     """
     g = value_at(generation)
     rays, passage, following, work, counts = g.rays, g.passage, g.following, g.work, g.counts
@@ -58,9 +58,6 @@ def spawn(generation, first, lanes, _):
                 _pass_through(k, rays, g.surfaces, passage, following, work, counts)
             if work.double[at.CLEAR + k] > 0.0:
                 m0, m1, m2 = _refract(k, m0, m1, m2, rays, g.surfaces.materials, passage, following, work, counts)
-        work.double[at.K0 + k], work.double[at.K1 + k], work.double[at.K2 + k] = m0, m1, m2
-    for k in range(lanes):
-        m0, m1, m2 = three(work.double, at.K0, k)
         if max(m0, m1, m2) < passage.least:
             counts[WEAK_REFLECTION] += max(m0, m1, m2) > 0.0
         elif work.double[at.ROUGH + k] > 0.0:

@@ -325,10 +325,13 @@ def test_a_scene_pays_for_textures_only_if_it_has_some():
 
 
 def test_each_texture_has_its_rows_and_its_own_texels():
-    """Images of 5×3 and 5×2 texels have coarser levels of 2×1 and 1×1 in the rows after their own."""
+    """Images of 5×3 and 5×2 texels have coarser levels of 2×1 and 1×1 in the rows after their own.
+
+    One texel more stands behind all, since four values are read at once.
+    """
     first, second = Image(PIXELS), Image(1 - PIXELS[:2])
     packed = TextureTable([first, None, BOARD, second, first, CLOUD, BOARD])
-    assert packed.table.shape[0] == 8 and [len(texels) for texels in packed.texels] == [3 * (15 + 10 + 2 * 3), 0]
+    assert packed.table.shape[0] == 8 and [len(texels) for texels in packed.texels] == [3 * (15 + 10 + 2 * 3 + 1), 0]
     assert [packed.index(t) for t in (first, BOARD, second, CLOUD, None)] == [0, 3, 4, 7, -1]
     # in one scene each body shows its own
     bodies = [

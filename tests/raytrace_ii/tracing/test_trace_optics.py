@@ -16,7 +16,6 @@ from raytrace_ii.tracing.kernels.sky import background_colour
 from raytrace_ii.tracing.kernels.srgb import encode_srgb
 from raytrace_ii.tracing.kernels.tables import LEAST_WEIGHT
 from raytrace_ii.tracing.lift import LIFT
-from raytrace_ii.tracing.tracer import Tracer
 from tests.support.trace_scenes import (
     BLACK,
     UNIFORM,
@@ -113,22 +112,6 @@ def test_a_slab_shifts_a_ray_and_leaves_its_direction(degrees):
         lift = LIFT * 130
         atol = 4 * lift * (1 + math.tan(angle)) + 4 * half * 2**-24 / b
         np.testing.assert_allclose(seen, straight - shift * np.array([0.6, 0.8]), atol=atol)
-
-
-def test_rays_through_glass_stand_before_those_over_it(monkeypatch):
-    """A packet holds rays of one kind. On b1dc540 they took turns, and each packet held two bundles."""
-    generations, trace_one = [], Tracer._generation
-
-    def recorded(*arguments):
-        generations.append(trace_one(*arguments).directions[:, 2].copy())
-        return trace_one(*arguments)
-
-    monkeypatch.setattr(Tracer, "_generation", recorded)
-    n = 40
-    slab = body(box(90, 90, 5), at=(0, 0, 10), transmission=WHITE, ior=1.5)
-    places = np.column_stack([np.linspace(-40, 40, n), np.linspace(30, -20, n), np.zeros(n)])
-    trace(Scene(bodies=[slab], max_depth=1), places, np.tile((0.0, 0.0, 1.0), (n, 1)))
-    np.testing.assert_array_equal(np.sign(generations[0]), [1.0] * n + [-1.0] * n)
 
 
 def test_glass_of_the_airs_own_index_is_not_there():
