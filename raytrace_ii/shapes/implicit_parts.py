@@ -71,7 +71,7 @@ class Ball(_Turned):
     def distance(self, x: Array, y: Array, z: Array) -> Array:
         own, r = self.own(x, y, z), self.radii_mm
         once = np.sqrt(sum((p / a) ** 2 for p, a in zip(own, r, strict=True)))
-        twice = np.sqrt(sum((p / a**2) ** 2 for p, a in zip(own, r, strict=True)))
+        twice = np.sqrt(sum((p / (a * a)) ** 2 for p, a in zip(own, r, strict=True)))
         # first order: exact, with slope 1, on the surface
         return np.where(twice > 0, once * (once - 1) / np.maximum(twice, 1e-12), -min(r))
 

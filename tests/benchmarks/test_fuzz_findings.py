@@ -31,6 +31,7 @@ from metrics.point_log import read_points
 from metrics.study import read_study
 from raytrace_ii.files.load import read_model
 from raytrace_ii.rendering.render_sets import _read_manifest
+from raytrace_ii.shapes.implicit_parts import Ball
 
 
 def refusal(call, *arguments):
@@ -284,3 +285,9 @@ def test_damaged_points_of_the_benchmark(name, value, said, tmp_path):
     result["pictures"][0]["points"][1][name] = value
     (tmp_path / "a.json").write_text(json.dumps(result))
     assert said in refusal(lambda: check_comparable(profile("small"), [("a", read_result(tmp_path / "a.json"))]))
+
+
+def test_a_ball_of_enormous_radii_is_measured():
+    """The square of a half axis overflowed."""
+    ball = Ball(part="ball", radii_mm=(1e200, 1e200, 1e200))
+    np.testing.assert_array_equal(ball.distance(*np.zeros((3, 2))), [-1e200, -1e200])
