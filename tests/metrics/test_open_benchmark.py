@@ -335,14 +335,15 @@ def test_profiles_of_the_package():
     pleno, own = profile("jpeg-pleno"), profile("dissertation")
     assert pleno.rates_bpp == (0.001, 0.005, 0.02, 0.1, 0.75) and {"q_ctc_psnr", "q_ctc_ssim"} <= set(pleno.measures)
     # Version 1 measured PSNR of full-range values and SSIM of BT.601 luma: other figures than the conditions have.
-    assert pleno.version == 2 and pleno.rank_by == "q_ctc_psnr"
+    # Version 2 had the pixels of trees of four children: 1–6 of 21 or 34 million are ties that fall otherwise now.
+    assert pleno.version == own.version == 3 and pleno.rank_by == "q_ctc_psnr"
     assert len(own.pictures) == 8 and {p.scale for p in own.pictures} == {1}
     for made in (pleno, own, profile("small")):
         for reference in made.pictures:
             camera = reference.made_camera()
             assert camera.regular and reference.use
             # Without a hash, nobody can tell whether a picture made elsewhere is that of the definition.
-            assert reference.name in ("hairdo", "mountains") or len(reference.sha256) == 64
+            assert len(reference.sha256) == 64
     field = pleno.pictures[0].made_camera()
     assert field.ei_pixels == (9, 9) and field.lenses == (512, 512) and field.viewer_mm == field.start_mm
 
