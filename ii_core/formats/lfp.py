@@ -196,7 +196,7 @@ def _sections(data: bytes) -> tuple[Mapping[str, Any], dict[str, bytes]]:
 
 def _section(sections: Mapping[str, bytes], name: Any, what: str) -> bytes:
     if name not in sections:
-        raise ValueError(f"its {what}, {name!r}, is not in it")
+        raise ValueError(f"its {what}, {checks.shown(name)}, is not in it")
     return sections[name]
 
 
@@ -246,11 +246,11 @@ def _mosaic(mosaic: Any) -> str | None:
         return None
     rows = [[cell.strip() for cell in row.split(",")] for row in str(mosaic["tile"]).split(":")]
     if [len(row) for row in rows] != [2, 2]:
-        raise ValueError(f"its mosaic is {mosaic['tile']!r}: 2×2 pixels are known")
+        raise ValueError(f"its mosaic is {checks.shown(mosaic['tile'])}: 2×2 pixels are known")
     tile = np.array(rows)
     first = np.argwhere(tile == mosaic.get("upperLeftPixel", tile[0, 0]))
     if not len(first):
-        raise ValueError(f"its mosaic {mosaic['tile']!r} has no {mosaic['upperLeftPixel']!r}")
+        raise ValueError(f"its mosaic {checks.shown(mosaic['tile'])} has no {checks.shown(mosaic['upperLeftPixel'])}")
     tile = np.roll(tile, tuple(-first[0]), axis=(0, 1))
     return "".join(cell[0] for cell in tile.ravel())
 

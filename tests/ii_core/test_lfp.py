@@ -126,3 +126,15 @@ def test_a_container_is_calibrated_by_the_command(run, tmp_path):
 
     light = np.median(linear(picture.pixels[100:200, 100:200] / 255), axis=(0, 1))
     np.testing.assert_allclose(light / light[1], (0.8, 1, 0.4), atol=0.06)
+
+
+@pytest.mark.parametrize("mosaic", [{"tile": "r" * 10**6}, {"tile": "r,gr:gb,b", "upperLeftPixel": "b" * 10**6}])
+def test_a_mosaic_of_a_long_name_is_refused_in_a_short_line(tmp_path, mosaic):
+    samples = np.zeros((12, 16), int)
+    (tmp_path / "a.raw").write_bytes(packed(samples, 12))
+    about = metadata(samples, 12)
+    about["image"]["rawDetails"]["mosaic"] = mosaic
+    (tmp_path / "a.json").write_text(json.dumps(about))
+    with pytest.raises(ValueError, match="its mosaic") as error:
+        read_raw(tmp_path / "a.raw")
+    assert len(str(error.value)) < 1000
