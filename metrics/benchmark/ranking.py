@@ -16,6 +16,7 @@ import numpy as np
 
 from ii_core.atomic import atomic_paths
 from ii_core.display.figure import COLOURS, LINES, MARKERS, new_figure, save
+from ii_core.files import one_line
 
 from ..measure import measure_of
 from ..plots.rd_chart import set_rate_axis
@@ -41,7 +42,7 @@ def check_comparable(profile: Profile, results: Sequence[tuple[str, Result]]) ->
         of = result["profile"]
         if (of["name"], of["version"], of["sha256"]) != (profile.name, profile.version, profile.digest):
             raise ValueError(
-                f"{name} is of profile {of['name']} version {of['version']}, {of['sha256'][:12]}: "
+                f"{name} is of profile {one_line(of['name'])} version {of['version']}, {of['sha256'][:12]}: "
                 f"{profile.name} version {profile.version}, {profile.digest[:12]}, is needed"
             )
         if _hashes(result) != hashes:

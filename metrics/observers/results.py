@@ -192,7 +192,7 @@ def _plan(text: str, path: Path) -> dict[str, Any]:
         known = (plan["format"], plan["version"]) == (plans.FORMAT, plans.VERSION)
         count = len(plan["stimuli"])
         pairs = [pair for order in [plan["training"], *plan["orders"]] for pair in order]
-        whole = all(0 <= a < count and 0 <= b < count for a, b in pairs) and bool(plan["orders"])
+        whole = all(type(n) is int and 0 <= n < count for a, b in pairs for n in (a, b)) and bool(plan["orders"])
         named = all(isinstance(one[key], str) for one in plan["stimuli"] for key in ("scene", "name", "scheme"))
         for one in plan["stimuli"]:
             for name, value in one["measures"].items():

@@ -287,6 +287,13 @@ def test_damaged_points_of_the_benchmark(name, value, said, tmp_path):
     assert said in refusal(lambda: check_comparable(profile("small"), [("a", read_result(tmp_path / "a.json"))]))
 
 
+def test_a_benchmark_of_a_name_of_two_lines(tmp_path):
+    result = {**_result(), "profile": {**_result()["profile"], "name": "small\nest"}}
+    (tmp_path / "a.json").write_text(json.dumps(result))
+    said = refusal(lambda: check_comparable(profile("small"), [("a", read_result(tmp_path / "a.json"))]))
+    assert "is of profile small est version" in said
+
+
 def test_a_ball_of_enormous_radii_is_measured():
     """The square of a half axis overflowed."""
     ball = Ball(part="ball", radii_mm=(1e200, 1e200, 1e200))

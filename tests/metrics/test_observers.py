@@ -193,6 +193,14 @@ def put(line, **change):
     return resealed(lambda records: [records[line].update(change), records][1])
 
 
+def fractional(records):
+    """Number the stimuli by floats: they led to an accidental IndexError."""
+    plan = json.loads(records[0]["plan"])
+    plan["orders"] = [[[float(n) for n in pair] for pair in order] for order in plan["orders"]]
+    records[0]["plan"] = json.dumps(plan)
+    return records
+
+
 @pytest.mark.parametrize(
     ("edit", "said"),
     [
@@ -216,6 +224,7 @@ def put(line, **change):
         (put(0, observer=4), "not what observer 4 was shown there"),
         (put(0, observer="me"), "no plan or number"),
         (put(0, plan="{}"), "no plan of a test"),
+        (resealed(fractional), "no plan of a test"),
         (put(0, format="other"), "is no result of an observer"),
     ],
 )
