@@ -21,6 +21,7 @@ from .inspect.progressive import DecodedView, Stage, decode_levels, decode_view
 from .inspect.random_access import decode_component, decode_frame
 from .search import Axis, CodingResult, Run, meet_size
 from .takes.api import EncodedTake, encode_take, open_take
+from .takes.coding import codes_takes
 from .takes.container import DamagedTake, is_take
 from .takes.field_cost import light_field_cost
 from .takes.header import TakeFloor, take_floor
@@ -55,6 +56,7 @@ __all__ = [
     "Stage",
     "TakeFloor",
     "analyse_orders",
+    "codes_takes",
     "component_cost",
     "decode",
     "decode_component",

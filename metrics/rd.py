@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IIPicture, checks
+from ii_core import IIPicture, IIVideo, checks
 from ii_core.executors import as_they_come, check_executor, lost
 from ii_core.extras import load
 from ii_core.identity import library_versions, source_hash
 from ii_core.progress import reporter
 
 from .global_angle import q_global
+from .over_time import measure_take
 
 PACKAGES = ("ii_core", "codec", "metrics")  # what a point depends on
 RATES = (0.02, 0.05, 0.15, 0.4, 1.0)  # bpp, of studies whose schemes reach them all
@@ -168,7 +169,7 @@ def _check_overlap(
 
 
 @checks.checked(
-    picture=checks.instance(IIPicture),
+    picture=checks.instance(IIPicture, IIVideo),
     schemes=checks.list_of(str),
     rates=checks.numbers_in_a_row,
     encode=checks.callable_,
@@ -180,7 +181,7 @@ def _check_overlap(
     keep=checks.callable_,
 )
 def rate_distortion(
-    picture: IIPicture,
+    picture: IIPicture | IIVideo,
     schemes: Sequence[str],
     rates: Sequence[float],
     *,
@@ -189,15 +190,17 @@ def rate_distortion(
     progress: Callable[[int, int, str], None] | bool | None = None,
     workers: int | None = None,
     executor: Any = None,
-    measure: Callable[[IIPicture], Mapping[str, Any]] | None = None,
+    measure: Callable[[Any], Mapping[str, Any]] | None = None,
     known: Mapping[tuple[str, float], dict[str, Any]] | None = None,
     keep: Callable[[dict[str, Any]], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """Code a picture by every scheme at every rate and measure what comes back.
+    """Code a picture or a video by every scheme at every rate and measure what comes back.
 
     Parameters
     ----------
-    picture : IIPicture
+    picture : IIPicture or IIVideo
+        Of a video, rates are per pixel of all frames, Q_global is of the squared errors of all frames, and ``encode``
+        and ``decode`` are those of takes, as `codec.encode_take` and `codec.open_take`.
     schemes : sequence of str
         Scheme names, options after a colon: ``"si-h264:order=spiral,gop=32"``.
     rates : sequence of float
@@ -328,22 +331,22 @@ def identity() -> dict[str, str]:
 class _Point:
     """Coding of one picture at one point, and what comes of it; other processes can be sent it."""
 
-    picture: IIPicture
+    picture: IIPicture | IIVideo
     encode: Callable[..., Any]
     decode: Callable[[Any], Any]
-    measure: Callable[[IIPicture], Mapping[str, Any]] | None
+    measure: Callable[[Any], Mapping[str, Any]] | None
 
     def __call__(self, scheme: str, rate: float) -> dict[str, Any]:
         return _measure(self.picture, scheme, rate, self.encode, self.decode, self.measure)
 
 
 def _measure(
-    picture: IIPicture,
+    picture: IIPicture | IIVideo,
     scheme: str,
     rate: float,
     encode: Callable[..., Any],
     decode: Callable[[Any], Any],
-    measure: Callable[[IIPicture], Mapping[str, Any]] | None,
+    measure: Callable[[Any], Mapping[str, Any]] | None,
 ) -> dict[str, Any]:
     try:
         coded = encode(picture, scheme, bpp=rate)
@@ -351,7 +354,7 @@ def _measure(
         answer = decode(coded)
         spent = time.thread_time() - start
         decoded, seconds = getattr(answer, "picture", answer), getattr(answer, "seconds", spent)
-        quality = {"q_global": q_global(picture, decoded), **(measure(decoded) if measure else {})}
+        quality = {"q_global": _quality(picture, decoded), **(measure(decoded) if measure else {})}
     except Exception as error:
         error.add_note(f"while measuring {scheme} at {rate:g} bpp")
         raise
@@ -366,6 +369,15 @@ def _measure(
         "decode_seconds": float(seconds),
         "nbytes": int(coded.nbytes),
     }
+
+
+def _quality(original: IIPicture | IIVideo, decoded: Any) -> float:
+    """Return the PSNR of all pixels, of a video those of all frames."""
+    if isinstance(original, IIPicture):
+        return q_global(original, decoded)
+    if len(decoded) != len(original):
+        raise ValueError(f"decoded has {len(decoded)} frames: {len(original)} are needed")
+    return measure_take(original, decoded).pooled_psnr
 
 
 def _options(scheme: str) -> dict[str, str]:

@@ -18,7 +18,7 @@ from ..coders import groups
 from ..coders.lf import segment
 from ..coders.lf.coder import EXACT_SETTINGS, FRACTIONS, SIZES, LightField
 from ..coders.pseudo_video import PseudoVideo, Source
-from ..contract import Coder, Goal, Value, find
+from ..contract import Coder, Goal, Value, find, parse_scheme
 from ..frames import Film
 from ..order import inverse
 from ..search import Axis, Run, meet_size
@@ -36,6 +36,17 @@ def segment_coder(
     if isinstance(coder, LightField):
         return FieldSegments(coder, structure, options, plan)
     return FilmSegments(coder, structure, options, plan)
+
+
+def codes_takes(scheme: str) -> bool:
+    """Return whether a scheme, with options after a colon, codes takes: a pseudo video sequence, or ``si-lf``.
+
+    Raises
+    ------
+    ValueError
+        If the scheme is unknown, or an option is unknown or out of range.
+    """
+    return isinstance(parse_scheme(scheme)[0], PseudoVideo | LightField)
 
 
 def take_coder(name: str) -> PseudoVideo[Any] | LightField:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from .profile import Profile, Reference
 
-CAPTION = "SHA-256 is that of the pixels (rows of R, G, B, one byte each); z is in mm."
+CAPTION = "SHA-256 is that of the pixels (rows of R, G, B, one byte each, frame after frame); z is in mm."
 HEAD = ("picture", "what it is for", "scene", "camera", "lenses, pixels under each", "samples", "SHA-256")
 
 
@@ -25,7 +25,7 @@ def card_table(profile: Profile, found: Mapping[str, str] | None = None) -> list
         (k, l), (u, v) = camera.lenses, camera.ei_pixels
         sha256 = reference.sha256 if found is None else found.get(reference.name)
         cells = (
-            reference.name, reference.use, reference.scene, _camera(reference), f"{k}×{l}, {u}×{v}",
+            reference.name, reference.use, _scene(reference), _camera(reference), f"{k}×{l}, {u}×{v}",
             str(reference.samples), "not fixed" if sha256 is None else f"`{sha256[:12]}`",
         )  # fmt: skip
         lines.append(f"| {' | '.join(cells)} |")
@@ -50,6 +50,11 @@ def data_card(profile: Profile, found: Mapping[str, str]) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def _scene(reference: Reference) -> str:
+    """Return the name of a scene, and which frames of its take are used."""
+    return reference.scene + (f", frames 0–{reference.frames - 1}" if reference.frames else "")
 
 
 def _camera(reference: Reference) -> str:

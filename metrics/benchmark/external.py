@@ -1,11 +1,14 @@
 """External commands as a coder: the encoder reads files of views, the decoder writes them.
 
+Of a video, each frame has a folder of its own, ``frame_0000`` and on.
+
 Commands run without a shell, in folders of their own, with a time limit. The folder of the decoder holds nothing but
 the coded file.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import resource
@@ -19,11 +22,15 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from ii_core import IIPicture
+from ii_core import IIPicture, video_of
 from ii_core.files import one_line
 from ii_core.formats.pleno import KINDS, make_view_folder, read_pleno_views, write_pleno_views
 
-KNOWN = ("{in}", "{out}", "{bpp}", "{bytes}", "{rows}", "{columns}", "{width}", "{height}")
+from .subject import Decoded, Subject
+
+KNOWN = (
+    "{in}", "{out}", "{bpp}", "{bytes}", "{rows}", "{columns}", "{width}", "{height}", "{frames}", "{fps}"
+)  # fmt: skip
 MAX_OUTPUT = 300  # characters of a failed command's output that the message quotes
 
 
@@ -33,26 +40,18 @@ class Refused(ValueError):
 
 @dataclass(frozen=True)
 class ExternalFile:
-    """Coded file of an external command."""
+    """Coded file of an external command; ``like`` is what was coded."""
 
     data: bytes
     bpp: float
     encode_seconds: float
     reached: bool
-    like: IIPicture
+    like: Subject
 
     @property
     def nbytes(self) -> int:
         """Size of the file."""
         return len(self.data)
-
-
-@dataclass(frozen=True)
-class Decoded:
-    """Decoded picture and CPU seconds of the decoder."""
-
-    picture: IIPicture
-    seconds: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +63,8 @@ class External:
     encoder, decoder : str
         Commands, split by a shell's rules, but run without one. Both need ``{in}`` and ``{out}``: for the encoder the
         folder of views and the coded file, for the decoder the coded file and the folder of views. Optional are
-        ``{bpp}``, ``{bytes}`` (the target), ``{rows}``, ``{columns}`` (views), ``{width}``, ``{height}`` (of a view).
+        ``{bpp}``, ``{bytes}`` (the target), ``{rows}``, ``{columns}`` (views), ``{width}``, ``{height}`` (of a view),
+        ``{frames}`` (1 for a picture), ``{fps}`` (0 for a picture).
     kind : {"ppm", "pgx", "png"}
         Files of the views: binary PPM of 10 bit, PGX of 10 bit in folders 0, 1 and 2 of red, green and blue, or PNG
         of 8 bit; named CCC_RRR, the column first.
@@ -98,8 +98,8 @@ class External:
             if shutil.which(words[0]) is None:
                 raise ValueError(f"{name}: program {words[0]!r} is not found")
 
-    def encode(self, picture: IIPicture, scheme: str, *, bpp: float) -> ExternalFile:
-        """Code a picture at a rate; the arguments are those of `metrics.rate_distortion`.
+    def encode(self, subject: Subject, scheme: str, *, bpp: float) -> ExternalFile:
+        """Code a picture or a video at a rate; the arguments are those of `metrics.rate_distortion`.
 
         Raises
         ------
@@ -108,20 +108,22 @@ class External:
         """
         with _folder() as folder:
             views, out = folder / "views", folder / "coded"
-            write_pleno_views(picture, views, self.kind)
-            across, down = picture.size
-            values = self._values(picture) | {
+            places = _places(subject, views)
+            for place, picture in zip(places, [subject] if isinstance(subject, IIPicture) else subject, strict=True):
+                write_pleno_views(picture, place, self.kind)
+            pixels = len(places) * math.prod(subject.size)
+            values = _values(subject) | {
                 "{in}": str(views),
                 "{out}": str(out),
                 "{bpp}": f"{bpp:.6g}",
-                "{bytes}": str(int(bpp * across * down / 8)),
+                "{bytes}": str(int(bpp * pixels / 8)),
             }
             seconds = self._run("encoder", self.encoder, values, folder)
             if not out.is_file() or not out.stat().st_size:
                 raise Refused(f"encoder wrote no file at {bpp:g} bpp: {{out}} is one file")
             data = out.read_bytes()
-        rate = 8 * len(data) / (across * down)
-        return ExternalFile(data, rate, seconds, rate <= bpp * (1 + self.rate_tolerance), picture)
+        rate = 8 * len(data) / pixels
+        return ExternalFile(data, rate, seconds, rate <= bpp * (1 + self.rate_tolerance), subject)
 
     def decode(self, coded: ExternalFile) -> Decoded:
         """Decode a file in a folder that holds nothing else.
@@ -132,23 +134,18 @@ class External:
             If the command fails, runs too long, or views are missing or wrong.
         """
         with _folder() as folder:
-            source, views = folder / "coded", folder / "views"
+            like, source, views = coded.like, folder / "coded", folder / "views"
             source.write_bytes(coded.data)
-            make_view_folder(views, self.kind)
-            values = self._values(coded.like) | {"{in}": str(source), "{out}": str(views)}
+            places = _places(like, views)
+            for place in places:
+                make_view_folder(place, self.kind)
+            values = _values(like) | {"{in}": str(source), "{out}": str(views)}
             seconds = self._run("decoder", self.decoder, values, folder)
             try:
-                return Decoded(read_pleno_views(views, coded.like, self.kind), seconds)
+                found = [read_pleno_views(place, _still(like), self.kind) for place in places]
             except (ValueError, OSError) as error:
                 raise Refused(f"decoder: {one_line(error)}") from None
-
-    @staticmethod
-    def _values(picture: IIPicture) -> dict[str, str]:
-        (columns, rows), (width, height) = picture.ei_pixels, picture.lenses
-        return {
-            "{rows}": str(rows), "{columns}": str(columns), "{width}": str(width), "{height}": str(height),
-            "{bpp}": "", "{bytes}": "",
-        }  # fmt: skip
+        return Decoded(found[0] if isinstance(like, IIPicture) else video_of(found, fps=like.fps), seconds)
 
     def _run(self, name: str, command: str, values: dict[str, str], folder: Path) -> float:
         """Run a command; return its CPU seconds."""
@@ -168,6 +165,27 @@ class External:
             text = one_line((folder / "said").read_bytes()[-MAX_OUTPUT:].decode("utf-8", "replace"))
             raise Refused(f"{name} ended with code {code}: {text or 'without output'}")
         return _children_seconds() - before
+
+
+def _still(subject: Subject) -> IIPicture:
+    """Return a picture of the structure."""
+    return subject if isinstance(subject, IIPicture) else subject.structure
+
+
+def _places(subject: Subject, folder: Path) -> list[Path]:
+    """Return the folder of a picture's views, or those of the frames of a video."""
+    if isinstance(subject, IIPicture):
+        return [folder]
+    return [folder / f"frame_{number:04}" for number in range(subject.frames)]
+
+
+def _values(subject: Subject) -> dict[str, str]:
+    frames, fps = (1, 0.0) if isinstance(subject, IIPicture) else (subject.frames, subject.fps)
+    (columns, rows), (width, height) = _still(subject).ei_pixels, _still(subject).lenses
+    return {
+        "{rows}": str(rows), "{columns}": str(columns), "{width}": str(width), "{height}": str(height),
+        "{frames}": str(frames), "{fps}": f"{fps:g}", "{bpp}": "", "{bytes}": "",
+    }  # fmt: skip
 
 
 def _split(name: str, command: str) -> list[str]:

@@ -29,12 +29,13 @@ FIELDS = {
     "seconds",
     "picture",
 }
-PICTURE = {"name", "use", "scene", "camera", "scale", "samples", "at_mm", "sha256"}
+MAX_FRAMES = 10_000
+PICTURE = {"name", "use", "scene", "frames", "camera", "scale", "samples", "at_mm", "sha256"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
-    """Reference picture: scene, camera and sampling, and the hash of its pixels.
+    """Reference picture or II-video: scene, camera and sampling, and the hash of its pixels.
 
     Parameters
     ----------
@@ -42,19 +43,22 @@ class Reference:
         Name, and what the picture is for.
     scene : str
         Scene of the package.
+    frames : int, optional
+        First frames of the scene's take that form a video; None for a still.
     camera : str or mapping
         Camera of the package, or its values.
     scale, samples : int
     at_mm : (x, y, z)
         Place of the camera in the scene.
     sha256 : str, optional
-        SHA-256 of the pixels; None if not fixed yet.
+        SHA-256 of the pixels, of a video those of all frames in order; None if not fixed yet.
     """
 
     name: str
     use: str
     scene: str
     camera: Any
+    frames: int | None = None
     scale: int = 1
     samples: int = 1
     at_mm: tuple[float, ...] = (0.0, 0.0, 0.0)
@@ -82,7 +86,7 @@ class Profile:
         Results of different versions are never ranked together.
     about : str
     rates_bpp : tuple of float
-        Targets: bits of the coded file per pixel of the II-picture.
+        Targets: bits of the coded file per pixel of the II-picture, of all frames of a video.
     measures : tuple of str
         Registered measures.
     rank_by : str
@@ -172,8 +176,10 @@ def _profile(data: Mapping[str, Any], digest: str) -> Profile:
 
 
 def _reference(values: Mapping[str, Any]) -> Reference:
-    _check_keys("picture", values, PICTURE, optional={"scale", "samples", "at_mm", "sha256"})
+    _check_keys("picture", values, PICTURE, optional={"frames", "scale", "samples", "at_mm", "sha256"})
     given = dict(values)
+    if "frames" in given:
+        checks.whole_from(1, MAX_FRAMES)("frames", given["frames"])
     if "at_mm" in given:
         given["at_mm"] = checks.place("at_mm", given["at_mm"], 3)
     return Reference(**given)

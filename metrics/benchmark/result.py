@@ -8,19 +8,19 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ii_core import IIPicture, checks
+from ii_core import checks
 from ii_core.files import one_line, read_json, write_json
 
-from ..batch import measuring
 from ..points import check_points, spelt, unspelt
 from ..rd import rate_distortion
-from ..study import picture_json, provenance
+from ..study import provenance
 from .profile import Profile, Reference
 from .run_log import RunLog
+from .subject import Subject, identity, measuring_subject
 
 FORMAT, VERSION = "ii-benchmark", 1
 NEEDED = {"profile", "coder", "pictures", "git", "machine", "versions", "date"}
-Made = Callable[[Reference], IIPicture]
+Made = Callable[[Reference], Subject]
 
 
 def run(
@@ -42,7 +42,7 @@ def run(
     coder : str
         Scheme, or the name of external commands.
     made : callable
-        ``made(reference)`` returns the picture; it is not called for a picture whose points are all in the log.
+        ``made(reference)`` returns the picture or video; it is not called if all its points are in the log.
     encode, decode : callable
         As for `metrics.rate_distortion`.
     commands : sequence of str, optional
@@ -88,34 +88,34 @@ def _row(
 ) -> dict[str, Any]:
     """Return a picture's identity and points; points of the log are not measured again."""
     known = {point["target_bpp"]: point for point in (log.points(reference.name) if log else ())}
-    identity = log.picture(reference.name) if log else None
-    if identity is None or set(profile.rates_bpp) - set(known):
-        picture = made(reference)
-        found, before = picture_json(reference.name, picture), identity
+    found = log.picture(reference.name) if log else None
+    if found is None or set(profile.rates_bpp) - set(known):
+        subject = made(reference)
+        before, found = found, identity(reference.name, subject)
         if before is not None and before["sha256"] != found["sha256"]:
             raise ValueError(
                 f"{reference.name} has pixels {found['sha256'][:12]}, finished points in {log and log.path} are of "
                 f"{before['sha256'][:12]}: --force starts again"
             )
-        identity = found
+        of = found
 
         def keep(point: dict[str, Any]) -> None:
             if log is not None:
-                log.keep(found, _judged(profile, point))
+                log.keep(of, _judged(profile, point))
 
         try:
             points = rate_distortion(
-                picture, [coder], profile.rates_bpp, workers=1, keep=keep,
+                subject, [coder], profile.rates_bpp, workers=1, keep=keep,
                 known={(coder, rate): point for rate, point in known.items()},
-                measure=measuring(picture, [name for name in profile.measures if name != "q_global"]), **tools,
+                measure=measuring_subject(subject, profile.measures), **tools,
             )  # fmt: skip
         except ValueError as error:
             raise ValueError(f"{coder} on {reference.name}: {one_line(error)}") from error
     else:
         points = [known[rate] for rate in profile.rates_bpp]
     return {
-        **identity,
-        "as_defined": reference.matches(identity["sha256"]),
+        **found,
+        "as_defined": reference.matches(found["sha256"]),
         "points": [_judged(profile, point) for point in points],
     }
 

@@ -1,7 +1,7 @@
 """Pictures of the benchmark: rendered in memory, or stored in a folder with hashes and a data card.
 
-``FOLDER/PROFILE/NAME.png`` are the pictures, ``manifest.json`` has the hashes of pixels and files, and ``README.md``
-is the data card. Pictures that are there and would be the same are not rendered again.
+``FOLDER/PROFILE/NAME.png`` are the pictures, folders ``NAME`` the frames of videos. ``manifest.json`` has the hashes
+of pixels and files, and ``README.md`` is the data card. What is there and would be the same is not rendered again.
 """
 
 from __future__ import annotations
@@ -16,22 +16,32 @@ from .progress import progress_bar, say_done
 from .words import say
 
 if TYPE_CHECKING:
-    from ii_core import IIPicture
     from metrics.benchmark.profile import Profile, Reference
+    from metrics.benchmark.subject import Subject
 
 SET, MANIFEST, CARD = "benchmark", "manifest.json", "README.md"
 FORM = "ii-benchmark-pictures"
 
 
-def rendered(reference: Reference) -> IIPicture:
-    """Render a reference picture."""
-    from raytrace_ii import load_scene, render
+def rendered(reference: Reference) -> Subject:
+    """Render a reference picture or video."""
+    from ii_core import video_of
+    from raytrace_ii import load_scene, load_take, render
 
-    return render(load_scene(reference.scene), reference.made_camera(), **_options(reference), support=()).picture
+    camera, options = reference.made_camera(), _options(reference)
+    if reference.frames is None:
+        return render(load_scene(reference.scene), camera, **options, support=()).picture
+    take, base = load_take(reference.scene), options.pop("pose")
+    instants = [frame / take.fps for frame in range(reference.frames)]
+    frames = [
+        render(take.scene_at(at), camera, pose=take.pose_at(at) @ base, **options, support=()).picture
+        for at in instants
+    ]
+    return video_of(frames, fps=take.fps)
 
 
-def stored(profile: Profile, folder: Path) -> Callable[[Reference], IIPicture]:
-    """Return a reader of rendered pictures of a profile.
+def stored(profile: Profile, folder: Path) -> Callable[[Reference], Subject]:
+    """Return a reader of rendered pictures and videos of a profile.
 
     Raises
     ------
@@ -39,8 +49,7 @@ def stored(profile: Profile, folder: Path) -> Callable[[Reference], IIPicture]:
         If a picture of the profile is missing, before any work; the reader also if its pixels are not those of the
         manifest.
     """
-    from ii_core import IIPicture
-    from metrics.study import picture_json
+    from metrics.benchmark.subject import identity
 
     place = folder / profile.name
     known = _pixels(_manifest(place, profile))
@@ -48,12 +57,11 @@ def stored(profile: Profile, folder: Path) -> Callable[[Reference], IIPicture]:
         if reference.name not in known:
             raise ValueError(f"{place} has no picture {reference.name}: `raytrace-ii render --set` renders it")
 
-    def read(reference: Reference) -> IIPicture:
-        path = place / f"{reference.name}.png"
-        picture = IIPicture.load(path)
-        if picture_json("", picture)["sha256"] != known[reference.name]:
+    def read(reference: Reference) -> Subject:
+        path, subject = _read(reference, place)
+        if identity("", subject)["sha256"] != known[reference.name]:
             raise ValueError(f"{path} has other pixels than its manifest says: `raytrace-ii render --set` repairs it")
-        return picture
+        return subject
 
     return read
 
@@ -79,22 +87,16 @@ def render_profiles(named: str, folder: Path, force: bool, workers: int | None) 
 
 def _render(profile: Profile, place: Path, force: bool, workers: int | None) -> dict[str, Any]:
     """Render the pictures that are missing; return the manifest."""
-    from functools import partial
-
-    from ii_core import IIPicture
     from ii_core.atomic import atomic_path
     from ii_core.files import write_json
     from ii_core.picture import sidecar
     from metrics.benchmark.card import data_card
-    from metrics.study import picture_json
+    from metrics.benchmark.subject import identity
 
-    from ..files.load import load_scene
-    from ..rendering.products import Product, commit, is_done, manifest_kept_if_used, record_of
-    from ..rendering.render import render_to
-    from ..scene.hashing import content_hash
+    from ..rendering.products import commit, manifest_kept_if_used
 
     old = _manifest(place, profile)
-    files = [place / f"{reference.name}.png" for reference in profile.pictures]
+    files = [place / f"{reference.name}.png" for reference in profile.pictures if reference.frames is None]
     strange = [place / CARD, *files, *map(sidecar, files)] if not old else []
     check_outputs([place / MANIFEST], True, make_folder=True)
     check_outputs(strange, force)
@@ -105,21 +107,76 @@ def _render(profile: Profile, place: Path, force: bool, workers: int | None) -> 
     }  # fmt: skip
     with manifest_kept_if_used(place / MANIFEST), progress_bar(f"render {profile.name}") as bar:
         write_json(place / MANIFEST, {**head, "pictures": records})
-        for reference, path in zip(profile.pictures, files, strict=True):
-            scene, camera = load_scene(reference.scene), reference.made_camera()
-            options = _options(reference)
-            key = content_hash("benchmark", head["raytrace_ii"], content_hash(scene), camera, *options.values())
-            product = Product((path, sidecar(path)), key, partial(render_to, path, scene, camera, **options))
-            if is_done(product, records.get(reference.name)):
-                continue
-            stats = product.make(progress=partial(_report, bar, path.name), workers=workers)
-            pixels = picture_json("", IIPicture.load(path))["sha256"]
-            records[reference.name] = {**record_of(product, stats), "pixels": pixels}
-            write_json(place / MANIFEST, {**head, "pictures": records})
+        for reference in profile.pictures:
+            before = records.get(reference.name)
+            make = _made_picture if reference.frames is None else _made_video
+            record = make(reference, place, before, force, bar, workers)
+            if record is not before:
+                records[reference.name] = {**record, "pixels": identity("", _read(reference, place)[1])["sha256"]}
+                write_json(place / MANIFEST, {**head, "pictures": records})
     manifest = {**head, "pictures": records}
     with atomic_path(place / CARD) as temporary:
         temporary.write_text(data_card(profile, _pixels(manifest)), encoding="utf-8")
     return manifest
+
+
+def _made_picture(
+    reference: Reference, place: Path, before: dict[str, Any] | None, force: bool, bar: Any, workers: int | None
+) -> dict[str, Any]:
+    """Render a picture unless it is there; return its record, ``before`` if nothing changed."""
+    from functools import partial
+
+    from ii_core.picture import sidecar
+
+    from ..files.load import load_scene
+    from ..rendering.products import Product, is_done, record_of
+    from ..rendering.render import render_to
+    from ..scene.hashing import content_hash
+
+    path = place / f"{reference.name}.png"
+    scene, camera, options = load_scene(reference.scene), reference.made_camera(), _options(reference)
+    key = content_hash("benchmark", version("raytrace-ii"), content_hash(scene), camera, *options.values())
+    product = Product((path, sidecar(path)), key, partial(render_to, path, scene, camera, **options))
+    if before is not None and is_done(product, before):
+        return before
+    return record_of(product, product.make(progress=partial(_report, bar, path.name), workers=workers))
+
+
+def _made_video(
+    reference: Reference, place: Path, before: dict[str, Any] | None, force: bool, bar: Any, workers: int | None
+) -> dict[str, Any]:
+    """Render the frames of a video that are not there; return the record of its files."""
+    from ..files.take import load_take
+    from ..rendering.products import fingerprint
+    from ..rendering.render_take import render_take
+
+    folder, frames = place / reference.name, range(reference.frames or 0)
+
+    def report(frame: int, done: int, total: int) -> None:
+        bar(done, total, f"{reference.name}, frame {frame}")
+
+    render_take(
+        load_take(reference.scene), folder, reference.made_camera(), frames=frames, force=force, progress=report,
+        workers=workers, **_options(reference),
+    )  # fmt: skip
+    files = [folder / f"frame_{frame:04}.png" for frame in frames]
+    record = {"key": folder.name, "files": {path.name: fingerprint(path) for path in files}}
+    same = before is not None and before["files"] == record["files"]
+    return before if same and before is not None else record
+
+
+def _read(reference: Reference, place: Path) -> tuple[Path, Subject]:
+    """Return the path and the content of a stored picture or video."""
+    from ii_core import IIPicture, open_video
+
+    if reference.frames is None:
+        path = place / f"{reference.name}.png"
+        return path, IIPicture.load(path)
+    path = place / reference.name
+    video = open_video(path)
+    if video.frames != reference.frames:
+        raise ValueError(f"{path} has {video.frames} frames: {reference.frames} are needed")
+    return path, video
 
 
 def _report(bar: Callable[[int, int, str], None], name: str, done: int, total: int) -> None:

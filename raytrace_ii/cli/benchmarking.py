@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -11,9 +11,6 @@ from .common import Force, app, check_outputs, columns
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, say_done
 from .words import say
-
-if TYPE_CHECKING:
-    from metrics.benchmark.profile import Profile
 
 
 @app.command()
@@ -46,6 +43,7 @@ def benchmark(
     from metrics.benchmark.result import run, write_result
     from metrics.benchmark.run_log import RunLog
 
+    from .benchmark_coders import coder_of
     from .benchmark_pictures import rendered, stored
 
     load_plugins(plugin)
@@ -56,7 +54,7 @@ def benchmark(
     if output is None:
         raise ValueError("output is missing: -o result.json is needed")
     check_outputs([output], force)
-    coder, tools = _coder(defined, scheme, external, name, views)
+    coder, tools = coder_of(defined, scheme, external, name, views)
     made = rendered if pictures is None else stored(defined, pictures)
     log = RunLog(output.with_suffix(".points.jsonl"), defined, coder, tools.get("commands"), restart=force)
     try:
@@ -72,30 +70,6 @@ def benchmark(
         say(f"not the pixels of the definition: {', '.join(changed)}; such results are ranked among themselves alone")
     points = [point for row in result["pictures"] for point in row["points"]]
     say_done(f"{output}: {coder} meets {sum(p['reached'] for p in points)} of {len(points)} targets")
-
-
-def _coder(
-    profile: Profile, scheme: str | None, external: tuple[str, str], name: str | None, views: str
-) -> tuple[str, dict[str, Any]]:
-    """Return the coder's name, and its functions for `run`."""
-    if (scheme is None) == (not any(external)):
-        raise ValueError("coder is missing: either --scheme or --external is needed")
-    if scheme is not None:
-        from codec import encode, options, timed_decode
-
-        if name is not None:
-            raise ValueError(f"name is {name!r}: only --external takes a name, a scheme has its own")
-        options(scheme.partition(":")[0])  # raises ValueError for an unknown one, before rendering
-        return scheme, {"encode": encode, "decode": timed_decode}
-    from metrics.benchmark.external import External
-
-    if not name:
-        raise ValueError("name is missing: --name gives the name of the external commands in results")
-    encoder, decoder = external
-    tool = External(
-        encoder=encoder, decoder=decoder, kind=views, seconds=profile.seconds, rate_tolerance=profile.rate_tolerance
-    )
-    return name, {"encode": tool.encode, "decode": tool.decode, "commands": [encoder, decoder]}
 
 
 @app.command()

@@ -6,8 +6,11 @@ import re
 import numpy as np
 import pytest
 
-from ii_core import IIPicture
+import codec
+from ii_core import IIPicture, open_video
+from metrics import measure_take
 from metrics.benchmark.profile import profile
+from metrics.benchmark.subject import identity
 from metrics.study import picture_json
 from raytrace_ii.cli.benchmark_pictures import rendered
 
@@ -30,6 +33,9 @@ scale = 64
 """
 
 
+VIDEO = TINY + "frames = 2\n"
+
+
 def test_a_coder_is_run_and_ranked(run, tmp_path):
     (tmp_path / "tiny.toml").write_text(TINY)
     definition = str(tmp_path / "tiny.toml")
@@ -41,7 +47,9 @@ def test_a_coder_is_run_and_ranked(run, tmp_path):
     page = tmp_path / "rank.md"
     code, out, _ = run("ranking", definition, *files, "-o", page)
     assert code == 0 and out.splitlines()[0].startswith("1  ") and page.exists() and page.with_suffix(".png").exists()
-    assert {line.split()[0] for line in run("benchmark")[1].splitlines()} == {"dissertation", "jpeg-pleno", "small"}
+    assert {line.split()[0] for line in run("benchmark")[1].splitlines()} == {
+        "dissertation", "jpeg-pleno", "small", "takes"
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -106,8 +114,6 @@ def test_a_set_keeps_foreign_files_and_refuses_options(run, refused, tmp_path):
 
 
 def test_a_stopped_run_continues(run, tmp_path, monkeypatch):
-    import codec
-
     (tmp_path / "tiny.toml").write_text(TINY)
     calls, encode = [], codec.encode
 
@@ -123,6 +129,36 @@ def test_a_stopped_run_continues(run, tmp_path, monkeypatch):
     assert run(*command)[0] == 0 and calls == [4.0, 8.0, 8.0]
     assert [p["target_bpp"] for p in json.loads((tmp_path / "r.json").read_text())["pictures"][0]["points"]] == [4, 8]
     assert not (tmp_path / "r.points.jsonl").exists()
+
+
+def test_a_video_is_rendered_coded_and_ranked(run, refused, tmp_path):
+    made, data = tmp_path / "tiny.toml", tmp_path / "data"
+    made.write_text(VIDEO)
+    code, out, _ = run("render", "--set", f"benchmark:{made}", "-o", data)
+    frames = open_video(data / "tiny" / "apples")
+    found = identity("", frames)["sha256"]
+    assert code == 0 and f"tiny/apples  {found}" in out and frames.frames == 2
+    assert frames[0].pixels.tobytes() != frames[1].pixels.tobytes()
+    assert identity("", rendered(profile(str(made)).pictures[0]))["sha256"] == found
+    assert "apples, frames 0–1" in (data / "tiny" / "README.md").read_text()
+    when = (data / "tiny" / "apples" / "frame_0001.png").stat().st_mtime_ns
+    assert run("render", "--set", f"benchmark:{made}", "-o", data)[0] == 0
+    assert (data / "tiny" / "apples" / "frame_0001.png").stat().st_mtime_ns == when  # not rendered again
+
+    taken = ("benchmark", made, "--pictures", data, "-o", tmp_path / "r.json", "--scheme")
+    refused(run(*taken, "jpeg2000"), "scheme jpeg2000 codes no takes: apples of profile tiny is one")
+    assert run(*taken, "si-h264")[0] == 0
+    row = json.loads((tmp_path / "r.json").read_text())["pictures"][0]
+    assert (row["sha256"], row["frames"], row["pixels"]) == (found, 2, [128, 64])
+    again = codec.open_take(codec.encode_take(frames, "si-h264", bpp=8.0))
+    point = row["points"][1]
+    # The rate is of all frames, the PSNR of all their errors.
+    assert point["bpp"] == 8 * point["nbytes"] / (2 * 128 * 64) <= 8.0
+    assert point["q_global"] == pytest.approx(measure_take(frames, again).pooled_psnr, abs=1e-9)
+    assert run("ranking", made, tmp_path / "r.json", "-o", tmp_path / "page.md")[0] == 0
+    (data / "tiny" / "apples" / "frame_0001.png").unlink()
+    code, _, error = run(*taken, "si-h264", "--force")
+    assert code == 2 and "apples has 1 frames: 2 are needed" in error
 
 
 @pytest.mark.slow

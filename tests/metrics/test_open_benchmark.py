@@ -4,19 +4,22 @@ import json
 import shlex
 import sys
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from ii_core import IIPicture
+from ii_core import IIPicture, video_of
 from ii_core.formats.pgx import Component, read_pgx, write_pgx
 from ii_core.formats.pleno import COMPONENTS, read_pleno_views, read_ppm, write_pleno_views, write_ppm
+from metrics import rate_distortion
+from metrics.batch import measuring
 from metrics.benchmark.external import External, Refused
 from metrics.benchmark.profile import profile, profile_names
 from metrics.benchmark.ranking import chart_path, ranked, write_page
 from metrics.benchmark.result import read_result, run, write_result
 from metrics.benchmark.run_log import RunLog
+from metrics.benchmark.subject import measuring_subject
 from metrics.study import picture_json, provenance
 
 PYTHON = f"{shlex.quote(sys.executable)} -I -S"  # without packages: starts in 20 ms
@@ -85,6 +88,74 @@ def coder(tmp_path):
     script.write_text(CODER)
     start = f"{PYTHON} {shlex.quote(str(script))}"
     return External(encoder=f"{start} enc {{in}} {{out}} {{bytes}}", decoder=f"{start} dec {{in}} {{out}}")
+
+
+# -- videos
+
+
+STORED = """
+import pathlib, sys, zlib
+act, source, target, *more = sys.argv[1:]
+source, target = pathlib.Path(source), pathlib.Path(target)
+if act == "enc":
+    assert more == ["2", "24"], more
+    files = sorted(f for f in source.rglob("*") if f.is_file())
+    assert len(files) == 18 and {f.parent.name for f in files} == {"frame_0000", "frame_0001"}
+    named = [f.relative_to(source).as_posix().encode() + b"|" + f.read_bytes() for f in files]
+    target.write_bytes(zlib.compress(b"".join(named), 9))
+else:
+    data = zlib.decompress(source.read_bytes())
+    while data:
+        name, _, data = data.partition(b"|")
+        size = len(b"P6\\n6 5\\n1023\\n") + 6 * 6 * 5
+        (target / name.decode()).write_bytes(data[:size])
+        data = data[size:]
+"""
+
+
+def test_external_commands_code_videos_frame_by_frame(tmp_path, picture):
+    script = tmp_path / "stored.py"
+    script.write_text(STORED)
+    start = f"{PYTHON} {shlex.quote(str(script))}"
+    coder = External(encoder=f"{start} enc {{in}} {{out}} {{frames}} {{fps}}", decoder=f"{start} dec {{in}} {{out}}")
+    video = video_of([picture, picture.with_pixels(picture.pixels[::-1].copy())])
+    coded = coder.encode(video, "stored", bpp=200.0)
+    assert coded.bpp == 8 * coded.nbytes / (2 * 18 * 15) and coded.reached
+    decoded = coder.decode(coded).picture
+    assert decoded.fps == 24 and len(decoded) == 2
+    for before, after in zip(video, decoded, strict=True):
+        np.testing.assert_array_equal(before.pixels, after.pixels)
+
+
+def test_measures_of_a_video_are_means_of_its_frames(picture):
+    worse = [picture.with_pixels(picture.pixels ^ np.uint8(bit)) for bit in (1, 4)]
+    video, decoded = video_of([picture, picture]), video_of(worse)
+    found = measuring_subject(video, ["q_global", "q_angle_mean"])(decoded)
+    alone = [measuring(picture, ["q_angle_mean"])(one)["q_angle_mean"] for one in worse]
+    assert found == {"q_angle_mean": pytest.approx(np.mean(alone))}
+    # Errors of 1 and of 4 codes: the pooled squared error is (1 + 16)/2.
+    point = rate_distortion(video, ["x"], [1.0], encode=lambda *_, bpp: Coded(bpp), decode=lambda _: decoded)[0]
+    assert point["q_global"] == pytest.approx(10 * np.log10(255**2 / 8.5))
+    short = video_of(worse[:1])
+    with pytest.raises(ValueError, match="decoded has 1 frames: 2 are needed"):
+        rate_distortion(video, ["x"], [1.0], encode=lambda *_, bpp: Coded(bpp), decode=lambda _: short)
+
+
+@dataclass
+class Coded:
+    """What an encoder returns."""
+
+    bpp: float
+    nbytes: int = 1
+    encode_seconds: float = 0.0
+    reached: bool = True
+
+
+@pytest.mark.parametrize("frames", ["0", "-1", "1.5", "true", "20000", '"2"'])
+def test_a_wrong_number_of_frames_is_refused(tmp_path, frames):
+    (tmp_path / "mine.toml").write_text(PROFILE + f"frames = {frames}\n")
+    with pytest.raises(ValueError, match=r"mine\.toml: frames is"):
+        profile(tmp_path / "mine.toml")
 
 
 # -- views as files
@@ -331,7 +402,7 @@ def test_wrong_commands_are_refused_before_work(encoder, message):
 
 
 def test_profiles_of_the_package():
-    assert set(profile_names()) == {"dissertation", "jpeg-pleno", "small"}
+    assert set(profile_names()) == {"dissertation", "jpeg-pleno", "small", "takes"}
     pleno, own = profile("jpeg-pleno"), profile("dissertation")
     assert pleno.rates_bpp == (0.001, 0.005, 0.02, 0.1, 0.75) and {"q_ctc_psnr", "q_ctc_ssim"} <= set(pleno.measures)
     # Version 1 measured PSNR of full-range values and SSIM of BT.601 luma: other figures than the conditions have.

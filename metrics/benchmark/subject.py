@@ -1,0 +1,59 @@
+"""What a coder of the benchmark gets, a picture or a video: identity and measures."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from statistics import fmean
+from typing import Any
+
+import numpy as np
+
+from ii_core import IIPicture, IIVideo
+
+from ..batch import measuring
+from ..study import picture_json
+
+Subject = IIPicture | IIVideo
+
+
+@dataclass(frozen=True)
+class Decoded:
+    """Decoded picture or video, and CPU seconds of the decoder."""
+
+    picture: Subject
+    seconds: float
+
+
+def identity(name: str, subject: Subject) -> dict[str, Any]:
+    """Return the identity of a picture as `picture_json` does, or of a video: the hash is that of all its frames."""
+    if isinstance(subject, IIPicture):
+        return picture_json(name, subject)
+    hashed = hashlib.sha256()
+    for frame in subject:
+        hashed.update(np.ascontiguousarray(frame.pixels).data)
+    of_frame = picture_json(name, subject.structure)
+    return {**of_frame, "sha256": hashed.hexdigest(), "frames": subject.frames, "fps": float(subject.fps)}
+
+
+def measuring_subject(reference: Subject, names: Sequence[str]) -> Callable[[Any], dict[str, Any]]:
+    """Return a function that measures what was decoded; values of a video are means over its frames.
+
+    It leaves Q_global to `rate_distortion`, which pools the errors of all frames.
+
+    Raises
+    ------
+    ValueError
+        As `measuring`.
+    """
+    names = [name for name in names if name != "q_global"]
+    if isinstance(reference, IIPicture):
+        return measuring(reference, names)
+    measuring(reference[0], names)  # refuses before anything is coded
+
+    def measure(decoded: IIVideo) -> dict[str, Any]:
+        rows = [measuring(before, names)(after) for before, after in zip(reference, decoded, strict=True)]
+        return {name: fmean(row[name] for row in rows) for name in names}
+
+    return measure
