@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atomic import disk_errors
+from ..atomic import atomic_path
 from ..files import check_file
 
 MAX_BITS = 16
@@ -49,8 +49,8 @@ def write_pgx(path: Path, component: Component, *, little: bool = False) -> None
     _check_range(path, component)
     height, width = codes.shape
     header = f"PG {'LM' if little else 'ML'} {'-' if signed else '+'}{bits} {width} {height}\n"
-    with disk_errors(path):
-        path.write_bytes(header.encode() + codes.astype(_dtype(bits, signed, little)).tobytes())
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(header.encode() + codes.astype(_dtype(bits, signed, little)).tobytes())
 
 
 def read_pgx(path: Path) -> Component:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atomic import disk_errors
+from ..atomic import atomic_path
 from ..files import check_file, write_image
 from ..picture import IIPicture
 from .pgx import Component, read_pgx, write_pgx
@@ -120,8 +120,8 @@ def view_name(row: int, col: int, kind: str) -> str:
 def write_ppm(path: Path, codes: Pixels) -> None:
     """Write (T, S, 3) codes of 10 bit as a binary PPM, two bytes a value, the high byte first."""
     height, width, _ = codes.shape
-    with disk_errors(path):
-        path.write_bytes(f"P6\n{width} {height}\n{TEN_BIT}\n".encode() + codes.astype(">u2").tobytes())
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(f"P6\n{width} {height}\n{TEN_BIT}\n".encode() + codes.astype(">u2").tobytes())
 
 
 def read_ppm(path: Path) -> Pixels:

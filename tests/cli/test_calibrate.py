@@ -8,6 +8,7 @@ import pytest
 from benchmarks.accuracy.calibration import exposed, random_camera, white_image
 from ii_core import IICamera, IIPicture
 from ii_core.files import read_image, write_image
+from tests.support.full_disk import limited
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,18 @@ def test_a_picture_without_lenses_ends_in_one_line(run, refused, tmp_path):
     refused(run("calibrate", tmp_path / "n.png", "-o", tmp_path / "c"), "no lenses are found")
     refused(run("calibrate", tmp_path / "n.png", "--mosaic", "rgbb", "-o", tmp_path / "c"), "mosaic")
     refused(run("calibrate", tmp_path / "n.png", "--white", tmp_path / "w.png", "-o", tmp_path / "c"), "w.png")
+
+
+@pytest.mark.parametrize("limit", [1_000, 140_000])
+def test_a_full_disk_ends_in_one_line(frames, tmp_path, limit):
+    """No file fits, or all but the picture of centres."""
+    done = limited(limit, "calibrate", frames[0] / "raw.png", "-o", tmp_path / "c", cwd=tmp_path)
+    assert done.returncode == 2 and "error: cannot write " in done.stderr and "Traceback" not in done.stderr
+    left = sorted(path.name for path in tmp_path.rglob("*"))
+    whole = ["c", "camera.json", "picture.png", "picture.png.json", "report.json"]
+    assert left == ([] if limit == 1_000 else whole)
+    if limit > 1_000:
+        assert IIPicture.load(tmp_path / "c/picture.png").camera is not None
 
 
 def test_existing_files_are_not_replaced(run, refused, frames, tmp_path):

@@ -12,6 +12,7 @@ import pytest
 
 from ii_core import IIPicture
 from ii_core.files import read_image
+from tests.support.full_disk import limited
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="RLIMIT_FSIZE is of POSIX")
 
@@ -25,6 +26,7 @@ from ii_core import (
 from ii_core.display.film import write_animation
 from ii_core.files import write_image, write_json
 from ii_core.formats.pfm import write_pfm
+from ii_core.formats.pleno import write_pleno_views
 from ii_core.json_lines import append_record
 from ii_core.spread import spread_maps
 from ii_core.spread_files import write_spread
@@ -89,6 +91,7 @@ writers = {
     "result.json": lambda path: write_result(path, {"pictures": [{"name": "x", "points": points}]}),
     "study.json": lambda path: write_study(path, "x", points, picture=picture),
     "views": lambda path: (path.mkdir(), write_views(picture, path)),
+    **{f"pleno_{k}": lambda path, k=k: write_pleno_views(picture, path, k) for k in ("ppm", "pgx", "png")},
     "hci": lambda path: (path.mkdir(), write_hci(picture, path, depth=rng.random((96, 160)))),
     "quilt.png": lambda path: write_quilt(picture, path),
     "map.pfm": lambda path: write_pfm(path, rng.random((40, 60)).astype(np.float32)),
@@ -139,6 +142,7 @@ NAMES = [
     "stream.mkv", "stream.mp4", "stream.h264", "film.mp4", "film.gif", "film.webp",
     "maps_png16", "maps_png8", "maps_exr", "maps_hdr", "views", "hci", "quilt.png", "map.pfm", "page.html",
     "chart.png", "chart.pdf", "chart.svg", "table.csv", "table.tex",
+    "pleno_ppm", "pleno_pgx", "pleno_png",
     "spread", "take.ii", "frames", "take_coded.ii", "films", "test.html", "opinions.png", "answers", "result.json",
     "study.json", "log.jsonl",
     "shot.png", "shot.tif", "shot.exr", "support.exr",
@@ -172,20 +176,6 @@ def test_a_full_disk_is_reported_and_no_broken_file_is_left(outcomes, name):
     for outcome in outcomes[name]:
         assert [path for path in outcome["broken"] if not path.endswith(KEPT.get(name, ()))] == [], outcome
         assert outcome["said"] and "cannot write" in outcome["said"] and "Error(" not in outcome["said"], outcome
-
-
-COMMAND = """
-import resource, sys
-from raytrace_ii import cli
-resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv.pop(1)),) * 2)
-cli.main()
-"""
-
-
-def limited(limit, *arguments, cwd):
-    return subprocess.run(
-        [sys.executable, "-c", COMMAND, str(limit), *map(str, arguments)], capture_output=True, text=True, cwd=cwd
-    )
 
 
 def test_commands_end_with_one_line_and_leave_nothing(tmp_path, run):
