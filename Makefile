@@ -14,7 +14,7 @@ study: $(VENV)/.installed
 	$(BIN)/python -m benchmarks run study --publish
 
 test: lint
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
 
 lint: $(VENV)/.installed
 	$(BIN)/ruff check .

@@ -293,8 +293,8 @@ def picture_rows(
     named : path
         Final name of the picture, for errors.
     """
-    # Neighbouring pixels of an elementary image belong to different views. Without filters and at level 2 a PNG takes
-    # 52–62 % less time and 3–25 % fewer bytes: apples, car, cuboid and twins, `setup1` at scale 16, 2026-11-22.
+    # Neighbouring pixels of an elementary image belong to different views. PNG's filters,
+    # which predict a pixel from its neighbours, cost time and bytes.
     filtered = (1, 1) in (structure.lenses, structure.ei_pixels)
     dtype = structure.pixels.dtype.name
     with image_rows(file, structure.size, 3, dtype, filtered=filtered, named=named) as write:

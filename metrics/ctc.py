@@ -66,7 +66,7 @@ def q_ctc_ssim(reference: Compared, decoded: Compared, *, structure: Structure |
     Raises
     ------
     ValueError
-        If the pictures differ in structure or type, are not regular, or hold a pixel that is not finite.
+        As `q_ctc_psnr`.
 
     References
     ----------

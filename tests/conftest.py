@@ -7,7 +7,9 @@ import pytest
 from hypothesis import settings
 
 from raytrace_ii import cli
-from tests.support.browser import browser, pytest_collection_modifyitems, show, show_once  # noqa: F401
+from tests.support import browser as browsers
+from tests.support import workers
+from tests.support.browser import browser, show, show_once  # noqa: F401
 
 # The first call of a kernel compiles it, which would exceed any deadline. CI uses the same examples every time.
 settings.register_profile("here", deadline=None, derandomize="CI" in os.environ)
@@ -17,6 +19,13 @@ settings.load_profile("here")
 def pytest_addoption(parser):
     """Flags of this suite."""
     parser.addoption("--make-golden", action="store_true", help="code what tests/golden lacks")
+
+
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
+def pytest_collection_modifyitems(items):
+    """Mark tests by what they need and where they run."""
+    browsers.mark(items)
+    workers.group(items)
 
 
 @pytest.fixture

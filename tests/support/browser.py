@@ -14,7 +14,7 @@ READY = """() => Promise.race([
     new Promise((_, reject) => setTimeout(() => reject(new Error("the page does not get ready")), 60000))])"""
 
 
-def pytest_collection_modifyitems(items):
+def mark(items):
     """Mark every test that drives a browser."""
     for item in items:
         if "browser" in getattr(item, "fixturenames", ()):
