@@ -165,6 +165,7 @@ BENCHMARKS = {
         Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.light_field_threads", records=OWN, fills=("docs/lf.md",)),
+        Benchmark("coding.jplm", needs="jpl-encoder-bin and jpl-decoder-bin", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.light_field_bounds", records=OWN, fills=("docs/lf_bounds.md",)),
         Benchmark("pages.lf_bounds_chart", needs="records of light_field_bounds", writes=(f"{IMAGES}/lf_bounds.*",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),

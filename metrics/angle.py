@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import checks
-from ii_core.colour import CB, CR, KB, KG, KR
+from ii_core.colour import YCBCR
 
 from .global_angle import angle_quality
 from .pair import Compared, PicturePair, Structure, picture_pair
@@ -16,12 +16,6 @@ from .quality import AngleQuality
 from .view import LUMA, WINDOW
 
 Floats = NDArray[np.float64]
-# BT.709, full range: Y, Cb and Cr from R, G and B.
-YCBCR = np.array([
-    [KR, KG, KB],
-    [-KR / CB, -KG / CB, 0.5],
-    [0.5, -KG / CR, -KB / CR],
-])  # fmt: skip
 # Exponents of the scales, finest first (Wang, Simoncelli and Bovik 2003).
 SCALES = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 

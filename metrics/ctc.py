@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .angle import YCBCR, each_view, ssim_maps, weighted_psnr
+from ii_core.colour import video_codes
+
+from .angle import each_view, ssim_maps, weighted_psnr
 from .pair import Compared, PicturePair, Structure, picture_pair
 from .quality import AngleQuality
 
 PEAK = 1023  # of 10 bit
-SCALE = 4 * np.array([219, 224, 224])  # codes of 10 bit from black to white, and between the ends of a colour
-OFFSET = 4 * np.array([16, 128, 128])
 Floats = NDArray[np.float64]
 
 
@@ -98,5 +98,4 @@ def ctc_ssim(pair: PicturePair) -> AngleQuality:
 
 def codes(rgb: Floats) -> Floats:
     """Return the YCbCr codes of RGB in [0, 1], (…, 3)."""
-    ten_bit = np.floor(np.clip(rgb, 0, 1) * PEAK + 0.5) / PEAK
-    return np.floor(ten_bit @ YCBCR.T * SCALE + OFFSET + 0.5)
+    return video_codes(np.floor(np.clip(rgb, 0, 1) * PEAK + 0.5) / PEAK)

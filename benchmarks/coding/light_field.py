@@ -137,10 +137,10 @@ def tables() -> Tables:
     tools = ["| picture | " + " | ".join(TOOLS.values()) + " |", "|---|" + "---|" * len(TOOLS)]
     for name in names:
         ours = curves[name, OURS]
-        cells = [_difference(curves.get((name, other)), ours) for other in OTHERS]
+        cells = [difference(curves.get((name, other)), ours) for other in OTHERS]
         times = [f"{np.median([point[key] for point in ours]):.1f}" for key in ("encode_us", "decode_us")]
         against.append(f"| {name} | {' | '.join(cells + times)} |")
-        without = [_difference(ours, curves.get((name, tool))) for tool in TOOLS]
+        without = [difference(ours, curves.get((name, tool))) for tool in TOOLS]
         tools.append(f"| {name} | {' | '.join(without)} |")
     lossless = ["| picture | " + " | ".join(f"`{scheme}`" for scheme in LOSSLESS) + " |"]
     lossless.append("|---|" + "---|" * len(LOSSLESS))
@@ -163,14 +163,16 @@ def targets(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     for scene in SCENES:
         curves = {row["scheme"]: row["points"] for row in rows if row["scene"] == scene}
         anchor = curves.get(coders.ANCHOR)
-        rates = {name: _rate(anchor, points) for name, points in curves.items() if anchor and not _is_ours(name)}
+        rates = {
+            name: rate_change(anchor, points) for name, points in curves.items() if anchor and not _is_ours(name)
+        }
         known = {name: rate for name, rate in rates.items() if rate is not None}
         best = min(known, key=known.__getitem__, default="")
         for other in sorted(known, key=known.__getitem__):
-            if (_rate(curves[best], curves[other]) or 0) < 0:
+            if (rate_change(curves[best], curves[other]) or 0) < 0:
                 best = other
         lines += [
-            f"| {scene} | `{name}` | `{best}` | {_difference(curves[best], curves[name])} |"
+            f"| {scene} | `{name}` | `{best}` | {difference(curves[best], curves[name])} |"
             for name in filter(_is_ours, curves if known else ())
         ]
     return [*lines, "", origin(rows)] if len(lines) > 2 else ["Not measured yet."]
@@ -180,13 +182,13 @@ def _is_ours(scheme: str) -> bool:
     return scheme.partition(":")[0] == OURS
 
 
-def _difference(anchor: Any, tested: Any) -> str:
+def difference(anchor: Any, tested: Any) -> str:
     """Return the Bjøntegaard rate of ``tested`` as text."""
-    rate = None if anchor is None or tested is None else _rate(anchor, tested)
+    rate = None if anchor is None or tested is None else rate_change(anchor, tested)
     return "–" if rate is None else _percent(rate)
 
 
-def _rate(anchor: Any, tested: Any) -> float | None:
+def rate_change(anchor: Any, tested: Any) -> float | None:
     """Return the Bjøntegaard rate of ``tested`` in per cent; None if the curves hardly overlap."""
     try:
         return bd_rate(*((_column(points, key)) for points in (anchor, tested) for key in ("bpp", "psnr")))

@@ -1,8 +1,8 @@
 """Views for the programs of JPEG Pleno: ``CCC_RRR.ppm`` of 10 bit, the same names as PGX, or as PNG.
 
 Columns and rows count from the top left, in camera order; the column comes first, as in JPEG Pleno's pictures and
-reference software. A view in PGX is three files of one name in folders 0, 1 and 2: red, green and blue. 8-bit codes
-become the nearest of the 1024 codes and return unchanged.
+reference software. A view in PGX is three files of one name in folders 0, 1 and 2: red, green and blue, or, for the
+reference software, Y, Cb and Cr of BT.709. 8-bit codes become the nearest of the 1024 codes and return unchanged.
 """
 
 from __future__ import annotations
@@ -14,14 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..atomic import atomic_path
+from ..colour import of_video_codes, video_codes
 from ..files import check_file, write_image
 from ..picture import IIPicture
 from .pgx import Component, read_pgx, write_pgx
 from .views import camera_views, read_view
 
 TEN_BIT = 1023
-KINDS = ("ppm", "pgx", "png")
-COMPONENTS = ("0", "1", "2")  # folders of red, green and blue in PGX
+KINDS = ("ppm", "pgx", "ycbcr", "png")
+IN_PARTS = ("pgx", "ycbcr")  # PGX of RGB, and of YCbCr
+COMPONENTS = ("0", "1", "2")  # folders of the components in PGX
 MAX_HEADER = 256  # bytes
 Pixels = NDArray[Any]
 
@@ -35,7 +37,7 @@ def write_pleno_views(picture: IIPicture, folder: Path, kind: str) -> int:
         Regular, uint8.
     folder : Path
         Created if missing.
-    kind : {"ppm", "pgx", "png"}
+    kind : {"ppm", "pgx", "ycbcr", "png"}
 
     Raises
     ------
@@ -50,8 +52,9 @@ def write_pleno_views(picture: IIPicture, folder: Path, kind: str) -> int:
         name = view_name(row, col, kind)
         if kind == "ppm":
             write_ppm(folder / name, ten_bit(view))
-        elif kind == "pgx":
-            for part, codes in zip(COMPONENTS, np.moveaxis(ten_bit(view), 2, 0), strict=True):
+        elif kind in IN_PARTS:
+            ten = ten_bit(view) if kind == "pgx" else video_codes(view / 255)
+            for part, codes in zip(COMPONENTS, np.moveaxis(ten, 2, 0), strict=True):
                 write_pgx(folder / part / name, Component(codes.astype(np.int32), 10, signed=False))
         else:
             write_image(folder / name, view)
@@ -61,7 +64,7 @@ def write_pleno_views(picture: IIPicture, folder: Path, kind: str) -> int:
 
 def make_view_folder(folder: Path, kind: str) -> None:
     """Create a folder for views with the folders of its components."""
-    for part in COMPONENTS if kind == "pgx" else (".",):
+    for part in COMPONENTS if kind in IN_PARTS else (".",):
         (folder / part).mkdir(parents=True, exist_ok=True)
 
 
@@ -84,37 +87,39 @@ def read_pleno_views(folder: Path, like: IIPicture, kind: str) -> IIPicture:
     empty = like.with_pixels(out)
     for row, col, view in camera_views(empty):  # views of `out`, in place
         name = view_name(row, col, kind)
-        if kind == "pgx":
-            for channel, part in enumerate(COMPONENTS):
-                view[..., channel] = _read_codes(folder, f"{part}/{name}", kind, view[..., channel].shape)
+        if kind in IN_PARTS:
+            parts = [_read_codes(folder, f"{part}/{name}", kind, view.shape[:2]) for part in COMPONENTS]
+            codes = np.stack(parts, axis=-1)
+            view[...] = codes if kind == "pgx" else np.rint(np.clip(255 * of_video_codes(codes), 0, 255))
         else:
             view[...] = _read_codes(folder, name, kind, view.shape)
     return empty
 
 
 def _read_codes(folder: Path, name: str, kind: str, shape: tuple[int, ...]) -> Pixels:
-    """Return the 8-bit codes of a view or of one component of it."""
+    """Return the 8-bit codes of a view or of one component of it; of YCbCr the codes in units of 10 bit."""
     path = folder / name
     if not path.is_file():
         raise ValueError(f"view {name} is missing")
     if kind == "ppm":
         found = _eight_bit(read_ppm(path), TEN_BIT)
-    elif kind == "pgx":
+    elif kind in IN_PARTS:
         component = read_pgx(path)
-        found = _eight_bit(component.codes - component.lowest, (1 << component.bits) - 1)
+        codes, bits = component.codes - component.lowest, component.bits
+        found = _eight_bit(codes, (1 << bits) - 1) if kind == "pgx" else codes * 2.0 ** (10 - bits)
     else:
         found = read_view(path)
-    if found.shape != shape or found.dtype != np.uint8:
+    if found.shape != shape or found.dtype != (np.float64 if kind == "ycbcr" else np.uint8):
         raise ValueError(
             f"view {name} is {found.shape[1]}×{found.shape[0]} px of {found.dtype}: "
-            f"{shape[1]}×{shape[0]} px of uint8 are needed"
+            f"{shape[1]}×{shape[0]} px of {found.dtype if kind == 'ycbcr' else 'uint8'} are needed"
         )
     return found
 
 
 def view_name(row: int, col: int, kind: str) -> str:
     """Return the name of a view's file."""
-    return f"{col:03}_{row:03}.{kind}"
+    return f"{col:03}_{row:03}.{'pgx' if kind in IN_PARTS else kind}"
 
 
 def write_ppm(path: Path, codes: Pixels) -> None:

@@ -65,9 +65,9 @@ class External:
         folder of views and the coded file, for the decoder the coded file and the folder of views. Optional are
         ``{bpp}``, ``{bytes}`` (the target), ``{rows}``, ``{columns}`` (views), ``{width}``, ``{height}`` (of a view),
         ``{frames}`` (1 for a picture), ``{fps}`` (0 for a picture).
-    kind : {"ppm", "pgx", "png"}
-        Files of the views: binary PPM of 10 bit, PGX of 10 bit in folders 0, 1 and 2 of red, green and blue, or PNG
-        of 8 bit; named CCC_RRR, the column first.
+    kind : {"ppm", "pgx", "ycbcr", "png"}
+        Files of the views: binary PPM of 10 bit, PGX of 10 bit in folders 0, 1 and 2 of red, green and blue or of Y,
+        Cb and Cr, or PNG of 8 bit; named CCC_RRR, the column first.
     seconds : float
         Limit of each command.
     rate_tolerance : float

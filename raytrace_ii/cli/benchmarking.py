@@ -26,7 +26,9 @@ def benchmark(
         typer.Option(help="Commands of an encoder and a decoder: 'enc {in} {out} {bpp}' 'dec {in} {out}'."),
     ] = ("", ""),
     name: Annotated[str | None, typer.Option(help="Name of the external commands in results.")] = None,
-    views: Annotated[str, typer.Option(help="Files for external commands: ppm or pgx of 10 bit, or png.")] = "ppm",
+    views: Annotated[
+        str, typer.Option(help="Files for external commands: ppm, pgx or ycbcr of 10 bit, or png.")
+    ] = "ppm",
     pictures: Annotated[
         Path | None, typer.Option(help="Folder of `raytrace-ii render --set benchmark`; rendered if none.")
     ] = None,

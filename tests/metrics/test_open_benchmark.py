@@ -217,6 +217,24 @@ def test_views_of_pgx_are_three_files_each(tmp_path, picture):
         read_pleno_views(tmp_path, picture, "pgx")
 
 
+def test_views_of_ycbcr_are_those_of_the_common_test_conditions(tmp_path):
+    """Codes of BT.709-6, table 4; every 8-bit colour returns, here the corners and a lattice of steps of 5."""
+    named = [(0, 0, 0), (255, 255, 255), (255, 0, 0), (0, 0, 255)]
+    steps = np.arange(0, 256, 5)
+    colours = np.concatenate([named, np.stack(np.meshgrid(steps, steps, steps), -1).reshape(-1, 3)]).astype(np.uint8)
+    shown = IIPicture(np.repeat(colours[None], 2, axis=0), (len(colours), 1), (1, 2))
+    assert write_pleno_views(shown, tmp_path, "ycbcr") == 2
+    np.testing.assert_array_equal(read_pleno_views(tmp_path, shown, "ycbcr").pixels, shown.pixels)
+    parts = [read_pgx(tmp_path / part / "000_001.pgx") for part in COMPONENTS]
+    assert {part.bits for part in parts} == {10}
+    codes = np.stack([part.codes[0, :4] for part in parts], -1)
+    # Y of red is 64 + 876 · 0.2126, of blue 64 + 876 · 0.0722; their Cr and Cb are the highest.
+    assert codes.tolist() == [[64, 512, 512], [940, 512, 512], [250, 409, 960], [127, 960, 471]]
+    wide = Component(parts[0].codes * 4, 12, signed=False)  # a decoder may write more bits
+    write_pgx(tmp_path / "0" / "000_001.pgx", wide)
+    np.testing.assert_array_equal(read_pleno_views(tmp_path, shown, "ycbcr").pixels, shown.pixels)
+
+
 @pytest.mark.parametrize("bits", range(1, 17))
 @pytest.mark.parametrize("signed", [False, True])
 @pytest.mark.parametrize("little", [False, True])
