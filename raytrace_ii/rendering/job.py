@@ -21,6 +21,7 @@ from ..tracing.packing import packed, share
 from ..tracing.sampling import Adaptive, Sampling, Shoot, adaptive_mean, fixed_sum
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
 from .audit import FULL_DEPTH, FULL_SAMPLES, Audit, chosen, compared
+from .nearness import pixels_are_nearer
 from .tiles import Order, Tile, ray_order, tiles
 
 TILE_RAYS = 65536  # many enough to hide the overhead of numpy, few enough for work arrays to stay in cache
@@ -135,7 +136,7 @@ class Job:
         started = time.thread_time()
         tracer = self._tracer()
         shape = rows.stop - rows.start, cols.stop - cols.start
-        order = ray_order(self.camera, rows, cols)
+        order = ray_order(self.camera, rows, cols, self._by_lens())
         support = self._support_room(len(order.pixels))
         if isinstance(self.sampling, Adaptive):
             radiance, samples = self._adaptive(tracer, self.sampling, rows, cols, order, support)
@@ -205,6 +206,21 @@ class Job:
             )  # fmt: skip
         tracer.begin()
         return tracer
+
+    def _by_lens(self) -> bool:
+        """Return whether rays go lens by lens: the same on all threads, from camera and scene alone."""
+        found: bool | None = getattr(self._local, "by_lens", None)
+        if found is None:
+            found = self._local.by_lens = pixels_are_nearer(self.camera, self._distances)
+        return found
+
+    def _distances(self, L: NDArray[np.float64], D: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the distances of the content along rays of unit directions (n, 3) in mm; NaN without a hit."""
+        turn, shift = self.pose[:3, :3].T, self.pose[:3, 3]
+        with np.errstate(over="ignore", invalid="ignore"):
+            origins, directions = (L @ turn + shift).astype(np.float32), (D @ turn).astype(np.float32)
+        hits, _ = packed(self.scene).intersector.nearest(origins, directions)
+        return np.where(hits.faces >= 0, hits.distances.astype(np.float64), np.nan)
 
     def _lobes(self) -> tuple[int, int]:
         """Return the rays of a sample over a rough mirror's lobe, and the samples that share the lobe's positions."""

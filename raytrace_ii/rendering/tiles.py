@@ -1,7 +1,9 @@
 """Tiles of a picture, and the order of rays within a tile.
 
-Rays from one position under 4×4 neighbouring lenses have equal directions and origins one lens pitch apart; they form
-a packet. Tiles and order depend on the camera alone, so that all workers trace the same packets.
+Rays from one position under 4×4 neighbouring lenses have equal directions and origins one lens pitch apart; rays from
+4×4 neighbouring pixels under one lens start close together and spread with distance. Those that are closer at the
+content form a packet, see `nearness`. Tiles and order depend on camera and scene alone, so that all workers trace
+the same packets.
 """
 
 from __future__ import annotations
@@ -56,11 +58,11 @@ def _span(most: int, cell: int, whole: bool) -> int:
     return cell if whole else most
 
 
-def ray_order(camera: Camera, rows: slice, cols: slice) -> Order:
+def ray_order(camera: Camera, rows: slice, cols: slice, by_lens: bool = False) -> Order:
     """Return the order of the rays of a tile: by position under the lens, then by blocks of 4×4 lenses.
 
-    Under large lenses, or a single one, the order is by blocks of 4×4 pixels; for maps without lenses, by direction
-    and origin.
+    With ``by_lens`` it is lens by lens, along a Morton curve of the pixels under it. Under large lenses, or a single
+    one, the order is by blocks of 4×4 pixels; for maps without lenses, by direction and origin.
     """
     shape = rows.stop - rows.start, cols.stop - cols.start
     lattice = _lattice(camera)
@@ -70,7 +72,7 @@ def ray_order(camera: Camera, rows: slice, cols: slice) -> Order:
         return _in_cells(shape, (rows.start % SIDE, cols.start % SIDE), (1, 1))
     if cells := _regular_cells(camera):
         packet = cells[1] * SIDE, cells[0] * SIDE
-        return _in_cells(shape, (rows.start % packet[0], cols.start % packet[1]), cells)
+        return _in_cells(shape, (rows.start % packet[0], cols.start % packet[1]), cells, by_lens)
     m, n = np.arange(cols.start, cols.stop)[None], np.arange(rows.start, rows.stop)[:, None]
     k, l = lattice.nearest(m, n)
     x, y = lattice.centres(k, l)
@@ -78,14 +80,15 @@ def ray_order(camera: Camera, rows: slice, cols: slice) -> Order:
         np.floor(at + 0.5 - centre + pitch / 2).clip(0, math.ceil(pitch) - 1).astype(np.int64)
         for at, centre, pitch in ((m, x, lattice.pitch[0]), (n, y, lattice.pitch[1]))
     )
-    return _order(_keys(k, l, u, v), shape[1])
+    return _order((_lens_keys if by_lens else _keys)(k, l, u, v), shape[1])
 
 
 @lru_cache(maxsize=64)
-def _in_cells(shape: tuple[int, int], start: tuple[int, int], cells: tuple[int, int]) -> Order:
+def _in_cells(shape: tuple[int, int], start: tuple[int, int], cells: tuple[int, int], by_lens: bool = False) -> Order:
     """Return the order of a tile of cells of equal size; its corner lies at ``start`` in the cells of a packet."""
     n, m = np.arange(shape[0])[:, None] + start[0], np.arange(shape[1])[None] + start[1]
-    return _order(_keys(m // cells[0], n // cells[1], m % cells[0], n % cells[1]), shape[1])
+    keys = _lens_keys if by_lens else _keys
+    return _order(keys(m // cells[0], n // cells[1], m % cells[0], n % cells[1]), shape[1])
 
 
 def _keys(k: Integers, l: Integers, u: Integers, v: Integers) -> Integers:
@@ -94,6 +97,14 @@ def _keys(k: Integers, l: Integers, u: Integers, v: Integers) -> Integers:
     packet = down * (across.max() + 1) + across
     place = v * (u.max() + 1) + u
     return ((place * (packet.max() + 1) + packet) * SIDE + l % SIDE) * SIDE + k % SIDE
+
+
+def _lens_keys(k: Integers, l: Integers, u: Integers, v: Integers) -> Integers:
+    """Return the ranks of pixels by lens (k, l), then along a Morton curve of positions (u, v) under it."""
+    size = int(max(u.max(), v.max())).bit_length()
+    lens = (l - l.min()) * (k.max() - k.min() + 1) + k - k.min()
+    place = sum((at >> bit & 1) << (2 * bit + axis) for axis, at in enumerate((u, v)) for bit in range(size))
+    return (lens << 2 * size) | place
 
 
 def _along_rays(camera: Camera, rows: slice, cols: slice) -> Integers:
@@ -125,6 +136,14 @@ def _lattice(camera: Camera) -> Lattice | None:
     if camera.model is not None:
         return camera.model.lens_lattice
     return Lattice(camera.lenses, camera.ei_pixels, (0.0, 0.0), False) if camera.lenses != (1, 1) else None
+
+
+def lens_cells(camera: Camera) -> tuple[int, int] | None:
+    """Return the pixels across and down under one of several lenses, rounded down; None if a lens is large."""
+    lenses = _lattice(camera)
+    if lenses is None or lenses.lenses == (1, 1) or max(lenses.pitch) > LARGE_LENS:
+        return None
+    return int(lenses.pitch[0]), int(lenses.pitch[1])
 
 
 def _regular_cells(camera: Camera) -> tuple[int, int] | None:

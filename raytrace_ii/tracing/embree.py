@@ -31,8 +31,9 @@ _ROBUST, _TRIANGLE, _INDEX, _VERTEX, _UINT3, _FLOAT3 = 1 << 2, 0, 0, 1, 0x5003, 
 _COHERENT = 1 << 16  # RTC_RAY_QUERY_FLAG_COHERENT
 _SPARE = 4  # float32 behind a shared buffer's last row: Embree reads 16 bytes at a time
 _CACHE_LINE = 64
-# Largest spread of a packet: wider ones lose to groups of near rays (all scenes, scales 1–32 of setup1, 2026-11-22).
-# Sum of the sides of the box around the origins, in median edges of the faces; the same of the directions as a share.
+# Largest spread of a coherent packet: wider ones lose to groups of near rays, or to Embree's traversal for rays
+# without order (all scenes, scales 1–32 of setup1, 2026-11-22). Sum of the sides of the box around the origins, with
+# its growth on the way to the last hit, in median edges of the faces; the same of the directions as a share.
 NEAR = {"rtcIntersect": 8.0, "rtcOccluded": 16.0}
 NARROW = {"rtcIntersect": 0.25, "rtcOccluded": 0.1}
 _SOME_FACES = 10000  # are enough for a median
@@ -123,7 +124,8 @@ def _declared(functions: ctypes.CDLL) -> ctypes.CDLL:
 class Tree:
     """An Embree scene of one geometry, whose primitive number is the row of a face in (F, 3, 3) corners.
 
-    Rays go in packets in their order, in groups of near rays where a packet spreads more than `NEAR` or `NARROW`.
+    Rays go in packets in their order. A packet that spreads more than `NEAR` or `NARROW` is traced in groups of near
+    rays, and the rest of it without coherence.
 
     Raises
     ------
@@ -182,18 +184,14 @@ class Tree:
         """Addresses, most spread and room for rays: of each call its own, for threads must not share it."""
         width = self.library.width
         active, chosen = _lines(2, np.int32)
-        packet, one = _lines(PACKET_ROWS * width // 16 + 1, np.float32), _lines(PACKET_ROWS // 16 + 1, np.float32)
-        packet, one = packet.reshape(-1), one.reshape(-1)
-        addresses = [
-            ctypes.cast(getattr(self.library.functions, f"{function}{n}"), ctypes.c_void_p).value or 0
-            for n in (width, 1)
-        ]
+        packet = _lines(PACKET_ROWS * width // 16 + 1, np.float32).reshape(-1)
+        address = ctypes.cast(getattr(self.library.functions, f"{function}{width}"), ctypes.c_void_p).value or 0
         calls = Calls(
-            addresses[0], addresses[1], self._scene, self._arguments[0].ctypes.data, self._arguments[1].ctypes.data,
-            active.ctypes.data, packet.ctypes.data, one.ctypes.data,
+            address, self._scene, self._arguments[0].ctypes.data, self._arguments[1].ctypes.data,
+            active.ctypes.data, packet.ctypes.data,
             np.float32(NEAR[function] * self._edge), np.float32(NARROW[function]),
         )  # fmt: skip
-        return calls, active, chosen, packet, packet.view(np.int32), one, one.view(np.int32)
+        return calls, active, chosen, packet, packet.view(np.int32)
 
 
 def with_spare(corners: Floats) -> Floats:

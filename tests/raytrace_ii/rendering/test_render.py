@@ -212,7 +212,7 @@ def places(samples, seed=0):
     camera = Watched(pixels=(24, 16), lenses=(3, 2), pixel_pitch_mm=0.1, gap_mm=2.0)
     object.__setattr__(camera, "asked", [])
     render(Scene(bodies=[body(wall(5))]), camera, samples=samples, seed=seed)
-    ((m, n, place, pixel),) = camera.asked
+    *_, (m, n, place, pixel) = camera.asked  # before them, the rays that measure the distance of the content
     order = np.lexsort((m, n), axis=0)  # stable: samples of a pixel stay in their order
     return camera, place[order].reshape(24 * 16, samples, 2), pixel.reshape(-1, 3)[order].reshape(16, 24, samples, 3)
 

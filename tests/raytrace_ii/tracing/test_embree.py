@@ -90,48 +90,60 @@ def test_hits_are_those_of_single_rays(configuration, spread, n):
             np.testing.assert_array_equal(blocked == 0, hit)
 
 
-class CountedSingles:
-    """Embree's functions, of which those for single rays count their calls."""
+class Watched:
+    """Embree's functions, of which those for packets note each call: whether it is coherent, and its active lanes."""
 
-    def __init__(self, functions):
-        self.functions, self.calls = functions, 0
-        self.rtcIntersect1, self.rtcOccluded1 = map(self.counted, (functions.rtcIntersect1, functions.rtcOccluded1))
+    def __init__(self, library):
+        self.functions, self.width, self.calls = library.functions, library.width, []
+        for name in (f"rtcIntersect{self.width}", f"rtcOccluded{self.width}"):
+            setattr(self, name, self.watched(getattr(library.functions, name)))
 
     def __getattr__(self, name):
         return getattr(self.functions, name)
 
-    def counted(self, function):
+    def watched(self, function):
         address = ctypes.cast(function, ctypes.c_void_p).value
-        kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
+        kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
 
-        def call(*arguments):
-            self.calls += 1
-            kind(address)(*arguments)
+        def call(active, tree, rays, arguments):
+            lanes = sum(lane != 0 for lane in (ctypes.c_int * self.width).from_address(active))
+            self.calls.append((ctypes.c_int.from_address(arguments).value != 0, lanes))
+            kind(address)(active, tree, rays, arguments)
 
         return kind(call)
 
 
-def test_bundles_that_share_a_packet_are_traced_as_packets():
-    """Rays of two bundles in turn, as at the edge of a body: no single rays, and their hits."""
+@pytest.mark.parametrize("configuration", ["", *NARROWER])
+def test_bundles_that_share_a_packet_are_traced_coherently_and_scattered_rays_at_once(configuration):
+    """Rays of two bundles in turn, as at the edge of a body: two calls a packet. Scattered rays: one call."""
     n = 64
-    corners, (origins, directions) = soup(), camera_rays(n, 0.2)
+    library = opened(configuration)
+    corners, (origins, directions) = soup(), camera_rays(n, 0.05)
     directions *= 0.02
     directions[:, 2] = 1
     origins[1::2, 0] += 12  # 28 median edges of the faces
     directions[1::2, 0] -= 2
-    counted = CountedSingles(opened("").functions)
-    packets, single = Tree(replace(opened(""), functions=counted), corners, True), SingleRays(corners, True)
+    watched = Watched(library)
+    packets, single = Tree(replace(library, functions=watched), corners, True), SingleRays(corners, True)
     found, expected = room(n), room(n)
+    single.nearest(origins, directions, NO_REACH, expected)
+    reach, blocked = np.full(n, 100, np.float32), np.full(n, -7, np.int32)
+    for trace in (
+        lambda: packets.nearest(origins, directions, NO_REACH, found),
+        lambda: packets.occluded(origins, directions, reach, blocked),
+    ):
+        watched.calls.clear()
+        trace()
+        assert watched.calls == [(True, library.width // 2)] * (2 * n // library.width)
+    np.testing.assert_array_equal(found[0], expected[0])
+    assert len(set(found[0])) > 4
+    np.testing.assert_array_equal(blocked == 0, expected[0] >= 0)
+    origins, directions = camera_rays(n, 1.0)
+    watched.calls.clear()
     packets.nearest(origins, directions, NO_REACH, found)
     single.nearest(origins, directions, NO_REACH, expected)
     np.testing.assert_array_equal(found[0], expected[0])
-    assert len(set(found[0])) > 4 and (found[0] >= 0).any()
-    blocked = np.full(n, -7, np.int32)
-    packets.occluded(origins, directions, np.full(n, 100, np.float32), blocked)
-    np.testing.assert_array_equal(blocked == 0, expected[0] >= 0)
-    assert counted.calls == 0
-    packets.nearest(*camera_rays(n, 1.0), NO_REACH, found)
-    assert counted.calls > 0
+    assert watched.calls == [(False, library.width)] * (n // library.width)
 
 
 def test_rays_without_a_direction_miss_and_harm_no_neighbour():
