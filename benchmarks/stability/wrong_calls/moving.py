@@ -69,6 +69,7 @@ def take_calls(folder: Path) -> dict[str, Call]:
         "EncodedTake": (codec.EncodedTake, fields),
         "EncodedTake.save": (coded.save, {"path": folder / "saved.ii"}),
         "EncodedTake.load": (codec.EncodedTake.load, {"path": folder / "take.ii", "partial": False}),
+        "codes_takes": (codec.codes_takes, {"scheme": "si-h264"}),
         "take_floor": (codec.take_floor, {"scheme": "si-h264", "lenses": (8, 8), "ei_pixels": (2, 2), "frames": 2,
             "plan": plan}),
         "measure_take": (metrics.measure_take, {"reference": video, "decoded": video, "viewpoints_mm": [FRONT],
