@@ -18,13 +18,26 @@ def light_field_cost(plan: Plan, ei_pixels: tuple[int, int], instants: int) -> A
 
     Parameters
     ----------
+    plan : Plan
+        Segments of the take.
     ei_pixels : (int, int)
         Columns U and rows V of views.
+    instants : int
+        Pictures of the take.
+
+    Returns
+    -------
+    AccessCost
+        Mean and worst number of views decoded, over all views and instants.
 
     Raises
     ------
     TypeError, ValueError
         If an argument is of another type or out of range.
+
+    Notes
+    -----
+    Counted from the order of coding: the pyramid of views (`codec.coders.lf.pyramid`) and the segments of the plan.
     """
     check_type("plan", plan, Plan, "a Plan")
     cols, rows = (whole("ei_pixels", side, 1, MOST_VIEWS) for side in whole_pair("ei_pixels", ei_pixels))

@@ -26,13 +26,11 @@ def moved(plane, dy, dx):
     return (1 - fy) * upper + fy * lower
 
 
-@pytest.mark.parametrize("every", [1, 2])
-def test_the_table_holds_inner_products_of_the_differences(every):
-    """Also for the squares at the border, and for disparities that lead beyond it."""
-    rng = np.random.default_rng(1)
-    views = rng.integers(-900, 900, (4, 3, 36, 52)).astype(np.int16)
+def example(disparity=None):
+    """Four views of noise, the last of which is coded; with a disparity (36, 52) it is synthesised."""
+    views = np.random.default_rng(1).integers(-900, 900, (4, 3, 36, 52)).astype(np.int16)
     blank = np.zeros((1, 1, 1), np.int16)
-    job = Job(
+    return Job(
         views=views,
         disparities=np.full((4, 36, 52), UNKNOWN, np.int16),
         at=3,
@@ -41,14 +39,21 @@ def test_the_table_holds_inner_products_of_the_differences(every):
         low=LOW,
         high=HIGH,
         made=blank,
-        disparity=blank[0],
+        disparity=blank[0] if disparity is None else disparity,
         doubt=blank[0],
-        synthesised=0,
+        synthesised=0 if disparity is None else 1,
         crossed=1,
         step=64,
         blocks=new_blocks(36, 52),
         levels=np.zeros((3, 36, 52), np.int16),
     )
+
+
+@pytest.mark.parametrize("every", [1, 2])
+def test_the_table_holds_inner_products_of_the_differences(every):
+    """Also for the squares at the border, and for disparities that lead beyond it."""
+    job = example()
+    views = job.views
     match = new_match((HIGH - LOW) // every + 1, every)
     for y0 in (0, 32):
         for x0 in (0, 32):
@@ -63,6 +68,22 @@ def test_the_table_holds_inner_products_of_the_differences(every):
                     expected = square.reshape(rows, 4, cols, 4).sum(axis=(1, 3))
                     # Sums of 16 products of up to 1800² in single precision.
                     np.testing.assert_allclose(match.products[:rows, :cols, at, k], expected, rtol=0, atol=20)
+
+
+def test_a_hurried_search_has_the_disparities_of_the_synthesis():
+    """Its table has those of the square and of eight samples around it, and every fourth; without synthesis all."""
+    disparity = np.zeros((36, 52), np.int16)
+    disparity[10:20, 39] = 5 * UNIT  # seven samples beside the first square
+    disparity[10:20, 41] = -6 * UNIT  # nine samples
+    match = new_match(HIGH - LOW + 1, 1, 1)
+    job = example(disparity)
+    fill_products(job, job.views[3], 0, 0, match)
+    listed = match.indices[: match.count[0]].tolist()
+    beside = {index + step for index in (0, 5) for step in (-1, 0, 1, 2)}
+    assert listed == sorted(beside | set(range(LOW, HIGH + 1, 4)))
+    job = example()
+    fill_products(job, job.views[3], 0, 0, match)
+    assert match.indices[: match.count[0]].tolist() == list(range(LOW, HIGH + 1))
 
 
 def test_costs_are_those_of_the_coder():

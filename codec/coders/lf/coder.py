@@ -35,6 +35,8 @@ QUALITY_RUNS, NEAR_DB, DB_A_STEP = 6, 0.05, 0.8  # PSNR falls so much from one q
 # Of the blocks that predict a view which is coded lossless; the better one is kept.
 EXACT_SETTINGS = 26 * FRACTIONS, 44 * FRACTIONS
 GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below which nothing else is tried
+SURELY = 5.0, 5.0, 2.0  # times GOOD: intra modes are not tried below it
+BLEND_ROWS = 4, 4, 1  # the kind of blending is chosen by every so many-th row
 WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 # Quantisers by which each level is finer than the next, for more is predicted from it, and the first is finer than
 # the last.
@@ -176,7 +178,7 @@ def decoded_batches(
 
 def _blended(job: Job, made: synthesis.Synthesis, nearest: int) -> None:
     if job.synthesised:
-        synthesis.blend(made, nearest)
+        synthesis.blend(made, nearest, 1)
 
 
 def check_views(picture: IIPicture) -> None:
@@ -312,7 +314,7 @@ class Source:
         """A view's blocks, found and decoded; its synthesis, and in which way that is blended."""
         job, made = field.job(node)
         original = self.view(node.row, node.col)
-        nearest = _nearer_blend(made, original) if job.synthesised else 0
+        nearest = _nearer_blend(made, original, BLEND_ROWS[self.effort]) if job.synthesised else 0
         search.find_blocks(costs, job, self._search(job, original))
         return job, made, nearest
 
@@ -321,22 +323,24 @@ class Source:
             original=original,
             weight=np.float32(WEIGHT * (job.step / 16) ** 2),
             least=3 if self.effort == 0 else 2,
-            intra_tries=(1, 2, 3)[self.effort],
+            intra_tries=(1, 1, 3)[self.effort],
             good=np.float32(GOOD[self.effort]),
+            surely=np.float32(SURELY[self.effort]),
             planes=1 if self.effort == 0 else 3,
             hurried=int(self.effort < 2),
         )
 
 
-def _nearer_blend(made: synthesis.Synthesis, original: NDArray[np.int16]) -> int:
-    """Synthesise in both ways, keep the one that comes nearer to the original, and return which it is."""
-    synthesis.blend(made, 0)
-    smooth, doubt, error = made.made.copy(), made.doubt.copy(), _error(made.made, original)
-    synthesis.blend(made, 1)
-    if _error(made.made, original) < error:
-        return 1
-    made.made[:], made.doubt[:] = smooth, doubt
-    return 0
+def _nearer_blend(made: synthesis.Synthesis, original: NDArray[np.int16], every: int) -> int:
+    """Synthesise in the way that comes nearer to the original in every so many-th row, and return which it is."""
+    errors = []
+    for way in (0, 1):
+        synthesis.blend(made, way, every)
+        errors.append(_error(made.made[:, ::every], original[:, ::every]))
+    best = int(errors[1] < errors[0])
+    if every > 1 or not best:
+        synthesis.blend(made, best, 1)
+    return best
 
 
 def _error(a: NDArray[np.int16], b: NDArray[np.int16]) -> float:

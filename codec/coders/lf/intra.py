@@ -75,13 +75,15 @@ def predict_intra(border, mode, n, out, plane):
                     out[plane, along, across] = value
                 across += 1
             start, part, side = 1 + (shift >> 3), np.int32(shift & 7), border[one]
+            rest = np.int32(8 - part)
             if from_left:
                 for i in range(across, n):
                     out[plane, i, along] = (side[start + i] * (8 - part) + side[start + i + 1] * part + 4) >> 3
             else:
                 row = out[plane, along]
                 for i in range(across, n):
-                    row[i] = (side[start + i] * (8 - part) + side[start + i + 1] * part + 4) >> 3
+                    total = np.int32(np.int32(side[start + i] * rest) + np.int32(side[start + i + 1] * part))
+                    row[i] = np.int32(total + np.int32(4)) >> np.int32(3)
 
 
 assert np.iinfo(np.int32).max > 64 * 64 * (1 << 14)  # the largest sum above

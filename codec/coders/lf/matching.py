@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .blocks import EXPLICIT, MOST_REFERENCES, from_where, guesses, kind_cost, mask_cost, seen_mask
+from .blocks import EXPLICIT, MOST_REFERENCES, UNKNOWN, from_where, guesses, kind_cost, mask_cost, seen_mask
 from .jit import inner, lean
 from .transform import LARGEST
 from .warp import clamped, moved_block
@@ -19,8 +19,13 @@ PAIRS = MOST_REFERENCES * (MOST_REFERENCES + 1) // 2  # the lower triangle by ro
 DIAGONAL = 0, 2, 5, 9
 CELLS = LARGEST // 4
 HUGE = np.float32(1e30)
-MOST_BEST = 6
+MOST_BEST, BEST = 6, 2  # disparities of least error by the table that are compared as decoded; in a hurried search
 MOST_TRIED = MOST_BEST + 3 + 2
+# A hurried search. Its table has every so many-th disparity, and those that the synthesis has up to so many samples
+# around the square. Neighbours' disparities are compared as decoded if the table's error there is at most so many
+# times the least and so many bits more, the second best of the table if it is at most half of that above the least.
+OTHERS, AROUND = 4, 8
+WORSE, MORE_BITS = np.float32(1.5), np.float32(4)
 
 
 class Match(NamedTuple):
@@ -29,9 +34,12 @@ class Match(NamedTuple):
     Parameters
     ----------
     every : int
-        The table holds every so many-th index.
-    best : int
-        Disparities of the least error that are compared as decoded, beside those of neighbours.
+        The table holds every so many-th index of the range,
+    indices : ndarray of int64, (indices,)
+        and of these the first ``count[0]`` of this list.
+    count : ndarray of int64, (1,)
+    hurried : int
+        Whether disparities that hardly ever pay are left out.
     products : ndarray of float32, (CELLS, CELLS, PAIRS, indices)
         Of the first plane, by 4×4 samples.
     total, errors : ndarray of float32, (PAIRS, indices) and (2, indices)
@@ -39,13 +47,15 @@ class Match(NamedTuple):
     missed : ndarray of float32, (MOST_REFERENCES + 1, LARGEST + 1)
         A row of differences.
     sums : ndarray of float32, (PAIRS, LARGEST)
-    moved : ndarray of int32, (MOST_REFERENCES, 3, LARGEST, LARGEST)
+    moved : ndarray of float32, (MOST_REFERENCES, 3, LARGEST, LARGEST)
         Differences between a block and its references as decoded.
     tried : ndarray of int64, (MOST_TRIED,)
     """
 
     every: Any
-    best: Any
+    indices: Any
+    count: Any
+    hurried: Any
     products: Any
     total: Any
     errors: Any
@@ -55,17 +65,19 @@ class Match(NamedTuple):
     tried: Any
 
 
-def new_match(indices: int, every: int, best: int = 1) -> Match:
+def new_match(indices: int, every: int, hurried: int = 0) -> Match:
     """Memory for one square after another."""
     return Match(
         every=every,
-        best=best,
+        indices=np.zeros(indices, np.int64),
+        count=np.zeros(1, np.int64),
+        hurried=hurried,
         products=np.zeros((CELLS, CELLS, PAIRS, indices), np.float32),
         total=np.zeros((PAIRS, indices), np.float32),
         errors=np.zeros((2, indices), np.float32),
         missed=np.zeros((MOST_REFERENCES + 1, LARGEST + 1), np.float32),
         sums=np.zeros((PAIRS, LARGEST), np.float32),
-        moved=np.zeros((MOST_REFERENCES, 3, LARGEST, LARGEST), np.int32),
+        moved=np.zeros((MOST_REFERENCES, 3, LARGEST, LARGEST), np.float32),
         tried=np.zeros(MOST_TRIED, np.int64),
     )
 
@@ -96,15 +108,44 @@ def _missed_row(plane, original, y, x0, dy, dx, between, missed):
 
 
 @lean
+def _list_indices(job, match, y0, x0):
+    """match.indices = those of the table: the whole range, or of a hurried search of a synthesised view a part of it.
+
+    The part is every fourth one, and those beside the disparities of the synthesis in the square and around it.
+    """
+    height, width = job.disparity.shape
+    indices, last = match.indices, np.int64(UNKNOWN)
+    part = match.hurried and job.synthesised
+    for k in range(indices.size):
+        indices[k] = 1 if not part or k % OTHERS == 0 else 0
+    if part:
+        for y in range(max(y0 - AROUND, 0), min(y0 + LARGEST + AROUND, height)):
+            row = job.disparity[y]
+            for x in range(max(x0 - AROUND, 0), min(x0 + LARGEST + AROUND, width)):
+                if row[x] != last:
+                    last = np.int64(row[x])
+                    middle = ((2 * last + job.unit) // (2 * job.unit) - job.low) // match.every
+                    for k in range(max(middle - 1, 0), min(middle + 3, indices.size)):
+                        indices[k] = 1
+    count = 0
+    for k in range(indices.size):
+        if indices[k]:
+            indices[count] = job.low + k * match.every
+            count += 1
+    match.count[0] = count
+
+
+@lean
 def fill_products(job, original, y0, x0, match):
     """match.products = inner products of the references' differences from the square at (y0, x0)."""
+    _list_indices(job, match, y0, x0)
     height, width = original.shape[1:]
     rows, cols = min(CELLS, (height - y0) >> 2), min(CELLS, (width - x0) >> 2)
     count = job.references.shape[0]
     between = match.missed[MOST_REFERENCES]
     sums, products = match.sums, match.products
-    for k in range(products.shape[3]):
-        d = (job.low + k * match.every) * job.unit
+    for k in range(match.count[0]):
+        d = match.indices[k] * job.unit
         for by in range(rows):
             for at in range(PAIRS):
                 for x in range(LARGEST):
@@ -131,8 +172,7 @@ def fill_products(job, original, y0, x0, match):
 def _add_cells(match, by, bx, size, pairs):
     """match.total = products summed over a block."""
     for at in range(pairs):
-        into = match.total[at]
-        indices = into.shape[0]
+        into, indices = match.total[at], match.count[0]
         for k in range(indices):
             into[k] = 0
         for i in range(by, by + size):
@@ -146,7 +186,7 @@ def _add_cells(match, by, bx, size, pairs):
 def _set_errors(match, count):
     """match.errors[0] = of each index the error of the best set of references."""
     least, error = match.errors[0], match.errors[1]
-    indices = least.shape[0]
+    indices = match.count[0]
     for k in range(indices):
         least[k] = HUGE
     for mask in range(1, 1 << count):
@@ -178,25 +218,40 @@ def _add_index(job, tried, number, index):
 
 
 @lean
-def _likely_indices(job, match, y0, x0, log):
+def _likely_indices(job, match, weight, y0, x0, log):
     """Fill match.tried with indices worth comparing as decoded; return their number."""
     by, bx = y0 >> 2, x0 >> 2
-    number = 0
-    for guess in guesses(job, by, bx, log):
-        number = _add_index(job, match.tried, number, guess)
-    count = job.references.shape[0]
+    count, indices, errors = job.references.shape[0], match.count[0], match.errors[0]
     _add_cells(match, by & (CELLS - 1), bx & (CELLS - 1), 1 << (log - 2), count * (count + 1) >> 1)
     _set_errors(match, count)
-    errors = match.errors[0]
-    for _ in range(match.best):
+    least, number = HUGE, 0
+    for k in range(indices):
+        least = min(least, errors[k])
+    most = WORSE * least + MORE_BITS * weight if match.hurried else HUGE
+    for guess in guesses(job, by, bx, log):
+        if _error_near(match, guess) <= most:
+            number = _add_index(job, match.tried, number, guess)
+    for _ in range(BEST if match.hurried else MOST_BEST):
         best = 0
-        for k in range(errors.shape[0]):
+        for k in range(indices):
             if errors[k] < errors[best]:
                 best = k
-        number = _add_index(job, match.tried, number, job.low + best * match.every)
-        for k in range(max(best - 1, 0), min(best + 2, errors.shape[0])):
+        if match.hurried and errors[best] > np.float32(0.5) * (least + most):
+            break
+        number = _add_index(job, match.tried, number, match.indices[best])
+        for k in range(max(best - 1, 0), min(best + 2, indices)):
             errors[k] = HUGE
     return number
+
+
+@inner
+def _error_near(match, index):
+    """The least error by the table beside an index; zero if the table has none there."""
+    error = HUGE
+    for k in range(match.count[0]):
+        if abs(match.indices[k] - index) < match.every:
+            error = min(error, match.errors[0, k])
+    return error if error < HUGE else np.float32(0)
 
 
 @lean
@@ -214,7 +269,7 @@ def _compare(job, match, work, original, y0, x0, n, index, planes):
             for y in range(n):
                 own, moved, missed = original[p, y0 + y, x0 : x0 + n], into[y], match.moved[r, p, y]
                 for x in range(n):
-                    missed[x] = np.int32(own[x]) - (np.int32(moved[x] + 2048) >> 12)
+                    missed[x] = np.float32(np.int32(own[x]) - (np.int32(moved[x] + 2048) >> 12))
 
 
 @inner
@@ -224,9 +279,8 @@ def _dot(moved, r, s, n, planes):
         for y in range(n):
             one, other = moved[r, p, y], moved[s, p, y]
             for x in range(0, n, 4):
-                a, b = np.float32(one[x]) * np.float32(other[x]), np.float32(one[x + 1]) * np.float32(other[x + 1])
-                c = np.float32(one[x + 2]) * np.float32(other[x + 2])
-                total += (a + b) + (c + np.float32(one[x + 3]) * np.float32(other[x + 3]))
+                a, b = one[x] * other[x], one[x + 1] * other[x + 1]
+                total += (a + b) + (one[x + 2] * other[x + 2] + one[x + 3] * other[x + 3])
     return total
 
 
@@ -264,7 +318,7 @@ def _best_set(costs, job, match, work, original, weight, planes, y0, x0, log, in
 def best_explicit(costs, job, match, work, original, weight, planes, y0, x0, log):
     """Index and set of references of the least squared error + weight · bits, before any residual."""
     tried = match.tried
-    number = _likely_indices(job, match, y0, x0, log)
+    number = _likely_indices(job, match, weight, y0, x0, log)
     best, best_index, best_mask = HUGE, job.low, 1
     t, between = 0, match.every == 1
     while t < number:

@@ -38,14 +38,12 @@ from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
 from .field import EIGHTH
 from .intra import DIRECTIONS, MODES, fill_border, predict_intra
 from .jit import inner, kernel, lean
-from .matching import MOST_BEST, best_explicit, fill_products, new_match
+from .matching import HUGE, best_explicit, fill_products, new_match
 from .motion import predict_in_time
 from .motion_search import best_vector
 from .transform import LARGEST, forward
 
-HUGE = np.float32(1e30)
 FIRST_DIRECTION = MODES - DIRECTIONS
-BEST = 2  # disparities by the table that a hurried search compares as decoded
 FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
 
 
@@ -67,6 +65,8 @@ class Search(NamedTuple):
         Whether intra directions are found coarse to fine, and sizes and disparities that hardly ever pay left out.
     good : float32
         A block whose cost a sample is less, in units of the weight, is not split, and not tried in other ways.
+    surely : float32
+        A block that costs less than so many times ``good`` is not tried by intra modes.
     """
 
     original: Any
@@ -76,6 +76,7 @@ class Search(NamedTuple):
     planes: Any
     hurried: Any
     good: Any
+    surely: Any
 
 
 class Trial(NamedTuple):
@@ -279,7 +280,7 @@ def best_block(costs, job, search, match, work, trial, y0, x0, log):
         if total < best:
             best, kind, index, mask, coded = total, EXPLICIT, k, m, some
             _keep(trial, log)
-    if job.references.shape[0] == 0 or best > 2 * good:
+    if job.references.shape[0] == 0 or best > search.surely * good:
         errors = trial.errors
         _rank_directions(costs, job, search, work, y0, x0, log, errors)
         for _ in range(search.intra_tries):
@@ -432,7 +433,5 @@ def find_blocks(costs: NDArray[np.float32], job: Job, search: Search) -> None:
     """Find, mark and decode all blocks of a view."""
     references = len(job.references)
     every = 2 if job.unit <= EIGHTH // 2 or job.high - job.low > FEW else 1
-    match = new_match(
-        (job.high - job.low) // every + 1 if references else 1, every, BEST if search.hurried else MOST_BEST
-    )
+    match = new_match((job.high - job.low) // every + 1 if references else 1, every, search.hurried)
     _search_view(costs, job, search, match, new_work(), new_trial())

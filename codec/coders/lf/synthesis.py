@@ -180,10 +180,11 @@ def _fill(disparity):
 
 
 @lean
-def blend(s, nearest):
+def blend(s, nearest, every):
     """s.made = the sources' samples along s.disparity, those left out that see something else.
 
-    With ``nearest`` the nearest samples are weighted by how near they are, else values are interpolated.
+    With ``nearest`` the nearest samples are weighted by how near they are, else values are interpolated. Only every
+    so many-th row is made.
     """
     height, width = s.counts.shape
     count = s.sources.shape[0]
@@ -195,7 +196,7 @@ def blend(s, nearest):
     for y in range(height >> 2):
         for x in range(width >> 2):
             s.doubt[y, x] = 0
-    for y in range(height):
+    for y in range(0, height, every):
         x = start = end = 0
         while x < width:
             d = np.int64(s.disparity[y, x])

@@ -38,6 +38,30 @@ def clamped(i, n):
     return min(max(i, 0), n - 1)
 
 
+@inner
+def _filtered(t, j, a, b, c, d, e, f):
+    """Sum of six samples from t[j] on, weighted."""
+    far = np.int32(np.int32(a * t[j]) + np.int32(f * t[j + 5]))
+    near = np.int32(np.int32(b * t[j + 1]) + np.int32(e * t[j + 4]))
+    return np.int32(np.int32(far + near) + np.int32(np.int32(c * t[j + 2]) + np.int32(d * t[j + 3])))
+
+
+@inner
+def _filtered_down(r, i, j, a, b, c, d, e, f):
+    """Sum of six samples below each other from r[i, j] on, weighted."""
+    far = np.int32(np.int32(a * r[i, j]) + np.int32(f * r[i + 5, j]))
+    near = np.int32(np.int32(b * r[i + 1, j]) + np.int32(e * r[i + 4, j]))
+    return np.int32(np.int32(far + near) + np.int32(np.int32(c * r[i + 2, j]) + np.int32(d * r[i + 3, j])))
+
+
+@inner
+def _add_four(out, at, one, two, three, four):
+    """out[at … at + 3] += four numbers: computed before any is stored, they are vectorised."""
+    one, two = np.int32(out[at] + one), np.int32(out[at + 1] + two)
+    three, four = np.int32(out[at + 2] + three), np.int32(out[at + 3] + four)
+    out[at], out[at + 1], out[at + 2], out[at + 3] = one, two, three, four
+
+
 @lean
 def moved_block(views, view, plane, y0, x0, n, dy, dx, rows, out):
     """out[plane, :n, :n] += 64² times the block at (y0 + dy, x0 + dx) of a plane; ``rows`` is (37, 32) for use."""
@@ -62,16 +86,13 @@ def moved_block(views, view, plane, y0, x0, n, dy, dx, rows, out):
                 row[j] = np.int32(taken[j]) * np.int32(64)
         else:
             taken = line[ix - BEFORE : ix - BEFORE + n + TAPS - 1]
-            for start in range(0, n, 4):  # loops of constant length are vectorised for the least blocks, too
-                for j in range(start, start + 4):
-                    row[j] = np.int32(
-                        a * taken[j]
-                        + b * taken[j + 1]
-                        + c * taken[j + 2]
-                        + d * taken[j + 3]
-                        + e * taken[j + 4]
-                        + f * taken[j + 5]
-                    )
+            if n == 4:
+                one, two = _filtered(taken, 0, a, b, c, d, e, f), _filtered(taken, 1, a, b, c, d, e, f)
+                three, four = _filtered(taken, 2, a, b, c, d, e, f), _filtered(taken, 3, a, b, c, d, e, f)
+                row[0], row[1], row[2], row[3] = one, two, three, four
+            else:
+                for j in range(n):
+                    row[j] = _filtered(taken, j, a, b, c, d, e, f)
     a, b, c, d, e, f = FILTERS[py, 0], FILTERS[py, 1], FILTERS[py, 2], FILTERS[py, 3], FILTERS[py, 4], FILTERS[py, 5]
     for i in range(n):
         into = out[plane, i]
@@ -79,9 +100,10 @@ def moved_block(views, view, plane, y0, x0, n, dy, dx, rows, out):
             row = rows[i]
             for j in range(n):
                 into[j] = np.int32(into[j] + np.int32(row[j] * np.int32(64)))
+        elif n == 4:
+            one, two = _filtered_down(rows, i, 0, a, b, c, d, e, f), _filtered_down(rows, i, 1, a, b, c, d, e, f)
+            three, four = _filtered_down(rows, i, 2, a, b, c, d, e, f), _filtered_down(rows, i, 3, a, b, c, d, e, f)
+            _add_four(into, 0, one, two, three, four)
         else:
-            r0, r1, r2, r3, r4, r5 = rows[i], rows[i + 1], rows[i + 2], rows[i + 3], rows[i + 4], rows[i + 5]
-            for start in range(0, n, 4):
-                for j in range(start, start + 4):
-                    total = a * r0[j] + b * r1[j] + c * r2[j] + d * r3[j] + e * r4[j] + f * r5[j]
-                    into[j] = np.int32(into[j] + total)
+            for j in range(n):
+                into[j] = np.int32(into[j] + _filtered_down(rows, i, j, a, b, c, d, e, f))
