@@ -19,7 +19,7 @@ import embreex.rtcore_scene  # loads the library and what it depends on
 import numpy as np
 from numpy.typing import NDArray
 
-from .kernels.packets import PACKET_ROWS, Calls, packet_kernels
+from .kernels.packets import PACKET_ROWS, Calls, Parting, packet_kernels
 
 CONFIGURATION = "RAYTRACE_II_EMBREE"  # environment variable: Embree's device configuration, or "embreex"
 # Trees of eight children a node: Embree keeps to four on CPUs that slow down under wide vectors, and takes 5 % longer
@@ -124,8 +124,8 @@ def _declared(functions: ctypes.CDLL) -> ctypes.CDLL:
 class Tree:
     """An Embree scene of one geometry, whose primitive number is the row of a face in (F, 3, 3) corners.
 
-    Rays go in packets in their order. A packet that spreads more than `NEAR` or `NARROW` is traced in groups of near
-    rays, and the rest of it without coherence.
+    Rays go in packets in their order. A packet that spreads more than `NEAR` or `NARROW` is parted: groups of half a
+    packet that are four times nearer are traced coherently, the others at once without coherence.
 
     Raises
     ------
@@ -167,20 +167,22 @@ class Tree:
         directions: Floats,
         reach: Floats,
         out: tuple[NDArray[np.int32], Floats, Floats, Floats],
+        bundled: bool = False,
     ) -> None:
         """Fill row of the face (−1 on a miss), u, v and distance of the nearest hit, placed in float64.
 
-        ``reach`` of no length is no end.
+        ``reach`` of no length is no end. ``bundled`` rays are a few bundles: a packet that spreads is parted into
+        groups of three, and single rays.
         """
         kernel = packet_kernels(self.library.width)[0]
-        kernel(*self._room("rtcIntersect"), origins, directions, reach, self._faces, *out)
+        kernel(*self._room("rtcIntersect", bundled), origins, directions, reach, self._faces, *out)
 
     def occluded(self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32]) -> None:
         """Fill 0 where something is hit within reach, −1 where not."""
         kernel = packet_kernels(self.library.width)[1]
         kernel(*self._room("rtcOccluded"), origins, directions, reach, out)
 
-    def _room(self, function: str) -> tuple[Any, ...]:
+    def _room(self, function: str, bundled: bool = False) -> tuple[Any, ...]:
         """Addresses, most spread and room for rays: of each call its own, for threads must not share it."""
         width = self.library.width
         active, chosen = _lines(2, np.int32)
@@ -190,6 +192,8 @@ class Tree:
             address, self._scene, self._arguments[0].ctypes.data, self._arguments[1].ctypes.data,
             active.ctypes.data, packet.ctypes.data,
             np.float32(NEAR[function] * self._edge), np.float32(NARROW[function]),
+            Parting(np.float32(0), np.float32(1), 3, width, True) if bundled
+            else Parting(np.float32(1), np.float32(0.25), width // 2, 2, False),
         )  # fmt: skip
         return calls, active, chosen, packet, packet.view(np.int32)
 

@@ -50,9 +50,9 @@ class Intersector:
         self._first = first_of_same(corners)
         self._first_clear = first_of_same(corners[opaque:]) if self._clear is not None else None
 
-    def nearest(self, origins: Floats, directions: Floats) -> tuple[Hits, float]:
-        """Nearest hit of every ray, and CPU seconds inside Embree."""
-        return _nearest(self._all, self._first, origins, directions, _NO_REACH)
+    def nearest(self, origins: Floats, directions: Floats, bundled: bool = False) -> tuple[Hits, float]:
+        """Nearest hit of every ray, and CPU seconds inside Embree; ``bundled`` as in `embree.Tree`."""
+        return _nearest(self._all, self._first, origins, directions, _NO_REACH, bundled)
 
     def nearest_clear(self, origins: Floats, directions: Floats, reach: Floats = _NO_REACH) -> tuple[Hits, float]:
         """Nearest hit within ``reach`` with a face that lets light through; faces count from their first."""
@@ -77,7 +77,7 @@ class SingleRays:
         vertices = np.ascontiguousarray(corners.reshape(-1, 3), np.float32)
         TriangleMesh(self._scene, vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3))
 
-    def nearest(self, origins: Floats, directions: Floats, reach: Floats, out: Hits) -> None:
+    def nearest(self, origins: Floats, directions: Floats, reach: Floats, out: Hits, bundled: bool = False) -> None:
         dists = reach.copy() if len(reach) else None  # embreex overwrites it
         found = self._scene.run(origins, directions, dists=dists, query="INTERSECT", output=True)
         for array, name in zip(out, ("primID", "u", "v", "tfar"), strict=True):
@@ -89,12 +89,17 @@ class SingleRays:
 
 
 def _nearest(
-    tree: Tree | SingleRays, first: NDArray[np.int32] | None, origins: Floats, directions: Floats, reach: Floats
+    tree: Tree | SingleRays,
+    first: NDArray[np.int32] | None,
+    origins: Floats,
+    directions: Floats,
+    reach: Floats,
+    bundled: bool = False,
 ) -> tuple[Hits, float]:
     n = len(origins)
     hits = Hits(np.empty(n, np.int32), *(np.empty(n, np.float32) for _ in range(3)))
     start = time.thread_time()
-    tree.nearest(origins, directions, reach, hits)
+    tree.nearest(origins, directions, reach, hits, bundled)
     if first is not None:
         hits.faces[:] = np.where(hits.faces >= 0, first[hits.faces], -1)
         place_hits(origins, directions, tree.corners, *hits)

@@ -38,9 +38,22 @@ _NEAR, _DIRECTION, _TIME, _FAR, _MASK, _FLAGS, _U, _V, _FACE, _GEOMETRY, _INSTAN
 _CORNERS = 24  # the hit ends with `instPrimID`, row 20; behind it room for the nine coordinates of the faces hit
 PACKET_ROWS = _CORNERS + 9
 _NO_END = np.float32(1e37)
-_TIGHT = np.float32(0.25)  # share of a packet's most spread that the rays of a group are apart from its first
-_MOST_LONE = 2  # groups of less than half a packet, after which the other rays are traced at once
-_LONE = 2  # state of the rays of such a group
+_LONE = 2  # state of a ray without a group
+
+
+class Parting(NamedTuple):
+    """What becomes of a packet whose rays spread too far.
+
+    ``grow`` is the share of the way to the last hit after which the spread counts; ``tight`` the share of the most
+    spread that the rays of a group are apart from its first; ``least`` the rays of a group. After ``lone`` rays
+    without a group, or if too few are left, all others are traced at once or, with ``singly``, one by one.
+    """
+
+    grow: np.float32
+    tight: np.float32
+    least: int
+    lone: int
+    singly: bool
 
 
 class Calls(NamedTuple):
@@ -58,6 +71,7 @@ class Calls(NamedTuple):
     room: int
     near: np.float32
     narrow: np.float32
+    parting: Parting
 
 
 def _reduce(function: Any) -> Any:
@@ -140,7 +154,9 @@ def _together(packet, calls, ahead, width):
     """Whether rays are near enough to each other for coherent tracing, at their origins and ``ahead`` of them."""
     x, y, z = packet[_DIRECTION * width], packet[(_DIRECTION + 1) * width], packet[(_DIRECTION + 2) * width]
     apart, turned = _spread(packet, np.int64(0), width), _spread(packet, np.int64(_DIRECTION), width)
-    return (apart + turned * ahead <= calls.near) & (turned <= calls.narrow * (abs(x) + abs(y) + abs(z)))
+    return (apart + turned * ahead * calls.parting.grow <= calls.near) & (
+        turned <= calls.narrow * (abs(x) + abs(y) + abs(z))
+    )
 
 
 @stage_kernel
@@ -174,13 +190,20 @@ def _take(packet, numbers, width, lane, i, primitives, u, v, distances):
 
 @stage_kernel
 def _choose(packet, active, chosen, calls, width):
-    """Set as active those lanes of ``chosen`` 1 that are near the first one in place and direction; count them."""
+    """Set as active those lanes of ``chosen`` 1 that are near the first one in place and direction.
+
+    Returns
+    -------
+    active, first : int
+        How many lanes are active, and the first one.
+    """
     first = 0
     while chosen[first] != 1:
         first += 1
     x, y, z = packet[first], packet[width + first], packet[2 * width + first]
     dx, dy, dz = packet[4 * width + first], packet[5 * width + first], packet[6 * width + first]
-    near, narrow = calls.near * _TIGHT, calls.narrow * _TIGHT * (abs(dx) + abs(dy) + abs(dz))
+    tight = calls.parting.tight
+    near, narrow = calls.near * tight, calls.narrow * tight * (abs(dx) + abs(dy) + abs(dz))
     count = 0
     for lane in range(width):
         away = abs(packet[lane] - x) + abs(packet[width + lane] - y) + abs(packet[2 * width + lane] - z)
@@ -192,42 +215,46 @@ def _choose(packet, active, chosen, calls, width):
         together = (away <= near) & (turned <= narrow) & (chosen[lane] == 1)
         active[lane] = -1 if together else 0
         count += together
-    return count
+    return count, first
 
 
 @stage_kernel
 def _trace_groups(calls, active, chosen, packet, lanes, width):
-    """Trace a packet whose rays spread too far: groups of near lanes coherently, all other lanes at once.
-
-    A group is half a packet at least; without one, Embree's own way of parting rays is the faster (2026-11-22).
-    """
+    """Trace a packet whose rays spread too far: groups of near lanes coherently, and the other lanes."""
     for lane in range(width):
         chosen[lane] = lane < lanes
-    left, lone, least = lanes, 0, width // 2
-    while left >= least and lone < _MOST_LONE:
-        count = _choose(packet, active, chosen, calls, width)
-        if count >= least:
+    left, lone, parting = lanes, 0, calls.parting
+    while left >= parting.least and lone < parting.lone:
+        count, first = _choose(packet, active, chosen, calls, width)
+        if count >= parting.least:
             call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
+            for lane in range(width):
+                chosen[lane] = 0 if active[lane] != 0 else chosen[lane]
+            left -= count
         else:
+            chosen[first] = _LONE
             lone += 1
-        state = 0 if count >= least else _LONE
-        for lane in range(width):
-            chosen[lane] = state if active[lane] != 0 else chosen[lane]
-        left -= count
+            left -= 1
     rest = 0
     for lane in range(width):
         active[lane] = -1 if chosen[lane] != 0 else 0
         rest += chosen[lane] != 0
-    if rest > 0:
+    if rest > 0 and not parting.singly:
         call(calls.packet, calls.active, calls.tree, calls.room, calls.incoherent)
+    elif rest > 0:
+        for one in range(width):
+            if chosen[one] != 0:
+                for lane in range(width):
+                    active[lane] = -1 if lane == one else 0
+                call(calls.packet, calls.active, calls.tree, calls.room, calls.incoherent)
 
 
 @cache
 def packet_kernels(width: int) -> tuple[Any, Any]:
     """The kernels for packets of so many rays: nearest hit, and whether anything is hit.
 
-    Rays go in packets of ``width`` in their order; a packet that spreads too far is traced in groups of near rays,
-    the other rays together without Embree's coherent traversal. u, v and distance of misses mean nothing.
+    Rays go in packets of ``width`` in their order; one that spreads too far is parted. u, v and distance of misses
+    mean nothing.
     """
 
     @kernel
