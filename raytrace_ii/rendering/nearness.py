@@ -37,15 +37,17 @@ def pixels_are_nearer(camera: Camera, distances: Distances) -> bool:
     # odd steps: the rays stand at all positions under their lenses
     everywhere = (slice(None, None, (size // PROBES) | 1) for size in (rows, columns))
     far = distances(*(array.reshape(-1, 3) for array in _unit_rays(camera, *everywhere)))
-    if not np.isfinite(far).any():
+    far = far[np.isfinite(far)]
+    if not len(far):
         return False
-    sizes = (rows, cells[1]), (columns, cells[0])
-    middle = (slice(max(pixels // 2 - cell, 0), pixels // 2 + cell) for pixels, cell in sizes)
-    L, D = _unit_rays(camera, *middle)
-    points = L + np.nanmedian(far) * D
-    of_pixels, of_lenses = (
-        np.mean([_step(points, axis, apart) for axis, apart in enumerate(steps)]) for steps in ((1, 1), cells[::-1])
-    )
+    steps = []
+    for axis, cell in enumerate(cells[::-1]):  # down and across, through the middle of the picture
+        line = [slice(size // 2, size // 2 + 1) for size in (rows, columns)]
+        line[axis] = slice(max(line[axis].start - cell, 0), line[axis].start + cell)
+        L, D = _unit_rays(camera, *line)
+        points = (L + np.median(far) * D).reshape(-1, 3)
+        steps.append((_step(points, 1), _step(points, cell)))
+    of_pixels, of_lenses = np.mean(steps, axis=0)
     return bool(FAVOUR * of_pixels < of_lenses)
 
 
@@ -55,8 +57,7 @@ def _unit_rays(camera: Camera, rows: slice, cols: slice) -> tuple[Floats, Floats
     return L, np.divide(D, length, out=np.zeros_like(D), where=length > 0)
 
 
-def _step(points: Floats, axis: int, size: int) -> float:
-    """Return the median distance of points ``size`` apart; infinite if there are none."""
-    points = np.moveaxis(points, axis, 0)
-    apart = np.linalg.norm(points[size:] - points[:-size], axis=-1)
-    return float(np.median(apart)) if apart.size else np.inf
+def _step(points: Floats, apart: int) -> float:
+    """Return the median distance of points (n, 3) so many places apart; infinite if there are none."""
+    steps = np.linalg.norm(points[apart:] - points[:-apart], axis=1)
+    return float(np.median(steps)) if len(steps) else np.inf
