@@ -195,8 +195,8 @@ class Tracer:
 
     ``lobes`` is how many rays at most a camera ray sends over the lobe of a rough mirror, and how many samples of a
     pixel share the lobe's places; later rays send one. ``footprint`` is how wide a ray is at its origin, mm, and by
-    how much it grows a mm of its way: images are filtered over it. ``scattered`` says that neighbouring rays are so
-    far apart that mirrored and refracted ones do not form bundles.
+    how much it grows a mm of its way: images are filtered over it. ``scattered`` says that neighbouring
+    rays are too far apart to form bundles.
     """
 
     def __init__(
@@ -208,7 +208,7 @@ class Tracer:
         self.pose = pose
         self.lobes = lobes
         self.footprint = footprint if self.scene.images else (0.0, 0.0)
-        self._bundles = not scattered  # of mirrored and refracted rays
+        self._bundles = not scattered
         self.begin()
         self._primary = _room(capacity, self.scene.nested, self.scene.glossy)
         # weights and pixels of rays that carry all light, one a pixel: read only
@@ -290,17 +290,16 @@ class Tracer:
         for depth in range(self.max_depth + 1):
             lobe_rays = self.lobes[0] if depth == 0 else 1
             spawn = depth < self.max_depth
-            rays = self._generation(rays, radiance, support if depth == 0 else None, depth == 0, spawn, lobe_rays)
+            rays = self._generation(rays, radiance, support if depth == 0 else None, spawn, lobe_rays)
             if not len(rays.pixels):
                 break
 
     def _generation(
-        self, rays: Rays, radiance: NDArray[np.float32], support: Support | None, first: bool, spawn: bool,
-        lobe_rays: int,
-    ) -> Rays:  # fmt: skip
+        self, rays: Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool, lobe_rays: int
+    ) -> Rays:
         """Trace and shade one generation; the next one comes back."""
         s, n = self.scene, len(rays.pixels)
-        hits = self._hits(rays, self._bundles and not first)
+        hits = self._hits(rays)
         spawn = spawn and (s.mirrors or s.transmits or s.blends)
         most = (lobe_rays if s.glossy else 1) + s.transmits + 2 * s.disperses + s.blends
         following = _room(most * n if spawn else 0, s.nested, s.glossy, any(self.footprint))
@@ -340,10 +339,10 @@ class Tracer:
                 self._addresses[stage] = address(stage, generation)
         return Stages(*(self._addresses[stage] if stage is not None else 0 for stage in wanted))
 
-    def _hits(self, rays: Rays, bundled: bool) -> Hits:
+    def _hits(self, rays: Rays) -> Hits:
         """Face, u, v and distance of the nearest face that is there: not cut out, not hidden in another body."""
         s = self.scene
-        found = self._nearest(rays.origins, rays.directions, bundled)
+        found = self._nearest(rays.origins, rays.directions)
         if not s.passes:
             return found
         table, rows = found, _NO_ROWS
@@ -363,11 +362,11 @@ class Tracer:
                 break
             self.count.rays["passed"] += count
             rows = onward[:count].copy()
-            found = self._nearest(origins[:count], directions[:count], self._bundles)
+            found = self._nearest(origins[:count], directions[:count])
         return table
 
-    def _nearest(self, origins: NDArray[np.float32], directions: NDArray[np.float32], bundled: bool) -> Hits:
-        hits, seconds = self.scene.intersector.nearest(origins, directions, bundled)
+    def _nearest(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> Hits:
+        hits, seconds = self.scene.intersector.nearest(origins, directions, self._bundles)
         self.count.embree_seconds += seconds
         return hits
 
