@@ -18,6 +18,7 @@ from .coefficients import code_coefficients
 from .cross import code_cross, keep_first, rebuild
 from .intra import MODES, SMOOTH, fill_border, predict_intra
 from .jit import kernel, lean
+from .samples import LARGEST_SKIPPED, code_samples
 from .transform import LARGEST
 from .warp import moved_block
 
@@ -29,7 +30,7 @@ MOST_INDEX = 1 << 14
 UNKNOWN = -32768  # disparity
 DIFFERENT = 205  # disparities that lead this far apart, in 2^-8 samples, are of different surfaces
 # What is known of each 4×4.
-KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, CROSS_1, CROSS_2, FIELDS = range(10)
+KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, CROSS_1, CROSS_2, SKIPPED, FIELDS = range(11)
 
 
 class Job(NamedTuple):
@@ -58,6 +59,8 @@ class Job(NamedTuple):
     synthesised : int
     crossed : int
         Whether the second and third plane's residuals may be predicted from the first's.
+    skipping : int
+        Whether small blocks may have no transform.
     step : int
         Of the quantiser, in 2^-7 of an 8-bit code.
     blocks : ndarray of int16, (FIELDS, H / 4, W / 4)
@@ -81,6 +84,7 @@ class Job(NamedTuple):
     doubt: Any
     synthesised: Any
     crossed: Any
+    skipping: Any
     step: Any
     blocks: Any
     levels: Any
@@ -182,9 +186,17 @@ def residual_context(job, by, bx, log, kind):
 
 
 @lean
-def coded_context(plane, log, kind, first):
-    """By plane, size, kind, and whether the first plane has a residual."""
+def coded_context(plane, log, kind, first, skipped):
+    """By plane, size, kind, whether the first plane has a residual, and whether the transform is skipped."""
+    if skipped:
+        return at.SAMPLE_CODED + (plane * 2 + log - 2) * 2 + first
     return at.CODED + ((plane * 4 + log - 2) * 2 + (1 if kind == INTRA else 0)) * 2 + first
+
+
+@lean
+def skipped_context(job, by, bx, log):
+    """By size, and how many of the blocks above and left have no transform."""
+    return at.SKIPPED + (log - 2) * 3 + neighbours(job.blocks, np.int64(SKIPPED), np.int64(1), by, bx)
 
 
 @lean
@@ -555,6 +567,23 @@ def _load_levels(job, work, plane, y0, x0, n):
 
 
 @lean
+def _note_levels(job, work, plane, y0, x0, n):
+    """job.levels = those decoded, contexts of the planes that follow."""
+    for y in range(n):
+        for x in range(n):
+            job.levels[plane, y0 + y, x0 + x] = work.levels[y, x]
+
+
+@lean
+def note_skipped(blocks, by, bx, log, skipped):
+    """Note whether a block has no transform."""
+    size = 1 << (log - 2)
+    for y in range(by, by + size):
+        for x in range(bx, bx + size):
+            blocks[SKIPPED, y, x] = skipped
+
+
+@lean
 def _clear(levels, n):
     for y in range(n):
         for x in range(n):
@@ -583,7 +612,9 @@ def code_block(coder, job, work, y0, x0, log):
             for p in range(3):
                 predict_direction(job, work, p, y0, x0, n, direction)
     coded = code_bit(coder, residual_context(job, by, bx, log, kind), np.int64(blocks[CODED, by, bx]))
-    first = 0
+    first = skipped = 0
+    if coded and job.skipping and log <= LARGEST_SKIPPED:
+        skipped = code_bit(coder, skipped_context(job, by, bx, log), np.int64(blocks[SKIPPED, by, bx]))
     for p in range(3):
         some = cross = 0
         if coded:
@@ -591,21 +622,27 @@ def code_block(coder, job, work, y0, x0, log):
                 cross = code_cross(coder, p, log, np.int64(blocks[CROSS_1 + p - 1, by, bx]))
             if not decoding:
                 some = _load_levels(job, work, p, y0, x0, n)
-            some = code_bit(coder, coded_context(p, log, kind, first), some)
+            some = code_bit(coder, coded_context(p, log, kind, first, skipped), some)
             if p == 0:
                 first = some
             if some:
                 if decoding:
                     _clear(work.levels, n)
-                code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0)
+                if skipped:
+                    code_samples(coder, work.levels, job.levels, y0, x0, p, log)
+                    if decoding:
+                        _note_levels(job, work, p, y0, x0, n)
+                else:
+                    code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0)
         if decoding:
             if some or cross:
-                rows, cols = rebuild(work, work.levels, log, job.step, some, cross)
+                rows, cols = rebuild(work, work.levels, log, job.step, some, cross, skipped)
                 if p == 0:
                     keep_first(work, rows, cols)
             store(job, work, p, y0, x0, n, some or cross)
     if decoding:
         mark_block(job, by, bx, log, kind, index, mask, direction, coded)
+        note_skipped(blocks, by, bx, log, skipped)
 
 
 @kernel

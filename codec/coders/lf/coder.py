@@ -62,6 +62,9 @@ class LightField(Coder):
         "stride": Option(about="binary logarithm of the first views' distance on the grid", default=3, low=0, high=6),
         "sources": Option(about="views that a synthesis is made of, 0 for none", default=4, low=0, high=8),
         "cross": Option(about="1 to predict colours of a residual from its first plane", default=1, low=0, high=1),
+        "skip": Option(
+            about="1 to code residuals of small blocks without a transform where it pays", default=1, low=0, high=1
+        ),
         "lossless": Option(about="1 to code to the bit", default=0, low=0, high=1),
         "threads": Option(
             about="threads that share the views; the bytes do not depend on it", default=1, low=1, high=16
@@ -237,6 +240,7 @@ class Source:
             high=high,
             axes=self.axes,
             crossed=bool(options["cross"]),
+            skipping=bool(options["skip"]) and not options["lossless"],
             steps=(),
         )
 

@@ -36,7 +36,18 @@ VECTOR = MIXED + 12  # block size 4 × (inherited by left: none, same, other 3; 
 INSTANT = VECTOR + 20  # 3 digits
 COMPONENT = INSTANT + 3  # down, across 2 × (14 digits and 1 sign)
 RESIDUAL_IN_TIME = COMPONENT + 30  # block size 4 × mixed 2 × neighbours with a residual 3
-COUNT = RESIDUAL_IN_TIME + 24
+# Of residuals without a transform, of two block sizes; "beside" is a class of nine.
+SKIPPED = RESIDUAL_IN_TIME + 24  # block size 2 × such neighbours 3
+SAMPLE_CODED = SKIPPED + 6  # plane 3 × block size 2 × first plane coded 2
+SAMPLE = SAMPLE_CODED + 12  # plane 3 × block size 2 × around 8
+SAMPLE_BESIDE = SAMPLE + 48  # plane 3 × block size 2 × beside 9
+SAMPLE_ABOVE_ONE = SAMPLE_BESIDE + 54  # plane 3 × around 8
+SAMPLE_ABOVE_ONE_BESIDE = SAMPLE_ABOVE_ONE + 24  # plane 3 × beside 9
+SAMPLE_ABOVE_TWO = SAMPLE_ABOVE_ONE_BESIDE + 27  # plane 3 × around 8
+SAMPLE_REST = SAMPLE_ABOVE_TWO + 24  # plane 3 × 16 digits
+SAMPLE_SIGN = SAMPLE_REST + 48  # plane 3 × sign of the first plane 3
+SAMPLE_WEIGHTS = SAMPLE_SIGN + 9  # plane 3 × block size 2, of above one plane 3
+COUNT = SAMPLE_WEIGHTS + 9
 
 # Probabilities to begin with: log(p / (1 - p)) from -6.2 up in steps of 0.2, by its digit; * where none is known. The
 # mean over eight coded pictures: three scenes and a flower of a real light field camera, at two quantisers each.

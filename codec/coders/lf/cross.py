@@ -74,7 +74,7 @@ def subtract_cross(work, cross):
 
 
 @lean
-def rebuild(work, levels, log, step, some, cross):
+def rebuild(work, levels, log, step, some, cross, skipped):
     """work.block = the residual, of levels if there are ``some``, and of the first plane.
 
     Return the rows and columns of work.coefficients that hold it.
@@ -91,5 +91,10 @@ def rebuild(work, levels, log, step, some, cross):
                     value += (cross * work.first[y, x]) >> 2
                 work.coefficients[y, x] = value
         rows, cols = high, wide
-    inverse(work.coefficients, log, rows, cols, work.half, work.block)
+    if skipped:
+        for y in range(1 << log):
+            for x in range(1 << log):
+                work.block[y, x] = work.coefficients[y, x] if y < rows and x < cols else 0
+    else:
+        inverse(work.coefficients, log, rows, cols, work.half, work.block)
     return rows, cols

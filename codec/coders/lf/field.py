@@ -83,6 +83,7 @@ class Field:
             doubt=made.doubt,
             synthesised=int(known),
             crossed=int(self.header.crossed),
+            skipping=int(self.header.skipping),
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),
             levels=np.zeros((3, *self.shape), np.int16),

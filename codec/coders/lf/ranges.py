@@ -74,6 +74,7 @@ def _errors(
         doubt=blank[0],
         synthesised=0,
         crossed=0,
+        skipping=0,
         step=1,
         blocks=blank,
         levels=blank,

@@ -27,10 +27,12 @@ from .blocks import (
     kind_cost,
     mark_block,
     new_work,
+    note_skipped,
     predict_direction,
     predict_explicit,
     predict_synthesis,
     residual_context,
+    skipped_context,
     split_context,
 )
 from .coefficients import quantise
@@ -41,6 +43,7 @@ from .jit import inner, kernel, lean
 from .matching import HUGE, best_explicit, fill_products, new_match
 from .motion import predict_in_time
 from .motion_search import best_vector
+from .samples import LARGEST_SKIPPED, quantise_samples
 from .transform import LARGEST, forward
 
 FIRST_DIRECTION = MODES - DIRECTIONS
@@ -88,6 +91,8 @@ class Trial(NamedTuple):
     trial_levels: Any
     cross: Any  # (6, 2) factors of `cross`
     trial_cross: Any
+    skipped: Any  # (6,) whether there is no transform
+    trial_skipped: Any  # (1,)
     errors: Any  # (MODES,) of intra prediction
 
 
@@ -100,32 +105,52 @@ def new_trial() -> Trial:
         trial_levels=np.zeros((3, LARGEST, LARGEST), np.int16),
         cross=np.zeros((6, 2), np.int64),
         trial_cross=np.zeros(2, np.int64),
+        skipped=np.zeros(6, np.int64),
+        trial_skipped=np.zeros(1, np.int64),
         errors=np.zeros(MODES, np.float32),
     )
 
 
+@inner
+def _copy_block(block, to, n):
+    for y in range(n):
+        for x in range(n):
+            to[y, x] = block[y, x]
+
+
 @lean
-def _try_plane(costs, work, plane, log, step, weight, kind, first, crossed, error):
+def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped):
+    """Quantise work.coefficients, which are samples if the transform is skipped."""
+    if skipped:
+        return quantise_samples(costs, work.coefficients, trial.trial_levels, plane, log, step, weight, levels)
+    return quantise(costs, work.coefficients, plane, log, step, weight, levels)
+
+
+@lean
+def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crossed, error, skipped):
     """Quantise work.block; return bits, whether there are levels, which array has them, and the factor of `cross`.
 
     ``first`` says whether the first plane has a residual, ``error`` is the squared error without one.
     """
-    context = coded_context(plane, log, kind, first)
+    context = coded_context(plane, log, kind, first, skipped)
     free, full = bit_cost(costs, context, np.int64(0)), bit_cost(costs, context, np.int64(1))
     predictable = plane > 0 and first and crossed
     none = cross_cost(costs, plane, log, np.int64(0)) if predictable else np.float32(0)
     bits, some, cross = free + none, 0, np.int64(0)
     if error <= np.float32(0.2) * step * step:
         return bits, some, cross
-    forward(work.block, log, work.half, work.coefficients)
-    more, missed = quantise(costs, work.coefficients, plane, log, step, weight, work.levels)
+    if skipped:
+        _copy_block(work.block, work.coefficients, 1 << log)
+    else:
+        forward(work.block, log, work.half, work.coefficients)
+    more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.levels, skipped)
     best = error + weight * bits
     if more > 0 and missed + weight * (more + full + none) < best:
         best, bits, some = missed + weight * (more + full + none), more + full + none, 1
     factor = best_cross(work) if predictable else np.int64(0)
     if factor:
         subtract_cross(work, factor)
-        more, missed = quantise(costs, work.coefficients, plane, log, step, weight, work.spare)
+        more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.spare, skipped)
         more += (full if more > 0 else free) + cross_cost(costs, plane, log, factor)
         if missed + weight * more < best:
             bits, some, cross = more, 1, factor
@@ -135,6 +160,40 @@ def _try_plane(costs, work, plane, log, step, weight, kind, first, crossed, erro
 @lean
 def try_residual(costs, job, search, work, trial, y0, x0, log, kind):
     """Code the difference to work.predicted; return bits, error and whether there is a residual."""
+    n = 1 << log
+    trial.trial_skipped[0] = 0
+    bits, error, coded = _try_way(costs, job, search, work, trial, y0, x0, log, kind, 0)
+    if not coded or not job.skipping or log > LARGEST_SKIPPED:
+        return bits, error, coded
+    trial.cross[1, 0], trial.cross[1, 1] = trial.trial_cross[0], trial.trial_cross[1]
+    _copy(
+        trial.trial_decoded,
+        trial.trial_levels,
+        trial.trial_cross,
+        trial.decoded[1],
+        trial.levels[1],
+        trial.cross[1],
+        n,
+    )
+    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, log, kind, 1)
+    if some and missed + search.weight * more < error + search.weight * bits:
+        trial.trial_skipped[0] = 1
+        return more, missed, some
+    _copy(
+        trial.decoded[1],
+        trial.levels[1],
+        trial.cross[1],
+        trial.trial_decoded,
+        trial.trial_levels,
+        trial.trial_cross,
+        n,
+    )
+    return bits, error, coded
+
+
+@lean
+def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped):
+    """As `try_residual`, with a transform or without."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
     step = np.float32(job.step / 16)
     bits, error, without = np.float32(0), np.float32(0), np.float32(0)
@@ -147,13 +206,15 @@ def try_residual(costs, job, search, work, trial, y0, x0, log, kind):
                 work.block[y, x] = difference
                 least += np.float32(difference * difference)
         without += least
-        more, some, cross = _try_plane(costs, work, p, log, step, search.weight, kind, first, job.crossed, least)
+        more, some, cross = _try_plane(
+            costs, work, trial, p, log, step, search.weight, kind, first, job.crossed, least, skipped
+        )
         bits += more
         if p:
             trial.trial_cross[p - 1] = cross
         if some:
             levels = work.spare if cross else work.levels
-            rows, cols = rebuild(work, levels, log, job.step, 1, cross)
+            rows, cols = rebuild(work, levels, log, job.step, 1, cross, skipped)
             if p == 0:
                 keep_first(work, rows, cols)
                 first = 1
@@ -172,6 +233,8 @@ def try_residual(costs, job, search, work, trial, y0, x0, log, kind):
     empty = bit_cost(costs, context, np.int64(0))
     if coded:
         bits += bit_cost(costs, context, 1)
+        if job.skipping and log <= LARGEST_SKIPPED:
+            bits += bit_cost(costs, skipped_context(job, by, bx, log), skipped)
         if error + search.weight * bits < without + search.weight * empty:
             return bits, error, 1
         for p in range(3):
@@ -192,6 +255,7 @@ def _leave(trial, work, p, n):
 def _keep(trial, log):
     n = 1 << log
     trial.cross[log, 0], trial.cross[log, 1] = trial.trial_cross[0], trial.trial_cross[1]
+    trial.skipped[log] = trial.trial_skipped[0]
     for p in range(3):
         for y in range(n):
             for x in range(n):
@@ -323,6 +387,7 @@ def best_of_all(costs, job, search, match, work, trial, y0, x0, log):
     good = search.good * search.weight * np.float32(n * n)
     best, kind, vector, coded = best_in_time(costs, job, search, work, trial, y0, x0, log, good)
     if best > good:
+        trial.skipped[0] = trial.skipped[log]
         _copy(
             trial.decoded[log],
             trial.levels[log],
@@ -335,6 +400,7 @@ def best_of_all(costs, job, search, match, work, trial, y0, x0, log):
         found = best_block(costs, job, search, match, work, trial, y0, x0, log)
         if found[0] < best:
             return found
+        trial.skipped[log] = trial.skipped[0]
         _copy(
             trial.decoded[0],
             trial.levels[0],
@@ -416,6 +482,7 @@ def search_tree(costs, job, search, match, work, trial, y0, x0, log):
                 job.levels[p, y0 + y, x0 + x] = trial.levels[log, p, y, x]
     mark_block(job, by, bx, log, kind, index, mask, direction, coded)
     job.blocks[CROSS_1, by, bx], job.blocks[CROSS_2, by, bx] = trial.cross[log, 0], trial.cross[log, 1]
+    note_skipped(job.blocks, by, bx, log, trial.skipped[log] if coded else 0)
     return best
 
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-VERSION, UNCROSSED = 3, 2  # the second version has no factors between planes
+# By factors between planes, and residuals without a transform. Version 4 is that of segments of takes.
+_VERSIONS = {(False, False): 2, (True, False): 3, (True, True): 5, (False, True): 6}
+_TOOLS = {version: tools for tools, version in _VERSIONS.items()}
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
 )
@@ -41,6 +43,8 @@ class Header:
         Colours, in units of 2^-14.
     crossed : bool
         Whether the residuals of the second and third plane may be predicted from the first's.
+    skipping : bool
+        Whether small blocks may have a residual without a transform.
     steps : tuple of int
         The quantiser's step of each level, in 2^-7 of an 8-bit code.
     """
@@ -53,13 +57,14 @@ class Header:
     high: int
     axes: NDArray[np.int16]
     crossed: bool
+    skipping: bool
     steps: tuple[int, ...]
 
 
 def pack(header: Header, levels: list[bytes], pixels: int) -> bytes:
     """The payload of a picture of so many pixels."""
     head = _HEAD.pack(
-        VERSION if header.crossed else UNCROSSED,
+        _VERSIONS[header.crossed, header.skipping],
         header.log_stride,
         header.sources,
         header.exact,
@@ -93,10 +98,10 @@ def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
     if len(payload) < max(_HEAD.size, least_bytes(pixels)):
         raise ValueError(f"its light field has {len(payload)} bytes, too few for {pixels} pixels")
     version, log_stride, sources, exact, down, low, high, *axes = _HEAD.unpack_from(payload)
-    if version not in (VERSION, UNCROSSED):
-        raise ValueError(
-            f"its light field is of version {version}: this decoder reads versions {UNCROSSED} and {VERSION}"
-        )
+    if version not in _TOOLS:
+        known = ", ".join(map(str, sorted(_TOOLS)))
+        raise ValueError(f"its light field is of version {version}: this decoder reads versions {known}")
+    crossed, skipping = _TOOLS[version]
     sound = log_stride <= MOST_LOG_STRIDE and sources <= MOST_SOURCES and exact <= 1 and abs(down) == 1
     if not sound or not -MOST_DISPARITY <= low <= high <= MOST_DISPARITY:
         raise ValueError("its header holds values that no encoder writes")
@@ -121,7 +126,8 @@ def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
         low=low,
         high=high,
         axes=np.array(axes, np.int16).reshape(3, 3),
-        crossed=version == VERSION,
+        crossed=crossed,
+        skipping=skipping,
         steps=tuple(step for step, _ in index),
     )
     return header, levels

@@ -1,0 +1,139 @@
+"""Residuals whose transform is skipped: the samples themselves are quantised and coded, row by row.
+
+Blocks that differ from their prediction at few samples, as at the edges of point-sampled pictures, have fewer bits so.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arithmetic import bit_cost, code_bit, code_mixed, code_number, number_cost
+from .coefficients import MOST_LEVEL
+from .contexts import (
+    SAMPLE,
+    SAMPLE_ABOVE_ONE,
+    SAMPLE_ABOVE_ONE_BESIDE,
+    SAMPLE_ABOVE_TWO,
+    SAMPLE_BESIDE,
+    SAMPLE_REST,
+    SAMPLE_SIGN,
+    SAMPLE_WEIGHTS,
+)
+from .jit import inner, lean
+
+LARGEST_SKIPPED = 3  # binary logarithm of the side
+
+
+@inner
+def _around(levels, y, x, n):
+    """Class 0–7 by the magnitudes left, above (twice each) and diagonally above."""
+    total = 0
+    if x:
+        total += 2 * abs(levels[y, x - 1])
+    if y:
+        total += 2 * abs(levels[y - 1, x])
+        if x:
+            total += abs(levels[y - 1, x - 1])
+        if x + 1 < n:
+            total += abs(levels[y - 1, x + 1])
+    return total if total < 5 else (5 if total < 7 else (6 if total < 10 else 7))
+
+
+@inner
+def _beside(planes, plane, y, x, before, seen):
+    """Class 0–8: by the levels of earlier planes at the sample; in the first, by the density of samples before."""
+    if plane == 0:
+        return min(8 * before // max(seen, 4), 8)
+    first = min(abs(planes[0, y, x]), 2)
+    second = min(abs(planes[1, y, x]), 2) if plane == 2 else 0
+    return 3 * first + second
+
+
+@inner
+def _sign_context(planes, plane, y, x):
+    """By plane, and the sign of the first plane's level."""
+    first = planes[0, y, x] if plane else 0
+    return SAMPLE_SIGN + plane * 3 + (0 if first == 0 else (1 if first > 0 else 2))
+
+
+@lean
+def code_samples(coder, levels, planes, y0, x0, plane, log):
+    """Write or read levels[:n, :n]; a reader finds only zeros there before.
+
+    ``planes[:plane, y0 : y0 + n, x0 : x0 + n]`` are the levels of earlier planes.
+    """
+    n, before = 1 << log, 0
+    for k in range(n * n):
+        y, x = k >> log, k & (n - 1)
+        value = np.int64(levels[y, x])
+        size = abs(value)
+        around = _around(levels, y, x, n)
+        beside = _beside(planes, plane, y0 + y, x0 + x, before, k)
+        by_size = plane * 2 + log - 2
+        one, other = SAMPLE + by_size * 8 + around, SAMPLE_BESIDE + by_size * 9 + beside
+        if not code_mixed(coder, one, other, SAMPLE_WEIGHTS + by_size, 1 if size else 0):
+            continue
+        before += 1
+        found = 1
+        one, other = SAMPLE_ABOVE_ONE + plane * 8 + around, SAMPLE_ABOVE_ONE_BESIDE + plane * 9 + beside
+        if code_mixed(coder, one, other, SAMPLE_WEIGHTS + 6 + plane, 1 if size > 1 else 0):
+            found = 2
+            if code_bit(coder, SAMPLE_ABOVE_TWO + plane * 8 + around, 1 if size > 2 else 0):
+                rest = code_number(coder, SAMPLE_REST + plane * 16, np.int64(16), np.int64(0), size - 3)
+                found = 3 + min(rest, MOST_LEVEL)
+        negative = code_bit(coder, _sign_context(planes, plane, y0 + y, x0 + x), 1 if value < 0 else 0)
+        levels[y, x] = -found if negative else found
+
+
+@inner
+def _mixed_cost(costs, one, other, bit):
+    return np.float32(0.5) * (bit_cost(costs, one, bit) + bit_cost(costs, other, bit))
+
+
+@inner
+def _sample_cost(costs, size, around, beside, plane, log):
+    """Bits of a sample, those of the sign left out."""
+    by_size = plane * 2 + log - 2
+    some = 1 if size else 0
+    bits = _mixed_cost(costs, SAMPLE + by_size * 8 + around, SAMPLE_BESIDE + by_size * 9 + beside, some)
+    if size:
+        one, other = SAMPLE_ABOVE_ONE + plane * 8 + around, SAMPLE_ABOVE_ONE_BESIDE + plane * 9 + beside
+        bits += _mixed_cost(costs, one, other, 1 if size > 1 else 0)
+        if size > 1:
+            bits += bit_cost(costs, SAMPLE_ABOVE_TWO + plane * 8 + around, 1 if size > 2 else 0)
+            if size > 2:
+                bits += number_cost(costs, SAMPLE_REST + plane * 16, np.int64(16), np.int64(0), size - 3)
+    return bits
+
+
+@lean
+def quantise_samples(costs, block, planes, plane, log, step, weight, levels):
+    """Fill levels[:n, :n]; return the bits, 0 if there are no levels, and the squared error.
+
+    ``planes[:plane, :n, :n]`` are the levels of earlier planes; units are those of `coefficients.quantise`.
+    """
+    n, before = 1 << log, 0
+    error, bits = np.float32(0), np.float32(0)
+    for k in range(n * n):
+        y, x = k >> log, k & (n - 1)
+        value = block[y, x]
+        size = abs(np.float32(value))
+        around = _around(levels, y, x, n)
+        beside = _beside(planes, plane, y, x, before, k)
+        level = min(np.int64(size / step + np.float32(0.5)), MOST_LEVEL)
+        best, kept, missed = np.int64(0), _sample_cost(costs, 0, around, beside, plane, log), size * size
+        least = missed + weight * kept
+        sign = _sign_context(planes, plane, y, x)
+        for tried in range(max(1, level - 1), level + 1):
+            cost = _sample_cost(costs, tried, around, beside, plane, log)
+            cost += bit_cost(costs, sign, 1 if value < 0 else 0)
+            left = size - np.float32(tried) * step
+            total = left * left + weight * cost
+            if total < least:
+                least, best, kept, missed = total, tried, cost, left * left
+        bits += kept
+        error += missed
+        levels[y, x] = -best if value < 0 else best
+        if best:
+            before += 1
+    return bits if before else np.float32(0), error
