@@ -34,7 +34,11 @@ SCENES = ("apples", "twins", "car", "cuboid")
 FIELDS = ("car-9x9", "apples-9x9")
 IMPORTED = "flower"
 OURS = "si-lf"
-TOOLS = {"si-lf:sources=0": "synthesis off", "si-lf:cross=0": "colours not predicted"}
+TOOLS = {
+    "si-lf:sources=0": "synthesis off",
+    "si-lf:cross=0": "colours not predicted",
+    "si-lf:skip=0": "always transformed",
+}
 QUANTISERS = {
     "si-lf": (22, 30, 38, 44, 50),
     "si-avif:best": (18, 28, 38, 48, 58),

@@ -1,7 +1,8 @@
-"""Frozen streams of `si-lf`, version 3: the same bytes decode to the same pixels on every machine.
+"""Frozen streams of `si-lf`, versions 3 and 5: the same bytes decode to the same pixels on every machine.
 
 ``tests/golden/lf/lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6 views of
-8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. The decoder has integer arithmetic alone, so that
+8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6 views of
+*Apples* of 40×28 pixels at quantiser 36; the encoder that first had residuals without a transform wrote it. The decoder has integer arithmetic alone, so that
 a hash of the pixels is the expectation.
 """
 
@@ -14,14 +15,17 @@ import pytest
 
 from codec import Encoded, decode
 from codec.coders.lf import stream
-from codec.coders.lf.blocks import EXPLICIT, INTRA, KIND, SYNTHESIS
+from codec.coders.lf.blocks import CODED, EXPLICIT, INTRA, KIND, LOG, SKIPPED, SYNTHESIS
 from codec.coders.lf.field import Field
 
 FOLDER = Path(__file__).parents[1] / "golden" / "lf"
 PIXELS = {
     "lossy": "defb0393182954c2a0827acfe2c0d408fd37d1c8abcac248e83ca5d02bb8f7ee",
+    "skipped": "DIGEST",
     "exact": "be2c46c242ca2aae010544f6e178dd5dfa93b5aec5566384427e4a469a1b2cfd",
 }
+
+VERSIONS = {"lossy": stream.VERSION, "exact": stream.VERSION, "skipped": stream.SKIPPING}
 
 
 def digest(pixels):
@@ -33,7 +37,7 @@ def digest(pixels):
 @pytest.mark.parametrize("name", PIXELS)
 def test_frozen_streams_decode_to_the_same_pixels(name, threads):
     coded = Encoded.load(FOLDER / f"{name}.ii")
-    assert coded.payload[0] == stream.VERSION == 3
+    assert coded.payload[0] == VERSIONS[name]
     coded = replace(coded, options={**coded.options, "threads": threads})
     assert digest(decode(coded).pixels) == PIXELS[name]
 
@@ -51,6 +55,24 @@ def test_the_lossy_stream_has_all_kinds_of_blocks(monkeypatch):
     decode(Encoded.load(FOLDER / "lossy.ii"))
     assert kinds == {INTRA, EXPLICIT, SYNTHESIS}
     assert synthesised == {0, 1}
+
+
+def test_versions_are_the_numbers_in_the_streams():
+    assert (stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED) == (2, 3, 5, 6)
+
+
+def test_the_third_stream_has_blocks_without_a_transform(monkeypatch):
+    """Of both sizes, among others that have one."""
+    found, code = set(), Field.code
+
+    def noting(field, coder, job, work):
+        code(field, coder, job, work)
+        coded = job.blocks[CODED] == 1
+        found.update(zip(job.blocks[LOG][coded].tolist(), job.blocks[SKIPPED][coded].tolist(), strict=True))
+
+    monkeypatch.setattr(Field, "code", noting)
+    decode(Encoded.load(FOLDER / "skipped.ii"))
+    assert {(2, 0), (2, 1), (3, 0), (3, 1)} <= found
 
 
 def test_the_lossy_stream_has_factors_between_planes():

@@ -72,7 +72,7 @@ class LightField(Coder):
         "effort": Option(about="of the search: 0, 1 or 2", default=1, low=0, high=2),
     }
     presets: ClassVar[Mapping[str, Options]] = {
-        "fast": {"effort": 0},
+        "fast": {"effort": 0, "skip": 0},
         "balanced": {"effort": 1},
         "best": {"effort": 2},
     }

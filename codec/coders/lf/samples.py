@@ -1,9 +1,11 @@
 """Residuals whose transform is skipped: the samples themselves are quantised and coded, row by row.
 
-Blocks that differ from their prediction at few samples, as at the edges of point-sampled pictures, have fewer bits so.
+This takes fewer bits where few samples differ from their prediction, as at edges of point-sampled pictures.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -120,8 +122,9 @@ def quantise_samples(costs, block, planes, plane, log, step, weight, levels):
         size = abs(np.float32(value))
         around = _around(levels, y, x, n)
         beside = _beside(planes, plane, y, x, before, k)
-        level = min(np.int64(size / step + np.float32(0.5)), MOST_LEVEL)
-        best, kept, missed = np.int64(0), _sample_cost(costs, 0, around, beside, plane, log), size * size
+        level: Any = min(np.int64(size / step + np.float32(0.5)), MOST_LEVEL)
+        best: Any = np.int64(0)
+        kept, missed = _sample_cost(costs, 0, around, beside, plane, log), size * size
         least = missed + weight * kept
         sign = _sign_context(planes, plane, y, x)
         for tried in range(max(1, level - 1), level + 1):

@@ -47,6 +47,7 @@ from .samples import LARGEST_SKIPPED, quantise_samples
 from .transform import LARGEST, forward
 
 FIRST_DIRECTION = MODES - DIRECTIONS
+WORTH_SKIPPING = np.float32(1.2)  # times the least cost so far: beyond it, skipping the transform is not tried
 FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
 
 
@@ -158,12 +159,16 @@ def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crosse
 
 
 @lean
-def try_residual(costs, job, search, work, trial, y0, x0, log, kind):
-    """Code the difference to work.predicted; return bits, error and whether there is a residual."""
+def try_residual(costs, job, search, work, trial, y0, x0, log, kind, so_far):
+    """Code the difference to work.predicted; return bits, error and whether there is a residual.
+
+    ``so_far`` is the least cost of the block: far above it, skipping the transform is not tried.
+    """
     n = 1 << log
     trial.trial_skipped[0] = 0
-    bits, error, coded = _try_way(costs, job, search, work, trial, y0, x0, log, kind, 0)
-    if not coded or not job.skipping or log > LARGEST_SKIPPED:
+    bits, error, coded = _try_way(costs, job, search, work, trial, y0, x0, log, kind, 0, HUGE)
+    cost = error + search.weight * bits
+    if not coded or not job.skipping or log > LARGEST_SKIPPED or cost > WORTH_SKIPPING * so_far:
         return bits, error, coded
     trial.cross[1, 0], trial.cross[1, 1] = trial.trial_cross[0], trial.trial_cross[1]
     _copy(
@@ -175,8 +180,8 @@ def try_residual(costs, job, search, work, trial, y0, x0, log, kind):
         trial.cross[1],
         n,
     )
-    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, log, kind, 1)
-    if some and missed + search.weight * more < error + search.weight * bits:
+    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, log, kind, 1, cost)
+    if some and missed + search.weight * more < cost:
         trial.trial_skipped[0] = 1
         return more, missed, some
     _copy(
@@ -192,8 +197,8 @@ def try_residual(costs, job, search, work, trial, y0, x0, log, kind):
 
 
 @lean
-def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped):
-    """As `try_residual`, with a transform or without."""
+def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit):
+    """As `try_residual`, with a transform or without; give up without a residual beyond a cost."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
     step = np.float32(job.step / 16)
     bits, error, without = np.float32(0), np.float32(0), np.float32(0)
@@ -229,6 +234,8 @@ def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped):
         else:
             _leave(trial, work, p, n)
             error += least
+        if error + search.weight * bits > limit:
+            return bits, error, 0
     context = residual_context(job, by, bx, log, kind)
     empty = bit_cost(costs, context, np.int64(0))
     if coded:
@@ -331,7 +338,7 @@ def best_block(costs, job, search, match, work, trial, y0, x0, log):
     if job.synthesised:
         side = kind_cost(costs, job, by, bx, log, np.int64(SYNTHESIS), np.int64(0), np.int64(0), np.int64(0))
         predict_synthesis(job, work, y0, x0, n)
-        bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, np.int64(SYNTHESIS))
+        bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, np.int64(SYNTHESIS), HUGE)
         best, kind, coded = error + search.weight * (bits + side), SYNTHESIS, some
         index = guesses(job, by, bx, log)[0]
         _keep(trial, log)
@@ -339,7 +346,7 @@ def best_block(costs, job, search, match, work, trial, y0, x0, log):
         k, m = best_explicit(costs, job, match, work, search.original, search.weight, search.planes, y0, x0, log)
         side = kind_cost(costs, job, by, bx, log, np.int64(EXPLICIT), k, m, np.int64(0))
         predict_explicit(job, work, y0, x0, n, k, m)
-        bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, np.int64(EXPLICIT))
+        bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, np.int64(EXPLICIT), best)
         total = error + search.weight * (bits + side)
         if total < best:
             best, kind, index, mask, coded = total, EXPLICIT, k, m, some
@@ -353,7 +360,7 @@ def best_block(costs, job, search, match, work, trial, y0, x0, log):
             side = kind_cost(costs, job, by, bx, log, np.int64(INTRA), np.int64(0), np.int64(0), mode)
             for p in range(3):
                 predict_direction(job, work, p, y0, x0, n, mode)
-            bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, np.int64(INTRA))
+            bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, np.int64(INTRA), best)
             total = error + search.weight * (bits + side)
             if total < best:
                 best, kind, index, mask, direction, coded = total, INTRA, 0, 0, mode, some
@@ -370,7 +377,7 @@ def best_in_time(costs, job, search, work, trial, y0, x0, log, good):
     for way in range(TIMED, TIMED + 1 + job.synthesised):
         side = kind_cost(costs, job, y0 >> 2, x0 >> 2, log, way, vector, np.int64(0), np.int64(0))
         predict_in_time(job, work, y0, x0, n, vector, way == MIXED)
-        bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, way)
+        bits, error, some = try_residual(costs, job, search, work, trial, y0, x0, log, way, best)
         total = error + search.weight * (bits + side)
         if total < best:
             best, kind, coded = total, way, some

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 # By factors between planes, and residuals without a transform. Version 4 is that of segments of takes.
-_VERSIONS = {(False, False): 2, (True, False): 3, (True, True): 5, (False, True): 6}
+VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED = 3, 2, 5, 6
+_VERSIONS = {
+    (False, False): UNCROSSED,
+    (True, False): VERSION,
+    (True, True): SKIPPING,
+    (False, True): SKIPPING_UNCROSSED,
+}
 _TOOLS = {version: tools for tools, version in _VERSIONS.items()}
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
