@@ -1,9 +1,9 @@
 """Frozen streams of `si-lf`, versions 3 and 5: the same bytes decode to the same pixels on every machine.
 
-``tests/golden/lf/lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6 views of
-8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6 views of
-*Apples* of 40×28 pixels at quantiser 36; the encoder that first had residuals without a transform wrote it. The decoder has integer arithmetic alone, so that
-a hash of the pixels is the expectation.
+In ``tests/golden/lf``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
+views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
+views of *Apples* at quantiser 36; the first encoder that left out transforms wrote it. The decoder has integer
+arithmetic alone, so that a hash of the pixels is the expectation.
 """
 
 import hashlib
