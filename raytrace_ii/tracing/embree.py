@@ -177,25 +177,31 @@ class Tree:
         kernel = packet_kernels(self.library.width)[0]
         kernel(*self._room("rtcIntersect", bundled), origins, directions, reach, self._faces, *out)
 
-    def occluded(self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32]) -> None:
+    def occluded(
+        self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32], bundled: bool = False
+    ) -> None:
         """Fill 0 where something is hit within reach, −1 where not."""
         kernel = packet_kernels(self.library.width)[1]
-        kernel(*self._room("rtcOccluded"), origins, directions, reach, out)
+        kernel(*self._room("rtcOccluded", bundled), origins, directions, reach, out)
 
     def _room(self, function: str, bundled: bool = False) -> tuple[Any, ...]:
         """Addresses, most spread and room for rays: of each call its own, for threads must not share it."""
         width = self.library.width
         active, chosen = _lines(2, np.int32)
-        packet = _lines(PACKET_ROWS * width // 16 + 1, np.float32).reshape(-1)
-        address = ctypes.cast(getattr(self.library.functions, f"{function}{width}"), ctypes.c_void_p).value or 0
+        packet, one = _lines(PACKET_ROWS * width // 16 + 1, np.float32), _lines(PACKET_ROWS // 16 + 1, np.int32)
+        packet, one = packet.reshape(-1), one.reshape(-1)
+        addresses = [
+            ctypes.cast(getattr(self.library.functions, f"{function}{n}"), ctypes.c_void_p).value or 0
+            for n in (width, 1)
+        ]
         calls = Calls(
-            address, self._scene, self._arguments[0].ctypes.data, self._arguments[1].ctypes.data,
-            active.ctypes.data, packet.ctypes.data,
+            *addresses, self._scene, self._arguments[0].ctypes.data, self._arguments[1].ctypes.data,
+            active.ctypes.data, packet.ctypes.data, one.ctypes.data,
             np.float32(NEAR[function] * self._edge), np.float32(NARROW[function]),
             Parting(np.float32(0), np.float32(1), 3, width, True) if bundled
             else Parting(np.float32(1), np.float32(0.25), width // 2, 2, False),
         )  # fmt: skip
-        return calls, active, chosen, packet, packet.view(np.int32)
+        return calls, active, chosen, packet, packet.view(np.int32), one
 
 
 def with_spare(corners: Floats) -> Floats:

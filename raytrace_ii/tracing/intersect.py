@@ -54,17 +54,21 @@ class Intersector:
         """Nearest hit of every ray, and CPU seconds inside Embree; ``bundled`` as in `embree.Tree`."""
         return _nearest(self._all, self._first, origins, directions, _NO_REACH, bundled)
 
-    def nearest_clear(self, origins: Floats, directions: Floats, reach: Floats = _NO_REACH) -> tuple[Hits, float]:
+    def nearest_clear(
+        self, origins: Floats, directions: Floats, reach: Floats = _NO_REACH, bundled: bool = False
+    ) -> tuple[Hits, float]:
         """Nearest hit within ``reach`` with a face that lets light through; faces count from their first."""
         assert self._clear is not None
-        return _nearest(self._clear, self._first_clear, origins, directions, reach)
+        return _nearest(self._clear, self._first_clear, origins, directions, reach, bundled)
 
-    def blocked(self, origins: Floats, directions: Floats, reach: Floats) -> tuple[NDArray[np.int32], float]:
+    def blocked(
+        self, origins: Floats, directions: Floats, reach: Floats, bundled: bool = False
+    ) -> tuple[NDArray[np.int32], float]:
         """0 where an opaque face lies within ``reach`` lengths of the direction, −1 where not; and CPU seconds."""
         found = np.full(len(origins), -1, np.int32)
         start = time.thread_time()
         if self._opaque is not None:
-            self._opaque.occluded(origins, directions, reach, found)
+            self._opaque.occluded(origins, directions, reach, found, bundled)
         return found, time.thread_time() - start
 
 
@@ -84,7 +88,9 @@ class SingleRays:
             array[:] = found[name]
         place_hits(origins, directions, self.corners, *out)
 
-    def occluded(self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32]) -> None:
+    def occluded(
+        self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32], bundled: bool = False
+    ) -> None:
         out[:] = self._scene.run(origins, directions, dists=reach.copy(), query="OCCLUDED")
 
 

@@ -382,7 +382,7 @@ class Tracer:
             if not count:
                 return
             self.count.rays["passed"] += count
-            hits, seconds = s.intersector.nearest_clear(origins[:count], directions[:count])
+            hits, seconds = s.intersector.nearest_clear(origins[:count], directions[:count], bundled=self._bundles)
             self.count.embree_seconds += seconds
             count = tell_inside(
                 hits.faces, hits.u, hits.v, rows, candidates, origins, directions, rays.inside,
@@ -393,7 +393,7 @@ class Tracer:
         """Add the light of the shadow rays that nothing opaque stops, dimmed by what is clear."""
         s = self.scene
         self.count.rays["shadow"] += len(shadow.pixels)
-        found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, shadow.reach)
+        found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, shadow.reach, self._bundles)
         self.count.embree_seconds += seconds
         if not s.lets_through:
             add_unblocked(found, shadow.colours, shadow.pixels, radiance)
@@ -402,7 +402,7 @@ class Tracer:
         kept = keep_unblocked(found, *rays)
         for _ in range(MOST_CLEAR_FACES):
             origins, directions, reach, colours, pixels, inside = rays = [array[:kept] for array in rays]
-            hits, seconds = s.intersector.nearest_clear(origins, directions, reach)
+            hits, seconds = s.intersector.nearest_clear(origins, directions, reach, self._bundles)
             self.count.embree_seconds += seconds
             kept = pass_clear_face(
                 *hits, origins, directions, reach, colours, pixels, inside,

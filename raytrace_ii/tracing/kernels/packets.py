@@ -64,11 +64,13 @@ class Calls(NamedTuple):
     """
 
     packet: int
+    single: int
     tree: int
     coherent: int
     incoherent: int
     active: int
     room: int
+    one: int
     near: np.float32
     narrow: np.float32
     parting: Parting
@@ -219,7 +221,7 @@ def _choose(packet, active, chosen, calls, width):
 
 
 @stage_kernel
-def _trace_groups(calls, active, chosen, packet, lanes, width):
+def _trace_groups(calls, active, chosen, packet, numbers, one_numbers, lanes, width):
     """Trace a packet whose rays spread too far: groups of near lanes coherently, and the other lanes."""
     for lane in range(width):
         chosen[lane] = lane < lanes
@@ -242,11 +244,13 @@ def _trace_groups(calls, active, chosen, packet, lanes, width):
     if rest > 0 and not parting.singly:
         call(calls.packet, calls.active, calls.tree, calls.room, calls.incoherent)
     elif rest > 0:
-        for one in range(width):
-            if chosen[one] != 0:
-                for lane in range(width):
-                    active[lane] = -1 if lane == one else 0
-                call(calls.packet, calls.active, calls.tree, calls.room, calls.incoherent)
+        for lane in range(width):
+            if chosen[lane] != 0:
+                for row in range(_CORNERS):
+                    one_numbers[row] = numbers[row * width + lane]
+                call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
+                for row in range(_FAR, _CORNERS):
+                    numbers[row * width + lane] = one_numbers[row]
 
 
 @cache
@@ -259,7 +263,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
 
     @kernel
     def nearest(
-        calls, active, chosen, packet, numbers, origins, directions, reach, corners,
+        calls, active, chosen, packet, numbers, one_numbers, origins, directions, reach, corners,
         primitives, u, v, distances,
     ):  # fmt: skip
         n, wide = origins.shape[0], np.int64(width)  # no literal: parts are compiled once
@@ -275,7 +279,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
             if _together(packet, calls, ahead, wide):
                 call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
             else:
-                _trace_groups(calls, active, chosen, packet, lanes, wide)
+                _trace_groups(calls, active, chosen, packet, numbers, one_numbers, lanes, wide)
             _place(packet, numbers, wide, corners)
             ahead = packet[_FAR * width] if numbers[_GEOMETRY * width] >= 0 else ahead
             for lane in range(lanes):
@@ -283,7 +287,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
 
     @kernel
     def occluded(
-        calls, active, chosen, packet, numbers, origins, directions, reach, found
+        calls, active, chosen, packet, numbers, one_numbers, origins, directions, reach, found
     ):  # fmt: skip
         n, wide = origins.shape[0], np.int64(width)  # no literal: parts are compiled once
         _begin(packet, numbers, wide)
@@ -296,7 +300,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
             if _together(packet, calls, np.float32(0), wide):
                 call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
             else:
-                _trace_groups(calls, active, chosen, packet, lanes, wide)
+                _trace_groups(calls, active, chosen, packet, numbers, one_numbers, lanes, wide)
             for lane in range(lanes):
                 found[first + lane] = 0 if packet[_FAR * width + lane] < 0 else -1
 
