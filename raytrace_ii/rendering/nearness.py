@@ -1,7 +1,7 @@
 """Choice of the rays that share a packet: those of neighbouring pixels under a lens, or of neighbouring lenses.
 
 Rays of neighbouring lenses keep their distance of a lens pitch; rays of neighbouring pixels spread. Which are closer
-at the content follows from its distance, which a few rays over the whole picture measure.
+at the content follows from its distances, which a few rays over the whole picture measure.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from ii_core import Camera
 from .tiles import SIDE, lens_cells
 
 PROBES = 12  # rays along each axis of the picture
+QUARTILES = 0.25, 0.75  # of distances: rays of pixels may cross between them, where views converge
 # Rays of one position under several lenses are parallel and bear a wider spread (CPU time of *Apples*, *Twins*,
 # *Cuboid* and *Objects* at scales 8, 16 and 32 of setup1, 2026-11-22).
 FAVOUR = 1.5
@@ -25,7 +26,7 @@ Distances = Callable[[Floats, Floats], Floats]
 
 
 def pixels_are_nearer(camera: Camera, distances: Distances) -> bool:
-    """Return whether rays of neighbouring pixels under a lens are the nearer ones at the content's median distance.
+    """Return whether rays of neighbouring pixels under a lens are the nearer ones at the content's distances.
 
     ``distances`` returns the distances of the content in mm along rays of origins and unit directions (n, 3); NaN
     without a hit.
@@ -44,10 +45,9 @@ def pixels_are_nearer(camera: Camera, distances: Distances) -> bool:
     for axis, cell in enumerate(cells[::-1]):  # down and across, through the middle of the picture
         line = [slice(size // 2, size // 2 + 1) for size in (rows, columns)]
         line[axis] = slice(max(line[axis].start - cell, 0), line[axis].start + cell)
-        L, D = _unit_rays(camera, *line)
-        points = (L + np.median(far) * D).reshape(-1, 3)
-        steps.append((_step(points, 1), _step(points, cell)))
-    of_pixels, of_lenses = np.mean(steps, axis=0)
+        L, D = (part.reshape(-1, 3) for part in _unit_rays(camera, *line))
+        steps.append([[_step(L + at * D, apart) for apart in (1, cell)] for at in np.quantile(far, QUARTILES)])
+    of_pixels, of_lenses = np.mean(steps, axis=0).max(axis=0)
     return bool(FAVOUR * of_pixels < of_lenses)
 
 
