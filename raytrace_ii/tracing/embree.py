@@ -195,7 +195,7 @@ class Tree:
             for n in (width, 1)
         ]
         calls = Calls(
-            *addresses, self._scene, self._arguments[0].ctypes.data, self._arguments[1].ctypes.data,
+            addresses[0], addresses[1], self._scene, self._arguments[0].ctypes.data, self._arguments[1].ctypes.data,
             active.ctypes.data, packet.ctypes.data, one.ctypes.data,
             np.float32(NEAR[function] * self._edge), np.float32(NARROW[function]),
             Parting(np.float32(0), np.float32(1), 3, width, True) if bundled
