@@ -137,14 +137,17 @@ def unshadowed(scene: Scene) -> Scene:
     free = replace(scene)  # a copy with a tree of its own
     none = np.empty(0, np.float32)
 
+    def blocked(o: NDArray[Any], *_: Any) -> tuple[NDArray[np.int32], float]:
+        return np.full(len(o), -1, np.int32), 0.0
+
     def clear(o: NDArray[Any]) -> tuple[Hits, float]:
         return Hits(np.full(len(o), -1, np.int32), none, none, none), 0.0
 
-    vars(packed(free).intersector)["blocked"] = lambda o, d, reach: (np.full(len(o), -1, np.int32), 0.0)
+    vars(packed(free).intersector)["blocked"] = blocked
     if packed(scene).lets_through:
         # camera rays still need the body in which they start
         found = packed(free).intersector.nearest_clear
-        vars(packed(free).intersector)["nearest_clear"] = lambda o, d, reach=None: (
+        vars(packed(free).intersector)["nearest_clear"] = lambda o, d, reach=None, bundled=False: (
             found(o, d) if reach is None else clear(o)
         )
     return free
