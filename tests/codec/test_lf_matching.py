@@ -43,6 +43,7 @@ def example(disparity=None):
         doubt=blank[0],
         synthesised=0 if disparity is None else 1,
         crossed=1,
+        skipping=False,
         step=64,
         blocks=new_blocks(36, 52),
         levels=np.zeros((3, 36, 52), np.int16),
