@@ -204,6 +204,13 @@ def test_a_click_focuses_by_the_depth_map(show, shot, tmp_path, lens):
     assert np.abs(around - depth).min() < 0.02 * depth
 
 
+def test_a_click_before_the_first_painting_finds_its_lens(show, shot, tmp_path):
+    write_viewer(tmp_path / "v.html", shot.picture, depth=shot.depth)
+    tab = show(tmp_path / "v.html", "#f=0", script="window.requestAnimationFrame = () => 1")
+    tab.mouse.click(*lens_at(tab, 5, 11))
+    assert tab.evaluate("ii.viewer.state.f") != 0 and tab.evaluate("Number.isFinite(ii.viewer.state.f)")
+
+
 def test_a_click_without_a_map_finds_where_views_agree(show, tmp_path):
     """A textured plane: seven places all lie on it."""
     rng = np.random.default_rng(4)

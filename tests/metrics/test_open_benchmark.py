@@ -23,12 +23,24 @@ from metrics.benchmark.subject import measuring_subject
 from metrics.study import picture_json, provenance
 
 PYTHON = f"{shlex.quote(sys.executable)} -I -S"  # without packages: starts in 20 ms
-# Views as they are, deflated after dropping as many bits as the target needs.
-CODER = """
+BEGIN = """
 import pathlib, sys, zlib
 act, source, target, *more = sys.argv[1:]
 source, target = pathlib.Path(source), pathlib.Path(target)
 if act == "enc":
+"""
+END = """
+    data = zlib.decompress(source.read_bytes())
+    while data:
+        name, _, data = data.partition(b"|")
+        size = len(b"P6\\n6 5\\n1023\\n") + 6 * 6 * 5
+        (target / name.decode()).write_bytes(data[:size])
+        data = data[size:]
+"""
+# Views as they are, deflated after dropping as many bits as the target needs.
+CODER = (
+    BEGIN
+    + """\
     limit, files = int(more[0]), sorted(source.iterdir())
     views = [f.read_bytes() for f in files]
     for drop in range(10):
@@ -42,13 +54,9 @@ if act == "enc":
     target.write_bytes(coded)
 else:
     assert [p.name for p in source.parent.iterdir() if p.is_file() and p.name != "said"] == [source.name]
-    data = zlib.decompress(source.read_bytes())
-    while data:
-        name, _, data = data.partition(b"|")
-        size = len(b"P6\\n6 5\\n1023\\n") + 6 * 6 * 5
-        (target / name.decode()).write_bytes(data[:size])
-        data = data[size:]
 """
+    + END
+)
 PROFILE = """
 name = "mine"
 version = 3
@@ -93,24 +101,18 @@ def coder(tmp_path):
 # -- videos
 
 
-STORED = """
-import pathlib, sys, zlib
-act, source, target, *more = sys.argv[1:]
-source, target = pathlib.Path(source), pathlib.Path(target)
-if act == "enc":
+STORED = (
+    BEGIN
+    + """\
     assert more == ["2", "24"], more
     files = sorted(f for f in source.rglob("*") if f.is_file())
     assert len(files) == 18 and {f.parent.name for f in files} == {"frame_0000", "frame_0001"}
     named = [f.relative_to(source).as_posix().encode() + b"|" + f.read_bytes() for f in files]
     target.write_bytes(zlib.compress(b"".join(named), 9))
 else:
-    data = zlib.decompress(source.read_bytes())
-    while data:
-        name, _, data = data.partition(b"|")
-        size = len(b"P6\\n6 5\\n1023\\n") + 6 * 6 * 5
-        (target / name.decode()).write_bytes(data[:size])
-        data = data[size:]
 """
+    + END
+)
 
 
 def test_external_commands_code_videos_frame_by_frame(tmp_path, picture):

@@ -154,6 +154,11 @@ class Viewer {
     return { ...this.lines(eye), focus: this.shift(), radius: ei.map((n) => Math.min(this.state.a, Math.max(1, n / 2))) };
   }
 
+  // Pixels of the canvas per pixel of the page; known before the first painting, since a click may come earlier.
+  get density() {
+    return Math.min(window.devicePixelRatio || 1, 2);
+  }
+
   // Lens coordinates of a pane: the whole array fits at zoom 1; `cx`, `cy` is the array's point in the middle.
   map(pane) {
     const { lenses, camera: c } = this.meta, size = lenses.map((n, i) => n * c.lens_pitch_mm[i]);
@@ -181,7 +186,6 @@ class Viewer {
 
   paint() {
     const { canvas } = this, { gl } = this.field;
-    this.density = Math.min(window.devicePixelRatio || 1, 2);
     const width = Math.round(canvas.clientWidth * this.density), height = Math.round(canvas.clientHeight * this.density);
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     gl.clearColor(0.07, 0.07, 0.08, 1);
