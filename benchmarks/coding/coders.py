@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.arguments import command_line
-from benchmarks.coding.rd import climbing, rd_point
+from benchmarks.coding.rd import climbing, compiled, rd_point
 from benchmarks.pages.pictures import write_picture
 from benchmarks.records import Records, origin, with_commits
 from codec import parse_scheme, schemes
@@ -45,6 +45,7 @@ QUANTISERS = {
     "vp9": (8, 18, 28, 38, 46, 54, 62),
     "avif": (8, 18, 28, 38, 46, 54, 62),
     "mpeg2": (1, 2, 4, 7, 12, 20, 31),
+    "lf": (20, 28, 36, 44, 52),
 }
 LETTERS = 8  # height of labels in the chart, typographic points
 NEAR = 0.1  # tolerance of the recommended setting, relative to the least rate
@@ -159,6 +160,7 @@ def qualities(scheme: str) -> list[dict[str, Any]]:
 def curve(picture: IIPicture, scheme: str) -> list[dict[str, float]]:
     """Return rate, PSNR and CPU seconds of one encoder run at every quality."""
     points = []
+    compiled(scheme, **qualities(scheme)[0])
     for goal in qualities(scheme):
         point = rd_point(picture, scheme, **goal)
         points.append(

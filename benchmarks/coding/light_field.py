@@ -20,6 +20,7 @@ import numpy as np
 
 from benchmarks.arguments import command_line
 from benchmarks.coding import coders
+from benchmarks.coding.rd import compiled
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
 from codec import encode, timed_decode
@@ -98,6 +99,7 @@ def measured(original: IIPicture, scheme: str) -> dict[str, Any]:
     """Return a curve, or the rate of a lossless scheme."""
     if scheme not in LOSSLESS:
         return curve(original, scheme)
+    compiled(scheme)
     coded = encode(original, scheme)
     decoding = timed_decode(coded)
     if not np.array_equal(decoding.picture.pixels, original.pixels):
@@ -111,6 +113,7 @@ def curve(original: IIPicture, scheme: str) -> dict[str, Any]:
     """Return rate, PSNR and CPU microseconds per pixel at each quantiser."""
     width, height = original.size
     points = []
+    compiled(scheme, qp=QUANTISERS[OURS][0])
     for qp in QUANTISERS[scheme if scheme in QUANTISERS else scheme.partition(":")[0]]:
         coded = encode(original, scheme, qp=qp)
         decoding = timed_decode(coded)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
+
 from codec import encode, timed_decode
 from ii_core import IIPicture
 from metrics import q_global
@@ -50,6 +52,12 @@ def rd_point(picture: IIPicture, scheme: str, **goal: Any) -> RDPoint:
         decoder_seconds=decoded.codec_seconds,
         picture=decoded.picture,
     )
+
+
+def compiled(scheme: str, **goal: Any) -> None:
+    """Code a small picture, so that times measured next hold no compilation."""
+    pixels = np.random.default_rng(0).integers(0, 256, (32, 64, 3), np.uint8)
+    timed_decode(encode(IIPicture(pixels, (16, 8), (4, 4)), scheme, **goal))
 
 
 def climbing(points: Sequence[Point]) -> list[Point]:
