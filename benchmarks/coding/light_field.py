@@ -5,8 +5,8 @@
 Pictures are four scenes through `setup1` at scale 8, and two light fields of 9×9 views of 120×56 pixels with
 disparity of both signs, rendered with four samples per pixel: the camera's gap is 32/3 of that of `setup1`, and each
 view is cropped one column or row further on than its neighbour. ``--flower`` adds the middle 96×64 pixels of 10×10
-views of a light field camera from a folder. Every scheme is run at five quantisers, and lossless. Numbers go to
-``benchmarks/results/light_field.jsonl``, tables to ``docs/lf.md``.
+views of a light field camera from a folder (alone: ``--pictures flower``). Every scheme is run at five quantisers,
+and lossless. Numbers go to ``benchmarks/results/light_field.jsonl``, tables to ``docs/lf.md``.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def main() -> None:
     parser = command_line(__doc__, pictures=SCENES + FIELDS, schemes=(*OTHERS, OURS, *TOOLS, *LOSSLESS))
     parser.add_argument("--flower", help="folder of the views of a light field camera")
     asked = parser.parse_args()
-    names = [*asked.pictures, *([IMPORTED] if asked.flower else [])]
+    names = dict.fromkeys([*asked.pictures, *([IMPORTED] if asked.flower else [])])
     keys = [{"picture": name, "scheme": scheme} for scheme in asked.schemes for name in names]
     for key in RECORDS.todo(keys, asked.again):
         original = picture(key["picture"], asked.flower)
