@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ QUANTISERS = {
 }
 OTHERS = ("si-avif:best", "si-hevc:best")
 LOSSLESS = ("si-lf:lossless=1", "si-ffv1", "jpegxl:lossless=1")
-TARGET_SCALE = 4  # of the records of `coders`
+TARGET_SCALES = (4, 1)  # of the records of `coders`
 VIEWS, GAP = 9, 6  # views per side; factor on disparity, by a larger gap
 
 
@@ -136,7 +137,9 @@ def tables() -> Tables:
     exact = {(row["picture"], row["scheme"]): row["bpp"] for row in rows if "bpp" in row}
     names = [name for name in (*SCENES, *FIELDS, IMPORTED) if (name, OURS) in curves]
     marks = ("lf-against", "lf-tools", "lf-lossless")
-    against_all = {("docs/lf.md", "lf-targets"): targets(coders.comparable(TARGET_SCALE))}
+    against_all = {
+        ("docs/lf.md", "lf-targets"): targets({scale: coders.comparable(scale) for scale in TARGET_SCALES})
+    }
     if not names:
         return against_all | {("docs/lf.md", mark): ["Not measured yet."] for mark in marks}
     against = ["| picture | " + " | ".join(f"`{other}`" for other in OTHERS) + " | encode µs | decode µs |"]
@@ -161,28 +164,39 @@ def tables() -> Tables:
     }
 
 
-def targets(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return a table of `si-lf` against the best of all other schemes, by comparable records of `coders`.
+def targets(records: Mapping[int, Sequence[Mapping[str, Any]]]) -> list[str]:
+    """Return a table of `si-lf` against the best of all other schemes, by comparable records of `coders` by scale.
 
     Schemes are in order of their Bjøntegaard rate against the anchor of `coders`; each then meets the best so far.
     """
-    lines = ["| scene | `si-lf` | least rate of all other schemes | rate of `si-lf` |", "|---|---|---|---|"]
-    for scene in SCENES:
-        curves = {row["scheme"]: row["points"] for row in rows if row["scene"] == scene}
-        anchor = curves.get(coders.ANCHOR)
-        rates = {
-            name: rate_change(anchor, points) for name, points in curves.items() if anchor and not _is_ours(name)
-        }
-        known = {name: rate for name, rate in rates.items() if rate is not None}
-        best = min(known, key=known.__getitem__, default="")
-        for other in sorted(known, key=known.__getitem__):
-            if (rate_change(curves[best], curves[other]) or 0) < 0:
-                best = other
-        lines += [
-            f"| {scene} | `{name}` | `{best}` | {difference(curves[best], curves[name])} |"
-            for name in filter(_is_ours, curves if known else ())
-        ]
-    return [*lines, "", origin(rows)] if len(lines) > 2 else ["Not measured yet."]
+    lines = [
+        "| scale | scene | `si-lf` | least rate of all others | of | rate of `si-lf` |",
+        "|---|---|---|---|---|---|",
+    ]
+    for scale, rows in records.items():
+        for scene in SCENES:
+            curves = {row["scheme"]: row["points"] for row in rows if row["scene"] == scene}
+            others = [name for name in curves if not _is_ours(name)]
+            best = least_rate(curves, others)
+            lines += [
+                f"| {scale} | {scene} | `{name}` | `{best}` | {len(others)} | "
+                f"{difference(curves[best], curves[name])} |"
+                for name in filter(_is_ours, curves if best else ())
+            ]
+    return [*lines, "", origin(chain(*records.values()))] if len(lines) > 2 else ["Not measured yet."]
+
+
+def least_rate(curves: Mapping[str, Any], names: Sequence[str]) -> str:
+    """Return the scheme with the least rate of these; none without the anchor's curve."""
+    if coders.ANCHOR not in curves:
+        return ""
+    rates = {name: rate_change(curves[coders.ANCHOR], curves[name]) for name in names}
+    known = {name: rate for name, rate in rates.items() if rate is not None}
+    best = coders.ANCHOR
+    for other in sorted(known, key=known.__getitem__):
+        if (rate_change(curves[best], curves[other]) or 0) < 0:
+            best = other
+    return best
 
 
 def _is_ours(scheme: str) -> bool:

@@ -35,6 +35,8 @@ QUALITY_RUNS, NEAR_DB, DB_A_STEP = 6, 0.05, 0.8  # PSNR falls so much from one q
 # Of the blocks that predict a view which is coded lossless; the better one is kept.
 EXACT_SETTINGS = 26 * FRACTIONS, 44 * FRACTIONS
 GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below which nothing else is tried
+# Views of more samples than so many are smoother, and their blocks cheaper: there GOOD is less by their share.
+GOOD_SAMPLES = 128 * 64
 SURELY = 5.0, 5.0, 2.0  # times GOOD: intra modes are not tried below it
 BLEND_ROWS = 4, 4, 1  # the kind of blending is chosen by every so many-th row
 WEIGHT = 0.12  # squared error a bit is worth, in squared steps
@@ -323,12 +325,13 @@ class Source:
         return job, made, nearest
 
     def _search(self, job: Any, original: NDArray[np.int16]) -> Search:
+        share = min(1.0, GOOD_SAMPLES / (self.height * self.width))
         return Search(
             original=original,
             weight=np.float32(WEIGHT * (job.step / 16) ** 2),
             least=3 if self.effort == 0 else 2,
             intra_tries=(1, 1, 3)[self.effort],
-            good=np.float32(GOOD[self.effort]),
+            good=np.float32(GOOD[self.effort] * share),
             surely=np.float32(SURELY[self.effort]),
             planes=1 if self.effort == 0 else 3,
             hurried=int(self.effort < 2),
