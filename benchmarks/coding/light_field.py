@@ -170,7 +170,7 @@ def targets(records: Mapping[int, Sequence[Mapping[str, Any]]]) -> list[str]:
     Schemes are in order of their Bjøntegaard rate against the anchor of `coders`; each then meets the best so far.
     """
     lines = [
-        "| scale | scene | `si-lf` | least rate of all others | of | rate of `si-lf` |",
+        "| scale | scene | `si-lf` | least rate of all others | others | rate of `si-lf` |",
         "|---|---|---|---|---|---|",
     ]
     for scale, rows in records.items():
