@@ -272,7 +272,7 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
     axes.set_title(
         f"Speed against accuracy, setup1 at scale {scale}; the line is the Pareto front\n{measured}", fontsize=10
     )
-    ticks = [0.3, 0.4, 0.5, 0.6, 0.8, 1, 1.5, 2, 3, 5, 8, 12, 20, 30]
+    ticks = [0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1, 1.5, 2, 3, 5, 8, 12, 20, 30]
     low, high = axes.get_ylim()
     axes.set_yticks([tick for tick in ticks if low < tick < high])
     axes.yaxis.set_major_formatter("{x:g} ×")

@@ -40,7 +40,8 @@ def tables() -> Tables:
 
 # Purposes, and the scheme for each; rates and times come from the records.
 CHOICES = {
-    "the smallest file, whatever it takes": "si-avif:best",
+    "the smallest file, whatever it takes": "si-lf",
+    "a small file by a standard, whatever it takes": "si-avif:best",
     "a small file in seconds": "si-hevc:balanced",
     "speed": "si-h264:fast",
     "one codestream with every view on its own": "si-jpeg2000",
