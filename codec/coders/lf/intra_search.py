@@ -1,0 +1,71 @@
+"""Encoder search of intra modes: ranked by their prediction error before any residual."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .blocks import DONE, INTRA, kind_cost
+from .intra import DIRECTIONS, MODES, fill_border, predict_intra
+from .jit import inner, lean
+from .matching import HUGE
+
+FIRST_DIRECTION = MODES - DIRECTIONS
+
+
+@lean
+def _add_magnitudes(search, work, y0, x0, n, plane, modes, errors):
+    """errors[mode] += sum of magnitudes of a plane's difference from the intra prediction."""
+    first, last, step = modes
+    predicted = work.predicted[plane]
+    for mode in range(first, last, step):
+        if mode < 0 or mode >= MODES:
+            continue
+        predict_intra(work.border, mode, n, work.predicted, plane)
+        total = np.float32(0)
+        for y in range(n):
+            own, row = search.original[plane, y0 + y, x0 : x0 + n], predicted[y]
+            for x in range(n):
+                total += np.float32(abs(np.int32(own[x]) - row[x]))
+        errors[mode] += total
+
+
+@lean
+def rank_directions(costs, job, search, work, y0, x0, log, errors):
+    """errors[:MODES] = sums of magnitudes and weighted bits; a hurried search leaves out unlikely directions."""
+    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    every = 4 if search.hurried and job.references.shape[0] else 1
+    for mode in range(MODES):
+        errors[mode] = HUGE
+    _add_planes(job, search, work, y0, x0, n, (0, FIRST_DIRECTION, 1), errors)
+    _add_planes(job, search, work, y0, x0, n, (FIRST_DIRECTION, MODES, every), errors)
+    while every > 1:
+        every >>= 1
+        best = least_error(errors)
+        if best >= FIRST_DIRECTION:
+            for mode in (best - every, best + every):
+                if FIRST_DIRECTION <= mode < MODES:
+                    _add_planes(job, search, work, y0, x0, n, (mode, mode + 1, 1), errors)
+    weight = np.float32(np.sqrt(search.weight))
+    for mode in range(MODES):
+        if errors[mode] < HUGE:
+            errors[mode] += weight * kind_cost(costs, job, by, bx, log, INTRA, 0, 0, mode)
+
+
+@lean
+def _add_planes(job, search, work, y0, x0, n, modes, errors):
+    """errors[mode] = sum of magnitudes of the difference from the intra prediction, for modes of a range."""
+    first, last, step = modes
+    for mode in range(first, last, step):
+        errors[max(mode, 0)] = 0
+    for p in range(3):
+        fill_border(job.views, job.at, p, job.blocks, np.int64(DONE), y0, x0, n, work.border)
+        _add_magnitudes(search, work, y0, x0, n, p, modes, errors)
+
+
+@inner
+def least_error(errors):
+    best = 0
+    for mode in range(MODES):
+        if errors[mode] < errors[best]:
+            best = mode
+    return best

@@ -1,0 +1,216 @@
+"""Encoder search of a block's residual: with a transform or without, colours predicted or not."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .arithmetic import bit_cost
+from .blocks import LIMIT, coded_context, residual_context, skipped_context
+from .coefficients import quantise
+from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
+from .intra import MODES
+from .jit import inner, lean
+from .matching import HUGE
+from .samples import LARGEST_SKIPPED, quantise_samples
+from .transform import LARGEST, forward
+
+WORTH_SKIPPING = np.float32(1.2)  # times the least cost so far: beyond it, skipping the transform is not tried
+
+
+class Trial(NamedTuple):
+    """Memory of the search, by block size."""
+
+    decoded: Any  # (6, 3, 32, 32) of the best way found; slot 0 for another one
+    levels: Any
+    trial_decoded: Any  # (3, 32, 32) of the way tried
+    trial_levels: Any
+    cross: Any  # (6, 2) factors of `cross`
+    trial_cross: Any
+    skipped: Any  # (6,) whether there is no transform
+    trial_skipped: Any  # (1,)
+    errors: Any  # (MODES,) of intra prediction
+
+
+def new_trial() -> Trial:
+    """Memory of the search."""
+    return Trial(
+        decoded=np.zeros((6, 3, LARGEST, LARGEST), np.int16),
+        levels=np.zeros((6, 3, LARGEST, LARGEST), np.int16),
+        trial_decoded=np.zeros((3, LARGEST, LARGEST), np.int16),
+        trial_levels=np.zeros((3, LARGEST, LARGEST), np.int16),
+        cross=np.zeros((6, 2), np.int64),
+        trial_cross=np.zeros(2, np.int64),
+        skipped=np.zeros(6, np.int64),
+        trial_skipped=np.zeros(1, np.int64),
+        errors=np.zeros(MODES, np.float32),
+    )
+
+
+@inner
+def _copy_block(block, to, n):
+    for y in range(n):
+        for x in range(n):
+            to[y, x] = block[y, x]
+
+
+@lean
+def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped):
+    """Quantise work.coefficients, which are samples if the transform is skipped."""
+    if skipped:
+        return quantise_samples(costs, work.coefficients, trial.trial_levels, plane, log, step, weight, levels)
+    return quantise(costs, work.coefficients, plane, log, step, weight, levels)
+
+
+@lean
+def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crossed, error, skipped):
+    """Quantise work.block; return bits, whether there are levels, which array has them, and the factor of `cross`.
+
+    ``first`` says whether the first plane has a residual, ``error`` is the squared error without one.
+    """
+    context = coded_context(plane, log, kind, first, skipped)
+    free, full = bit_cost(costs, context, np.int64(0)), bit_cost(costs, context, np.int64(1))
+    predictable = plane > 0 and first and crossed
+    none = cross_cost(costs, plane, log, np.int64(0)) if predictable else np.float32(0)
+    bits, some, cross = free + none, 0, np.int64(0)
+    if error <= np.float32(0.2) * step * step:
+        return bits, some, cross
+    if skipped:
+        _copy_block(work.block, work.coefficients, 1 << log)
+    else:
+        forward(work.block, log, work.half, work.coefficients)
+    more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.levels, skipped)
+    best = error + weight * bits
+    if more > 0 and missed + weight * (more + full + none) < best:
+        best, bits, some = missed + weight * (more + full + none), more + full + none, 1
+    factor = best_cross(work) if predictable else np.int64(0)
+    if factor:
+        subtract_cross(work, factor)
+        more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.spare, skipped)
+        more += (full if more > 0 else free) + cross_cost(costs, plane, log, factor)
+        if missed + weight * more < best:
+            bits, some, cross = more, 1, factor
+    return bits, some, cross
+
+
+@lean
+def try_residual(costs, job, search, work, trial, y0, x0, log, kind, so_far):
+    """Code the difference to work.predicted; return bits, error and whether there is a residual.
+
+    ``so_far`` is the least cost of the block: far above it, skipping the transform is not tried.
+    """
+    n = 1 << log
+    trial.trial_skipped[0] = 0
+    bits, error, coded = _try_way(costs, job, search, work, trial, y0, x0, log, kind, 0, HUGE)
+    cost = error + search.weight * bits
+    if not coded or not job.skipping or log > LARGEST_SKIPPED or cost > WORTH_SKIPPING * so_far:
+        return bits, error, coded
+    trial.cross[1, 0], trial.cross[1, 1] = trial.trial_cross[0], trial.trial_cross[1]
+    copy_trial(
+        trial.trial_decoded,
+        trial.trial_levels,
+        trial.trial_cross,
+        trial.decoded[1],
+        trial.levels[1],
+        trial.cross[1],
+        n,
+    )
+    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, log, kind, 1, cost)
+    if some and missed + search.weight * more < cost:
+        trial.trial_skipped[0] = 1
+        return more, missed, some
+    copy_trial(
+        trial.decoded[1],
+        trial.levels[1],
+        trial.cross[1],
+        trial.trial_decoded,
+        trial.trial_levels,
+        trial.trial_cross,
+        n,
+    )
+    return bits, error, coded
+
+
+@lean
+def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit):
+    """As `try_residual`, with a transform or without; give up without a residual beyond a cost."""
+    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    step = np.float32(job.step / 16)
+    bits, error, without = np.float32(0), np.float32(0), np.float32(0)
+    first, coded = 0, 0
+    for p in range(3):
+        least = np.float32(0)
+        for y in range(n):
+            for x in range(n):
+                difference = search.original[p, y0 + y, x0 + x] - work.predicted[p, y, x]
+                work.block[y, x] = difference
+                least += np.float32(difference * difference)
+        without += least
+        more, some, cross = _try_plane(
+            costs, work, trial, p, log, step, search.weight, kind, first, job.crossed, least, skipped
+        )
+        bits += more
+        if p:
+            trial.trial_cross[p - 1] = cross
+        if some:
+            levels = work.spare if cross else work.levels
+            rows, cols = rebuild(work, levels, log, job.step, 1, cross, skipped)
+            if p == 0:
+                keep_first(work, rows, cols)
+                first = 1
+            coded = 1
+            for y in range(n):
+                for x in range(n):
+                    value = min(max(np.int32(work.predicted[p, y, x] + work.block[y, x]), -LIMIT), LIMIT)
+                    trial.trial_decoded[p, y, x] = value
+                    trial.trial_levels[p, y, x] = levels[y, x]
+                    difference = search.original[p, y0 + y, x0 + x] - value
+                    error += np.float32(difference * difference)
+        else:
+            _leave(trial, work, p, n)
+            error += least
+        if error + search.weight * bits > limit:
+            return bits, error, 0
+    context = residual_context(job, by, bx, log, kind)
+    empty = bit_cost(costs, context, np.int64(0))
+    if coded:
+        bits += bit_cost(costs, context, 1)
+        if job.skipping and log <= LARGEST_SKIPPED:
+            bits += bit_cost(costs, skipped_context(job, by, bx, log), skipped)
+        if error + search.weight * bits < without + search.weight * empty:
+            return bits, error, 1
+        for p in range(3):
+            _leave(trial, work, p, n)
+    return empty, without, 0
+
+
+@inner
+def _leave(trial, work, p, n):
+    """A plane without a residual."""
+    for y in range(n):
+        for x in range(n):
+            trial.trial_decoded[p, y, x] = work.predicted[p, y, x]
+            trial.trial_levels[p, y, x] = 0
+
+
+@inner
+def keep(trial, log):
+    n = 1 << log
+    trial.cross[log, 0], trial.cross[log, 1] = trial.trial_cross[0], trial.trial_cross[1]
+    trial.skipped[log] = trial.trial_skipped[0]
+    for p in range(3):
+        for y in range(n):
+            for x in range(n):
+                trial.decoded[log, p, y, x] = trial.trial_decoded[p, y, x]
+                trial.levels[log, p, y, x] = trial.trial_levels[p, y, x]
+
+
+@inner
+def copy_trial(decoded, levels, cross, to_decoded, to_levels, to_cross, n):
+    to_cross[0], to_cross[1] = cross[0], cross[1]
+    for p in range(3):
+        for y in range(n):
+            for x in range(n):
+                to_decoded[p, y, x] = decoded[p, y, x]
+                to_levels[p, y, x] = levels[p, y, x]
