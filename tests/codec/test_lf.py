@@ -313,3 +313,19 @@ def test_too_many_views_are_refused_before_long_work():
     picture = IIPicture(np.zeros((256, 256, 3), np.uint8), (1, 1), (256, 256))
     with pytest.raises(ValueError, match="the picture has 256×256 views: at most 16384"):
         encode(picture, "si-lf", qp=30)
+
+
+def test_large_views_are_searched_further():
+    """At full size, 0.22 bits a sample are more than most blocks cost: nothing but synthesis was tried."""
+    assert threshold(128, 64) == threshold(16, 8) == pytest.approx(lf.GOOD[1])
+    assert threshold(512, 256) == pytest.approx(lf.GOOD[1] / 16)
+    assert threshold(513, 256) < threshold(512, 256)
+
+
+def threshold(width, height):
+    """Cost in bits a sample below which a block of views of this size is tried in no other way."""
+    picture = IIPicture(np.zeros((2 * height, 2 * width, 3), np.uint8), (width, height), (2, 2))
+    source = lf.Source(picture, checked_options(lf.LightField(), {}))
+    field = source.field(replace(source.header, steps=source.steps(480)))
+    job, _ = field.job(field.levels[0][0])
+    return float(source._search(job, source.view(0, 0)).good)

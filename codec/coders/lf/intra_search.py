@@ -64,6 +64,7 @@ def _add_planes(job, search, work, y0, x0, n, modes, errors):
 
 @inner
 def least_error(errors):
+    """The mode of the least error."""
     best = 0
     for mode in range(MODES):
         if errors[mode] < errors[best]:

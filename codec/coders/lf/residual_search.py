@@ -196,6 +196,7 @@ def _leave(trial, work, p, n):
 
 @inner
 def keep(trial, log):
+    """Note the way tried as the best one of a block of this size."""
     n = 1 << log
     trial.cross[log, 0], trial.cross[log, 1] = trial.trial_cross[0], trial.trial_cross[1]
     trial.skipped[log] = trial.trial_skipped[0]
@@ -208,6 +209,7 @@ def keep(trial, log):
 
 @inner
 def copy_trial(decoded, levels, cross, to_decoded, to_levels, to_cross, n):
+    """Copy what a way makes of a block of n×n samples."""
     to_cross[0], to_cross[1] = cross[0], cross[1]
     for p in range(3):
         for y in range(n):
