@@ -34,7 +34,6 @@ from raytrace_ii import load_scene, render
 
 RECORDS = Records("coders", ("benchmarks.coding.coders", "benchmarks.coding.rd"))
 SCENES = ("apples", "twins", "car", "cuboid")
-FILTERED = ("twins", "car", "cuboid")  # scenes whose pictures were changed by texture filtering
 ANCHOR = "si-h264:chroma=420,rate=cq"
 RATES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
 # Quantisers by coder, over the anchor's range of quality.
@@ -115,22 +114,9 @@ def measure(picture: IIPicture, keys: Sequence[Mapping[str, Any]], workers: int)
 
 def studied(scale: int) -> list[dict[str, Any]]:
     """Return the newest row of every scene and scheme at a scale, compared with the scene's anchor."""
-    rows = comparable(scale)
+    rows = RECORDS.rows(scale=scale)
     anchors = {row["scene"]: row["points"] for row in rows if row["scheme"] == ANCHOR}
     return [{**row, **compared(anchors[row["scene"]], row["points"])} for row in rows if row["scene"] in anchors]
-
-
-def comparable(scale: int) -> list[dict[str, Any]]:
-    """Return the newest row of every scene and scheme at a scale, such that all rows of a scene are of one picture.
-
-    Texture filtering changed the pictures of `FILTERED`; older rows have no commit. For these scenes the newer rows
-    are returned if there are at least as many as older ones, else the older rows.
-    """
-    rows = [row for row in RECORDS.rows(scale=scale) if row["scene"] not in FILTERED]
-    for scene in FILTERED:
-        before, since = (RECORDS.rows(unsure=unsure, scale=scale, scene=scene) for unsure in (True, False))
-        rows += since if len(since) >= len(before) else before
-    return rows
 
 
 def candidates() -> list[str]:

@@ -138,7 +138,7 @@ def tables() -> Tables:
     names = [name for name in (*SCENES, *FIELDS, IMPORTED) if (name, OURS) in curves]
     marks = ("lf-against", "lf-tools", "lf-lossless")
     against_all = {
-        ("docs/lf.md", "lf-targets"): targets({scale: coders.comparable(scale) for scale in TARGET_SCALES})
+        ("docs/lf.md", "lf-targets"): targets({scale: coders.RECORDS.rows(scale=scale) for scale in TARGET_SCALES})
     }
     if not names:
         return against_all | {("docs/lf.md", mark): ["Not measured yet."] for mark in marks}
@@ -165,7 +165,7 @@ def tables() -> Tables:
 
 
 def targets(records: Mapping[int, Sequence[Mapping[str, Any]]]) -> list[str]:
-    """Return a table of `si-lf` against the best of all other schemes, by comparable records of `coders` by scale.
+    """Return a table of `si-lf` against the best of all other schemes, by records of `coders` by scale.
 
     Schemes are in order of their Bjøntegaard rate against the anchor of `coders`; each then meets the best so far.
     """

@@ -72,7 +72,7 @@ def tables(kept: Path = KEPT) -> Tables:
         **shown_tables(results, best),
         "gain-by-size": sizes(everything),
         "view-by-size": views_by_size(everything),
-        "bjontegaard": bjontegaard(coders.comparable(CODERS_SCALE)),
+        "bjontegaard": bjontegaard(coders.RECORDS.rows(scale=CODERS_SCALE)),
     }
     return {("docs/study.md", mark): lines for mark, lines in made.items()}
 
