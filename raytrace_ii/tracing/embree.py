@@ -168,14 +168,15 @@ class Tree:
         reach: Floats,
         out: tuple[NDArray[np.int32], Floats, Floats, Floats],
         bundled: bool = False,
+        placed: bool = True,
     ) -> None:
-        """Fill row of the face (−1 on a miss), u, v and distance of the nearest hit, placed in float64.
+        """Fill row of the face (−1 on a miss), u, v and distance of the nearest hit, placed in float64 if ``placed``.
 
         ``reach`` of no length is no end. ``bundled`` rays are a few bundles: a packet that spreads is parted into
         groups of three, and single rays.
         """
         kernel = packet_kernels(self.library.width)[0]
-        kernel(*self._room("rtcIntersect", bundled), origins, directions, reach, self._faces, *out)
+        kernel(*self._room("rtcIntersect", bundled), origins, directions, reach, self._faces, placed, *out)
 
     def occluded(
         self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32], bundled: bool = False

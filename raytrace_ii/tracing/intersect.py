@@ -50,9 +50,11 @@ class Intersector:
         self._first = first_of_same(corners)
         self._first_clear = first_of_same(corners[opaque:]) if self._clear is not None else None
 
-    def nearest(self, origins: Floats, directions: Floats, bundled: bool = False) -> tuple[Hits, float]:
-        """Nearest hit of every ray, and CPU seconds inside Embree; ``bundled`` as in `embree.Tree`."""
-        return _nearest(self._all, self._first, origins, directions, _NO_REACH, bundled)
+    def nearest(
+        self, origins: Floats, directions: Floats, bundled: bool = False, placed: bool = True
+    ) -> tuple[Hits, float]:
+        """Nearest hit of every ray, and CPU seconds inside Embree; ``bundled`` and ``placed`` as in `embree.Tree`."""
+        return _nearest(self._all, self._first, origins, directions, _NO_REACH, bundled, placed)
 
     def nearest_clear(
         self, origins: Floats, directions: Floats, reach: Floats = _NO_REACH, bundled: bool = False
@@ -81,12 +83,16 @@ class SingleRays:
         vertices = np.ascontiguousarray(corners.reshape(-1, 3), np.float32)
         TriangleMesh(self._scene, vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3))
 
-    def nearest(self, origins: Floats, directions: Floats, reach: Floats, out: Hits, bundled: bool = False) -> None:
+    def nearest(
+        self, origins: Floats, directions: Floats, reach: Floats, out: Hits, bundled: bool = False,
+        placed: bool = True,
+    ) -> None:  # fmt: skip
         dists = reach.copy() if len(reach) else None  # embreex overwrites it
         found = self._scene.run(origins, directions, dists=dists, query="INTERSECT", output=True)
         for array, name in zip(out, ("primID", "u", "v", "tfar"), strict=True):
             array[:] = found[name]
-        place_hits(origins, directions, self.corners, *out)
+        if placed:
+            place_hits(origins, directions, self.corners, *out)
 
     def occluded(
         self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32], bundled: bool = False
@@ -101,12 +107,14 @@ def _nearest(
     directions: Floats,
     reach: Floats,
     bundled: bool = False,
+    placed: bool = True,
 ) -> tuple[Hits, float]:
     n = len(origins)
     hits = Hits(np.empty(n, np.int32), *(np.empty(n, np.float32) for _ in range(3)))
     start = time.thread_time()
-    tree.nearest(origins, directions, reach, hits, bundled)
+    tree.nearest(origins, directions, reach, hits, bundled, placed)
     if first is not None:
         hits.faces[:] = np.where(hits.faces >= 0, first[hits.faces], -1)
+    if first is not None and placed:
         place_hits(origins, directions, tree.corners, *hits)
     return hits, time.thread_time() - start

@@ -306,7 +306,7 @@ class Tracer:
         if len(self._shadow.reach) < n * len(s.lights):
             self._shadow = _shadow_room(n * len(s.lights), s.nested)
         counts, lit = np.zeros(COUNTS, np.int64), np.zeros(len(s.lights), np.int64)
-        passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint)
+        passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint, placed=s.passes)
         images: list[Any] = [*(support or Support()).rows(), self.pose[:3, 3], self.pose[:3, 2]]
         generation = Generation(
             hits, rays, s.surfaces, s.surroundings, passage, Recorded(*images), radiance, self._shadow, following,
@@ -340,9 +340,12 @@ class Tracer:
         return Stages(*(self._addresses[stage] if stage is not None else 0 for stage in wanted))
 
     def _hits(self, rays: Rays) -> Hits:
-        """Face, u, v and distance of the nearest face that is there: not cut out, not hidden in another body."""
+        """Face, u, v and distance of the nearest face that is there: not cut out, not hidden in another body.
+
+        They are placed only if rays pass faces; else shading does it, for it reads the faces' corners anyway.
+        """
         s = self.scene
-        found = self._nearest(rays.origins, rays.directions)
+        found = self._nearest(rays.origins, rays.directions, placed=s.passes)
         if not s.passes:
             return found
         table, rows = found, _NO_ROWS
@@ -365,8 +368,8 @@ class Tracer:
             found = self._nearest(origins[:count], directions[:count])
         return table
 
-    def _nearest(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> Hits:
-        hits, seconds = self.scene.intersector.nearest(origins, directions, self._bundles)
+    def _nearest(self, origins: NDArray[np.float32], directions: NDArray[np.float32], placed: bool = True) -> Hits:
+        hits, seconds = self.scene.intersector.nearest(origins, directions, self._bundles, placed)
         self.count.embree_seconds += seconds
         return hits
 

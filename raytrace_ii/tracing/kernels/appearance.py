@@ -11,7 +11,7 @@ from ii_core.jit import late_kernel, part_kernel, stage_kernel
 from . import lanes as at
 from .addresses import value_at
 from .glossy import highlight
-from .lanes import BLOCK
+from .lanes import BLOCK, slot
 from .media import clearness, enter, medium_of
 from .noise import fractal_lanes, vectors
 from .tables import (
@@ -114,7 +114,7 @@ def paint(generation, first, lanes, _):
     g = value_at(generation)
     materials, noisy = g.surfaces.materials, np.int64(0)  # no literal: another signature
     for k in range(lanes):
-        body = g.work.whole[at.BODY + k]
+        body = np.uint64(g.work.whole[at.BODY + k])
         g.work.double[at.CLEAR + k] = 0.0
         if materials[body, TEXTURE] >= 0 and g.work.double[at.SCATTERED + k] > 0.0:
             noisy += _take_pattern(k, int(materials[body, TEXTURE]), g.surfaces, g.work, noisy)
@@ -186,17 +186,17 @@ def _take_images(k, surfaces, filtering, blending, work, noisy):
 def _take_pattern(k, row, surfaces, work, noisy):
     """Colour one lane by a pattern, or note the place where its noise is wanted as number ``noisy``: 1 then."""
     single, double, whole, table = work.single, work.double, work.whole, surfaces.textures
-    x, y, z = interpolate(surfaces.coordinates, whole[at.FACE + k], single[at.U + k], single[at.V + k])
+    x, y, z = interpolate(surfaces.coordinates, np.uint64(whole[at.FACE + k]), single[at.U + k], single[at.V + k])
     if table[row, 0] != NOISE:
         t0, t1, t2 = pattern_colour(table, row, x, y, z)
         double[at.T0 + k], double[at.T1 + k], double[at.T2 + k] = t0, t1, t2
         return 0
-    whole[at.NOISY + noisy] = k
+    whole[slot(at.NOISY, noisy)] = k
     packed = int(table[row, 10])
-    whole[at.OCTAVES + noisy], whole[at.SEED + noisy] = packed % 16, packed // 16
-    double[at.SX + noisy], double[at.SY + noisy], double[at.SZ + noisy] = (
-        x * table[row, 1], y * table[row, 2], z * table[row, 3],
-    )  # fmt: skip
+    whole[slot(at.OCTAVES, noisy)], whole[slot(at.SEED, noisy)] = packed & 15, packed >> 4
+    double[slot(at.SX, noisy)] = x * table[row, 1]
+    double[slot(at.SY, noisy)] = y * table[row, 2]
+    double[slot(at.SZ, noisy)] = z * table[row, 3]
     return 1
 
 
@@ -234,8 +234,8 @@ def _colour_by_noise(many, surfaces, work):
     fractal_lanes(many, whole, double)
     for j in range(many):
         k = whole[at.NOISY + j]
-        row = int(surfaces.materials[whole[at.BODY + k], TEXTURE])
-        double[at.T0 + k], double[at.T1 + k], double[at.T2 + k] = noise_colour(
+        row = int(surfaces.materials[np.uint64(whole[slot(at.BODY, k)]), TEXTURE])
+        double[slot(at.T0, k)], double[slot(at.T1, k)], double[slot(at.T2, k)] = noise_colour(
             surfaces.textures, row, double[at.TOTAL + j]
         )
 

@@ -87,7 +87,7 @@ class Passage(NamedTuple):
     ``least`` is the least weight of a spawned ray. Up to ``lobe_rays`` rays go over the lobe of a rough mirror, whose
     places stand ``lobe_stride`` apart. A ray is ``first_width`` wide where it starts, if it has no width of its own,
     and grows by ``spread`` a mm, from a negative width through 0: images are filtered over its width, not at all if
-    both are 0.
+    both are 0. Hits that are not ``placed`` stand where Embree put them.
     """
 
     least: float
@@ -95,6 +95,7 @@ class Passage(NamedTuple):
     lobe_stride: int
     first_width: float
     spread: float
+    placed: bool
 
 
 class Recorded(NamedTuple):

@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 
-from ii_core.jit import late_kernel, stage_kernel
+from ii_core.jit import exact_stage_kernel, late_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
-from .lanes import BLOCK
+from .lanes import BLOCK, slot
+from .packets import place_hit
 from .tables import IMAGES
 from .textures import footprint
 from .vectors import three, three_doubles
@@ -39,25 +40,39 @@ def gather(first, hits, rays, surfaces, work):
         if face < 0:
             continue
         f = np.uint64(face)  # unsigned indices into one dimension: numba need not look for negative ones
-        whole[at.ROW + lanes], whole[at.FACE + lanes] = first + k, face
-        whole[at.BODY + lanes] = surfaces.object_of_face[f]
-        single[at.U + lanes], single[at.V + lanes], single[at.DISTANCE + lanes] = (
-            hits.u[i],
-            hits.v[i],
-            hits.distances[i],
-        )
+        whole[slot(at.ROW, lanes)], whole[slot(at.FACE, lanes)] = first + k, face
+        whole[slot(at.BODY, lanes)] = surfaces.object_of_face[f]
+        single[slot(at.U, lanes)], single[slot(at.V, lanes)] = hits.u[i], hits.v[i]
+        single[slot(at.DISTANCE, lanes)] = hits.distances[i]
         for c in range(3):
-            single[at.DX + c * BLOCK + lanes] = rays.directions[i, c]
-            single[at.WEIGHT + c * BLOCK + lanes] = rays.weights[i, c]
+            single[slot(at.START + c * BLOCK, lanes)] = rays.origins[i, c]
+            single[slot(at.DX + c * BLOCK, lanes)] = rays.directions[i, c]
+            single[slot(at.WEIGHT + c * BLOCK, lanes)] = rays.weights[i, c]
         for c in range(5):
-            single[at.FACE_NORMAL + c * BLOCK + lanes] = faces[f * _5 + np.uint64(c)]
+            single[slot(at.FACE_NORMAL + c * BLOCK, lanes)] = faces[f * _5 + np.uint64(c)]
         for c in range(9):
-            single[at.CORNER + c * BLOCK + lanes] = corners[f * _9 + np.uint64(c)]
+            single[slot(at.CORNER + c * BLOCK, lanes)] = corners[f * _9 + np.uint64(c)]
         if smooth:
             for c in range(9):
-                single[at.NORMAL + c * BLOCK + lanes] = normals[f * _9 + np.uint64(c)]
+                single[slot(at.NORMAL + c * BLOCK, lanes)] = normals[f * _9 + np.uint64(c)]
         lanes += 1
     return lanes
+
+
+@exact_stage_kernel
+def settle(single):
+    """Put u, v and distance as `place_hit` gives them in place of Embree's."""
+    for k in range(BLOCK):
+        o, d, c = at.START + k, at.DX + k, at.CORNER + k
+        u, v, t, sure = place_hit(
+            single[o], single[o + BLOCK], single[o + 2 * BLOCK], single[d], single[d + BLOCK], single[d + 2 * BLOCK],
+            single[c], single[c + BLOCK], single[c + 2 * BLOCK],
+            single[c + 3 * BLOCK], single[c + 4 * BLOCK], single[c + 5 * BLOCK],
+            single[c + 6 * BLOCK], single[c + 7 * BLOCK], single[c + 8 * BLOCK],
+        )  # fmt: skip
+        single[at.U + k] = u if sure else single[at.U + k]
+        single[at.V + k] = v if sure else single[at.V + k]
+        single[at.DISTANCE + k] = t if sure else single[at.DISTANCE + k]
 
 
 @stage_kernel

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core.jit import inline_kernel
+
 BLOCK = 64  # rays that go through the stages together: what is kept of them fits in the first cache
 
 
@@ -31,6 +33,8 @@ def _offsets(many: int) -> tuple[int, ...]:
 
 # Quantities in float32, as they are gathered: place in the face, ray, corners, face and normals of its corners.
 U, V, DISTANCE, DX, DY, DZ, WEIGHT = _offsets(7)
+_offsets(2)
+START = next(_offset)
 _offsets(2)
 CORNER = next(_offset)
 _offsets(8)
@@ -68,6 +72,15 @@ _DOUBLES = next(_offset)
 _offset = count(0, BLOCK)
 ROW, FACE, BODY, LANE, NOISY, OCTAVES, SEED = _offsets(7)
 _WHOLES = next(_offset)
+
+
+@inline_kernel
+def slot(quantity, lane):
+    """Index of a lane's number: unsigned, so that numba need not look for negative ones.
+
+    Lanes of a loop over all of them are known not to be negative; those that are counted or read are not.
+    """
+    return np.uint64(quantity + lane)
 
 
 def work() -> Work:

@@ -10,7 +10,7 @@ from ii_core.jit import lean_kernel as kernel
 from ii_core.jit import stage_kernel
 
 from . import lanes as at
-from .lanes import BLOCK
+from .lanes import BLOCK, slot
 from .tables import (
     CONE_AXIS,
     CONE_OFFSET,
@@ -107,9 +107,9 @@ def cast(lanes, lights, light, rays, shadows, first, work, counts):
             continue
         i = np.uint64(whole[at.ROW + k])
         for c in range(3):
-            shadows.origins[row, c] = double[at.OX + c * BLOCK + k] + double[at.AX + c * BLOCK + k]
-            shadows.directions[row, c] = double[at.LX + c * BLOCK + k]
-            shadows.colours[row, c] = double[at.C0 + c * BLOCK + k]
+            shadows.origins[row, c] = double[slot(at.OX + c * BLOCK, k)] + double[slot(at.AX + c * BLOCK, k)]
+            shadows.directions[row, c] = double[slot(at.LX + c * BLOCK, k)]
+            shadows.colours[row, c] = double[slot(at.C0 + c * BLOCK, k)]
         shadows.reach[row] = reach
         shadows.pixels[row] = rays.pixels[i]
         for j in range(rays.inside.shape[1]):
@@ -123,8 +123,9 @@ def add_unblocked(blocked, colours, pixels, radiance):
     """Add the light of every shadow ray that arrived."""
     for i in range(blocked.shape[0]):
         if blocked[i] != 0:
+            pixel = np.uint64(pixels[i])
             for c in range(3):
-                radiance[pixels[i], c] += colours[i, c]
+                radiance[pixel, c] += colours[i, c]
 
 
 @kernel

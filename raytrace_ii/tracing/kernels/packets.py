@@ -130,13 +130,20 @@ def _begin(packet, numbers, width):
         numbers[_INSTANCE * width + lane] = -1
 
 
+@inline_kernel
+def _at(row, width, lane):
+    """Index of a number in a packet: unsigned, so that numba need not look for negative ones."""
+    return np.uint64(row * width + lane)
+
+
 @stage_kernel
-def _fill(packet, numbers, width, lane, o, d, i, far):
+def _fill(packet, numbers, width, lane, o, d, ray, far):
+    i = np.uint64(ray)
     for c in range(3):
-        packet[c * width + lane] = o[i, c]
-        packet[(_DIRECTION + c) * width + lane] = d[i, c]
-    packet[_FAR * width + lane] = far
-    numbers[_GEOMETRY * width + lane] = -1
+        packet[_at(c, width, lane)] = o[i, c]
+        packet[_at(_DIRECTION + c, width, lane)] = d[i, c]
+    packet[_at(_FAR, width, lane)] = far
+    numbers[_at(_GEOMETRY, width, lane)] = -1
 
 
 @_reduce
@@ -165,9 +172,9 @@ def _together(packet, calls, ahead, width):
 def _place(packet, numbers, width, corners):
     """Put u, v and distance as `place_hit` gives them in place of Embree's: a loop without branches, for vectors."""
     for lane in range(width):
-        f = numbers[_FACE * width + lane] if numbers[_GEOMETRY * width + lane] >= 0 else 0
+        f = np.uint64(numbers[_at(_FACE, width, lane)] if numbers[_at(_GEOMETRY, width, lane)] >= 0 else 0)
         for k in range(9):
-            packet[(_CORNERS + k) * width + lane] = corners[f, k // 3, k % 3]
+            packet[_at(_CORNERS + k, width, lane)] = corners[f, k // 3, k % 3]
     for lane in range(width):
         u, v, t, sure = place_hit(
             packet[lane], packet[width + lane], packet[2 * width + lane],
@@ -185,9 +192,12 @@ def _place(packet, numbers, width, corners):
 
 
 @stage_kernel
-def _take(packet, numbers, width, lane, i, primitives, u, v, distances):
-    primitives[i] = numbers[_FACE * width + lane] if numbers[_GEOMETRY * width + lane] >= 0 else -1
-    u[i], v[i], distances[i] = packet[_U * width + lane], packet[_V * width + lane], packet[_FAR * width + lane]
+def _take(packet, numbers, width, lane, ray, primitives, u, v, distances):
+    i = np.uint64(ray)
+    primitives[i] = numbers[_at(_FACE, width, lane)] if numbers[_at(_GEOMETRY, width, lane)] >= 0 else -1
+    u[i], v[i], distances[i] = (
+        packet[_at(_U, width, lane)], packet[_at(_V, width, lane)], packet[_at(_FAR, width, lane)],
+    )  # fmt: skip
 
 
 @stage_kernel
@@ -257,13 +267,13 @@ def _trace_groups(calls, active, chosen, packet, numbers, one_numbers, lanes, wi
 def packet_kernels(width: int) -> tuple[Any, Any]:
     """The kernels for packets of so many rays: nearest hit, and whether anything is hit.
 
-    Rays go in packets of ``width`` in their order; one that spreads too far is parted. u, v and distance of misses
-    mean nothing.
+    Rays go in packets of ``width`` in their order; one that spreads too far is parted. u, v and distance are those of
+    `place_hit` if ``placed``, else Embree's; of misses they mean nothing.
     """
 
     @kernel
     def nearest(
-        calls, active, chosen, packet, numbers, one_numbers, origins, directions, reach, corners,
+        calls, active, chosen, packet, numbers, one_numbers, origins, directions, reach, corners, placed,
         primitives, u, v, distances,
     ):  # fmt: skip
         n, wide = origins.shape[0], np.int64(width)  # no literal: parts are compiled once
@@ -280,7 +290,8 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
             else:
                 _trace_groups(calls, active, chosen, packet, numbers, one_numbers, lanes, wide)
-            _place(packet, numbers, wide, corners)
+            if placed:
+                _place(packet, numbers, wide, corners)
             ahead = packet[_FAR * width] if numbers[_GEOMETRY * width] >= 0 else ahead
             for lane in range(lanes):
                 _take(packet, numbers, wide, lane, first + lane, primitives, u, v, distances)

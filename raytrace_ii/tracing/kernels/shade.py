@@ -12,8 +12,8 @@ from ii_core.jit import lean_kernel as kernel
 from . import lanes as at
 from .addresses import address_of, call, value_at
 from .appearance import scatter, take_materials
-from .attributes import flat_normals, gather, place, smooth_normals, up_to_smooth
-from .lanes import BLOCK
+from .attributes import flat_normals, gather, place, settle, smooth_normals, up_to_smooth
+from .lanes import BLOCK, slot
 from .light import cast, in_cone, towards_light
 from .sky import background_colour
 from .vectors import interpolate, put
@@ -33,6 +33,8 @@ def shade(generation, stages):
     for first in range(0, n, BLOCK):
         lanes = gather(first, generation.hits, generation.rays, generation.surfaces, generation.work)
         if lanes > 0:
+            if not generation.passage.placed:
+                settle(single)
             place(single, double)
             if generation.surfaces.normals.shape[0] > 0:
                 smooth_normals(single, double)
@@ -74,8 +76,8 @@ def add_light(first, gradient, generation):
         if k >= 0:
             for c in range(3):
                 if foggy:
-                    radiance[pixel, c] += double[at.F0 + c * BLOCK + k]
-                radiance[pixel, c] += double[at.E0 + c * BLOCK + k]
+                    radiance[pixel, c] += double[slot(at.F0 + c * BLOCK, k)]
+                radiance[pixel, c] += double[slot(at.E0 + c * BLOCK, k)]
         elif gradient:
             b0, b1, b2 = background_colour(background, float(rays.directions[i, 1]))
             radiance[pixel, 0] += float(rays.weights[i, 0]) * b0
@@ -88,11 +90,11 @@ def record(generation, first, lanes, _):
     """Note of each ray what support images want."""
     g = value_at(generation)
     hits, rays, surfaces, recorded = g.hits, g.rays, g.surfaces, g.recorded
-    double, whole, eye, axis = g.work.double, g.work.whole, recorded.eye, recorded.axis
+    single, double, whole, eye, axis = g.work.single, g.work.double, g.work.whole, recorded.eye, recorded.axis
     for i in range(first, min(first + BLOCK, hits.faces.shape[0])):
         f, k, pixel = hits.faces[i], whole[at.LANE + i - first], rays.pixels[i]
         if recorded.ray_length.shape[0] > 0:
-            recorded.ray_length[pixel] = hits.distances[i] if f >= 0 else math.nan
+            recorded.ray_length[pixel] = single[at.DISTANCE + k] if f >= 0 else math.nan
         if recorded.object_id.shape[0] > 0:
             recorded.object_id[pixel] = surfaces.object_of_face[f] if f >= 0 else -1
         if recorded.normal.shape[0] > 0:
@@ -100,7 +102,7 @@ def record(generation, first, lanes, _):
                 recorded.normal[pixel, c] = surfaces.faces[f, c] if f >= 0 else 0.0
         if recorded.depth.shape[0] > 0:
             if f >= 0:
-                x, y, z = interpolate(surfaces.corners, f, float(hits.u[i]), float(hits.v[i]))
+                x, y, z = interpolate(surfaces.corners, f, float(single[at.U + k]), float(single[at.V + k]))
                 recorded.depth[pixel] = (x - eye[0]) * axis[0] + (y - eye[1]) * axis[1] + (z - eye[2]) * axis[2]
             else:
                 recorded.depth[pixel] = math.nan

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ii_core.jit import lean_kernel as kernel
 
 _LEAST, _MOST = 1e-150, 1e150  # between them squares and their sums neither vanish nor overflow
@@ -69,11 +71,13 @@ def start_separable_rays(x, y, z, rows, columns, rotation, shift, out_origins, o
     lz, dz = z[0], z[1]
     sure = (_LEAST < abs(dz) < _MOST) & (abs(lz) < _MOST)
     for rays in (x, y):
-        for i in range(rays.shape[0]):
-            sure &= (abs(rays[i, 0]) < _MOST) & (abs(rays[i, 1]) < _MOST)
-    for i in range(rows.shape[0]):
-        lx, dx = x[columns[i], 0], x[columns[i], 1]
-        ly, dy = y[rows[i], 0], y[rows[i], 1]
+        for k in range(rays.shape[0]):
+            sure &= (abs(rays[k, 0]) < _MOST) & (abs(rays[k, 1]) < _MOST)
+    for ray in range(rows.shape[0]):
+        i = np.uint64(ray)  # unsigned: numba need not look for negative indices
+        column, row = np.uint64(columns[i]), np.uint64(rows[i])
+        lx, dx = x[column, 0], x[column, 1]
+        ly, dy = y[row, 0], y[row, 1]
         inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
         out_origins[i, 0] = r00 * lx + r01 * ly + r02 * lz + s0
         out_origins[i, 1] = r10 * lx + r11 * ly + r12 * lz + s1
