@@ -13,14 +13,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, between, disagreement
+from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, disagreement, hashed
 from .blocks import EXPLICIT, INDEX, KIND, UNKNOWN
 from .jit import inner, kernel, lean
-from .warp import FILTERS, TAPS, clamped
+from .warp import BEFORE, FILTERS, TAPS, clamped, filtered
 
 CANDIDATES = 8
 MOST_SOURCES = 8
 RUN = 32  # samples of a row that are blended together, if their disparity is the same
+MET = 64  # disparities around a sample that are known to have been looked at
 SMOOTH = 8  # cost of a step of disparity
 
 
@@ -53,12 +54,15 @@ class Synthesis(NamedTuple):
     scratch : ndarray of int64, (10, MOST_SOURCES)
     tried : ndarray of int64, (16,)
     span : ndarray of int32, (MATCHED, SPAN)
-    kept : ndarray of int16, (ROWS, W / SPAN, SLOTS, SPAN)
+    kept : ndarray of int16, (ROWS · W / SPAN · SLOTS, SPAN)
         How far the sources differ, by row, position and disparity.
-    marks : ndarray of int64, (ROWS, W / SPAN, SLOTS)
+    marks : ndarray of int64, (ROWS · W / SPAN · SLOTS,)
         Row and disparity of what is kept.
     taken : ndarray of int32, (MOST_SOURCES, 3, RUN)
         Samples of the sources for a run of samples of one disparity.
+    sums : ndarray of int32, (RUN + TAPS - 1,)
+    met : ndarray of int64, (MET,)
+        Samples and disparities that were looked at.
     """
 
     views: Any
@@ -75,6 +79,8 @@ class Synthesis(NamedTuple):
     kept: Any
     marks: Any
     taken: Any
+    sums: Any
+    met: Any
 
 
 def new_synthesis(views: Any, disparities: Any, sources: Any) -> Synthesis:
@@ -92,9 +98,11 @@ def new_synthesis(views: Any, disparities: Any, sources: Any) -> Synthesis:
         scratch=np.zeros((10, MOST_SOURCES), np.int64),
         tried=np.zeros(16, np.int64),
         span=np.zeros((MATCHED, SPAN), np.int32),
-        kept=np.zeros((ROWS, -(-width // SPAN), SLOTS, SPAN), np.int16),
-        marks=np.full((ROWS, -(-width // SPAN), SLOTS), -1),
+        kept=np.zeros((ROWS * -(-width // SPAN) * SLOTS, SPAN), np.int16),
+        marks=np.full(ROWS * -(-width // SPAN) * SLOTS, -1),
         taken=np.zeros((MOST_SOURCES, 3, RUN), np.int32),
+        sums=np.zeros(RUN + TAPS - 1, np.int32),
+        met=np.full(MET, -1),
     )
 
 
@@ -135,19 +143,21 @@ def choose(s, apart):
     tried = s.tried
     for y in range(height):
         for x in range(width):
-            number, last = 0, np.int64(UNKNOWN)
+            number = 0
             for j in range(max(y - 1, 0), min(y + 2, height)):
                 for i in range(max(x - 1, 0), min(x + 2, width)):
-                    for c in range(s.counts[j, i]):
-                        d = np.int64(s.candidates[c, j, i])
-                        if d == last:
+                    for c in range(s.counts[np.uint64(j), np.uint64(i)]):
+                        d = np.int64(s.candidates[np.uint64(c), np.uint64(j), np.uint64(i)])
+                        mark, place = ((y * width + x) << 16) | (d & 0xFFFF), np.uint64(hashed(d) & (MET - 1))
+                        if s.met[place] == mark:
                             continue
-                        last, new = d, True
+                        s.met[place], new = mark, True
                         for k in range(number):
                             if abs(tried[k] - d) <= apart:
                                 new = False
+                                break
                         if new and number < tried.size:
-                            tried[number] = d
+                            tried[np.uint64(number)] = d
                             number += 1
             best, least = np.int64(UNKNOWN), np.int64(1 << 40)
             if number == 1:
@@ -240,64 +250,44 @@ def blend(s, nearest, every):
 
 
 @lean
-def _six_taps(plane, iy, ix, py, px):
-    height, width = plane.shape
-    total = np.int64(0)
-    inside = ix >= 2 and ix + 3 < width
-    across = FILTERS[px]
-    for k in range(TAPS):
-        f = np.int64(FILTERS[py, k])
-        if f:
-            line = plane[clamped(iy + k - 2, height)]
-            row = np.int64(0)
-            if inside:
-                taken = line[ix - 2 : ix + 4]
-                for m in range(TAPS):
-                    row += np.int64(across[m]) * np.int64(taken[m])
-            else:
-                for m in range(TAPS):
-                    row += np.int64(across[m]) * np.int64(line[clamped(ix + m - 2, width)])
-            total += f * row
-    return (total + 2048) >> 12
+def _six_taps_run(plane, iy, ix, py, px, count, sums, out):
+    """out[:count] = samples of a plane that follow each other, by six taps down, into ``sums``, then across.
 
-
-@lean
-def _six_taps_run(plane, iy, ix, py, px, count, out):
-    """out[:count] = `_six_taps` of samples that follow each other, four at a time inside the plane."""
+    Beyond its border the plane goes on with the border's samples.
+    """
     height, width = plane.shape
-    length = (count + 3) & ~3
-    if ix < 2 or ix + length + 3 > width:
-        for j in range(count):
-            out[j] = _six_taps(plane, iy, ix + j, py, px)
-        return
-    a, b, c, d, e, f = FILTERS[px, 0], FILTERS[px, 1], FILTERS[px, 2], FILTERS[px, 3], FILTERS[px, 4], FILTERS[px, 5]
-    for j in range(length):
-        out[j] = 2048
+    length = (count + 3) & -4
+    columns = length + TAPS - 1
+    within = ix >= BEFORE and ix - BEFORE + columns <= width
+    for j in range(columns):
+        sums[j] = 0
     for k in range(TAPS):
         g = FILTERS[py, k]
         if g:
-            t = plane[clamped(iy + k - 2, height), ix - 2 : ix + length + 3]
-            if px == 0:
-                for first in range(0, length, 4):
-                    for j in range(first, first + 4):
-                        out[j] = np.int32(out[j] + np.int32(np.int32(64 * g) * t[j + 2]))
+            row = plane[np.uint64(clamped(iy + k - BEFORE, height))]
+            if within:
+                taken = row[ix - BEFORE : ix - BEFORE + columns]
+                for j in range(columns):
+                    sums[j] = np.int32(sums[j] + np.int32(g * np.int32(taken[j])))
             else:
-                for first in range(0, length, 4):
-                    for j in range(first, first + 4):
-                        row = a * t[j] + b * t[j + 1] + c * t[j + 2] + d * t[j + 3] + e * t[j + 4] + f * t[j + 5]
-                        out[j] = np.int32(out[j] + np.int32(g * np.int32(row)))
-    for j in range(length):
-        out[j] >>= 12
+                for j in range(columns):
+                    sums[j] += g * row[np.uint64(clamped(ix + j - BEFORE, width))]
+    a, b, c, d, e, f = FILTERS[px, 0], FILTERS[px, 1], FILTERS[px, 2], FILTERS[px, 3], FILTERS[px, 4], FILTERS[px, 5]
+    for at in range(0, length, 4):
+        t, four = sums[at : at + TAPS + 3], out[at : at + 4]
+        m, n = filtered(t, 0, a, b, c, d, e, f), filtered(t, 1, a, b, c, d, e, f)
+        o, p = filtered(t, 2, a, b, c, d, e, f), filtered(t, 3, a, b, c, d, e, f)
+        four[0], four[1], four[2], four[3] = (m + 2048) >> 12, (n + 2048) >> 12, (o + 2048) >> 12, (p + 2048) >> 12
 
 
-@lean
+@inner
 def _interpolate(s, y, x, length, d, count):
     """s.taken[:count, :, :length] = samples of the sources along a disparity."""
     for r in range(count):
         dx, dy = d * s.sources[r, 1], d * s.sources[r, 2]
         ix, iy, px, py = x + (dx >> 8), y + (dy >> 8), (dx >> 4) & 15, (dy >> 4) & 15
         for p in range(3):
-            _six_taps_run(s.views[s.sources[r, 0], p], iy, ix, py, px, length, s.taken[r, p])
+            _six_taps_run(s.views[s.sources[r, 0], p], iy, ix, py, px, length, s.sums, s.taken[r, p])
 
 
 @inner
@@ -351,7 +341,7 @@ def _weighted(s, y, x, count):
     return _quotient(spread, all_)
 
 
-@lean
+@inner
 def _mismatch(s, at, y, x, d):
     """Return the difference of the best two sources from the decoded view around a sample, in eighths of a code."""
     height, width = s.counts.shape
@@ -379,9 +369,17 @@ def _mismatch(s, at, y, x, d):
                     break
         else:
             for j in range(max(y - 1, 0), min(y + 2, height)):
+                mine = own[np.uint64(j)]
+                upper = other[np.uint64(clamped(j + iy, height))]
+                lower = other[np.uint64(clamped(j + iy + 1, height))]
                 for i in range(max(x - 1, 0), min(x + 2, width)):
-                    value = between(other, j + iy, i + ix, py, px) >> 8
-                    total += min(abs(value - np.int64(own[j, i])), TRUNCATED)
+                    left, right = np.uint64(clamped(i + ix, width)), np.uint64(clamped(i + ix + 1, width))
+                    above = np.int64(upper[left]) * (16 - px) + np.int64(upper[right]) * px
+                    below = np.int64(lower[left]) * (16 - px) + np.int64(lower[right]) * px
+                    value = (above * (16 - py) + below * py) >> 8
+                    total += min(abs(value - np.int64(mine[np.uint64(i)])), TRUNCATED)
+                if total >= second:
+                    break
         if total < least:
             least, second = total, least
         elif total < second:
@@ -418,17 +416,14 @@ def refine(s, at, backward):
             two = np.int64(s.disparities[at, y - step, x]) if 0 <= y - step < height else own
             if one == own and two == own:
                 continue
-            best, least = own, 1 << 40
-            if own != UNKNOWN:
-                least = _mismatch(s, at, y, x, own) + _roughness(own, one, two)
-            if one != UNKNOWN and one != own:
-                cost = _mismatch(s, at, y, x, one) + _roughness(one, one, two)
+            best, least = own, np.int64(1 << 40)
+            for k in range(3):
+                d = own if k == 0 else (one if k == 1 else two)
+                if d == UNKNOWN or (k > 0 and d == own) or (k == 2 and d == one):
+                    continue
+                cost = _mismatch(s, at, y, x, d) + _roughness(d, one, two)
                 if cost < least:
-                    least, best = cost, one
-            if two != UNKNOWN and two != own and two != one:
-                cost = _mismatch(s, at, y, x, two) + _roughness(two, one, two)
-                if cost < least:
-                    least, best = cost, two
+                    least, best = cost, d
             s.disparities[at, y, x] = best
 
 

@@ -39,7 +39,7 @@ def clamped(i, n):
 
 
 @inner
-def _filtered(t, j, a, b, c, d, e, f):
+def filtered(t, j, a, b, c, d, e, f):
     """Sum of six samples from t[j] on, weighted."""
     far = np.int32(np.int32(a * t[j]) + np.int32(f * t[j + 5]))
     near = np.int32(np.int32(b * t[j + 1]) + np.int32(e * t[j + 4]))
@@ -87,12 +87,12 @@ def moved_block(views, view, plane, y0, x0, n, dy, dx, rows, out):
         else:
             taken = line[ix - BEFORE : ix - BEFORE + n + TAPS - 1]
             if n == 4:
-                one, two = _filtered(taken, 0, a, b, c, d, e, f), _filtered(taken, 1, a, b, c, d, e, f)
-                three, four = _filtered(taken, 2, a, b, c, d, e, f), _filtered(taken, 3, a, b, c, d, e, f)
+                one, two = filtered(taken, 0, a, b, c, d, e, f), filtered(taken, 1, a, b, c, d, e, f)
+                three, four = filtered(taken, 2, a, b, c, d, e, f), filtered(taken, 3, a, b, c, d, e, f)
                 row[0], row[1], row[2], row[3] = one, two, three, four
             else:
                 for j in range(n):
-                    row[j] = _filtered(taken, j, a, b, c, d, e, f)
+                    row[j] = filtered(taken, j, a, b, c, d, e, f)
     a, b, c, d, e, f = FILTERS[py, 0], FILTERS[py, 1], FILTERS[py, 2], FILTERS[py, 3], FILTERS[py, 4], FILTERS[py, 5]
     for i in range(n):
         into = out[plane, i]
