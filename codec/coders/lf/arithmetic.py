@@ -151,7 +151,7 @@ def bit_costs(contexts: NDArray[np.int32]) -> NDArray[np.float32]:
 @inner
 def bit_cost(costs, context, bit):
     """Bits that a bit would take, of the table by `bit_costs`."""
-    return costs[context, bit]
+    return costs[np.uint64(context), np.uint64(bit)]
 
 
 @inner

@@ -120,7 +120,7 @@ def new_work() -> Work:
         reach=np.zeros(2, np.int64),
         spare=np.zeros(square, np.int32),
         border=np.zeros((2, 2 * LARGEST + 2), np.int32),
-        rows=np.zeros((LARGEST + 5, LARGEST), np.int32),
+        rows=np.zeros((LARGEST + 6, LARGEST + 8), np.int32),
     )
 
 

@@ -21,12 +21,12 @@ def _add_magnitudes(search, work, y0, x0, n, plane, modes, errors):
         if mode < 0 or mode >= MODES:
             continue
         predict_intra(work.border, mode, n, work.predicted, plane)
-        total = np.float32(0)
+        total = np.int32(0)
         for y in range(n):
-            own, row = search.original[plane, y0 + y, x0 : x0 + n], predicted[y]
+            own, row = search.original[plane, np.uint64(y0 + y)], predicted[y]
             for x in range(n):
-                total += np.float32(abs(np.int32(own[x]) - row[x]))
-        errors[mode] += total
+                total += np.int32(abs(np.int32(np.int32(own[np.uint64(x0 + x)]) - row[x])))
+        errors[mode] += np.float32(total)  # exact: 1024 differences of decoded samples stay below 2^24
 
 
 @lean

@@ -44,11 +44,15 @@ class Match(NamedTuple):
         Of the first plane, by 4×4 samples.
     total, errors : ndarray of float32, (PAIRS, indices) and (2, indices)
         Sums over a block; errors of the best and of one set of references.
-    missed : ndarray of float32, (MOST_REFERENCES + 1, LARGEST + 1)
-        A row of differences.
+    missed : ndarray of float32, (MOST_REFERENCES, 4 · LARGEST)
+        Four rows of differences.
+    between : ndarray of float32, (LARGEST + 1,)
+        A row of a view between its own.
     sums : ndarray of float32, (PAIRS, LARGEST)
-    moved : ndarray of float32, (MOST_REFERENCES, 3, LARGEST, LARGEST)
-        Differences between a block and its references as decoded.
+    moved : ndarray of float32, (MOST_REFERENCES, 3 · LARGEST²)
+        Differences between a block and its references as decoded, plane by plane and row by row.
+    sets : ndarray of float64, (2^MOST_REFERENCES,)
+        Sums of inner products over the pairs of each set of references.
     tried : ndarray of int64, (MOST_TRIED,)
     """
 
@@ -60,8 +64,10 @@ class Match(NamedTuple):
     total: Any
     errors: Any
     missed: Any
+    between: Any
     sums: Any
     moved: Any
+    sets: Any
     tried: Any
 
 
@@ -75,36 +81,54 @@ def new_match(indices: int, every: int, hurried: int = 0) -> Match:
         products=np.zeros((CELLS, CELLS, PAIRS, indices), np.float32),
         total=np.zeros((PAIRS, indices), np.float32),
         errors=np.zeros((2, indices), np.float32),
-        missed=np.zeros((MOST_REFERENCES + 1, LARGEST + 1), np.float32),
+        missed=np.zeros((MOST_REFERENCES, 4 * LARGEST), np.float32),
+        between=np.zeros(LARGEST + 1, np.float32),
         sums=np.zeros((PAIRS, LARGEST), np.float32),
-        moved=np.zeros((MOST_REFERENCES, 3, LARGEST, LARGEST), np.float32),
+        moved=np.zeros((MOST_REFERENCES, 3 * LARGEST * LARGEST), np.float32),
+        sets=np.zeros(1 << MOST_REFERENCES),
         tried=np.zeros(MOST_TRIED, np.int64),
     )
 
 
+@inner
+def _between_rows(upper, lower, at, fy):
+    """A sample between two rows, which is as far below the upper one as ``fy`` says."""
+    one, other = np.float32(upper[np.uint64(at)]), np.float32(lower[np.uint64(at)])
+    return (np.float32(1) - fy) * one + fy * other
+
+
 @lean
-def _missed_row(plane, original, y, x0, dy, dx, between, missed):
-    """missed[:32] = a row of the plane moved, between samples bilinearly, less that of the original."""
+def _missed_rows(plane, original, y0, x0, dy, dx, between, missed):
+    """Fill missed with four rows of 32 samples: the plane moved, between samples bilinearly, less the original."""
     height, width = plane.shape
-    iy, ix = dy >> 8, dx >> 8
+    iy, start = dy >> 8, x0 + (dx >> 8)
     fx, fy = np.float32((dx & 255) / 256), np.float32((dy & 255) / 256)
-    upper, lower = plane[clamped(y + iy, height)], plane[clamped(y + iy + 1, height)]
-    start = x0 + ix
-    if start >= 0 and start + LARGEST + 1 <= width:
-        one, other = upper[start : start + LARGEST + 1], lower[start : start + LARGEST + 1]
-        for x in range(LARGEST + 1):
-            between[x] = (np.float32(1) - fy) * np.float32(one[x]) + fy * np.float32(other[x])
-    else:
-        for x in range(LARGEST + 1):
-            at = clamped(start + x, width)
-            between[x] = (np.float32(1) - fy) * np.float32(upper[at]) + fy * np.float32(lower[at])
-    if x0 + LARGEST <= width:
-        own = original[y, x0 : x0 + LARGEST]
-        for x in range(LARGEST):
-            missed[x] = (np.float32(1) - fx) * between[x] + fx * between[x + 1] - np.float32(own[x])
-    else:
-        for x in range(width - x0):
-            missed[x] = (np.float32(1) - fx) * between[x] + fx * between[x + 1] - np.float32(original[y, x0 + x])
+    # The row between two begins and ends with so many repetitions of the border's samples.
+    before, within = min(max(-start, 0), between.size), max(min(width - start, between.size), 0)
+    for i in range(4):
+        y, own = y0 + i + iy, original[np.uint64(y0 + i)]
+        upper, lower = plane[np.uint64(clamped(y, height))], plane[np.uint64(clamped(y + 1, height))]
+        for x in range(before, within):
+            between[np.uint64(x)] = _between_rows(upper, lower, start + x, fy)
+        for x in range(before):
+            between[x] = _between_rows(upper, lower, 0, fy)
+        for x in range(within, between.size):
+            between[np.uint64(x)] = _between_rows(upper, lower, width - 1, fy)
+        for x in range(min(LARGEST, width - x0)):
+            moved = (np.float32(1) - fx) * between[x] + fx * between[x + 1]
+            missed[np.uint64(LARGEST * i + x)] = moved - np.float32(own[np.uint64(x0 + x)])
+
+
+@inner
+def _add_rows(one, other, columns, sums):
+    """Fill sums with inner products of each column's four samples."""
+    for x in range(columns):
+        total = np.float32(0)
+        total += one[x] * other[x]
+        total += one[LARGEST + x] * other[LARGEST + x]
+        total += one[2 * LARGEST + x] * other[2 * LARGEST + x]
+        total += one[3 * LARGEST + x] * other[3 * LARGEST + x]
+        sums[x] = total
 
 
 @lean
@@ -142,29 +166,22 @@ def fill_products(job, original, y0, x0, match):
     height, width = original.shape[1:]
     rows, cols = min(CELLS, (height - y0) >> 2), min(CELLS, (width - x0) >> 2)
     count = job.references.shape[0]
-    between = match.missed[MOST_REFERENCES]
     sums, products = match.sums, match.products
     for k in range(match.count[0]):
         d = match.indices[k] * job.unit
         for by in range(rows):
-            for at in range(PAIRS):
-                for x in range(LARGEST):
-                    sums[at, x] = 0
-            for y in range(y0 + 4 * by, y0 + 4 * by + 4):
-                at = 0
-                for r in range(count):
-                    dx, dy = d * job.references[r, 1], d * job.references[r, 2]
-                    own = match.missed[r]
-                    _missed_row(job.views[job.references[r, 0], 0], original[0], y, x0, dy, dx, between, own)
-                    for s in range(r + 1):
-                        other, into = match.missed[s], sums[at]
-                        for x in range(LARGEST):
-                            into[x] += own[x] * other[x]
-                        at += 1
+            at = 0
+            for r in range(count):
+                dx, dy = d * job.references[r, 1], d * job.references[r, 2]
+                own, plane = match.missed[r], job.views[job.references[r, 0], 0]
+                _missed_rows(plane, original[0], y0 + 4 * by, x0, dy, dx, match.between, own)
+                for s in range(r + 1):
+                    _add_rows(own, match.missed[s], 4 * cols, sums[at])
+                    at += 1
             for bx in range(cols):
                 for at in range(count * (count + 1) >> 1):
-                    x = 4 * bx
-                    total = (sums[at, x] + sums[at, x + 1]) + (sums[at, x + 2] + sums[at, x + 3])
+                    row, x = sums[at], np.uint64(4 * bx)
+                    total = (row[x] + row[x + np.uint64(1)]) + (row[x + np.uint64(2)] + row[x + np.uint64(3)])
                     products[by, bx, at, k] = total
 
 
@@ -266,21 +283,22 @@ def _compare(job, match, work, original, y0, x0, n, index, planes):
                     into[y, x] = 0
             dy, dx = d * job.references[r, 2], d * job.references[r, 1]
             moved_block(job.views, job.references[r, 0], p, y0, x0, n, dy, dx, work.rows, work.predicted)
+            missed = match.moved[r]
             for y in range(n):
-                own, moved, missed = original[p, y0 + y, x0 : x0 + n], into[y], match.moved[r, p, y]
+                own, moved, at = original[p, np.uint64(y0 + y)], into[y], (p * n + y) * n
                 for x in range(n):
-                    missed[x] = np.float32(np.int32(own[x]) - (np.int32(moved[x] + 2048) >> 12))
+                    difference = np.int32(own[np.uint64(x0 + x)]) - (np.int32(moved[x] + 2048) >> 12)
+                    missed[np.uint64(at + x)] = np.float32(difference)
 
 
 @inner
-def _dot(moved, r, s, n, planes):
+def _dot(one, other, size):
+    """Inner product; the order of the sums is fixed, for the choices of the search follow from them."""
     total = np.float32(0)
-    for p in range(planes):
-        for y in range(n):
-            one, other = moved[r, p, y], moved[s, p, y]
-            for x in range(0, n, 4):
-                a, b = one[x] * other[x], one[x + 1] * other[x + 1]
-                total += (a + b) + (one[x + 2] * other[x + 2] + one[x + 3] * other[x + 3])
+    for k in range(size >> 2):
+        w, x, y, z = np.uint64(4 * k), np.uint64(4 * k + 1), np.uint64(4 * k + 2), np.uint64(4 * k + 3)
+        a, b = one[w] * other[w], one[x] * other[x]
+        total += (a + b) + (one[y] * other[y] + one[z] * other[z])
     return total
 
 
@@ -288,29 +306,34 @@ def _dot(moved, r, s, n, planes):
 def _best_set(costs, job, match, work, original, weight, planes, y0, x0, log, index):
     """Squared error + weight · bits of an index by the best set of references, and that set."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
-    count, total = job.references.shape[0], match.total
+    count, total, sets = job.references.shape[0], match.total, match.sets
     where, seen = from_where(job, by, bx, log, index), seen_mask(job, by, bx, log, index)
     _compare(job, match, work, original, y0, x0, n, index, planes)
     at = 0
     for r in range(count):
         for s in range(r + 1):
-            total[at, 0] = _dot(match.moved, r, s, n, planes)
+            total[at, 0] = _dot(match.moved[r], match.moved[s], planes * n * n)
             at += 1
     side = weight * kind_cost(costs, job, by, bx, log, np.int64(EXPLICIT), index, np.int64(0), np.int64(0))
     best, best_mask = HUGE, 1
-    for mask in range(1, 1 << count):
-        members, at, error = 0, 0, np.float32(0)
-        for r in range(count):
-            for s in range(r + 1):
-                if (mask >> r) & 1 and (mask >> s) & 1:
-                    error += total[at, 0] if r == s else 2 * total[at, 0]
-                at += 1
-            members += (mask >> r) & 1
-        cost = error / np.float32(members * members) + side
-        if cost < best and count > 1:
-            cost += weight * mask_cost(costs, job, by, bx, where, seen, mask)
-        if cost < best:
-            best, best_mask = cost, mask
+    sets[0] = 0
+    for r in range(count):
+        # Sets of the references up to this one are those without it and its pairs.
+        first = r * (r + 1) >> 1
+        for rest in range(1 << r):
+            members, error = 1, sets[rest]
+            for s in range(r):
+                if (rest >> s) & 1:
+                    members += 1
+                    error += 2 * total[first + s, 0]
+            error += total[first + r, 0]
+            mask = (1 << r) + rest
+            sets[mask] = error
+            cost = error / np.float32(members * members) + side
+            if cost < best and count > 1:
+                cost += weight * mask_cost(costs, job, by, bx, where, seen, mask)
+            if cost < best:
+                best, best_mask = cost, mask
     return best, best_mask
 
 

@@ -142,9 +142,10 @@ def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit)
     for p in range(3):
         least = np.float32(0)
         for y in range(n):
+            own, predicted, block = search.original[p, np.uint64(y0 + y)], work.predicted[p, y], work.block[y]
             for x in range(n):
-                difference = search.original[p, y0 + y, x0 + x] - work.predicted[p, y, x]
-                work.block[y, x] = difference
+                difference = np.int32(own[np.uint64(x0 + x)] - predicted[x])
+                block[x] = difference
                 least += np.float32(difference * difference)
         without += least
         more, some, cross = _try_plane(
@@ -161,12 +162,14 @@ def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit)
                 first = 1
             coded = 1
             for y in range(n):
+                own, predicted, block = search.original[p, np.uint64(y0 + y)], work.predicted[p, y], work.block[y]
+                decoded = trial.trial_decoded[p, y]
                 for x in range(n):
-                    value = min(max(np.int32(work.predicted[p, y, x] + work.block[y, x]), -LIMIT), LIMIT)
-                    trial.trial_decoded[p, y, x] = value
-                    trial.trial_levels[p, y, x] = levels[y, x]
-                    difference = search.original[p, y0 + y, x0 + x] - value
+                    value = min(max(np.int32(predicted[x] + block[x]), np.int32(-LIMIT)), np.int32(LIMIT))
+                    decoded[x] = value
+                    difference = np.int32(own[np.uint64(x0 + x)] - value)
                     error += np.float32(difference * difference)
+            _copy_block(levels, trial.trial_levels[p], n)
         else:
             _leave(trial, work, p, n)
             error += least

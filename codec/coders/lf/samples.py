@@ -24,20 +24,24 @@ from .contexts import (
 from .jit import inner, lean
 
 LARGEST_SKIPPED = 3  # binary logarithm of the side
+# Class by samples before that are not zero, and all samples before.
+_SAMPLES = np.arange(1 << 2 * LARGEST_SKIPPED)
+DENSITY = np.minimum(8 * _SAMPLES[:, None] // np.maximum(_SAMPLES, 4), 8).astype(np.uint8)
 
 
 @inner
 def _around(levels, y, x, n):
     """Class 0–7 by the magnitudes left, above (twice each) and diagonally above."""
     total = 0
+    row, above = levels[np.uint64(y)], levels[np.uint64(max(y - 1, 0))]
     if x:
-        total += 2 * abs(levels[y, x - 1])
+        total += 2 * abs(row[np.uint64(x - 1)])
     if y:
-        total += 2 * abs(levels[y - 1, x])
+        total += 2 * abs(above[np.uint64(x)])
         if x:
-            total += abs(levels[y - 1, x - 1])
+            total += abs(above[np.uint64(x - 1)])
         if x + 1 < n:
-            total += abs(levels[y - 1, x + 1])
+            total += abs(above[np.uint64(x + 1)])
     return total if total < 5 else (5 if total < 7 else (6 if total < 10 else 7))
 
 
@@ -45,7 +49,7 @@ def _around(levels, y, x, n):
 def _beside(planes, plane, y, x, before, seen):
     """Class 0–8: by the levels of earlier planes at the sample; in the first, by the density of samples before."""
     if plane == 0:
-        return min(8 * before // max(seen, 4), 8)
+        return np.int64(DENSITY[np.uint64(before), np.uint64(seen)])
     first = min(abs(planes[0, y, x]), 2)
     second = min(abs(planes[1, y, x]), 2) if plane == 2 else 0
     return 3 * first + second
@@ -118,7 +122,7 @@ def quantise_samples(costs, block, planes, plane, log, step, weight, levels):
     error, bits = np.float32(0), np.float32(0)
     for k in range(n * n):
         y, x = k >> log, k & (n - 1)
-        value = block[y, x]
+        value = block[np.uint64(y), np.uint64(x)]
         size = abs(np.float32(value))
         around = _around(levels, y, x, n)
         beside = _beside(planes, plane, y, x, before, k)
@@ -136,7 +140,7 @@ def quantise_samples(costs, block, planes, plane, log, step, weight, levels):
                 least, best, kept, missed = total, tried, cost, left * left
         bits += kept
         error += missed
-        levels[y, x] = -best if value < 0 else best
+        levels[np.uint64(y), np.uint64(x)] = -best if value < 0 else best
         if best:
             before += 1
     return bits if before else np.float32(0), error

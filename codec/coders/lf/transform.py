@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .jit import lean
+from .jit import inner, lean
 
 LARGEST = 32
 _SIZES = 6  # by their binary logarithm
@@ -27,7 +27,7 @@ def _matrices():
 
 def _scans():
     """Places y·32 + x by rising y + x, up and down in turn."""
-    found = np.zeros((_SIZES, LARGEST * LARGEST), np.int32)
+    found = np.zeros((_SIZES, LARGEST * LARGEST), np.uint16)
     for log in range(2, _SIZES):
         n = 1 << log
         places = sorted((y + x, y if (x + y) % 2 else x, y * LARGEST + x) for y in range(n) for x in range(n))
@@ -40,49 +40,40 @@ TRANSPOSED = np.ascontiguousarray(MATRICES.swapaxes(1, 2))
 SCANS = _scans()
 
 
+@inner
+def _product(left, right, rows, terms, n, rounding, shift, out):
+    """out[:rows, :n] = left[:rows, :terms] · right[:terms, :n] / 2^shift, rounded."""
+    for i in range(rows):
+        weights, into = left[i], out[i]
+        if n == 4:  # sums of a short row stay in registers
+            a = b = c = d = np.int32(rounding)
+            for k in range(terms):
+                weight, row = weights[k], right[k]
+                a, b = np.int32(a + np.int32(weight * row[0])), np.int32(b + np.int32(weight * row[1]))
+                c, d = np.int32(c + np.int32(weight * row[2])), np.int32(d + np.int32(weight * row[3]))
+            into[0], into[1], into[2], into[3] = a >> shift, b >> shift, c >> shift, d >> shift
+        else:
+            for j in range(n):
+                into[j] = rounding
+            for k in range(terms):
+                weight, row = weights[k], right[k]
+                for j in range(n):
+                    into[j] = np.int32(into[j] + np.int32(weight * row[j]))
+            for j in range(n):
+                into[j] = into[j] >> shift
+
+
 @lean
 def forward(block, log, half, out):
     """out[:n, :n] = the transform of block[:n, :n]; all (32, 32) of int32."""
     n = 1 << log
-    for i in range(n):
-        for j in range(n):
-            half[i, j] = 0
-        for k in range(n):
-            m = MATRICES[log, i, k]
-            for j in range(n):
-                half[i, j] = np.int32(half[i, j] + np.int32(m * block[k, j]))
-        for j in range(n):
-            half[i, j] = np.int32(half[i, j] + 128) >> 8
-    for i in range(n):
-        for j in range(n):
-            out[i, j] = 0
-        for k in range(n):
-            value = half[i, k]
-            for j in range(n):
-                out[i, j] = np.int32(out[i, j] + np.int32(value * TRANSPOSED[log, k, j]))
-        for j in range(n):
-            out[i, j] = np.int32(out[i, j] + 2048) >> 12
+    _product(MATRICES[log], block, n, n, n, 128, 8, half)
+    _product(half, TRANSPOSED[log], n, n, n, 2048, 12, out)
 
 
 @lean
 def inverse(coefficients, log, rows, cols, half, out):
     """out[:n, :n] = the inverse transform of coefficients that are zero but for the first rows and columns."""
     n = 1 << log
-    for i in range(rows):
-        for j in range(n):
-            half[i, j] = 0
-        for k in range(cols):
-            value = coefficients[i, k]
-            for j in range(n):
-                half[i, j] = np.int32(half[i, j] + np.int32(value * MATRICES[log, k, j]))
-        for j in range(n):
-            half[i, j] = np.int32(half[i, j] + 32) >> 6
-    for i in range(n):
-        for j in range(n):
-            out[i, j] = 0
-        for k in range(rows):
-            m = MATRICES[log, k, i]
-            for j in range(n):
-                out[i, j] = np.int32(out[i, j] + np.int32(m * half[k, j]))
-        for j in range(n):
-            out[i, j] = np.int32(out[i, j] + 8192) >> 14
+    _product(coefficients, MATRICES[log], rows, cols, n, 32, 6, half)
+    _product(TRANSPOSED[log], half, n, rows, n, 8192, 14, out)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inner, lean
+from .transform import LARGEST
 
 UNIT = 256
 TAPS = 6
@@ -39,11 +40,26 @@ def clamped(i, n):
 
 
 @inner
-def filtered(t, j, a, b, c, d, e, f):
-    """Sum of six samples from t[j] on, weighted."""
-    far = np.int32(np.int32(a * t[j]) + np.int32(f * t[j + 5]))
-    near = np.int32(np.int32(b * t[j + 1]) + np.int32(e * t[j + 4]))
-    return np.int32(np.int32(far + near) + np.int32(np.int32(c * t[j + 2]) + np.int32(d * t[j + 3])))
+def filtered(t, at, a, b, c, d, e, f):
+    """Sum of six samples from t[at] on, weighted."""
+    far = np.int32(np.int32(a * t[np.uint64(at)]) + np.int32(f * t[np.uint64(at + 5)]))
+    near = np.int32(np.int32(b * t[np.uint64(at + 1)]) + np.int32(e * t[np.uint64(at + 4)]))
+    middle = np.int32(np.int32(c * t[np.uint64(at + 2)]) + np.int32(d * t[np.uint64(at + 3)]))
+    return np.int32(np.int32(far + near) + middle)
+
+
+@inner
+def _filter_row(t, at, n, phase, row):
+    """row[:n] = samples between those of t, from t[at + BEFORE] on, in units of 2^-6."""
+    a, b, c = FILTERS[phase, 0], FILTERS[phase, 1], FILTERS[phase, 2]
+    d, e, f = FILTERS[phase, 3], FILTERS[phase, 4], FILTERS[phase, 5]
+    if n == 4:
+        one, two = filtered(t, at, a, b, c, d, e, f), filtered(t, at + 1, a, b, c, d, e, f)
+        three, four = filtered(t, at + 2, a, b, c, d, e, f), filtered(t, at + 3, a, b, c, d, e, f)
+        row[0], row[1], row[2], row[3] = one, two, three, four
+    else:
+        for j in range(n):
+            row[j] = filtered(t, at + j, a, b, c, d, e, f)
 
 
 @inner
@@ -64,35 +80,29 @@ def _add_four(out, at, one, two, three, four):
 
 @lean
 def moved_block(views, view, plane, y0, x0, n, dy, dx, rows, out):
-    """out[plane, :n, :n] += 64² times the block at (y0 + dy, x0 + dx) of a plane; ``rows`` is (37, 32) for use."""
+    """out[plane, :n, :n] += 64² times the block at (y0 + dy, x0 + dx) of a plane; ``rows`` is (38, 40) for use.
+
+    Indices that cannot be negative are cast to unsigned: for others, numba emits a look for negative ones.
+    """
     source = views[view, plane]
     height, width = source.shape
     iy, ix = y0 + (dy >> 8), x0 + (dx >> 8)
     py, px = (dy >> 4) & 15, (dx >> 4) & 15
     first, count = (0, n) if py == 0 else (-BEFORE, n + TAPS - 1)
-    inside = ix >= BEFORE and ix + n + TAPS - BEFORE - 1 <= width
-    a, b, c, d, e, f = FILTERS[px, 0], FILTERS[px, 1], FILTERS[px, 2], FILTERS[px, 3], FILTERS[px, 4], FILTERS[px, 5]
+    start, taken = ix - BEFORE, n + TAPS - 1
+    inside = start >= 0 and start + taken <= width
+    bordered = rows[LARGEST + TAPS - 1]
     for i in range(count):
-        line, row = source[clamped(iy + first + i, height)], rows[i]
+        line, row = source[np.uint64(clamped(iy + first + i, height))], rows[i]
         if not inside:
-            for j in range(n):
-                total = np.int32(0)
-                for k in range(TAPS):
-                    total += FILTERS[px, k] * line[clamped(ix + j + k - BEFORE, width)]
-                row[j] = total
+            for j in range(taken):
+                bordered[j] = line[np.uint64(clamped(start + j, width))]
+            _filter_row(bordered, 0, n, px, row)
         elif px == 0:
-            taken = line[ix : ix + n]
             for j in range(n):
-                row[j] = np.int32(taken[j]) * np.int32(64)
+                row[j] = np.int32(line[np.uint64(ix + j)]) * np.int32(64)
         else:
-            taken = line[ix - BEFORE : ix - BEFORE + n + TAPS - 1]
-            if n == 4:
-                one, two = filtered(taken, 0, a, b, c, d, e, f), filtered(taken, 1, a, b, c, d, e, f)
-                three, four = filtered(taken, 2, a, b, c, d, e, f), filtered(taken, 3, a, b, c, d, e, f)
-                row[0], row[1], row[2], row[3] = one, two, three, four
-            else:
-                for j in range(n):
-                    row[j] = filtered(taken, j, a, b, c, d, e, f)
+            _filter_row(line, start, n, px, row)
     a, b, c, d, e, f = FILTERS[py, 0], FILTERS[py, 1], FILTERS[py, 2], FILTERS[py, 3], FILTERS[py, 4], FILTERS[py, 5]
     for i in range(n):
         into = out[plane, i]
