@@ -176,6 +176,7 @@ def decoded_batches(
                         raise ValueError(f"level {level} of its light field ends early")
                 workers.map(field.refine, nodes, jobs, made)
                 field.finish(nodes)
+                del job, jobs, made  # before the next batch takes as much
                 yield level, nodes, before + min(int(coder.state[arithmetic.AT]), len(data))
             contexts.after(level)
             before += len(data)
@@ -312,6 +313,7 @@ class Source:
                         field.code(coder, job, work)
                     workers.map(field.refine, nodes, jobs, made)
                     field.finish(nodes)
+                    del job, jobs, made  # before the next batch takes as much
                 levels.append(arithmetic.finish(coder))
                 contexts.after(number)
         return levels

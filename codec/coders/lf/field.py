@@ -15,7 +15,7 @@ from .exact import code_exact, new_exact, prepare
 from .planes import gather, scatter
 from .pyramid import Node, Place, batches, pyramid
 from .stream import Header
-from .synthesis import Synthesis, new_synthesis
+from .synthesis import Synthesis, chosen, new_synthesis
 
 EIGHTH = 32  # of a sample, in units of disparity
 MOST_SEARCHED = 800  # disparities of one view
@@ -65,11 +65,13 @@ class Field:
     def job(self, node: Node) -> tuple[Job, Synthesis]:
         """All that coding of a view needs, its synthesis' disparity included."""
         at = self.number((node.row, node.col))
-        self.disparities[at] = UNKNOWN
+        if (node.row, node.col) in self.used:  # memory that is not written to is not taken
+            self.disparities[at] = UNKNOWN
         references, sources = (self._offsets(node, places) for places in (node.references, node.sources))
         unit = self._unit(references)
         made = new_synthesis(self.views, self.disparities, sources)
         known = len(sources) > 1 and synthesis.synthesise(made, self._unit(sources))
+        made = chosen(made)
         job = Job(
             views=self.views,
             disparities=self.disparities,

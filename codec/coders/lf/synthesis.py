@@ -106,6 +106,11 @@ def new_synthesis(views: Any, disparities: Any, sources: Any) -> Synthesis:
     )
 
 
+def chosen(s: Synthesis) -> Synthesis:
+    """Return it without the room that only the choice of disparity takes, half of all."""
+    return s._replace(candidates=s.candidates[:0].copy(), kept=s.kept[:0].copy(), marks=s.marks[:0].copy())
+
+
 @inner
 def _insert(s, y, x, d, apart):
     count = np.int64(s.counts[y, x])
