@@ -2,8 +2,9 @@
 
 In ``tests/golden/lf``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
 views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
-views of *Apples* at quantiser 26; the first encoder that left out transforms wrote it. The decoder has integer
-arithmetic alone, so that a hash of the pixels is the expectation.
+views of *Apples* at quantiser 26; the first encoder that left out transforms wrote it. ``row.ii`` holds 1×10 views of
+*Apples* of 32×16 pixels at quantiser 36, by cdd3aba: its first view is matched to one that no other view is made of.
+The decoder has integer arithmetic alone, so that a hash of the pixels is the expectation.
 """
 
 import hashlib
@@ -22,10 +23,11 @@ FOLDER = Path(__file__).parents[1] / "golden" / "lf"
 PIXELS = {
     "lossy": "defb0393182954c2a0827acfe2c0d408fd37d1c8abcac248e83ca5d02bb8f7ee",
     "skipped": "4bb0232b9f5557feb2f5d26ac1904b48c687300269542c6db1bf73b3e635b603",
+    "row": "8779e10e45bc0ef8e8a3921c5f3ed192d0b0dad3092e0d9619ae1a54c87281c0",
     "exact": "be2c46c242ca2aae010544f6e178dd5dfa93b5aec5566384427e4a469a1b2cfd",
 }
 
-VERSIONS = {"lossy": stream.VERSION, "exact": stream.VERSION, "skipped": stream.SKIPPING}
+VERSIONS = {"lossy": stream.VERSION, "exact": stream.VERSION, "skipped": stream.SKIPPING, "row": stream.SKIPPING}
 
 
 def digest(pixels):

@@ -65,7 +65,8 @@ class Field:
     def job(self, node: Node) -> tuple[Job, Synthesis]:
         """All that coding of a view needs, its synthesis' disparity included."""
         at = self.number((node.row, node.col))
-        if (node.row, node.col) in self.used:  # memory that is not written to is not taken
+        # `_first` reads views of the second level. Of others that nobody reads, memory is not taken.
+        if node.level <= 1 or (node.row, node.col) in self.used:
             self.disparities[at] = UNKNOWN
         references, sources = (self._offsets(node, places) for places in (node.references, node.sources))
         unit = self._unit(references)
