@@ -21,7 +21,7 @@ from ..tracing.packing import packed, share
 from ..tracing.sampling import Adaptive, Sampling, Shoot, adaptive_mean, fixed_sum
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
 from .audit import FULL_DEPTH, FULL_SAMPLES, Audit, chosen, compared
-from .nearness import pixels_are_nearer
+from .nearness import parts_of_pixel, pixels_are_nearer, steps_at_content
 from .tiles import Order, Tile, ray_order, tiles
 
 TILE_RAYS = 65536  # many enough to hide the overhead of numpy, few enough for work arrays to stay in cache
@@ -187,7 +187,8 @@ class Job:
         assert isinstance(self.sampling, int)
         tracer = self._tracer()
         if isinstance(self.camera, IICamera):
-            radiance = fixed_sum(self.camera, self.sampling, self.seed, m, n, TILE_RAYS, self._shoot(tracer, None))
+            shoot, alone = self._shoot(tracer, None), lambda _: (1, 1)  # the pixels are far from each other
+            radiance = fixed_sum(self.camera, self.sampling, self.seed, m, n, TILE_RAYS, alone, shoot)
         else:
             radiance = np.zeros((len(m), 3), np.float32)
             at = n - rows.start, m - cols.start
@@ -209,10 +210,19 @@ class Job:
 
     def _by_lens(self) -> bool:
         """Return whether rays go lens by lens: the same on all threads, from camera and scene alone."""
-        found: bool | None = getattr(self._local, "by_lens", None)
+        return pixels_are_nearer(self._steps())
+
+    def _steps(self) -> NDArray[np.float64]:
+        """Return the steps of `steps_at_content`, measured once a thread."""
+        found: NDArray[np.float64] | None = getattr(self._local, "steps", None)
         if found is None:
-            found = self._local.by_lens = pixels_are_nearer(self.camera, self._distances)
+            found = self._local.steps = steps_at_content(self.camera, self._distances)
         return found
+
+    def _parts(self, samples: int) -> tuple[int, int]:
+        """Return how samples of pixels share packets: see `parts_of_pixel`; those of an aperture stay in order."""
+        assert isinstance(self.camera, IICamera)
+        return (1, 1) if self.camera.samples_aperture or self._by_lens() else parts_of_pixel(samples, self._steps())
 
     def _distances(self, L: NDArray[np.float64], D: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the distances of the content along rays of unit directions (n, 3) in mm; NaN without a hit."""
@@ -250,7 +260,9 @@ class Job:
         m, n = cols.start + order.columns, rows.start + order.rows
         if isinstance(self.camera, IICamera):
             if samples > 1:
-                return fixed_sum(self.camera, samples, self.seed, m, n, TILE_RAYS, self._shoot(tracer, support))
+                return fixed_sum(
+                    self.camera, samples, self.seed, m, n, TILE_RAYS, self._parts, self._shoot(tracer, support)
+                )  # fmt: skip
             rays = self.camera.separable_rays(rows, cols)
         else:
             rays = None
@@ -285,16 +297,20 @@ class Job:
         codes = CURVES["uint8"]
         assert codes is not None
         shoot = self._shoot(tracer, support)
-        return adaptive_mean(self.camera, wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, shoot)
+        return adaptive_mean(
+            self.camera, wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, self._parts, shoot
+        )  # fmt: skip
 
     def _shoot(self, tracer: Tracer, support: Support | None) -> Shoot:
         """Return the function that traces samples of pixels and keeps support arrays of the first ones."""
 
-        def shoot(L: Any, D: Any, shares: Any, *, numbers: Any, first: slice | None) -> NDArray[np.float32]:
+        def shoot(
+            L: Any, D: Any, shares: Any, *, numbers: Any, first: slice | None, traced: NDArray[np.int32]
+        ) -> NDArray[np.float32]:
             self._check_stopped()
             radiance = np.zeros((len(L), 3), np.float32)
             room = self._support_room(len(L)) if first is not None else None
-            tracer.run(L, D, radiance, room, shares, self._keys(*numbers))
+            tracer.run(L, D, radiance, room, shares, self._keys(*numbers), traced=traced)
             if room is not None and first is not None:
                 every = len(L) // (first.stop - first.start)
                 for name, array in vars(support).items():

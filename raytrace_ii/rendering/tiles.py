@@ -92,11 +92,12 @@ def _in_cells(shape: tuple[int, int], start: tuple[int, int], cells: tuple[int, 
 
 
 def _keys(k: Integers, l: Integers, u: Integers, v: Integers) -> Integers:
-    """Return the ranks of pixels by position (u, v) under the lens, then by packet, then by lens (k, l)."""
+    """Return the ranks of pixels by position (u, v) under the lens, then by packet, its quarter and lens (k, l)."""
     across, down = k // SIDE - k.min() // SIDE, l // SIDE - l.min() // SIDE
     packet = down * (across.max() + 1) + across
     place = v * (u.max() + 1) + u
-    return ((place * (packet.max() + 1) + packet) * SIDE + l % SIDE) * SIDE + k % SIDE
+    quarter = l % SIDE // 2 * 2 + k % SIDE // 2  # of the packet: its four lenses share the packet of a few samples
+    return ((place * (packet.max() + 1) + packet) * 4 + quarter) * 4 + l % 2 * 2 + k % 2
 
 
 def _lens_keys(k: Integers, l: Integers, u: Integers, v: Integers) -> Integers:

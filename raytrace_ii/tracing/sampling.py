@@ -23,12 +23,12 @@ guards against both.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ii_core import IICamera
 
@@ -76,26 +76,33 @@ def sampling(samples: Any, error: float) -> Sampling:
 class Shoot(Protocol):
     """Traces rays of a camera; ``first`` says that these begin their pixels.
 
-    ``numbers`` are columns and rows of the pixels, the first of their samples, and how many each has.
+    ``numbers`` are columns and rows of the pixels, the first of their samples, and how many each has; ``traced``
+    names the rays in the order in which they share packets, empty if as they come.
     """
 
     def __call__(
         self, L: Floats, D: Floats, shares: Floats | None, *,
-        numbers: tuple[NDArray[Any], NDArray[Any], int, int], first: slice | None,
+        numbers: tuple[NDArray[Any], NDArray[Any], int, int], first: slice | None, traced: NDArray[np.int32],
     ) -> NDArray[np.float32]: ...  # fmt: skip
 
 
+# How samples share packets, by their number: parts of a pixel along each side, and pixels side by side.
+Parts = Callable[[int], tuple[int, int]]
+
+
 def fixed_sum(
-    camera: IICamera, samples: int, seed: int, m: NDArray[Any], n: NDArray[Any], batch: int, shoot: Shoot
-) -> Radiance:
+    camera: IICamera, samples: int, seed: int, m: NDArray[Any], n: NDArray[Any], batch: int, parts: Parts,
+    shoot: Shoot,
+) -> Radiance:  # fmt: skip
     """Return the summed radiance (p, 3) of pixels in columns m and rows n, all with the same number of samples.
 
-    The samples of a pixel stand together: they share packets, and are as close as its own width.
+    The samples of a pixel stand together; those of one of its ``parts`` share packets with those of pixels beside it.
     """
     total = np.zeros((len(m), 3), np.float32)
     for some, first, many in _portions(len(m), 0, samples, batch):
         numbers = m[some], n[some], first, many
-        radiance = shoot(*_rays(camera, seed, *numbers), numbers=numbers, first=some if first == 0 else None)
+        rays, traced = _rays(camera, seed, *numbers, *parts(many))
+        radiance = shoot(*rays, numbers=numbers, first=some if first == 0 else None, traced=traced)
         sample_kernels.sum_samples(radiance, many, total[some])
     return total
 
@@ -110,7 +117,7 @@ def _portions(pixels: int, start: int, count: int, batch: int) -> Iterator[tuple
 
 def adaptive_mean(
     camera: IICamera, wanted: Adaptive, seed: int, rows: slice, cols: slice, order: NDArray[np.int32], batch: int,
-    curve: Floats, shoot: Shoot,
+    curve: Floats, parts: Parts, shoot: Shoot,
 ) -> tuple[Radiance, NDArray[np.int32]]:  # fmt: skip
     """Mean radiance (h·w, 3) of a block of pixels and the number of samples (h·w,) of each, in a given order.
 
@@ -125,6 +132,8 @@ def adaptive_mean(
         Rays to shoot at a time.
     curve : ndarray
         8-bit codes at even steps of linear light.
+    parts : callable
+        As of `fixed_sum`.
     shoot : callable
         Called with L, D, shares, the numbers of pixels and samples and, in the first round, which of the ordered
         pixels (every ``least``-th ray) they begin; radiance of the rays comes back.
@@ -140,8 +149,8 @@ def adaptive_mean(
         for block, first, many in _portions(len(which), start, count, batch):
             some = which[block]
             numbers = m[some], n[some], first, many
-            rays = _rays(camera, seed, *numbers)
-            radiance = shoot(*rays, numbers=numbers, first=block if begins and first == 0 else None)
+            rays, traced = _rays(camera, seed, *numbers, *parts(many))
+            radiance = shoot(*rays, numbers=numbers, first=block if begins and first == 0 else None, traced=traced)
             sample_kernels.add_samples(radiance, some, first, many, (start + count) // 4, quarters)
 
     inside, rim = np.flatnonzero(own), np.flatnonzero(~own & _needed(lens, own))
@@ -150,13 +159,15 @@ def adaptive_mean(
     add(inside, 0, wanted.least, begins=True)
     add(rim, 0, wanted.least)
     step = np.empty((height, width, 3))
-    sample_kernels.steps_to_neighbours(_whole(quarters).reshape(*lens.shape, 3) / wanted.least, lens, *corner, step)
+    mean = np.empty((*lens.shape, 3))
+    sample_kernels.means(quarters, np.arange(len(m)), np.full(len(m), wanted.least), mean.reshape(-1, 3))
+    sample_kernels.steps_to_neighbours(mean, lens, *corner, step)
     step = step.reshape(-1, 3)[order]
     counts = np.full(len(inside), wanted.least, np.int32)
     unsure, count = np.arange(len(inside)), wanted.least
     while count < wanted.most:
         error = np.empty(len(unsure))
-        sample_kernels.standard_errors(quarters[inside[unsure]], step[unsure], count, curve, error)
+        sample_kernels.standard_errors(quarters, inside[unsure], step[unsure], count, curve, error)
         unsure = unsure[error > wanted.error]
         if not len(unsure):
             break
@@ -164,13 +175,9 @@ def adaptive_mean(
         add(inside[unsure], count, count)
         count *= 2
         counts[unsure] = count
-    return (_whole(quarters)[inside] / counts[:, None]).astype(np.float32), counts
-
-
-def _whole(quarters: Floats) -> Floats:
-    """Sum of the four quarters; by slices, since numpy sums short axes slowly."""
-    total: Floats = quarters[:, 0] + quarters[:, 1] + quarters[:, 2] + quarters[:, 3]
-    return total
+    found = np.empty((len(inside), 3), np.float32)
+    sample_kernels.means(quarters, inside, counts, found)
+    return found, counts
 
 
 def _with_rim(camera: IICamera, rows: slice, cols: slice) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.int64]]:
@@ -195,13 +202,19 @@ def _needed(lens: NDArray[np.int64], own: NDArray[np.bool_]) -> NDArray[np.bool_
 
 
 def _rays(
-    camera: IICamera, seed: int, m: NDArray[Any], n: NDArray[Any], first: int, count: int
-) -> tuple[Floats, Floats, Floats | None]:
-    """Rays of ``count`` samples of each pixel, pixel by pixel; what a pixel's samples share is computed once."""
-    where: list[ArrayLike] = []
+    camera: IICamera, seed: int, m: NDArray[Any], n: NDArray[Any], first: int, count: int, parts: int, pixels: int
+) -> tuple[tuple[Floats, Floats, Floats | None], NDArray[np.int32]]:
+    """Rays of ``count`` samples of each pixel, pixel by pixel, and the order in which they share packets.
+
+    What a pixel's samples have in common is computed once.
+    """
+    where: list[Floats] = []
     for pair in range(1 + camera.samples_aperture):
         out = np.empty((len(m), count, 2))
         sample_kernels.places(seed, m, n, camera.pixels[0], first, count, pair, out.reshape(-1, 2))
         where.append(out)
     L, D, shares = camera.weighted_rays_at(m[:, None], n[:, None], *where)
-    return L.reshape(-1, 3), D.reshape(-1, 3), None if shares is None else shares.reshape(-1)
+    traced = np.empty(len(m) * count if parts > 1 else 0, np.int32)
+    if parts > 1:
+        sample_kernels.near_together(where[0], parts, pixels, traced)
+    return (L.reshape(-1, 3), D.reshape(-1, 3), None if shares is None else shares.reshape(-1)), traced

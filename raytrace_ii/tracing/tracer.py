@@ -230,19 +230,20 @@ class Tracer:
         shares: NDArray[np.float64] | None = None,
         keys: NDArray[np.uint64] | None = None,
         order: NDArray[np.int32] = _NO_ROWS,
+        traced: NDArray[np.int32] = _NO_ROWS,
     ) -> None:
         """Add what each ray sees to ``radiance`` (n, 3), and fill ``support`` if given.
 
         ``shares`` is the share of light that each ray carries; one that carries none is not traced. ``order`` names
         the rays in the order in which they are traced: that of ``radiance``, ``support`` and ``keys``, which are
-        needed if the scene is glossy.
+        needed if the scene is glossy. ``traced`` names them likewise, but they keep their rows.
         """
         shape = locations.shape[:-1]
         locations, directions = locations.reshape(-1, 3), directions.reshape(-1, 3)
         shares = np.empty(0) if shares is None else shares.reshape(-1)
         room = self._primary
         n, bad = start_rays(
-            locations, directions, shares, order, self.pose[:3, :3], self.pose[:3, 3],
+            locations, directions, shares, traced if len(traced) else order, self.pose[:3, :3], self.pose[:3, 3],
             room.origins, room.directions, room.weights, room.pixels, room.inside,
         )  # fmt: skip
         if bad >= 0:
@@ -251,6 +252,8 @@ class Tracer:
                 f"ray [{where}] from {locations[bad].tolist()} along {directions[bad].tolist()}: "
                 "a finite place and a finite direction other than zero are needed"
             )
+        if len(traced):
+            room.pixels[:n] = traced[room.pixels[:n]]
         if support is not None and n < len(locations):
             support.clear()
         if keys is not None:

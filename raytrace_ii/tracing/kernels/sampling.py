@@ -31,6 +31,36 @@ def places(seed, m, n, columns, first, count, pair, out):
 
 
 @kernel
+def near_together(places, parts, pixels, out):
+    """Order of samples in which those of the same part of so many pixels in a row stand together.
+
+    ``places`` (p, count, 2) are the samples of each pixel, in [0, 1)²; a pixel has ``parts``² parts.
+    """
+    many, count = places.shape[0], places.shape[1]
+    ends = np.empty(parts * parts + 1, np.int64)
+    row = 0
+    for first in range(0, many, pixels):
+        last = min(first + pixels, many)
+        ends[:] = 0
+        for i in range(first, last):
+            for j in range(count):
+                ends[_part(places, i, j, parts) + 1] += 1
+        for part in range(parts * parts):
+            ends[part + 1] += ends[part]
+        for i in range(first, last):
+            for j in range(count):
+                part = _part(places, i, j, parts)
+                out[row + ends[part]] = i * count + j
+                ends[part] += 1
+        row += (last - first) * count
+
+
+@inline_kernel
+def _part(places, i, j, parts):
+    return int(places[i, j, 1] * parts) * parts + int(places[i, j, 0] * parts)
+
+
+@kernel
 def lobe_keys(seed, m, n, columns, first, count, out):
     """Keys of places in [0, 1)² in the lobes of rough mirrors, as rows of ``out``: samples of pixels (m, n).
 
@@ -82,6 +112,16 @@ def add_samples(radiance, which, first, count, quarter, quarters):
 
 
 @kernel
+def means(quarters, which, counts, out):
+    """Means of the samples of each pixel named, of which there are ``counts``."""
+    for i in range(which.shape[0]):
+        pixel = which[i]
+        for c in range(3):
+            total = quarters[pixel, 0, c] + quarters[pixel, 1, c] + quarters[pixel, 2, c] + quarters[pixel, 3, c]
+            out[i, c] = total / counts[i]
+
+
+@kernel
 def steps_to_neighbours(mean, lens, top, left, out):
     """Largest difference, by channel, of each pixel to its eight neighbours under the same lens.
 
@@ -101,18 +141,19 @@ def steps_to_neighbours(mean, lens, top, left, out):
 
 
 @kernel
-def standard_errors(quarters, step, n, curve, out):
+def standard_errors(quarters, which, step, n, curve, out):
     """Standard error of the mean of ``n`` samples, in codes of ``curve``: half of what lies between mean ± error.
 
-    From the means of the four quarters of the samples, and from ``step``, the difference to the neighbours.
+    From the means of the four quarters of the samples of each pixel named, and from ``step``, its difference to the
+    neighbours.
     """
     for i in range(out.shape[0]):
-        worst = 0.0
+        worst, pixel = 0.0, which[i]
         for c in range(3):
-            mean = (quarters[i, 0, c] + quarters[i, 1, c] + quarters[i, 2, c] + quarters[i, 3, c]) / n
+            mean = (quarters[pixel, 0, c] + quarters[pixel, 1, c] + quarters[pixel, 2, c] + quarters[pixel, 3, c]) / n
             square = step[i, c] * step[i, c] / (float(n) * n * n)
             for part in range(4):
-                square += (quarters[i, part, c] * 4.0 / n - mean) ** 2 / 12.0
+                square += (quarters[pixel, part, c] * 4.0 / n - mean) ** 2 / 12.0
             error = math.sqrt(square)
             worst = max(worst, 0.5 * (_code(mean + error, curve) - _code(mean - error, curve)))
         out[i] = worst

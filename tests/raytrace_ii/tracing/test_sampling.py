@@ -70,6 +70,18 @@ def test_sums_of_samples_are_those_in_their_order_to_the_bit():
     np.testing.assert_array_equal(total, 1 + one_by_one)
 
 
+@pytest.mark.parametrize(("count", "parts", "pixels"), [(16, 2, 4), (16, 4, 16), (4, 2, 16), (9, 2, 4), (1, 8, 3)])
+def test_samples_of_a_part_stand_together_for_so_many_pixels(count, parts, pixels):
+    many = 37  # the last group has fewer pixels
+    places = np.random.default_rng(5).random((many, count, 2))
+    places[0, 0] = 0.0, np.nextafter(1, 0)
+    order = np.empty(many * count, np.int32)
+    sample_kernels.near_together(places, parts, pixels, order)
+    x, y = (places.reshape(-1, 2) * parts).astype(int).T
+    group = np.arange(many * count) // count // pixels
+    np.testing.assert_array_equal(order, np.lexsort((x, y, group)))
+
+
 def test_a_flat_scene_stays_at_the_least():
     shot = adaptive(Scene(bodies=[body(wall(20, 100), colour=(0.3, 0.6, 0.9))], ambient=WHITE), SMALL)
     assert shot.stats.samples == {4: 128 * 64} and shot.stats.mean_samples == 4
