@@ -208,7 +208,7 @@ BENCHMARKS = {
             needs="records of map_precision",
             records=OWN,
             fills=("docs/speed_accuracy.md",),
-            writes=(f"{IMAGES}/pareto.*",),
+            writes=(f"{IMAGES}/pareto.*", f"{IMAGES}/pareto_fine.*"),
         ),
         Benchmark(
             "speed.feature_ablation",

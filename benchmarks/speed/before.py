@@ -5,8 +5,9 @@ time. The earlier code comes from a git worktree in a temporary folder. Its proc
 ``EmbreeScene.run`` of its render, on the same rays in the same order: this is Embree's bare time.
 
 The earlier code reads image textures at points. The present code therefore renders twice: as by default, with its
-textures filtered, and with the filter off, which is the earlier code's picture but for the pixels that `difference`
-counts: ties, and mended vertex normals.
+textures filtered, and with the filter off, which is the earlier code's picture but for mended vertex normals. Pixels
+are compared with the commit `MENDED`, which mended them and is else the earlier code: what `difference` counts there
+are ties.
 
 As a script, ``python before.py SCENE BAND …``, it is one of these processes: a line of input is a task, "render",
 "plain" for a render without the filter, "bare", or "save FILE" for the pixels of "plain"; the line of output its CPU
@@ -32,6 +33,7 @@ from typing import Any
 import numpy as np
 
 COMMIT = "b1dc540"  # the last commit that traced single rays in rows of pixels
+MENDED = "a0d34f9"  # the same with vertex normals of length 1
 ROOT = Path(__file__).parents[2]
 BAND = 256  # rows of full setup1 per band
 BANDS = {"hairdo": (7,)}  # one band of hair costs as much as four of other scenes
@@ -63,14 +65,14 @@ def nanoseconds(scene: str, repeats: int) -> dict[str, list[float]]:
 
 @cache
 def difference(scene: str) -> tuple[float, float]:
-    """Return percentages of pixels in which the picture without texture filter is not the earlier code's.
+    """Return percentages of pixels in which the picture without texture filter is not that of `MENDED`.
 
     Those that differ, and those that differ by more than one 8-bit code in a channel.
     """
     bands = BANDS.get(scene, USUAL_BANDS)
     with tempfile.TemporaryDirectory() as folder:
         pictures = []
-        for code in (ROOT, worktree()):
+        for code in (ROOT, worktree(MENDED)):
             file = Path(folder) / f"{len(pictures)}.npy"
             with process(code, Path(__file__), scene, *map(str, bands)) as measure:
                 measure(f"save {file}")
@@ -80,11 +82,11 @@ def difference(scene: str) -> tuple[float, float]:
 
 
 @cache
-def worktree() -> Path:
-    """Return a work tree of the earlier code, kept until this process ends, so that its kernels are compiled once."""
+def worktree(commit: str = COMMIT) -> Path:
+    """Return a work tree of an earlier code, kept until this process ends, so that its kernels are compiled once."""
     folder = tempfile.mkdtemp()
-    tree = Path(folder) / COMMIT
-    subprocess.run(["git", "-C", str(ROOT), "worktree", "add", "-q", "--detach", str(tree), COMMIT], check=True)
+    tree = Path(folder) / commit
+    subprocess.run(["git", "-C", str(ROOT), "worktree", "add", "-q", "--detach", str(tree), commit], check=True)
 
     def remove() -> None:
         subprocess.run(["git", "-C", str(ROOT), "worktree", "remove", "--force", str(tree)], check=True)
@@ -121,11 +123,12 @@ def process(code: Path, script: Path, *arguments: str) -> Iterator[Callable[[str
 
 def _serve(scene_name: str, bands: list[int]) -> None:
     ii_core, raytrace_ii = importlib.import_module("ii_core"), importlib.import_module("raytrace_ii")
-    unfiltered: dict[str, Any] = {"texture_filter": False}
     try:
         job: Any = importlib.import_module("raytrace_ii.rendering.job")
-    except ModuleNotFoundError:  # the earlier code, which has no filter
-        job, unfiltered = importlib.import_module("raytrace_ii.job"), {}
+    except ModuleNotFoundError:  # the earlier code
+        job = importlib.import_module("raytrace_ii.job")
+    filters = "texture_filter" in job.Job.__annotations__
+    unfiltered: dict[str, Any] = {"texture_filter": False} if filters else {}
     whole = job.Job.tiles
     job.Job.tiles = lambda self: [tile for tile in whole(self) if tile[0].start // BAND in bands]
     scene, camera = raytrace_ii.load_scene(scene_name), ii_core.preset("setup1")

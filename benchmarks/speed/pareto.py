@@ -7,7 +7,7 @@ large where the scene file sets the tessellation. Time is CPU seconds of `render
 two or three. Samples per pixel, adaptive sampling, recursion depth and tessellation are varied. The code of an
 earlier commit renders each setting in turn with the present one, each in a process of its own and against its own
 reference. A band of lenses stands for pictures with more rows of them. Records go to
-``benchmarks/results/pareto.jsonl``, tables to ``docs/speed_accuracy.md``, the chart to ``docs/images/pareto.png``.
+``benchmarks/results/pareto.jsonl``, tables to ``docs/speed_accuracy.md``, charts of both scales to ``docs/images``.
 """
 
 from __future__ import annotations
@@ -65,8 +65,10 @@ def main() -> None:
         record = RECORDS.measure(key, lambda key=key: both(key["scene"], camera))
         best = record["result"]["recommended"]
         print(f"{key['scene']}: {best['setting']}, {best['psnr']:.1f} dB, {record['seconds']:.0f} s", flush=True)
-    if set(scenes := measured()) == set(SCENES):
-        chart(scenes, IMAGES / "pareto.png")
+    for scale, target in ((SCALE, "pareto.png"), (FINE_SCALE, "pareto_fine.png")):
+        if set(scenes := measured(scale)) == set(SCENES):
+            chart(scenes, IMAGES / target)
+    if set(measured()) == set(SCENES):
         publish(tables())
 
 
