@@ -17,7 +17,7 @@ from metrics import read_study, summary_table
 
 RESULTS = ROOT / "benchmarks" / "results"
 SIZES = {"demo": "4096×2048, 256×128 lenses (the demo)", "full": "8192×4096, 512×256 lenses (full `setup1`)"}
-SHOWN = ("apples_detail.png", "apples_view_front.png")
+SHOWN = ("apples_detail", "apples_view_front")
 
 
 def main() -> None:
@@ -28,7 +28,7 @@ def main() -> None:
             shutil.copy(study, RESULTS / f"{run}_{study.name}")
             write_picture(IMAGES / f"{run}_{study.stem}.png", study.with_suffix(".png"))
     for name in SHOWN:
-        write_picture(IMAGES / name, ROOT / "out" / "demo" / name)
+        write_picture(IMAGES / f"{name}.webp", ROOT / "out" / "demo" / f"{name}.png")
     publish(tables())
 
 

@@ -15,6 +15,7 @@ from statistics import median
 from typing import Any
 
 from benchmarks.arguments import command_line
+from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, by_scene
 from ii_core import preset
@@ -38,6 +39,7 @@ def main() -> None:
         print(f"{key['scene']}: {record['seconds']:.0f} s", flush=True)
     if set(scenes := measured()) == set(SCENES):
         save(draw(scenes), ROOT / CHART)
+        write_picture(ROOT / CHART, ROOT / CHART)
         publish(tables())
 
 
