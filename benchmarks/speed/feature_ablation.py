@@ -147,7 +147,7 @@ def unshadowed(scene: Scene) -> Scene:
     if packed(scene).lets_through:
         # camera rays still need the body in which they start
         found = packed(free).intersector.nearest_clear
-        vars(packed(free).intersector)["nearest_clear"] = lambda o, d, reach=None, bundled=False: (
+        vars(packed(free).intersector)["nearest_clear"] = lambda o, d, reach=None: (
             found(o, d) if reach is None else clear(o)
         )
     return free

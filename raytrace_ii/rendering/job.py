@@ -203,7 +203,7 @@ class Job:
         tracer: Tracer | None = getattr(self._local, "tracer", None)
         if tracer is None:
             tracer = self._local.tracer = Tracer(
-                self.scene, TILE_RAYS, self.pose, self._lobes(), self._footprint(), self._by_lens()
+                self.scene, TILE_RAYS, self.pose, self._lobes(), self._footprint()
             )  # fmt: skip
         tracer.begin()
         return tracer

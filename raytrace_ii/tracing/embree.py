@@ -19,7 +19,7 @@ import embreex.rtcore_scene  # loads the library and what it depends on
 import numpy as np
 from numpy.typing import NDArray
 
-from .kernels.packets import PACKET_ROWS, Calls, Parting, packet_kernels
+from .kernels.packets import PACKET_ROWS, Calls, packet_kernels
 
 CONFIGURATION = "RAYTRACE_II_EMBREE"  # environment variable: Embree's device configuration, or "embreex"
 # Trees of eight children a node: Embree keeps to four on CPUs that slow down under wide vectors, and takes 5 % longer
@@ -160,6 +160,7 @@ class Tree:
         self._arguments = _lines(2, np.uint32)
         self._arguments[:, 1] = 0xFFFFFFFF  # every feature
         self._arguments[0, 0] = _COHERENT
+        self._rooms = threading.local()
 
     def nearest(
         self,
@@ -167,42 +168,38 @@ class Tree:
         directions: Floats,
         reach: Floats,
         out: tuple[NDArray[np.int32], Floats, Floats, Floats],
-        bundled: bool = False,
         placed: bool = True,
     ) -> None:
         """Fill row of the face (−1 on a miss), u, v and distance of the nearest hit, placed in float64 if ``placed``.
 
-        ``reach`` of no length is no end. ``bundled`` rays are a few bundles: a packet that spreads is parted into
-        groups of three, and single rays.
+        ``reach`` of no length is no end.
         """
         kernel = packet_kernels(self.library.width)[0]
-        kernel(*self._room("rtcIntersect", bundled), origins, directions, reach, self._faces, placed, *out)
+        kernel(*self._room("rtcIntersect"), origins, directions, reach, self._faces, placed, *out)
 
-    def occluded(
-        self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32], bundled: bool = False
-    ) -> None:
+    def occluded(self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32]) -> None:
         """Fill 0 where something is hit within reach, −1 where not."""
         kernel = packet_kernels(self.library.width)[1]
-        kernel(*self._room("rtcOccluded", bundled), origins, directions, reach, out)
+        kernel(*self._room("rtcOccluded"), origins, directions, reach, out)
 
-    def _room(self, function: str, bundled: bool = False) -> tuple[Any, ...]:
-        """Addresses, most spread and room for rays: of each call its own, for threads must not share it."""
+    def _room(self, function: str) -> tuple[Any, ...]:
+        """Addresses, most spread and room for rays, which threads must not share: kept for each of them."""
+        kept: dict[str, tuple[Any, ...]] = vars(self._rooms)
+        if function not in kept:
+            kept[function] = self._new_room(function)
+        return kept[function]
+
+    def _new_room(self, function: str) -> tuple[Any, ...]:
         width = self.library.width
         active, chosen = _lines(2, np.int32)
-        packet, one = _lines(PACKET_ROWS * width // 16 + 1, np.float32), _lines(PACKET_ROWS // 16 + 1, np.int32)
-        packet, one = packet.reshape(-1), one.reshape(-1)
-        addresses = [
-            ctypes.cast(getattr(self.library.functions, f"{function}{n}"), ctypes.c_void_p).value or 0
-            for n in (width, 1)
-        ]
+        packet = _lines(PACKET_ROWS * width // 16 + 1, np.float32).reshape(-1)
+        address = ctypes.cast(getattr(self.library.functions, f"{function}{width}"), ctypes.c_void_p).value or 0
         calls = Calls(
-            addresses[0], addresses[1], self._scene, self._arguments[0].ctypes.data, self._arguments[1].ctypes.data,
-            active.ctypes.data, packet.ctypes.data, one.ctypes.data,
-            np.float32(NEAR[function] * self._edge), np.float32(NARROW[function]),
-            Parting(np.float32(0), np.float32(1), 3, width, True) if bundled
-            else Parting(np.float32(1), np.float32(0.25), width // 2, 2, False),
+            address, self._scene, self._arguments[0].ctypes.data, self._arguments[1].ctypes.data,
+            active.ctypes.data, packet.ctypes.data, np.float32(NEAR[function] * self._edge),
+            np.float32(NARROW[function]),
         )  # fmt: skip
-        return calls, active, chosen, packet, packet.view(np.int32), one
+        return calls, active, chosen, packet, packet.view(np.int32)
 
 
 def with_spare(corners: Floats) -> Floats:

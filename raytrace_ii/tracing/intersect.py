@@ -50,27 +50,21 @@ class Intersector:
         self._first = first_of_same(corners)
         self._first_clear = first_of_same(corners[opaque:]) if self._clear is not None else None
 
-    def nearest(
-        self, origins: Floats, directions: Floats, bundled: bool = False, placed: bool = True
-    ) -> tuple[Hits, float]:
-        """Nearest hit of every ray, and CPU seconds inside Embree; ``bundled`` and ``placed`` as in `embree.Tree`."""
-        return _nearest(self._all, self._first, origins, directions, _NO_REACH, bundled, placed)
+    def nearest(self, origins: Floats, directions: Floats, placed: bool = True) -> tuple[Hits, float]:
+        """Nearest hit of every ray, and CPU seconds inside Embree; ``placed`` as in `embree.Tree`."""
+        return _nearest(self._all, self._first, origins, directions, _NO_REACH, placed)
 
-    def nearest_clear(
-        self, origins: Floats, directions: Floats, reach: Floats = _NO_REACH, bundled: bool = False
-    ) -> tuple[Hits, float]:
+    def nearest_clear(self, origins: Floats, directions: Floats, reach: Floats = _NO_REACH) -> tuple[Hits, float]:
         """Nearest hit within ``reach`` with a face that lets light through; faces count from their first."""
         assert self._clear is not None
-        return _nearest(self._clear, self._first_clear, origins, directions, reach, bundled)
+        return _nearest(self._clear, self._first_clear, origins, directions, reach)
 
-    def blocked(
-        self, origins: Floats, directions: Floats, reach: Floats, bundled: bool = False
-    ) -> tuple[NDArray[np.int32], float]:
+    def blocked(self, origins: Floats, directions: Floats, reach: Floats) -> tuple[NDArray[np.int32], float]:
         """0 where an opaque face lies within ``reach`` lengths of the direction, −1 where not; and CPU seconds."""
         found = np.full(len(origins), -1, np.int32)
         start = time.thread_time()
         if self._opaque is not None:
-            self._opaque.occluded(origins, directions, reach, found, bundled)
+            self._opaque.occluded(origins, directions, reach, found)
         return found, time.thread_time() - start
 
 
@@ -83,10 +77,7 @@ class SingleRays:
         vertices = np.ascontiguousarray(corners.reshape(-1, 3), np.float32)
         TriangleMesh(self._scene, vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3))
 
-    def nearest(
-        self, origins: Floats, directions: Floats, reach: Floats, out: Hits, bundled: bool = False,
-        placed: bool = True,
-    ) -> None:  # fmt: skip
+    def nearest(self, origins: Floats, directions: Floats, reach: Floats, out: Hits, placed: bool = True) -> None:
         dists = reach.copy() if len(reach) else None  # embreex overwrites it
         found = self._scene.run(origins, directions, dists=dists, query="INTERSECT", output=True)
         for array, name in zip(out, ("primID", "u", "v", "tfar"), strict=True):
@@ -94,9 +85,7 @@ class SingleRays:
         if placed:
             place_hits(origins, directions, self.corners, *out)
 
-    def occluded(
-        self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32], bundled: bool = False
-    ) -> None:
+    def occluded(self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32]) -> None:
         out[:] = self._scene.run(origins, directions, dists=reach.copy(), query="OCCLUDED")
 
 
@@ -106,13 +95,12 @@ def _nearest(
     origins: Floats,
     directions: Floats,
     reach: Floats,
-    bundled: bool = False,
     placed: bool = True,
 ) -> tuple[Hits, float]:
     n = len(origins)
     hits = Hits(np.empty(n, np.int32), *(np.empty(n, np.float32) for _ in range(3)))
     start = time.thread_time()
-    tree.nearest(origins, directions, reach, hits, bundled, placed)
+    tree.nearest(origins, directions, reach, hits, placed)
     if first is not None:
         hits.faces[:] = np.where(hits.faces >= 0, first[hits.faces], -1)
     if first is not None and placed:

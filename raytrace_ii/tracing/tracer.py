@@ -14,7 +14,7 @@ from ii_core.checks import MOST_MM
 
 from ..scene.scene import Scene
 from .intersect import Hits
-from .kernels.addresses import address
+from .kernels.addresses import addresses
 from .kernels.appearance import attenuate, look_closely, paint
 from .kernels.arrays import Generation, Passage, Rays, Recorded, ShadowRays, Stages
 from .kernels.attributes import footprints
@@ -195,20 +195,18 @@ class Tracer:
 
     ``lobes`` is how many rays at most a camera ray sends over the lobe of a rough mirror, and how many samples of a
     pixel share the lobe's places; later rays send one. ``footprint`` is how wide a ray is at its origin, mm, and by
-    how much it grows a mm of its way: images are filtered over it. ``scattered`` says that neighbouring
-    rays are too far apart to form bundles.
+    how much it grows a mm of its way: images are filtered over it.
     """
 
     def __init__(
         self, scene: Scene, capacity: int, pose: NDArray[np.float64], lobes: tuple[int, int] = (LOBE_RAYS, 1),
-        footprint: tuple[float, float] = (0.0, 0.0), scattered: bool = False,
+        footprint: tuple[float, float] = (0.0, 0.0),
     ) -> None:  # fmt: skip
         self.scene: PackedScene = packed(scene)
         self.max_depth = scene.max_depth
         self.pose = pose
         self.lobes = lobes
         self.footprint = footprint if self.scene.images else (0.0, 0.0)
-        self._bundles = not scattered
         self.begin()
         self._primary = _room(capacity, self.scene.nested, self.scene.glossy)
         # weights and pixels of rays that carry all light, one a pixel: read only
@@ -337,9 +335,8 @@ class Tracer:
             record if recorded else None,
             (spawn_rays if clear else reflect) if spawn else None,
         )
-        for stage in wanted:
-            if stage is not None and stage not in self._addresses:
-                self._addresses[stage] = address(stage, generation)
+        unknown = [stage for stage in wanted if stage is not None and stage not in self._addresses]
+        self._addresses.update(addresses(unknown, generation))
         return Stages(*(self._addresses[stage] if stage is not None else 0 for stage in wanted))
 
     def _hits(self, rays: Rays) -> Hits:
@@ -372,7 +369,7 @@ class Tracer:
         return table
 
     def _nearest(self, origins: NDArray[np.float32], directions: NDArray[np.float32], placed: bool = True) -> Hits:
-        hits, seconds = self.scene.intersector.nearest(origins, directions, self._bundles, placed)
+        hits, seconds = self.scene.intersector.nearest(origins, directions, placed)
         self.count.embree_seconds += seconds
         return hits
 
@@ -388,7 +385,7 @@ class Tracer:
             if not count:
                 return
             self.count.rays["passed"] += count
-            hits, seconds = s.intersector.nearest_clear(origins[:count], directions[:count], bundled=self._bundles)
+            hits, seconds = s.intersector.nearest_clear(origins[:count], directions[:count])
             self.count.embree_seconds += seconds
             count = tell_inside(
                 hits.faces, hits.u, hits.v, rows, candidates, origins, directions, rays.inside,
@@ -399,7 +396,7 @@ class Tracer:
         """Add the light of the shadow rays that nothing opaque stops, dimmed by what is clear."""
         s = self.scene
         self.count.rays["shadow"] += len(shadow.pixels)
-        found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, shadow.reach, self._bundles)
+        found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, shadow.reach)
         self.count.embree_seconds += seconds
         if not s.lets_through:
             add_unblocked(found, shadow.colours, shadow.pixels, radiance)
@@ -408,7 +405,7 @@ class Tracer:
         kept = keep_unblocked(found, *rays)
         for _ in range(MOST_CLEAR_FACES):
             origins, directions, reach, colours, pixels, inside = rays = [array[:kept] for array in rays]
-            hits, seconds = s.intersector.nearest_clear(origins, directions, reach, self._bundles)
+            hits, seconds = s.intersector.nearest_clear(origins, directions, reach)
             self.count.embree_seconds += seconds
             kept = pass_clear_face(
                 *hits, origins, directions, reach, colours, pixels, inside,

@@ -5,6 +5,7 @@ Addresses are arguments of kernels, so that nothing of one process is kept in nu
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numba
@@ -65,6 +66,9 @@ address_of: Any = intrinsic(_address_of)
 value_at: Any = intrinsic(_value_at)
 
 
-def address(stage: Any, generation: tuple[Any, ...]) -> int:
-    """Return the address of a stage, a late kernel, for a generation like this; compile it on first use."""
-    return jit.address(stage, (types.CPointer(numba.typeof(generation)), types.intp, types.intp, types.intp))
+def addresses(stages: Collection[Any], generation: tuple[Any, ...]) -> dict[Any, int]:
+    """Return the addresses of stages, late kernels, for a generation like this; compile them on first use."""
+    if not stages:
+        return {}
+    arguments = types.CPointer(numba.typeof(generation)), types.intp, types.intp, types.intp  # a millisecond
+    return {stage: jit.address(stage, arguments) for stage in stages}

@@ -39,41 +39,27 @@ _CORNERS = 24  # the hit ends with `instPrimID`, row 20; behind it room for the 
 PACKET_ROWS = _CORNERS + 9
 _NO_END = np.float32(1e37)
 _LONE = 2  # state of a ray without a group
-
-
-class Parting(NamedTuple):
-    """What becomes of a packet whose rays spread too far.
-
-    ``grow`` is the share of the way to the last hit after which the spread counts; ``tight`` the share of the most
-    spread that the rays of a group are apart from its first; ``least`` the rays of a group. After ``lone`` rays
-    without a group, or if too few are left, all others are traced at once or, with ``singly``, one by one.
-    """
-
-    grow: np.float32
-    tight: np.float32
-    least: int
-    lone: int
-    singly: bool
+# A packet whose rays spread too far is parted into groups of at least half of its rays, which are apart from their
+# first by at most this share of the most spread. After so many rays without a group all others are traced at once
+# without coherence, which costs less than single rays (all scenes, scales 1–32 of setup1, 2026-11-23).
+_TIGHT, _MOST_LONE = np.float32(0.25), 2
 
 
 class Calls(NamedTuple):
-    """What Embree is called with: addresses of functions, tree, arguments and room; and the most spread of a packet.
+    """What Embree is called with: addresses of a function, tree, arguments and room; and the most spread of a packet.
 
     ``near`` bounds the sum of the sides of the box around the origins, ``narrow`` that of the directions as a share
     of the first one's.
     """
 
     packet: int
-    single: int
     tree: int
     coherent: int
     incoherent: int
     active: int
     room: int
-    one: int
     near: np.float32
     narrow: np.float32
-    parting: Parting
 
 
 def _reduce(function: Any) -> Any:
@@ -163,9 +149,7 @@ def _together(packet, calls, ahead, width):
     """Whether rays are near enough to each other for coherent tracing, at their origins and ``ahead`` of them."""
     x, y, z = packet[_DIRECTION * width], packet[(_DIRECTION + 1) * width], packet[(_DIRECTION + 2) * width]
     apart, turned = _spread(packet, np.int64(0), width), _spread(packet, np.int64(_DIRECTION), width)
-    return (apart + turned * ahead * calls.parting.grow <= calls.near) & (
-        turned <= calls.narrow * (abs(x) + abs(y) + abs(z))
-    )
+    return (apart + turned * ahead <= calls.near) & (turned <= calls.narrow * (abs(x) + abs(y) + abs(z)))
 
 
 @stage_kernel
@@ -214,8 +198,7 @@ def _choose(packet, active, chosen, calls, width):
         first += 1
     x, y, z = packet[first], packet[width + first], packet[2 * width + first]
     dx, dy, dz = packet[4 * width + first], packet[5 * width + first], packet[6 * width + first]
-    tight = calls.parting.tight
-    near, narrow = calls.near * tight, calls.narrow * tight * (abs(dx) + abs(dy) + abs(dz))
+    near, narrow = calls.near * _TIGHT, calls.narrow * _TIGHT * (abs(dx) + abs(dy) + abs(dz))
     count = 0
     for lane in range(width):
         away = abs(packet[lane] - x) + abs(packet[width + lane] - y) + abs(packet[2 * width + lane] - z)
@@ -231,14 +214,14 @@ def _choose(packet, active, chosen, calls, width):
 
 
 @stage_kernel
-def _trace_groups(calls, active, chosen, packet, numbers, one_numbers, lanes, width):
+def _trace_groups(calls, active, chosen, packet, lanes, width):
     """Trace a packet whose rays spread too far: groups of near lanes coherently, and the other lanes."""
     for lane in range(width):
         chosen[lane] = lane < lanes
-    left, lone, parting = lanes, 0, calls.parting
-    while left >= parting.least and lone < parting.lone:
+    left, lone = lanes, 0
+    while left >= width // 2 and lone < _MOST_LONE:
         count, first = _choose(packet, active, chosen, calls, width)
-        if count >= parting.least:
+        if count >= width // 2:
             call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
             for lane in range(width):
                 chosen[lane] = 0 if active[lane] != 0 else chosen[lane]
@@ -251,16 +234,8 @@ def _trace_groups(calls, active, chosen, packet, numbers, one_numbers, lanes, wi
     for lane in range(width):
         active[lane] = -1 if chosen[lane] != 0 else 0
         rest += chosen[lane] != 0
-    if rest > 0 and not parting.singly:
+    if rest > 0:
         call(calls.packet, calls.active, calls.tree, calls.room, calls.incoherent)
-    elif rest > 0:
-        for lane in range(width):
-            if chosen[lane] != 0:
-                for row in range(_CORNERS):
-                    one_numbers[row] = numbers[row * width + lane]
-                call(calls.single, calls.tree, calls.one, calls.incoherent, 0)
-                for row in range(_FAR, _CORNERS):
-                    numbers[row * width + lane] = one_numbers[row]
 
 
 @cache
@@ -273,8 +248,8 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
 
     @kernel
     def nearest(
-        calls, active, chosen, packet, numbers, one_numbers, origins, directions, reach, corners, placed,
-        primitives, u, v, distances,
+        calls, active, chosen, packet, numbers, origins, directions, reach, corners, placed, primitives, u, v,
+        distances,
     ):  # fmt: skip
         n, wide = origins.shape[0], np.int64(width)  # no literal: parts are compiled once
         ahead = np.float32(0)  # distance of the last hit
@@ -289,7 +264,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
             if _together(packet, calls, ahead, wide):
                 call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
             else:
-                _trace_groups(calls, active, chosen, packet, numbers, one_numbers, lanes, wide)
+                _trace_groups(calls, active, chosen, packet, lanes, wide)
             if placed:
                 _place(packet, numbers, wide, corners)
             ahead = packet[_FAR * width] if numbers[_GEOMETRY * width] >= 0 else ahead
@@ -297,9 +272,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 _take(packet, numbers, wide, lane, first + lane, primitives, u, v, distances)
 
     @kernel
-    def occluded(
-        calls, active, chosen, packet, numbers, one_numbers, origins, directions, reach, found
-    ):  # fmt: skip
+    def occluded(calls, active, chosen, packet, numbers, origins, directions, reach, found):
         n, wide = origins.shape[0], np.int64(width)  # no literal: parts are compiled once
         _begin(packet, numbers, wide)
         for first in range(0, n, width):
@@ -311,7 +284,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
             if _together(packet, calls, np.float32(0), wide):
                 call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
             else:
-                _trace_groups(calls, active, chosen, packet, numbers, one_numbers, lanes, wide)
+                _trace_groups(calls, active, chosen, packet, lanes, wide)
             for lane in range(lanes):
                 found[first + lane] = 0 if packet[_FAR * width + lane] < 0 else -1
 

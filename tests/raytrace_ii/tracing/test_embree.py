@@ -144,11 +144,6 @@ def test_bundles_that_share_a_packet_are_traced_coherently_and_scattered_rays_at
     single.nearest(origins, directions, NO_REACH, expected)
     np.testing.assert_array_equal(found[0], expected[0])
     assert watched.calls == [(False, library.width)] * (n // library.width)
-    watched.calls.clear()
-    packets.nearest(origins, directions, NO_REACH, found, bundled=True)  # groups of three and more, and single rays
-    np.testing.assert_array_equal(found[0], expected[0])
-    assert all(coherent and lanes >= 3 for coherent, lanes in watched.calls)
-    assert sum(lanes for _, lanes in watched.calls) < n
 
 
 def test_rays_without_a_direction_miss_and_harm_no_neighbour():

@@ -98,7 +98,7 @@ def agree(scene, monkeypatch):
         for name in names:
             monkeypatch.setattr(module, name, getattr(module, name).py_func)
     # stages are called by address, which Python cannot: the function stands for its address, a tuple for its place
-    monkeypatch.setattr(tracer, "address", lambda stage, _: stage.py_func)
+    monkeypatch.setattr(tracer, "addresses", lambda stages, _: {stage: stage.py_func for stage in stages})
     monkeypatch.setattr(shade, "call", lambda stage, *arguments: stage(*arguments))
     monkeypatch.setattr(shade, "address_of", lambda generation: generation)
     for module in (appearance, attributes, shade, sky, spawn):
