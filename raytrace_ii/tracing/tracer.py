@@ -336,7 +336,8 @@ class Tracer:
             (spawn_rays if clear else reflect) if spawn else None,
         )
         unknown = [stage for stage in wanted if stage is not None and stage not in self._addresses]
-        self._addresses.update(addresses(unknown, generation))
+        if unknown:
+            self._addresses.update(addresses(unknown, generation))
         return Stages(*(self._addresses[stage] if stage is not None else 0 for stage in wanted))
 
     def _hits(self, rays: Rays) -> Hits:
