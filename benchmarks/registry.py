@@ -140,6 +140,7 @@ BENCHMARKS = {
     for benchmark in (
         Benchmark("pages.cameras", writes=("docs/cameras.md", f"{IMAGES}/cameras/*", f"{IMAGES}/scenes.*")),
         Benchmark("pages.concepts", writes=(f"{IMAGES}/concepts/*",)),
+        Benchmark("accuracy.sample_places", records=OWN, fills=("docs/speed_accuracy.md",)),
         Benchmark("accuracy.camera_in_scene", records=OWN, writes=(f"{IMAGES}/camera_in_scene.*",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",), tables_in="pages.calibration"),
         Benchmark("accuracy.lens_rays", needs="--peer, an interpreter with optiland", records=OWN),

@@ -1,8 +1,8 @@
 """Supersampling: positions and number of the samples of a pixel.
 
-The samples of a pixel are the first of a (0, 2)-sequence, see `kernels.sampling.places`. Their number is fixed, or
-adaptive: it starts with the least, then doubles, pixel by pixel, until the estimated standard error of the pixel is
-within a target or the most is reached. The estimate is
+Up to 16 samples of a pixel stand where `sample_places` puts them, more are the first of a (0, 2)-sequence, see
+`kernels.sampling.places`. Their number is fixed, or adaptive: it starts with the least, then doubles, pixel by pixel,
+until the estimated standard error of the pixel is within a target or the most is reached. The estimate is
 
     error² = Σ(qᵢ − x̄)² / 12 + d² / n³
 
@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from ii_core import IICamera
 
 from .kernels import sampling as sample_kernels
+from .sample_places import doubling_places, fixed_places
 
 MOST_SAMPLES = 1 << 16
 
@@ -98,10 +99,10 @@ def fixed_sum(
 
     The samples of a pixel stand together; those of one of its ``parts`` share packets with those of pixels beside it.
     """
-    total = np.zeros((len(m), 3), np.float32)
+    total, table = np.zeros((len(m), 3), np.float32), fixed_places(samples)
     for some, first, many in _portions(len(m), 0, samples, batch):
         numbers = m[some], n[some], first, many
-        rays, traced = _rays(camera, seed, *numbers, *parts(many))
+        rays, traced = _rays(camera, seed, table, *numbers, *parts(many))
         radiance = shoot(*rays, numbers=numbers, first=some if first == 0 else None, traced=traced)
         sample_kernels.sum_samples(radiance, many, total[some])
     return total
@@ -142,14 +143,14 @@ def adaptive_mean(
     m, n, lens = _with_rim(camera, rows, cols)
     own = ((n >= rows.start) & (n < rows.stop) & (m >= cols.start) & (m < cols.stop)).ravel()
     m, n = m.ravel(), n.ravel()
-    quarters = np.zeros((len(m), 4, 3))
+    quarters, table = np.zeros((len(m), 4, 3)), doubling_places(wanted.most)
 
     def add(which: NDArray[np.int64], start: int, count: int, begins: bool = False) -> None:
         """Samples start … start + count of some pixels, to the four quarters of all so far."""
         for block, first, many in _portions(len(which), start, count, batch):
             some = which[block]
             numbers = m[some], n[some], first, many
-            rays, traced = _rays(camera, seed, *numbers, *parts(many))
+            rays, traced = _rays(camera, seed, table, *numbers, *parts(many))
             radiance = shoot(*rays, numbers=numbers, first=block if begins and first == 0 else None, traced=traced)
             sample_kernels.add_samples(radiance, some, first, many, (start + count) // 4, quarters)
 
@@ -202,7 +203,15 @@ def _needed(lens: NDArray[np.int64], own: NDArray[np.bool_]) -> NDArray[np.bool_
 
 
 def _rays(
-    camera: IICamera, seed: int, m: NDArray[Any], n: NDArray[Any], first: int, count: int, parts: int, pixels: int
+    camera: IICamera,
+    seed: int,
+    table: Floats,
+    m: NDArray[Any],
+    n: NDArray[Any],
+    first: int,
+    count: int,
+    parts: int,
+    pixels: int,
 ) -> tuple[tuple[Floats, Floats, Floats | None], NDArray[np.int32]]:
     """Rays of ``count`` samples of each pixel, pixel by pixel, and the order in which they share packets.
 
@@ -211,7 +220,8 @@ def _rays(
     where: list[Floats] = []
     for pair in range(1 + camera.samples_aperture):
         out = np.empty((len(m), count, 2))
-        sample_kernels.places(seed, m, n, camera.pixels[0], first, count, pair, out.reshape(-1, 2))
+        best = table if pair == 0 else table[:0]
+        sample_kernels.places(seed, m, n, camera.pixels[0], first, count, pair, best, out.reshape(-1, 2))
         where.append(out)
     L, D, shares = camera.weighted_rays_at(m[:, None], n[:, None], *where)
     traced = np.empty(len(m) * count if parts > 1 else 0, np.int32)

@@ -10,17 +10,21 @@ from ii_core.jit import inline_kernel, kernel
 
 
 @kernel
-def places(seed, m, n, columns, first, count, pair, out):
+def places(seed, m, n, columns, first, count, pair, table, out):
     """Samples ``first`` … ``first + count`` of pixels (m, n), as rows of ``out``, pixel by pixel, in [0, 1)².
 
-    A (0, 2)-sequence, van der Corput's and Sobol''s, Owen-scrambled by a hash of seed and pixel (Owen 1995; hashes
-    of Laine and Karras 2011, Burley 2020): any first 2^k samples lie one in each cell of every grid of 2^k equal
-    cells of sides 2^-i. ``pair`` 0 is the place in the pixel, 1 that on the aperture, which walks through the same
-    sequence in another order so as not to follow the first.
+    Rows of ``table`` (n, 2), turned or mirrored by a hash of seed and pixel. If it has none, a (0, 2)-sequence, van
+    der Corput's and Sobol''s, Owen-scrambled by that hash (Owen 1995; hashes of Laine and Karras 2011, Burley 2020):
+    any first 2^k samples lie one in each cell of every grid of 2^k equal cells of sides 2^-i. ``pair`` 0 is the place
+    in the pixel, 1 that on the aperture, which walks through the same sequence in another order so as not to follow
+    the first.
     """
     for i in range(m.shape[0]):
         pixel = np.uint64(n[i]) * np.uint64(columns) + np.uint64(m[i])
         own = _mix(_mix(np.uint64(seed) ^ _mix(pixel)) + np.uint64(pair))
+        if table.shape[0] > 0:
+            _turned(table[first : first + count], own, out[i * count : (i + 1) * count])
+            continue
         across, down, order = own & _LOW, own >> np.uint64(32), _mix(own) & _LOW
         for j in range(count):
             index = np.uint64(first + j)
@@ -28,6 +32,16 @@ def places(seed, m, n, columns, first, count, pair, out):
                 index = _scrambled(index, order)
             out[i * count + j, 0] = _scrambled(_reversed(index), across) * (1.0 / 4294967296.0)
             out[i * count + j, 1] = _scrambled(_sobol(index), down) * (1.0 / 4294967296.0)
+
+
+@inline_kernel
+def _turned(places, bits, out):
+    """Places in the unit square, turned or mirrored by the last three bits."""
+    swapped = int(bits & _ONE)
+    across, down = (bits & np.uint64(2)) != 0, (bits & np.uint64(4)) != 0
+    for j in range(places.shape[0]):
+        x, y = places[j, swapped], places[j, 1 - swapped]
+        out[j, 0], out[j, 1] = 1.0 - x if across else x, 1.0 - y if down else y
 
 
 @kernel
