@@ -143,7 +143,8 @@ def adaptive_mean(
     m, n, lens = _with_rim(camera, rows, cols)
     own = ((n >= rows.start) & (n < rows.stop) & (m >= cols.start) & (m < cols.stop)).ravel()
     m, n = m.ravel(), n.ravel()
-    quarters, table = np.zeros((len(m), 4, 3)), doubling_places(wanted.most)
+    quarters = np.zeros((len(m), 4, 3))
+    table = fixed_places(wanted.most) if wanted.least == wanted.most else doubling_places(wanted.most)
 
     def add(which: NDArray[np.int64], start: int, count: int, begins: bool = False) -> None:
         """Samples start … start + count of some pixels, to the four quarters of all so far."""

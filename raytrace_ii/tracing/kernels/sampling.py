@@ -161,14 +161,16 @@ def standard_errors(quarters, which, step, n, curve, out):
     From the means of the four quarters of the samples of each pixel named, and from ``step``, its difference to the
     neighbours.
     """
+    share, hidden = 1.0 / n, 1.0 / (float(n) * n * n)
     for i in range(out.shape[0]):
-        worst, pixel = 0.0, which[i]
+        worst, pixel = 0.0, np.uint64(which[i])
         for c in range(3):
-            mean = (quarters[pixel, 0, c] + quarters[pixel, 1, c] + quarters[pixel, 2, c] + quarters[pixel, 3, c]) / n
-            square = step[i, c] * step[i, c] / (float(n) * n * n)
-            for part in range(4):
-                square += (quarters[pixel, part, c] * 4.0 / n - mean) ** 2 / 12.0
-            error = math.sqrt(square)
+            a, b, d, e = quarters[pixel, 0, c], quarters[pixel, 1, c], quarters[pixel, 2, c], quarters[pixel, 3, c]
+            mean, four = (a + b + d + e) * share, 4.0 * share
+            scatter = (
+                (a * four - mean) ** 2 + (b * four - mean) ** 2 + (d * four - mean) ** 2 + (e * four - mean) ** 2
+            )
+            error = math.sqrt(scatter / 12.0 + step[i, c] * step[i, c] * hidden)
             worst = max(worst, 0.5 * (_code(mean + error, curve) - _code(mean - error, curve)))
         out[i] = worst
 

@@ -15,6 +15,7 @@ from raytrace_ii.rendering import job
 from raytrace_ii.rendering.tiles import ray_order, tiles
 from raytrace_ii.tracing.kernels.sampling import places as sample_places
 from raytrace_ii.tracing.kernels.srgb import encode_srgb
+from raytrace_ii.tracing.sample_places import fixed_places
 from raytrace_ii.tracing.support_images import SUPPORT, SUPPORT_IMAGES
 from tests.support.trace_scenes import UNIFORM, WHITE, body, box, floor, hall, lamp, sphere, sun, wall
 
@@ -110,7 +111,7 @@ def test_support_images_are_of_the_first_sample_and_as_requested(hall_scene):
 
     m, n = np.meshgrid(np.arange(128), np.arange(64))
     place = np.empty((128 * 64, 2))
-    sample_places(1, m.ravel(), n.ravel(), 128, 0, 1, 0, place)
+    sample_places(1, m.ravel(), n.ravel(), 128, 0, 1, 0, fixed_places(3), place)
     first = trace(hall_scene, *SMALL.rays(sample=place.reshape(64, 128, 2)))
     np.testing.assert_array_equal(full.depth.ravel(), first.depth)
     np.testing.assert_array_equal(np.isnan(full.depth), full.object_id == -1)
@@ -218,8 +219,8 @@ def places(samples, seed=0):
 
 
 @pytest.mark.parametrize("samples", [1, 2, 4, 8, 16, 32])
-def test_samples_stay_in_their_pixel_under_their_lens_one_in_each_cell_of_every_grid(samples):
-    """On b1dc540 a sample was in a cell of one grid alone: 16 left 1.3–2.1 dB more error than these."""
+def test_samples_stay_in_their_pixel_under_their_lens_where_their_set_puts_them(samples):
+    """More than 16 lie one in each cell of every grid."""
     camera, place, pixel = places(samples)
     width, height = camera.size_mm
     row, column = np.mgrid[:16, :24]
@@ -228,8 +229,16 @@ def test_samples_stay_in_their_pixel_under_their_lens_one_in_each_cell_of_every_
     # 1e-12: rounding of lens − (lens − pixel) over coordinates of a millimetre
     np.testing.assert_allclose(np.stack([x, y], axis=-1).reshape(place.shape), place, atol=1e-12)
     assert (place >= 0).all() and (place < 1).all()
+    if samples <= 16:
+        table = fixed_places(samples)
+        middle = np.abs(table - 0.5)
+        turned = np.minimum(
+            np.abs(np.abs(place - 0.5) - middle).max(axis=(1, 2)),
+            np.abs(np.abs(place - 0.5) - middle[:, ::-1]).max(axis=(1, 2)),
+        )
+        assert turned.max() < 1e-15
     across = 1
-    while across <= samples:
+    while 16 < samples and across <= samples:
         down = samples // across
         cell = (place[..., 1] * down).astype(int) * across + (place[..., 0] * across).astype(int)
         np.testing.assert_array_equal(np.sort(cell, axis=1), np.broadcast_to(np.arange(samples), cell.shape))
@@ -240,6 +249,11 @@ def test_samples_stay_in_their_pixel_under_their_lens_one_in_each_cell_of_every_
 
 def test_samples_depend_on_seed_and_pixel_alone():
     stacks = [places(4, seed)[1] for seed in (3, 3, 4)]
+    np.testing.assert_array_equal(stacks[0], stacks[1])
+    # 3 of 4 pixels have the first sample elsewhere in x: it has four places along each axis
+    assert (stacks[0] != stacks[2]).mean() == pytest.approx(0.75, abs=0.08)
+    assert len(np.unique(stacks[0][:, 0], axis=0)) == 8
+    stacks = [places(32, seed)[1] for seed in (3, 3, 4)]
     np.testing.assert_array_equal(stacks[0], stacks[1])
     assert (stacks[0] != stacks[2]).mean() > 0.99
     first = stacks[0][:, 0]
