@@ -20,7 +20,7 @@ from scipy.optimize import minimize
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records
+from benchmarks.records import Records, origin
 from raytrace_ii.tracing.kernels.sampling import places
 from raytrace_ii.tracing.sample_places import MOST, doubling_places, fixed_places
 
@@ -154,7 +154,7 @@ def tables() -> Tables:
         sets = [row.get(name) for name in ("sequence", "own", "doubling")]
         cells = [f"{one[axis] * 100:.1f} %" if one else "" for axis in (0, 1) for one in sets]
         lines.append(f"| {samples} | {' | '.join(cells)} |")
-    return {(PAGE, "sample-places"): lines}
+    return {(PAGE, "sample-places"): [*lines, "", origin(rows.values())]}
 
 
 if __name__ == "__main__":
