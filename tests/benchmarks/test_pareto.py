@@ -59,7 +59,8 @@ def test_a_band_is_the_middle_rows_of_lenses():
 
 
 def studied(before, now):
-    return {"before": {"recommended": {**before, "setting": "9 samples"}}, "rows": now, "front": pareto.front(now), "commit": "abc1234"}
+    earlier = {"recommended": {**before, "setting": "9 samples"}}
+    return {"before": earlier, "rows": now, "front": pareto.front(now), "commit": "abc1234"}
 
 
 def test_speedup_is_the_ratio_of_times_at_the_earlier_recommended_psnr():
