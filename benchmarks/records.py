@@ -21,8 +21,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ii_core.identity import source_hash
-from ii_core.json_lines import append_record, read_records
+from ii_core.base.identity import source_hash
+from ii_core.base.json_lines import append_record, read_records
 from metrics import provenance
 
 Record = dict[str, Any]

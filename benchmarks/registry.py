@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.records import RESULTS, ROOT, seconds_in
-from ii_core.json_lines import lines_of
+from ii_core.base.json_lines import lines_of
 
 LEAST = 6.0  # seconds: shorter sums are times of single calls, not of the run
 OWN = "NAME.jsonl"  # stands for the file of the benchmark's name

@@ -12,11 +12,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ii_core import IIPicture, checks
-from ii_core.camera import whole_pair
-from ii_core.files import one_line
-from ii_core.foreign import ForeignError, foreign_errors
-from ii_core.progress import reporter
+from ii_core import IIPicture
+from ii_core.base import checks
+from ii_core.base.files import one_line
+from ii_core.base.foreign import ForeignError, foreign_errors
+from ii_core.base.progress import reporter
+from ii_core.camera.camera import whole_pair
 
 from . import container, file_header
 from .checks import check_type, whole

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TypeVar
 
-from ii_core import interrupt
+from ii_core.base import interrupt
 
 TASKS = "/proc/self/task"
 Result = TypeVar("Result")
@@ -29,7 +29,7 @@ def spent_elsewhere(seconds: float) -> None:
 
 
 def interruptible(call: Callable[[], Result]) -> Result:
-    """Call a function as `ii_core.interrupt.interruptible` does; its CPU time counts for the calling thread."""
+    """Call a function as `ii_core.base.interrupt.interruptible` does; its CPU time counts for the calling thread."""
     caller = threading.get_ident()
 
     def timed() -> tuple[Result, float]:

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.colour import CB, CR, KB, KG, KR
-from ii_core.jit import kernel
+from ii_core.base.colour import CB, CR, KB, KG, KR
+from ii_core.base.jit import kernel
 
 # Fractional bits: 20 suffice to round as real numbers do.
 BITS = np.int32(20)

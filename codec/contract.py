@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
-from ii_core.interrupt import STOPS
+from ii_core.base.interrupt import STOPS
 
 from .checks import check_type
 from .search import CodingResult

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.component import KINDS
+from ii_core.picture.component import KINDS
 
 from . import colour
 from .colour import Format

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from ii_core.checks import callable_, checked, instance, number
+from ii_core.base.checks import callable_, checked, instance, number
 
 from .progress import run_begins, runs_so_far
 

@@ -22,8 +22,8 @@ from ii_core import (
     sub_images,
     view_image,
 )
-from ii_core.files import write_image
-from metrics.rd import RATES
+from ii_core.base.files import write_image
+from metrics.rates.rd import RATES
 from raytrace_ii import Scene, Shot, load_scene, render
 from raytrace_ii.cli.evaluate import SCHEMES, run_study
 from raytrace_ii.cli.progress import progress_bar, spinner

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from ii_core import camera_pose, preset
+from ii_core.base.progress import reporter
 from ii_core.display.film import write_animation
 from ii_core.display.quilt import quilt
-from ii_core.progress import reporter
 from raytrace_ii import load_scene, render
 
 

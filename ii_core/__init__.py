@@ -1,9 +1,11 @@
 """Cameras, pictures, component images and view images of integral imaging."""
 
 from .calibration import Calibration, NoLenses, calibrate, calibrated_picture, centres_picture
-from .camera import Camera, IICamera
-from .component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
-from .disparity import depth_of_disparity, disparity_of_depth
+from .camera.camera import Camera, IICamera
+from .camera.maps import MapCamera, read_maps, write_maps
+from .camera.pose import camera_pose
+from .camera.presets import camera_names, preset, preset_cameras
+from .design.panel import PanelDesign, panel_display
 from .display.eye import Eye, EyeImage, eye_image
 from .display.model import DisplayModel
 from .display.notebook import EmbeddedViewer, embed_viewer
@@ -14,15 +16,13 @@ from .formats.mosaic import load_mosaic
 from .formats.quilt import write_quilt
 from .formats.rig import Rig
 from .formats.views import write_views
-from .maps import MapCamera, read_maps, write_maps
-from .panel import PanelDesign, panel_display
-from .picture import IIPicture
-from .pose import camera_pose
-from .presets import camera_names, preset, preset_cameras
-from .regular import from_smallest_rectangle, resampled, smallest_rectangle
-from .sensor_noise import add_sensor_noise
-from .video import IIVideo, open_video, video_of, write_view_folders
-from .view import five_viewpoints, orthoscopic, projection_camera, refocus, stand_back, view_image
+from .picture.component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
+from .picture.disparity import depth_of_disparity, disparity_of_depth
+from .picture.picture import IIPicture
+from .picture.regular import from_smallest_rectangle, resampled, smallest_rectangle
+from .picture.sensor_noise import add_sensor_noise
+from .picture.view import five_viewpoints, orthoscopic, projection_camera, refocus, stand_back, view_image
+from .video.video import IIVideo, open_video, video_of, write_view_folders
 
 __all__ = [
     "Calibration",

@@ -2,31 +2,20 @@
 
 from ii_core.display.view_sheets import plot_pair, plot_views
 
-from .against_anchor import differences, mean_differences
-from .angle import q_angle_ssim, q_angle_ycbcr
-from .batch import measuring
-from .builtin_measures import MEASURES
-from .ctc import q_ctc_psnr, q_ctc_ssim
 from .depth.focus import FocusDepth, depth_from_focus
 from .depth.layers import covering_layers, disparity_layers, linear_layers, logarithmic_layers
-from .depth.q_depth import q_depth
-from .global_angle import angle_axes, mean_q_angle, q_angle, q_global
-from .measure import Measure, Needs, known_measures, register_measure
-from .over_time import TakeQuality, measure_take
-from .pair import PicturePair
-from .plots.angle_depth import plot_depth
-from .plots.depth_chart import depth_over_rate, depth_rate_chart
-from .plots.error_maps import plot_error_layers
-from .plots.rd_chart import rd_chart
-from .plots.tables import summary_table, write_csv, write_latex
-from .plots.time_chart import time_chart
-from .point_log import PointLog
-from .quality import AngleQuality, DepthQuality, ViewQuality
-from .quality_report import Report, quality_rows, report
-from .rd import bd_psnr, bd_rate, default_rates, rate_distortion
-from .sheets import PLOTS, plot_all, plot_angle, plot_error_views
-from .study import provenance, read_study, write_study
-from .subjective import (
+from .measures.angle import q_angle_ssim, q_angle_ycbcr
+from .measures.batch import measuring
+from .measures.builtin_measures import MEASURES
+from .measures.ctc import q_ctc_psnr, q_ctc_ssim
+from .measures.global_angle import angle_axes, mean_q_angle, q_angle, q_global
+from .measures.measure import Measure, Needs, known_measures, register_measure
+from .measures.over_time import TakeQuality, measure_take
+from .measures.pair import PicturePair
+from .measures.q_depth import q_depth
+from .measures.quality import AngleQuality, DepthQuality, ViewQuality
+from .measures.view import error_map, q_view
+from .observers.subjective import (
     OpinionScores,
     PairScale,
     Prediction,
@@ -37,7 +26,18 @@ from .subjective import (
     simulated_scores,
     simulated_wins,
 )
-from .view import error_map, q_view
+from .plots.angle_depth import plot_depth
+from .plots.depth_chart import depth_over_rate, depth_rate_chart
+from .plots.error_maps import plot_error_layers
+from .plots.rd_chart import rd_chart
+from .plots.tables import summary_table, write_csv, write_latex
+from .plots.time_chart import time_chart
+from .rates.against_anchor import differences, mean_differences
+from .rates.rd import bd_psnr, bd_rate, default_rates, rate_distortion
+from .reports.point_log import PointLog
+from .reports.quality_report import Report, quality_rows, report
+from .reports.sheets import PLOTS, plot_all, plot_angle, plot_error_views
+from .reports.study import provenance, read_study, write_study
 
 __all__ = [
     "MEASURES",

@@ -24,7 +24,7 @@ from benchmarks.arguments import command_line
 from benchmarks.records import Records
 from ii_core import IICamera, calibrate, preset
 from ii_core.calibration import Calibration
-from ii_core.optics import Lens
+from ii_core.camera.optics import Lens
 
 RECORDS = Records("calibration", ("benchmarks.accuracy.calibration",))
 CAMERAS = 50  # cameras per row; four rows of small pictures

@@ -23,7 +23,7 @@ from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.records import Records
 from ii_core import IICamera, preset
-from ii_core.optics import Bundle, LensModel, SphericalLenslet, Under
+from ii_core.camera.optics import Bundle, LensModel, SphericalLenslet, Under
 from metrics import q_global
 from raytrace_ii import Background, Body, Material, Scene, Shot, load_scene, render
 from raytrace_ii.tracing.packing import packed

@@ -25,8 +25,8 @@ from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.records import Records
 from ii_core import IICamera, preset
+from ii_core.camera.optics import SphericalLenslet
 from ii_core.display.figure import COLOURS
-from ii_core.optics import SphericalLenslet
 from raytrace_ii import Body, Light, Material, Scene, trace
 from raytrace_ii.scene.textures import Image
 

@@ -26,7 +26,7 @@ from benchmarks.records import ROOT, Records, origin, with_commits
 from codec import decode, encode
 from ii_core import IIPicture, add_sensor_noise, preset
 from ii_core.display.figure import COLOURS, new_figure, save
-from ii_core.view import camera_of
+from ii_core.picture.view import camera_of
 from metrics import DepthQuality, FocusDepth, depth_from_focus, linear_layers, q_depth
 from metrics.depth.focus import METHODS
 from metrics.depth.virtual_camera import virtual_camera_pixels

@@ -27,14 +27,14 @@ from benchmarks.study.coding import SCENES, shot
 from benchmarks.study.views import LABELS, SHOWN
 from codec import decode, encode
 from ii_core import DisplayModel, Eye, IIPicture, eye_image, five_viewpoints
-from ii_core.parallel import cores
-from ii_core.view import camera_of
+from ii_core.base.parallel import cores
+from ii_core.picture.view import camera_of
 from metrics import measuring
+from metrics.measures.view import mssim
 from metrics.observers import Options, Verdict, read_results, verdict
 from metrics.observers.plan import make_plan
 from metrics.observers.simulated import write_simulated
 from metrics.plots.opinion_chart import opinion_chart
-from metrics.view import mssim
 
 RECORDS = Records(
     "eye_views",

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.records import Records
-from ii_core.elements import Bundle
-from ii_core.glass import CATALOGUE
-from ii_core.prescriptions import lens
-from ii_core.surfaces import Surface, Surfaces
+from ii_core.camera.elements import Bundle
+from ii_core.camera.glass import CATALOGUE
+from ii_core.camera.prescriptions import lens
+from ii_core.camera.surfaces import Surface, Surfaces
 
 RECORDS = Records("lens_rays", modules=("benchmarks.accuracy.lens_rays",))
 RAYS = 5000

@@ -19,7 +19,7 @@ from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.records import Records, number
 from ii_core import IICamera, preset, read_maps, write_maps
-from ii_core.maps import FORMATS
+from ii_core.camera.maps import FORMATS
 from metrics import q_global
 from raytrace_ii import load_scene, render
 

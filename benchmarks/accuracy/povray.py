@@ -29,7 +29,7 @@ from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, origin, with_commits
 from ii_core import IICamera, preset
-from ii_core.colour import srgb
+from ii_core.base.colour import srgb
 from raytrace_ii import Light, Material, trace
 
 RECORDS = Records("povray", ("benchmarks.accuracy.povray", "benchmarks.accuracy.analytic"))

@@ -20,12 +20,12 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
 from codec import decode, encode
 from ii_core import IICamera, preset
+from ii_core.camera.elements import Bundle
+from ii_core.camera.optics import Lens
+from ii_core.camera.prescriptions import lens
+from ii_core.camera.presets import scaled
+from ii_core.design.properties import through_front_mm
 from ii_core.display.figure import new_figure, save
-from ii_core.elements import Bundle
-from ii_core.optics import Lens
-from ii_core.prescriptions import lens
-from ii_core.presets import scaled
-from ii_core.properties import through_front_mm
 from metrics import bd_rate, q_global
 from raytrace_ii import load_scene, render
 

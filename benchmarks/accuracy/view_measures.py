@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture, five_viewpoints, view_image
-from ii_core.view import camera_of
+from ii_core.picture.view import camera_of
 
 CANDIDATES = ("ms_ssim", "flip", "epi_psnr")
 PEERS = {"ms_ssim": ("sewar", "sewar"), "flip": ("flip_evaluator", "flip-evaluator")}

@@ -4,9 +4,10 @@
 
 A row of pixels under one lens shows a texture of even stripes, 8 pixels wide in the mean. The truth is the wave's
 point-spread function, summed over pixels: of a round lens by its angular spectrum, or Airy's closed form where the
-field would be too large. The model by rays leaves the texture as it is. The point-spread maps of `ii_core.spread` are
-the model of round lenses, the box of rays folded with sinc² that of slits. Errors are PSNR of linear light. The last
-rows spread *Apples* and *Cuboid* as ideal and as glass lenses of full setup1 do, and code them (`lens_setup1`).
+field would be too large. The model by rays leaves the texture as it is. The point-spread maps of
+`ii_core.waves.spread` are the model of round lenses, the box of rays folded with sinc² that of slits. Errors are PSNR
+of linear light. The last rows spread *Apples* and *Cuboid* as ideal and as glass lenses of full setup1 do, and code
+them (`lens_setup1`).
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, number, origin
 from ii_core import IICamera, IIPicture
-from ii_core.optics import Lenslet
-from ii_core.spread import spread_maps, spread_picture
-from ii_core.wave import diffraction_limit, lens_spread, model_spread, pixel_kernel
+from ii_core.camera.optics import Lenslet
+from ii_core.waves.spread import spread_maps, spread_picture
+from ii_core.waves.wave import diffraction_limit, lens_spread, model_spread, pixel_kernel
 from metrics.plots.rd_chart import COLOURS, MARKERS, new_figure, save
 
 RECORDS = Records("waves", ("benchmarks.accuracy.waves", "benchmarks.accuracy.lens_setup1"))

@@ -15,7 +15,7 @@ from benchmarks.coding.rd import climbing, rd_point
 from benchmarks.records import Records, origin, with_commits
 from ii_core import IIPicture, preset
 from metrics import bd_psnr
-from metrics.rd import UndefinedDifference
+from metrics.rates.rd import UndefinedDifference
 from raytrace_ii import load_scene, render
 
 RECORDS = Records("bframes", ("benchmarks.coding.bframes", "benchmarks.coding.rd"))

@@ -27,9 +27,9 @@ from benchmarks.records import Records, origin, with_commits
 from codec import parse_scheme, schemes
 from codec.contract import find
 from ii_core import IIPicture, preset
-from ii_core.parallel import for_each
+from ii_core.base.parallel import for_each
 from metrics import bd_rate
-from metrics.rd import UndefinedDifference
+from metrics.rates.rd import UndefinedDifference
 from raytrace_ii import load_scene, render
 
 RECORDS = Records("coders", ("benchmarks.coding.coders", "benchmarks.coding.rd"))

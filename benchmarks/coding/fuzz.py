@@ -32,7 +32,7 @@ from benchmarks.workers import cases
 from codec import Encoded, decode, encode, parse_scheme, schemes
 from codec.contract import find
 from ii_core import IIPicture
-from ii_core.parallel import for_each
+from ii_core.base.parallel import for_each
 
 RECORDS = Records("fuzz", ("benchmarks.coding.fuzz", "benchmarks.workers"))
 LENSES, EI = (16, 8), (4, 4)

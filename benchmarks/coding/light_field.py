@@ -28,7 +28,7 @@ from codec import encode, timed_decode
 from ii_core import IIPicture, preset
 from ii_core.formats.find import find_views, picture_of
 from metrics import bd_rate, q_global
-from metrics.rd import UndefinedDifference
+from metrics.rates.rd import UndefinedDifference
 from raytrace_ii import load_scene, render
 
 RECORDS = Records("light_field", ("benchmarks.coding.light_field",))

@@ -21,7 +21,7 @@ from benchmarks.records import ROOT, Records, origin, with_commits
 from codec import Plan, component_cost, encode_take, open_take
 from ii_core import IIVideo, open_video, preset, sub_images, video_of
 from metrics import bd_rate, measure_take
-from metrics.rd import UndefinedDifference
+from metrics.rates.rd import UndefinedDifference
 from raytrace_ii import load_take, render_take
 
 RECORDS = Records("takes", ("benchmarks.coding.takes",))

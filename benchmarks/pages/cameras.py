@@ -30,7 +30,7 @@ from ii_core import (
     sub_images,
     view_image,
 )
-from ii_core.regular import resampled
+from ii_core.picture.regular import resampled
 from raytrace_ii import Scene, load_scene, render, scene_names
 
 DOCS, CAMERAS = ROOT / "docs", ROOT / "assets" / "cameras"

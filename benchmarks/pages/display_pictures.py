@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.study.sheets import enlarged, sheet
 from ii_core import DisplayModel, Eye, IICamera, IIPicture, eye_image, five_viewpoints, preset, viewing_zone
-from ii_core.colour import LINEAR
-from ii_core.view import camera_of
+from ii_core.base.colour import LINEAR
+from ii_core.picture.view import camera_of
 from metrics.plots.rd_chart import COLOURS, new_figure, save
 from raytrace_ii import load_scene, render
 

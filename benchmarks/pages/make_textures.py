@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.files import write_image
+from ii_core.base.files import write_image
 
 TILE, TILES = 128, 4  # pixels a side, tiles a side
 

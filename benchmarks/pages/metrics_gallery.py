@@ -19,7 +19,7 @@ from benchmarks.pages.pictures import write_picture
 from benchmarks.records import ROOT
 from codec import decode, encode, timed_decode
 from ii_core import preset
-from ii_core.view import camera_of
+from ii_core.picture.view import camera_of
 from metrics import (
     depth_rate_chart,
     linear_layers,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from benchmarks.records import ROOT
-from ii_core.files import atomic_path
+from ii_core.base.files import atomic_path
 
 IMAGES = ROOT / "docs" / "images"
 WIDEST = 1500  # pixels: twice the column of a page

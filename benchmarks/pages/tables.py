@@ -17,7 +17,7 @@ from pathlib import Path
 
 from benchmarks.records import ROOT
 from benchmarks.registry import BENCHMARKS
-from ii_core.files import atomic_path
+from ii_core.base.files import atomic_path
 
 Tables = Mapping[tuple[str, str], list[str]]
 OWNERS = tuple(benchmark.tables for benchmark in BENCHMARKS.values() if benchmark.tables)

@@ -23,9 +23,9 @@ from benchmarks.arguments import command_line
 from benchmarks.coding.rd import rd_point
 from benchmarks.records import ROOT, Records
 from ii_core import IIPicture
-from ii_core.files import read_image
+from ii_core.base.files import read_image
 from metrics import bd_rate
-from metrics.rd import UndefinedDifference
+from metrics.rates.rd import UndefinedDifference
 
 RECORDS = Records("before_after", ("benchmarks.speed.before_after", "benchmarks.coding.rd"))
 SCHEME, QUANTISERS = "si-h264:rate=cq", (21, 26, 31, 36, 41)

@@ -28,8 +28,8 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, by_scene
 from benchmarks.speed.pareto import BASE, SCENES, at_depth, cut_scene, scene_text, sizes
 from ii_core import IICamera, IIPicture, add_sensor_noise, preset
-from ii_core.component import picture_pixels
 from ii_core.display.figure import COLOURS, new_figure, save
+from ii_core.picture.component import picture_pixels
 from metrics import q_global, q_view
 from raytrace_ii import Body, Scene, Shot, render
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, VertexColours

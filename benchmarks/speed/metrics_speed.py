@@ -30,7 +30,7 @@ from ii_core import IIPicture, five_viewpoints, preset
 from ii_core.display.figure import COLOURS, MARKERS, new_figure, save
 from metrics import depth_from_focus, linear_layers, q_angle, q_depth, q_global, q_view
 from metrics.depth.virtual_camera import virtual_camera_pixels
-from metrics.view import LUMA, view_pair
+from metrics.measures.view import LUMA, view_pair
 from raytrace_ii import Shot, load_scene, render
 
 RECORDS = Records("metrics_speed", ("benchmarks.speed.metrics_speed",))

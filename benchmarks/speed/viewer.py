@@ -21,8 +21,8 @@ from typing import Any
 from benchmarks.pages.tables import filled
 from benchmarks.records import RESULTS, ROOT
 from ii_core import preset
+from ii_core.base.files import write_json
 from ii_core.display.viewer import write_viewer
-from ii_core.files import write_json
 from metrics import provenance
 from raytrace_ii import load_scene, render
 

@@ -22,7 +22,7 @@ from benchmarks.coding.coders import ANCHOR
 from benchmarks.coding.rd import climbing
 from benchmarks.stability.geometry import Row
 from metrics import bd_psnr, bd_rate
-from metrics.rd import METHOD, UndefinedDifference
+from metrics.rates.rd import METHOD, UndefinedDifference
 
 CURVES = Path(__file__).parent / "rd_curves.json"
 SCHEMES = ("si-h264", "si-hevc", "si-av1", "si-vp9", "si-jpeg2000", "si-jp3d", "si-mpeg2")

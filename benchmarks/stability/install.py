@@ -32,7 +32,7 @@ TRIAL = """
 import json, platform
 from codec import decode, encode, schemes
 from ii_core import preset
-from ii_core.extras import NotInstalled
+from ii_core.base.extras import NotInstalled
 from metrics import q_global
 from raytrace_ii import load_scene, render
 picture = render(load_scene("apples"), preset("setup1", scale=64)).picture

@@ -11,8 +11,8 @@ from benchmarks.accuracy.analytic import still_life
 from benchmarks.stability.geometry import Row
 from codec import decode, encode
 from ii_core import IICamera, IIPicture, preset, view_image
-from ii_core.colour import srgb
-from ii_core.regular import resampled
+from ii_core.base.colour import srgb
+from ii_core.picture.regular import resampled
 from metrics import q_global
 from raytrace_ii import load_scene, render, trace
 

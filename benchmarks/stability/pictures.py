@@ -13,7 +13,7 @@ from benchmarks.stability import depth, geometry, light
 from benchmarks.study.sheets import enlarged, sheet
 from codec import decode, encode
 from ii_core import add_sensor_noise, preset, read_maps, view_image, write_maps
-from ii_core.colour import srgb
+from ii_core.base.colour import srgb
 from metrics.depth.focus import METHODS
 from raytrace_ii import Body, Scene, load_scene, render, trace
 from raytrace_ii.shapes.primitives import rotation

@@ -10,7 +10,7 @@ from typing import Any
 from benchmarks.coding.coders import qualities
 from benchmarks.coding.rd import rd_point
 from ii_core import IIPicture, preset
-from ii_core.parallel import cores
+from ii_core.base.parallel import cores
 from raytrace_ii import Shot, load_scene, render
 
 SCENES = ("apples", "twins", "car", "cuboid")

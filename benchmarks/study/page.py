@@ -13,10 +13,10 @@ from benchmarks.coding.rd import climbing
 from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, filled
 from benchmarks.records import ROOT, origin, with_commits
-from ii_core.files import atomic_path
-from ii_core.json_lines import lines_of, read_records
+from ii_core.base.files import atomic_path
+from ii_core.base.json_lines import lines_of, read_records
 from metrics import bd_psnr, bd_rate
-from metrics.rd import UndefinedDifference
+from metrics.rates.rd import UndefinedDifference
 
 from . import theirs
 from .charts import LABELS, draw_all

@@ -18,7 +18,7 @@ from ii_core import (
     sub_images,
     view_image,
 )
-from ii_core.files import write_image
+from ii_core.base.files import write_image
 from raytrace_ii import load_scene, render
 
 from .coding import setup3_scale, shot

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.records import code_hash, cpu_seconds, plain, stamp
-from ii_core.json_lines import append_record, read_records
+from ii_core.base.json_lines import append_record, read_records
 from metrics import provenance
 
 FORMAT, VERSION = "ii-study-step", 1

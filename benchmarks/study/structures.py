@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.coding.headers import SIDES, duel
 from ii_core import preset
-from ii_core.parallel import cores
+from ii_core.base.parallel import cores
 from raytrace_ii import load_scene, render
 
 from .runner import Step

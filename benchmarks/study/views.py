@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, view_image
-from ii_core.files import write_image
-from ii_core.parallel import cores
-from ii_core.view import camera_of
+from ii_core.base.files import write_image
+from ii_core.base.parallel import cores
+from ii_core.picture.view import camera_of
 from metrics import (
     FocusDepth,
     angle_axes,

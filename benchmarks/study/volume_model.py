@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from codec import decode, encode
 from codec.order import selection_order
 from ii_core import IIPicture
-from ii_core.component import component_images, picture_pixels
+from ii_core.picture.component import component_images, picture_pixels
 from metrics import q_global
 
 from .coding import CODED, FLOOR, RATES, SCENES, shot

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.extras import Lazy
+from ii_core.base.extras import Lazy
 
 from ..clock import cpu_seconds
 from ..colour import Format

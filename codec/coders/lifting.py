@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.jit import inline_kernel, kernel
+from ii_core.base.jit import inline_kernel, kernel
 
 # Alternately predictions of odd rows from even ones and updates of even rows from odd ones.
 STEPS = {

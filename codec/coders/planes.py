@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.extras import Lazy
+from ii_core.base.extras import Lazy
 
 from ..bitstream import jpeg2000
 

@@ -23,7 +23,7 @@ from PIL import Image, features
 from PIL.JpegImagePlugin import JpegImageFile
 
 from ii_core import IIPicture
-from ii_core.extras import Lazy
+from ii_core.base.extras import Lazy
 
 from ..bitstream.jpeg2000 import without_comments
 from ..clock import cpu_seconds

@@ -33,7 +33,7 @@ import av
 import numpy as np
 from av.bitstream import BitStreamFilterContext
 
-from ii_core.files import atomic_path
+from ii_core.base.files import atomic_path
 
 from ..api import Encoded
 from ..checks import check_type

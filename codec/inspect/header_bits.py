@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ii_core import IIPicture
-from ii_core.camera import whole_pair
+from ii_core.camera.camera import whole_pair
 
 from ..api import Encoded, encode
 from ..bitstream.obu import units

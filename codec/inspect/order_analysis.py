@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
-from ii_core.component import KINDS
-from ii_core.jit import kernel
+from ii_core.base.jit import kernel
+from ii_core.picture.component import KINDS
 
 from ..checks import check_type, texts
 from ..frames import layout

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IIVideo, checks
-from ii_core.files import one_line
+from ii_core import IIVideo
+from ii_core.base import checks
+from ii_core.base.files import one_line
 
 from .. import file_header
 from ..api import blank_picture, check_coded

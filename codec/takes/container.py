@@ -23,8 +23,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ii_core import checks
-from ii_core.files import atomic_path, check_file
+from ii_core.base import checks
+from ii_core.base.files import atomic_path, check_file
 
 from ..bitstream.compact import leb128, read_leb128, read_values, write_values
 from ..container import MAX_HEADER

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ii_core import IIPicture, video_of
-from ii_core.camera import whole_pair
+from ii_core.camera.camera import whole_pair
 
 from ..checks import check_type, whole
 from ..contract import MAX_PIXELS, find

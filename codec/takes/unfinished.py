@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.atomic import disk_errors
-from ii_core.files import read_json, write_json
+from ii_core.base.atomic import disk_errors
+from ii_core.base.files import read_json, write_json
 
 from ..search import Run
 from . import container

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import checks
+from ..base import checks
 
 MOSAICS = ("rggb", "bggr", "grbg", "gbrg")  # colours of the first two pixels of the first two rows
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..extras import Lazy
-from ..lattice import DRIFT_TERMS, Drift, Lattice, axes_of, drift_terms
+from ..base.extras import Lazy
+from ..camera.lattice import DRIFT_TERMS, Drift, Lattice, axes_of, drift_terms
 from .peaks import FEWEST, SMOOTH, Floats, Summits, Vectors, lattice_vectors, middle_of_one
 from .refusal import NoLenses
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..extras import Lazy
+from ..base.extras import Lazy
 from .grid import LensGrid
 
 ndimage, special = Lazy("scipy.ndimage"), Lazy("scipy.special")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..extras import Lazy
+from ..base.extras import Lazy
 from .refusal import NoLenses
 
 ndimage = Lazy("scipy.ndimage")

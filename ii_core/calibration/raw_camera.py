@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import checks
-from ..camera import IICamera
-from ..checks import length
-from ..colour import linear, srgb
-from ..lattice import DRIFT_TERMS, LATTICES, Drift
-from ..picture import IIPicture
-from ..regular import owners
+from ..base import checks
+from ..base.checks import length
+from ..base.colour import linear, srgb
+from ..camera.camera import IICamera
+from ..camera.lattice import DRIFT_TERMS, LATTICES, Drift
+from ..picture.picture import IIPicture
+from ..picture.regular import owners
 from .demosaic import MOSAICS, demosaiced, evened
 from .refusal import NoLenses
 
@@ -364,7 +364,7 @@ def _linear(frame: NDArray[Any], curve: str) -> NDArray[np.float32]:
 )
 def centres_picture(calibration: Calibration, picture: IIPicture, *, zoom: int = 2) -> NDArray[np.uint8]:
     """Centres over the raw picture, (zoom·N, zoom·M, 3): green of the grid, yellow found, red left out."""
-    from ..picture import codes8
+    from ..picture.picture import codes8
 
     image = np.repeat(np.repeat(codes8(picture.pixels), zoom, axis=0), zoom, axis=1)
     grid = calibration.grid

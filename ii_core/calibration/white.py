@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..extras import Lazy
-from ..lattice import Lattice
-from ..regular import owners
+from ..base.extras import Lazy
+from ..camera.lattice import Lattice
+from ..picture.regular import owners
 from .peaks import SMOOTH, Summits
 
 ndimage = Lazy("scipy.ndimage")

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import IICamera
-from ..checks import MOST_MM, Pair, checked, instance, length, place, view_size, whole, within
-from ..colour import linear, srgb
-from ..jit import exact_kernel
-from ..optics import Lenslet, unit_disk
-from ..picture import IIPicture
+from ..base.checks import MOST_MM, Pair, checked, instance, length, place, view_size, whole, within
+from ..base.colour import linear, srgb
+from ..base.jit import exact_kernel
+from ..camera.camera import IICamera
+from ..camera.optics import Lenslet, unit_disk
+from ..picture.picture import IIPicture
 from .model import LAYOUTS, DisplayModel
 
 RAYS = 64  # rays per point of the view, for a pupil that is no point

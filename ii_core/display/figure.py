@@ -7,8 +7,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from ..extras import load
-from ..files import atomic_path
+from ..base.extras import load
+from ..base.files import atomic_path
 
 # Colours of Okabe and Ito, which colour-blind readers can distinguish; without their yellow, too pale on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

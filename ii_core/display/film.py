@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ii_core.files import atomic_path
+from ..base.files import atomic_path
 
 ANIMATIONS = (".mp4", ".gif", ".webp")
 QUALITY_CRF = 18  # x264's constant rate factor: no visible loss

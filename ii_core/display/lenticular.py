@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Pair, checked, instance, number, view_size, whole, whole_pair, within
-from ..picture import IIPicture
+from ..base.checks import Pair, checked, instance, number, view_size, whole, whole_pair, within
+from ..picture.picture import IIPicture
 from .look import display_views
 
 MOST, MOST_ALONG = 1e9, 1 << 16  # pixels

@@ -4,28 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..camera import IICamera, Pair
-from ..checks import view_size
-from ..jit import kernel
-from ..picture import IIPicture, codes8
-from ..view import camera_of, five_viewpoints, view_positions, widening
+from ..base.checks import view_size
+from ..base.jit import kernel
+from ..camera.camera import IICamera, Pair
+from ..picture.picture import IIPicture, codes8
+from ..picture.view import camera_of, five_viewpoints, view_positions, widening
 
-ASSUMED_ANGLE_DEG = 20.0
 MOST_FRAMES = 3000  # longest film: two minutes at 25 frames per second
-
-
-def with_assumed_camera(picture: IIPicture) -> IIPicture:
-    """Return the picture with its camera, or with an assumed one of 1 mm pixels and a viewing angle of 20°."""
-    if picture.camera is not None:
-        return picture
-    gap = picture.ei_pixels[0] / 2 / math.tan(math.radians(ASSUMED_ANGLE_DEG / 2))
-    camera = IICamera(pixels=picture.size, lenses=picture.lenses, pixel_pitch_mm=1.0, gap_mm=gap, name="assumed")
-    return replace(picture, camera=camera)
 
 
 def focused_view(

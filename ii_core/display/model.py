@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..camera import IICamera
-from ..checks import MOST_MM, instance, length, one_of, place, within
-from ..optics import Grin, Lenslet, LensModel, Lenticular, Pinhole
+from ..base.checks import MOST_MM, instance, length, one_of, place, within
+from ..camera.camera import IICamera
+from ..camera.optics import Grin, Lenslet, LensModel, Lenticular, Pinhole
 
 LAYOUTS = ("square", "rgb-stripe", "pentile")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Pair, view_size, whole_pair
+from ..base.checks import Pair, view_size, whole_pair
 from ..formats.quilt import quilt_pixels
-from ..picture import IIPicture
+from ..picture.picture import IIPicture
 from .look import display_views
 
 

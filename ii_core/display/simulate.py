@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..camera import IICamera, Pair
-from ..checks import view_size
-from ..picture import IIPicture, codes8
-from ..view import camera_of, lens_array_mm, view_positions
+from ..base.checks import view_size
+from ..camera.camera import IICamera, Pair
+from ..picture.picture import IIPicture, codes8
+from ..picture.view import camera_of, lens_array_mm, view_positions
 
 
 def display_simulation(

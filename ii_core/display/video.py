@@ -12,14 +12,15 @@ import av
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..camera import Pair
-from ..files import one_line
+from ..base.files import one_line
+from ..camera.camera import Pair
 from ..formats.grid import camera_views
 from ..formats.quilt import QUILT, quilt_path, quilt_row
-from ..picture import IIPicture, codes8
-from ..video import IIVideo
+from ..picture.assumed import with_assumed_camera
+from ..picture.picture import IIPicture, codes8
+from ..video.video import IIVideo
 from .film import write_animation
-from .look import focused_view, with_assumed_camera
+from .look import focused_view
 
 Progress = Callable[[int, int], None] | None
 

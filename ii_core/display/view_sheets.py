@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import checks
-from ..colour import srgb
-from ..picture import IIPicture, peak
-from ..view import camera_of, five_viewpoints, view_image
+from ..base import checks
+from ..base.colour import srgb
+from ..picture.picture import IIPicture, peak
+from ..picture.view import camera_of, five_viewpoints, view_image
 from .figure import new_figure, save
 
 AMPLIFY = (32, 16, 8, 4, 2, 1)  # factors of the difference; `plot_views` selects one

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..checks import MOST_MM, checked, instance, length, number, within
+from ..base.checks import MOST_MM, checked, instance, length, number, within
 from .model import DisplayModel
 
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import checks
-from ..camera import Pair
-from ..picture import IIPicture
-from ..view import turned_pixels
+from ..base import checks
+from ..camera.camera import Pair
+from ..picture.picture import IIPicture
+from ..picture.view import turned_pixels
 from .grid import Views
 from .order import Arrangement, estimate
 from .quilt import quilt_views

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Pair
-from ..files import read_image
-from ..picture import IIPicture
+from ..base.files import read_image
+from ..camera.camera import Pair
+from ..picture.picture import IIPicture
 from .order import Read
 from .positions import Positions
 from .rig import Rig

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import checks
-from ..camera import Pair
-from ..disparity import disparity_of_depth
-from ..files import atomic_path, one_line, read_text, write_image
-from ..picture import IIPicture
+from ..base import checks
+from ..base.files import atomic_path, one_line, read_text, write_image
+from ..camera.camera import Pair
+from ..picture.disparity import disparity_of_depth
+from ..picture.picture import IIPicture
 from .grid import WHOLE_ORDER, Views, camera_views, listed
 from .pfm import write_pfm
 from .rig import Rig, rig_of

@@ -32,9 +32,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import checks
-from ..camera import Pair
-from ..files import check_file, memory_bytes, one_line, read_image, read_json
+from ..base import checks
+from ..base.files import check_file, memory_bytes, one_line, read_image, read_json
+from ..camera.camera import Pair
 
 MAGIC = b"\x89LF"
 MARK = b"\r\n\x1a\n"

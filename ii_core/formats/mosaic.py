@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import checks
-from ..camera import Pair
-from ..picture import IIPicture
+from ..base import checks
+from ..camera.camera import Pair
+from ..picture.picture import IIPicture
 from .grid import read_view
 
 

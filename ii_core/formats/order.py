@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..colour import KB, KG, KR
+from ..base.colour import KB, KG, KR
 
 Floats = NDArray[np.float32]
 Read = Callable[[int, int], NDArray[Any]]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import atomic_path, check_file
+from ..base.files import atomic_path, check_file
 
 
 def read_pfm(path: str | os.PathLike[str]) -> NDArray[np.float32]:

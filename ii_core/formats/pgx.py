@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atomic import atomic_path
-from ..files import check_file
+from ..base.atomic import atomic_path
+from ..base.files import check_file
 
 MAX_BITS = 16
 MAX_HEADER = 256  # bytes

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atomic import atomic_path
-from ..colour import of_video_codes, video_codes
-from ..files import check_file, write_image
-from ..picture import IIPicture
+from ..base.atomic import atomic_path
+from ..base.colour import of_video_codes, video_codes
+from ..base.files import check_file, write_image
+from ..picture.picture import IIPicture
 from .pgx import Component, read_pgx, write_pgx
 from .views import camera_views, read_view
 

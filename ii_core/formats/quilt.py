@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import checks
-from ..camera import Pair
-from ..files import write_image
-from ..picture import IIPicture
+from ..base import checks
+from ..base.files import write_image
+from ..camera.camera import Pair
+from ..picture.picture import IIPicture
 from .grid import WHOLE_ORDER, Views, camera_views, read_view
 
 QUILT = re.compile(r"_qs(\d+)x(\d+)(?:a(\d+(?:\.\d+)?))?")

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..camera import IICamera, Pair
-from ..checks import length, whole_pair
+from ..base.checks import length, whole_pair
+from ..camera.camera import IICamera, Pair
 
 FAR_DISPARITY = 1e-4  # pixels a view: with this the plane of zero disparity stands for infinity
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import checks
-from ..camera import Pair
-from ..files import one_line, read_json, write_image, write_json
-from ..picture import IIPicture
+from ..base import checks
+from ..base.files import one_line, read_json, write_image, write_json
+from ..camera.camera import Pair
+from ..picture.picture import IIPicture
 from .grid import WHOLE_ORDER, Views, camera_views, checked_reader, listed, read_view
 from .hci import HCI_VIEW, hci_views
 from .positions import named_positions

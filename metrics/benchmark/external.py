@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ii_core import IIPicture, video_of
-from ii_core.files import one_line
+from ii_core.base.files import one_line
 from ii_core.formats.pleno import KINDS, make_view_folder, read_pleno_views, write_pleno_views
 
 from .subject import Decoded, Subject

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import assets
-from ii_core import IICamera, checks, preset
-from ii_core.files import one_line, read_text
+from ii_core import IICamera, preset
+from ii_core.base import checks
+from ii_core.base.files import one_line, read_text
 
-from ..measure import measure_of
+from ..measures.measure import measure_of
 
 FIELDS = {
     "name",

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from ii_core.atomic import atomic_paths
+from ii_core.base.atomic import atomic_paths
+from ii_core.base.files import one_line
 from ii_core.display.figure import COLOURS, LINES, MARKERS, new_figure, save
-from ii_core.files import one_line
 
-from ..measure import measure_of
+from ..measures.measure import measure_of
 from ..plots.rd_chart import set_rate_axis
-from ..rd import bd_rate
+from ..rates.rd import bd_rate
 from .profile import Profile
 
 Result = Mapping[str, Any]

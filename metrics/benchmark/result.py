@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ii_core import checks
-from ii_core.files import one_line, read_json, write_json
+from ii_core.base import checks
+from ii_core.base.files import one_line, read_json, write_json
 
-from ..points import check_points, spelt, unspelt
-from ..rd import rate_distortion
-from ..study import provenance
+from ..rates.points import check_points, spelt, unspelt
+from ..rates.rd import rate_distortion
+from ..reports.study import provenance
 from .profile import Profile, Reference
 from .run_log import RunLog
 from .subject import Subject, identity, measuring_subject

@@ -9,13 +9,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ii_core.files import one_line
-from ii_core.identity import file_hash, source_hash
-from ii_core.json_lines import append_record, read_records
+from ii_core.base.files import one_line
+from ii_core.base.identity import file_hash, source_hash
+from ii_core.base.json_lines import append_record, read_records
 
-from ..points import check_points, spelt, unspelt
-from ..rd import PACKAGES
-from ..study import provenance
+from ..rates.points import check_points, spelt, unspelt
+from ..rates.rd import PACKAGES
+from ..reports.study import provenance
 from .profile import Profile
 
 FORMAT, VERSION = "ii-benchmark-run", 1

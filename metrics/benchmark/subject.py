@@ -12,8 +12,8 @@ import numpy as np
 
 from ii_core import IIPicture, IIVideo
 
-from ..batch import measuring
-from ..study import picture_json
+from ..measures.batch import measuring
+from ..reports.study import picture_json
 
 Subject = IIPicture | IIVideo
 

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IIPicture, checks, depth_of_disparity, disparity_of_depth
-from ii_core.parallel import over_rows
-from ii_core.picture import peak
-from ii_core.view import camera_of, view_image
+from ii_core import IIPicture, depth_of_disparity, disparity_of_depth
+from ii_core.base import checks
+from ii_core.base.parallel import over_rows
+from ii_core.picture.picture import peak
+from ii_core.picture.view import camera_of, view_image
 
 from . import kernels
 from .layers import Floats, check_layers, virtual_viewpoint

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel, kernel
+from ii_core.base.jit import inline_kernel, kernel
 
 # Least neighbours of a half: a single one often agrees by chance. More would also exclude lenses at the border.
 FEWEST = 2

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IICamera
-from ii_core.view import view_positions
+from ii_core.picture.view import view_positions
 
 from .layers import Floats, virtual_viewpoint
 

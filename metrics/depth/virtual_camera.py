@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IICamera, IIPicture
-from ii_core.view import camera_of, view_positions
+from ii_core.picture.view import camera_of, view_positions
 
 from .layers import virtual_viewpoint
 

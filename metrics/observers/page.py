@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ii_core import checks
-from ii_core.checks import Pair, view_size
-from ii_core.display.look import focused_view, viewpoints_across, viewpoints_around, with_assumed_camera
-from ii_core.files import atomic_path
-from ii_core.picture import IIPicture
-from ii_core.view import camera_of, five_viewpoints
+from ii_core.base import checks
+from ii_core.base.checks import Pair, view_size
+from ii_core.base.files import atomic_path
+from ii_core.display.look import focused_view, viewpoints_across, viewpoints_around
+from ii_core.picture.assumed import with_assumed_camera
+from ii_core.picture.picture import IIPicture
+from ii_core.picture.view import camera_of, five_viewpoints
 
 from .plan import Options, frame_order, frames_per_second, make_plan
 from .plates import plates

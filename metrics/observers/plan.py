@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ii_core.checks import one_of, whole, within
+from ii_core.base.checks import one_of, whole, within
 
 FORMAT, VERSION = "ii-subjective-test", 1
 METHODS = ("dsis", "pairs")

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ii_core import checks
-from ii_core.files import check_file, parse_json
+from ii_core.base import checks
+from ii_core.base.files import check_file, parse_json
 
 from . import plan as plans
 

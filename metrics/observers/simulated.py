@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ii_core import checks
-from ii_core.atomic import atomic_path
+from ii_core.base import checks
+from ii_core.base.atomic import atomic_path
 
 from . import plan as plans
 from .results import FORMAT, VERSION, sealed

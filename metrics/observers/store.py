@@ -7,7 +7,7 @@ import re
 import threading
 from pathlib import Path
 
-from ii_core.atomic import disk_errors
+from ii_core.base.atomic import disk_errors
 
 from .results import MOST_BYTES, checked_lines, read_observer
 

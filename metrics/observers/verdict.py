@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import checks
+from ii_core.base import checks
 
-from ..subjective import Prediction, opinion_scores, pair_scale, predicted_scores, screened_observers
 from .results import Observer, Results
+from .subjective import Prediction, opinion_scores, pair_scale, predicted_scores, screened_observers
 
 EVERYTHING = "all"
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import checks
+from ii_core.base import checks
 from ii_core.display.figure import COLOURS, new_figure, save
 
 from ..depth.layers import logarithmic
-from ..quality import AngleQuality, DepthQuality, told_outside
+from ..measures.quality import AngleQuality, DepthQuality, told_outside
 from .rd_chart import edges
 
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import checks
+from ii_core.base import checks
 from ii_core.display.figure import COLOURS, LINES, MARKERS, check_suffix, new_figure, save
 
 from ..depth.layers import logarithmic
-from ..points import is_study
-from ..quality import told_outside
+from ..measures.quality import told_outside
+from ..rates.points import is_study
 from .rd_chart import edges, set_rate_axis
 
 EXTREMES = ("q_depth_min", "q_depth_mean", "q_depth_max")

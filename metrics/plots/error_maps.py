@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IIPicture, checks
+from ii_core import IIPicture
+from ii_core.base import checks
 from ii_core.display.figure import new_figure, save
-from ii_core.picture import peak
+from ii_core.picture.picture import peak
 
 from ..depth.virtual_camera import view_of
-from ..quality import DepthQuality
+from ..measures.quality import DepthQuality
 
 COLOURS_OF_ERRORS = "magma"
 PANELS = 12  # largest number of panels on a sheet of layers: more would be too small to read

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ii_core import checks
+from ii_core.base import checks
 from ii_core.display.figure import COLOURS, MARKERS, check_suffix, new_figure, save
 
-from ..measure import known_measures
+from ..measures.measure import known_measures
 from ..observers.verdict import EVERYTHING, Verdict
 
 

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import checks
+from ii_core.base import checks
+from ii_core.base.extras import load
 from ii_core.display.figure import COLOURS, LINES, MARKERS, check_suffix, new_figure, save
-from ii_core.extras import load
 
-from ..measure import measure_of
-from ..points import check_measured, is_study
+from ..measures.measure import measure_of
+from ..rates.points import check_measured, is_study
 
 
 @checks.checked(study=is_study, path=checks.path, measure=checks.text)

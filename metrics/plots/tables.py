@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ii_core import checks
-from ii_core.files import atomic_path
+from ii_core.base import checks
+from ii_core.base.files import atomic_path
 
-from ..against_anchor import anchor_of, differences
-from ..measure import Measure, measure_of
-from ..points import FIELDS, check_measured, check_points, is_study, measures_of
+from ..measures.measure import Measure, measure_of
+from ..rates.against_anchor import anchor_of, differences
+from ..rates.points import FIELDS, check_measured, check_points, is_study, measures_of
 
 
 @checks.checked(path=checks.path, records=checks.sequence)

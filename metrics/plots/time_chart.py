@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ii_core import checks
+from ii_core.base import checks
 from ii_core.display.figure import COLOURS, check_suffix, new_figure, save
 
-from ..over_time import TakeQuality
+from ..measures.over_time import TakeQuality
 
 
 @checks.checked(takes=checks.mapping, path=checks.path)

@@ -12,7 +12,7 @@ from typing import Any
 
 import typer
 
-from ii_core.foreign import ForeignError
+from ii_core.base.foreign import ForeignError
 
 from . import synthesize, render, pictures, calibrating, coding, evaluate, benchmarking, show, eye, observers, video
 from .common import app
@@ -64,7 +64,7 @@ def _run() -> None:
             print("interrupted", file=sys.stderr)
         raise
     except ImportError as error:
-        from ii_core.extras import NotInstalled
+        from ii_core.base.extras import NotInstalled
 
         if not isinstance(error, NotInstalled):
             raise

@@ -87,9 +87,9 @@ def render_profiles(named: str, folder: Path, force: bool, workers: int | None) 
 
 def _render(profile: Profile, place: Path, force: bool, workers: int | None) -> dict[str, Any]:
     """Render the pictures that are missing; return the manifest."""
-    from ii_core.atomic import atomic_path
-    from ii_core.files import write_json
-    from ii_core.picture import sidecar
+    from ii_core.base.atomic import atomic_path
+    from ii_core.base.files import write_json
+    from ii_core.picture.picture import sidecar
     from metrics.benchmark.card import data_card
     from metrics.benchmark.subject import identity
 
@@ -126,7 +126,7 @@ def _made_picture(
     """Render a picture unless it is there; return its record, ``before`` if nothing changed."""
     from functools import partial
 
-    from ii_core.picture import sidecar
+    from ii_core.picture.picture import sidecar
 
     from ..files.load import load_scene
     from ..rendering.products import Product, is_done, record_of

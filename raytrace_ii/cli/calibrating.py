@@ -38,9 +38,9 @@ def calibrate(
     """
     from ii_core import calibrate as find
     from ii_core import calibrated_picture, centres_picture
-    from ii_core.files import write_image, write_json
+    from ii_core.base.files import write_image, write_json
     from ii_core.formats.lfp import read_raw
-    from ii_core.picture import sidecar
+    from ii_core.picture.picture import sidecar
 
     picture_file = output / "picture.png"
     files = {name: output / name for name in ("camera.json", "report.json", "centres.png")}

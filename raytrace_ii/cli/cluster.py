@@ -19,8 +19,8 @@ def cluster(address: str | None, identity: Callable[[], Mapping[str, str]]) -> I
         return
     import logging
 
-    from ii_core.executors import check_workers
-    from ii_core.extras import load
+    from ii_core.base.executors import check_workers
+    from ii_core.base.extras import load
 
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # our one line reports a lost scheduler
     load("distributed")

@@ -53,7 +53,7 @@ def encode(
     """Code an II-picture, or a folder of frames as II-video."""
     from codec import Plan, encode
     from ii_core import IIPicture
-    from ii_core.files import IMAGE_TYPES
+    from ii_core.base.files import IMAGE_TYPES
 
     load_plugins(plugin)
     if output.suffix.lower() in IMAGE_TYPES:
@@ -99,7 +99,7 @@ def decode(
 ) -> None:
     """Decode an II-picture, one component image of it, or the frames of a take."""
     from codec import Encoded, decode, decode_component, is_take
-    from ii_core.files import check_file, write_image
+    from ii_core.base.files import check_file, write_image
 
     load_plugins(plugin)
     check_file(coded)
@@ -135,7 +135,7 @@ def extract(
 ) -> None:
     """Extract the coded stream into a file for other programs, without coding it again."""
     from codec import Encoded, extract
-    from ii_core.files import check_file
+    from ii_core.base.files import check_file
 
     load_plugins(plugin)
     check_file(coded)
@@ -158,7 +158,7 @@ def study_orders(path: Path, folder: Path, force: bool) -> None:
     """Write NAME_orders.json and print its table of correlation and residuals by order."""
     from codec import analyse_orders
     from ii_core import IIPicture
-    from ii_core.files import write_json
+    from ii_core.base.files import write_json
     from metrics import provenance
 
     numbers = folder / f"{path.stem}_orders.json"

@@ -49,7 +49,7 @@ Workers = Annotated[int | None, typer.Option(help="Number of threads; the number
 def load_any(path: Path) -> IIPicture:
     """Return an II-picture from its file or from a coded file."""
     from ii_core import IIPicture
-    from ii_core.files import IMAGE_TYPES, check_file
+    from ii_core.base.files import IMAGE_TYPES, check_file
 
     if path.suffix in IMAGE_TYPES:
         return IIPicture.load(path)
@@ -67,7 +67,7 @@ def image_file(path: Path | None, dtype: str) -> list[Path]:
     ValueError
         If the file type cannot store the pixel type.
     """
-    from ii_core.files import check_type
+    from ii_core.base.files import check_type
 
     if path is None:
         return []
@@ -77,7 +77,7 @@ def image_file(path: Path | None, dtype: str) -> list[Path]:
 
 def picture_files(path: Path, dtype: str) -> list[Path]:
     """Return the files of an II-picture for `check_outputs`: picture and sidecar."""
-    from ii_core.picture import sidecar
+    from ii_core.picture.picture import sidecar
 
     return [*image_file(path, dtype), sidecar(path)]
 
@@ -106,7 +106,7 @@ def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = Fal
     make_folder : bool
         Create missing folders; a command that fails removes those that are still empty.
     """
-    from ii_core.files import check_name
+    from ii_core.base.files import check_name
 
     files = list(paths)
     seen: set[str] = set()

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ii_core.interrupt import Terminated
+from ii_core.base.interrupt import Terminated
 
 GRACE_SECONDS = 1.5  # time limit of the cleanup, even if compiled code runs longer
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
@@ -71,7 +71,7 @@ def _watch(heard: socket.socket, left: threading.Event) -> None:
 
 def _stop(code: int, *, said: bool) -> None:
     """End the process without waiting for threads; remove its unfinished files; print "interrupted" unless done."""
-    from ii_core.atomic import remove_temporaries
+    from ii_core.base.atomic import remove_temporaries
 
     remove_temporaries()
     if sys.stderr.isatty():

@@ -69,8 +69,8 @@ def measure(
 ) -> None:
     """Compare two II-pictures of the same structure, or two takes over time."""
     from ii_core import IIPicture
-    from ii_core.extras import load
-    from ii_core.files import read_depth, read_image, write_json
+    from ii_core.base.extras import load
+    from ii_core.base.files import read_depth, read_image, write_json
     from metrics import report
 
     load_plugins(plugin)
@@ -110,8 +110,8 @@ def measure(
 
 def _judged(path: Path, reference: IIPicture) -> IIPicture:
     """Return the decoded picture; without a sidecar it has the structure of the reference."""
-    from ii_core.files import IMAGE_TYPES, image_header, read_image
-    from ii_core.picture import sidecar
+    from ii_core.base.files import IMAGE_TYPES, image_header, read_image
+    from ii_core.picture.picture import sidecar
 
     if path.suffix not in IMAGE_TYPES or sidecar(path).exists():
         return load_any(path)
@@ -126,7 +126,7 @@ def _judged(path: Path, reference: IIPicture) -> IIPicture:
 
 def _layers(text: str | None, picture: IIPicture) -> Any:
     """Return depths of layers from ``dissertation``, ``250``, ``5:200:60`` or ``px:-2:2:60``; None if no text."""
-    from ii_core.view import camera_of
+    from ii_core.picture.view import camera_of
     from metrics import disparity_layers, linear_layers, logarithmic_layers
 
     if text is None:
@@ -187,9 +187,9 @@ def study(
     """
     from codec import parse_scheme
     from ii_core import IIPicture
-    from ii_core.extras import load
-    from ii_core.files import read_depth
-    from metrics.rd import identity
+    from ii_core.base.extras import load
+    from ii_core.base.files import read_depth
+    from metrics.rates.rd import identity
 
     if dask and workers is not None:
         raise ValueError("--workers is for threads of this machine: leave it out with --dask")
@@ -280,7 +280,7 @@ def run_study(
     Rates default to `default_rates`. ``over_depth`` holds depth, layers_mm and method of `measuring`.
     """
     from codec import encode, timed_decode
-    from ii_core.parallel import cores
+    from ii_core.base.parallel import cores
     from metrics import PointLog, default_rates, measuring, provenance, rate_distortion, write_study
 
     provenance()  # record the commit that measures, even if the checkout changes meanwhile
@@ -307,7 +307,7 @@ def run_study(
 def draw_study(folder: Path, name: str, measures: Sequence[str]) -> None:
     """Draw the charts and write the tables of a study from its JSON; print the tables."""
     from metrics import depth_rate_chart, rd_chart, read_study, summary_table, write_csv, write_latex
-    from metrics.quality import told_outside
+    from metrics.measures.quality import told_outside
 
     drawn = read_study(folder / f"{name}_rd.json")
     write_csv(folder / f"{name}_rd.csv", drawn["points"])
@@ -326,9 +326,9 @@ def draw_study(folder: Path, name: str, measures: Sequence[str]) -> None:
 
 def write_means(folder: Path, names: Sequence[str], measures: Sequence[str]) -> None:
     """Write the mean differences over several pictures into a folder; print them."""
-    from ii_core.files import write_json
+    from ii_core.base.files import write_json
     from metrics import mean_differences, provenance, read_study
-    from metrics.points import spelt
+    from metrics.rates.points import spelt
 
     studies = [read_study(folder / f"{name}_rd.json") for name in names]
     means = {measure: mean_differences(studies, measure=measure) for measure in measures}
@@ -345,7 +345,7 @@ def write_means(folder: Path, names: Sequence[str], measures: Sequence[str]) -> 
 
 
 def _means(found: dict[str, Any], measure: str) -> str:
-    from metrics.measure import measure_of
+    from metrics.measures.measure import measure_of
 
     kind = measure_of(measure)
     unit = f" {kind.unit}" if kind.unit else ""
@@ -362,7 +362,7 @@ def _means(found: dict[str, Any], measure: str) -> str:
 
 def about(measure: str, anchor: str) -> str:
     """Return the caption of the table of a measure."""
-    from metrics.measure import measure_of
+    from metrics.measures.measure import measure_of
 
     return f"{measure_of(measure).caption} at bits per pixel; gain and Bjøntegaard differences against {anchor}"
 

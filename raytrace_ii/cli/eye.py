@@ -48,8 +48,8 @@ def eye(
     A point pupil, square pixels and the camera's own lens array give the view image.
     """
     from ii_core import DisplayModel, Eye, IIPicture, eye_image, five_viewpoints
-    from ii_core.files import write_image
-    from ii_core.view import camera_of
+    from ii_core.base.files import write_image
+    from ii_core.picture.view import camera_of
 
     sides = ("left", "right") if both else ("",)
     paths = [output.with_stem(f"{output.stem}_{side}") if side else output for side in sides]
@@ -75,8 +75,8 @@ def _spread(picture: IIPicture, display: DisplayModel, eye: Eye, text: str | Non
     """Return the light of every pixel, spread by the lenses towards the eye."""
     import numpy as np
 
-    from ii_core.optics import Lenslet
-    from ii_core.spread import spread_picture
+    from ii_core.camera.optics import Lenslet
+    from ii_core.waves.spread import spread_picture
 
     from .spread import AUTO, maps_of
 

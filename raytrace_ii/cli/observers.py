@@ -93,7 +93,7 @@ def _stimuli(paths: list[Path], measures: str | None) -> list[Stimulus]:
     """Return references and coded pictures; a picture begins a scene, coded files belong to it."""
     from codec import Encoded, decode
     from ii_core import IIPicture
-    from ii_core.files import IMAGE_TYPES
+    from ii_core.base.files import IMAGE_TYPES
     from metrics import measuring
     from metrics.observers import Stimulus
 
@@ -140,7 +140,7 @@ def opinions(
     force: Force = False,
 ) -> None:
     """Analyse results of a test with observers: scores with intervals, and their prediction by measures."""
-    from ii_core.files import write_json
+    from ii_core.base.files import write_json
     from metrics.observers import read_results, verdict
     from metrics.plots.opinion_chart import opinion_chart
 

@@ -35,7 +35,7 @@ def regular(
     import numpy as np
 
     from ii_core import IIPicture, resampled, smallest_rectangle
-    from ii_core.files import write_image
+    from ii_core.base.files import write_image
 
     methods = {"rectangle": smallest_rectangle, "resample": resampled}
     if method not in methods:
@@ -92,8 +92,8 @@ def import_(
     parameters.cfg of an HCI folder, or given: --camera, or --baseline-mm, --focal-mm and --sensor-mm.
     """
     from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset
-    from ii_core.files import check_type, image_types
-    from ii_core.picture import sidecar
+    from ii_core.base.files import check_type, image_types
+    from ii_core.picture.picture import sidecar
 
     image_types(output)
     check_outputs([output, sidecar(output)], force)
@@ -154,7 +154,7 @@ def export(
 ) -> None:
     """Export an II-picture for other light-field programs."""
     from ii_core import write_hci, write_quilt, write_views
-    from ii_core.files import read_depth, write_image
+    from ii_core.base.files import read_depth, write_image
     from ii_core.formats.quilt import quilt_path
 
     load_plugins(plugin)
@@ -201,8 +201,8 @@ def components(
     import numpy as np
 
     from ii_core import component_images
-    from ii_core.component import KINDS
-    from ii_core.files import write_image
+    from ii_core.base.files import write_image
+    from ii_core.picture.component import KINDS
 
     load_plugins(plugin)
     if type not in KINDS:

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from ii_core.interrupt import STOPS
+from ii_core.base.interrupt import STOPS
 
 Plugins = Annotated[
     list[Path] | None,
@@ -40,7 +40,7 @@ def load_plugins(paths: Sequence[Path] | None) -> None:
 
 
 def _run(path: Path) -> None:
-    from ii_core.files import check_file, one_line
+    from ii_core.base.files import check_file, one_line
 
     check_file(path)
     if path.suffix != ".py":

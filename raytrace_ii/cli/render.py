@@ -269,7 +269,7 @@ def _shoot(path: Path, scene: Any, camera: Any, **options: Any) -> Stats:
 def _save_projection(scene: Any, camera: Any, pose: Any, path: Path, means: dict[str, Any]) -> None:
     """Write a plain picture without a sidecar."""
     from ii_core import orthoscopic, projection_camera
-    from ii_core.files import write_image
+    from ii_core.base.files import write_image
 
     from ..rendering.render import render as shot_of
 

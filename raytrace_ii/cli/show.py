@@ -39,8 +39,8 @@ def view(
     force: Force = False,
 ) -> None:
     """Write a viewer page for a browser: parallax, focus, comparison, stereo, playback of takes."""
+    from ii_core.base.files import read_depth
     from ii_core.display.viewer import JPEG_QUALITY, write_viewer, write_viewer_folder
-    from ii_core.files import read_depth
 
     load_plugins(plugin)
     check_page(output, serve, port, force)
@@ -119,12 +119,12 @@ def display(
     the integral-imaging display seen from one position; parallax: a film around the viewing zone.
     """
     from ii_core import IIPicture
+    from ii_core.base.files import write_image
     from ii_core.display.lenticular import lenticular
-    from ii_core.display.look import with_assumed_camera
     from ii_core.display.quilt import quilt
     from ii_core.display.simulate import display_simulation
-    from ii_core.files import write_image
     from ii_core.formats.quilt import quilt_name
+    from ii_core.picture.assumed import with_assumed_camera
 
     if is_take_source(picture):
         raise ValueError(f"{picture} is a take: raytrace-ii video {picture} shows takes, as quilts and films")
@@ -157,7 +157,8 @@ def _film(
 ) -> None:
     from ii_core import IIPicture
     from ii_core.display.film import write_animation
-    from ii_core.display.look import focused_view, viewpoints_around, with_assumed_camera
+    from ii_core.display.look import focused_view, viewpoints_around
+    from ii_core.picture.assumed import with_assumed_camera
 
     original = with_assumed_camera(IIPicture.load(picture))
     places = viewpoints_around(original, count, cone=cone)

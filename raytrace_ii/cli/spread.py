@@ -11,7 +11,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from ii_core import IICamera, IIPicture
-    from ii_core.spread import SpreadMaps
+    from ii_core.waves.spread import SpreadMaps
 
 AUTO = "auto"
 
@@ -24,7 +24,7 @@ def depth_of(text: str) -> Any:
     ValueError
         If it is neither a number nor an .exr file.
     """
-    from ii_core.files import read_depth
+    from ii_core.base.files import read_depth
 
     if text.endswith(".exr"):
         return read_depth(text)
@@ -45,8 +45,8 @@ def maps_of(text: str, camera: IICamera | None, index: int, depth_mm: Any) -> Sp
     ValueError
         If it is neither, there is no such array, or ``auto`` has no camera.
     """
-    from ii_core.spread import spread_maps
-    from ii_core.spread_files import read_spread
+    from ii_core.waves.spread import spread_maps
+    from ii_core.waves.spread_files import read_spread
 
     if text != AUTO:
         return _stored(read_spread, text, index)
@@ -57,7 +57,7 @@ def maps_of(text: str, camera: IICamera | None, index: int, depth_mm: Any) -> Sp
 
 def check_spread(text: str, arrays: Sequence[Any]) -> None:
     """Raise ValueError, before any work, unless pictures of these pixel arrays can be spread."""
-    from ii_core.spread_files import read_spread
+    from ii_core.waves.spread_files import read_spread
 
     for i, array in enumerate(arrays):
         if array.lenses == (1, 1):
@@ -93,9 +93,9 @@ def shoot_spread(
         ``shoot(path, **options)`` renders into a file.
     """
     from ii_core import IIPicture
-    from ii_core.atomic import folder_beside
-    from ii_core.files import read_depth
-    from ii_core.spread import spread_picture
+    from ii_core.base.atomic import folder_beside
+    from ii_core.base.files import read_depth
+    from ii_core.waves.spread import spread_picture
 
     dtype, noise = options.pop("dtype"), options.pop("noise", 0.0)
     with folder_beside(path) as folder:
@@ -111,9 +111,9 @@ def shoot_spread(
 
 
 def _coded(light: IIPicture, dtype: str, noise: float, seed: int) -> IIPicture:
-    from ii_core.colour import srgb
-    from ii_core.picture import peak
-    from ii_core.sensor_noise import add_sensor_noise
+    from ii_core.base.colour import srgb
+    from ii_core.picture.picture import peak
+    from ii_core.picture.sensor_noise import add_sensor_noise
 
     pixels = light.pixels
     if dtype != "float32":

@@ -56,7 +56,7 @@ def camera(
 ) -> None:
     """Store a camera as L and D maps, print its properties, design one for a panel, or solve for missing lengths."""
     from ii_core import preset_cameras, write_maps
-    from ii_core.maps import check_format, map_files
+    from ii_core.camera.maps import check_format, map_files
 
     check_format(format)
     if solve is not None:
@@ -71,14 +71,14 @@ def camera(
         raise ValueError("--spread stores point-spread functions beside camera maps: -o is needed")
     arrays = preset_cameras(name, scale=scale)
     if output is None or report:
-        from ii_core.design import report as describe
+        from ii_core.design.design import report as describe
 
         say("\n\n".join(describe(array) for array in arrays))
     if output is not None:
         files, maps = map_files(arrays, format), []
         if spread is not None:
-            from ii_core.spread import spread_maps
-            from ii_core.spread_files import spread_files, write_spread
+            from ii_core.waves.spread import spread_maps
+            from ii_core.waves.spread_files import spread_files, write_spread
 
             from .spread import depth_of
 
@@ -102,7 +102,7 @@ MEASURES = {
 
 
 def _print_solution(text: str) -> None:
-    from ii_core.design import solve
+    from ii_core.design.design import solve
 
     given: dict[str, Any] = {}
     for item in text.split(","):
@@ -121,9 +121,9 @@ WISHES = {"pitch": "lens_pitch_mm", "distance": "viewer_mm", "gap": "gap_mm", "s
 
 def _design(text: str, output: Path | None, force: bool) -> None:
     """Print a display's report, and write its camera file."""
-    from ii_core.design import report
-    from ii_core.files import write_json
-    from ii_core.panel import panel_display
+    from ii_core.base.files import write_json
+    from ii_core.design.design import report
+    from ii_core.design.panel import panel_display
 
     wishes: dict[str, Any] = {}
     for item in text.split(","):

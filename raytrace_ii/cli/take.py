@@ -82,7 +82,7 @@ def decode_frames(
 ) -> None:
     """Decode a take into a folder, or one frame or component image of it into a file."""
     from codec import EncodedTake, open_take
-    from ii_core.files import write_image
+    from ii_core.base.files import write_image
 
     stream = EncodedTake.load(coded, partial=options.pop("partial"))
     video = open_take(stream, **options)
@@ -107,8 +107,8 @@ def decode_frames(
 
 def measure_frames(reference: Path, decoded: Path, json: Path | None, plots: Path | None, force: bool) -> None:
     """Compare two takes over time."""
+    from ii_core.base.files import write_json
     from ii_core.display.look import viewpoints_around
-    from ii_core.files import write_json
     from metrics import measure_take, time_chart
 
     from .video import opened

@@ -37,9 +37,10 @@ def video(
 ) -> None:
     """Convert II-video to folders of frames or views, quilt videos, films of each view or of a moving viewer."""
     from ii_core import write_view_folders
-    from ii_core.display.look import viewpoints_around, with_assumed_camera
+    from ii_core.display.look import viewpoints_around
     from ii_core.display.video import write_path_film, write_quilt_video, write_view_films
     from ii_core.formats.quilt import quilt_path
+    from ii_core.picture.assumed import with_assumed_camera
 
     if to not in TO:
         raise ValueError(f"unknown form {to!r}: known are {', '.join(TO)}")
@@ -108,7 +109,7 @@ def compared_takes(source: Path, compare: Path | None) -> tuple[IIVideo, IIVideo
 
 def coding(path: Path) -> list[str]:
     """Return scheme and rate of a coded picture or take, or the name of a picture or folder."""
-    from ii_core.files import IMAGE_TYPES
+    from ii_core.base.files import IMAGE_TYPES
 
     if path.is_dir() or path.suffix.lower() in (*IMAGE_TYPES, *FILMS):
         return [path.stem]
@@ -124,13 +125,13 @@ def opened(source: Path, fps: float | None = None) -> IIVideo:
 
     if source.suffix == ".ii":
         from codec import open_take
-        from ii_core.files import check_file
+        from ii_core.base.files import check_file
 
         check_file(source)
         return _at(open_take(source), fps)
     if source.suffix.lower() in FILMS:
+        from ii_core.base.files import check_file
         from ii_core.display.video import open_quilt_video
-        from ii_core.files import check_file
 
         check_file(source)
         return _at(open_quilt_video(source), fps)

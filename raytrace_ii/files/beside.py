@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ii_core.files import check_file, image_header, read_image
+from ii_core.base.files import check_file, image_header, read_image
 
 MOST_BYTES = 4 << 30  # of a mesh file or its buffer
 MOST_TEXELS = 1 << 28  # of a texture: 16384², 3 GB as linear float32

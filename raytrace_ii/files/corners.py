@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.extras import Lazy
+from ii_core.base.extras import Lazy
 
 from ..scene.scene import unit_rows
 from ..shapes.primitives import Mesh

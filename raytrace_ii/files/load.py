@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from ii_core.files import check_file, one_line
+from ii_core.base.files import check_file, one_line
 
 from ..scene.scene import Background, Body, Fog, Light, Material, Scene, Vector, unit_rows
 from ..scene.textures import (

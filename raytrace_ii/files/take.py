@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.checks import text, within
+from ii_core.base.checks import text, within
 
 from ..scene.keyframes import Track, looking_pose, turned_pose
 from ..scene.scene import Scene

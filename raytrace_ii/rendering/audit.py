@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.colour import srgb
+from ii_core.base.colour import srgb
 
 WRONG_CODES = 2  # 8-bit codes; a pixel with a larger difference in a channel is wrong
 FULL_SAMPLES = 256

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from ii_core.files import read_channels, read_image, write_image
+from ii_core.base.files import read_channels, read_image, write_image
 
 from ..tracing.support_images import SUPPORT_IMAGES
 

@@ -1,4 +1,4 @@
-"""Execution of the tiles of a picture by threads, processes or a dask cluster; see `ii_core.executors`."""
+"""Execution of the tiles of a picture by threads, processes or a dask cluster; see `ii_core.base.executors`."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Generator, Sequence
 from functools import lru_cache
 from typing import Any
 
-from ii_core.executors import in_order, lost
-from ii_core.identity import library_versions, source_hash
+from ii_core.base.executors import in_order, lost
+from ii_core.base.identity import library_versions, source_hash
 
 from .job import Block, Job
 

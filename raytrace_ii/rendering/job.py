@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import Camera, IICamera, MapCamera
-from ii_core.colour import srgb
+from ii_core.base.colour import srgb
 
 from ..scene.scene import Scene
 from ..tracing.kernels.sampling import lobe_keys

@@ -11,7 +11,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ii_core.executors import check_executor
+from ii_core.base.executors import check_executor
 
 from ..tracing.sampling import sampling
 from .job import CURVES

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ii_core.files import read_json
-from ii_core.identity import file_hash
+from ii_core.base.files import read_json
+from ii_core.base.identity import file_hash
 
 from .render import Stats
 

@@ -14,12 +14,13 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise, checks
-from ii_core.display.notebook import captioned
-from ii_core.files import RowWriter, atomic_paths, check_type, image_rows
-from ii_core.picture import picture_rows, sidecar
-from ii_core.progress import reporter
-from ii_core.sensor_noise import NOISE_ROWS, noisy_rows
+from ii_core import IICamera, IIPicture, MapCamera, add_sensor_noise
+from ii_core.base import checks
+from ii_core.base.files import RowWriter, atomic_paths, check_type, image_rows
+from ii_core.base.progress import reporter
+from ii_core.picture.notebook import captioned, front_png
+from ii_core.picture.picture import picture_rows, sidecar
+from ii_core.picture.sensor_noise import NOISE_ROWS, noisy_rows
 
 from ..scene.scene import Scene
 from ..tracing.sampling import sampling
@@ -107,7 +108,7 @@ class Shot:
         return f"Shot({self.about})"
 
     def _repr_png_(self) -> bytes:
-        return self.picture._repr_png_()
+        return front_png(self.picture)
 
     def _repr_html_(self) -> str:
         return captioned(self._repr_png_(), self.about)

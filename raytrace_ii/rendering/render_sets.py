@@ -16,8 +16,8 @@ from typing import Any, Unpack
 from numpy.typing import ArrayLike
 
 from ii_core import Camera, IICamera, MapCamera, projection_camera
-from ii_core.files import write_json
-from ii_core.picture import sidecar
+from ii_core.base.files import write_json
+from ii_core.picture.picture import sidecar
 
 from ..files.load import load_scene
 from ..scene.hashing import content_hash

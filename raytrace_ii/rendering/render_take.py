@@ -17,9 +17,10 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ii_core import IICamera, MapCamera, checks
-from ii_core.files import IMAGE_TYPES, write_json
-from ii_core.picture import sidecar
+from ii_core import IICamera, MapCamera
+from ii_core.base import checks
+from ii_core.base.files import IMAGE_TYPES, write_json
+from ii_core.picture.picture import sidecar
 
 from ..files.take import Take
 from ..scene.hashing import SceneHashes, content_hash

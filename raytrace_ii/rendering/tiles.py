@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import Camera
-from ii_core.lattice import Lattice
+from ii_core.camera.lattice import Lattice
 
 SIDE = 4  # lenses or pixels along each axis of a packet of 16 rays
 # From this number of pixels per lens on, 4×4 neighbouring pixels are closer than pixels under 4×4 lenses.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import checks
+from ii_core.base import checks
 
 from .textures import Image, Texture, VertexColours
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from ii_core.colour import LINEAR, linear
+from ii_core.base.colour import LINEAR, linear
 
 WRAPS = ("repeat", "mirror", "clamp")
 

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core.checks import MOST_MM
+from ii_core.base.checks import MOST_MM
 
 from ..scene.scene import Scene
 from .intersect import Hits

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.accuracy import camera_in_scene
 from ii_core import IICamera
-from ii_core.optics import SphericalLenslet
+from ii_core.camera.optics import SphericalLenslet
 from raytrace_ii import Scene, render
 from tests.support.trace_scenes import WHITE, body, ramp, reflectance, sun, wall
 

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.coding import disparity
 from examples import demo
 from ii_core import IIPicture, preset
-from ii_core.files import read_image
+from ii_core.base.files import read_image
 
 ROOT = Path(__file__).parents[2]
 

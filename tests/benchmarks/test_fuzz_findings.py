@@ -16,19 +16,19 @@ from codec import Encoded, decode, encode
 from codec.container import write
 from codec.file_header import values
 from ii_core import IIPicture, preset
+from ii_core.base.files import MAX_MESSAGE, one_line, read_image, write_image
+from ii_core.base.json_lines import read_records
+from ii_core.camera.maps import read_maps, write_maps
+from ii_core.camera.prescriptions import lens
+from ii_core.camera.presets import preset_cameras
 from ii_core.display.look import MOST_FRAMES, viewpoints_around
-from ii_core.files import MAX_MESSAGE, one_line, read_image, write_image
 from ii_core.formats.find import find_views
 from ii_core.formats.lfp import read_packed
-from ii_core.json_lines import read_records
-from ii_core.maps import read_maps, write_maps
-from ii_core.prescriptions import lens
-from ii_core.presets import preset_cameras
 from metrics.benchmark.profile import profile
 from metrics.benchmark.ranking import check_comparable
 from metrics.benchmark.result import read_result
-from metrics.point_log import read_points
-from metrics.study import read_study
+from metrics.reports.point_log import read_points
+from metrics.reports.study import read_study
 from raytrace_ii.files.load import read_model
 from raytrace_ii.rendering.render_sets import _read_manifest
 from raytrace_ii.shapes.implicit_parts import Ball

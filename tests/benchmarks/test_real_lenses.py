@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.accuracy.real_lenses import LENSES, ideal_twin, magnification, real_camera, slope
-from ii_core.properties import through_front_mm
+from ii_core.design.properties import through_front_mm
 
 
 @pytest.mark.parametrize("name", LENSES)

@@ -15,7 +15,7 @@ from benchmarks.coding import coders, fuzz, rd
 from benchmarks.pages import tables
 from benchmarks.records import ALL, MISSING, Records, check, commit_of, origin, with_commits
 from ii_core import preset
-from ii_core.json_lines import append_record
+from ii_core.base.json_lines import append_record
 from raytrace_ii import load_scene, render
 
 ROOT = Path(__file__).parents[2]

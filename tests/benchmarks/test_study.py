@@ -18,7 +18,7 @@ from benchmarks.study.sheets import STRIP
 from benchmarks.study.steps import all_steps
 from benchmarks.study.views import towards
 from ii_core import IIPicture
-from ii_core.files import read_image, write_image
+from ii_core.base.files import read_image, write_image
 
 calls = []
 

@@ -11,7 +11,7 @@ from ii_core import IIPicture, open_video
 from metrics import measure_take
 from metrics.benchmark.profile import profile
 from metrics.benchmark.subject import identity
-from metrics.study import picture_json
+from metrics.reports.study import picture_json
 from raytrace_ii.cli.benchmark_pictures import rendered
 
 TINY = """

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.accuracy.calibration import exposed, random_camera, white_image
 from ii_core import IICamera, IIPicture
-from ii_core.files import read_image, write_image
+from ii_core.base.files import read_image, write_image
 from tests.support.full_disk import limited
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture, camera_names, preset
-from ii_core.files import read_image
-from ii_core.maps import FORMATS
+from ii_core.base.files import read_image
+from ii_core.camera.maps import FORMATS
 
 
 def test_every_camera_is_listed(run):

@@ -13,9 +13,9 @@ import pytest
 import codec
 from codec import encode
 from ii_core import IICamera, IIPicture, preset, video_of
-from ii_core.files import read_image
+from ii_core.base.files import read_image
 from metrics import PointLog
-from metrics.points import FIELDS
+from metrics.rates.points import FIELDS
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture, five_viewpoints, preset, view_image
-from ii_core.files import read_image
+from ii_core.base.files import read_image
 
 
 @pytest.fixture

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture
-from ii_core.camera import MOST_ALONG
-from ii_core.files import MAX_TEXT, write_image
-from ii_core.picture import sidecar
+from ii_core.base.files import MAX_TEXT, write_image
+from ii_core.camera.camera import MOST_ALONG
+from ii_core.picture.picture import sidecar
 from tests.support.interrupts import hear_interrupts
 
 SMALL = ("render", "objects", "--scale", 128)
@@ -138,7 +138,7 @@ LIMITED = """
 import resource, sys
 from raytrace_ii import cli
 from tests.support.interrupts import hear_interrupts
-import numba, codec, metrics, ii_core.picture  # what they need is there before the limit is set
+import numba, codec, metrics, ii_core.picture.picture  # what they need is there before the limit is set
 used = int(next(line for line in open("/proc/self/status") if line.startswith("VmData")).split()[1]) * 1024
 resource.setrlimit(resource.RLIMIT_DATA, (used + (1 << 29),) * 2)
 cli.main()

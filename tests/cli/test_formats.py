@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture, preset, sub_images
-from ii_core.files import read_image
+from ii_core.base.files import read_image
 from ii_core.formats.pfm import read_pfm
 
 
 @pytest.fixture(scope="module")
 def shot(tmp_path_factory):
     """A rendered picture with depth, on disk."""
-    from ii_core.files import write_image
+    from ii_core.base.files import write_image
     from raytrace_ii import load_scene, render
 
     folder = tmp_path_factory.mktemp("shot")

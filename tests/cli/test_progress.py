@@ -9,7 +9,8 @@ import sys
 import pytest
 
 from codec import decode, encode
-from ii_core import compilation, preset
+from ii_core import preset
+from ii_core.base import compilation
 from raytrace_ii import load_scene, render
 from raytrace_ii.cli import app, progress
 from raytrace_ii.cli.progress import console
@@ -104,7 +105,7 @@ def test_coding_reports_frames_and_runs():
     assert told[0][2].startswith("run 1 of ")
 
 
-KERNEL = "from ii_core.jit import kernel\n@kernel\ndef double(x):\n    return 2 * x\n"
+KERNEL = "from ii_core.base.jit import kernel\n@kernel\ndef double(x):\n    return 2 * x\n"
 
 
 def test_compilation_is_reported_once_and_only_with_a_cold_cache(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from codec import encode_take
 from ii_core import IICamera, IIPicture, video_of
-from ii_core.files import write_image
+from ii_core.base.files import write_image
 
 TAKE = ("render", "apples", "--scale", 128, "-o", "out/take", "--frames")
 SET = ("render", "--set", "reference", "--scale", 128, "-o", "out/set")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture, preset
-from ii_core.files import read_channels, read_image
+from ii_core.base.files import read_channels, read_image
 from raytrace_ii import load_scene, render
 
 CAMERA = preset("setup1", scale=128)  # 64×32 px, 4×2 lenses

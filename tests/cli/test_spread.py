@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture, preset
-from ii_core.files import read_image
-from ii_core.maps import FORMATS
-from ii_core.spread import spread_maps, spread_picture
-from ii_core.spread_files import read_spread
+from ii_core.base.files import read_image
+from ii_core.camera.maps import FORMATS
+from ii_core.waves.spread import spread_maps, spread_picture
+from ii_core.waves.spread_files import read_spread
 from raytrace_ii import load_scene, render
 
 
@@ -64,7 +64,7 @@ def wanted_of(folder, shot):
 
 
 def _srgb(light):
-    from ii_core.colour import srgb
+    from ii_core.base.colour import srgb
 
     return srgb(light)
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from codec.inspect.order_analysis import analyse_orders
 from codec.order import ORDERS, selection_order
 from ii_core import IIPicture, component_images
-from ii_core.component import KINDS
+from ii_core.picture.component import KINDS
 
 counts = st.integers(1, 6)
 

@@ -23,9 +23,9 @@ from codec.contract import _CODERS
 from codec.takes import container
 from codec.takes.api import _values
 from ii_core import IIPicture, video_of
-from ii_core.foreign import ForeignError
+from ii_core.base.foreign import ForeignError
 from metrics import Measure, measuring, register_measure, report
-from metrics.measure import MEASURES
+from metrics.measures.measure import MEASURES
 
 PICTURE = IIPicture(np.random.default_rng(3).integers(0, 256, (32, 64, 3), np.uint8), (16, 8), (4, 4))
 

@@ -13,7 +13,7 @@ import pytest
 from codec import Encoded, decode, encode, schemes
 from codec.contract import find
 from ii_core import IICamera, IIPicture
-from ii_core.files import read_image, write_image, write_json
+from ii_core.base.files import read_image, write_image, write_json
 
 FOLDER = Path(__file__).parents[1] / "golden"
 TOTAL_BYTES = 200_000

@@ -15,7 +15,7 @@ from codec.coders.pseudo_video import PseudoVideo, Source
 from codec.contract import find, schemes
 from codec.takes.order import WALKS
 from ii_core import IIPicture, open_video, sub_images, video_of
-from ii_core.files import read_image, read_json
+from ii_core.base.files import read_image, read_json
 
 VIDEO_SCHEMES = [name for name in schemes() if isinstance(find(name), PseudoVideo)]
 LENSES, EI = (32, 32), (4, 3)  # 12 sub-images of 32×32, 1024 elementary images of 4×3

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from benchmarks.pages.cameras import KINDS as GROUPS
 from ii_core import IICamera, camera_names, panel_display
-from ii_core.optics import KINDS, LensModel
+from ii_core.camera.optics import KINDS, LensModel
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "camera_files.md").read_text(encoding="utf-8")

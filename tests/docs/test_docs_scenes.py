@@ -10,7 +10,7 @@ import trimesh
 from pydantic import TypeAdapter
 from pydantic_core import PydanticUndefined
 
-from ii_core.files import write_image
+from ii_core.base.files import write_image
 from raytrace_ii import load_scene, trace
 from raytrace_ii.files.toml_schema import (  # fmt: skip
     LIGHTS,

@@ -15,7 +15,7 @@ from codec import encode, register, schemes
 from codec.contract import _CODERS
 from ii_core import IIPicture, embed_viewer, five_viewpoints, preset, view_image, write_views
 from metrics import MEASURES, read_study, write_study
-from metrics import measure as measure_module
+from metrics.measures import measure as measure_module
 from raytrace_ii import load_scene, render
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

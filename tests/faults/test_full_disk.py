@@ -11,7 +11,7 @@ import sys
 import pytest
 
 from ii_core import IIPicture
-from ii_core.files import read_image
+from ii_core.base.files import read_image
 from tests.support.full_disk import limited
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="RLIMIT_FSIZE is of POSIX")
@@ -24,12 +24,12 @@ from codec import Plan, encode, encode_take, extract
 from ii_core import (
     IICamera, IIPicture, preset, video_of, write_hci, write_maps, write_quilt, write_view_folders, write_views)
 from ii_core.display.film import write_animation
-from ii_core.files import write_image, write_json
+from ii_core.base.files import write_image, write_json
 from ii_core.formats.pfm import write_pfm
 from ii_core.formats.pleno import write_pleno_views
-from ii_core.json_lines import append_record
-from ii_core.spread import spread_maps
-from ii_core.spread_files import write_spread
+from ii_core.base.json_lines import append_record
+from ii_core.waves.spread import spread_maps
+from ii_core.waves.spread_files import write_spread
 from metrics import write_csv, write_latex, write_study
 from metrics.benchmark.result import write_result
 from metrics.observers import Options, Stimulus, read_results, verdict, write_test

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 KERNEL = """
-from ii_core.jit import kernel
+from ii_core.base.jit import kernel
 
 @kernel
 def doubled(x):
@@ -83,7 +83,8 @@ def test_an_edit_of_a_file_beside_it(package):
     """A kernel may call a kernel of another file in its folder; numba's own cache would keep the old copy."""
     (package / "old" / "twice.py").write_text(KERNEL.replace("doubled", "twice"))
     (package / "old" / "kernels.py").write_text(
-        "from ii_core.jit import kernel\nfrom .twice import twice\n\n@kernel\ndef doubled(x):\n    return twice(x)\n"
+        "from ii_core.base.jit import kernel\nfrom .twice import twice\n\n"
+        "@kernel\ndef doubled(x):\n    return twice(x)\n"
     )
     assert call(package, "old.kernels") == ["42", "0"]
     assert call(package, "old.kernels") == ["42", "1"]

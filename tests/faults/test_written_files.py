@@ -15,11 +15,11 @@ import pytest
 from codec import encode
 from codec.inspect.extract import extract
 from ii_core import IIPicture, preset
-from ii_core.atomic import atomic_paths
+from ii_core.base.atomic import atomic_paths
+from ii_core.base.files import atomic_path, image_header, pixel_digest, read_image, read_json, write_image, write_json
+from ii_core.camera.maps import write_maps
 from ii_core.display.view_sheets import plot_pair, plot_views
-from ii_core.files import atomic_path, image_header, pixel_digest, read_image, read_json, write_image, write_json
-from ii_core.maps import write_maps
-from ii_core.picture import sidecar
+from ii_core.picture.picture import sidecar
 from metrics import rd_chart, read_study, write_csv, write_latex, write_study
 from raytrace_ii import load_scene, render
 
@@ -153,14 +153,14 @@ def test_equal_content_makes_equal_files(tmp_path, name):
 DIES = """
 import os, sys, signal
 from pathlib import Path
-from ii_core.atomic import atomic_path, folder_beside
+from ii_core.base.atomic import atomic_path, folder_beside
 with atomic_path(sys.argv[1]) as temporary, folder_beside(Path(sys.argv[1])) as folder:
     temporary.write_text("half")
     (folder / "light.exr").write_text("half")
     print(temporary.name, flush=True)
     os.kill(os.getpid(), signal.SIGKILL) if sys.argv[2] == "dies" else sys.stdin.read()
 """
-NEXT = "import sys; from ii_core.files import write_json; write_json(sys.argv[1], 1)"
+NEXT = "import sys; from ii_core.base.files import write_json; write_json(sys.argv[1], 1)"
 
 
 @pytest.mark.slow

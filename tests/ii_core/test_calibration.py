@@ -230,7 +230,7 @@ def test_a_calibrated_picture_shows_the_views_of_a_straight_camera():
     made = calibrated_picture(found, raw, white=white - 30.0, full_scale=2000.0, bits=16)
     regular, valid = resampled(made)
     assert valid.mean() > 0.99
-    from ii_core.colour import linear
+    from ii_core.base.colour import linear
 
     (u, v), lattice = regular.ei_pixels, made.camera.lens_lattice
     for place in ((u // 2, v // 2), (u // 2 + 2, v // 2 - 3)):
@@ -333,7 +333,7 @@ def test_a_mosaic_that_does_not_divide_is_cut_with_a_warning(tmp_path):
     _, image = shot(1)
     outside = calibrate(image).report()["pixels_outside"]
     assert set(outside) == {"left", "right", "top", "bottom"} and max(outside.values()) > 0
-    from ii_core.files import write_image
+    from ii_core.base.files import write_image
 
     write_image(tmp_path / "m.png", image)
     with pytest.warns(UserWarning, match="cut off"):

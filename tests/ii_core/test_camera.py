@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, five_viewpoints, preset, projection_camera
-from ii_core.design import report
-from ii_core.properties import properties
+from ii_core.design.design import report
+from ii_core.design.properties import properties
 
 CASES = [("setup1", 8), ("setup1", 64), ("setup2-32", 8), ("setup2-128", 4), ("setup3", 8)]
 

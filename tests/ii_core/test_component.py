@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ii_core import IIPicture, component, component_images, elementary_images, picture_pixels, ray_space_images
+from ii_core import IIPicture, component_images, elementary_images, picture_pixels, ray_space_images
 from ii_core import sub_images as sub_images_of
-from ii_core.component import join_si, split_si, swap_runs
-from ii_core.picture import picture_order
+from ii_core.picture import component
+from ii_core.picture.component import join_si, split_si, swap_runs
+from ii_core.picture.picture import picture_order
 
 KINDS = ("ei", "si", "ri")
 side = st.integers(1, 6)
@@ -56,7 +57,7 @@ def test_definitions_element_by_element(lenses, ei_pixels):
 @pytest.mark.parametrize("cpus", [1, 3, 64])
 def test_any_number_of_threads_gives_the_same(kind, cpus, monkeypatch):
     monkeypatch.setattr(component, "SMALL", 0)
-    monkeypatch.setattr("ii_core.parallel.cores", lambda: cpus)
+    monkeypatch.setattr("ii_core.base.parallel.cores", lambda: cpus)
     source = make((7, 5), (3, 4))
     field = source.pixels.reshape(5, 4, 7, 3, 3)
     axes = {"ei": (0, 2, 1, 3, 4), "si": (1, 3, 0, 2, 4), "ri": (1, 0, 2, 3, 4)}[kind]

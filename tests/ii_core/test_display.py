@@ -8,15 +8,10 @@ from PIL import Image
 from ii_core import IICamera, IIPicture, five_viewpoints, preset, view_image
 from ii_core.display.film import write_animation
 from ii_core.display.lenticular import lenticular
-from ii_core.display.look import (
-    focused_view,
-    look,
-    viewpoints_across,
-    viewpoints_around,
-    with_assumed_camera,
-)
+from ii_core.display.look import focused_view, look, viewpoints_across, viewpoints_around
 from ii_core.display.quilt import quilt
 from ii_core.display.simulate import display_simulation
+from ii_core.picture.assumed import with_assumed_camera
 from raytrace_ii import load_scene, render
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ii_core.extras import EXTRAS
+from ii_core.base.extras import EXTRAS
 
 ROOT = Path(__file__).parents[2]
 WITHOUT = f"""

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture, five_viewpoints, preset, view_image
-from ii_core.colour import LINEAR, linear
+from ii_core.base.colour import LINEAR, linear
+from ii_core.camera.optics import Lenslet
 from ii_core.display.eye import Eye, eye_image, see
 from ii_core.display.look import focused_view
 from ii_core.display.model import DisplayModel
 from ii_core.display.quilt import quilt
 from ii_core.display.simulate import display_simulation
 from ii_core.display.zones import converging_distance, crosstalk, viewing_zone
-from ii_core.optics import Lenslet
 
 
 def camera(k=12, l=8, u=8, **change):

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset, resampled, sub_images, view_image
-from ii_core.files import read_image, write_image
+from ii_core.base.files import read_image, write_image
 from ii_core.formats.grid import camera_views
 from ii_core.formats.hci import view_disparity, write_hci
 from ii_core.formats.order import Arrangement, estimate

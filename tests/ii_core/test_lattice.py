@@ -8,8 +8,8 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from ii_core import IICamera
-from ii_core.lattice import Lattice, nearest_hexagonal
-from ii_core.presets import camera_names, preset_cameras, scaled
+from ii_core.camera.lattice import Lattice, nearest_hexagonal
+from ii_core.camera.presets import camera_names, preset_cameras, scaled
 
 # Eighths of a pixel make ties that are exact in binary; tenths make ties with rounding; other values, none.
 LENGTHS = st.one_of(

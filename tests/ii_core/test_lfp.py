@@ -122,7 +122,7 @@ def test_a_container_is_calibrated_by_the_command(run, tmp_path):
     picture = IIPicture.load(tmp_path / "c/picture.png")
     assert picture.camera.lens_turn_deg == pytest.approx(camera.lens_turn_deg, abs=0.005)
     assert picture.camera.pixel_pitch_mm == pytest.approx(0.0014)
-    from ii_core.colour import linear
+    from ii_core.base.colour import linear
 
     light = np.median(linear(picture.pixels[100:200, 100:200] / 255), axis=(0, 1))
     np.testing.assert_allclose(light / light[1], (0.8, 1, 0.4), atol=0.06)

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ii_core import Camera, IICamera, preset, preset_cameras, read_maps, write_maps
-from ii_core.files import read_image, write_image
-from ii_core.maps import FORMATS, decode, encode, widened
+from ii_core.base.files import read_image, write_image
+from ii_core.camera.maps import FORMATS, decode, encode, widened
 from raytrace_ii import render
 from tests.support.trace_scenes import hall
 

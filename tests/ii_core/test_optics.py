@@ -8,11 +8,22 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, camera_names, orthoscopic, preset, view_image
-from ii_core.optics import Bundle, Grin, Lens, Lenslet, Lenticular, Pinhole, SphericalLenslet, Under, chain, unit_disk
-from ii_core.optics import element as element_of
-from ii_core.presets import preset_cameras, scaled
-from ii_core.surfaces import surfaces_of
-from ii_core.view import view_positions
+from ii_core.camera.optics import (
+    Bundle,
+    Grin,
+    Lens,
+    Lenslet,
+    Lenticular,
+    Pinhole,
+    SphericalLenslet,
+    Under,
+    chain,
+    unit_disk,
+)
+from ii_core.camera.optics import element as element_of
+from ii_core.camera.presets import preset_cameras, scaled
+from ii_core.camera.surfaces import surfaces_of
+from ii_core.picture.view import view_positions
 from raytrace_ii import Background, Scene, render
 from raytrace_ii.shapes.primitives import Mesh
 from tests.support.trace_scenes import WHITE, body, ramp, wall

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ii_core.parallel import cores, over_rows
+from ii_core.base.parallel import cores, over_rows
 
 
 @given(rows=st.integers(0, 300), workers=st.integers(-1, 40), step=st.integers(1, 70))

@@ -9,7 +9,7 @@ import OpenImageIO as oiio
 import pytest
 
 from ii_core import IICamera, IIPicture, add_sensor_noise
-from ii_core.files import json_text, read_image, write_image, write_json
+from ii_core.base.files import json_text, read_image, write_image, write_json
 
 PEAKS = {"uint8": 255, "uint16": 65535, "float32": 1.0}
 HELD = [
@@ -163,7 +163,7 @@ class FailingOutput:
 def test_failure_while_writing_leaves_the_old_files(tmp_path, monkeypatch):
     old = picture()
     old.save(tmp_path / "p.png")
-    monkeypatch.setattr("ii_core.files.oiio.ImageOutput", type("", (), {"create": lambda path: FailingOutput()}))
+    monkeypatch.setattr("ii_core.base.files.oiio.ImageOutput", type("", (), {"create": lambda path: FailingOutput()}))
     with pytest.raises(OSError, match=r"p\.png: no space left"):
         picture(seed=1).save(tmp_path / "p.png")
     monkeypatch.undo()

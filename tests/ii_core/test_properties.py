@@ -9,8 +9,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from ii_core import IICamera, camera_names, design, five_viewpoints, preset, preset_cameras
-from ii_core import properties as ii
+from ii_core import IICamera, camera_names, five_viewpoints, preset, preset_cameras
+from ii_core.design import design
+from ii_core.design import properties as ii
 
 ROUNDING = 1e-12  # relative: a few operations in double precision
 LENGTH = st.floats(1e-4, 1e4)

@@ -7,9 +7,9 @@ import pytest
 from scipy.signal import resample
 
 from ii_core import IICamera, IIPicture
-from ii_core.optics import SphericalLenslet
-from ii_core.spread import FIRST_ZERO, SpreadMaps, _kernel, spread_maps, spread_picture
-from ii_core.wave import lens_spread
+from ii_core.camera.optics import SphericalLenslet
+from ii_core.waves.spread import FIRST_ZERO, SpreadMaps, _kernel, spread_maps, spread_picture
+from ii_core.waves.wave import lens_spread
 
 IOR = 1.5
 

@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from ii_core import IICamera, IIPicture, component_images, preset, view_image
-from ii_core.regular import from_smallest_rectangle, owners, resampled, smallest_rectangle
+from ii_core.picture.regular import from_smallest_rectangle, owners, resampled, smallest_rectangle
 
 REGULAR = ("rectangular", (5.0, 5.0), (0.0, 0.0))
 KINDS = [

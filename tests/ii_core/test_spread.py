@@ -7,9 +7,9 @@ import pytest
 from scipy.signal import resample
 
 from ii_core import DisplayModel, Eye, IICamera, IIPicture, eye_image, preset
-from ii_core.optics import Lenslet
-from ii_core.spread import FIRST_ZERO, _kernel, scatter, spread_maps, spread_picture
-from ii_core.wave import diffraction_limit, lens_spread
+from ii_core.camera.optics import Lenslet
+from ii_core.waves.spread import FIRST_ZERO, _kernel, scatter, spread_maps, spread_picture
+from ii_core.waves.wave import diffraction_limit, lens_spread
 
 
 def camera(u=15, k=1, pixel=0.001, gap=1.0, width=0.1, focal=None):
@@ -111,7 +111,7 @@ def test_light_is_linear_and_colours_spread_by_their_wavelengths():
     maps = spread_maps(made)
     light = spread_picture(point(made), maps).pixels
     codes = spread_picture(point(made, dtype=np.uint8), maps).pixels
-    from ii_core.colour import LINEAR
+    from ii_core.base.colour import LINEAR
 
     np.testing.assert_allclose(LINEAR[codes], light, atol=3e-3)  # half a code
     middle = light[7, 7]
@@ -154,7 +154,7 @@ def test_kernel_without_compilation(monkeypatch):
     made = camera(u=5, k=2, pixel=0.003)
     maps = spread_maps(made, 4.0)
     compiled = spread_picture(point(made), maps).pixels
-    monkeypatch.setattr("ii_core.spread.scatter", scatter.py_func)
+    monkeypatch.setattr("ii_core.waves.spread.scatter", scatter.py_func)
     np.testing.assert_array_equal(spread_picture(point(made), maps).pixels, compiled)
 
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from benchmarks.accuracy.lens_rays import cases
 from ii_core import IICamera, preset
-from ii_core.elements import Bundle
-from ii_core.glass import CATALOGUE, LINE_C_NM, LINE_D_NM, LINE_F_NM, Glass, glass
-from ii_core.prescriptions import lens, lens_names
-from ii_core.properties import image_planes, through_front_mm
-from ii_core.surfaces import Surface, Surfaces
+from ii_core.camera.elements import Bundle
+from ii_core.camera.glass import CATALOGUE, LINE_C_NM, LINE_D_NM, LINE_F_NM, Glass, glass
+from ii_core.camera.prescriptions import lens, lens_names
+from ii_core.camera.surfaces import Surface, Surfaces
+from ii_core.design.properties import image_planes, through_front_mm
 
 ROUNDING = 1e-12  # millimetres in float64, some hundred operations
 GOOD = {"radius_mm": 50.0, "thickness_mm": 5.0, "glass": "F2", "diameter_mm": 20.0, "stop": True}

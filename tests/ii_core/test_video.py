@@ -8,8 +8,8 @@ import pytest
 from ii_core import IIVideo, open_video, preset, sub_images, video_of, view_image, write_view_folders
 from ii_core.display.look import viewpoints_across
 from ii_core.display.video import open_quilt_video, write_path_film, write_quilt_video, write_view_films
-from ii_core.picture import IIPicture
-from ii_core.video import KEPT, blank
+from ii_core.picture.picture import IIPicture
+from ii_core.video.video import KEPT, blank
 
 CAMERA = preset("setup1", scale=32)  # 16×8 lenses of 16×16 pixels
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ii_core import IICamera, IIPicture, five_viewpoints, orthoscopic, preset, refocus, view_image
-from ii_core.view import view_positions
+from ii_core.picture.view import view_positions
 
 CAMERA = IICamera(pixels=(42, 30), lenses=(7, 5), pixel_pitch_mm=0.25, gap_mm=2.0)  # 6×6 px under each lens
 VIEWPOINTS = [

@@ -13,9 +13,9 @@ import pytest
 from PIL import Image
 
 from ii_core import IICamera, IIPicture, preset, view_image
+from ii_core.base.files import write_image
 from ii_core.display.viewer import page, write_viewer, write_viewer_folder
 from ii_core.display.viewer.page import depth_view
-from ii_core.files import write_image
 from metrics import quality_rows
 from raytrace_ii import load_scene, render
 
@@ -104,7 +104,7 @@ def test_a_mosaic_of_several_pages(show, shot, tmp_path, monkeypatch):
 
 def focused(picture, viewpoint, shift, radius):
     """Compute the shader's result in numpy: pixels within the aperture, each from the lens of the same point."""
-    from ii_core.view import view_positions
+    from ii_core.picture.view import view_positions
 
     (k, l), (u, v) = picture.lenses, picture.ei_pixels
     field = picture.pixels.reshape(l, v, k, u, 3).astype(float)
@@ -148,14 +148,14 @@ def test_focus_and_aperture(show, tmp_path, erect):
     if erect:  # the same formulas with the other sign, which `view_positions` takes
         from functools import partial
 
-        import ii_core.view
+        import ii_core.picture.view
 
-        original = ii_core.view.view_positions
-        ii_core.view.view_positions = partial(original, erect=True)
+        original = ii_core.picture.view.view_positions
+        ii_core.picture.view.view_positions = partial(original, erect=True)
         try:
             wanted = focused(picture, viewpoint, -0.7, 1.8)
         finally:
-            ii_core.view.view_positions = original
+            ii_core.picture.view.view_positions = original
     else:
         wanted = focused(picture, viewpoint, 0.7, 1.8)
     assert np.abs(shown - wanted).max() <= 2  # 8-bit rounding of sums in single precision

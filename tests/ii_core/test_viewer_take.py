@@ -17,7 +17,7 @@ import pytest
 from codec import Plan, encode_take
 from ii_core import video_of, view_image
 from ii_core.display.viewer import page, write_viewer, write_viewer_folder
-from ii_core.video import IIVideo
+from ii_core.video.video import IIVideo
 from tests.ii_core.test_viewer import snapshot
 
 FRAMES = 6

@@ -19,11 +19,11 @@ from ii_core import (
     refocus,
     view_image,
 )
+from ii_core.base.files import read_image
+from ii_core.design.properties import viewing_zone
 from ii_core.display.look import focused_view
 from ii_core.display.viewer.page import _Page
-from ii_core.files import read_image
-from ii_core.properties import viewing_zone
-from ii_core.view import view_positions
+from ii_core.picture.view import view_positions
 from raytrace_ii import Scene, render
 from raytrace_ii.rendering.job import disparity, footprint
 from tests.support.trace_scenes import body, wall

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture, preset
-from ii_core.wave import (
+from ii_core.waves.wave import (
     angular_spectrum,
     defocus_mm,
     diffraction_limit,

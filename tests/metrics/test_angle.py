@@ -8,7 +8,7 @@ from skimage.metrics import structural_similarity
 
 from ii_core import IIPicture
 from metrics import q_angle_ssim, q_angle_ycbcr, q_ctc_psnr, q_ctc_ssim
-from metrics.ctc import codes
+from metrics.measures.ctc import codes
 
 PEAKS = {"uint8": 255, "uint16": 65535, "float32": 1.0}
 

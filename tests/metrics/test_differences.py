@@ -23,7 +23,7 @@ from metrics import (
     read_study,
     write_study,
 )
-from metrics.rd import RATES, rates_above
+from metrics.rates.rd import RATES, rates_above
 
 PICTURE = IIPicture(np.random.default_rng(1).integers(90, 120, (32, 64, 3), np.uint8), (8, 4), (8, 8))
 RATES_TRIED = [0.5, 1.0, 2.0, 4.0]
@@ -59,7 +59,7 @@ def test_where_lower_is_better_rates_compare_alike():
     """A curve of errors that falls with rate has the same BD-rate as its negative."""
     kind = Measure(name="e", compute=None, text="", higher_is_better=False)
     errors = {name: [(r, 40 - 6 * math.log2(r) - up) for r in RATES_TRIED] for name, up in (("a", 0), ("b", 3))}
-    from metrics.against_anchor import _growing
+    from metrics.rates.against_anchor import _growing
 
     a, b = (_growing(points, kind) for points in errors.values())
     assert bd_rate(*zip(*a, strict=True), *zip(*b, strict=True)) == pytest.approx(100 * (2**-0.5 - 1))

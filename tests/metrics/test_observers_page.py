@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture, preset, view_image
-from ii_core.view import five_viewpoints
+from ii_core.picture.view import five_viewpoints
 from metrics.observers import Options, Stimulus, read_results, write_test
 from metrics.observers.store import ResultFolder
 from raytrace_ii.cli.server import Answers, PageServer

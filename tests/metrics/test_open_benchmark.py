@@ -13,14 +13,14 @@ from ii_core import IIPicture, video_of
 from ii_core.formats.pgx import Component, read_pgx, write_pgx
 from ii_core.formats.pleno import COMPONENTS, read_pleno_views, read_ppm, write_pleno_views, write_ppm
 from metrics import rate_distortion
-from metrics.batch import measuring
 from metrics.benchmark.external import External, Refused
 from metrics.benchmark.profile import profile, profile_names
 from metrics.benchmark.ranking import chart_path, ranked, write_page
 from metrics.benchmark.result import read_result, run, write_result
 from metrics.benchmark.run_log import RunLog
 from metrics.benchmark.subject import measuring_subject
-from metrics.study import picture_json, provenance
+from metrics.measures.batch import measuring
+from metrics.reports.study import picture_json, provenance
 
 PYTHON = f"{shlex.quote(sys.executable)} -I -S"  # without packages: starts in 20 ms
 BEGIN = """
@@ -188,7 +188,7 @@ def test_first_view_is_that_from_the_top_left(tmp_path, picture):
     np.testing.assert_array_equal(again.pixels, picture.pixels)
     # Elementary images of plain lenses are upside down: their first pixel looks to the lower right, from there
     # the camera that stands at the top left.
-    from ii_core.files import read_image
+    from ii_core.base.files import read_image
 
     np.testing.assert_array_equal(read_image(tmp_path / "a" / "000_000.png"), picture.pixels[0::3, 0::3])
     # Column 2, row 1: "S_T" of JPEG Pleno's reference software. This test wanted the row first until the names were

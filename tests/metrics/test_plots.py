@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture, five_viewpoints, view_image
+from ii_core.base.files import read_image, write_image
 from ii_core.display.view_sheets import _pair_figure, _views_figure, plot_pair, plot_views
-from ii_core.files import read_image, write_image
 from metrics import PLOTS, angle_axes, plot_all, plot_angle, q_angle, q_depth
 from metrics.plots.angle_depth import _depth_figure, angle_figure, plot_depth
 

@@ -8,7 +8,7 @@ from skimage.metrics import peak_signal_noise_ratio
 
 from ii_core import IIPicture, preset
 from metrics import angle_axes, mean_q_angle, q_angle, q_global
-from metrics.global_angle import sum_masked_errors, sum_squared_errors
+from metrics.measures.global_angle import sum_masked_errors, sum_squared_errors
 
 PEAKS = {"uint8": 255, "uint16": 65535, "float32": 1.0}
 

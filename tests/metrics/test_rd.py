@@ -15,14 +15,13 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture
-from ii_core.identity import LIBRARIES, library_versions
+from ii_core.base.identity import LIBRARIES, library_versions
 from metrics import (
     bd_psnr,
     bd_rate,
     provenance,
     q_global,
     rate_distortion,
-    rd,
     rd_chart,
     read_study,
     summary_table,
@@ -30,6 +29,7 @@ from metrics import (
 )
 from metrics import write_study as _write_study
 from metrics.plots.rd_chart import draw
+from metrics.rates import rd
 
 RATES = np.array([0.02, 0.05, 0.1, 0.35, 1.0])
 

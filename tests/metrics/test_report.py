@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture, five_viewpoints, resampled, view_image
-from ii_core.files import read_image, write_image
+from ii_core.base.files import read_image, write_image
 from metrics import DepthQuality, error_map, q_angle, q_depth, q_global, q_view, report
 from metrics.plots.error_maps import _error_layers_figure, error_views_figure, layer_groups
 

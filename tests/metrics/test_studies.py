@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture
-from ii_core.files import read_image, write_image
+from ii_core.base.files import read_image, write_image
 from metrics import (
     MEASURES,
     Measure,
@@ -256,7 +256,7 @@ def mean_absolute_error(pair):
 
 @pytest.fixture
 def own_measure(monkeypatch):
-    from metrics import measure
+    from metrics.measures import measure
 
     monkeypatch.setattr(measure, "MEASURES", MEASURES.copy())  # what a test registers ends with it
     return register_measure(
@@ -306,7 +306,7 @@ def test_measures_of_installed_packages(monkeypatch):
     """An entry point adds its measure; one that does not load is left out with a warning."""
     from importlib.metadata import EntryPoint
 
-    from metrics import measure
+    from metrics.measures import measure
 
     monkeypatch.setattr(measure, "MEASURES", MEASURES.copy())
     points = [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from metrics.subjective import (
+from metrics.observers.subjective import (
     opinion_scores,
     pair_scale,
     predicted_scores,

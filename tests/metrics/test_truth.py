@@ -7,7 +7,7 @@ import pytest
 from skimage import data
 
 from ii_core import IICamera, IIPicture, five_viewpoints, preset, view_image
-from ii_core.view import view_positions
+from ii_core.picture.view import view_positions
 from metrics import linear_layers, q_angle, q_depth, q_global, q_view
 from raytrace_ii import load_scene, render
 

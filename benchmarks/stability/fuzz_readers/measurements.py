@@ -14,11 +14,11 @@ import numpy as np
 from numpy.random import Generator
 
 from ii_core import preset
+from ii_core.camera.maps import write_maps
+from ii_core.camera.prescriptions import lens as read_lens
 from ii_core.formats.lfp import read_raw
-from ii_core.maps import write_maps
-from ii_core.prescriptions import lens as read_lens
-from ii_core.spread import spread_maps
-from ii_core.spread_files import read_spread, write_spread
+from ii_core.waves.spread import spread_maps
+from ii_core.waves.spread_files import read_spread, write_spread
 from metrics.benchmark.profile import profile
 from metrics.benchmark.ranking import check_comparable, ranked
 from metrics.benchmark.result import FORMAT, NEEDED, VERSION, read_result

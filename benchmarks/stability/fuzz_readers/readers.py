@@ -18,14 +18,14 @@ from codec import decode
 from codec.container import write
 from codec.file_header import values
 from ii_core import IIPicture, preset
-from ii_core.files import write_image
+from ii_core.base.files import write_image
+from ii_core.camera.maps import read_maps, write_maps
+from ii_core.camera.presets import preset_cameras
 from ii_core.formats.find import find_views, picture_of
 from ii_core.formats.mosaic import load_mosaic
 from ii_core.formats.pfm import read_pfm
-from ii_core.maps import read_maps, write_maps
-from ii_core.presets import preset_cameras
-from metrics.point_log import read_points
-from metrics.study import read_study
+from metrics.reports.point_log import read_points
+from metrics.reports.study import read_study
 from raytrace_ii import load_scene
 from raytrace_ii.files.beside import read_texture
 from raytrace_ii.files.load import read_model

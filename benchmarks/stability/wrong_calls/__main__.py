@@ -23,7 +23,8 @@ import raytrace_ii
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
-from ii_core import glass, optics, prescriptions, spread, spread_files, surfaces, wave
+from ii_core.camera import glass, optics, prescriptions, surfaces
+from ii_core.waves import spread, spread_files, wave
 from metrics import observers
 from metrics.observers import simulated
 from metrics.plots import opinion_chart

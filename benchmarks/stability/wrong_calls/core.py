@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import ii_core
-from ii_core import IICamera, IIPicture, design, properties
+from ii_core import IICamera, IIPicture
+from ii_core.camera.maps import read_maps, write_maps
+from ii_core.design import design, properties
 from ii_core.display.lenticular import lenticular
 from ii_core.formats.find import find_views
-from ii_core.maps import read_maps, write_maps
 
 from .good import BLOCK, CAMERA, DEPTH, FRONT, PICTURE, PIXELS, SAMPLE, Call
 

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ii_core import glass, optics, prescriptions, spread, spread_files, surfaces, wave
-from ii_core.maps import write_maps
+from ii_core.camera import glass, optics, prescriptions, surfaces
+from ii_core.camera.maps import write_maps
+from ii_core.waves import spread, spread_files, wave
 
 from .good import CAMERA, PICTURE, Call
 

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ii_core import jit
+from ii_core.base import jit
 
 MARK = b"from .jit import"
 
@@ -42,7 +42,7 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def lean(function: Callable[..., Any]) -> Any:
-    """A kernel that makes no arrays; see `ii_core.jit.lean_kernel`."""
+    """A kernel that makes no arrays; see `ii_core.base.jit.lean_kernel`."""
     return _stamped(jit.lean_kernel(function))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
-from ii_core.extras import Lazy
+from ii_core.base.extras import Lazy
 
 from ...clock import cpu_seconds
 from ...contract import Coder, Goal, Option, Options, Pixels

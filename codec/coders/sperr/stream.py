@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.extras import Lazy
+from ii_core.base.extras import Lazy
 
 from ...clock import spent_elsewhere
 from . import worker

@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ...files import atomic_path
-from ...picture import IIPicture, codes8
-from ...video import IIVideo, video_of
-from ...view import camera_of, five_viewpoints, lens_array_mm, view_image
-from ..look import ASSUMED_ANGLE_DEG, with_assumed_camera
+from ...base.files import atomic_path
+from ...picture.assumed import ASSUMED_ANGLE_DEG, with_assumed_camera
+from ...picture.picture import IIPicture, codes8
+from ...picture.view import camera_of, five_viewpoints, lens_array_mm, view_image
+from ...video.video import IIVideo, video_of
 
 PAGE_SIDE = 2048  # texture size that every WebGL2 supports
 PREVIEW_SIDE = 512

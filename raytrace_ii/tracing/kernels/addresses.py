@@ -15,7 +15,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from ii_core import jit
+from ii_core.base import jit
 
 
 def _call(typing: Any, address: Any, a: Any, b: Any, c: Any, d: Any) -> Any:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.jit import exact_stage_kernel, late_kernel, stage_kernel
+from ii_core.base.jit import exact_stage_kernel, late_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ii_core.jit import lean_kernel as kernel
-from ii_core.jit import stage_kernel
+from ii_core.base.jit import lean_kernel as kernel
+from ii_core.base.jit import stage_kernel
 
 from .fresnel import fresnel
 from .media import cross, enter, leave, media_at, medium_of, refractive_index, transmits

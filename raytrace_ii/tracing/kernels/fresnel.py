@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ii_core.jit import part_kernel
+from ii_core.base.jit import part_kernel
 
 
 @part_kernel

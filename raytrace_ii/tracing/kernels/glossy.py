@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ii_core.jit import inline_kernel, part_kernel
-from ii_core.jit import lean_kernel as kernel
+from ii_core.base.jit import inline_kernel, part_kernel
+from ii_core.base.jit import lean_kernel as kernel
 
 
 @part_kernel

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.jit import inline_kernel
+from ii_core.base.jit import inline_kernel
 
 BLOCK = 64  # rays that go through the stages together: what is kept of them fits in the first cache
 

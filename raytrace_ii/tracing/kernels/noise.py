@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel, inner_kernel, stage_kernel
-from ii_core.jit import lean_kernel as kernel
+from ii_core.base.jit import inline_kernel, inner_kernel, stage_kernel
+from ii_core.base.jit import lean_kernel as kernel
 
 from . import lanes as at
 

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.jit import exact_kernel as kernel
-from ii_core.jit import exact_stage_kernel as stage_kernel
-from ii_core.jit import inline_kernel, part_kernel
+from ii_core.base.jit import exact_kernel as kernel
+from ii_core.base.jit import exact_stage_kernel as stage_kernel
+from ii_core.base.jit import inline_kernel, part_kernel
 
 from .addresses import call
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel, kernel
+from ii_core.base.jit import inline_kernel, kernel
 
 
 @kernel

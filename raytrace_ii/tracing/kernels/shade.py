@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ii_core.jit import late_kernel, part_kernel
-from ii_core.jit import lean_kernel as kernel
+from ii_core.base.jit import late_kernel, part_kernel
+from ii_core.base.jit import lean_kernel as kernel
 
 from . import lanes as at
 from .addresses import address_of, call, value_at

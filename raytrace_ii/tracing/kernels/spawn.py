@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.jit import inline_kernel, late_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import inline_kernel, late_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.jit import lean_kernel as kernel
+from ii_core.base.jit import lean_kernel as kernel
 
 
 @kernel

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.jit import lean_kernel as kernel
+from ii_core.base.jit import lean_kernel as kernel
 
 _LEAST, _MOST = 1e-150, 1e150  # between them squares and their sums neither vanish nor overflow
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ii_core.colour import LINEAR
-from ii_core.jit import inline_kernel, part_kernel, stage_kernel
+from ii_core.base.colour import LINEAR
+from ii_core.base.jit import inline_kernel, part_kernel, stage_kernel
 
 from .tables import ALPHA_BLEND, CHECKER, CUTOFF, IMAGE, LEVELS, MIRROR, REPEAT, TEXTURE, VERTEX
 from .texels import mixed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.jit import inline_kernel, part_kernel
+from ii_core.base.jit import inline_kernel, part_kernel
 
 from .lanes import BLOCK
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ii_core.files import write_image
+from ii_core.base.files import write_image
 from raytrace_ii import load_scene
 from raytrace_ii.files import beside
 from raytrace_ii.files.load import read_model

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ii_core import preset
-from ii_core.files import write_image
+from ii_core.base.files import write_image
 from raytrace_ii import load_scene, render, trace
 from raytrace_ii.files.gltf.materials import surface
 from raytrace_ii.files.load import read_model

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ii_core import preset
-from ii_core.files import write_image
+from ii_core.base.files import write_image
 from raytrace_ii import load_scene, render, scene_names, trace
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, linear
 

@@ -8,7 +8,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ii_core.files import write_image
+from ii_core.base.files import write_image
 from raytrace_ii import load_scene, trace
 from raytrace_ii.files.load import read_model
 from raytrace_ii.files.polygons import triangulated

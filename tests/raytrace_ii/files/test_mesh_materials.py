@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from ii_core.files import write_image
+from ii_core.base.files import write_image
 from raytrace_ii import load_scene, trace
 from raytrace_ii.files.load import read_model
 from raytrace_ii.scene.textures import VertexColours, linear

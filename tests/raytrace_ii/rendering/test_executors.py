@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture, preset
-from ii_core import executors as calls
+from ii_core.base import executors as calls
 from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.rendering import executors, job
 from raytrace_ii.tracing.packing import packed

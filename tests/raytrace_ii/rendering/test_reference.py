@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ii_core import IIPicture, preset
-from ii_core.files import read_channels, read_image
+from ii_core.base.files import read_channels, read_image
 from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.rendering import render_sets as reference
 from raytrace_ii.scene.hashing import content_hash

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, add_sensor_noise, five_viewpoints, preset, read_maps, view_image, write_maps
-from ii_core.view import view_positions
+from ii_core.picture.view import view_positions
 from raytrace_ii import Audit, Background, Scene, load_scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.rendering.tiles import ray_order, tiles

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture, orthoscopic, preset, stand_back
-from ii_core.files import read_about, read_channels, read_depth, read_image
+from ii_core.base.files import read_about, read_channels, read_depth, read_image
 from raytrace_ii import Scene, render, render_to
 from raytrace_ii.rendering import job
 from raytrace_ii.tracing.support_images import SUPPORT_IMAGES

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ii_core.files import read_image
+from ii_core.base.files import read_image
 from raytrace_ii import Scene, trace
 from raytrace_ii.rendering.job import CURVES, STEPS
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, image_texture, linear, normal_map

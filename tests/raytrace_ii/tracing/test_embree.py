@@ -11,7 +11,8 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from ii_core import IICamera, optics
+from ii_core import IICamera
+from ii_core.camera import optics
 from raytrace_ii import Scene, render
 from raytrace_ii.tracing import embree
 from raytrace_ii.tracing.embree import CONFIGURATION, Library, Tree, library

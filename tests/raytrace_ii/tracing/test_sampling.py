@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.sample_places import squares
-from ii_core import IICamera, optics, preset
+from ii_core import IICamera, preset
+from ii_core.camera import optics
 from raytrace_ii import Scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.scene.textures import Checker, Noise

@@ -1,0 +1,1 @@
+"""Properties of cameras and displays, and their design from wanted properties."""

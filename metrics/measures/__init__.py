@@ -1,0 +1,1 @@
+"""Measures of a pair of pictures: their contract and registry, and the built-in ones."""

@@ -1,0 +1,1 @@
+"""Rate–distortion: points of schemes and Bjøntegaard differences of curves."""

@@ -1,0 +1,1 @@
+"""Files of studies and reports of pairs of pictures, as text and charts."""
