@@ -73,7 +73,7 @@ def table() -> list[str]:
     commits = []
     for condition in dict.fromkeys(row["condition"] for row in rows):
         own = {row["scene"]: row for row in rows if row["condition"] == condition}
-        cells = [" · ".join(map(_decibel, own[s]["psnr"].values())) if s in own else "–" for s in scenes]
+        cells = [", ".join(map(_decibel, own[s]["psnr"].values())) if s in own else "–" for s in scenes]
         lines.append(f"| {condition} | {' | '.join(cells)} |")
         commits.append([row["commit"] for row in own.values()])
     return [origin(rows), "", *with_commits(lines, commits)]

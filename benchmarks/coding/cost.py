@@ -131,8 +131,8 @@ def peak() -> int:
 def table(rows: list[dict[str, Any]]) -> list[str]:
     """Return a table of CPU seconds, our share of them, and memory in pictures, one row per scheme."""
     lines = [
-        "| scheme | bpp | dB | encoder, s | ours, of that | decoder, s | ours, of encoder | ours, of decoder "
-        "| peak encoding | peak decoding |",
+        "| scheme | bpp | dB | encoder, s | ours, % | decoder, s | ours, % of encoder | ours, % of decoder "
+        "| peak encoding, pictures | peak decoding, pictures |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for r in rows:
@@ -141,9 +141,9 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
         lossless = r["q_global"] is None
         lines.append(
             f"| `{r['scheme']}` | {r['bpp']:.3g} | {'lossless' if lossless else format(r['q_global'], '.1f')} | "
-            f"{r['encoder_seconds']:.2f} | {packing / r['encoder_seconds']:.0%} | {r['decoder_seconds']:.2f} | "
-            f"{unpacking / r['encoder_seconds']:.0%} | {unpacking / r['decoder_seconds']:.0%} | "
-            f"{r['encode_peak']:.1f} × | {r['decode_peak']:.1f} × |"
+            f"{r['encoder_seconds']:.2f} | {100 * packing / r['encoder_seconds']:.0f} | {r['decoder_seconds']:.2f} | "
+            f"{100 * unpacking / r['encoder_seconds']:.0f} | {100 * unpacking / r['decoder_seconds']:.0f} | "
+            f"{r['encode_peak']:.1f} | {r['decode_peak']:.1f} |"
         )
     return [origin(rows), "", *with_commits(lines, [[r["commit"]] for r in rows])]
 

@@ -11,6 +11,7 @@ of ``benchmarks/results/headers.jsonl``; tables go into ``docs/structure.md``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -28,6 +29,7 @@ from raytrace_ii import load_scene, render
 RECORDS = Records("headers", ("benchmarks.coding.headers",))
 SCENE, SCALE = "apples", 4  # conditions of the page
 SIDES = (16, 32, 64, 128, 256)
+SHOWN = (16, 64, 256)  # sides in the tables of bits
 RATES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
 KINDS = ("si", "ei", "ri")
 
@@ -117,11 +119,12 @@ def tables() -> Tables:
 
 def floor_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return rates of black / scene at the coarsest quantiser, bpp, one column per structure."""
-    lines = ["| scheme | " + " | ".join(f"{side}²" for side in SIDES) + " |", "|---|" + "---|" * len(SIDES)]
+    rows = [row for row in rows if row["side"] in SHOWN]
+    lines = ["| scheme | " + " | ".join(f"{side}²" for side in SHOWN) + " |", "|---|" + "---|" * len(SHOWN)]
     commits = []
     for scheme in dict.fromkeys(row["scheme"] for row in rows):
         those = {row["side"]: row for row in rows if row["scheme"] == scheme}
-        cells = [floor_cell(those[side]) if side in those else "" for side in SIDES]
+        cells = [floor_cell(those[side]) if side in those else "" for side in SHOWN]
         lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
         commits.append([row["commit"] for row in those.values()])
     return with_commits(lines, commits)
@@ -136,21 +139,34 @@ def floor_cell(row: dict[str, Any]) -> str:
 
 
 def part_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Return the bits per frame of a black picture by purpose."""
+    """Return the bits per frame of a black picture by purpose, over the structures."""
     lines = [
-        "| scheme | EI | frames | start codes, lengths | parameter sets | slice headers | data | bits per frame |",
-        "|---|---|---|---|---|---|---|---|",
+        "| scheme | frames | start codes, lengths | parameter sets | slice headers | data | bits per frame |",
+        "|---|---|---|---|---|---|---|",
     ]
-    shown = [row for row in rows if "parts" in row and row["side"] in (16, 64, 256)]
-    for row in shown:
-        p, j = row["parts"], row["frames"]
-        headers = "(in data)" if p["headers"] is None else f"{p['headers'] / j:.1f}"
-        total = sum(p[name] or 0 for name in ("framing", "parameters", "messages", "headers", "data"))
-        lines.append(
-            f"| `{row['scheme']}` | {row['side']}² | {j} | {p['framing'] / j:.1f} | {p['parameters'] / j:.1f} | "
-            f"{headers} | {(p['data'] + p['messages']) / j:.1f} | {total / j:.1f} |"
-        )
-    return with_commits(lines, [[row["commit"]] for row in shown])
+    shown = [row for row in rows if "parts" in row and row["side"] in SHOWN]
+    commits = []
+    for scheme in dict.fromkeys(row["scheme"] for row in shown):
+        own = [row for row in shown if row["scheme"] == scheme]
+        bits = [_per_frame(row["parts"], row["frames"]) for row in own]
+        cells = [_range([row["frames"] for row in own], "d")]
+        cells += ["(in data)" if None in some else _range(some, ".1f") for some in zip(*bits, strict=True)]
+        lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
+        commits.append([row["commit"] for row in own])
+    return with_commits(lines, commits)
+
+
+def _per_frame(p: dict[str, Any], frames: int) -> list[float | None]:
+    """Return bits of framing, parameter sets, slice headers (None if in the data), data, and all, per frame."""
+    data = p["data"] + p["messages"]
+    total = p["framing"] + p["parameters"] + (p["headers"] or 0) + data
+    sums = (p["framing"], p["parameters"], p["headers"], data, total)
+    return [None if bits is None else bits / frames for bits in sums]
+
+
+def _range(values: Sequence[Any], form: str) -> str:
+    """Return the least and the greatest value, once if they look alike."""
+    return "–".join(dict.fromkeys(format(value, form) for value in (min(values), max(values))))
 
 
 def duel_table(rows: list[dict[str, Any]]) -> list[str]:

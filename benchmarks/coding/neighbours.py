@@ -226,7 +226,7 @@ def table() -> list[str]:
     if not rows:
         return ["Not measured yet."]
     takes = [take for take in TAKES if any(key[0] == take for key in rows)]
-    lines = ["| | " + " | ".join(takes) + " |", "|---|" + "---|" * len(takes)]
+    lines = ["| | " + " | ".join(f"{take}, %" for take in takes) + " |", "|---|" + "---|" * len(takes)]
     names = {"view": "last view alone", "better": "the better of both", "mean": "the better of both, or their mean"}
     for qp in map(str, QUANTISERS):
         for name, text in names.items():
@@ -234,14 +234,14 @@ def table() -> list[str]:
             for take in takes:
                 found = rows.get((take, "bits"))
                 parts = found and found["bits_per_pixel"][qp]
-                cells.append(f"{100 * (parts[name] / parts['time'] - 1):+.1f} %" if parts else "–")
+                cells.append(f"{100 * (parts[name] / parts['time'] - 1):+.1f}" if parts else "–")
             lines.append(f"| predicted from {text}, step of quantiser {qp} | " + " | ".join(cells) + " |")
     for what in CODINGS:
         cells = []
         for take in takes:
             pair = [rows.get((take, name)) for name in (ANCHOR, what)]
             off = None if None in pair else difference(*(row["points"] for row in pair if row))
-            cells.append("anchor" if what == ANCHOR else "–" if off is None else f"{off:+.1f} %")
+            cells.append("anchor" if what == ANCHOR else "–" if off is None else f"{off:+.1f}")
         lines.append(f"| x264, {what} | " + " | ".join(cells) + " |")
     return [origin(rows.values()), "", *lines]
 

@@ -169,7 +169,10 @@ def plan_table() -> list[str]:
     rows = by_plan()
     if not rows:
         return ["Not measured yet."]
-    lines = ["| plan | frames for one SI, mean | " + " | ".join(rows) + " |", "|---|---|" + "---|" * len(rows)]
+    lines = [
+        "| plan | frames for one SI, mean | " + " | ".join(f"{take}, %" for take in rows) + " |",
+        "|---|---|" + "---|" * len(rows),
+    ]
     commits = []
     for plan in PLANS:
         cost = component_cost(PLANS[plan], 256, FRAMES)
@@ -192,7 +195,7 @@ def coder_table() -> list[str]:
     if not rows:
         return ["Not measured yet."]
     lines = [
-        "| coder | order | " + " | ".join(f"{take}, own | H.264" for take in TAKES) + " | CPU over encoder's |",
+        "| coder | order | " + " | ".join(f"{take}, own, % | H.264, %" for take in TAKES) + " | CPU over encoder's |",
         "|---|---|" + "---|---|" * len(TAKES) + "---|",
     ]
     for coder in CODERS:
@@ -212,7 +215,7 @@ def coder_table() -> list[str]:
 
 def rate_text(off: float | None) -> str:
     """Return a Bjøntegaard rate as text of a cell."""
-    return "–" if off is None else f"{off:+.1f} %"
+    return "–" if off is None else f"{off:+.1f}"
 
 
 def speed_table() -> list[str]:
@@ -221,7 +224,7 @@ def speed_table() -> list[str]:
     if not rows:
         return ["Not measured yet."]
     lines = [
-        "| take | speed | 1 − c in time | 1 − c in view | time-first against view-first |",
+        "| take | speed | 1 − c in time | 1 − c in view | time-first against view-first, % |",
         "|---|---|---|---|---|",
     ]
     for row in sorted(rows, key=lambda row: (TAKES.index(row["take"]), row["step"])):

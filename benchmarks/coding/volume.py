@@ -118,7 +118,7 @@ def rows(name: str, scene: dict[str, Any]) -> list[str]:
     for scheme, points in scene["curves"].items():
         curve = list(zip(*points, strict=True))
         try:
-            gain = f"{bd_rate(*anchor, *curve):+.0f} %"
+            gain = f"{bd_rate(*anchor, *curve):+.0f}"
         except ValueError:
             gain = "no overlap"
         low, high = points[0], points[-1]
@@ -133,7 +133,7 @@ def rows(name: str, scene: dict[str, Any]) -> list[str]:
 def tables() -> Tables:
     """Return the tables of the page."""
     scenes = RECORDS.rows(scale=SCALE)
-    table = ["| scene | scheme | rate | bpp | dB | lossless, bpp |", "|---|---|---|---|---|---|"]
+    table = ["| scene | scheme | rate, % | bpp | dB | lossless, bpp |", "|---|---|---|---|---|---|"]
     apart_table = ["| scene | a stream each, bpp | of it headers | one stream, bpp |", "|---|---|---|---|"]
     commits: list[list[str]] = []
     for scene in scenes:
