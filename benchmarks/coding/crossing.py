@@ -35,7 +35,7 @@ REFS = 1
 
 
 def main() -> None:
-    """Measure, print and fill the table."""
+    """Measure, print the table and fill the page."""
     asked = command_line(__doc__).parse_args()
     keys = [
         {"scale": SCALE, "pitch_px": pitch, "mm_per_frame": speed, "refs": REFS}
@@ -98,26 +98,27 @@ def rows() -> list[dict[str, Any]]:
 
 
 def tables() -> Tables:
-    """Return the table of the page of videos."""
-    return {("docs/video.md", "takes-crossing"): table()}
+    """Return the commits behind the chart of the page of videos, which has the numbers of the table."""
+    found = rows()
+    return {("docs/video.md", "takes-crossing"): [origin(found) if found else "Not measured yet."]}
 
 
 def table() -> list[str]:
-    """Return a table with a row per pitch and speed: ratios of decorrelation, and the rate."""
+    """Return a table with a row per pitch and speed: ratios of decorrelation and energy, and the rate."""
     found = rows()
     if not found:
         return ["Not measured yet."]
     lines = [
-        "| references | lens pitch, px | lenses a frame | 1 − c, time over view | compensated | "
-        "time-first against view-first, % |",
-        "|" + "---|" * 6,
+        "| references | lens pitch | mm a frame | lenses a frame | 1 − c, time over view | e, time over view | "
+        "1 − c, compensated | e, compensated | time-first against view-first |",
+        "|" + "---|" * 9,
     ]
     for row in found:
         lenses = row["mm_per_frame"] / (preset("setup1", scale=row["scale"]).pixel_pitch_mm * row["pitch_px"])
-        values = [ratios(row, kind)[0] for kind in ("plain", "compensated")]
-        off = "–" if row["rate"] is None else f"{row['rate']:+.1f}"
+        values = [*ratios(row, "plain"), *ratios(row, "compensated")]
+        off = "–" if row["rate"] is None else f"{row['rate']:+.1f} %"
         lines.append(
-            f"| {row['refs']} | {row['pitch_px']} | {lenses:.2g} | "
+            f"| {row['refs']} | {row['pitch_px']} px | {row['mm_per_frame']:g} | {lenses:.2g} | "
             + " | ".join(f"{value:.3g}" for value in values)
             + f" | {off} |"
         )

@@ -118,7 +118,7 @@ def tables() -> Tables:
 
 
 def floor_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Return rates of black / scene at the coarsest quantiser, bpp, one column per structure."""
+    """Return rates of black and scene at the coarsest quantiser, bpp, one column per structure."""
     rows = [row for row in rows if row["side"] in SHOWN]
     lines = ["| scheme | " + " | ".join(f"{side}²" for side in SHOWN) + " |", "|---|" + "---|" * len(SHOWN)]
     commits = []
@@ -131,11 +131,11 @@ def floor_table(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def floor_cell(row: dict[str, Any]) -> str:
-    """Return rates of black / scene, and the PSNR of the scene."""
+    """Return rates of black and scene, and the PSNR of the scene."""
     if "refused" in row:
         return "–"
     quality = "lossless" if row["floor_db"] is None else f"{row['floor_db']:.1f}"
-    return f"{row['black_bpp']:.2g} / {row['floor_bpp']:.2g} ({quality})"
+    return f"{row['black_bpp']:.2g}, {row['floor_bpp']:.2g} ({quality})"
 
 
 def part_table(rows: list[dict[str, Any]]) -> list[str]:

@@ -228,14 +228,14 @@ def table() -> list[str]:
     takes = [take for take in TAKES if any(key[0] == take for key in rows)]
     lines = ["| | " + " | ".join(f"{take}, %" for take in takes) + " |", "|---|" + "---|" * len(takes)]
     names = {"view": "last view alone", "better": "the better of both", "mean": "the better of both, or their mean"}
-    for qp in map(str, QUANTISERS):
-        for name, text in names.items():
-            cells = []
-            for take in takes:
-                found = rows.get((take, "bits"))
-                parts = found and found["bits_per_pixel"][qp]
-                cells.append(f"{100 * (parts[name] / parts['time'] - 1):+.1f}" if parts else "–")
-            lines.append(f"| predicted from {text}, step of quantiser {qp} | " + " | ".join(cells) + " |")
+    for name, text in names.items():
+        cells = []
+        for take in takes:
+            found = rows.get((take, "bits"))
+            bits = [found["bits_per_pixel"][str(qp)] for qp in QUANTISERS] if found else []
+            cells.append(", ".join(f"{100 * (parts[name] / parts['time'] - 1):+.1f}" for parts in bits) or "–")
+        steps = " and ".join(map(str, QUANTISERS))
+        lines.append(f"| predicted from {text}, steps of quantisers {steps} | " + " | ".join(cells) + " |")
     for what in CODINGS:
         cells = []
         for take in takes:
