@@ -29,7 +29,7 @@ from raytrace_ii import load_scene, render
 RECORDS = Records("headers", ("benchmarks.coding.headers",))
 SCENE, SCALE = "apples", 4  # conditions of the page
 SIDES = (16, 32, 64, 128, 256)
-SHOWN = (16, 64, 256)  # sides in the tables of bits
+SHOWN = (16, 64, 256)  # sides in the table of bits
 RATES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
 KINDS = ("si", "ei", "ri")
 
@@ -109,33 +109,12 @@ def tables() -> Tables:
     """Return the tables of the page of structures."""
     floors, duels = (RECORDS.rows(part=part, scene=SCENE, scale=SCALE) for part in ("floor", "duel"))
     floors.sort(key=lambda row: (row["scheme"], row["side"]))
+    page = "docs/structure.md"
     return {
-        ("docs/structure.md", mark): [origin(rows), "", *made(rows)]
-        for mark, made, rows in (
-            ("floors", floor_table, floors), ("parts", part_table, floors), ("duels", duel_table, duels)
-        )
-    }  # fmt: skip
-
-
-def floor_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Return rates of black and scene at the coarsest quantiser, bpp, one column per structure."""
-    rows = [row for row in rows if row["side"] in SHOWN]
-    lines = ["| scheme | " + " | ".join(f"{side}²" for side in SHOWN) + " |", "|---|" + "---|" * len(SHOWN)]
-    commits = []
-    for scheme in dict.fromkeys(row["scheme"] for row in rows):
-        those = {row["side"]: row for row in rows if row["scheme"] == scheme}
-        cells = [floor_cell(those[side]) if side in those else "" for side in SHOWN]
-        lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
-        commits.append([row["commit"] for row in those.values()])
-    return with_commits(lines, commits)
-
-
-def floor_cell(row: dict[str, Any]) -> str:
-    """Return rates of black and scene, and the PSNR of the scene."""
-    if "refused" in row:
-        return "–"
-    quality = "lossless" if row["floor_db"] is None else f"{row['floor_db']:.1f}"
-    return f"{row['black_bpp']:.2g}, {row['floor_bpp']:.2g} ({quality})"
+        (page, "floors"): [origin(floors)],  # a chart has the numbers: `benchmarks.pages.floors_chart`
+        (page, "parts"): [origin(floors), "", *part_table(floors)],
+        (page, "duels"): [origin(duels), "", *duel_table(duels)],
+    }
 
 
 def part_table(rows: list[dict[str, Any]]) -> list[str]:
