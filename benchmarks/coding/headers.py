@@ -149,29 +149,21 @@ def _range(values: Sequence[Any], form: str) -> str:
 
 
 def duel_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Return predictions and results of SI against EI and RI."""
+    """Return gains of SI over EI and RI and the lowest rates that were reached."""
     lines = [
-        "| EI | SI before EI by (5.14) | fewer bits black | mean gain | lowest rate SI, EI | SI before RI by (5.15) "
-        "| fewer bits black | mean gain | lowest rate RI |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| EI | over EI, dB | over RI, dB | lowest rate SI, EI, RI, bpp |",
+        "|---|---|---|---|",
     ]
     for row in rows:
-        ei, ri = row["ei"], row["ri"]
-        cells = [yes(ei["predicted"]), yes(ei["fewer_header_bits"]), gain(ei)]
-        cells += [f"{ei['lowest']['si'] or '–'}, {ei['lowest']['ei'] or '–'}"]
-        cells += [yes(ri["predicted"]), yes(ri["fewer_header_bits"]), gain(ri), f"{ri['lowest']['ri'] or '–'}"]
-        lines.append(f"| {row['side']}² | " + " | ".join(cells) + " |")
+        reached = (row["ei"]["lowest"]["si"], row["ei"]["lowest"]["ei"], row["ri"]["lowest"]["ri"])
+        lowest = ", ".join("–" if rate is None else f"{rate:g}" for rate in reached)
+        lines.append(f"| {row['side']}² | {gain(row['ei'])} | {gain(row['ri'])} | {lowest} |")
     return with_commits(lines, [[row["commit"]] for row in rows])
-
-
-def yes(value: bool) -> str:
-    """Return yes or no for a table."""
-    return "yes" if value else "no"
 
 
 def gain(row: dict[str, Any]) -> str:
     """Return a gain in dB with the number of rates."""
-    return "–" if row["gain_db"] is None else f"{row['gain_db']:+.1f} dB ({len(row['rates_both'])} rates)"
+    return "–" if row["gain_db"] is None else f"{row['gain_db']:+.1f} ({len(row['rates_both'])} rates)"
 
 
 if __name__ == "__main__":

@@ -234,8 +234,7 @@ def table() -> list[str]:
             found = rows.get((take, "bits"))
             bits = [found["bits_per_pixel"][str(qp)] for qp in QUANTISERS] if found else []
             cells.append(", ".join(f"{100 * (parts[name] / parts['time'] - 1):+.1f}" for parts in bits) or "–")
-        steps = " and ".join(map(str, QUANTISERS))
-        lines.append(f"| predicted from {text}, steps of quantisers {steps} | " + " | ".join(cells) + " |")
+        lines.append(f"| estimate, {text} | " + " | ".join(cells) + " |")
     for what in CODINGS:
         cells = []
         for take in takes:
