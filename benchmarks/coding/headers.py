@@ -120,16 +120,15 @@ def tables() -> Tables:
 def part_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return the bits per frame of a black picture by purpose, over the structures."""
     lines = [
-        "| scheme | frames | start codes, lengths | parameter sets | slice headers | data | bits per frame |",
-        "|---|---|---|---|---|---|---|",
+        "| scheme | start codes, lengths | parameter sets | slice headers | data | bits per frame |",
+        "|---|---|---|---|---|---|",
     ]
     shown = [row for row in rows if "parts" in row and row["side"] in SHOWN]
     commits = []
     for scheme in dict.fromkeys(row["scheme"] for row in shown):
         own = [row for row in shown if row["scheme"] == scheme]
         bits = [_per_frame(row["parts"], row["frames"]) for row in own]
-        cells = [_range([row["frames"] for row in own], "d")]
-        cells += ["(in data)" if None in some else _range(some, ".1f") for some in zip(*bits, strict=True)]
+        cells = ["(in data)" if None in some else _range(some) for some in zip(*bits, strict=True)]
         lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
         commits.append([row["commit"] for row in own])
     return with_commits(lines, commits)
@@ -143,9 +142,9 @@ def _per_frame(p: dict[str, Any], frames: int) -> list[float | None]:
     return [None if bits is None else bits / frames for bits in sums]
 
 
-def _range(values: Sequence[Any], form: str) -> str:
+def _range(values: Sequence[float]) -> str:
     """Return the least and the greatest value, once if they look alike."""
-    return "–".join(dict.fromkeys(format(value, form) for value in (min(values), max(values))))
+    return "–".join(dict.fromkeys(f"{value:.1f}" for value in (min(values), max(values))))
 
 
 def duel_table(rows: list[dict[str, Any]]) -> list[str]:

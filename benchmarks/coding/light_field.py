@@ -170,8 +170,8 @@ def targets(records: Mapping[int, Sequence[Mapping[str, Any]]]) -> list[str]:
     Schemes are in order of their Bjøntegaard rate against the anchor of `coders`; each then meets the best so far.
     """
     lines = [
-        "| scale | scene | `si-lf` | least rate of all others | others | rate of `si-lf` |",
-        "|---|---|---|---|---|---|",
+        "| scale | scene | least rate of all others | others | rate of `si-lf` |",
+        "|---|---|---|---|---|",
     ]
     for scale, rows in records.items():
         for scene in SCENES:
@@ -179,7 +179,7 @@ def targets(records: Mapping[int, Sequence[Mapping[str, Any]]]) -> list[str]:
             others = [name for name in curves if not _is_ours(name)]
             best = least_rate(curves, others)
             lines += [
-                f"| {scale} | {scene} | `{name}` | `{best}` | {len(others)} | "
+                f"| {scale} | {scene}{'' if name == OURS else f', `{name}`'} | `{best}` | {len(others)} | "
                 f"{difference(curves[best], curves[name])} |"
                 for name in filter(_is_ours, curves if best else ())
             ]

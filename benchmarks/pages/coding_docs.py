@@ -40,7 +40,7 @@ def tables() -> Tables:
     best = ", ".join(f"`{row['scheme']}`" for row in front(others))
     page = "docs/coding.md"
     return {
-        (page, "which"): [*size(SCALE, others), "", *which(others)],
+        (page, "which"): which(others),
         (page, "coders"): [
             *size(SCALE, others),
             "",
@@ -68,14 +68,14 @@ CHOICES = {
 
 
 def which(rows: list[dict[str, Any]]) -> list[str]:
-    """Return a table of schemes by purpose."""
+    """Return a table of schemes by purpose; conditions and commits are those of the table of all schemes."""
     known = {row["scheme"]: row for row in summary(rows)}
     lines = ["| you want | take | rate at equal PSNR | CPU s |", "|---|---|---|---|"]
     for wish, scheme in CHOICES.items():
         row = known[scheme]
         rate = "curves share too little" if row["mean"] is None else f"{1 + row['mean'] / 100:.2f} ×"
         lines.append(f"| {wish} | `{scheme}` | {rate} | {row['seconds']:.2f} |")
-    return with_commits(lines, [known[scheme]["commits"] for scheme in CHOICES.values()])
+    return lines
 
 
 def front_table(rows: list[dict[str, Any]]) -> list[str]:
