@@ -35,19 +35,12 @@ def main() -> None:
 def tables() -> Tables:
     """Return all tables of schemes."""
     coders, full = studied(SCALE), studied(1)
-    trials = [row for row in coders if row["scheme"] in {*TRIALS, ANCHOR}]
+    trials = [row for row in coders if row["scheme"] in TRIALS]
     others = [row for row in coders if row["scheme"] not in TRIALS]
-    best = ", ".join(f"`{row['scheme']}`" for row in front(others))
     page = "docs/coding.md"
     return {
         (page, "which"): which(others),
-        (page, "coders"): [
-            *size(SCALE, others),
-            "",
-            *table(others, shortened(summary(others))),
-            "",
-            f"Pareto front of rate and time: {best}.",
-        ],
+        (page, "coders"): [*size(SCALE, others), "", *table(others, shortened(summary(others)))],
         (page, "full"): [*size(1, full), "", *table(full)],
         (page, "trials"): [*size(SCALE, trials), "", *trial_table(trials)],
         (page, "bframes"): bframes.table(),
