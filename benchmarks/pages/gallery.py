@@ -27,8 +27,8 @@ SAMPLES = 16
 SCALE = 2  # 256×128 lenses: pages of a few megabytes
 INTRODUCTION = f"""# Gallery
 
-On this page you can choose a reference scene. `make gallery` makes a [viewer](../viewer.md) page of
-each, which opens in any browser without a network; it takes some 20 minutes of CPU time. Each is
+Here you choose a reference scene. `make gallery` makes a [viewer](../viewer.md) page of each, which
+opens in any browser without a network, in 20 minutes of CPU time. Each is
 `setup1` with half of the lenses each way, {SAMPLES} samples per pixel, JPEG of quality {QUALITY}. *Mountains* and
 the ground behind the *Twins* are so far away that each lens sees them whole: no display of this
 kind can resolve them.
