@@ -240,10 +240,10 @@ BENCHMARKS = {
         Benchmark("pages.gallery", needs=f"{BROWSER} for --stills", writes=("docs/gallery/*",)),
         Benchmark(
             "pages.readme",
-            needs="out/demo and out/full of examples/demo.py; records of disparity and ratios",
+            needs="out/demo and out/full of examples/demo.py; records of the coders, ratios, Mitsuba and POV-Ray",
             records="*_rd.json",
-            fills=("README.md", "docs/study.md"),
-            writes=tuple(f"{IMAGES}/{name}_*" for name in ("apples", "cuboid", "demo", "full")),
+            fills=("README.md", "docs/study.md", "docs/speed_accuracy.md"),
+            writes=(f"{IMAGES}/apples_*", f"{IMAGES}/demo_*"),
         ),
         Benchmark(
             "study",
