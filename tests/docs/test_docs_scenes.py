@@ -26,7 +26,6 @@ from raytrace_ii.files.toml_schema import (  # fmt: skip
     SceneFile,
     TrackTable,
 )
-from raytrace_ii.shapes.implicit_parts import Part
 
 DOCS = (Path(__file__).parents[2] / "docs" / "scenes.md").read_text(encoding="utf-8")
 MODELS = {
@@ -36,22 +35,35 @@ MODELS = {
     "material": MaterialTable,
     "object": ObjectTable,
     "mesh": MeshFile,
-    "parts": Part,
     "animation": AnimationTable,
     "track": TrackTable,
     **{
-        f"{kind} {name}": model
-        for kind, models in (("light", LIGHTS), ("texture", TEXTURES), ("shape", SHAPES), ("part", SHAPE_PARTS))
+        f"{table} {name}": model
+        for table, models in (("light", LIGHTS), ("texture", TEXTURES), ("shape", SHAPES), ("parts", SHAPE_PARTS))
         for name, model in models.items()
     },
 }
-SECTIONS = {
-    " ".join(re.findall(r"`(\w+)`", head)): [
-        (key, default.strip())
-        for key, default in re.findall(r"^\| `(\w+)` \|[^\n]*\| ([^|\n]+) \|$", text, re.M)
-    ]
-    for head, text in re.findall(r"^### (`[^\n]+`)\n(.*?)(?=^##|\Z)", DOCS, re.M | re.S)
-}  # fmt: skip
+
+
+def sections(text):
+    """Return the keys with their defaults of each table, of each kind that its heading lists.
+
+    An entry that begins with kinds in italics is a key of these kinds alone.
+    """
+    found = {}
+    for head, body in re.findall(r"^### (`[^\n]+`)\n(.*?)(?=^##|\Z)", text, re.M | re.S):
+        table, *kinds = re.findall(r"`(\w+)`", head)
+        rows = re.findall(r"^\| `(\w+)` \| (?:\*([\w, ]+)\*: )?[^\n]*\| ([^|\n]+) \|$", body, re.M)
+        for _, of, _ in rows:
+            assert set(filter(None, of.split(", "))) <= set(kinds), f"{head}: kinds {of}"
+        for kind in kinds or [""]:
+            found[f"{table} {kind}".strip()] = [
+                (key, default.strip()) for key, of, default in rows if not of or kind in of.split(", ")
+            ]
+    return found
+
+
+SECTIONS = sections(DOCS)
 
 
 BALL = """
@@ -70,9 +82,7 @@ def test_every_table_of_a_file_has_its_section():
 
 @pytest.mark.parametrize("name", MODELS)
 def test_every_key_is_documented_with_its_default_and_no_other(name):
-    fields = dict(MODELS[name].model_fields)
-    if name.startswith("part "):
-        fields = {key: field for key, field in fields.items() if key not in Part.model_fields}
+    fields = MODELS[name].model_fields
     documented = dict(SECTIONS[name])
     assert len(documented) == len(SECTIONS[name]), "a key twice"
     assert set(documented) == set(fields)
