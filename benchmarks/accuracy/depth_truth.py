@@ -92,11 +92,9 @@ def table(data: dict[str, Any]) -> list[str]:
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     keys = ("median_layers", "within_one_layer", "within_10_%")
     clean = [row for row in data["rows"] if not row["noise"]]
-    fine, coarse = (
-        [row for row in clean if (row["scale"] == NOISE_SCALE) == is_coarse] for is_coarse in (False, True)
-    )
+    fine = [row for row in clean if row["scale"] != NOISE_SCALE]
     groups = {name: _only(fine, scene=name) for name in dict.fromkeys(row["scene"] for row in fine)}
-    groups[f"all at scale {NOISE_SCALE}, mean"] = coarse
+    groups[f"all at scale {NOISE_SCALE}, mean"] = [row for row in clean if row["scale"] == NOISE_SCALE]
     for name, rows in groups.items():
         cells = [
             " → ".join(

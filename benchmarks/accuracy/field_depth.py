@@ -102,8 +102,8 @@ def tables() -> Tables:
         for rows in (converged, parallel)
     )
     told = (
-        "Each cell: the dissertation's method → the robust one. Converged views: 9×9 of 128² pixels. Last row: median "
-        f"of the same scenes behind the parallel lenses of setup1, scale 8. Disparities are {reach} (1–99 %). "
+        "Each cell: the dissertation's method → the robust one. Converged views: 9×9 of 128² pixels. Last row: "
+        f"median of the same scenes behind the parallel lenses of setup1, scale 8. Disparities are {reach} (1–99 %). "
         f"4 samples a pixel. {origin(measured)}"
     )
     return {("docs/metrics.md", "field-depth"): [*lines, "", *textwrap.wrap(told, 100, break_on_hyphens=False)]}
