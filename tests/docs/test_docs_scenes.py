@@ -45,21 +45,30 @@ MODELS = {
 }
 
 
+TAGS = {"light": "kind", "texture": "kind", "shape": "shape", "parts": "part"}
+KEY = re.compile(
+    r"^- (?P<bold>\*\*)?`(?P<key>\w+)(?: = (?P<value>[^`]+))?`(?:\*\*)?(?: = \*(?P<words>[^*]+)\*)?"
+    r"(?: \(\*(?P<kinds>[\w, ]+)\*\))?:",
+    re.M,
+)
+
+
 def sections(text):
     """Return the keys with their defaults of each table, of each kind that its heading lists.
 
-    An entry that begins with kinds in italics is a key of these kinds alone.
+    Defaults are ``...`` for needed keys, None for absent ones, else as on the page, ``*in words*`` too.
     """
     found = {}
     for head, body in re.findall(r"^### (`[^\n]+`)\n(.*?)(?=^##|\Z)", text, re.M | re.S):
         table, *kinds = re.findall(r"`(\w+)`", head)
-        rows = re.findall(r"^\| `(\w+)` \| (?:\*([\w, ]+)\*: )?[^\n]*\| ([^|\n]+) \|$", body, re.M)
-        for _, of, _ in rows:
-            assert set(filter(None, of.split(", "))) <= set(kinds), f"{head}: kinds {of}"
         for kind in kinds or [""]:
-            found[f"{table} {kind}".strip()] = [
-                (key, default.strip()) for key, of, default in rows if not of or kind in of.split(", ")
-            ]
+            keys = found[f"{table} {kind}".strip()] = [(TAGS[table], ...)] if kind else []
+            for one in KEY.finditer(body):
+                of = (one["kinds"] or "").split(", ")
+                assert of == [""] or set(of) < set(kinds), f"{head}: kinds {of}"
+                if of == [""] or kind in of:
+                    words = one["words"] and f"*{one['words']}*"
+                    keys.append((one["key"], ... if one["bold"] else one["value"] or words))
     return found
 
 
@@ -89,16 +98,16 @@ def test_every_key_is_documented_with_its_default_and_no_other(name):
     for key, said in documented.items():
         field = fields[key]
         if field.default is PydanticUndefined:
-            assert said == "*needed*", key
+            assert said is ..., key
         elif field.default is None:
-            assert said == "*none*", key
+            assert said is None, key
         elif said == "*black*":
             assert field.default == BackgroundTable(horizon="#000000"), key
         elif said.startswith("*linear"):
             numbers = [float(n) for n in re.findall(r"[\d.]+", said)]
             np.testing.assert_allclose(np.ravel(field.default), np.resize(numbers, np.size(field.default)))
         else:
-            value = tomllib.loads(f"x = {said.strip('`')}")["x"]
+            value = tomllib.loads(f"x = {said}")["x"]
             reads = [m.func for m in field.metadata if hasattr(m, "func")] or [
                 TypeAdapter(field.annotation).validate_python
             ]
