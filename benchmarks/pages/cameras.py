@@ -90,23 +90,21 @@ KINDS = {
 
 INTRODUCTION = """# Cameras
 
-With this page you can choose a camera of the package, and the format of its maps. A camera is a
-location and a direction for every pixel. Each strip shows, from left to right, with an eighth of the
-lenses each way (`python -m benchmarks run cameras`):
+With this page you can choose a camera of the package and the format of its maps. A camera is a
+location and a direction for every pixel. Each strip shows (`python -m benchmarks run cameras`; an
+eighth of the lenses each way, of several arrays the first):
 
 1. the locations L over the whole array, with x, y and z as red, green and blue;
-2. the directions D of a few lenses, in the same colours;
+2. the directions D of a few lenses, in the same colours, black if blocked;
 3. the same few lenses of *Apples*, rendered through L and D;
 4. the view of a viewer in front of the display; with a main lens, the middle sub-image, upright.
 
-Of several arrays the strip shows the first. Blocked rays are black. A camera has 8192×4096 px,
-512×256 lenses in a rectangular array, 16×16 px each, and a viewing angle α = 29.9°, unless given.
-
-`raytrace-ii camera NAME -o dir/` stores L and D as pictures; `raytrace-ii camera NAME --report`
-prints properties and limits. [Camera files](camera_files.md) lists all keys and elements, for a
-camera or a display of your own.
+Unless given, cameras have pinholes, 8192×4096 px, 512×256 lenses in a rectangular array, 16×16 px
+each, and a viewing angle α = 29.9°. `raytrace-ii camera NAME -o dir/` stores L and D as pictures,
+`--report` prints properties and limits. [Camera files](camera_files.md) lists all keys and
+elements.
 """
-USUAL = ("8192×4096 px", "512×256 lenses", "rectangular", "16×16 px each", "α = 29.9°")
+USUAL = ("pinhole", "8192×4096 px", "512×256 lenses", "rectangular", "16×16 px each", "α = 29.9°")
 
 
 def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
@@ -121,11 +119,13 @@ def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
         f"{u:.4g}×{v:.4g} px each", f"α = {first.view_angle_deg:.1f}°",
     ]  # fmt: skip
     arrays = [f"{len(full)} arrays"] if len(full) > 1 else []
-    facts = [f"{chain}{blocked}", *arrays, *(fact for fact in facts if fact not in USUAL)]
+    facts = [f"{chain}{blocked}", *arrays, *facts]
+    facts = [fact for fact in facts if fact not in USUAL]
     sheet = json.loads((CAMERAS / f"{name}.json").read_text(encoding="utf-8"))
     about = sheet["about"][:1].upper() + sheet["about"][1:]
-    picture = f"![L, D, detail, view](images/cameras/{file_name(name)})"
-    text = fill(f"{about}. {sheet['notes']} *{', '.join(facts)}.*", 100, break_on_hyphens=False)
+    picture = f"![{name}](images/cameras/{file_name(name)})"
+    given = f" *{', '.join(facts)}.*" if facts else ""
+    text = fill(f"{about}. {sheet['notes']}{given}", 100, break_on_hyphens=False)
     return f"\n### {name}\n\n{text}\n\n{picture}\n"
 
 
@@ -147,8 +147,8 @@ def precision() -> str:
     rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
     lines = [
         "\n## Stored as pictures: which format is enough\n",
-        "Greatest errors of the maps of `setup1`, `setup3` and `spherical`, stored as pictures at a quarter of",
-        "the lenses each way, and PSNR of *Apples* and *Cuboid* against pictures of float maps:\n",
+        "Greatest errors of the maps of `setup1`, `setup3` and `spherical` at a quarter of the lenses each way,",
+        "and PSNR of *Apples* and *Cuboid* against pictures of float maps:\n",
         "| format | bytes per ray | angle | location | PSNR |",
         "|---|---|---|---|---|",
     ]
@@ -185,15 +185,14 @@ def in_scene() -> str:
     )
 
 
-SEGMENTS = (2, 8, 64)  # around a lens, of the meshes on the page
+SEGMENTS = (2, 64)  # around a lens, of the meshes on the page
 IN_SCENE = """
 ## Against a camera of glass inside the scene
 
-A camera may also be simulated as lenses of glass in the scene, with rays from the pixels. PSNR of
-that picture is against the picture through L and D of `spherical`, which do not include Fresnel
-losses, stray light in the glass, and the camera's shadow. Without these effects, the remaining
-difference comes from the faces of the lenses' meshes: 6 dB for every doubling. L and D take at most a
-third of the time, and can be exchanged as files.
+PSNR of pictures through lenses of glass in the scene against those through L and D of `spherical`,
+which do not include Fresnel losses, stray light in the glass, and the camera's shadow. Without
+these, the remaining difference comes from the faces of the lenses' meshes: 6 dB for every doubling.
+L and D take at most a third of the time, and can be exchanged as files.
 """
 
 
@@ -204,9 +203,8 @@ def figure(value: float) -> str:
 
 VERDICT = """**PNG-16** is sufficient for all pictures with sensor noise, which alone gives 47.5 dB: pixels
 change only where a ray grazes an edge. **EXR** is for pictures that must agree to the bit.
-**PNG-8** and **RGBE** (`hdr`) are for viewing a camera: an error of a milliradian moves a point
-100 mm away by a tenth of a millimetre, a whole lens of `setup1`. The eight bits of RGBE are relative
-to the largest of the three numbers."""
+**PNG-8** and **RGBE** (`hdr`) are for viewing: an error of a milliradian moves a point 100 mm away
+by a tenth of a millimetre, a whole lens of `setup1`."""
 
 
 def strip(scene: Scene, camera: IICamera, name: str) -> NDArray[np.uint8]:
