@@ -46,11 +46,9 @@ MODELS = {
 
 
 TAGS = {"light": "kind", "texture": "kind", "shape": "shape", "parts": "part"}
-KEY = re.compile(
-    r"^- (?P<bold>\*\*)?`(?P<key>\w+)(?: = (?P<value>[^`]+))?`(?:\*\*)?(?: = \*(?P<words>[^*]+)\*)?"
-    r"(?: \(\*(?P<kinds>[\w, ]+)\*\))?:",
-    re.M,
-)
+KEY = r"(?P<bold>\*\*)?`(?P<key>\w+)(?: = (?P<value>[^`]+))?`(?:\*\*)?(?: = \*(?P<words>[^*]+)\*)?"
+ITEM = re.compile(rf"^- (?P<keys>{re.sub('P<.*?>', ':', KEY)}(?:, {re.sub('P<.*?>', ':', KEY)})*)"
+                  r"(?: \(\*(?P<kinds>[\w, ]+)\*\))?:", re.M)  # fmt: skip
 
 
 def sections(text):
@@ -63,12 +61,13 @@ def sections(text):
         table, *kinds = re.findall(r"`(\w+)`", head)
         for kind in kinds or [""]:
             keys = found[f"{table} {kind}".strip()] = [(TAGS[table], ...)] if kind else []
-            for one in KEY.finditer(body):
-                of = (one["kinds"] or "").split(", ")
+            for item in ITEM.finditer(body):
+                of = (item["kinds"] or "").split(", ")
                 assert of == [""] or set(of) < set(kinds), f"{head}: kinds {of}"
                 if of == [""] or kind in of:
-                    words = one["words"] and f"*{one['words']}*"
-                    keys.append((one["key"], ... if one["bold"] else one["value"] or words))
+                    for one in re.finditer(KEY, item["keys"]):
+                        words = one["words"] and f"*{one['words']}*"
+                        keys.append((one["key"], ... if one["bold"] else one["value"] or words))
     return found
 
 
