@@ -118,11 +118,11 @@ def tables() -> Tables:
 
 
 def order_table() -> list[str]:
-    """Pairs of schemes whose order is that of Q_view, by scene, over all rates that both reach."""
+    """Pairs of schemes whose order is that of Q_view, over all rates that both reach, by scale."""
     if not (found := rows()):
         return []
     lines = [
-        "| scale | scene | pairs | order kept, ideal display | with faults | reversed by more than 0.01 |",
+        "| scale | scenes | pairs | order kept, ideal display | with faults | reversed by more than 0.01 |",
         "|---|---|---|---|---|---|",
     ]
     for scale in sorted({one["scale"] for one in found}, reverse=True):
@@ -130,7 +130,7 @@ def order_table() -> list[str]:
         counts = {scene: kept_pairs([one for one in at if one["scene"] == scene]) for scene in SCENES}
         counts = {scene: each for scene, each in counts.items() if each.any()}
         if len(counts) > 1:
-            counts["all"] = np.sum(list(counts.values()), axis=0)
+            counts = {f"all {len(counts)}": np.sum(list(counts.values()), axis=0)}
         lines += [f"| {scale} | {scene} | " + " | ".join(map(str, each)) + " |" for scene, each in counts.items()]
     return [*lines, "", origin(found)]
 
