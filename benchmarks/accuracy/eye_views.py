@@ -118,11 +118,11 @@ def tables() -> Tables:
 
 
 def order_table() -> list[str]:
-    """Pairs of schemes whose order is that of Q_view, by scene, over all rates that both reach."""
+    """Pairs of schemes whose order is that of Q_view, over all rates that both reach, by scale."""
     if not (found := rows()):
         return []
     lines = [
-        "| scale | scene | pairs | order kept, ideal display | with faults | reversed by more than 0.01 |",
+        "| scale | scenes | pairs | order kept, ideal display | with faults | reversed by more than 0.01 |",
         "|---|---|---|---|---|---|",
     ]
     for scale in sorted({one["scale"] for one in found}, reverse=True):
@@ -130,7 +130,7 @@ def order_table() -> list[str]:
         counts = {scene: kept_pairs([one for one in at if one["scene"] == scene]) for scene in SCENES}
         counts = {scene: each for scene, each in counts.items() if each.any()}
         if len(counts) > 1:
-            counts["all"] = np.sum(list(counts.values()), axis=0)
+            counts = {f"all {len(counts)}": np.sum(list(counts.values()), axis=0)}
         lines += [f"| {scale} | {scene} | " + " | ".join(map(str, each)) + " |" for scene, each in counts.items()]
     return [*lines, "", origin(found)]
 
@@ -175,28 +175,17 @@ def measured(found: list[dict[str, Any]]) -> list[str]:
 
 
 def simulated_table() -> list[str]:
-    """PLCC, SROCC, RMSE and outlier ratio of each measure for all stimuli; range of PLCC by scene and by scheme."""
+    """PLCC, SROCC, RMSE and outlier ratio of each measure for all stimuli."""
     if not rows():
         return []
     found = finest()
     made = simulated()
-    groups = [group for group in dict.fromkeys(group for _, group in made.predictions) if group != "all"]
-    scenes = {one["scene"] for one in found}
-    lines = [
-        "| measure | PLCC | SROCC | RMSE | outliers | PLCC by scene | by scheme |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    lines = ["| measure | PLCC | SROCC | RMSE | outliers |", "|---" * 5 + "|"]
     for measure in measured(found):
         every = made.predictions[measure, "all"]
-        ranges = [
-            f"{min(each):.2f}–{max(each):.2f}" if each else "–"
-            for each in (
-                [made.predictions[measure, group].plcc for group in groups if (group in scenes) == by_scene]
-                for by_scene in (True, False)
-            )
-        ]
-        head = f"{every.plcc:.3f} | {every.srocc:.3f} | {every.rmse:.2f} | {every.outlier_ratio:.0%}"
-        lines.append(f"| `{measure}` | {head} | {' | '.join(ranges)} |")
+        lines.append(
+            f"| `{measure}` | {every.plcc:.3f} | {every.srocc:.3f} | {every.rmse:.2f} | {every.outlier_ratio:.0%} |"
+        )
     return [*lines, "", origin(found)]
 
 
