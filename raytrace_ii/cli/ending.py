@@ -16,7 +16,6 @@ from ii_core.base.interrupt import Terminated
 GRACE_SECONDS = 1.5  # time limit of the cleanup, even if compiled code runs longer
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
 SHOW_CURSOR = b"\x1b[?25h"  # progress bars hide the cursor
-_watched: list[socket.socket] = []  # sockets of interrupted commands, closed with the process
 
 
 @contextmanager
@@ -47,8 +46,8 @@ def ends_soon() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
         if ended:
             told.close()  # ends the thread
-        else:  # Python waits for the threads of pools when it exits: keep the time limit until then
-            _watched.append(told)
+        else:  # Python waits for the threads of pools when it exits: keep the time limit until the process ends
+            told.detach()
 
 
 def _terminate(number: int, frame: Any) -> None:

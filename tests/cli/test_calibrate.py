@@ -8,7 +8,7 @@ import pytest
 from benchmarks.accuracy.calibration import exposed, random_camera, white_image
 from ii_core import IICamera, IIPicture
 from ii_core.base.files import read_image, write_image
-from tests.support.full_disk import limited
+from tests.support.full_disk import full_disk
 
 
 @pytest.fixture(scope="module")
@@ -55,10 +55,11 @@ def test_a_picture_without_lenses_ends_in_one_line(run, refused, tmp_path):
 
 
 @pytest.mark.parametrize("limit", [1_000, 140_000])
-def test_a_full_disk_ends_in_one_line(frames, tmp_path, limit):
+def test_a_full_disk_ends_in_one_line(run, frames, tmp_path, limit):
     """No file fits, or all but the picture of centres."""
-    done = limited(limit, "calibrate", frames[0] / "raw.png", "-o", tmp_path / "c", cwd=tmp_path)
-    assert done.returncode == 2 and "error: cannot write " in done.stderr and "Traceback" not in done.stderr
+    with full_disk(limit):
+        code, _, err = run("calibrate", frames[0] / "raw.png", "-o", tmp_path / "c")
+    assert code == 2 and "error: cannot write " in err and "Traceback" not in err
     left = sorted(path.name for path in tmp_path.rglob("*"))
     whole = ["c", "camera.json", "picture.png", "picture.png.json", "report.json"]
     assert left == ([] if limit == 1_000 else whole)

@@ -1,18 +1,16 @@
-"""Commands on a disk that is full: a limit on the size of files simulates it."""
+"""A full disk, which a limit on the size of files simulates."""
 
-import subprocess
-import sys
-
-COMMAND = """
-import resource, sys
-from raytrace_ii import cli
-resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv.pop(1)),) * 2)
-cli.main()
-"""
+from contextlib import contextmanager
 
 
-def limited(limit, *arguments, cwd):
-    """Run a command that can write no file of more than ``limit`` bytes."""
-    return subprocess.run(
-        [sys.executable, "-c", COMMAND, str(limit), *map(str, arguments)], capture_output=True, text=True, cwd=cwd
-    )
+@contextmanager
+def full_disk(limit):
+    """Let no file of this process grow beyond ``limit`` bytes; Python ignores the signal, so that writing fails."""
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
