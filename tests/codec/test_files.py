@@ -139,8 +139,13 @@ def test_words_keep_their_numbers():
 
 @pytest.mark.parametrize(
     "scheme",
-    ["si-h264:balanced", "ei-hevc:best", "ri-av1:best,by=columns", "jpeg2000"]
-    + [pytest.param("si-avif:best", marks=pytest.mark.slow)],
+    [
+        "si-h264:balanced",
+        "ei-hevc:best",
+        "ri-av1:best,by=columns",
+        "jpeg2000",
+        pytest.param("si-avif:best", marks=pytest.mark.slow),
+    ],
 )
 def test_usual_files_have_at_most_64_bytes_beside_the_payload(scheme, tmp_path):
     for name in ("setup1", "setup2-64", "setup3"):
