@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from typing import ClassVar
 
 import av
@@ -89,9 +90,18 @@ def test_a_component_that_was_coded_on_its_side():
         np.testing.assert_array_equal(decode_component(stream, (v, l)), whole[v, l])
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-@pytest.mark.parametrize("options", ["", ":wavelet=53", ":lossless=1"])
-@pytest.mark.parametrize("size", [(20, 18, 4, 3), (150, 270, 2, 2), (1, 5, 3, 2), (3, 2, 37, 37)])
+SMALL_SIZES = (20, 18, 4, 3), (1, 5, 3, 2)
+LARGE_SIZES = (150, 270, 2, 2), (3, 2, 37, 37)  # many precincts, and many planes
+
+
+def packets():
+    """Return sizes, options and types; of the large sizes two are quick enough."""
+    for case in product(SMALL_SIZES + LARGE_SIZES, ("", ":wavelet=53", ":lossless=1"), (np.uint8, np.uint16)):
+        slow = case[0] in LARGE_SIZES and case[1:] not in ((":lossless=1", np.uint8), ("", np.uint16))
+        yield pytest.param(*case, marks=[pytest.mark.slow] if slow else [])
+
+
+@pytest.mark.parametrize(("size", "options", "dtype"), list(packets()))
 def test_a_component_of_one_codestream_by_its_own_packets(size, options, dtype, monkeypatch):
     """To the bit, for all precincts, code blocks and groups, without decoding another plane."""
     from codec.coders import planes

@@ -1,6 +1,7 @@
 """Files with false sizes: refused in a second and in bounded memory, with every scheme.
 
-The tests run in a separate process of limited address space, on files with correct checksums.
+All are decoded in one separate process, which forks for every case: limits of address space and the most memory taken
+are those of one case.
 """
 
 import json
@@ -14,11 +15,14 @@ from codec import decode, encode
 from ii_core import IIPicture
 
 SCRIPT = """
-import json, resource, sys, time
+import json, os, resource, sys, time, traceback
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 from benchmarks.coding.fuzz import sample
-from codec import decode, schemes
+from codec import Encoded, decode, encode, schemes
+from ii_core import IIPicture
 
 CLAIMS = [
     ([1 << 15, 1 << 14], [1, 4]),  # as many pixels as are allowed
@@ -27,86 +31,139 @@ CLAIMS = [
     ([1 << 10, 1 << 10], [32, 32]),
     ([1 << 20, 1 << 20], [1 << 20, 1 << 20]),
 ]
-coded = [sample(name) for name in sorted(schemes())]
-for one in coded:
-    decode(one)
-room = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + (1 << 29)
-resource.setrlimit(resource.RLIMIT_AS, (room, room))
-for one in coded:
-    for lenses, ei_pixels in CLAIMS:
-        started = time.process_time()
+
+
+def bound(extra):
+    room = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + extra
+    resource.setrlimit(resource.RLIMIT_AS, (room, room))
+
+
+def said(coded, **forged):
+    started = time.process_time()
+    try:
+        decode(replace(coded, **forged) if forged else coded)
+        answer = "a picture"
+    except ValueError as error:
+        answer = str(error)
+    except BaseException as error:
+        answer = repr(error)
+        return "wrong", answer, time.process_time() - started
+    return "picture" if answer == "a picture" else "refused", answer, time.process_time() - started
+
+
+def most(who=resource.RUSAGE_SELF):
+    return resource.getrusage(who).ru_maxrss >> 10
+
+
+def claims():
+    coded = [sample(name) for name in sorted(schemes())]
+    for one in coded:
+        decode(one)
+    bound(1 << 29)
+    return [
+        [one.scheme, *claim, *said(one, structure=one.structure | dict(zip(("lenses", "ei_pixels"), claim)))]
+        for one in coded for claim in CLAIMS
+    ]
+
+
+def forged(scheme, side, path):
+    asked = {"bpp": 1} if scheme == "jpeg2000" else {"quality": 5}
+    coded = encode(IIPicture(np.zeros((64, 64, 3), np.uint8), (8, 8), (8, 8)), scheme, **asked)
+    small, large = (64).to_bytes(4, "big"), side.to_bytes(4, "big")
+    payload = coded.payload
+    if scheme == "jpeg":
+        at = payload.index(b"\\xff\\xc2") + 5
+        payload = payload[:at] + 2 * large[2:] + payload[at + 4 :]
+    else:
+        assert payload.count(small) == 4
+        payload = payload.replace(small, large)
+    structure = coded.structure | {"lenses": [side // 8, side // 8]}
+    Encoded(scheme=coded.scheme, options=coded.options, payload=payload, structure=structure).save(path)
+    assert Path(path).stat().st_size < 1500
+    bound(1 << 28)
+    return said(path)
+
+
+def precincts(how):
+    coded = encode(IIPicture(np.zeros((2048, 2048, 3), np.uint8), (256, 256), (8, 8)), "jpeg2000", bpp=1)
+    payload = coded.payload
+    assert len(payload) < 1000
+    at = payload.index(b"\\xff\\x52")
+    style = payload[at : at + 14]
+    levels = style[9]
+    small = b"\\xff\\x52" + (13 + levels).to_bytes(2, "big") + b"\\x01" + style[5:14] + b"\\x00" + b"\\x11" * levels
+    if how == "precincts":
+        payload = payload[:at] + small + payload[at + 14 :]
+    elif how == "second style":
+        payload = payload[: at + 14] + small + payload[at + 14 :]
+    elif how == "style of a tile":
+        tile = payload.index(b"\\xff\\x93")
+        payload = payload[:tile] + small + payload[tile:]
+    elif how == "tiles":
+        payload = payload[:24] + (16).to_bytes(4, "big") * 2 + payload[32:]
+    before = most()
+    return [*said(coded, payload=payload), most() - before]
+
+
+def sperr(side):
+    noise = np.random.default_rng(0).integers(0, 9, (64, 64, 3), np.uint8)
+    coded = encode(IIPicture(noise, (8, 8), (8, 8)), "si-sperr", bpp=1)
+    structure = coded.structure | {"lenses": [side // 8, side // 8]}
+    payload = coded.payload[:1000].ljust(1024, b"\\0")
+    before = most()
+    answer = said(coded, payload=payload, structure=structure)
+    return [*answer, most() - before, most(resource.RUSAGE_CHILDREN)]
+
+
+for case in json.loads(sys.argv[1]):
+    name, *arguments = case
+    sys.stdout.flush()
+    child = os.fork()
+    if not child:
         try:
-            decode(replace(one, structure={**one.structure, "lenses": lenses, "ei_pixels": ei_pixels}))
-            said = "a picture"
-        except ValueError as error:
-            said = "refused"
-        except BaseException as error:
-            said = repr(error)
-        print(json.dumps([one.scheme, lenses, ei_pixels, said, time.process_time() - started]))
+            print(json.dumps([case, globals()[name](*arguments)]), flush=True)
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(0)
+    os.waitpid(child, 0)
 """
+SIZES = [
+    ("jpeg", 32000, "at most 134217728 are decoded, raise max_pixels"),
+    ("jpeg", 8000, "cannot hold 8000×8000 pixels"),
+    ("jpeg2000", 32000, "at most 134217728 are decoded, raise max_pixels"),
+]
+STYLES = ["whole", "precincts", "second style", "style of a tile", "tiles"]
+VOLUMES = [(2048, 22 * 4 + 50, 40 * 4 + 200), (2056, 5, 200), (8192, 5, 200)]
 
 
-def test_claims_are_refused_fast_and_small():
-    done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=300, check=False)
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory):
+    """Return how every case ended."""
+    folder = tmp_path_factory.mktemp("forged")
+    cases = [["claims"], *(["precincts", how] for how in STYLES), *(["sperr", side] for side, *_ in VOLUMES)]
+    cases += [["forged", scheme, side, str(folder / f"{scheme}{side}.ii")] for scheme, side, _ in SIZES]
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, json.dumps(cases)], capture_output=True, text=True, timeout=300, check=False
+    )
     assert done.returncode == 0, done.stderr[-2000:]
     results = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [case for case, _ in results] == cases, done.stderr[-2000:]
+    return {tuple(case[:3]): answer for case, answer in results}
+
+
+def test_claims_are_refused_fast_and_small(ended):
+    results = ended["claims",]
     assert len(results) >= 6 * 4
-    wrong = [result for result in results if result[3] != "refused" or result[4] > 1]
+    wrong = [result for result in results if result[3] != "refused" or result[5] > 1]
     assert wrong == []
 
 
-FORGED = """
-import io, resource, sys, time
-from pathlib import Path
-import numpy as np
-from codec import Encoded, decode, encode
-from ii_core import IIPicture
-
-side, path = int(sys.argv[2]), sys.argv[3]
-asked = {"bpp": 1} if sys.argv[1] == "jpeg2000" else {"quality": 5}
-coded = encode(IIPicture(np.zeros((64, 64, 3), np.uint8), (8, 8), (8, 8)), sys.argv[1], **asked)
-small, large = (64).to_bytes(4, "big"), side.to_bytes(4, "big")
-payload = coded.payload
-if sys.argv[1] == "jpeg":
-    at = payload.index(b"\\xff\\xc2") + 5
-    payload = payload[:at] + 2 * large[2:] + payload[at + 4 :]
-else:
-    assert payload.count(small) == 4
-    payload = payload.replace(small, large)
-structure = coded.structure | {"lenses": [side // 8, side // 8]}
-Encoded(scheme=coded.scheme, options=coded.options, payload=payload, structure=structure).save(path)
-assert Path(path).stat().st_size < 1500
-room = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + (1 << 28)
-resource.setrlimit(resource.RLIMIT_AS, (room, room))
-started = time.process_time()
-try:
-    decode(path)
-except ValueError as error:
-    print(error)
-assert time.process_time() - started < 1
-"""
-
-
-@pytest.mark.parametrize(
-    ("scheme", "side", "said"),
-    [
-        ("jpeg", 32000, "at most 134217728 are decoded, raise max_pixels"),
-        ("jpeg", 8000, "cannot hold 8000×8000 pixels"),
-        ("jpeg2000", 32000, "at most 134217728 are decoded, raise max_pixels"),
-    ],
-)
-def test_forged_streams_that_agree_with_a_forged_structure_are_refused_small(scheme, side, said, tmp_path):
+@pytest.mark.parametrize(("scheme", "side", "said"), SIZES)
+def test_forged_streams_that_agree_with_a_forged_structure_are_refused_small(ended, scheme, side, said):
     """The test above forges only the structure, which the size of the stream contradicts."""
-    path = str(tmp_path / "forged.ii")
-    done = subprocess.run(
-        [sys.executable, "-c", FORGED, scheme, str(side), path],
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
-    assert said in done.stdout
+    kind, answer, seconds = ended["forged", scheme, side]
+    assert kind == "refused" and said in answer and seconds < 1
 
 
 def test_larger_pictures_decode_by_an_explicit_limit(run, tmp_path):
@@ -127,86 +184,18 @@ def test_the_smallest_jpeg_stream_decodes(chroma):
     assert decode(encode(picture, f"jpeg:chroma={chroma}", quality=1)).pixels.max() <= 1  # a rounding of colour
 
 
-PRECINCTS = """
-import resource, sys, time
-from dataclasses import replace
-import numpy as np
-from codec import decode, encode
-from ii_core import IIPicture
-
-how = sys.argv[1]
-coded = encode(IIPicture(np.zeros((2048, 2048, 3), np.uint8), (256, 256), (8, 8)), "jpeg2000", bpp=1)
-payload = coded.payload
-assert len(payload) < 1000
-at = payload.index(b"\\xff\\x52")
-style = payload[at : at + 14]
-levels = style[9]
-small = b"\\xff\\x52" + (13 + levels).to_bytes(2, "big") + b"\\x01" + style[5:14] + b"\\x00" + b"\\x11" * levels
-if how == "precincts":
-    payload = payload[:at] + small + payload[at + 14 :]
-elif how == "second style":
-    payload = payload[: at + 14] + small + payload[at + 14 :]
-elif how == "style of a tile":
-    tile = payload.index(b"\\xff\\x93")
-    payload = payload[:tile] + small + payload[tile:]
-elif how == "tiles":
-    payload = payload[:24] + (16).to_bytes(4, "big") * 2 + payload[32:]
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-started = time.process_time()
-try:
-    decode(replace(coded, payload=payload))
-except ValueError as error:
-    print(error)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before >> 10, time.process_time() - started)
-"""
-
-
-@pytest.mark.parametrize("how", ["whole", "precincts", "second style", "style of a tile", "tiles"])
-def test_forged_precincts_and_tiles_of_jpeg2000_take_no_memory(how):
+@pytest.mark.parametrize("how", STYLES)
+def test_forged_precincts_and_tiles_of_jpeg2000_take_no_memory(ended, how):
     """Small precincts took 1600 bytes per pixel; the tests above forge only sizes."""
-    done = subprocess.run(
-        [sys.executable, "-c", PRECINCTS, how], capture_output=True, text=True, timeout=100, check=False
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
-    *said, numbers = done.stdout.splitlines()
-    megabytes, seconds = map(float, numbers.split())
-    assert ("damaged" in "".join(said)) == (how != "whole")
+    kind, answer, seconds, megabytes = ended["precincts", how]
+    assert kind == ("picture" if how == "whole" else "refused") and ("damaged" in answer) == (how != "whole")
     assert megabytes < (120 if how == "whole" else 20)  # 10 bytes a pixel of the picture are 42 MB
     assert seconds < 5
 
 
-SPERR = """
-import resource, sys, time
-from dataclasses import replace
-import numpy as np
-from codec import decode, encode
-from ii_core import IIPicture
-
-side = int(sys.argv[1])
-noise = np.random.default_rng(0).integers(0, 9, (64, 64, 3), np.uint8)
-coded = encode(IIPicture(noise, (8, 8), (8, 8)), "si-sperr", bpp=1)
-structure = coded.structure | {"lenses": [side // 8, side // 8]}
-payload = coded.payload[:1000].ljust(1024, b"\\0")
-own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-try:
-    decode(replace(coded, payload=payload, structure=structure))
-except ValueError as error:
-    print(error)
-worker = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - own >> 10, worker >> 10)
-"""
-
-
-@pytest.mark.parametrize(
-    ("side", "own", "worker"), [(2048, 22 * 4 + 50, 40 * 4 + 200), (2056, 5, 200), (8192, 5, 200)]
-)
-def test_forged_volumes_of_sperr_take_memory_by_their_bytes(side, own, worker):
+@pytest.mark.parametrize(("side", "own", "worker"), VOLUMES)
+def test_forged_volumes_of_sperr_take_memory_by_their_bytes(ended, side, own, worker):
     """A kilobyte allows 2048² pixels at most; 22 bytes per pixel here, 40 in the decoder, in MB."""
-    done = subprocess.run(
-        [sys.executable, "-c", SPERR, str(side)], capture_output=True, text=True, timeout=100, check=False
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
-    *said, numbers = done.stdout.splitlines()
-    assert ("too few for" in "".join(said)) == (side > 2048)
-    taken = [int(number) for number in numbers.split()]
+    kind, answer, _, *taken = ended["sperr", side]
+    assert kind != "wrong" and ("too few for" in answer) == (side > 2048)
     assert taken[0] <= own and taken[1] <= worker

@@ -57,6 +57,12 @@ def large():
     return textured(64, 32, 16, 16)
 
 
+@cache
+def many():
+    """Return a picture with a third of the pixels, whose headers are small beside its frames."""
+    return textured(48, 24, 12, 12)
+
+
 def psnr(a, b, peak=255):
     with np.errstate(divide="ignore"):
         return 10 * np.log10(peak**2 / np.mean((a.pixels.astype(float) - b.pixels) ** 2))
@@ -97,14 +103,24 @@ def medium(scheme):
     return {"quality": type(low)((low + high) / 2)}
 
 
+@cache
+def fine(scheme):
+    """Return the picture coded by a scheme at its best quality."""
+    return encode(textured(), quick(scheme), **finest(scheme))
+
+
+@cache
+def moderate(scheme):
+    """Return the picture coded by a scheme at a moderate rate."""
+    return encode(textured(), quick(scheme), **medium(scheme))
+
+
 RATED = [scheme for scheme in SCHEMES if find(scheme).rate_control and not lossless(scheme)]
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_round_trip(scheme):
-    picture = textured()
-    coded = encode(picture, quick(scheme), **finest(scheme))
-    decoded = decode(coded)
+    picture, decoded = textured(), decode(fine(scheme))
     assert decoded.pixels.shape == picture.pixels.shape
     assert decoded.pixels.dtype == picture.pixels.dtype
     assert (decoded.lenses, decoded.ei_pixels, decoded.erect) == (picture.lenses, picture.ei_pixels, picture.erect)
@@ -144,7 +160,7 @@ def test_eight_bits_come_back_to_the_bit(scheme):
 
 @pytest.mark.parametrize("scheme", RATED)
 def test_target_rates_are_met(scheme):
-    picture = large()
+    picture = large() if scheme == "ei-mpeg2" else many()  # MPEG-2 fills frames of 12×12 px up to 16×16
     coded = encode(picture, quick(scheme), bpp=1.5)
     assert coded.reached
     assert coded.bpp == pytest.approx(1.5, rel=0.02)
@@ -152,8 +168,7 @@ def test_target_rates_are_met(scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_all_bytes_are_accounted_for(scheme, tmp_path):
-    picture = textured()
-    coded = encode(picture, quick(scheme), **medium(scheme))
+    picture, coded = textured(), moderate(scheme)
     path = tmp_path / "coded.ii"
     coded.save(path)
     assert path.read_bytes().endswith(coded.payload)
@@ -165,7 +180,7 @@ def test_all_bytes_are_accounted_for(scheme, tmp_path):
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_coding_is_reproducible_alone_and_in_parallel(scheme):
     picture, asked = textured(), medium(scheme)
-    first = encode(picture, quick(scheme), **asked).payload
+    first = moderate(scheme).payload
     with ThreadPoolExecutor(2) as pool:
         others = list(pool.map(lambda _: encode(picture, quick(scheme), **asked).payload, range(2)))
     assert others == [first, first]
@@ -173,7 +188,7 @@ def test_coding_is_reproducible_alone_and_in_parallel(scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_file_decodes_by_itself(scheme, tmp_path):
-    coded = encode(textured(), quick(scheme), **finest(scheme))
+    coded = fine(scheme)
     path = tmp_path / "coded.ii"
     coded.save(path)
     from_file, from_memory = decode(str(path)), decode(coded)
@@ -250,7 +265,7 @@ def test_exactly_one_goal_is_allowed(scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_costs_are_recorded_apart(scheme):
-    coded = encode(textured(), quick(scheme), **medium(scheme))
+    coded = moderate(scheme)
     assert 0 < coded.codec_seconds <= coded.encode_seconds
     decoding = timed_decode(coded)
     assert 0 < decoding.codec_seconds <= decoding.seconds
@@ -261,7 +276,7 @@ def test_damaged_payloads_end_in_a_value_error_or_a_picture(scheme):
     """Damage inside the checksum, as by an attacker: no crash and no other error."""
     coded = encode(textured(16, 8, 4, 4), quick(scheme), **medium(scheme))
     rng = np.random.default_rng(11)
-    for _ in range(60):
+    for _ in range(15 if "sperr" in scheme else 60):  # each volume of SPERR is decoded by a process of its own
         payload = bytearray(coded.payload)
         at = rng.integers(len(payload), size=rng.integers(1, 6))
         for position in at:

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codec import Coder, CodingResult, Run, encode, register, schemes
+from codec import Coder, CodingResult, Run, contract, encode, register, schemes
 from codec.coders.jpeg2000 import Jpeg2000
 from codec.contract import _CODERS
 from ii_core import IIPicture
 from metrics import read_study
+from metrics.measures import measure
 from raytrace_ii.cli import main
 
 ROOT = Path(__file__).parents[2]
@@ -39,32 +40,53 @@ def package(tmp_path):
     return tmp_path
 
 
-def command(package, *arguments, ok=True):
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join((str(package), str(ROOT))), "COLUMNS": "120"}
-    line = [sys.executable, "-c", "from raytrace_ii.cli import main; main()", *map(str, arguments)]
-    done = subprocess.run(line, env=environment, cwd=package, capture_output=True, text=True)
-    assert (done.returncode == 0) == ok, done.stderr
-    return done.stdout + done.stderr
+@pytest.fixture
+def command(package, run, monkeypatch):
+    """Run a command as a new process would: without the coders and measures that one before has registered."""
+    monkeypatch.syspath_prepend(str(package))
+    monkeypatch.chdir(package)
+    coders, measures = dict(contract._CODERS), dict(measure.MEASURES)
+
+    def forget():
+        for module in "my", "plugin_mine":
+            sys.modules.pop(module, None)
+        contract._load_plugins.cache_clear()
+        measure._load_plugins.cache_clear()
+
+    def call(*arguments, ok=True):
+        monkeypatch.setattr(contract, "_CODERS", dict(coders))
+        monkeypatch.setattr(measure, "MEASURES", dict(measures))
+        forget()
+        code, out, err = run(*arguments)
+        assert (code == 0) == ok, err
+        return out + err
+
+    yield call
+    forget()
 
 
-@pytest.mark.slow
-def test_the_coder_of_the_page_is_a_scheme_of_every_command(package):
-    assert "deflate" in command(package, "schemes")
-    command(package, "encode", "noise.png", "--scheme", "deflate", "--qp", 3, "-o", "noise.ii")
-    command(package, "decode", "noise.ii", "-o", "back.png")
+def test_the_coder_of_the_page_is_a_scheme_of_every_command(command, package):
+    assert "deflate" in command("schemes")
+    command("encode", "noise.png", "--scheme", "deflate", "--qp", 3, "-o", "noise.ii")
+    command("decode", "noise.ii", "-o", "back.png")
     assert (IIPicture.load(package / "back.png").pixels == PIXELS >> 3 << 3).all()
-    said = command(package, "encode", "noise.png", "--scheme", "deflate", "--bpp", 12.5, "-o", "half.ii")
+    said = command("encode", "noise.png", "--scheme", "deflate", "--bpp", 12.5, "-o", "half.ii")
     assert (package / "half.ii").stat().st_size < 1.02 * 12.5 * PIXELS.size / 3 / 8, said
     damaged = bytearray((package / "noise.ii").read_bytes())
     damaged[-1] ^= 1
     (package / "noise.ii").write_bytes(damaged)
-    assert "damaged" in command(package, "decode", "noise.ii", "-o", "other.png", ok=False)
+    assert "damaged" in command("decode", "noise.ii", "-o", "other.png", ok=False)
 
 
 def test_a_plugin_that_fails_is_a_warning_and_others_go_on(package):
+    """In a process of its own, whose warnings go to its error output."""
     points = package / "my-1.0.dist-info" / "entry_points.txt"
     points.write_text("[raytrace_ii.coders]\nbroken = no_such_module:Coder\nmy = my\n")
-    said = command(package, "schemes")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join((str(package), str(ROOT))), "COLUMNS": "120"}
+    line = [sys.executable, "-c", "from raytrace_ii.cli import main; main()", "schemes"]
+    done = subprocess.run(line, env=environment, cwd=package, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    said = done.stdout + done.stderr
     assert "coder plugin broken (no_such_module:Coder) is not loaded: No module named 'no_such_module'" in said
     assert "deflate" in said.split("known")[0]
 
@@ -77,26 +99,23 @@ def file(package):
     return package
 
 
-@pytest.mark.slow
-def test_the_file_of_the_page_is_known_to_every_command_that_it_is_given_to(file):
-    assert "unknown scheme 'deflate'" in command(
-        file, "encode", "noise.png", "--scheme", "deflate", "-o", "a.ii", ok=False
-    )
+def test_the_file_of_the_page_is_known_to_every_command_that_it_is_given_to(file, command):
+    assert "unknown scheme 'deflate'" in command("encode", "noise.png", "--scheme", "deflate", "-o", "a.ii", ok=False)
     plugin = ("--plugin", "mine.py")
-    assert "deflate" in command(file, "schemes", *plugin)
-    assert "largest error of a pixel in codes, lower is better" in command(file, "measures", *plugin)
-    command(file, "encode", "noise.png", "--scheme", "deflate", "--bpp", 12.5, "-o", "a.ii", *plugin)
+    assert "deflate" in command("schemes", *plugin)
+    assert "largest error of a pixel in codes, lower is better" in command("measures", *plugin)
+    command("encode", "noise.png", "--scheme", "deflate", "--bpp", 12.5, "-o", "a.ii", *plugin)
     for words in (
         ["decode", "a.ii", "-o", "b.png"],
         ["components", "a.ii", "-o", "c"],
         ["export", "a.ii", "-o", "d"],
     ):
-        command(file, *words, *plugin)
+        command(*words, *plugin)
     error = abs(IIPicture.load(file / "b.png").pixels.astype(int) - PIXELS).max()
-    said = command(file, "measure", "noise.png", "a.ii", *plugin)
+    said = command("measure", "noise.png", "a.ii", *plugin)
     assert f"{error}.00 codes, largest error of a pixel, lower is better" in said
     words = ["--schemes", "deflate,jpeg2000", "--rates", "12.5", "--measures", "q_worst", "-o", "s"]
-    command(file, "study", "noise.png", *words, *plugin)
+    command("study", "noise.png", *words, *plugin)
     point = read_study(file / "s" / "noise_rd.json")["points"][0]
     assert point["q_worst"] == error > 0
 

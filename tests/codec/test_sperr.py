@@ -17,7 +17,7 @@ from codec.coders.sperr import coder as sperr
 from codec.coders.sperr import stream as sperr_stream
 from codec.coders.sperr import worker as sperr_worker
 from ii_core import IIPicture
-from tests.codec.test_contract import large, psnr, textured
+from tests.codec.test_contract import many, psnr, textured
 
 CONSTANT = 54  # bytes of the header
 
@@ -63,7 +63,7 @@ def test_cut_streams_beat_rounded_ones(step, monkeypatch):
 @pytest.mark.parametrize("scale", [1, 257])
 def test_quality_is_the_psnr(quality, scale):
     """To the rounding of 8-bit codes, which takes 0.06 dB at 40."""
-    picture = large()
+    picture = many()
     picture = picture.with_pixels(picture.pixels * np.array(scale, "uint8" if scale == 1 else "uint16"))
     coded = encode(picture, "si-sperr", quality=quality)
     assert psnr(picture, decode(coded), peak=255 * scale) == pytest.approx(quality, abs=0.15)

@@ -12,7 +12,7 @@ from codec import decode, encode
 from codec.coders.libaom import samples
 from codec.coders.stills import jpeg_tables, jpegxl_codestream, jpegxl_distance, jpegxl_size
 from ii_core import IIPicture
-from tests.codec.test_contract import large, psnr, textured
+from tests.codec.test_contract import many, psnr, textured
 
 
 @pytest.mark.parametrize("quality", [1, 13, 49, 50, 51, 75, 99, 100])
@@ -26,7 +26,7 @@ def test_jpeg_tables_are_libjpegs(quality):
 
 
 def test_qualities_in_between_make_sizes_in_between():
-    sizes = [encode(large(), "jpeg", quality=q).nbytes for q in (20, 20.25, 20.5, 20.75, 21)]
+    sizes = [encode(many(), "jpeg", quality=q).nbytes for q in (20, 20.25, 20.5, 20.75, 21)]
     assert sizes == sorted(sizes)
     assert len(set(sizes)) == 5
 
@@ -39,9 +39,9 @@ def test_the_payload_is_a_jpeg_file(scheme):
 
 
 def test_subsampled_colour_costs_less_and_is_worse():
-    full, less = (encode(large(), f"jpeg:chroma={c}", quality=95) for c in ("444", "420"))
+    full, less = (encode(many(), f"jpeg:chroma={c}", quality=95) for c in ("444", "420"))
     assert less.nbytes < 0.95 * full.nbytes
-    assert psnr(large(), decode(less)) < psnr(large(), decode(full)) - 1
+    assert psnr(many(), decode(less)) < psnr(many(), decode(full)) - 1
 
 
 def test_pictures_beyond_jpeg_sizes_are_refused():

@@ -12,7 +12,7 @@ from codec.coders.planes import decode_planes, encode_planes
 from codec.coders.volume import GROUP, MAX_SLICES, principal_axes
 from codec.frames import layout
 from ii_core import IIPicture
-from tests.codec.test_contract import large, psnr, textured
+from tests.codec.test_contract import many, psnr, textured
 
 
 @pytest.mark.parametrize("dtype", ["int16", "int32"])
@@ -43,7 +43,7 @@ def test_the_error_over_all_planes_meets_its_target(wavelet, error):
 @pytest.mark.parametrize("dtype", ["uint8", "uint16"])
 def test_quality_is_the_psnr(quality, dtype):
     """The gains are right: an error in the bands is as large in the picture."""
-    picture = large()
+    picture = many()
     peak = np.iinfo(dtype).max
     picture = picture.with_pixels((picture.pixels.astype(dtype)) * dtype_scale(dtype))
     decoded = decode(encode(picture, "si-jp3d", quality=quality))
@@ -55,7 +55,7 @@ def dtype_scale(dtype):
 
 
 def test_the_wavelet_along_the_slices_lowers_the_rate():
-    picture = large()
+    picture = many()
     volume, alone = (encode(picture, s, quality=32) for s in ("si-jp3d", "si-jpeg2000"))
     assert volume.nbytes < 0.9 * alone.nbytes
     assert abs(psnr(picture, decode(volume)) - psnr(picture, decode(alone))) < 0.3

@@ -8,7 +8,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from ii_core import IICamera
-from ii_core.camera.lattice import Lattice, nearest_hexagonal
+from ii_core.camera.lattice import Lattice, axes_of, nearest_hexagonal
 from ii_core.camera.presets import camera_names, preset_cameras, scaled
 
 # Eighths of a pixel make ties that are exact in binary; tenths make ties with rounding; other values, none.
@@ -173,6 +173,31 @@ def test_any_whole_structure_is_regular(structure, pitch, given_in_mm):
     columns, rows = camera.lens_lattice.nearest(np.arange(k * u), np.arange(l * v))
     np.testing.assert_array_equal(columns, np.arange(k * u) // u)
     np.testing.assert_array_equal(rows, np.arange(l * v) // v)
+
+
+# -- turn and shear
+
+
+TURNS, SHEARS = st.floats(-59.0, 59.0), st.floats(-0.2, 0.2)
+
+
+@given(turn=TURNS, shear=SHEARS)
+def test_axes_are_a_shear_and_a_turn_and_keep_areas(turn, shear):
+    """Rows rise to the right by the turn (y is down); the shear is applied first. Their determinants are 1."""
+    cosine, sine = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+    expected = np.array([[cosine, sine], [-sine, cosine]]) @ np.array([[1, shear], [0, 1]])
+    axes = np.reshape(axes_of(turn, shear) or (1, 0, 0, 1), (2, 2))
+    np.testing.assert_allclose(axes, expected, atol=1e-12)
+    assert np.linalg.det(axes) == pytest.approx(1, abs=1e-12)
+
+
+@given(turn=TURNS, shear=SHEARS, pitch=st.tuples(LENGTHS, LENGTHS), origin=st.tuples(LENGTHS, LENGTHS))
+def test_a_turned_and_sheared_grid_is_made_straight_again(turn, shear, pitch, origin):
+    straight = Lattice((5, 4), pitch, origin, False)
+    turned = straight._replace(axes=axes_of(turn, shear))
+    k, l = (i.ravel() for i in np.meshgrid(np.arange(5), np.arange(4)))
+    np.testing.assert_allclose(turned.straight(*turned.centres(k, l)), straight.centres(k, l), atol=1e-9)
+    np.testing.assert_array_equal(np.stack(turned.nearest(*np.subtract(turned.centres(k, l), 0.5))), [k, l])
 
 
 # -- drift

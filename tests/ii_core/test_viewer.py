@@ -3,8 +3,6 @@
 import io
 import json
 import re
-import subprocess
-import sys
 import urllib.request
 from dataclasses import replace
 
@@ -18,6 +16,8 @@ from ii_core.display.viewer import page, write_viewer, write_viewer_folder
 from ii_core.display.viewer.page import depth_view
 from metrics import quality_rows
 from raytrace_ii import load_scene, render
+from tests.support.one_tab import with_script
+from tests.support.serving import served
 
 
 def snapshot(tab, **state):
@@ -37,40 +37,28 @@ def psnr(a, b):
 PLACES = [(0, 0, 1), (0.7, -0.3, 1), (-1, 1, 1), (1.8, 0, 1), (0.2, 0.1, 0.5)]
 
 
-def test_every_viewpoint_shows_its_view_image(show, shot, tmp_path):
-    write_viewer(tmp_path / "v.html", shot.picture, quality=None)
-    tab = show(tmp_path / "v.html")
+def test_every_viewpoint_shows_its_view_image(opened, still, shot):
+    tab = opened(still)
     for x, y, r in PLACES:
         shown, viewpoint = snapshot(tab, x=x, y=y, r=r, f=0, a=1)
         wanted, valid = view_image(shot.picture, viewpoint)
         assert np.abs(shown - wanted)[valid].max() <= 1  # the card rounds a half its own way
 
 
-def test_jpeg_pages_show_it_nearly(show, shot, tmp_path):
-    write_viewer(tmp_path / "v.html", shot.picture)
-    shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=0.5, y=0.2, f=0, a=1)
-    assert psnr(shown, view_image(shot.picture, viewpoint)[0]) >= 35
-
-
-def moved(picture, **change):
-    camera = picture.camera
-    return IIPicture(picture.pixels, picture.lenses, picture.ei_pixels, camera, **change)
-
-
-def test_upright_elementary_images_look_the_other_way(show, shot, tmp_path):
-    picture = moved(shot.picture, erect=True)
+def test_upright_elementary_images_look_the_other_way(opened, shot, tmp_path):
+    picture = replace(shot.picture, erect=True)
     write_viewer(tmp_path / "v.html", picture, quality=None)
-    shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=0.6, y=-0.4, f=0, a=1)
+    shown, viewpoint = snapshot(opened(tmp_path / "v.html"), x=0.6, y=-0.4, f=0, a=1)
     assert np.abs(shown - view_image(picture, viewpoint)[0]).max() <= 1
 
 
 @pytest.mark.parametrize("optics", ["pinhole", "grin"])
-def test_viewing_zones_that_meet(show, shot, tmp_path, optics):
+def test_viewing_zones_that_meet(opened, shot, tmp_path, optics):
     old = shot.picture.camera
     camera = replace(old, viewer_mm=150 * old.gap_mm, optics=(optics,), lens_pitch_mm=None)
     picture = replace(shot.picture, camera=camera, erect=camera.erect)
     write_viewer(tmp_path / "v.html", picture, quality=None)
-    tab = show(tmp_path / "v.html")
+    tab = opened(tmp_path / "v.html")
     for x, y, r in PLACES[:3]:
         shown, viewpoint = snapshot(tab, x=x, y=y, r=r, f=0, a=1)
         wanted, valid = view_image(picture, viewpoint)
@@ -80,14 +68,14 @@ def test_viewing_zones_that_meet(show, shot, tmp_path, optics):
 @pytest.mark.parametrize(
     ("lenses", "ei_pixels"), [((1, 1), (1, 1)), ((7, 5), (1, 1)), ((1, 1), (9, 4)), ((3, 2), (1, 6))]
 )
-@pytest.mark.parametrize("with_camera", [True, False])
-def test_any_structure(show, tmp_path, lenses, ei_pixels, with_camera):
+@pytest.mark.parametrize("with_camera", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_any_structure(opened, tmp_path, lenses, ei_pixels, with_camera):
     size = lenses[0] * ei_pixels[0], lenses[1] * ei_pixels[1]
     pixels = np.random.default_rng(1).integers(0, 256, (size[1], size[0], 3), np.uint8)
     camera = IICamera(pixels=size, lenses=lenses, pixel_pitch_mm=0.01, gap_mm=0.3) if with_camera else None
     picture = IIPicture(pixels, lenses, ei_pixels, camera)
     write_viewer(tmp_path / "v.html", picture, quality=None)
-    shown, viewpoint = snapshot(show(tmp_path / "v.html"), f=0, a=1)
+    shown, viewpoint = snapshot(opened(tmp_path / "v.html"), f=0, a=1)
     if with_camera:
         wanted, valid = view_image(picture, viewpoint)
         assert np.abs(shown - wanted)[valid].max() <= 1
@@ -95,10 +83,10 @@ def test_any_structure(show, tmp_path, lenses, ei_pixels, with_camera):
         assert shown.shape == (lenses[1], lenses[0], 3)
 
 
-def test_a_mosaic_of_several_pages(show, shot, tmp_path, monkeypatch):
+def test_a_mosaic_of_several_pages(opened, shot, tmp_path, monkeypatch):
     monkeypatch.setattr(page, "PAGE_SIDE", 100)  # cuts through sub-images of 32×16 px
     write_viewer(tmp_path / "v.html", shot.picture, quality=None)
-    shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=-0.4, y=0.9, f=0, a=1)
+    shown, viewpoint = snapshot(opened(tmp_path / "v.html"), x=-0.4, y=0.9, f=0, a=1)
     assert np.abs(shown - view_image(shot.picture, viewpoint)[0]).max() <= 1
 
 
@@ -138,12 +126,12 @@ def focused(picture, viewpoint, shift, radius):
 
 
 @pytest.mark.parametrize("erect", [False, True])
-def test_focus_and_aperture(show, tmp_path, erect):
+def test_focus_and_aperture(opened, tmp_path, erect):
     rng = np.random.default_rng(2)
     camera = IICamera(pixels=(40, 24), lenses=(10, 6), pixel_pitch_mm=0.01, gap_mm=0.1)
     picture = IIPicture(rng.integers(0, 256, (24, 40, 3), np.uint8), (10, 6), (4, 4), camera, erect)
     write_viewer(tmp_path / "v.html", picture, quality=None)
-    tab = show(tmp_path / "v.html")
+    tab = opened(tmp_path / "v.html")
     shown, viewpoint = snapshot(tab, x=0.3, y=0.2, f=0.7, a=1.8)
     if erect:  # the same formulas with the other sign, which `view_positions` takes
         from functools import partial
@@ -161,9 +149,8 @@ def test_focus_and_aperture(show, tmp_path, erect):
     assert np.abs(shown - wanted).max() <= 2  # 8-bit rounding of sums in single precision
 
 
-def test_dragging_turns_the_scene(show, shot, tmp_path):
-    write_viewer(tmp_path / "v.html", shot.picture, quality=None)
-    tab = show(tmp_path / "v.html", "#f=0&a=1")
+def test_dragging_turns_the_scene(opened, still, shot):
+    tab = opened(still, "#f=0&a=1")
     box = tab.locator("#main").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     tab.mouse.move(x, y)
@@ -191,27 +178,28 @@ def lens_at(tab, k, l):
     )
 
 
-# on the red apple in front, the green one and the large one behind, away from their edges
-@pytest.mark.parametrize("lens", [(5, 11), (16, 13), (10, 8)])
-def test_a_click_focuses_by_the_depth_map(show, shot, tmp_path, lens):
-    write_viewer(tmp_path / "v.html", shot.picture, depth=shot.depth)
-    tab = show(tmp_path / "v.html", "#f=0")
-    tab.mouse.click(*lens_at(tab, *lens))
-    tab.wait_for_function("ii.viewer.state.f !== 0")
-    depth = tab.evaluate("ii.viewer.depthOf(ii.viewer.state.f)")
-    around = depth_view(shot.picture, shot.depth)[lens[1] - 1 : lens[1] + 2, lens[0] - 1 : lens[0] + 2]
-    # the line of sight meets the map between its pixels: one of the nine around is what it finds
-    assert np.abs(around - depth).min() < 0.02 * depth
+def test_a_page_as_jpeg_shows_the_picture_nearly_and_clicks_focus_by_its_depth_map(opened, mapped, shot):
+    tab = opened(mapped, "#f=0")
+    # on the red apple in front, the green one and the large one behind, away from their edges
+    for k, l in ((5, 11), (16, 13), (10, 8)):
+        tab.evaluate("ii.viewer.set({ f: 0 })")
+        tab.mouse.click(*lens_at(tab, k, l))
+        tab.wait_for_function("ii.viewer.state.f !== 0")
+        depth = tab.evaluate("ii.viewer.depthOf(ii.viewer.state.f)")
+        around = depth_view(shot.picture, shot.depth)[l - 1 : l + 2, k - 1 : k + 2]
+        # the line of sight meets the map between its pixels: one of the nine around is what it finds
+        assert np.abs(around - depth).min() < 0.02 * depth
+    shown, viewpoint = snapshot(tab, x=0.5, y=0.2, f=0, a=1)
+    assert psnr(shown, view_image(shot.picture, viewpoint)[0]) >= 35
 
 
-def test_a_click_before_the_first_painting_finds_its_lens(show, shot, tmp_path):
-    write_viewer(tmp_path / "v.html", shot.picture, depth=shot.depth)
-    tab = show(tmp_path / "v.html", "#f=0", script="window.requestAnimationFrame = () => 1")
+def test_a_click_before_the_first_painting_finds_its_lens(opened, mapped, tmp_path):
+    tab = opened(with_script(mapped, "window.requestAnimationFrame = () => 1", tmp_path / "v.html"), "#f=0")
     tab.mouse.click(*lens_at(tab, 5, 11))
     assert tab.evaluate("ii.viewer.state.f") != 0 and tab.evaluate("Number.isFinite(ii.viewer.state.f)")
 
 
-def test_a_click_without_a_map_finds_where_views_agree(show, tmp_path):
+def test_a_click_without_a_map_finds_where_views_agree(opened, tmp_path):
     """A textured plane: seven places all lie on it."""
     rng = np.random.default_rng(4)
     k, l, u, shift = 48, 24, 7, 1.5
@@ -229,17 +217,14 @@ def test_a_click_without_a_map_finds_where_views_agree(show, tmp_path):
             field[:, v, :, h] = top[:, c0] * (1 - t) + top[:, c0 + 1] * t
     picture = IIPicture(field.reshape(l * u, k * u, 3), (k, l), (u, u), camera)
     write_viewer(tmp_path / "v.html", picture, quality=None)
-    tab = show(tmp_path / "v.html", "#f=0")
+    tab = opened(tmp_path / "v.html", "#f=0")
     found = [tab.evaluate("p => ii.viewer.pick(p)", [col, row]) for col in (14, 20, 30, 36) for row in (10, 14)]
     span = tab.evaluate("ii.viewer.meta.focus")
     assert found == pytest.approx([shift] * len(found), abs=(span[1] - span[0]) / 500)
 
 
-def test_comparison_shows_the_difference(show, shot, tmp_path):
-    a = shot.picture
-    b = a.with_pixels(np.minimum(a.pixels, 245) + np.uint8(10))
-    write_viewer(tmp_path / "v.html", a, b, quality=None, quality_rows=quality_rows(a, b))
-    tab = show(tmp_path / "v.html")
+def test_comparison_shows_the_difference(opened, compared, shot, brighter):
+    tab = opened(compared)
     assert tab.evaluate("ii.viewer.state.mode") == "split"
     first, _ = snapshot(tab, mode="original", f=0)
     second, _ = snapshot(tab, mode="decoded")
@@ -249,13 +234,13 @@ def test_comparison_shows_the_difference(show, shot, tmp_path):
     np.testing.assert_array_equal(split[:, :14], first[:, :14])
     np.testing.assert_array_equal(split[:, 18:], second[:, 18:])
     names, values = (tab.locator(f"table {kind}").all_inner_texts() for kind in ("th", "td"))
-    assert names[:3] == ["Qglobal", "Qangle", "Qview front"] and values[0] == quality_rows(a, b)[0][1]
+    assert names[:3] == ["Qglobal", "Qangle", "Qview front"]
+    assert values[0] == quality_rows(shot.picture, brighter)[0][1]
     assert tab.locator("table sub").count() == len(names)
 
 
-def test_stereo_pairs_and_keys(show, shot, tmp_path):
-    write_viewer(tmp_path / "v.html", shot.picture)
-    tab = show(tmp_path / "v.html", "#stereo=cross-eyed&eyes=1&f=0")
+def test_stereo_pairs_and_keys(opened, still):
+    tab = opened(still, "#stereo=cross-eyed&eyes=1&f=0")
     tab.locator("#main").focus()
     assert tab.evaluate("ii.viewer.state.stereo") == "cross-eyed"
     for key in ("ArrowRight", "ArrowUp", "+", "]", ".", "s"):
@@ -264,7 +249,7 @@ def test_stereo_pairs_and_keys(show, shot, tmp_path):
     state = tab.evaluate("ii.viewer.state")
     assert state["stereo"] == "anaglyph" and state["x"] == 0.05 and state["y"] == 0.05
     assert state["zoom"] == 1.2 and state["a"] == 2 and state["f"] > 0
-    again = show(tmp_path / "v.html", tab.evaluate("location.hash"))
+    again = opened(still, tab.evaluate("location.hash"))
     for key, value in again.evaluate("ii.viewer.state").items():
         assert value == (state[key] if isinstance(value, str) else pytest.approx(state[key], rel=1e-4, abs=1e-5))
 
@@ -290,14 +275,17 @@ def screen(tab):
     return pixels, on, off
 
 
-@pytest.mark.parametrize("with_map", [True, False])
-@pytest.mark.parametrize("scene", ["twins", "mountains"])
-def test_far_scenes_open_without_bands(show, tmp_path, scene, with_map):
-    made = render(load_scene(scene), preset("setup1", scale=16), support=("depth",))
-    write_viewer(tmp_path / "v.html", made.picture, depth=made.depth if with_map else None)
-    tab = show(tmp_path / "v.html")
-    for far in (False, True):  # as it opens, and focused as far as the slider goes
-        if far:
+@pytest.fixture(scope="module", params=[pytest.param("twins", marks=pytest.mark.slow), "mountains"])
+def far(request):
+    return render(load_scene(request.param), preset("setup1", scale=16), support=("depth",))
+
+
+@pytest.mark.parametrize("with_map", [pytest.param(True, marks=pytest.mark.slow), False])
+def test_far_scenes_open_without_bands(opened, far, tmp_path, with_map):
+    write_viewer(tmp_path / "v.html", far.picture, depth=far.depth if with_map else None)
+    tab = opened(tmp_path / "v.html", viewport={"width": 800, "height": 420})  # wide: a border beside the array
+    for focused in (False, True):  # as it opens, and focused as far as the slider goes
+        if focused:
             tab.evaluate("ii.viewer.set({ f: ii.viewer.meta.focus[1] })")
         pixels, on, off = screen(tab)
         background = (abs(pixels - BACKGROUND) <= 1).all(axis=2)
@@ -307,41 +295,39 @@ def test_far_scenes_open_without_bands(show, tmp_path, scene, with_map):
     assert abs(tab.evaluate("ii.viewer.opening.f")) <= 1
 
 
-def test_focus_breaks_nowhere_in_the_picture(show, tmp_path):
+def test_focus_breaks_nowhere_in_the_picture(opened, tmp_path):
     """A smooth far scene, focused near: earlier, a step appeared where a neighbour's lens left the array."""
     camera = IICamera(pixels=(256, 128), lenses=(32, 16), pixel_pitch_mm=0.0244, gap_mm=0.73)
     ramp = np.tile(np.linspace(40, 215, 8)[:, None], (16, 256))  # what every lens sees of infinity
     picture = IIPicture(np.repeat(ramp[..., None], 3, axis=2).astype(np.uint8), (32, 16), (8, 8), camera)
     near = picture.pixels.reshape(16, 8, 32, 8, 3) + np.arange(16, dtype=np.uint8)[:, None, None, None, None]
     write_viewer(tmp_path / "v.html", picture.with_pixels(near.reshape(128, 256, 3)), quality=None)
-    shown, _ = snapshot(show(tmp_path / "v.html"), f=6, a=1)
+    shown, _ = snapshot(opened(tmp_path / "v.html"), f=6, a=1)
     step = np.diff(shown[..., 0].mean(axis=1))
     # From row to row: a pixel of the ramp over 16 lenses and its brightening; a pixel of the ramp alone is 25.
     assert abs(step).max() < 14, step
 
 
-def test_a_damaged_link_is_ignored(show, shot, tmp_path):
-    write_viewer(tmp_path / "v.html", shot.picture)
-    tab = show(tmp_path / "v.html", "#x=nonsense&r=-5&stereo=smell&mode=difference&f=1&__proto__=2")
+def test_a_damaged_link_is_ignored(opened, still):
+    tab = opened(still, "#x=nonsense&r=-5&stereo=smell&mode=difference&f=1&__proto__=2")
     state = tab.evaluate("ii.viewer.state")
     assert (state["x"], state["r"], state["stereo"], state["mode"]) == (0, 0.35, "off", "original")
 
 
-def test_a_lost_graphics_card_is_reported(show, shot, tmp_path):
-    write_viewer(tmp_path / "v.html", shot.picture)
-    tab = show(tmp_path / "v.html")
+def test_a_lost_graphics_card_is_reported(opened, still):
+    tab = opened(still, again=True)
     assert not tab.locator("#failure").is_visible()
     tab.evaluate("ii.viewer.field.gl.getExtension('WEBGL_lose_context').loseContext()")
     tab.locator("#failure").wait_for(state="visible")
     assert "graphics card" in tab.locator("#failure").inner_text()
 
 
-def test_the_centre_view_comes_first(show, shot, tmp_path):
+def test_the_centre_view_comes_first(opened, shot, tmp_path):
     """Served with every page held back: the preview stands for them."""
     write_viewer_folder(tmp_path, shot.picture, quality=None)
     text = (tmp_path / "index.html").read_text()
     (tmp_path / "early.html").write_text(re.sub(r"<script>ii\.fetch.*</script>", "", text))
-    tab = show(tmp_path / "early.html", wait=False)
+    tab = opened(tmp_path / "early.html", wait=False)
     order = json.loads(re.search(r"ii\.fetch\((\[.*\])\)", text)[1])
     assert order[0][0] == "preview"
     data = list((tmp_path / order[0][1]).read_bytes())
@@ -350,13 +336,14 @@ def test_the_centre_view_comes_first(show, shot, tmp_path):
     assert psnr(shown, view_image(shot.picture, viewpoint)[0]) > 30  # JPEG of quality 90
 
 
-def test_the_largest_picture(show, tmp_path):
+@pytest.mark.slow  # the mosaic of several pages above, by 8 pages of 2048² px
+def test_the_largest_picture(opened, tmp_path):
     camera = preset("setup1")
     row = np.arange(8192)[:, None] % 251
     pixels = np.broadcast_to(row.astype(np.uint8), (4096, 8192, 3)).copy()
     pixels[::7] //= 2
     write_viewer(tmp_path / "v.html", IIPicture(pixels, camera.lenses, camera.ei_pixels, camera))
-    shown, viewpoint = snapshot(show(tmp_path / "v.html"), x=0.8, y=-0.6, f=0, a=1)
+    shown, viewpoint = snapshot(opened(tmp_path / "v.html"), x=0.8, y=-0.6, f=0, a=1)
     picture = IIPicture(pixels, camera.lenses, camera.ei_pixels, camera)
     assert psnr(shown, view_image(picture, viewpoint)[0]) >= 35
 
@@ -373,18 +360,17 @@ def test_the_command_refuses_invalid_pictures(run, refused, shot, tmp_path, monk
     assert not list(tmp_path.glob("*.html")) and not list(tmp_path.glob(".*"))
 
 
-def test_served(shot, tmp_path):
+def test_served(run, monkeypatch, shot, tmp_path):
     path = tmp_path / "a.png"
     shot.picture.save(path)
-    command = [sys.executable, "-m", "raytrace_ii.cli", "view", str(path), "--serve"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-        try:
-            url = server.stdout.readline().split()[0]
-            with urllib.request.urlopen(url) as page:
-                text = page.read().decode()
-            order = json.loads(re.search(r"ii\.fetch\((\[.*\])\)", text)[1])
-            for _, name, *_ in order:
-                with urllib.request.urlopen(url + name) as data:
-                    assert len(data.read()) > 100
-        finally:
-            server.terminate()
+
+    def visit(url):
+        with urllib.request.urlopen(url) as page:
+            order = json.loads(re.search(r"ii\.fetch\((\[.*\])\)", page.read().decode())[1])
+        assert len(order) > 1
+        for _, name, *_ in order:
+            with urllib.request.urlopen(url + name) as data:
+                assert len(data.read()) > 100
+
+    code, out, _ = served(monkeypatch, run, ["view", path, "--serve"], visit)
+    assert code == 0 and "shows the page" in out

@@ -6,34 +6,20 @@ import pytest
 from codec import encode
 from ii_core import IICamera, IIPicture
 from ii_core.display.viewer import write_viewer
-from metrics import quality_rows
+from tests.ii_core.conftest import LABELS
+from tests.support.one_tab import with_script
 
-LABELS = ("original", "si-h264, 0.100 bpp, 30.32 dB")
 PHONE = {"width": 390, "height": 844}
-SMALL = {"width": 780, "height": 400}  # drawn by the processor: few pixels
-
-
-@pytest.fixture(scope="module")
-def compared(shot, tmp_path_factory):
-    """A page of a picture beside another, with a table of qualities."""
-    path = tmp_path_factory.mktemp("page") / "v.html"
-    a = shot.picture
-    b = a.with_pixels(np.minimum(a.pixels, 245) + np.uint8(10))
-    write_viewer(path, a, b, depth=shot.depth, quality_rows=quality_rows(a, b), labels=LABELS)
-    return path
-
-
-@pytest.fixture(scope="module")
-def loaded(show_once, compared):
-    return show_once(compared, viewport=SMALL)
+WIDE = {"width": 780, "height": 400}  # controls stand beside the picture
 
 
 @pytest.fixture
-def tab(loaded):
+def tab(opened, compared):
     """The page as it opened."""
-    loaded.evaluate("ii.viewer.set({ ...ii.viewer.opening })")
-    frame(loaded)
-    return loaded
+    tab = opened(compared, viewport=WIDE)
+    tab.evaluate("ii.viewer.set({ ...ii.viewer.opening })")
+    frame(tab)
+    return tab
 
 
 def state(tab):
@@ -103,12 +89,12 @@ def test_the_split_line_has_a_handle_and_labels(tab):
     assert not tab.locator("#grip").is_visible()
 
 
-def test_the_command_names_scheme_rate_and_quality(run, show, shot, tmp_path):
+def test_the_command_names_scheme_rate_and_quality(run, opened, shot, tmp_path):
     shot.picture.save(tmp_path / "a.png")
     encode(shot.picture, "si-h264", qp=30).save(tmp_path / "a.ii")
     code, _, err = run("view", tmp_path / "a.png", "--compare", tmp_path / "a.ii", "-o", tmp_path / "v.html")
     assert code == 0, err
-    text = show(tmp_path / "v.html").locator("#split .half").nth(1).inner_text()
+    text = opened(tmp_path / "v.html").locator("#split .half").nth(1).inner_text()
     scheme, rate, quality = text.split(", ")
     assert scheme == "si-h264" and float(rate.removesuffix(" bpp")) > 0
     assert 20 < float(quality.removesuffix(" dB")) < 60
@@ -133,14 +119,14 @@ def disabled(tab):
     return set(tab.evaluate("[...document.querySelectorAll('[data-state]:disabled')].map(i => i.dataset.state)"))
 
 
-def test_sliders_without_effect_are_disabled(tab, show, tmp_path):
+def test_sliders_without_effect_are_disabled(tab, opened, tmp_path):
     assert disabled(tab) == {"eyes", "gain"}
     tab.evaluate("ii.viewer.set({ mode: 'difference', stereo: 'anaglyph' })")
     assert disabled(tab) == {"split"}
     pixels = np.full((4, 6, 3), 128, np.uint8)  # one pixel a lens: there is nothing to focus
     camera = IICamera(pixels=(6, 4), lenses=(6, 4), pixel_pitch_mm=0.01, gap_mm=0.3)
     write_viewer(tmp_path / "v.html", IIPicture(pixels, (6, 4), (1, 1), camera))
-    assert disabled(show(tmp_path / "v.html")) == {"eyes", "f", "a"}
+    assert disabled(opened(tmp_path / "v.html")) == {"eyes", "f", "a"}
 
 
 def test_nothing_is_cut_on_a_small_screen(tab):
@@ -151,7 +137,6 @@ def test_nothing_is_cut_on_a_small_screen(tab):
     assert tab.evaluate("(a => a.scrollHeight - a.clientHeight)(document.querySelector('aside'))") == 0
     cut = "[...document.querySelectorAll('label, td, output')].filter(e => e.scrollWidth > e.clientWidth + 1).length"
     assert tab.evaluate(cut) == 0
-    tab.set_viewport_size(SMALL)
 
 
 def test_full_screen_shows_the_picture_alone(tab):
@@ -170,7 +155,6 @@ def test_full_screen_shows_the_picture_alone(tab):
 
 # Animation frames at the rate of the test, independent of drawing time.
 PACE = "let now = 0; window.requestAnimationFrame = (f) => setTimeout(() => f((now += %d)), 30);"
-MOVING = {"reduced_motion": "no-preference", "viewport": {"width": 780, "height": 300}}
 
 
 def places(tab, count=4):
@@ -181,8 +165,8 @@ def places(tab, count=4):
     return got
 
 
-def test_the_view_sways_until_the_first_touch(show, compared):
-    tab = show(compared, script=PACE % 30, **MOVING)
+def test_the_view_sways_until_the_first_touch(opened, still, tmp_path):
+    tab = opened(with_script(still, PACE % 30, tmp_path / "v.html"), motion="no-preference")
     assert len(set(places(tab))) > 2
     assert tab.evaluate("location.hash") == ""  # the sway is no state to keep
     box = tab.locator("#main").bounding_box()
@@ -191,9 +175,9 @@ def test_the_view_sways_until_the_first_touch(show, compared):
     assert len(set(places(tab))) == 1
 
 
-def test_the_view_rests_where_motion_is_slow_or_not_wanted(tab, show, compared):
+def test_the_view_rests_where_motion_is_slow_or_not_wanted(tab, opened, still, tmp_path):
     assert len(set(places(tab))) == 1
-    slow = show(compared, script=PACE % 300, **MOVING)
+    slow = opened(with_script(still, PACE % 300, tmp_path / "v.html"), motion="no-preference")
     slow.wait_for_function("ii.viewer.swaying === false")
     assert len(set(places(slow))) == 1
 
@@ -238,12 +222,10 @@ def test_tilting_turns_by_the_same_angle(phone):
     assert state(tab)["x"] == 1
 
 
-def test_without_webgl2_a_still_picture_stands_under_the_message(compared, browser):
-    tab = browser.new_page()
-    tab.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
-    tab.goto(f"file://{compared}")
+def test_without_webgl2_a_still_picture_stands_under_the_message(compared, opened, tmp_path):
+    page = with_script(compared, "HTMLCanvasElement.prototype.getContext = () => null", tmp_path / "v.html")
+    tab = opened(page, wait=False, viewport={"width": 1280, "height": 720})
     assert "WebGL2" in tab.locator("#failure").inner_text()
     still, text = tab.locator("#still").bounding_box(), tab.locator("#failure p").bounding_box()
     assert tab.evaluate("document.getElementById('still').naturalWidth") == 32 and still["width"] > 300
     assert still["y"] >= text["y"] + text["height"]
-    tab.close()

@@ -5,8 +5,6 @@ import functools
 import http.server
 import json
 import re
-import subprocess
-import sys
 import threading
 import urllib.error
 import urllib.request
@@ -19,9 +17,9 @@ from ii_core import video_of, view_image
 from ii_core.display.viewer import page, write_viewer, write_viewer_folder
 from ii_core.video.video import IIVideo
 from tests.ii_core.test_viewer import snapshot
+from tests.support.serving import served
 
 FRAMES = 6
-SMALL = {"width": 480, "height": 240}  # drawn by the processor: few pixels
 
 
 @pytest.fixture(scope="module")
@@ -42,23 +40,19 @@ def other(take):
 
 
 @pytest.fixture(scope="module")
-def compared(take, other, tmp_path_factory):
+def compared_takes(take, other, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "v.html"
     write_viewer(path, take, other, quality=None, labels=("original", "brighter"))
     return path
 
 
-@pytest.fixture(scope="module")
-def loaded(show_once, compared):
-    return show_once(compared, viewport=SMALL)
-
-
 @pytest.fixture
-def tab(loaded):
+def tab(opened, compared_takes):
     """The page as it opened."""
-    loaded.evaluate("ii.viewer.play(false); ii.viewer.set({ ...ii.viewer.opening, mode: 'original', f: 0, a: 1 })")
-    on_screen(loaded, 0)
-    return loaded
+    tab = opened(compared_takes)
+    tab.evaluate("ii.viewer.play(false); ii.viewer.set({ ...ii.viewer.opening, mode: 'original', f: 0, a: 1 })")
+    on_screen(tab, 0)
+    return tab
 
 
 def on_screen(tab, frame):
@@ -158,7 +152,7 @@ def test_keys_step_and_the_address_keeps_the_instant(tab):
 
 
 @contextlib.contextmanager
-def served(folder):
+def simply_served(folder):
     """A server without range requests, like many simple ones."""
     handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=folder)
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
@@ -169,12 +163,12 @@ def served(folder):
             server.shutdown()
 
 
-def test_a_card_without_room_for_all_frames(show, take, tmp_path, monkeypatch):
+def test_a_card_without_room_for_all_frames(opened, take, tmp_path, monkeypatch):
     """Frames leave the card and come again; here from a server that always sends the whole file."""
     monkeypatch.setattr(page, "CARD_BYTES", 0)
     write_viewer_folder(tmp_path, take, quality=None)
-    with served(tmp_path) as url:
-        tab = show(f"{url}index.html#f=0&a=1", viewport=SMALL)
+    with simply_served(tmp_path) as url:
+        tab = opened(f"{url}index.html", "#f=0&a=1")
         assert tab.evaluate("ii.viewer.take.slots") == 2
         for frame in (4, 1, 5, 0, 0, 1):
             tab.evaluate("t => ii.viewer.set({ t })", frame)
@@ -189,34 +183,34 @@ def test_a_card_without_room_for_all_frames(show, take, tmp_path, monkeypatch):
             wanted, valid = view_image(take[frame], viewpoint)
             assert np.abs(shown - wanted)[valid].max() <= 1
             seen.add(frame)
-        tab.close()
+        tab.goto("about:blank")  # before the server ends
 
 
-def test_the_command_serves_a_take_in_parts(show, take, tmp_path):
+def test_the_command_serves_a_take_in_parts(run, monkeypatch, opened, take, tmp_path):
     take.save(tmp_path / "frames")
     encode_take(take, "si-h264", qp=30, plan=Plan(walk="time-first"), path=tmp_path / "take.ii")
-    command = [sys.executable, "-m", "raytrace_ii.cli", "view", str(tmp_path / "frames"), "--serve", "--lossless"]
-    command += ["--compare", str(tmp_path / "take.ii")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-        try:
-            url = server.stdout.readline().split()[0]
-            with urllib.request.urlopen(url) as answer:
-                order = json.loads(re.search(r"ii\.fetch\((\[.*\])\)", answer.read().decode())[1])
-            _, name, *_, first, end = order[-1]
-            part = urllib.request.Request(url + name, headers={"Range": f"bytes={first}-{end - 1}"})
-            with urllib.request.urlopen(part) as answer:
-                size = int(answer.headers["Content-Range"].rpartition("/")[2])
-                assert answer.status == 206 and len(answer.read()) == end - first and size == end
-            beyond = urllib.request.Request(url + name, headers={"Range": f"bytes={size}-"})
-            with pytest.raises(urllib.error.HTTPError, match="416"):
-                urllib.request.urlopen(beyond)
-            tab = show(f"{url}#f=0&a=1&t=4", viewport=SMALL)
-            on_screen(tab, 4)
-            assert shows(tab, take, 4, x=-0.6, mode="original")
-            assert re.fullmatch(r"si-h264, [\d.]+ bpp, [\d.]+ dB", tab.evaluate("ii.viewer.meta.labels[1]"))
-            tab.close()
-        finally:
-            server.terminate()
+    words = ["view", tmp_path / "frames", "--serve", "--lossless", "--compare", tmp_path / "take.ii"]
+
+    def visit(url):
+        with urllib.request.urlopen(url) as answer:
+            order = json.loads(re.search(r"ii\.fetch\((\[.*\])\)", answer.read().decode())[1])
+        _, name, *_, first, end = order[-1]
+        part = urllib.request.Request(url + name, headers={"Range": f"bytes={first}-{end - 1}"})
+        with urllib.request.urlopen(part) as answer:
+            size = int(answer.headers["Content-Range"].rpartition("/")[2])
+            assert answer.status == 206 and len(answer.read()) == end - first and size == end
+        beyond = urllib.request.Request(url + name, headers={"Range": f"bytes={size}-"})
+        with pytest.raises(urllib.error.HTTPError, match="416") as refusal:
+            urllib.request.urlopen(beyond)
+        refusal.value.close()
+        tab = opened(url, "#f=0&a=1&t=4")
+        on_screen(tab, 4)
+        assert shows(tab, take, 4, x=-0.6, mode="original")
+        assert re.fullmatch(r"si-h264, [\d.]+ bpp, [\d.]+ dB", tab.evaluate("ii.viewer.meta.labels[1]"))
+        tab.goto("about:blank")  # before the server ends
+
+    code, _, err = served(monkeypatch, run, words, visit)
+    assert code == 0, err
 
 
 def test_a_take_too_large_is_refused_by_its_first_frame(take, tmp_path, monkeypatch):

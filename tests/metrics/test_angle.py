@@ -96,6 +96,14 @@ def test_ms_ssim_by_hand():
     assert q_angle_ssim(a, b, scales=2).values[1, 0] == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.parametrize("scales", [1, 2])
+def test_negative_means_count_as_nothing(scales):
+    """A negative has a negative contrast term everywhere: SSIM shows it, a product of powers ends at 0."""
+    a = picture()
+    values = q_angle_ssim(a, a.with_pixels(255 - a.pixels), scales=scales).values
+    assert (values < -0.5).all() if scales == 1 else (values == 0).all()
+
+
 def test_even_pictures_have_a_quality():
     a = picture()
     black = a.with_pixels(np.zeros_like(a.pixels))

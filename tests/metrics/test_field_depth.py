@@ -8,7 +8,7 @@ import pytest
 from ii_core import IICamera, IIPicture, Rig, add_sensor_noise, depth_of_disparity, disparity_of_depth, preset
 from metrics import depth_from_focus, q_depth
 from metrics.depth.focus import METHODS
-from metrics.depth.layers import disparity_layers, field_layers
+from metrics.depth.layers import check_layers, covering_layers, disparity_layers, field_layers, first_mm
 from metrics.depth.views import near_and_far, view_steps, view_tables, views_side_by_side
 from tests.ii_core.test_rig import CAMERA, RIG, seen
 
@@ -98,6 +98,20 @@ def test_layers_may_lie_before_the_pixel_plane():
     assert found.layers_mm[0] < 0 and np.median(np.abs(found.depth_mm + 10)) < 1
     with pytest.raises(ValueError, match=r"layers_mm must be finite, beyond -75\.26 mm and increase"):
         depth_from_focus(picture, layers_mm=[-80.0, 10.0])
+
+
+def test_layers_begin_where_rays_start():
+    """Rays start 120 mm before the lens plane at z = 5 + 2: distances count from z = −113 mm."""
+    camera = IICamera(
+        pixels=(48, 48), lenses=(12, 12), pixel_pitch_mm=0.1, gap_mm=2.0, start_mm=120.0, origin_mm=(0, 0, 5)
+    )
+    assert covering_layers(camera)[[0, -1]] == pytest.approx([-113 + 3 * 2, -113 + 49 * 2])
+    seen_mm = covering_layers(camera, [-113.5, -112.0, -13.0, np.nan], 3)  # the first lies behind the viewer
+    assert seen_mm == pytest.approx([-112, -113 + 10, -13])
+    assert first_mm(camera) == -113
+    np.testing.assert_array_equal(check_layers([-112.999, 0.0], camera), [-112.999, 0.0])
+    with pytest.raises(ValueError, match="beyond -113 mm"):
+        check_layers([-113.0, 0.0], camera)
 
 
 def test_default_layers_have_both_signs():

@@ -75,10 +75,21 @@ def test_little_overlap_is_refused_with_both_intervals():
         bd_rate(a, 30 + 10 * np.log10(a), a, 38 + 10 * np.log10(a))
     with pytest.raises(ValueError, match=r"rate of curve a runs from 0.01 to 0.1, of curve b from 0.2 to 2: .* 0%"):
         bd_psnr(a, curve(a), a * 20, curve(a))
-    # exactly a quarter passes; a little less does not
     bd_psnr(a, curve(a), a * 10**0.7499, curve(a))
     with pytest.raises(ValueError, match="25%"):
         bd_psnr(a, curve(a), a * 10**0.76, curve(a))
+
+
+def test_a_quarter_of_overlap_is_enough():
+    """Whole numbers, so that the share is 1/4 to the bit: one of four dB, one of four decades."""
+    line = np.array([0.0, 1.0, 2.0, 4.0])
+    assert bd_rate(10**line, line, 10**line, line + 3) == pytest.approx(-99.9)
+    decades = 10.0 ** np.array([0, 1, 2, 4])
+    assert np.log10(decades * 1000).tolist() == [3, 4, 5, 7]
+    assert bd_psnr(decades, line, decades * 1000, line) == pytest.approx(-3)
+    for less in (3.001, 3.5):
+        with pytest.raises(rd.UndefinedDifference, match="of the shorter, at least 25% are needed"):
+            bd_rate(10**line, line, 10**line, line + less)
 
 
 @pytest.mark.parametrize(
@@ -101,6 +112,9 @@ def test_invalid_curves_are_refused(function, rates, quality, message):
 def test_falling_quality_has_no_bd_rate_but_a_bd_psnr():
     with pytest.raises(ValueError, match=r"quality_b goes from 3 to 2\.5 between rates 3 and 4"):
         bd_rate([1, 2, 3, 4], [1, 2, 3, 4], [1, 2, 3, 4], [1, 2, 3, 2.5])
+    with pytest.raises(rd.UndefinedDifference, match="quality_a goes from 2 to 2 between rates 2 and 3") as level:
+        bd_rate([1, 2, 3, 4], [1, 2, 2, 4], [1, 2, 3, 4], [1, 2, 3, 4])  # rate over quality has no value at 2
+    assert level.value.short == "quality falls"
     assert math.isfinite(bd_psnr([1, 2, 3, 4], [1, 2, 3, 4], [1, 2, 3, 4], [1, 2, 3, 2.5]))
 
 

@@ -53,6 +53,14 @@ def test_screening_by_hand():
     np.testing.assert_array_equal(out, wanted)
 
 
+def test_screening_by_scores_that_are_all_alike():
+    """Without a spread nobody is outside, though every score is 0 or more spreads from the mean."""
+    scores = np.full((6, 10), 3.0)
+    assert not screened_observers(scores).any()
+    scores[:, :4] = simulated_scores([2.0, 3.0, 3.5, 4.0], 6, seed=1)
+    assert not screened_observers(scores).any()
+
+
 def test_observers_who_stopped_half_way_count_by_what_they_gave():
     scores = simulated_scores(np.linspace(1, 5, 10), 12, seed=2)
     scores[4, 5:] = np.nan

@@ -151,6 +151,19 @@ def test_a_mask_takes_out_what_is_interpolated_from_it():
     assert q_view(a, other, mask=np.ones_like(mask)).values == q_view(a, other).values
 
 
+def test_a_view_pixel_with_a_masked_neighbour_does_not_count():
+    """Views lie between pixels: of a masked pixel even a small weight takes the view pixel out."""
+    a = picture(lenses=(24, 14))
+    viewpoint = five_viewpoints(a.camera)["left"] * [0.7, 1, 1]
+    mask = np.ones(a.pixels.shape[:2], bool)
+    mask.reshape(14, 6, 24, 6)[:, :, 3:6, 1::2] = False  # every other column under three columns of lenses
+    counted, _ = view_image(a.with_pixels(np.repeat(mask[..., None], 3, 2).astype(np.float32)), viewpoint)
+    assert 0 < counted.min() < 1  # interpolated between masked and unmasked pixels
+    wrong = a.with_pixels(np.where(mask[..., None], a.pixels, 255 - a.pixels))
+    q = q_view(a, wrong, viewpoints={"aside": viewpoint}, mask=mask)
+    assert q.values["aside"] == 1 and q.psnr["aside"] == np.inf
+
+
 @pytest.mark.parametrize("z", [1.2, 5.0])
 def test_invalid_viewpoints_are_refused(z):
     a = picture()
