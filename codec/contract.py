@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import operator
 import sys
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
-from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
-from ii_core.base.interrupt import STOPS
+from ii_core.base.plugins import load_plugins
 
 from .checks import check_type
 from .search import CodingResult
@@ -203,18 +200,8 @@ def register(coder: Coder) -> None:
 
 @cache
 def _load_plugins() -> None:
-    """Register the coders of installed packages, once; a package that fails is a warning."""
-    for entry in entry_points(group=ENTRY_POINTS):
-        try:
-            found = entry.load()
-            if isinstance(found, ModuleType):  # it has registered its coders
-                continue
-            for coder in found if isinstance(found, list | tuple) else [found]:
-                register(coder() if isinstance(coder, type) else coder)
-        except STOPS:
-            raise
-        except BaseException as error:  # whatever a foreign package raises, SystemExit too, must not stop the others
-            warnings.warn(f"coder plugin {entry.name} ({entry.value}) is not loaded: {error}", stacklevel=2)
+    """Register the coders of installed packages, once."""
+    load_plugins(ENTRY_POINTS, "coder", register)
 
 
 def find(name: str) -> Coder:
