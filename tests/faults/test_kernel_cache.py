@@ -1,10 +1,14 @@
 """Cache of compiled kernels: kernels run with any content of the cache, which is repaired."""
 
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+ROOT = Path(__file__).parents[2]
 
 KERNEL = """
 from ii_core.base.jit import kernel
@@ -91,3 +95,35 @@ def test_an_edit_of_a_file_beside_it(package):
     (package / "old" / "twice.py").write_text(KERNEL.replace("doubled", "twice").replace("2 * x", "3 * x"))
     assert call(package, "old.kernels") == ["63", "0"]
     assert call(package, "old.kernels") == ["63", "1"]
+
+
+def test_an_edit_of_a_file_in_another_folder(package):
+    """A coder's kernels call the arithmetic coder of another folder, by way of any number of files."""
+    for folder, text in (
+        ("far", KERNEL.replace("doubled", "twice")),
+        ("between", "from far.kernels import twice\n" + KERNEL.replace("2 * x", "twice(x)")),
+        ("near", "from between.kernels import doubled as same\n" + KERNEL.replace("2 * x", "same(x)")),
+    ):
+        (package / folder).mkdir()
+        (package / folder / "__init__.py").write_text("")
+        (package / folder / "kernels.py").write_text(text)
+    assert call(package, "near.kernels") == ["42", "0"]
+    assert call(package, "near.kernels") == ["42", "1"]
+    source = package / "far" / "kernels.py"
+    source.write_text(source.read_text().replace("2 * x", "3 * x"))
+    assert call(package, "near.kernels") == ["63", "0"]
+    assert call(package, "near.kernels") == ["63", "1"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edited", ["ii_core/base/jit.py", "codec/coders/lf/contexts.py"])
+def test_an_edit_of_a_file_without_kernels(tmp_path, edited):
+    """The way kernels are compiled, and constants in their code, for kernels of a coder."""
+    for folder in ("ii_core", "codec"):
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "calls.py").write_text("from codec.coders.lf.motion import unpacked as doubled\n")
+    assert call(tmp_path, "calls")[-1] == "0"
+    assert call(tmp_path, "calls")[-1] == "1"
+    with (tmp_path / edited).open("a") as file:
+        file.write("\n# edited\n")
+    assert call(tmp_path, "calls")[-1] == "0"
