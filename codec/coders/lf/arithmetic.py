@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ii_core.base.jit import inner_kernel, lean_kernel
 
-LOW, RANGE, CACHE, WAITING, AT, DECODING, CODE, RAW_BITS = range(8)
+LOW, RANGE, CACHE, WAITING, AT, DECODING, CODE = range(7)
 FULL = (1 << 40) - 1
 LEAST_RANGE = 1 << 32
 ONE = 1 << 16
@@ -58,7 +58,7 @@ def new_contexts(count: int) -> NDArray[np.int32]:
 
 def writer(contexts: NDArray[np.int32], capacity: int) -> Arithmetic:
     """A coder that writes at most so many bytes; `finish` gives them."""
-    state = np.zeros(8, np.int64)
+    state = np.zeros(7, np.int64)
     state[RANGE], state[WAITING] = FULL, 1
     return Arithmetic(contexts, state, np.zeros(capacity, np.uint8))
 
@@ -74,7 +74,7 @@ def enlarged(coder: Arithmetic, capacity: int) -> Arithmetic:
 
 def reader(contexts: NDArray[np.int32], data: bytes) -> Arithmetic:
     """A coder that reads bytes, and zeros after them."""
-    state = np.zeros(8, np.int64)
+    state = np.zeros(7, np.int64)
     state[RANGE], state[DECODING], state[AT] = FULL, 1, 5
     state[CODE] = int.from_bytes(data[:5].ljust(5, b"\0"), "big")
     return Arithmetic(contexts, state, np.array(np.frombuffer(data, np.uint8)))
