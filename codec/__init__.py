@@ -7,7 +7,6 @@ from .coders.jpeg2000 import Jpeg2000
 from .coders.lf.coder import LightField
 from .coders.libaom import Avif
 from .coders.mpeg2 import Mpeg2
-from .coders.sperr.coder import Sperr
 from .coders.stills import Htj2k, Jpeg, JpegXl
 from .coders.svtav1 import Av1
 from .coders.volume import Separate, Volume
@@ -35,7 +34,6 @@ for _coder in (Mpeg2("ei"), Mpeg2("si"), Jpeg2000(), Jpeg(), JpegXl(), Htj2k()):
 for _kind in ("ei", "si", "ri"):
     register(Volume(_kind))
 register(Separate("si"))
-register(Sperr("si"))
 register(Avif("si"))
 register(LightField())
 register(Forman())

@@ -28,6 +28,7 @@ from .contract import (
     Coder,
     Goal,
     Options,
+    RemovedScheme,
     Value,
     check_picture,
     checked_goal,
@@ -184,6 +185,8 @@ class Encoded:
         header, payload = container.read(path)
         try:
             return _from_file(header, payload)
+        except RemovedScheme as error:
+            raise RemovedScheme(f"{os.fspath(path)}: {error}") from None
         except (ValueError, TypeError, OverflowError) as error:
             raise ValueError(f"{os.fspath(path)} is damaged: {one_line(error)}") from None
 
@@ -363,7 +366,7 @@ def decode(
     coded : Encoded or path
     max_pixels : int
         Largest number of pixels to decode, 2²⁷ by default, 2³¹ at most. It bounds the memory that a forged file can
-        take: up to 10 bytes per pixel, with SPERR 22.
+        take: up to 10 bytes per pixel.
     progress : callable or bool, optional
         ``progress(done, total, text)`` with the frames done, in any thread; True prints a line.
 

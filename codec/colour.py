@@ -19,9 +19,9 @@ image.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ii_core.base.colour import CB, CR, KB, KG, KR
 from ii_core.base.jit import kernel
@@ -92,27 +92,69 @@ def scatter(planes, origins, steps, size, form: Format, pixels) -> None:
         convert(*planes, origins, *steps, *size, backward(form.depth), pixels)
 
 
-def forward(depth: int) -> NDArray[np.int32]:
-    """Return the factors of R, G and B in Y, Cb and Cr, the chroma offset and the highest value."""
+class Forward(NamedTuple):
+    """Factors of R, G and B in Y, Cb and Cr, in units of 2^-`BITS`; chroma of grey and highest value."""
+
+    y_r: np.int32
+    y_g: np.int32
+    y_b: np.int32
+    cb_r: np.int32
+    cb_g: np.int32
+    cb_b: np.int32
+    cr_r: np.int32
+    cr_g: np.int32
+    cr_b: np.int32
+    grey: np.int32
+    peak: np.int32
+
+
+class Backward(NamedTuple):
+    """Factors of Y, of Cr in R, of Cb and Cr in G, and of Cb in B, in units of 2^-`BITS`; chroma of grey."""
+
+    y: np.int32
+    r_cr: np.int32
+    g_cb: np.int32
+    g_cr: np.int32
+    b_cb: np.int32
+    grey: np.int32
+
+
+def forward(depth: int) -> Forward:
+    """Return the factors of the conversion to YCbCr of so many bits."""
     peak = (1 << depth) - 1
     gain = peak / 255
-    yr, yb = _fixed(KR * gain), _fixed(KB * gain)
-    luma = [yr, _fixed(gain) - yr - yb, yb]  # the sum is exact, so that grey has neutral chroma
-    cb = [_fixed(-KR / CB * gain), _fixed(-KG / CB * gain), _fixed(0.5 * gain)]
-    cr = [_fixed(0.5 * gain), _fixed(-KG / CR * gain), _fixed(-KB / CR * gain)]
-    return np.array([*luma, *cb, *cr, (peak + 1) // 2, peak], np.int32)
+    y_r, y_b = _fixed(KR * gain), _fixed(KB * gain)
+    return Forward(
+        y_r=y_r,
+        y_g=np.int32(_fixed(gain) - y_r - y_b),  # the sum is exact, so that grey has neutral chroma
+        y_b=y_b,
+        cb_r=_fixed(-KR / CB * gain),
+        cb_g=_fixed(-KG / CB * gain),
+        cb_b=_fixed(0.5 * gain),
+        cr_r=_fixed(0.5 * gain),
+        cr_g=_fixed(-KG / CR * gain),
+        cr_b=_fixed(-KB / CR * gain),
+        grey=np.int32((peak + 1) // 2),
+        peak=np.int32(peak),
+    )
 
 
-def backward(depth: int) -> NDArray[np.int32]:
-    """Return the factors of Y, of Cr in R, of Cb and Cr in G, and of Cb in B, and the chroma offset."""
+def backward(depth: int) -> Backward:
+    """Return the factors of the conversion from YCbCr of so many bits."""
     peak = (1 << depth) - 1
     gain = 255 / peak
-    parts = [gain, CR * gain, -KB * CB / KG * gain, -KR * CR / KG * gain, CB * gain]
-    return np.array([*map(_fixed, parts), (peak + 1) // 2], np.int32)
+    return Backward(
+        y=_fixed(gain),
+        r_cr=_fixed(CR * gain),
+        g_cb=_fixed(-KB * CB / KG * gain),
+        g_cr=_fixed(-KR * CR / KG * gain),
+        b_cb=_fixed(CB * gain),
+        grey=np.int32((peak + 1) // 2),
+    )
 
 
-def _fixed(value: float) -> int:
-    return round(value * (1 << 20))
+def _fixed(value: float) -> np.int32:
+    return np.int32(round(value * (1 << BITS)))
 
 
 # Kernels process one row of several frames before the next row: neighbouring frames are interleaved in the picture,
@@ -121,34 +163,28 @@ TILE = 16
 
 
 @kernel
-def gather_444(pixels, origins, step_y, step_x, height, width, wide, factors, luma, cb, cr):
+def gather_444(pixels, origins, step_y, step_x, height, width, wide, f, luma, cb, cr):
     """planes[b, y, x] = YCbCr of pixels[origins[b] + y·step_y + x·step_x]."""
-    yr, yg, yb, br, bg, bb, rr, rg, rb, mid, top = (
-        factors[0], factors[1], factors[2], factors[3], factors[4], factors[5],
-        factors[6], factors[7], factors[8], factors[9], factors[10],
-    )  # fmt: skip
     for tile in range(0, origins.size, TILE):
         for y in range(luma.shape[1]):
             for b in range(tile, min(tile + TILE, origins.size)):
                 line = pixels[origins[b] + min(y, height - 1) * step_y :]
                 to_luma, to_cb, to_cr = luma[b, y], cb[b, y], cr[b, y]
                 for x in range(width):
-                    p = np.uint64(x) * np.uint64(
-                        step_x
-                    )  # unsigned: numba then omits the handling of negative indices
+                    # unsigned: numba then omits the handling of negative indices
+                    p = np.uint64(x) * np.uint64(step_x)
                     red, green, blue = np.int32(line[p, 0]), np.int32(line[p, 1]), np.int32(line[p, 2])
-                    to_luma[x] = (yr * red + yg * green + yb * blue + HALF) >> BITS
+                    to_luma[x] = (f.y_r * red + f.y_g * green + f.y_b * blue + HALF) >> BITS
                     # Pure blue and pure red round to one above the highest value.
-                    to_cb[x] = min(((br * red + bg * green + bb * blue + HALF) >> BITS) + mid, top)
-                    to_cr[x] = min(((rr * red + rg * green + rb * blue + HALF) >> BITS) + mid, top)
+                    to_cb[x] = min(((f.cb_r * red + f.cb_g * green + f.cb_b * blue + HALF) >> BITS) + f.grey, f.peak)
+                    to_cr[x] = min(((f.cr_r * red + f.cr_g * green + f.cr_b * blue + HALF) >> BITS) + f.grey, f.peak)
                 for x in range(width, wide):
                     to_luma[x], to_cb[x], to_cr[x] = to_luma[width - 1], to_cb[width - 1], to_cr[width - 1]
 
 
 @kernel
-def scatter_444(luma, cb, cr, origins, step_y, step_x, height, width, factors, pixels):
+def scatter_444(luma, cb, cr, origins, step_y, step_x, height, width, f, pixels):
     """pixels[origins[b] + y·step_y + x·step_x] = RGB of planes[b, y, x]."""
-    yy, r_cr, g_cb, g_cr, b_cb, mid = factors[0], factors[1], factors[2], factors[3], factors[4], factors[5]
     low, high = np.int32(0), np.int32(255)
     for tile in range(0, origins.size, TILE):
         for y in range(height):
@@ -156,20 +192,16 @@ def scatter_444(luma, cb, cr, origins, step_y, step_x, height, width, factors, p
                 line = pixels[origins[b] + y * step_y :]
                 for x in range(width):
                     p = np.uint64(x) * np.uint64(step_x)
-                    grey = np.int32(luma[b, y, x]) * yy + HALF
-                    blue, red = np.int32(cb[b, y, x]) - mid, np.int32(cr[b, y, x]) - mid
-                    line[p, 0] = min(max((grey + r_cr * red) >> BITS, low), high)
-                    line[p, 1] = min(max((grey + g_cb * blue + g_cr * red) >> BITS, low), high)
-                    line[p, 2] = min(max((grey + b_cb * blue) >> BITS, low), high)
+                    grey = np.int32(luma[b, y, x]) * f.y + HALF
+                    blue, red = np.int32(cb[b, y, x]) - f.grey, np.int32(cr[b, y, x]) - f.grey
+                    line[p, 0] = min(max((grey + f.r_cr * red) >> BITS, low), high)
+                    line[p, 1] = min(max((grey + f.g_cb * blue + f.g_cr * red) >> BITS, low), high)
+                    line[p, 2] = min(max((grey + f.b_cb * blue) >> BITS, low), high)
 
 
 @kernel
-def gather_420(pixels, origins, step_y, step_x, height, width, wide, factors, luma, cb, cr):
+def gather_420(pixels, origins, step_y, step_x, height, width, wide, f, luma, cb, cr):
     """Do as `gather_444`, with the chroma of the mean colour of every 2×2 pixels."""
-    yr, yg, yb, br, bg, bb, rr, rg, rb, mid, top = (
-        factors[0], factors[1], factors[2], factors[3], factors[4], factors[5],
-        factors[6], factors[7], factors[8], factors[9], factors[10],
-    )  # fmt: skip
     bits, half = BITS + 2, HALF << 2
     for tile in range(0, origins.size, TILE):
         for y in range(luma.shape[1]):
@@ -179,7 +211,7 @@ def gather_420(pixels, origins, step_y, step_x, height, width, wide, factors, lu
                 for x in range(width):
                     p = np.uint64(x) * np.uint64(step_x)
                     red, green, blue = np.int32(line[p, 0]), np.int32(line[p, 1]), np.int32(line[p, 2])
-                    to_luma[x] = (yr * red + yg * green + yb * blue + HALF) >> BITS
+                    to_luma[x] = (f.y_r * red + f.y_g * green + f.y_b * blue + HALF) >> BITS
                 for x in range(width, wide):
                     to_luma[x] = to_luma[width - 1]
                 if y % 2:
@@ -190,14 +222,15 @@ def gather_420(pixels, origins, step_y, step_x, height, width, wide, factors, lu
                         red = np.int32(line[p, 0]) + line[q, 0] + above[p, 0] + above[q, 0]
                         green = np.int32(line[p, 1]) + line[q, 1] + above[p, 1] + above[q, 1]
                         blue = np.int32(line[p, 2]) + line[q, 2] + above[p, 2] + above[q, 2]
-                        cb[b, y // 2, x] = min(((br * red + bg * green + bb * blue + half) >> bits) + mid, top)
-                        cr[b, y // 2, x] = min(((rr * red + rg * green + rb * blue + half) >> bits) + mid, top)
+                        to_cb = f.cb_r * red + f.cb_g * green + f.cb_b * blue
+                        to_cr = f.cr_r * red + f.cr_g * green + f.cr_b * blue
+                        cb[b, y // 2, x] = min(((to_cb + half) >> bits) + f.grey, f.peak)
+                        cr[b, y // 2, x] = min(((to_cr + half) >> bits) + f.grey, f.peak)
 
 
 @kernel
-def scatter_420(luma, cb, cr, origins, step_y, step_x, height, width, factors, pixels):
+def scatter_420(luma, cb, cr, origins, step_y, step_x, height, width, f, pixels):
     """Do as `scatter_444`, with chroma interpolated between the centres of 2×2 pixels."""
-    yy, r_cr, g_cb, g_cr, b_cb, mid = factors[0], factors[1], factors[2], factors[3], factors[4], factors[5]
     low, high = np.int32(0), np.int32(255)
     bits, last_x, last_y = BITS + 4, (width - 1) // 2, (height - 1) // 2
     for tile in range(0, origins.size, TILE):
@@ -209,22 +242,22 @@ def scatter_420(luma, cb, cr, origins, step_y, step_x, height, width, factors, p
                 for x in range(width):
                     p = np.uint64(x) * np.uint64(step_x)
                     near, far = x // 2, min(max(x // 2 + (x % 2) * 2 - 1, 0), last_x)
-                    grey = ((np.int64(luma[b, y, x]) * yy) << 4) + (HALF << 4)
+                    grey = ((np.int64(luma[b, y, x]) * f.y) << 4) + (HALF << 4)
                     blue = (
                         9 * np.int64(cb[b, near_y, near])
                         + 3 * (np.int64(cb[b, near_y, far]) + cb[b, far_y, near])
                         + cb[b, far_y, far]
-                        - 16 * mid
+                        - 16 * f.grey
                     )
                     red = (
                         9 * np.int64(cr[b, near_y, near])
                         + 3 * (np.int64(cr[b, near_y, far]) + cr[b, far_y, near])
                         + cr[b, far_y, far]
-                        - 16 * mid
+                        - 16 * f.grey
                     )
-                    line[p, 0] = min(max((grey + r_cr * red) >> bits, low), high)
-                    line[p, 1] = min(max((grey + g_cb * blue + g_cr * red) >> bits, low), high)
-                    line[p, 2] = min(max((grey + b_cb * blue) >> bits, low), high)
+                    line[p, 0] = min(max((grey + f.r_cr * red) >> bits, low), high)
+                    line[p, 1] = min(max((grey + f.g_cb * blue + f.g_cr * red) >> bits, low), high)
+                    line[p, 2] = min(max((grey + f.b_cb * blue) >> bits, low), high)
 
 
 @kernel

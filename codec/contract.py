@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import operator
 import sys
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
-from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
-from ii_core.base.interrupt import STOPS
+from ii_core.base.plugins import load_plugins
 
 from .checks import check_type
 from .search import CodingResult
@@ -29,7 +26,7 @@ Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 # Largest number of pixels of a picture: 6 GiB of RGB with 8 bit.
 MAX_PIXELS = 1 << 31
 # Largest number of pixels that is decoded by default: 16384×8192, four times the full setup 1. Decoders take up to
-# 10 bytes per pixel, SPERR 22 (docs/structure.md, cost).
+# 10 bytes per pixel (docs/structure.md, cost).
 MAX_DECODED_PIXELS = 1 << 27
 
 
@@ -181,6 +178,13 @@ ENTRY_POINTS = "raytrace_ii.coders"
 
 _CODERS: dict[str, Coder] = {}
 
+# Schemes of earlier versions and what there is instead. Files name them; see `codec.bitstream.compact`.
+REMOVED = {"si-sperr": "versions until 2026-11-22 decode its files, si-jp3d codes volumes"}
+
+
+class RemovedScheme(ValueError):
+    """A scheme that only earlier versions had."""
+
 
 def register(coder: Coder) -> None:
     """Add a coder to the known schemes, under its name.
@@ -203,18 +207,8 @@ def register(coder: Coder) -> None:
 
 @cache
 def _load_plugins() -> None:
-    """Register the coders of installed packages, once; a package that fails is a warning."""
-    for entry in entry_points(group=ENTRY_POINTS):
-        try:
-            found = entry.load()
-            if isinstance(found, ModuleType):  # it has registered its coders
-                continue
-            for coder in found if isinstance(found, list | tuple) else [found]:
-                register(coder() if isinstance(coder, type) else coder)
-        except STOPS:
-            raise
-        except BaseException as error:  # whatever a foreign package raises, SystemExit too, must not stop the others
-            warnings.warn(f"coder plugin {entry.name} ({entry.value}) is not loaded: {error}", stacklevel=2)
+    """Register the coders of installed packages, once."""
+    load_plugins(ENTRY_POINTS, "coder", register)
 
 
 def find(name: str) -> Coder:
@@ -223,12 +217,14 @@ def find(name: str) -> Coder:
     Raises
     ------
     TypeError, ValueError
-        If the name is no text, or unknown.
+        If the name is no text, or unknown; `RemovedScheme` if it was known to earlier versions.
     """
     check_type("scheme", name, str, "a name")
     if name not in _CODERS:
         _load_plugins()
     if name not in _CODERS:
+        if name in REMOVED:
+            raise RemovedScheme(f"scheme {name} is no longer there: {REMOVED[name]}")
         raise ValueError(f"unknown scheme {name!r}: known are {', '.join(sorted(_CODERS))}")
     return _CODERS[name]
 

@@ -33,7 +33,6 @@ ANCHOR = "si-h264:rate=cq,chroma=420"
 CURVES: dict[str, list[dict[str, Any]]] = {
     ANCHOR: [{"qp": qp} for qp in (20, 29, 38, 47)],
     "si-jp3d": [{"quality": q} for q in (17, 22, 27, 33)],
-    "si-sperr": [{"quality": q} for q in (17, 22, 27, 33)],
     "si-jp3d:wavelet=53": [{"quality": q} for q in (17, 22, 27, 33)],
     "si-jp3d:order=row": [{"quality": q} for q in (17, 22, 27, 33)],
     "si-jpeg2000": [{"quality": q} for q in (17, 22, 27, 33)],

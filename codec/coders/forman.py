@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
+from ii_core.base.jit import array_kernel, lean_kernel
 
 from .. import clock
 from ..contract import Coder, Goal, Option, Options, Pixels
@@ -39,7 +40,6 @@ from .lf.arithmetic import (
     reader,
     writer,
 )
-from .lf.jit import kernel, lean
 from .volume import principal_axes
 
 SIDE = 8  # largest side of a block
@@ -172,7 +172,7 @@ def _code(coder: Arithmetic, samples: NDArray[np.int16], picture: IIPicture, gro
     _code_blocks(coder, samples, (l, u, v), parts(k, group), parts(v, SIDE), parts(u, SIDE), step)
 
 
-@lean
+@lean_kernel
 def _transformed(block, sizes, backward, half):
     """Transform a block (8, 8, 8) of int64 in place, along one axis after the other."""
     for axis in range(3):
@@ -196,7 +196,7 @@ def _transformed(block, sizes, backward, half):
                         block[i, j, a] = total >> 14
 
 
-@lean
+@lean_kernel
 def _near(levels, t, y, x):
     """Class 0–7 by the magnitudes of the six places one or two further along an axis."""
     total = np.int64(0)
@@ -210,7 +210,7 @@ def _near(levels, t, y, x):
     return total if total < 5 else (5 if total < 7 else (6 if total < 11 else 7))
 
 
-@lean
+@lean_kernel
 def _code_levels(coder, levels, sizes, plane, before):
     """Write levels, or read them into zeros; return whether there are any."""
     count = sizes[0] * sizes[1] * sizes[2]
@@ -247,7 +247,7 @@ def _code_levels(coder, levels, sizes, plane, before):
     return 1
 
 
-@kernel
+@array_kernel
 def _code_blocks(coder, samples, structure, groups, rows, cols, step):
     """Write or read all blocks: by rows of elementary images, groups, rows and columns of blocks, and planes."""
     count, width, height = structure

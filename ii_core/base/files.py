@@ -8,7 +8,7 @@ import json
 import os
 import re
 import stat
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ __all__ = [
     "atomic_path",
     "atomic_paths",
     "check_file",
+    "check_form",
     "check_name",
     "check_type",
     "image_header",
@@ -144,6 +145,14 @@ def parse_json(text: str | bytes) -> Any:
     except json.JSONDecodeError as error:
         raise ValueError(f"no JSON, line {error.lineno}, column {error.colno}: {error.msg}") from None
     return value
+
+
+def check_form(data: Any, wrong: str, format: str, version: int, keys: Collection[str] = ()) -> None:
+    """Raise ValueError, which starts with ``wrong``, unless data state format and version and have the keys."""
+    if not isinstance(data, dict) or (data.get("format"), data.get("version")) != (format, version):
+        raise ValueError(f'{wrong}: needs "format": "{format}", "version": {version}')
+    if missing := set(keys) - set(data):
+        raise ValueError(f"{wrong}: {', '.join(sorted(missing))} missing")
 
 
 def _check_depth(value: Any, left: int) -> None:

@@ -1,7 +1,8 @@
 """Compilation of kernels: lazy, cached on disk, without the interpreter lock.
 
-A cached kernel is valid as long as no source file of its folder changes, nor this file and the table of sRGB: kernels
-may call kernels of their own folder. The cache of numba alone notices changes in a kernel's own file only.
+A cached kernel is valid as long as no source file of its folder changes, nor of the folders of kernels that its file
+imports, nor this file and the table of sRGB: the machine code of a kernel contains that of the kernels it calls. The
+cache of numba alone notices changes in a kernel's own file only.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.dispatcher import Dispatcher
 
 
 class Cache(FunctionCache):
@@ -28,9 +30,7 @@ class Cache(FunctionCache):
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        self._cache_file = IndexDataCacheFile(
-            self._cache_path, self._impl.filename_base, _sources(Path(function.__code__.co_filename).parent)
-        )
+        self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, _stamp(function))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled kernel of a signature; None if none can be read."""
@@ -47,14 +47,38 @@ class Cache(FunctionCache):
             super().save_overload(sig, data)
 
 
+_STAMPS: dict[str, str] = {}
+
+
+def _stamp(function: Callable[..., Any]) -> str:
+    """Return the hash of all sources that the machine code of a file's kernels depends on."""
+    file = function.__code__.co_filename
+    if file not in _STAMPS:  # the first kernel of its file: the imports above it are done
+        folders = {Path(file).parent}
+        _add_folders(function.__globals__, folders, set())
+        here = Path(__file__)
+        sources = [
+            here,
+            here.with_name("colour.py"),
+            *(source for folder in folders for source in folder.glob("*.py")),
+        ]
+        _STAMPS[file] = hashlib.sha256(b"".join(sorted(map(_source, sources)))).hexdigest()
+    return _STAMPS[file]
+
+
+def _add_folders(namespace: dict[str, Any], folders: set[Path], seen: set[int]) -> None:
+    """Add the folders of all kernels of a file, of those that their files import, and so on."""
+    seen.add(id(namespace))
+    for value in namespace.values():
+        if isinstance(value, Dispatcher) and id(value.py_func.__globals__) not in seen:
+            folders.add(Path(value.py_func.__code__.co_filename).parent)
+            _add_folders(value.py_func.__globals__, folders, seen)
+
+
 @cache
-def _sources(folder: Path) -> str:
-    """Hash of all sources of a folder of kernels, of this file and of the table of sRGB, a constant of kernels."""
-    here = Path(__file__)
-    found = hashlib.sha256()
-    for file in (*sorted(folder.glob("*.py")), here, here.with_name("colour.py")):
-        found.update(file.name.encode() + b"\0" + file.read_bytes())
-    return found.hexdigest()
+def _source(file: Path) -> bytes:
+    """Return the hash of a source file and its name, the same in every copy of its folder."""
+    return hashlib.sha256(file.name.encode() + b"\0" + file.read_bytes()).digest()
 
 
 def kernel(function: Callable[..., Any], **options: Any) -> Any:
@@ -63,6 +87,11 @@ def kernel(function: Callable[..., Any], **options: Any) -> Any:
     with contextlib.suppress(RuntimeError):  # no cache folder can be written
         compiled._cache = Cache(function)  # as numba's own enable_caching does
     return compiled
+
+
+def array_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that creates arrays; division by zero gives infinity or NaN, as in numpy."""
+    return kernel(function, error_model="numpy")
 
 
 def lean_kernel(function: Callable[..., Any], **options: Any) -> Any:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .atomic import disk_errors
-from .files import check_file, parse_json
+from .files import check_file, check_form, parse_json
 
 try:
     import fcntl
@@ -57,9 +57,8 @@ def read_records(path: Path, format: str, version: int) -> list[dict[str, Any]]:
             break
         try:
             record = parse_json(line)
+            check_form(record, "no record", format, version)
         except ValueError as error:
             raise ValueError(f"{path}, line {number}: {error}") from None
-        if not isinstance(record, dict) or (record.get("format"), record.get("version")) != (format, version):
-            raise ValueError(f'{path}, line {number}: no record: needs "format": "{format}", "version": {version}')
         found.append(record)
     return found

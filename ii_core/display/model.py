@@ -116,13 +116,3 @@ class DisplayModel:
         """Cosine and sine of the lens array's turn."""
         turn = math.radians(self.turn_deg)
         return (math.cos(turn), math.sin(turn)) if turn else (1.0, 0.0)
-
-    @property
-    def matched(self) -> bool:
-        """Whether the lens array is the camera's, in its place."""
-        return (
-            self.lens_pitch_mm == self.camera.lens_pitch_mm
-            and self.gap_mm == self.camera.gap_mm
-            and self.shift_mm == (0.0, 0.0)
-            and self.turn_deg == 0
-        )

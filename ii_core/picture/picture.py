@@ -17,6 +17,7 @@ from ..base.colour import srgb
 from ..base.files import (
     RowWriter,
     atomic_paths,
+    check_form,
     check_type,
     image_header,
     image_rows,
@@ -213,10 +214,7 @@ class IIPicture:
         ValueError
             If the values are not those of a structure, or do not fit the pixels.
         """
-        if not isinstance(data, dict) or data.get("format") != "ii-picture" or data.get("version") != 1:
-            raise ValueError('no II-picture structure: needs "format": "ii-picture", "version": 1')
-        if missing := {"lenses", "ei_pixels"} - set(data):
-            raise ValueError(f"no II-picture structure: {', '.join(sorted(missing))} missing")
+        check_form(data, "no II-picture structure", "ii-picture", 1, ("lenses", "ei_pixels"))
         camera = data.get("camera")
         return cls(
             pixels,

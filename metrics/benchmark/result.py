@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ii_core.base import checks
-from ii_core.base.files import one_line, read_json, write_json
+from ii_core.base.files import check_form, one_line, read_json, write_json
 
 from ..rates.points import check_points, spelt, unspelt
 from ..rates.rd import rate_distortion
@@ -143,10 +143,7 @@ def read_result(path: str | os.PathLike[str]) -> dict[str, Any]:
     """
     data = read_json(path)
     try:
-        if not isinstance(data, dict) or data.get("format") != FORMAT or data.get("version") != VERSION:
-            raise ValueError(f'no result of the benchmark: needs "format": "{FORMAT}", "version": {VERSION}')
-        if missing := NEEDED - set(data):
-            raise ValueError(f"no result of the benchmark: {', '.join(sorted(missing))} missing")
+        check_form(data, "no result of the benchmark", FORMAT, VERSION, NEEDED)
         if not isinstance(data["pictures"], list) or not data["pictures"]:
             raise ValueError("no result of the benchmark: a list of pictures is needed")
         for row in data["pictures"]:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import entry_points
-from types import ModuleType
 from typing import Any
 
 from ii_core.base.files import one_line
 from ii_core.base.foreign import ForeignError, foreign_errors
-from ii_core.base.interrupt import STOPS
+from ii_core.base.plugins import load_plugins
 
 from .pair import PicturePair
 
@@ -179,7 +176,7 @@ def known_measures() -> dict[str, Measure]:
     """Return all measures by name, those of installed packages too.
 
     A package registers a measure by an entry point of the group ``raytrace_ii.measures`` that names a `Measure`,
-    or a module that calls `register_measure`.
+    a list of them, or a module that calls `register_measure`.
     """
     _load_plugins()
     return MEASURES
@@ -187,15 +184,8 @@ def known_measures() -> dict[str, Measure]:
 
 @cache
 def _load_plugins() -> None:
-    for point in entry_points(group=PLUGINS):
-        try:
-            found = point.load()
-            if not isinstance(found, ModuleType):  # a module has registered its measures
-                register_measure(found)
-        except STOPS:
-            raise
-        except BaseException as error:  # whatever a foreign package raises, SystemExit too, must not stop the others
-            warnings.warn(f"measure {point.name} ({point.value}) is left out: {error}", stacklevel=3)
+    """Register the measures of installed packages, once."""
+    load_plugins(PLUGINS, "measure", register_measure)
 
 
 def measure_of(name: str) -> Measure:

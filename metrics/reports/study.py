@@ -16,7 +16,7 @@ import numpy as np
 
 from ii_core import IIPicture
 from ii_core.base import checks
-from ii_core.base.files import one_line, read_json, write_json
+from ii_core.base.files import check_form, one_line, read_json, write_json
 from ii_core.base.identity import library_versions
 
 from ..rates.against_anchor import differences
@@ -138,10 +138,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     """
     study = read_json(path)
     try:
-        if not isinstance(study, dict) or study.get("format") != FORMAT or study.get("version") != VERSION:
-            raise ValueError(f'not a study: needs "format": "{FORMAT}", "version": {VERSION}')
-        if missing := {"picture", "points"} - set(study):
-            raise ValueError(f"not a study: {', '.join(sorted(missing))} missing")
+        check_form(study, "not a study", FORMAT, VERSION, ("picture", "points"))
         if not isinstance(study["picture"], dict) or not isinstance(study["points"], list):
             raise ValueError("not a study: picture is to be an object, points a list")
         check_points(study["points"])

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from metrics.benchmark.profile import Profile, Reference
     from metrics.benchmark.subject import Subject
 
-SET, MANIFEST, CARD = "benchmark", "manifest.json", "README.md"
+MANIFEST, CARD = "manifest.json", "README.md"
 FORM = "ii-benchmark-pictures"
 
 

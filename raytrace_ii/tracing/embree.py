@@ -167,7 +167,7 @@ class Tree:
         origins: Floats,
         directions: Floats,
         reach: Floats,
-        out: tuple[NDArray[np.int32], Floats, Floats, Floats],
+        out: HitArrays,
         placed: bool = True,
     ) -> None:
         """Fill row of the face (−1 on a miss), u, v and distance of the nearest hit, placed in float64 if ``placed``.

@@ -105,16 +105,6 @@ def precincts(how):
     return [*said(coded, payload=payload), most() - before]
 
 
-def sperr(side):
-    noise = np.random.default_rng(0).integers(0, 9, (64, 64, 3), np.uint8)
-    coded = encode(IIPicture(noise, (8, 8), (8, 8)), "si-sperr", bpp=1)
-    structure = coded.structure | {"lenses": [side // 8, side // 8]}
-    payload = coded.payload[:1000].ljust(1024, b"\\0")
-    before = most()
-    answer = said(coded, payload=payload, structure=structure)
-    return [*answer, most() - before, most(resource.RUSAGE_CHILDREN)]
-
-
 for case in json.loads(sys.argv[1]):
     name, *arguments = case
     sys.stdout.flush()
@@ -134,14 +124,13 @@ SIZES = [
     ("jpeg2000", 32000, "at most 134217728 are decoded, raise max_pixels"),
 ]
 STYLES = ["whole", "precincts", "second style", "style of a tile", "tiles"]
-VOLUMES = [(2048, 22 * 4 + 50, 40 * 4 + 200), (2056, 5, 200), (8192, 5, 200)]
 
 
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory):
     """Return how every case ended."""
     folder = tmp_path_factory.mktemp("forged")
-    cases = [["claims"], *(["precincts", how] for how in STYLES), *(["sperr", side] for side, *_ in VOLUMES)]
+    cases = [["claims"], *(["precincts", how] for how in STYLES)]
     cases += [["forged", scheme, side, str(folder / f"{scheme}{side}.ii")] for scheme, side, _ in SIZES]
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, json.dumps(cases)], capture_output=True, text=True, timeout=300, check=False
@@ -191,11 +180,3 @@ def test_forged_precincts_and_tiles_of_jpeg2000_take_no_memory(ended, how):
     assert kind == ("picture" if how == "whole" else "refused") and ("damaged" in answer) == (how != "whole")
     assert megabytes < (120 if how == "whole" else 20)  # 10 bytes a pixel of the picture are 42 MB
     assert seconds < 5
-
-
-@pytest.mark.parametrize(("side", "own", "worker"), VOLUMES)
-def test_forged_volumes_of_sperr_take_memory_by_their_bytes(ended, side, own, worker):
-    """A kilobyte allows 2048² pixels at most; 22 bytes per pixel here, 40 in the decoder, in MB."""
-    kind, answer, _, *taken = ended["sperr", side]
-    assert kind != "wrong" and ("too few for" in answer) == (side > 2048)
-    assert taken[0] <= own and taken[1] <= worker

@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codec.coders.lf import arithmetic
-from codec.coders.lf.jit import kernel
 from codec.coders.lf.transform import forward, inverse
+from ii_core.base.jit import array_kernel
 
 
-@kernel
+@array_kernel
 def coded(coder, bits, contexts, numbers):
     """Code bits, each in its context, then numbers, in place."""
     for i in range(bits.size):

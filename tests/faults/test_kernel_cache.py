@@ -8,11 +8,15 @@ import os
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numba
 import pytest
 
 from ii_core.base import jit
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("old", "new", "far", "between", "near")  # packages that tests make
 
 KERNEL = """
 from ii_core.base.jit import kernel
@@ -50,11 +54,12 @@ def called(monkeypatch, recwarn, capfd):
     monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits within a second would have one time stamp
 
     def call(folder, module):
-        for name in [name for name in sys.modules if name.partition(".")[0] in ("old", "new")]:
+        for name in [name for name in sys.modules if name.partition(".")[0] in FOLDERS]:
             del sys.modules[name]
         with monkeypatch.context() as here:
             here.syspath_prepend(folder)
-            jit._sources.cache_clear()
+            jit._STAMPS.clear()
+            jit._source.cache_clear()
             doubled = importlib.import_module(module).doubled
             found = doubled(21), len(doubled.stats.cache_hits)
         assert not recwarn.list and capfd.readouterr() == ("", "")
@@ -126,3 +131,35 @@ def test_an_edit_of_a_file_beside_it(called, package):
     (package / "old" / "twice.py").write_text(KERNEL.replace("doubled", "twice").replace("2 * x", "3 * x"))
     assert called(package, "old.kernels") == (63, 0)
     assert called(package, "old.kernels") == (63, 1)
+
+
+def test_an_edit_of_a_file_in_another_folder(called, tmp_path):
+    """A coder's kernels call the arithmetic coder of another folder, by way of any number of files."""
+    for folder, text in (
+        ("far", KERNEL.replace("doubled", "twice")),
+        ("between", "from far.kernels import twice\n" + KERNEL.replace("2 * x", "twice(x)")),
+        ("near", "from between.kernels import doubled as same\n" + KERNEL.replace("2 * x", "same(x)")),
+    ):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "__init__.py").write_text("")
+        (tmp_path / folder / "kernels.py").write_text(text)
+    assert called(tmp_path, "near.kernels") == (42, 0)
+    assert called(tmp_path, "near.kernels") == (42, 1)
+    source = tmp_path / "far" / "kernels.py"
+    source.write_text(source.read_text().replace("2 * x", "3 * x"))
+    assert called(tmp_path, "near.kernels") == (63, 0)
+    assert called(tmp_path, "near.kernels") == (63, 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edited", ["ii_core/base/jit.py", "codec/coders/lf/contexts.py"])
+def test_an_edit_of_a_file_without_kernels(tmp_path, edited):
+    """The way kernels are compiled, and constants in their code, for kernels of a coder."""
+    for folder in ("ii_core", "codec"):
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "calls.py").write_text("from codec.coders.lf.motion import unpacked as doubled\n")
+    assert called_in_a_process(tmp_path, "calls")[-1] == 0
+    assert called_in_a_process(tmp_path, "calls")[-1] == 1
+    with (tmp_path / edited).open("a") as file:
+        file.write("\n# edited\n")
+    assert called_in_a_process(tmp_path, "calls")[-1] == 0

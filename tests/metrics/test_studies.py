@@ -303,23 +303,30 @@ def test_names_of_measures_are_checked(own_measure):
 
 
 def test_measures_of_installed_packages(monkeypatch):
-    """An entry point adds its measure; one that does not load is left out with a warning."""
+    """An entry point adds its measure, or a list of them; one that does not load is left out with a warning."""
     from importlib.metadata import EntryPoint
 
+    from ii_core.base import plugins
     from metrics.measures import measure
 
     monkeypatch.setattr(measure, "MEASURES", MEASURES.copy())
     points = [
         EntryPoint("broken", "no_such_module:x", "raytrace_ii.measures"),
         EntryPoint("own", f"{__name__}:PLUGIN", "raytrace_ii.measures"),
+        EntryPoint("two", f"{__name__}:TWO_PLUGINS", "raytrace_ii.measures"),
     ]
-    monkeypatch.setattr(measure, "entry_points", lambda group: [point for point in points if point.group == group])
+    monkeypatch.setattr(plugins, "entry_points", lambda group: [point for point in points if point.group == group])
     measure._load_plugins.cache_clear()
     try:
-        with pytest.warns(UserWarning, match=r"measure broken \(no_such_module:x\) is left out"):
-            assert measure.known_measures()["q_plugin"].text == "from a package"
+        with pytest.warns(UserWarning, match=r"measure plugin broken \(no_such_module:x\) is not loaded"):
+            known = measure.known_measures()
+        assert known["q_plugin"].text == "from a package"
+        assert {"q_first", "q_second"} <= set(known)
     finally:
         measure._load_plugins.cache_clear()
 
 
 PLUGIN = Measure(name="q_plugin", compute=mean_absolute_error, text="from a package")
+TWO_PLUGINS = [
+    Measure(name=name, compute=mean_absolute_error, text="from a package") for name in ("q_first", "q_second")
+]

@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from ii_core.base.jit import lean_kernel
+
 from . import contexts as at
 from .arithmetic import bit_cost, code_bit
 from .coefficients import dequantise
-from .jit import lean
 from .transform import inverse
 
 MOST_CROSS = 4  # quarters
 
 
-@lean
+@lean_kernel
 def code_cross(coder, plane, log, cross):
     """Write or read the factor."""
     context = at.CROSS + (plane - 1) * 8
@@ -29,7 +30,7 @@ def code_cross(coder, plane, log, cross):
     return -size if negative else size
 
 
-@lean
+@lean_kernel
 def cross_cost(costs, plane, log, cross):
     """Bits that `code_cross` would take."""
     context = at.CROSS + (plane - 1) * 8
@@ -41,7 +42,7 @@ def cross_cost(costs, plane, log, cross):
     return bits
 
 
-@lean
+@lean_kernel
 def keep_first(work, rows, cols):
     """Remember work.coefficients[:rows, :cols] as the first plane's."""
     work.reach[0], work.reach[1] = rows, cols
@@ -50,7 +51,7 @@ def keep_first(work, rows, cols):
             work.first[y, x] = work.coefficients[y, x]
 
 
-@lean
+@lean_kernel
 def best_cross(work):
     """The factor by which the first plane's coefficients come nearest to work.coefficients."""
     product = square = np.float32(0)
@@ -65,7 +66,7 @@ def best_cross(work):
     return min(max(factor, -MOST_CROSS), MOST_CROSS)
 
 
-@lean
+@lean_kernel
 def subtract_cross(work, cross):
     """Take the prediction from work.coefficients."""
     for y in range(work.reach[0]):
@@ -73,7 +74,7 @@ def subtract_cross(work, cross):
             work.coefficients[y, x] -= (cross * work.first[y, x]) >> 2
 
 
-@lean
+@lean_kernel
 def rebuild(work, levels, log, step, some, cross, skipped):
     """work.block = the residual, of levels if there are ``some``, and of the first plane.
 

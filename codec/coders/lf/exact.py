@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ii_core.base.jit import array_kernel, lean_kernel
+
 from . import contexts as at
 from .arithmetic import DECODING, code_bit, code_number, code_raw
-from .jit import kernel, lean
 
 ORDER = (1, 0, 2)
 FEATURES = 15
@@ -56,7 +57,7 @@ def new_exact(height: int, width: int, dtype: Any) -> Exact:
     )
 
 
-@lean
+@lean_kernel
 def prepare(exact, views, view, axes, sixteen):
     """exact.guess = a decoded view in the picture's colours; exact.missed = 0."""
     height, width = exact.pixels.shape[:2]
@@ -73,7 +74,7 @@ def prepare(exact, views, view, axes, sixteen):
                 exact.guess[i, y, x] = min(max((total >> shift) + 8 * middle, 0), 8 * top)
 
 
-@lean
+@lean_kernel
 def _features(missed, i, y, x, found):
     """Gather earlier errors; y and x count from the border of ``missed``. Return the sum of their magnitudes."""
     found[0], found[1] = missed[i, y, x - 1], missed[i, y - 1, x]
@@ -90,7 +91,7 @@ def _features(missed, i, y, x, found):
         found[8] = missed[0, y, x + 1]
 
 
-@lean
+@lean_kernel
 def _code_magnitude(coder, first, size, scale):
     """A prefix of ones, each in its context, and ``scale`` bits of even odds; a long prefix ends in a number."""
     head = size >> scale
@@ -104,7 +105,7 @@ def _code_magnitude(coder, first, size, scale):
     return found
 
 
-@kernel
+@array_kernel
 def code_exact(coder, exact):
     """Write the pixels of a view, or read them."""
     height, width = exact.pixels.shape[:2]

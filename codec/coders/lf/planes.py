@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core.base.jit import lean_kernel
+
 from ..volume import principal_axes
-from .jit import lean
 from .warp import clamped
 
 MOST_COMPARED = 1 << 22  # pixels of which the principal axes are found
@@ -38,7 +39,7 @@ def detail_axes(pixels: NDArray[Any], grid: tuple[int, int]) -> NDArray[np.int16
     return principal_axes(detail if len(detail) else pixels)
 
 
-@lean
+@lean_kernel
 def gather(pixels, grid, row, col, axes, sixteen, out):
     """out (3, H, W) = the planes of a view; sides beyond the view repeat its border.
 
@@ -64,7 +65,7 @@ def gather(pixels, grid, row, col, axes, sixteen, out):
                 out[p, y, x] = total >> shift
 
 
-@lean
+@lean_kernel
 def scatter(views, at, grid, row, col, axes, sixteen, pixels):
     """The inverse of `gather`, rounded and clipped; the axes are a rotation."""
     height, width = pixels.shape[0] // grid[0], pixels.shape[1] // grid[1]

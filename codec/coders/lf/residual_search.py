@@ -6,12 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ii_core.base.jit import inner_kernel, lean_kernel
+
 from .arithmetic import bit_cost
 from .blocks import LIMIT, coded_context, residual_context, skipped_context
 from .coefficients import quantise
 from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
 from .intra import MODES
-from .jit import inner, lean
 from .matching import HUGE
 from .samples import LARGEST_SKIPPED, quantise_samples
 from .transform import LARGEST, forward
@@ -48,14 +49,14 @@ def new_trial() -> Trial:
     )
 
 
-@inner
+@inner_kernel
 def _copy_block(block, to, n):
     for y in range(n):
         for x in range(n):
             to[y, x] = block[y, x]
 
 
-@lean
+@lean_kernel
 def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped):
     """Quantise work.coefficients, which are samples if the transform is skipped."""
     if skipped:
@@ -63,7 +64,7 @@ def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped):
     return quantise(costs, work.coefficients, plane, log, step, weight, levels)
 
 
-@lean
+@lean_kernel
 def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crossed, error, skipped):
     """Quantise work.block; return bits, whether there are levels, which array has them, and the factor of `cross`.
 
@@ -94,7 +95,7 @@ def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crosse
     return bits, some, cross
 
 
-@lean
+@lean_kernel
 def try_residual(costs, job, search, work, trial, y0, x0, log, kind, so_far):
     """Code the difference to work.predicted; return bits, error and whether there is a residual.
 
@@ -132,7 +133,7 @@ def try_residual(costs, job, search, work, trial, y0, x0, log, kind, so_far):
     return bits, error, coded
 
 
-@lean
+@lean_kernel
 def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit):
     """As `try_residual`, with a transform or without; give up without a residual beyond a cost."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
@@ -188,7 +189,7 @@ def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit)
     return empty, without, 0
 
 
-@inner
+@inner_kernel
 def _leave(trial, work, p, n):
     """A plane without a residual."""
     for y in range(n):
@@ -197,7 +198,7 @@ def _leave(trial, work, p, n):
             trial.trial_levels[p, y, x] = 0
 
 
-@inner
+@inner_kernel
 def keep(trial, log):
     """Note the way tried as the best one of a block of this size."""
     n = 1 << log
@@ -210,7 +211,7 @@ def keep(trial, log):
                 trial.levels[log, p, y, x] = trial.trial_levels[p, y, x]
 
 
-@inner
+@inner_kernel
 def copy_trial(decoded, levels, cross, to_decoded, to_levels, to_cross, n):
     """Copy what a way makes of a block of n×n samples."""
     to_cross[0], to_cross[1] = cross[0], cross[1]

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core.base.jit import array_kernel, inner_kernel, lean_kernel
+
 from .arithmetic import bit_cost
 from .blocks import (
     CROSS_1,
@@ -32,7 +34,6 @@ from .blocks import (
 )
 from .field import EIGHTH
 from .intra_search import least_error, rank_directions
-from .jit import inner, kernel, lean
 from .matching import HUGE, best_explicit, fill_products, new_match
 from .motion import predict_in_time
 from .motion_search import best_vector
@@ -73,7 +74,7 @@ class Search(NamedTuple):
     surely: Any
 
 
-@lean
+@lean_kernel
 def best_block(costs, job, search, match, work, trial, y0, x0, log):
     """Try the ways to code a block and note the best; return its cost and whether it has a residual."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
@@ -112,7 +113,7 @@ def best_block(costs, job, search, match, work, trial, y0, x0, log):
     return best, kind, index, mask, direction, coded
 
 
-@lean
+@lean_kernel
 def best_in_time(costs, job, search, work, trial, y0, x0, log, good):
     """Try a block in time, alone and mixed with synthesis; return cost, kind, vector, and if it has a residual."""
     n = 1 << log
@@ -129,7 +130,7 @@ def best_in_time(costs, job, search, work, trial, y0, x0, log, good):
     return best, kind, vector, coded
 
 
-@lean
+@lean_kernel
 def best_of_all(costs, job, search, match, work, trial, y0, x0, log):
     """As `best_block`, with the ways in time if there are earlier instants."""
     if job.past.shape[0] == 0:
@@ -164,7 +165,7 @@ def best_of_all(costs, job, search, match, work, trial, y0, x0, log):
     return best, kind, vector, 0, 0, coded
 
 
-@inner
+@inner_kernel
 def _much_smaller(blocks, by, bx, log):
     """Whether all blocks above and to the left have a quarter of the side at most."""
     if by == 0 or bx == 0:
@@ -177,7 +178,7 @@ def _much_smaller(blocks, by, bx, log):
     return True
 
 
-@lean
+@lean_kernel
 def search_tree(costs, job, search, match, work, trial, y0, x0, log):
     """Find, mark and decode the blocks of a square; return the cost."""
     height, width = job.levels.shape[1:]
@@ -227,7 +228,7 @@ def search_tree(costs, job, search, match, work, trial, y0, x0, log):
     return best
 
 
-@kernel
+@array_kernel
 def _search_view(costs, job, search, match, work, trial):
     height, width = job.levels.shape[1:]
     for y0 in range(0, height, 1 << LOG_LARGEST):

@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ii_core.base.jit import array_kernel, inner_kernel, lean_kernel
+
 from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, disagreement, hashed
 from .blocks import EXPLICIT, INDEX, KIND, UNKNOWN
-from .jit import inner, kernel, lean
 from .warp import BEFORE, FILTERS, TAPS, clamped, filtered
 
 CANDIDATES = 8
@@ -111,7 +112,7 @@ def chosen(s: Synthesis) -> Synthesis:
     return s._replace(candidates=s.candidates[:0].copy(), kept=s.kept[:0].copy(), marks=s.marks[:0].copy())
 
 
-@inner
+@inner_kernel
 def _insert(s, y, x, d, apart):
     count = np.int64(s.counts[y, x])
     for i in range(count):
@@ -122,7 +123,7 @@ def _insert(s, y, x, d, apart):
         s.counts[y, x] = count + 1
 
 
-@lean
+@lean_kernel
 def project(s, apart):
     """Move the sources' disparities to where they lead in the view; nearly equal ones count as one."""
     height, width = s.counts.shape
@@ -141,7 +142,7 @@ def project(s, apart):
                     _insert(s, to_y, to_x, d, apart)
 
 
-@lean
+@lean_kernel
 def choose(s, apart):
     """s.disparity = of the candidates around each sample the one on which the sources agree best."""
     height, width = s.counts.shape
@@ -176,7 +177,7 @@ def choose(s, apart):
     _fill(s.disparity)
 
 
-@lean
+@lean_kernel
 def _fill(disparity):
     """Give samples without disparity that of the one to the left, above, right or below."""
     height, width = disparity.shape
@@ -194,7 +195,7 @@ def _fill(disparity):
                 disparity[y, x] = disparity[y + 1, x]
 
 
-@lean
+@lean_kernel
 def blend(s, nearest, every):
     """s.made = the sources' samples along s.disparity, those left out that see something else.
 
@@ -254,7 +255,7 @@ def blend(s, nearest, every):
             x += 1
 
 
-@lean
+@lean_kernel
 def _six_taps_run(plane, iy, ix, py, px, count, sums, out):
     """out[:count] = samples of a plane that follow each other, by six taps down, into ``sums``, then across.
 
@@ -285,7 +286,7 @@ def _six_taps_run(plane, iy, ix, py, px, count, sums, out):
         four[0], four[1], four[2], four[3] = (m + 2048) >> 12, (n + 2048) >> 12, (o + 2048) >> 12, (p + 2048) >> 12
 
 
-@inner
+@inner_kernel
 def _interpolate(s, y, x, length, d, count):
     """s.taken[:count, :, :length] = samples of the sources along a disparity."""
     for r in range(count):
@@ -295,20 +296,20 @@ def _interpolate(s, y, x, length, d, count):
             _six_taps_run(s.views[s.sources[r, 0], p], iy, ix, py, px, length, s.sums, s.taken[r, p])
 
 
-@inner
+@inner_kernel
 def _quotient(a, b):
     """a // b by a division of floating point, which is exact while a has at most 52 bits, and four times as fast."""
     return np.int64(np.floor(np.float64(a) / np.float64(b)))
 
 
-@inner
+@inner_kernel
 def _apart(s, a, b):
     """Difference of two sources' samples."""
     differs = abs(s.scratch[1, a] - s.scratch[1, b])
     return differs + abs(s.scratch[2, a] - s.scratch[2, b]) + abs(s.scratch[3, a] - s.scratch[3, b])
 
 
-@inner
+@inner_kernel
 def _weighted(s, y, x, count):
     """The mean by weights, which fall with the distance from the source in best agreement with the others.
 
@@ -346,7 +347,7 @@ def _weighted(s, y, x, count):
     return _quotient(spread, all_)
 
 
-@inner
+@inner_kernel
 def _mismatch(s, at, y, x, d):
     """Return the difference of the best two sources from the decoded view around a sample, in eighths of a code."""
     height, width = s.counts.shape
@@ -392,7 +393,7 @@ def _mismatch(s, at, y, x, d):
     return least + second if count > 1 else 2 * least
 
 
-@lean
+@lean_kernel
 def start(s, at, blocks, unit, synthesised):
     """s.disparities[at] = that of the explicit blocks, and of the synthesis elsewhere."""
     height, width = s.counts.shape
@@ -407,7 +408,7 @@ def start(s, at, blocks, unit, synthesised):
                 s.disparities[at, y, x] = UNKNOWN
 
 
-@lean
+@lean_kernel
 def refine(s, at, backward):
     """Let each sample take over a neighbour's disparity that fits the decoded view better."""
     height, width = s.counts.shape
@@ -432,12 +433,12 @@ def refine(s, at, backward):
             s.disparities[at, y, x] = best
 
 
-@inner
+@inner_kernel
 def _roughness(d, one, two):
     return 9 * SMOOTH * ((1 if d != one else 0) + (1 if d != two else 0))
 
 
-@kernel
+@array_kernel
 def synthesise(s, apart):
     """Disparity of a view from its sources'; return whether any is known."""
     project(s, apart)

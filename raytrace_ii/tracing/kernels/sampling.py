@@ -8,6 +8,8 @@ import numpy as np
 
 from ii_core.base.jit import inline_kernel, kernel
 
+from .keys import LOW, R2_ACROSS, R2_AROUND, mix_bits
+
 
 @kernel
 def places(seed, m, n, columns, first, count, pair, table, out):
@@ -21,11 +23,11 @@ def places(seed, m, n, columns, first, count, pair, table, out):
     """
     for i in range(m.shape[0]):
         pixel = np.uint64(n[i]) * np.uint64(columns) + np.uint64(m[i])
-        own = _mix(_mix(np.uint64(seed) ^ _mix(pixel)) + np.uint64(pair))
+        own = mix_bits(mix_bits(np.uint64(seed) ^ mix_bits(pixel)) + np.uint64(pair))
         if table.shape[0] > 0:
             _turned(table[first : first + count], own, out[i * count : (i + 1) * count])
             continue
-        across, down, order = own & _LOW, own >> np.uint64(32), _mix(own) & _LOW
+        across, down, order = own & LOW, own >> np.uint64(32), mix_bits(own) & LOW
         for j in range(count):
             index = np.uint64(first + j)
             if pair:
@@ -83,11 +85,11 @@ def lobe_keys(seed, m, n, columns, first, count, out):
     """
     for i in range(m.shape[0]):
         pixel = np.uint64(n[i]) * np.uint64(columns) + np.uint64(m[i])
-        own = _mix(_mix(np.uint64(seed) ^ _mix(pixel)) + np.uint64(2))
+        own = mix_bits(mix_bits(np.uint64(seed) ^ mix_bits(pixel)) + np.uint64(2))
         for j in range(count):
             step = np.uint64(first + j)
-            across = ((own & _LOW) + step * np.uint64(3242174889)) & _LOW
-            around = ((own >> np.uint64(32)) + step * np.uint64(2447445414)) & _LOW
+            across = ((own & LOW) + step * R2_ACROSS) & LOW
+            around = ((own >> np.uint64(32)) + step * R2_AROUND) & LOW
             out[i * count + j] = (around << np.uint64(32)) | across
 
 
@@ -183,8 +185,6 @@ def _code(x, curve):
     return curve[j] + (at - j) * (curve[j + 1] - curve[j])
 
 
-# 32-bit fractions in 64-bit words: numba makes 64 bits of a sum of two 32-bit numbers.
-_LOW = np.uint64(0xFFFFFFFF)
 _ONE = np.uint64(1)
 
 
@@ -212,18 +212,9 @@ def _reversed(x):
 @kernel
 def _scrambled(x, seed):
     """Owen's scramble: each bit is flipped or not by a hash of all bits before it."""
-    x = (_reversed(x) + seed) & _LOW
-    x ^= (x * np.uint64(0x6C50B47C)) & _LOW
-    x ^= (x * np.uint64(0xB82F1E52)) & _LOW
-    x ^= (x * np.uint64(0xC7AFE638)) & _LOW
-    x ^= (x * np.uint64(0x8D22F6E6)) & _LOW
+    x = (_reversed(x) + seed) & LOW
+    x ^= (x * np.uint64(0x6C50B47C)) & LOW
+    x ^= (x * np.uint64(0xB82F1E52)) & LOW
+    x ^= (x * np.uint64(0xC7AFE638)) & LOW
+    x ^= (x * np.uint64(0x8D22F6E6)) & LOW
     return _reversed(x)
-
-
-@inline_kernel
-def _mix(h):
-    """splitmix64's finaliser (Steele, Lea, Flood 2014)."""
-    h = h + np.uint64(0x9E3779B97F4A7C15)
-    h = (h ^ (h >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    h = (h ^ (h >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return h ^ (h >> np.uint64(31))

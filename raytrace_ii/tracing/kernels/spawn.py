@@ -12,6 +12,7 @@ from . import lanes as at
 from .addresses import value_at
 from .fresnel import fresnel
 from .glossy import glossy_direction
+from .keys import LOW, R2_ACROSS, R2_AROUND, mix_bits
 from .media import cross, disperses, media_at, refractive_index
 from .tables import (
     ALPHA_BLEND,
@@ -24,10 +25,7 @@ from .tables import (
     WEAK_REFLECTION,
     WEAK_REFRACTION,
 )  # fmt: skip
-from .vectors import behind, mix_bits, put, three, three_doubles
-
-# Steps of the R2 sequence, 1/g and 1/g² of g³ = g + 1, as fractions of 2³².
-_LOW, _R2_ACROSS, _R2_AROUND = np.uint64(0xFFFFFFFF), np.uint64(3242174889), np.uint64(2447445414)
+from .vectors import behind, put, three, three_doubles
 
 
 @late_kernel
@@ -206,6 +204,6 @@ def _reflect(k, m0, m1, m2, rays, following, work, counts):
 def _in_lobe(key, step):
     """A place in [0, 1)²: the key's own, ``step`` places on along the R2 sequence (Roberts 2018)."""
     step = np.uint64(step)
-    a = ((key & _LOW) + step * _R2_ACROSS) & _LOW
-    b = ((key >> np.uint64(32)) + step * _R2_AROUND) & _LOW
+    a = ((key & LOW) + step * R2_ACROSS) & LOW
+    b = ((key >> np.uint64(32)) + step * R2_AROUND) & LOW
     return a * (1.0 / 4294967296.0), b * (1.0 / 4294967296.0)

@@ -59,15 +59,6 @@ def put_behind(out, i, corners, faces, f, u, v, entering):
 
 
 @inline_kernel
-def mix_bits(h):
-    """splitmix64's finaliser (Steele, Lea, Flood 2014)."""
-    h = h + np.uint64(0x9E3779B97F4A7C15)
-    h = (h ^ (h >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    h = (h ^ (h >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return h ^ (h >> np.uint64(31))
-
-
-@inline_kernel
 def three(values, first, k):
     """Three quantities of a lane that follow each other."""
     return values[first + k], values[first + BLOCK + k], values[first + 2 * BLOCK + k]

@@ -1,1 +1,0 @@
-"""SPERR volume coder, decoded in a process with limits."""
