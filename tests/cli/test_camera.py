@@ -109,9 +109,7 @@ def test_a_hexagonal_picture_is_made_regular_and_coded(run, refused, tmp_path):
     refused(run("regular", tmp_path / "h.png", "--method", "x", "-o", tmp_path / "x.png"), "unknown method 'x'")
 
 
-@pytest.mark.parametrize(
-    ("name", "scale"), [("setup3", 1), ("plenoptic2", 1), ("hdtv", 5), ("moving-lenslets", 32)]
-)
+@pytest.mark.parametrize(("name", "scale"), [("setup3", 1), ("plenoptic2", 1), ("hdtv", 5), ("moving-lenslets", 32)])
 def test_reports(run, name, scale):
     code, out, _ = run("camera", name, "--scale", scale, "--report")
     assert code == 0
