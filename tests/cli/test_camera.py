@@ -109,9 +109,9 @@ def test_a_hexagonal_picture_is_made_regular_and_coded(run, refused, tmp_path):
     refused(run("regular", tmp_path / "h.png", "--method", "x", "-o", tmp_path / "x.png"), "unknown method 'x'")
 
 
-@pytest.mark.parametrize("name", ["setup3", "plenoptic2", "hdtv", "moving-lenslets"])
-def test_reports(run, name):
-    code, out, _ = run("camera", name, "--report")
+@pytest.mark.parametrize(("name", "scale"), [("setup3", 1), ("plenoptic2", 1), ("hdtv", 5), ("moving-lenslets", 32)])
+def test_reports(run, name, scale):
+    code, out, _ = run("camera", name, "--scale", scale, "--report")
     assert code == 0
     for what in (
         "viewing angle",

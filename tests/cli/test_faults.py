@@ -18,6 +18,7 @@ from ii_core.base.files import MAX_TEXT, write_image
 from ii_core.camera.camera import MOST_ALONG
 from ii_core.picture.picture import sidecar
 from tests.support.interrupts import hear_interrupts
+from tests.support.processes import in_one_process
 
 SMALL = ("render", "objects", "--scale", 128)
 COMMAND = [sys.executable, "-m", "raytrace_ii.cli"]
@@ -135,19 +136,15 @@ def bomb(path, width, height):
 
 
 LIMITED = """
-import resource, sys
-from raytrace_ii import cli
-from tests.support.interrupts import hear_interrupts
+import resource
 import numba, codec, metrics, ii_core.picture.picture  # what they need is there before the limit is set
 used = int(next(line for line in open("/proc/self/status") if line.startswith("VmData")).split()[1]) * 1024
 resource.setrlimit(resource.RLIMIT_DATA, (used + (1 << 29),) * 2)
-cli.main()
 """
 
 
-def test_sizes_in_headers_are_checked_before_decoding(picture, tmp_path):
+def test_sizes_in_headers_are_checked_before_decoding(picture, refused, tmp_path):
     bomb(picture, 40000, 40000)
-    write_image(tmp_path / "small.png", np.zeros((32, 64, 3), np.uint8))
     IIPicture(np.zeros((32, 64, 3), np.uint8), (8, 4), (8, 8)).save(tmp_path / "good.png")
     bomb(tmp_path / "bare.png", 40000, 40000)
     good = tmp_path / "good.png"
@@ -156,9 +153,8 @@ def test_sizes_in_headers_are_checked_before_decoding(picture, tmp_path):
         ("measure", good, tmp_path / "bare.png"): "40000×40000 px of 3 channels",
         ("measure", good, good, "--mask", tmp_path / "bare.png"): "64×32 are needed",
     }
-    for command, words in said.items():
-        done = subprocess.run([sys.executable, "-c", LIMITED, *map(str, command)], capture_output=True, text=True)
-        assert (done.returncode, done.stderr.count("\n")) == (2, 1) and words in done.stderr, done.stderr
+    for result, words in zip(in_one_process(*said, before=LIMITED), said.values(), strict=True):
+        refused(result, words)
 
 
 def test_pictures_larger_than_the_memory_are_refused(run, refused, tmp_path):
@@ -265,10 +261,10 @@ def test_brackets_in_names_are_printed_unchanged(run, picture, tmp_path, monkeyp
 def test_a_name_that_is_no_utf8_is_one_line(picture, tmp_path):
     strange = os.fsencode(tmp_path) + b"/\xff.png"
     os.rename(picture, strange)
-    for command in (("encode", strange, "--qp", "30", "-o", "x.ii"), (*map(str, SMALL), "-o", strange + b"2.png")):
-        done = subprocess.run([*COMMAND, *command], capture_output=True, cwd=tmp_path)
-        assert done.returncode == 2 and done.stderr.count(b"\n") == 1, done.stderr
-        assert b"is no UTF-8 name" in done.stderr and b"udcff" in done.stderr
+    commands = ("encode", strange, "--qp", 30, "-o", "x.ii"), (*SMALL, "-o", strange + b"2.png")
+    for code, _, err in in_one_process(*commands, cwd=tmp_path):
+        assert code == 2 and err.count("\n") == 1, err
+        assert "is no UTF-8 name" in err and "udcff" in err
 
 
 def test_messages_carry_no_terminal_escapes(run, refused, picture, tmp_path):
@@ -278,14 +274,13 @@ def test_messages_carry_no_terminal_escapes(run, refused, picture, tmp_path):
     assert code == 0 and "\x1b" not in out and "\\x1b]0;title" in out
 
 
-@pytest.mark.parametrize("command", [("cameras",), ("camera", "setup1"), ("encode", "a×b.png", "-o", "c")])
-def test_a_terminal_of_ascii(tmp_path, command):
-    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
-    done = subprocess.run([*COMMAND, *command], capture_output=True, cwd=tmp_path, env=environment)
-    assert done.returncode == (2 if "encode" in command else 0), done.stderr
-    assert b"Traceback" not in done.stderr and (done.stdout + done.stderr).isascii()
-    if "encode" in command:
-        assert b"axb.png" in done.stderr
+def test_a_terminal_of_ascii():
+    commands = ("cameras",), ("camera", "setup1"), ("encode", "a×b.png", "-o", "c")
+    found = in_one_process(*commands, PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    assert [code for code, *_ in found] == [0, 0, 2]
+    for _, out, err in found:
+        assert "Traceback" not in err and (out + err).isascii()
+    assert "axb.png" in found[2][2]
 
 
 # Ends
@@ -309,7 +304,7 @@ def test_a_signal_ends_a_run_within_two_seconds(tmp_path, number, code):
     ) as running:
         try:
             wait_for(lambda: list(tmp_path.glob(".p*")))
-            time.sleep(5)  # the scene is loaded, and threads trace
+            time.sleep(3)  # the scene is loaded, and threads trace
             started = time.monotonic()
             running.send_signal(number)
             assert running.wait(60) == code
@@ -363,10 +358,9 @@ def test_only_this_machines_own_names_are_served(served):
     assert list(folder.iterdir()) == []
 
 
-@pytest.mark.parametrize("address", ["tls://", "tls://127.0.0.1:9", "nothing://x"])
-def test_addresses_of_no_scheduler_are_one_line_to_the_end_of_the_process(picture, address):
+def test_addresses_of_no_scheduler_are_one_line_to_the_end_of_the_process(picture, refused):
     """Only a separate process shows the nine lines that a client printed at its end."""
-    command = [*COMMAND, "study", picture, "-o", picture.parent / "study", "--rates", "1", "--dask", address]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100)
-    assert done.returncode == 2 and done.stderr.count("\n") == 1
-    assert done.stderr.startswith(f"error: no dask scheduler answers at {address}: ")
+    addresses = "tls://", "tls://127.0.0.1:9", "nothing://x"
+    command = ("study", picture, "-o", picture.parent / "study", "--rates", "1", "--dask")
+    for address, result in zip(addresses, in_one_process(*((*command, a) for a in addresses)), strict=True):
+        refused(result, f"no dask scheduler answers at {address}: ")

@@ -44,6 +44,7 @@ WORKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WORKS)
 def test_ctrl_c_returns_within_two_seconds(name):
     """On b1dc540 render waited for the blocks of its threads, and encode for the library's call."""

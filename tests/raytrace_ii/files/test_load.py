@@ -7,7 +7,7 @@ import pytest
 
 from ii_core import preset
 from ii_core.base.files import write_image
-from raytrace_ii import load_scene, render, scene_names, trace
+from raytrace_ii import load_scene, render, trace
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, linear
 
 BALL = """
@@ -257,18 +257,6 @@ def test_a_minimal_file_loads(tmp_path):
     assert scene.background.horizon == scene.background.zenith == scene.background.nadir == (0, 0, 0)
     even = load(tmp_path, '[background]\nhorizon = "#ffffff"\n' + BALL)
     assert even.background.zenith == even.background.nadir == (1, 1, 1)
-
-
-def test_packaged_scenes_load_and_have_a_description():
-    names = scene_names()
-    assert "apples" in names
-    for name, about in names.items():
-        assert about
-        scene = load_scene(name)
-        assert scene.name == name and scene.bodies and scene.lights
-        assert np.isfinite(scene.bounds_mm).all()
-        seen = trace(scene, np.zeros((50, 3)), [(x, -0.1, 1) for x in np.linspace(-0.3, 0.3, 50)])
-        assert np.isfinite(seen.radiance).all() and seen.radiance.max() > 0
 
 
 # What may not

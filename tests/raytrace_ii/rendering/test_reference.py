@@ -131,6 +131,7 @@ def test_an_interrupted_set_continues(small_set, tmp_path, stop_at):
     assert {name: t for name, t in files(tmp_path).items() if name in finished} == finished
 
 
+@pytest.mark.slow
 def test_an_interrupt_from_outside(tmp_path):
     """The command on the real scenes: after Ctrl-C the manifest lists all finished files, and all are whole."""
     out = tmp_path / "set"

@@ -229,6 +229,7 @@ print("done")
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="RLIMIT_DATA holds for all memory on Linux only")
 def test_a_picture_larger_than_memory(tmp_path):
     """5.2 million pixels of 32 bytes, 168 MB, written with 96 MB to spare; in memory they do not fit.

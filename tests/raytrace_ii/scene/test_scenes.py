@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from ii_core import orthoscopic, preset, projection_camera
-from raytrace_ii import load_scene, render, scene_names
+from raytrace_ii import load_scene, render, scene_names, trace
+from tests.support.pictures import scene
 
 NAMES = ("apples", "car", "cuboid", "dolphin", "hairdo", "mountains", "objects", "twins")
 SURROUNDINGS = {"floor", "road", "meadow", "wood", "sea"}
@@ -31,9 +32,8 @@ def measured():
 
     def measure(name):
         if name not in known:
-            scene = load_scene(name)
             camera, pose = projection_camera(preset("setup1", scale=16), 192)
-            shot = render(scene, camera, pose=pose)
+            shot = render(scene(name), camera, pose=pose)
             bright = orthoscopic(shot.picture).pixels @ np.array([0.299, 0.587, 0.114])
             hit = shot.object_id >= 0
             around = [i for i, body in enumerate(shot.object_names) if body in SURROUNDINGS]
@@ -52,7 +52,16 @@ def measured():
 
 def test_all_reference_scenes_come_with_the_package():
     assert set(NAMES) <= set(scene_names())
-    assert all(about for about in scene_names().values())
+
+
+def test_packaged_scenes_load_and_have_a_description():
+    for name, about in scene_names().items():
+        assert about
+        one = scene(name)
+        assert one.name == name and one.bodies and one.lights
+        assert np.isfinite(one.bounds_mm).all()
+        seen = trace(one, np.zeros((50, 3)), [(x, -0.1, 1) for x in np.linspace(-0.3, 0.3, 50)])
+        assert np.isfinite(seen.radiance).all() and seen.radiance.max() > 0
 
 
 @pytest.mark.parametrize("high", ["twins", "cuboid", "hairdo"])
@@ -88,7 +97,7 @@ def test_fill(measured):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_scenes_load_the_same_every_time_and_are_no_burden(name):
-    first, second = load_scene(name), load_scene(name)
+    first, second = scene(name), load_scene(name)
     assert [body.name for body in first.bodies] == [body.name for body in second.bodies]
     for a, b in zip(first.bodies, second.bodies, strict=True):
         np.testing.assert_array_equal(a.vertices, b.vertices)
@@ -102,12 +111,12 @@ def test_scenes_load_the_same_every_time_and_are_no_burden(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_no_lens_stands_in_or_under_a_body(name):
     """Bodies at z < 8 mm stay below the lowest lens."""
-    for body in load_scene(name).bodies:
+    for body in scene(name).bodies:
         near = body.vertices[body.vertices[:, 2] < 8]
         near = near[(np.abs(near[:, 0]) < 25) & (near[:, 2] > 0)]
         assert not len(near) or near[:, 1].max() < -12.5, body.name
 
 
 def test_the_head_has_the_stated_number_of_hairs():
-    hair = next(body for body in load_scene("hairdo").bodies if body.name == "hair")
+    hair = next(body for body in scene("hairdo").bodies if body.name == "hair")
     assert len(hair.faces) / (2 * 6) > 20_000

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ii_core import preset
-from raytrace_ii import load_scene, trace
+from raytrace_ii import trace
 from raytrace_ii.rendering.job import Job
 from raytrace_ii.scene.textures import Image
 from raytrace_ii.tracing import tracer
@@ -15,6 +15,7 @@ from raytrace_ii.tracing.kernels import appearance, attributes, shade, sky, spaw
 from raytrace_ii.tracing.kernels.fresnel import fresnel
 from raytrace_ii.tracing.kernels.light import keep_unblocked
 from raytrace_ii.tracing.kernels.start import start_rays, start_separable_rays
+from tests.support.pictures import scene
 from tests.support.trace_scenes import WHITE, body, hall, sphere, wall
 
 NAMES = (
@@ -72,7 +73,7 @@ def test_passing_in_python_sees_the_same(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("scene", "stages"),
+    ("name", "stages"),
     [
         ("apples", {"paint"}),
         ("car", {"paint", "reflect"}),
@@ -81,10 +82,10 @@ def test_passing_in_python_sees_the_same(monkeypatch):
         ("objects", {"attenuate", "look_closely", "spawn"}),
     ],
 )
-def test_a_scene_compiles_only_the_stages_it_needs(scene, stages):
+def test_a_scene_compiles_only_the_stages_it_needs(name, stages):
     """One function of all stages took 16 s more to compile for Apples, which uses the fewest."""
     camera = preset("setup1", scale=256)
-    job = Job(load_scene(scene), camera, 1, 0, np.eye(4), "uint8", ())
+    job = Job(scene(name), camera, 1, 0, np.eye(4), "uint8", ())
     job.tile(slice(0, 8), slice(0, 64))
     assert {stage.py_func.__name__ for stage in job._tracer()._addresses} == stages
 
