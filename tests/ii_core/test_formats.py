@@ -19,7 +19,7 @@ from ii_core.formats.order import Arrangement, estimate
 from ii_core.formats.pfm import read_pfm
 from ii_core.formats.quilt import write_quilt
 from ii_core.formats.views import write_views
-from raytrace_ii import load_scene, render
+from tests.support import pictures
 
 counts = st.integers(1, 5)
 structures = st.tuples(counts, counts, counts, counts).filter(lambda s: s[2] * s[3] > 1)
@@ -40,7 +40,7 @@ def same(a, b):
 @pytest.fixture(scope="module")
 def shot():
     """A rendered picture with depth; near objects in front of far ones."""
-    return render(load_scene("apples"), preset("setup1", scale=4), support=("depth",))
+    return pictures.shot(scale=8)
 
 
 @given(structure=structures, dtype=st.sampled_from(["uint8", "uint16"]), erect=st.booleans())
@@ -384,7 +384,7 @@ def test_disparity_needs_a_camera_and_its_own_depth(shot, tmp_path):
     ],
 )
 def test_import_warns_of_cropping_and_hexagonal_lenses(tmp_path, camera, ei_pixels, hexagonal):
-    made = render(load_scene("twins"), preset(camera, scale=5 if camera == "hdtv" else 8), support=())
+    made = pictures.shot("twins", camera, {"hdtv": 5, "hexagonal": 8}.get(camera, 16))
     height, width = made.picture.pixels.shape[:2]
     (u, v), source = ei_pixels, tmp_path / "raw.png"
     pixels = np.pad(made.picture.pixels, ((0, -height % v + 3), (0, -width % u + 5), (0, 0)), mode="edge")
@@ -414,7 +414,7 @@ def test_more_digits_than_a_camera_keeps_are_the_same_pitch():
 
 
 def test_deshift_is_on_the_command_line(run, refused, tmp_path):
-    made = render(load_scene("apples"), preset("hexagonal", scale=8), support=()).picture
+    made = pictures.shot("twins", "hexagonal", 8).picture
     made.save(tmp_path / "h.png")
     assert run("regular", tmp_path / "h.png", "--deshift", "-o", tmp_path / "r.png")[0] == 0
     np.testing.assert_array_equal(IIPicture.load(tmp_path / "r.png").pixels, resampled(made, deshift=True)[0].pixels)

@@ -298,9 +298,16 @@ def test_diffraction_against_pixels():
     assert ii.properties(preset("pinhole2d"))["diffraction"] is None
 
 
-@pytest.mark.parametrize("name", sorted(camera_names()))
-def test_every_camera_has_a_report(name):
-    camera = preset_cameras(name)[0]
+LARGE = {"hdtv": 5, "hexagonal": 8, "grin-hexagonal-depth-control": 8, "moving-lenslets": 8}  # their quick scales
+
+
+@pytest.mark.parametrize(
+    ("name", "scale"),
+    [(name, LARGE.get(name, 1)) for name in sorted(camera_names())]
+    + [pytest.param(name, 1, marks=pytest.mark.slow) for name in LARGE],
+)
+def test_every_camera_has_a_report(name, scale):
+    camera = preset_cameras(name, scale=scale)[0]
     text = design.report(camera)
     assert camera.name in text and max(map(len, text.splitlines())) <= 118
     p = ii.properties(camera)
