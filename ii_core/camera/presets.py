@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -117,9 +118,12 @@ def scaled(camera: IICamera, scale: int) -> IICamera:
     single = camera.lenses == (1, 1)
     divided, what = (camera.pixels, "pixels") if single else (camera.lenses, "lenses")
     if not isinstance(scale, int) or scale < 1 or any(n % scale for n in (*divided, *camera.pixels)):
+        common = math.gcd(*divided, *camera.pixels)
+        fitting = [n for n in range(1, math.isqrt(common) + 1) if common % n == 0]
+        fitting = sorted({*fitting, *(common // n for n in fitting)})
         raise ValueError(
             f"scale {scale} does not divide the {divided[0]}×{divided[1]} {what} and "
-            f"{camera.pixels[0]}×{camera.pixels[1]} pixels: a whole number that divides all is needed"
+            f"{camera.pixels[0]}×{camera.pixels[1]} pixels: one of {', '.join(map(str, fitting))} is needed"
         )
     if scale == 1:
         return camera

@@ -24,6 +24,16 @@ def new_figure(width: float, height: float, layout: Any = "constrained") -> Any:
     return figure
 
 
+def plain_text(name: str) -> str:
+    """Return a name for a figure that is drawn letter by letter.
+
+    Matplotlib reads text between dollar signs as mathematics, and leaves labels that begin with an underscore out of
+    legends. Every name of a user in a figure passes through this function.
+    """
+    escaped = name.replace("$", r"\$")
+    return f"\u200b{escaped}" if escaped.startswith("_") else escaped
+
+
 def check_suffix(path: str | os.PathLike[str]) -> str:
     """Return the format that a path's suffix names.
 

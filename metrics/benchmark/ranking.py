@@ -16,7 +16,7 @@ import numpy as np
 
 from ii_core.base.atomic import atomic_paths
 from ii_core.base.files import one_line
-from ii_core.display.figure import COLOURS, LINES, MARKERS, new_figure, save
+from ii_core.display.figure import COLOURS, LINES, MARKERS, new_figure, plain_text, save
 
 from ..measures.measure import measure_of
 from ..plots.rd_chart import set_rate_axis
@@ -193,7 +193,7 @@ def _chart(profile: Profile, rows: Sequence[Mapping[str, Any]]) -> Any:
             continue
         every = [row["result"]["pictures"][i]["points"] for row in rows]
         set_rate_axis(panel, [point for points in every for point in points])
-        panel.set_title(rows[0]["result"]["pictures"][i]["name"])
+        panel.set_title(plain_text(rows[0]["result"]["pictures"][i]["name"]))
         panel.set_ylabel(measure.axis)
         for j, (row, points) in enumerate(zip(rows, every, strict=True)):
             finite = [p for p in points if math.isfinite(p[profile.rank_by])]
@@ -203,7 +203,7 @@ def _chart(profile: Profile, rows: Sequence[Mapping[str, Any]]) -> Any:
                 LINES[j // len(COLOURS) % len(LINES)],
                 color=COLOURS[j % len(COLOURS)],
                 marker=MARKERS[j % len(MARKERS)],
-                label=row["coder"] if i == 0 else None,
+                label=plain_text(row["coder"]) if i == 0 else None,
             )
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
     return figure

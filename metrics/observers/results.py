@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import re
 from collections.abc import Sequence
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ii_core.base import checks
-from ii_core.base.files import check_file, parse_json
+from ii_core.base.files import check_file, one_line, parse_json
 
 from . import plan as plans
 
@@ -189,17 +190,52 @@ def checked_lines(data: bytes, name: str) -> list[dict[str, Any]]:
 def _plan(text: str, path: Path) -> dict[str, Any]:
     try:
         plan = parse_json(text)
-        known = (plan["format"], plan["version"]) == (plans.FORMAT, plans.VERSION)
-        count = len(plan["stimuli"])
-        pairs = [pair for order in [plan["training"], *plan["orders"]] for pair in order]
-        whole = all(type(n) is int and 0 <= n < count for a, b in pairs for n in (a, b)) and bool(plan["orders"])
-        named = all(isinstance(one[key], str) for one in plan["stimuli"] for key in ("scene", "name", "scheme"))
-        for one in plan["stimuli"]:
-            for name, value in one["measures"].items():
-                checks.number(name, value)
-    except (ValueError, TypeError, KeyError, AttributeError):
-        known = whole = named = False
-        plan = {}
-    if not (known and whole and named and plan.get("method") in plans.METHODS):
-        raise ValueError(f"{path} has no plan of a test that this version reads")
+        _check_plan(plan)
+    except ValueError as error:
+        raise ValueError(f"{path} has no plan of a test that this version reads: {one_line(error)}") from None
     return dict(plan)
+
+
+def _check_plan(plan: Any) -> None:
+    """Raise ValueError unless every part of a plan that the analysis reads has its kind."""
+    if not isinstance(plan, dict) or (plan.get("format"), plan.get("version")) != (plans.FORMAT, plans.VERSION):
+        raise ValueError(f'"format": "{plans.FORMAT}", "version": {plans.VERSION} is needed')
+    if plan.get("method") not in plans.METHODS:
+        raise ValueError(f"method is {checks.shown(plan.get('method'))}: {' or '.join(plans.METHODS)} is needed")
+    for number, one in enumerate(_list(plan, "stimuli")):
+        _check_stimulus(one, f"stimuli.{number}")
+    count = len(plan["stimuli"])
+    orders = {"training": _list(plan, "training", least=0)}
+    orders |= {f"orders.{number}": order for number, order in enumerate(_list(plan, "orders"))}
+    for name, order in orders.items():
+        for pair in order if isinstance(order, list) else [order]:
+            right = isinstance(pair, list) and len(pair) == 2
+            if not (right and all(type(n) is int and 0 <= n < count for n in pair)):
+                raise ValueError(f"{name} holds {checks.shown(pair)}: a list of pairs of stimuli is needed")
+
+
+def _check_stimulus(one: Any, where: str) -> None:
+    if not isinstance(one, dict):
+        raise ValueError(f"{where} is {checks.shown(one)}: an object is needed")
+    kinds = {"scene": str, "name": str, "scheme": str, "reference": bool, "measures": dict}
+    for key, kind in kinds.items():
+        if not isinstance(one.get(key), kind):
+            wanted = {str: "text", bool: "true or false", dict: "an object"}[kind]
+            raise ValueError(f"{where}.{key} is {checks.shown(one.get(key))}: {wanted} is needed")
+    for name, value in one["measures"].items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(_float(value)):
+            raise ValueError(f"{where}.measures.{name} is {checks.shown(value)}: a finite number is needed")
+
+
+def _float(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def _list(plan: dict[str, Any], key: str, least: int = 1) -> list[Any]:
+    value = plan.get(key)
+    if not isinstance(value, list) or len(value) < least:
+        raise ValueError(f"{key} is {checks.shown(value)}: a list{' that is not empty' if least else ''} is needed")
+    return value

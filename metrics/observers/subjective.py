@@ -13,6 +13,7 @@ from ii_core.base.checks import checked, number, number_from, numbers, numbers_i
 
 Floats = NDArray[np.float64]
 MODELS = ("bradley-terry", "thurstone")
+LOGISTIC, LINE = 4, 2  # parameters of the fits
 
 
 class OpinionScores(NamedTuple):
@@ -56,8 +57,9 @@ class Prediction(NamedTuple):
     Attributes
     ----------
     plcc, rmse, outlier_ratio : float
-        After the monotone fit: Pearson's correlation, root mean square error, and the share of stimuli off by more
-        than the half width of their interval (NaN without intervals).
+        After the monotone fit: Pearson's correlation, root mean square error over N − d degrees of freedom (N stimuli,
+        d parameters of the fit), and the share of stimuli off by more than the half width of their interval (NaN
+        without intervals).
     srocc : float
         Spearman's rank correlation, before the fit.
     fitted : ndarray, (stimuli,)
@@ -189,7 +191,8 @@ def predicted_scores(measure: ArrayLike, mos: ArrayLike, half_width: ArrayLike |
     """Return the accuracy of a measure as a predictor of opinion scores, after a monotone fit.
 
     The fit is the logistic function of four parameters of the Video Quality Experts Group; where it does not
-    converge, a straight line.
+    converge, a straight line. The root mean square error has N − d in its denominator, as ITU-T P.1401 has: d is 4
+    for the logistic function and 2 for a straight line.
 
     Parameters
     ----------
@@ -220,12 +223,13 @@ def predicted_scores(measure: ArrayLike, mos: ArrayLike, half_width: ArrayLike |
         raise ValueError("measure or mos is the same for all stimuli: nothing can be correlated")
     if half_width is not None and np.shape(half_width) != x.shape:
         raise ValueError(f"half_width has {np.shape(half_width)} values, mos {y.shape}: one for each is needed")
-    fitted = _monotone(x, y)
+    fitted, parameters = _monotone(x, y)
     off = np.abs(fitted - y)
     widths = np.full(len(x), np.nan) if half_width is None else np.asarray(half_width, np.float64)
     outside = float(np.mean(off > widths)) if half_width is not None else math.nan
     plcc = float(np.corrcoef(fitted, y)[0, 1]) if np.ptp(fitted) > 0 else 0.0
-    return Prediction(plcc, float(spearmanr(x, y)[0]), float(np.sqrt(np.mean(off**2))), outside, fitted)
+    rmse = float(np.sqrt(np.sum(off**2) / (len(x) - parameters)))
+    return Prediction(plcc, float(spearmanr(x, y)[0]), rmse, outside, fitted)
 
 
 @checked(
@@ -304,8 +308,8 @@ def _likelihood(wins: Floats, scale: Floats, law: Any) -> tuple[Floats, Floats]:
     return gradient, np.diag(weight.sum(axis=1)) - weight
 
 
-def _monotone(x: Floats, y: Floats) -> Floats:
-    """The logistic fit of y over x."""
+def _monotone(x: Floats, y: Floats) -> tuple[Floats, int]:
+    """Return the logistic fit of y over x, or a straight line, and its number of parameters."""
     from scipy.optimize import OptimizeWarning, curve_fit
 
     unit = (x - x.mean()) / x.std()
@@ -320,6 +324,6 @@ def _monotone(x: Floats, y: Floats) -> Floats:
             warnings.simplefilter("ignore", OptimizeWarning)
             found, _ = curve_fit(curve, unit, y, (y.min(), y.max(), 0.0, 2 * sign), maxfev=5000)
     except RuntimeError:
-        return straight
+        return straight, LINE
     fitted = curve(unit, *found)
-    return fitted if np.square(fitted - y).sum() <= np.square(straight - y).sum() else straight
+    return (fitted, LOGISTIC) if np.square(fitted - y).sum() <= np.square(straight - y).sum() else (straight, LINE)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core.base import checks
-from ii_core.display.figure import COLOURS, new_figure, save
+from ii_core.display.figure import COLOURS, new_figure, plain_text, save
 
 from ..depth.layers import logarithmic
 from ..measures.quality import AngleQuality, DepthQuality, told_outside
@@ -96,7 +96,7 @@ def _depth_figure(quality: DepthQuality) -> Any:
             z[same], np.ones(same.sum()), "o", transform=top, clip_on=False, mfc="white", color=COLOURS[0], ms=5
         )
         upper.annotate("○ identical", (1, 1.03), xycoords="axes fraction", ha="right", fontsize=9)
-    title = f"Q_depth; depth: {quality.source}"
+    title = f"Q_depth; depth: {plain_text(quality.source)}"
     if finite.any():
         mean = 10 * np.log10(quality.counts.sum() / _squared(quality).sum())
         upper.axhline(mean, color="0.4", linewidth=1, linestyle="--", zorder=1)

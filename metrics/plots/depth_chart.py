@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core.base import checks
-from ii_core.display.figure import COLOURS, LINES, MARKERS, check_suffix, new_figure, save
+from ii_core.display.figure import COLOURS, LINES, MARKERS, check_suffix, new_figure, plain_text, save
 
 from ..depth.layers import logarithmic
 from ..measures.quality import told_outside
@@ -101,7 +101,7 @@ def draw_depth_rate(study: Mapping[str, Any]) -> Any:
     held = np.any([np.any(~np.isnan(v), axis=0) for *_, v in images], axis=0)
     for axes, scheme, image in zip(panels[0], schemes, images, strict=True):
         map_ = _image(axes, *image, held, (low, max(high, low + 0.1)))
-        axes.set_title(scheme, fontsize=10)
+        axes.set_title(plain_text(scheme), fontsize=10)
     for axes, scheme in zip(panels[1], schemes, strict=True):
         _extremes(axes, [p for p in points if p["scheme"] == scheme])
         set_rate_axis(axes, points)
@@ -114,7 +114,7 @@ def draw_depth_rate(study: Mapping[str, Any]) -> Any:
     figure.colorbar(map_, ax=panels[0].tolist(), label=r"$Q_\mathrm{depth}$ [dB]")
     lost = [p["depth_outside"] for p in points if "depth_outside" in p]
     told = f": {told_outside(max(lost))}" if lost else ""  # equal for all points: depth is that of the reference
-    figure.suptitle(study.get("picture", {"name": ""})["name"] + told, x=0.01, ha="left", fontsize=12)
+    figure.suptitle(plain_text(study.get("picture", {"name": ""})["name"]) + told, x=0.01, ha="left", fontsize=12)
     return figure
 
 

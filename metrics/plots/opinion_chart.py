@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from ii_core.base import checks
-from ii_core.display.figure import COLOURS, MARKERS, check_suffix, new_figure, save
+from ii_core.display.figure import COLOURS, MARKERS, check_suffix, new_figure, plain_text, save
 
 from ..measures.measure import known_measures
 from ..observers.verdict import EVERYTHING, Verdict
@@ -47,7 +47,7 @@ def opinion_chart(made: Verdict, path: str | os.PathLike[str]) -> Path:
             stimulus = stimuli[one.stimulus]
             colour = COLOURS[schemes.index(stimulus["scheme"]) % len(COLOURS)]
             marker = MARKERS[scenes.index(stimulus["scene"]) % len(MARKERS)]
-            label = f"{stimulus['scheme']}, {stimulus['scene']}"
+            label = plain_text(f"{stimulus['scheme']}, {stimulus['scene']}")
             axes.errorbar(
                 value, one.score, one.half_width, fmt=marker, color=colour, markersize=4, linewidth=0.8, label=label
             )
@@ -55,7 +55,7 @@ def opinion_chart(made: Verdict, path: str | os.PathLike[str]) -> Path:
         line = sorted(zip((value for value, _ in pairs), found.fitted, strict=True))
         axes.plot(*zip(*line, strict=True), color="0.5", linewidth=1)
         axes.set_title(f"PLCC {found.plcc:.3f}, SROCC {found.srocc:.3f}", fontsize=9)
-        axes.set_xlabel(known[measure].axis if measure in known else measure)
+        axes.set_xlabel(known[measure].axis if measure in known else plain_text(measure))
         axes.grid(True, color="0.92", linewidth=0.8)
         axes.spines[["top", "right"]].set_visible(False)
     for axes in panels.flat[len(measures) :]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ii_core.base import checks
 from ii_core.base.extras import load
-from ii_core.display.figure import COLOURS, LINES, MARKERS, check_suffix, new_figure, save
+from ii_core.display.figure import COLOURS, LINES, MARKERS, check_suffix, new_figure, plain_text, save
 
 from ..measures.measure import measure_of
 from ..rates.points import check_measured, is_study
@@ -70,7 +70,7 @@ def draw(study: Mapping[str, Any], measure: str = "q_global") -> Any:
     if not all(point["reached"] for point in points):
         style = {"color": "0.4", "marker": "o", "linestyle": ":"}
         axes.plot([], [], markerfacecolor="white", label="target not met: nearest rate", **style)
-    axes.set_title(study.get("picture", {"name": ""})["name"], loc="left")
+    axes.set_title(plain_text(study.get("picture", {"name": ""})["name"]), loc="left")
     # Below the axes the legend has space for long scheme names, and covers no curve.
     figure.legend(loc="outside lower left", ncols=2, frameon=False, fontsize=9, handlelength=3)
     return figure
@@ -100,7 +100,7 @@ def _draw(axes: Any, points: Sequence[Mapping[str, Any]], i: int, measure: str) 
     missed = sorted({(p["bpp"], p[measure]) for p in finite if not p["reached"]} - set(met))
     lossless = sorted({p["bpp"] for p in points if p[measure] == measure_of(measure).best})
 
-    label = points[0]["scheme"]
+    label = plain_text(points[0]["scheme"])
     floor = min((p["bpp"] for p in points if not p["reached"] and p["bpp"] > p["target_bpp"]), default=None)
     ceiling = max((p["bpp"] for p in points if not p["reached"] and p["bpp"] <= p["target_bpp"]), default=None)
     for limit, words in ((floor, "not below"), (ceiling, "not above")):

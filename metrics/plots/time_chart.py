@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ii_core.base import checks
-from ii_core.display.figure import COLOURS, check_suffix, new_figure, save
+from ii_core.display.figure import COLOURS, check_suffix, new_figure, plain_text, save
 
 from ..measures.over_time import TakeQuality
 
@@ -49,7 +49,7 @@ def time_chart(takes: Mapping[str, TakeQuality], path: str | os.PathLike[str]) -
     axes: Any = figure.subplots(len(panels), 1, sharex=True)
     for i, (name, quality) in enumerate(takes.items()):
         seconds, colour = np.arange(len(quality.q_global)) / quality.fps, COLOURS[i % len(COLOURS)]
-        axes[0].plot(seconds, quality.q_global, color=colour, label=name)
+        axes[0].plot(seconds, quality.q_global, color=colour, label=plain_text(name))
         angles = quality.q_angle.reshape(len(seconds), -1)
         axes[0].fill_between(seconds, angles.min(axis=1), angles.max(axis=1), color=colour, alpha=0.15, linewidth=0)
         if quality.view_psnr is not None:

@@ -141,21 +141,24 @@ def opinions(
 ) -> None:
     """Analyse results of a test with observers: scores with intervals, and their prediction by measures."""
     from ii_core.base.files import write_json
+    from ii_core.display.figure import check_suffix
     from metrics.observers import read_results, verdict
     from metrics.plots.opinion_chart import opinion_chart
 
     check_outputs([path for path in (json, plot) if path], force)
+    if plot is not None:
+        check_suffix(plot)
     files = [file for path in results for file in (sorted(path.glob("*.jsonl")) if path.is_dir() else [path])]
     if not files:
         raise ValueError(f"{results[0]} holds no file of an observer: observer-001.jsonl is needed")
     made = verdict(read_results(files), confidence=confidence)
-    if plot:
-        opinion_chart(made, plot)
-    if json:
-        write_json(json, made.numbers)
     for note in made.notes:
         say(f"note: {note}")
     _print(made)
+    if json:
+        write_json(json, made.numbers)
+    if plot:
+        opinion_chart(made, plot)
 
 
 def _print(made: Verdict) -> None:

@@ -70,12 +70,8 @@ def camera(
     if spread is not None and output is None:
         raise ValueError("--spread stores point-spread functions beside camera maps: -o is needed")
     arrays = preset_cameras(name, scale=scale)
-    if output is None or report:
-        from ii_core.design.design import report as describe
-
-        say("\n\n".join(describe(array) for array in arrays))
+    files, maps = map_files(arrays, format), []
     if output is not None:
-        files, maps = map_files(arrays, format), []
         if spread is not None:
             from ii_core.waves.spread import spread_maps
             from ii_core.waves.spread_files import spread_files, write_spread
@@ -86,6 +82,11 @@ def camera(
             maps = [spread_maps(array, depth) for array in arrays]
             files += spread_files(len(arrays), format)
         check_outputs([output / file for file in files], force, make_folder=True)
+    if output is None or report:
+        from ii_core.design.design import report as describe
+
+        say("\n\n".join(describe(array) for array in arrays))
+    if output is not None:
         with progress_bar(f"write {output}") as tell:
             write_maps(arrays, output, format=format, progress=lambda done, total: tell(done, total, ""))
             if maps:

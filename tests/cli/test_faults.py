@@ -89,6 +89,13 @@ def test_a_file_is_no_folder_of_other_outputs(run, refused, picture, tmp_path):
     assert not name.exists()
 
 
+def test_outputs_are_checked_before_a_report_is_printed(run, refused, tmp_path):
+    (tmp_path / "file").touch()
+    refused(run("camera", "setup1", "--scale", 64, "--report", "-o", tmp_path / "file"), "cannot write")
+    (tmp_path / "L.png").touch()
+    refused(run("camera", "setup1", "--scale", 64, "--report", "-o", tmp_path), "--force replaces it")
+
+
 def test_a_coded_file_takes_no_name_of_a_picture(run, refused, picture):
     """With --force the coded file replaced the picture that it was made of."""
     before = picture.read_bytes()

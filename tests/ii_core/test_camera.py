@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, five_viewpoints, preset, projection_camera
+from ii_core.camera.presets import scaled
 from ii_core.design.design import report
 from ii_core.design.properties import properties
 
@@ -165,6 +166,17 @@ def test_preset_refusals():
     for scale in (3, 0, -1, 512, 1.5):
         with pytest.raises(ValueError, match=rf"setup1: scale {scale} does not divide the 512×256 lenses"):
             preset("setup1", scale=scale)
+
+
+@pytest.mark.parametrize(("lenses", "fitting"), [((12, 6), "1, 2, 3, 6"), ((7, 5), "1"), ((32, 18), "1, 2")])
+def test_a_refused_scale_names_the_scales_that_fit(lenses, fitting):
+    camera = IICamera(
+        pixels=(lenses[0] * 6, lenses[1] * 6), lenses=lenses, pixel_pitch_mm=0.1, gap_mm=1.0, name="mine"
+    )
+    with pytest.raises(ValueError, match=rf"one of {fitting} is needed"):
+        scaled(camera, 8)
+    for scale in map(int, fitting.split(", ")):
+        scaled(camera, scale)
 
 
 GOOD = {"pixels": (8, 6), "lenses": (2, 3), "pixel_pitch_mm": 0.1, "gap_mm": 1.0}

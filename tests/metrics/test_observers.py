@@ -236,6 +236,37 @@ def test_a_file_that_cannot_be_used_is_one_clear_line(files, edit, said):
     assert said in note and "observer-003.jsonl" in note and note.endswith(": left out") and "\n" not in note
 
 
+STRANGE = (None, True, 7, 0.5, "a", "", [], [[]], [7], [[0]], [[0, 0]], [[[0]]], {}, {"": ""}, {"a": [[0, 0]]})
+PARTS = [
+    *((key,) for key in ("format", "version", "method", "stimuli", "training", "orders")),
+    *(("stimuli", 1), ("orders", 0), ("orders", 0, 1), ("orders", 0, 1, 0), ("training", 0)),
+    *(("stimuli", 1, key) for key in ("scene", "name", "scheme", "reference", "measures")),
+    ("stimuli", 1, "measures", "q_view"),
+]
+
+
+@pytest.mark.parametrize("part", PARTS, ids=str)
+def test_a_plan_of_any_kinds_is_read_or_refused_in_words(tmp_path, part):
+    """An object for ``orders`` was a KeyError."""
+    (source,) = write_simulated(tmp_path, planned(), [3.0] * 15, 1)
+    whole = json.loads(source.read_text(encoding="utf-8").splitlines()[0])["plan"]
+    refused = 0
+    for strange in STRANGE:
+        plan = json.loads(whole)
+        at = plan
+        for key in part[:-1]:
+            at = at[key]
+        at[part[-1]] = strange
+        source.write_text(sealed({"format": "ii-observer", "version": 1, "kind": "begin", "at": "2026", "observer": 1,
+                                  "colour_vision": "passed", "plan": json.dumps(plan)}), encoding="utf-8")  # fmt: skip
+        try:
+            read_results([source])
+        except ValueError as error:
+            refused += 1
+            assert "has no plan of a test that this version reads: " in str(error) and "\n" not in str(error)
+    assert refused >= len(STRANGE) - 4
+
+
 def test_of_two_files_of_one_observer_and_of_two_tests_the_first_counts(files, tmp_path):
     copy = tmp_path / "observer-001 (1).jsonl"
     copy.write_bytes(files[0].read_bytes())

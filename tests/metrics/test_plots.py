@@ -2,15 +2,22 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture, five_viewpoints, view_image
 from ii_core.base.files import read_image, write_image
+from ii_core.display.figure import save
 from ii_core.display.view_sheets import _pair_figure, _views_figure, plot_pair, plot_views
-from metrics import PLOTS, angle_axes, plot_all, plot_angle, q_angle, q_depth
+from metrics import PLOTS, angle_axes, depth_rate_chart, plot_all, plot_angle, q_angle, q_depth, rd_chart, time_chart
+from metrics.benchmark import ranking
+from metrics.measures.over_time import TakeQuality
+from metrics.observers.subjective import predicted_scores
+from metrics.observers.verdict import Judged, Verdict
 from metrics.plots.angle_depth import _depth_figure, angle_figure, plot_depth
+from metrics.plots.opinion_chart import opinion_chart
 
 
 def picture(lenses=(12, 8), ei_pixels=(6, 4), seed=0, dtype="uint8"):
@@ -156,3 +163,60 @@ def test_refusals(tmp_path):
     with pytest.raises(ValueError, match="different structure"):
         plot_views(a, picture(ei_pixels=(4, 6)), tmp_path / "x.png")
     assert not list(tmp_path.iterdir())
+
+
+NAME = "a_$b^{"
+
+
+def _studied():
+    point = {
+        "scheme": NAME, "options": {}, "target_bpp": 0.1, "bpp": 0.1, "nbytes": 10, "q_global": 30.0, "reached": True,
+        "q_depth_min": 20.0, "q_depth_mean": 30.0, "q_depth_max": 40.0, "q_depth": [20.0, 40.0], "depth_mm": [1.0, 2.0],
+    }  # fmt: skip
+    points = [{**point, "bpp": bpp, "target_bpp": bpp, "scheme": scheme} for bpp in (0.1, 0.2) for scheme in NAMES]
+    return {"picture": {"name": NAME}, "points": points}
+
+
+NAMES = (NAME, f"{NAME}}}$ in two", f"_{NAME}")
+
+
+def _opinions():
+    stimuli = [
+        {"scene": NAME, "name": NAME, "reference": False, "scheme": NAMES[i % 3], "measures": {NAME: float(i)}}
+        for i in range(6)
+    ]
+    scores = [1.0, 1.5, 2.5, 3.5, 4.0, 4.5]
+    judged = [Judged(i, score, 0.1, 3) for i, score in enumerate(scores)]
+    found = {(NAME, "all"): predicted_scores(range(6), scores)}
+    return Verdict({"method": "dsis", "stimuli": stimuli}, judged, found, [], 3, simulated=True)
+
+
+def _take():
+    values = np.linspace(30, 40, 4)
+    flicker = values / 100
+    return TakeQuality(
+        fps=25.0, q_global=values, q_angle=values[:, None, None], flicker=flicker, error_change=flicker
+    )
+
+
+def _ranking():
+    point = [{"bpp": bpp, "q_global": 30.0} for bpp in (0.1, 0.2)]
+    rows = [{"coder": name, "result": {"pictures": [{"name": NAME, "points": point}]}} for name in NAMES]
+    return ranking._chart(SimpleNamespace(pictures=[NAME], rank_by="q_global"), rows)
+
+
+CHARTS = {
+    "rd": lambda path: rd_chart(_studied(), path),
+    "depth over rate": lambda path: depth_rate_chart(_studied(), path),
+    "opinions": lambda path: opinion_chart(_opinions(), path),
+    "time": lambda path: time_chart(dict.fromkeys(NAMES, _take()), path),
+    "ranking": lambda path: save(_ranking(), path),
+}
+
+
+@pytest.mark.parametrize("chart", CHARTS)
+def test_names_in_charts_are_drawn_letter_by_letter(chart, tmp_path):
+    """A dollar sign began a formula, of which matplotlib could make no sense; a first underscore hid a name."""
+    text = CHARTS[chart](tmp_path / "c.svg").read_text(encoding="utf-8")
+    for name in [NAME] if chart == "opinions" else NAMES:
+        assert name in text

@@ -112,6 +112,16 @@ def test_a_measure_that_is_a_monotone_function_of_opinion_predicts_it():
     assert lower.plcc == pytest.approx(1) and lower.srocc == pytest.approx(-1) and math.isnan(lower.outlier_ratio)
 
 
+@pytest.mark.parametrize("count", [8, 25])
+def test_the_error_has_the_degrees_of_freedom_of_the_fit(count):
+    """ITU-T P.1401: N − 4 for the logistic function; of noise of known spread, the error is that spread."""
+    rng = np.random.default_rng(1)
+    measure = np.linspace(-2, 2, count)
+    truth = 1.5 + 3 / (1 + np.exp(-2 * measure))
+    found = [predicted_scores(measure, truth + rng.normal(0, 0.1, count)) for _ in range(200)]
+    assert np.sqrt(np.mean([one.rmse**2 for one in found])) == pytest.approx(0.1, rel=0.07)
+
+
 def test_a_measure_without_relation_predicts_nothing():
     rng = np.random.default_rng(5)
     got = predicted_scores(rng.random(200), rng.random(200))

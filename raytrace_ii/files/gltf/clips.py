@@ -98,7 +98,22 @@ def _curve(file: GltfFile, channel: Channel, sampler: KeyframeSampler, where: st
             f"{len(times)} times"
         )
     shape = (len(times), 3, width) if sampler.interpolation == "CUBICSPLINE" else (len(times), width)
-    return Curve(node, path, times[:, 0], values.reshape(shape), sampler.interpolation)
+    values = values.reshape(shape)
+    if path == "rotation":
+        values = _unit_keys(values, where)
+    return Curve(node, path, times[:, 0], values, sampler.interpolation)
+
+
+def _unit_keys(values: Array, where: str) -> Array:
+    """Return quaternions scaled to unit length, with the tangents of cubic splines scaled by the same factor.
+
+    Stored quaternions are rounded: of 8 bits, they are up to 1 % from unit length, and slerp needs unit length.
+    """
+    points = values[:, 1:2] if values.ndim == 3 else values
+    lengths = np.linalg.norm(points, axis=-1, keepdims=True)
+    if not (lengths > 0).all():
+        raise ValueError(f"{where}.output: a quaternion of length 0")
+    return np.asarray(values / lengths)
 
 
 def _hermite(a: Array, a_slope: Array, b: Array, b_slope: Array, s: float) -> Array:

@@ -20,6 +20,13 @@ from .tables import KNOWN_EXTENSIONS, Accessor, Buffer, BufferView, Gltf, ImageS
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SHAPES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 MOST_ROWS = 10_000_000  # of an accessor without a view: no bytes of the file answer for them
+DECODE, KTX2 = "gltf-transform copy in.glb out.glb", "gltf-transform ktxdecompress in.glb out.glb"
+# Commands that remove compressed data from a file, by the extension that needs a decoder.
+CONVERSIONS = {
+    "KHR_draco_mesh_compression": DECODE,
+    "EXT_meshopt_compression": DECODE,
+    "KHR_texture_basisu": KTX2,
+}
 _GLB, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 
 
@@ -43,9 +50,9 @@ class GltfFile:
         self.tables = _checked(text)
         unknown = sorted(set(self.tables.extensionsRequired) - KNOWN_EXTENSIONS)
         if unknown:
-            raise ValueError(
-                f"extensionsRequired: {', '.join(unknown)}: known are {', '.join(sorted(KNOWN_EXTENSIONS))}"
-            )
+            commands = list(dict.fromkeys(CONVERSIONS[name] for name in unknown if name in CONVERSIONS))
+            advice = _advice(*commands) if commands else f"known are {', '.join(sorted(KNOWN_EXTENSIONS))}"
+            raise ValueError(f"extensionsRequired: {', '.join(unknown)}: {advice}")
         self._buffers: dict[int, bytes] = {}
         self._arrays: dict[int, NDArray[Any]] = {}
         self._images: dict[int, NDArray[Any]] = {}
@@ -180,6 +187,10 @@ class GltfFile:
         return beside(self.folder, unquote_to_bytes(uri).decode("utf-8", "replace"))
 
 
+def _advice(*commands: str) -> str:
+    return f"convert the file with `{'`, then `'.join(commands)}` (npm package @gltf-transform/cli)"
+
+
 def _glb(data: bytes) -> tuple[bytes, bytes | None]:
     """JSON and binary chunk of a GLB container."""
     if len(data) < 20:
@@ -225,7 +236,7 @@ def _pixels(data: bytes, where: str) -> NDArray[Any]:
     kinds = {b"\x89PNG": ".png", b"\xff\xd8": ".jpg", b"RIFF": ".webp", b"\xabKTX": ".ktx2"}
     suffix = next((suffix for magic, suffix in kinds.items() if data.startswith(magic)), ".png")
     if suffix == ".ktx2":
-        raise ValueError(f"{where}: a KTX2 image: PNG or JPEG is needed")
+        raise ValueError(f"{where}: a KTX2 image: PNG or JPEG is needed, {_advice(KTX2)}")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"image{suffix}"
         path.write_bytes(data)

@@ -106,7 +106,18 @@ WRONG = [
     (
         "extensionsRequired",
         ["KHR_draco_mesh_compression"],
-        "extensionsRequired: KHR_draco_mesh_compression: known are",
+        "extensionsRequired: KHR_draco_mesh_compression: convert the file with `gltf-transform copy in.glb out.glb` (",
+    ),
+    (
+        "extensionsRequired",
+        ["KHR_texture_basisu", "EXT_meshopt_compression"],
+        "`gltf-transform copy in.glb out.glb`, then `gltf-transform ktxdecompress in.glb out.glb` (npm package",
+    ),
+    ("extensionsRequired", ["EXT_other"], "extensionsRequired: EXT_other: known are KHR_"),
+    (
+        "images.0",
+        {"uri": "data:;base64,q0tUWA=="},
+        "images.0: a KTX2 image: PNG or JPEG is needed, convert the file with `gltf-transform ktxdecompress",
     ),
     ("nodes", {}, "nodes: {}: a list is needed"),
     ("meshes.0.primitives.0.attributes", [], "meshes.0.primitives.0.attributes: []: a table of keys is needed"),

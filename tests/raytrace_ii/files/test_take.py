@@ -221,6 +221,35 @@ def test_a_skin_follows_its_joints(flexed):
         np.testing.assert_allclose(bent[4:], [[1 + c, s, 0], [1 + c - s, s + c, 0]], atol=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["int8", "int16"])
+def test_rounded_quaternions_turn_at_constant_speed(kind, tmp_path):
+    """Keys of 8 bits are up to 1 % from unit length: without scaling, the turn was off by 0.47°."""
+    gltf = Gltf()
+    elbow = arm(gltf)
+    most = np.iinfo(kind).max
+    half = np.radians(80) / 2
+    exact = np.array([[0, 0, 0, 1], [0, 0, np.sin(half), np.cos(half)]])
+    short = np.round(exact * [[0.6 * most], [most]]).astype(kind)  # unequal lengths show the fault at any rounding
+    times = accessor(gltf, [0, 1])
+    samplers = [{"input": times, "output": gltf.accessor(short, normalized=True)}]
+    channels = [{"sampler": 0, "target": {"node": elbow, "path": "rotation"}}]
+    gltf.add("animations", {"name": "Flex", "channels": channels, "samplers": samplers})
+    gltf.save(tmp_path / "arm.glb")
+    whole = 2 * np.arctan2(*short[1, 2:].astype(float))  # of the rounded key
+    for share in (0.25, 0.5, 0.75):
+        bent, _ = vertices(tmp_path, share)
+        x, y = bent[4, :2] - [1, 0]
+        assert np.arctan2(y, x) == pytest.approx(share * whole, abs=1e-6)
+
+
+def test_a_key_of_length_0_is_no_rotation(tmp_path):
+    gltf = Gltf()
+    clip(gltf, "Flex", arm(gltf), "rotation", [0, 1], [[0, 0, 0, 1], [0, 0, 0, 0]])
+    gltf.save(tmp_path / "arm.glb")
+    with pytest.raises(ValueError, match="output: a quaternion of length 0"):
+        vertices(tmp_path, 0.5)
+
+
 def test_stepped_keys_hold(flexed):
     low, _ = vertices(flexed, 1.99, "Jump")
     high, _ = vertices(flexed, 2.0, "Jump")
