@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from difflib import get_close_matches
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from ..base.checks import number, within
+import assets
+
+from ..base.checks import number, shown, within
+from ..base.files import read_json
 
 LINE_D_NM, LINE_F_NM, LINE_C_NM = 587.5618, 486.1327, 656.2725  # spectral lines of the Abbe number
 LEAST_NM, MOST_NM = 200.0, 2500.0
 MOST_INDEX = 10.0
+MOST_NAME = 40  # characters of a name that are compared with the catalogue's
+NEAR = 4  # names in the error of an unknown one
+PREFIX = re.compile("^[A-Z]+-")  # of glasses without lead, of moulding types and of makers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,24 +111,62 @@ class Glass:
         return plain if self.sellmeier is None else {**plain, "sellmeier": list(self.sellmeier)}
 
 
-def _schott(name: str, *six: float) -> Glass:
-    return Glass(name=name, sellmeier=six)
+class CatalogueGlass(NamedTuple):
+    """Glass of the catalogue with its maker, and n_d and V_d of the maker's data sheet."""
+
+    maker: str
+    glass: Glass
+    ior: float
+    abbe: float
 
 
-# Coefficients of Schott's catalogue of optical glasses.
-CATALOGUE = {
-    glass.name: glass
-    for glass in (
-        _schott("N-BK7", 1.03961212, 0.231792344, 1.01046945, 0.00600069867, 0.0200179144, 103.560653),
-        _schott("N-SK2", 1.28189012, 0.257738258, 0.96818604, 0.0072719164, 0.0242823527, 110.377773),
-        _schott("N-SK16", 1.34317774, 0.241144399, 0.994317969, 0.00704687339, 0.0229005, 92.7508526),
-        _schott("N-SSK2", 1.4306027, 0.153150554, 1.01390904, 0.00823982975, 0.0333736841, 106.870822),
-        _schott("F2", 1.34533359, 0.209073176, 0.937357162, 0.00997743871, 0.0470450767, 111.886764),
-        _schott("F5", 1.3104463, 0.19603426, 0.96612977, 0.00958633048, 0.0457627627, 115.011883),
-        _schott("N-SF11", 1.73759695, 0.313747346, 1.89878101, 0.013188707, 0.0623068142, 155.23629),
-        _schott("N-LAK9", 1.46231905, 0.344399589, 1.15508372, 0.00724270156, 0.0243353131, 85.4686868),
-    )
-}
+@cache
+def catalogue() -> Mapping[str, CatalogueGlass]:
+    """Return the glasses of ``assets/glasses.json`` by name."""
+    lines = read_json(Path(str(files(assets) / "glasses.json")))["glasses"]
+    return {
+        name: CatalogueGlass(maker, Glass(name=name, sellmeier=tuple(six)), ior, abbe)
+        for name, maker, six, ior, abbe in lines
+    }
+
+
+class _Catalogue(Mapping[str, Glass]):
+    """Glasses by name, read at first use: most commands need none."""
+
+    def __getitem__(self, name: str) -> Glass:
+        return catalogue()[name].glass
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(catalogue())
+
+    def __len__(self) -> int:
+        return len(catalogue())
+
+
+CATALOGUE: Mapping[str, Glass] = _Catalogue()
+
+
+def known_glass(name: str) -> CatalogueGlass:
+    """Return the catalogue glass of a name, whose letters may be small.
+
+    A name without its entry is refused: glasses that replace one another, such as SF11 and N-SF11, differ.
+
+    Raises
+    ------
+    ValueError
+        If the name is unknown; the message has the nearest names.
+    """
+    known = catalogue()
+    found = known.get(name) or known.get(name.upper())
+    if found is not None:
+        return found
+    wanted = name.upper()[:MOST_NAME]
+    kin = [other for other in known if PREFIX.sub("", other) == PREFIX.sub("", wanted)]
+    near = list(dict.fromkeys([*kin, *get_close_matches(wanted, known, NEAR)]))[:NEAR]
+    listed = ", ".join(f"{other} (n {known[other].ior:g}, V {known[other].abbe:g})" for other in near)
+    makers = "Schott, Ohara and CDGM"
+    said = f"near it are {listed}" if near else f"known are {len(known)} names of {makers}, such as N-BK7"
+    raise ValueError(f"unknown glass {shown(name)}: {said}")
 
 
 def glass(value: Any) -> Glass | None:
@@ -131,12 +180,10 @@ def glass(value: Any) -> Glass | None:
     if value is None or isinstance(value, Glass):
         return value
     if isinstance(value, str):
-        known = CATALOGUE.get(value) or CATALOGUE.get(f"N-{value}")
-        if known is None:
-            raise ValueError(
-                f"unknown glass {value!r}: known are {', '.join(CATALOGUE)}; others are given by ior and abbe"
-            )
-        return known
+        try:
+            return known_glass(value).glass
+        except ValueError as error:
+            raise ValueError(f"{error}; others are given by ior and abbe, or sellmeier") from None
     if not isinstance(value, Mapping):
         number("glass", value)
         return Glass(ior=value)

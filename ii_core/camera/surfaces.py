@@ -1,4 +1,4 @@
-"""Lens of spherical and conic surfaces between glasses, with stop and rims: exact refraction ray by ray.
+"""Lens of spheres, conics and even aspheres between glasses, with stop and rims: exact refraction ray by ray.
 
 Surfaces are listed as prescriptions list them, from the scene to the pixels; a radius is positive if the centre of
 curvature lies on the pixels' side of the surface. Rays are traced the other way, from the pixels into the scene.
@@ -25,12 +25,16 @@ MOST_SURFACES = 200
 FAN = 32  # heights of the parallel rays that test whether a lens lets light through
 # Surfaces that touch at the rim, as computed: published lengths have seven digits.
 TOUCH_MM = 1e-5
+MOST_ASPHERIC = 8  # coefficients, up to that of r¹⁶
+MOST_COEFFICIENT = 1e30
+MOST_STEPS = 60  # of Newton's method, halved ones included; published aspheres take up to six
+ROUNDING = 64 * float(np.finfo(np.float64).eps)  # of a sag, against the sum of its terms
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Surface:
-    """Surface of revolution: a sphere, a conic or a plane.
+    """Surface of revolution: a sphere, a conic, an even asphere or a plane.
 
     Parameters
     ----------
@@ -43,6 +47,9 @@ class Surface:
     conic : float
         κ of the sag r²/R / (1 + √(1 − (1 + κ)r²/R²)): 0 is a sphere, −1 a paraboloid, −e² an ellipsoid or hyperboloid
         of eccentricity e about the axis.
+    aspheric : sequence of float
+        Coefficients of r², r⁴, … r¹⁶ in the sag, added to that of the conic; that of rⁱ in mm¹⁻ⁱ. The coefficient of
+        r² adds to the curvature at the vertex. Zeros at the end are left out.
     diameter_mm : float, optional
         Diameter of the rim; without it, the surface ends where it turns back.
     stop : bool
@@ -53,6 +60,7 @@ class Surface:
     thickness_mm: float = 0.0
     glass: Glass | None = None
     conic: float = 0.0
+    aspheric: tuple[float, ...] = ()
     diameter_mm: float | None = None
     stop: bool = False
 
@@ -69,6 +77,7 @@ class Surface:
         put("thickness_mm", within("thickness_mm", self.thickness_mm, 0, MOST_MM, "distance", " mm"))
         put("glass", glass(self.glass))
         put("conic", within("conic", self.conic, -1e6, 1e6))
+        put("aspheric", _coefficients(self.aspheric))
         if self.diameter_mm is not None:
             put("diameter_mm", length("diameter_mm", self.diameter_mm))
             if not math.isfinite(self.sag(self.diameter_mm / 2)):
@@ -86,15 +95,25 @@ class Surface:
         """1/R per mm; 0 of a plane."""
         return 0.0 if self.radius_mm is None else 1 / self.radius_mm
 
+    @property
+    def vertex_curvature(self) -> float:
+        """Curvature at the vertex per mm, with the coefficient of r²."""
+        return self.curvature + 2 * self.aspheric[0] if self.aspheric else self.curvature
+
     def sag(self, height_mm: float) -> float:
         """Return how far the surface lies from its vertex towards the pixels; infinite beyond its edge."""
         c, square = self.curvature, height_mm * height_mm
         under = 1 - (1 + self.conic) * c * c * square
-        return c * square / (1 + math.sqrt(under)) if under >= 0 else math.inf
+        if under < 0:
+            return math.inf
+        conic = c * square / (1 + math.sqrt(under))
+        return conic + float(_polynomial(self.aspheric, square)) if self.aspheric else conic
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values; those equal to their default are left out."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) != f.default}
+        if self.aspheric:
+            values["aspheric"] = list(self.aspheric)
         return {**values, "glass": self.glass.to_json()} if self.glass else values
 
 
@@ -218,7 +237,8 @@ class Surfaces(FrontElement):
         def grown(surface: Surface) -> Surface:
             given = {name: getattr(surface, name) for name in ("radius_mm", "thickness_mm", "diameter_mm")}
             lengths: dict[str, Any] = {name: x * times for name, x in given.items() if x is not None}
-            return replace(surface, **lengths)
+            aspheric = tuple(a * times ** (1 - 2 * power) for power, a in enumerate(surface.aspheric, 1))
+            return replace(surface, **lengths, aspheric=aspheric)
 
         return replace(self, surfaces=tuple(map(grown, self.surfaces)))
 
@@ -234,7 +254,8 @@ class Surfaces(FrontElement):
         for i in reversed(range(0 if count is None else total - count, total)):
             after = 1.0 if i == 0 else self._indices[i - 1]
             to_here = np.array([[1.0, self._vertices[i] - z], [0.0, 1.0]])
-            bend = np.array([[1.0, 0.0], [(after - index) * self.surfaces[i].curvature / after, index / after]])
+            curvature = self.surfaces[i].vertex_curvature
+            bend = np.array([[1.0, 0.0], [(after - index) * curvature / after, index / after]])
             matrix, index, z = bend @ to_here @ matrix, after, self._vertices[i]
         return Paraxial(*(float(x) for x in matrix.ravel()))
 
@@ -325,6 +346,25 @@ def _surface(number: int, value: Any) -> Surface:
         raise ValueError(f"surfaces: surface {number}: {error}") from None
 
 
+def _coefficients(given: Any) -> tuple[float, ...]:
+    """Return aspheric coefficients without zeros at the end."""
+    sequence("aspheric", given)
+    if len(given) > MOST_ASPHERIC:
+        raise ValueError(f"aspheric has {len(given)} coefficients: at most {MOST_ASPHERIC}, of r² to r¹⁶, are needed")
+    checked = [within("aspheric", a, -MOST_COEFFICIENT, MOST_COEFFICIENT) for a in given]
+    while checked and not checked[-1]:
+        checked.pop()
+    return tuple(checked)
+
+
+def _polynomial(coefficients: Sequence[float], square: Any) -> Any:
+    """Return the aspheric terms of the sag at r²."""
+    total = 0.0 * square
+    for a in reversed(coefficients):
+        total = (total + a) * square
+    return total
+
+
 def _check_apart(number: int, near: Surface, far: Surface) -> None:
     """Raise ValueError unless a surface and the next, ``far`` from the scene, are apart up to the smaller rim."""
     if near.glass is not None and not near.thickness_mm:
@@ -332,7 +372,8 @@ def _check_apart(number: int, near: Surface, far: Surface) -> None:
     rims = [s.diameter_mm / 2 for s in (near, far) if s.diameter_mm is not None]
     if not rims:
         return
-    for share in (0.25, 0.5, 0.75, 1.0):
+    shares = 32 if near.aspheric or far.aspheric else 4  # aspheres may turn back between
+    for share in ((i + 1) / shares for i in range(shares)):
         height = min(rims) * share
         gap = near.thickness_mm + far.sag(height) - near.sag(height)
         if gap < -TOUCH_MM:
@@ -345,20 +386,22 @@ def _check_apart(number: int, near: Surface, far: Surface) -> None:
 def _refracted(ray: tuple[Any, ...], surface: Surface, vertex: float, index: float, after: float) -> tuple[Any, ...]:
     """Return the rays behind a surface and whether they pass; directions are unit vectors and stay so.
 
-    The surface lies at z = vertex − sag. With c = −1/R, a point at distance t past the vertex plane fulfils
-    A·t² − 2B·t + C = 0. C/(B + √(B² − AC)) is the root next to the vertex, exact for planes too.
+    The surface lies at z = vertex − sag.
     """
     x, y, z, dx, dy, dz = ray
     c, k = -surface.curvature, 1 + surface.conic
     to_plane = (vertex - z) / dz
     x0, y0 = x + dx * to_plane, y + dy * to_plane
-    if c:
-        square = c * (x0 * x0 + y0 * y0)
-        b = dz - c * (x0 * dx + y0 * dy)
-        under = b * b - c * (1 + surface.conic * dz * dz) * square
-        below = b + np.sqrt(np.maximum(under, 0))
-        through = (under >= 0) & (below > 0)
-        t = square / np.where(below > 0, below, 1.0)
+    if surface.aspheric:
+        t, through = _to_asphere((x0, y0, dx, dy, dz), surface)
+        x, y, depth = x0 + dx * t, y0 + dy * t, dz * t
+        steep = _slope(np.where(through, x * x + y * y, 0.0), surface)
+        size = np.sqrt(4 * steep * steep * (x * x + y * y) + 1)
+        nx, ny, nz = 2 * steep * x / size, 2 * steep * y / size, 1 / size
+        z = vertex + depth
+        through = through & (dx * nx + dy * ny + dz * nz > 0) & (to_plane + t >= -TOUCH_MM)
+    elif c:
+        t, through = _to_conic((x0, y0, dx, dy, dz), c, surface.conic)
         x, y, depth = x0 + dx * t, y0 + dy * t, dz * t
         steep = 1 - k * c * depth  # z component of the normal before it is a unit vector
         through = through & (steep > 0)
@@ -384,6 +427,79 @@ def _refracted(ray: tuple[Any, ...], surface: Surface, vertex: float, index: flo
     forward = dz > 0
     dx, dy, dz = (np.where(forward, d, safe) for d, safe in ((dx, 0.0), (dy, 0.0), (dz, 1.0)))
     return x, y, z, dx, dy, dz, through & forward
+
+
+def _to_conic(ray: tuple[Any, ...], c: float, conic: float) -> tuple[Any, Mask]:
+    """Return the distance past the vertex plane at which rays from there meet a conic, and whether they do.
+
+    With c = −1/R, the distance t fulfils A·t² − 2B·t + C = 0. C/(B + √(B² − AC)) is the root next to the vertex,
+    exact for planes too.
+    """
+    x0, y0, dx, dy, dz = ray
+    square = c * (x0 * x0 + y0 * y0)
+    b = dz - c * (x0 * dx + y0 * dy)
+    under = b * b - c * (1 + conic * dz * dz) * square
+    below = b + np.sqrt(np.maximum(under, 0))
+    return square / np.where(below > 0, below, 1.0), (under >= 0) & (below > 0)
+
+
+def _slope(square: Any, surface: Surface) -> Any:
+    """Return the derivative of the sag after r², inside the edge of the conic."""
+    c = surface.curvature
+    total = 0.0 * square
+    for power in reversed(range(len(surface.aspheric))):
+        total = total * square + (power + 1) * surface.aspheric[power]
+    return total + c / (2 * np.sqrt(1 - (1 + surface.conic) * c * c * square))
+
+
+def _to_asphere(ray: tuple[Any, ...], surface: Surface) -> tuple[Any, Mask]:
+    """Return the distance past the vertex plane at which rays from there meet an even asphere, and whether they do.
+
+    Newton's method from the point on the conic, or from the vertex plane if a ray misses the conic. A step that does
+    not lessen the residual is halved. A ray meets the surface if its residual falls to the rounding of its terms.
+    """
+    x0, y0, dx, dy, dz = (np.ravel(a) for a in ray)
+    with np.errstate(over="ignore", invalid="ignore"):
+        start, on_conic = _to_conic((x0, y0, dx, dy, dz), -surface.curvature, surface.conic)
+        found = np.where(on_conic, start, 0.0)
+        met = np.zeros(found.shape, bool)
+        left, t = np.arange(found.size), found
+        residual, slope, rounding = _residual((x0, y0, dx, dy, dz), t, surface)
+        step = -residual / slope
+        for _ in range(MOST_STEPS):
+            done = np.abs(residual) <= rounding
+            found[left[done]], met[left[done]] = t[done], True
+            on = ~done & np.isfinite(step)
+            if not on.any():
+                break
+            left, t, residual, step = left[on], t[on], residual[on], step[on]
+            trial = t + step
+            after, slope, rounding = _residual(tuple(a[left] for a in (x0, y0, dx, dy, dz)), trial, surface)
+            better = np.abs(after) < np.abs(residual)
+            step = np.where(better, -after / slope, step / 2)
+            t, residual = np.where(better, trial, t), np.where(better, after, residual)
+            rounding = np.where(better, rounding, 0.0)
+    shape = np.shape(ray[0])
+    return np.where(met, found, 0.0).reshape(shape), met.reshape(shape)
+
+
+def _residual(ray: tuple[Any, ...], t: Any, surface: Surface) -> tuple[Any, Any, Any]:
+    """Return the height of rays over an asphere, its derivative along the ray, and its rounding.
+
+    The height is infinite beyond the edge of the conic.
+    """
+    x0, y0, dx, dy, dz = ray
+    x, y = x0 + dx * t, y0 + dy * t
+    square = x * x + y * y
+    c = surface.curvature
+    under = 1 - (1 + surface.conic) * c * c * square
+    inside = under > 0
+    conic = c * square / (1 + np.sqrt(np.where(inside, under, 1.0)))
+    height = np.where(inside, dz * t + conic + _polynomial(surface.aspheric, square), np.inf)
+    slope = dz + 2 * _slope(np.where(inside, square, 0.0), surface) * (x * dx + y * dy)
+    terms = np.abs(conic) + _polynomial([abs(a) for a in surface.aspheric], square)
+    rounding = ROUNDING * (terms + np.abs(x0) + np.abs(y0) + np.abs(t))
+    return height, np.where(slope != 0, slope, 1.0), rounding
 
 
 def surfaces_of(elements: Sequence[Any]) -> tuple[Surfaces, ...]:

@@ -1,7 +1,8 @@
 """Lens files of Zemax OpticStudio, ``.zmx``: surfaces, glasses, stop, rims and the primary wavelength.
 
 The files are lines of words, in UTF-8 or UTF-16. A block of indented lines belongs to the ``SURF`` line before it.
-Surface 0 is the object, the last one the image. ``DIAM`` holds half a diameter.
+Surface 0 is the object, the last one the image. ``DIAM`` holds half a diameter. ``GLAS`` holds a name, the kind of
+solve, the surface of a pickup, index and Abbe number; the latter two are placeholders unless the glass is a model.
 """
 
 from __future__ import annotations
@@ -11,11 +12,16 @@ import os
 from typing import Any
 
 from ..base.files import MAX_TEXT, check_file
-from .glass import CATALOGUE
+from .glass import PREFIX, catalogue, known_glass
+from .surfaces import MOST_ASPHERIC
 
 UNITS_MM = {"MM": 1.0, "CM": 10.0, "IN": 25.4, "METER": 1000.0}
 # Kinds of surface whose parameters beside curvature and conic would change the lens.
 KNOWN_TYPES = ("STANDARD", "EVENASPH")
+FIXED, MODEL, PICKUP, SUBSTITUTE = "0", "1", "2", "3"  # solves of a glass
+MAKERS = ("Schott", "Ohara", "CDGM")  # whose catalogues have files for Zemax
+# A model glass by the name of a catalogue glass may differ from it by the rounding of its numbers.
+SAME_INDEX, SAME_ABBE = 5e-4, 0.01
 
 
 def read_zmx(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -26,8 +32,8 @@ def read_zmx(path: str | os.PathLike[str]) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If the file is none of Zemax's, or has mirrors, tilts, aspheric terms, an unknown unit, an unknown glass
-        without an index, or a gap of no length.
+        If the file is none of Zemax's, or has mirrors, tilts, surfaces that are neither conics nor even aspheres, an
+        unknown unit, an unknown glass, or a gap of no length.
     OSError
         If the file is missing.
     """
@@ -37,7 +43,10 @@ def read_zmx(path: str | os.PathLike[str]) -> dict[str, Any]:
     unit = _first(head, "UNIT", "MM")
     if unit not in UNITS_MM:
         raise ValueError(f"unit {unit!r}: known are {', '.join(UNITS_MM)}")
-    found = [_surface(i, block, UNITS_MM[unit]) for i, block in enumerate(blocks[:-1])][1:]
+    surfaces: list[dict[str, Any]] = []
+    for block in blocks[:-1]:
+        surfaces.append(_surface(block, UNITS_MM[unit], surfaces, head.get("GCAT", [])))
+    found = surfaces[1:]
     back = found[-1]["thickness_mm"]
     kept: list[dict[str, Any]] = []
     for i, surface in enumerate(found):
@@ -97,14 +106,15 @@ def _blocks(text: str) -> tuple[dict[str, list[str]], list[dict[str, list[str]]]
     return head, blocks
 
 
-def _surface(index: int, block: dict[str, list[str]], unit_mm: float) -> dict[str, Any]:
+def _surface(
+    block: dict[str, list[str]], unit_mm: float, before: list[dict[str, Any]], catalogues: list[str]
+) -> dict[str, Any]:
+    """Return the values of a surface that follows those of ``before``."""
     kind = _first(block, "TYPE", "STANDARD")
+    index = len(before)
     named = f"surface {index}"
     if kind not in KNOWN_TYPES:
         raise ValueError(f"{named} is of type {kind}: {' and '.join(KNOWN_TYPES)} are read")
-    for key, words in block.items():
-        if key.startswith("PARM ") and kind == "EVENASPH" and _number(named, words):
-            raise ValueError(f"{named} has aspheric terms: spheres and conics are read")
     if "MIRR" in block and block["MIRR"] and block["MIRR"][0] not in ("0", "2"):
         raise ValueError(f"{named} is a mirror: refracting surfaces are read")
     curvature = _number(named, block.get("CURV", ["0"]))
@@ -115,25 +125,67 @@ def _surface(index: int, block: dict[str, list[str]], unit_mm: float) -> dict[st
     return {
         "radius_mm": unit_mm / curvature if curvature else None,
         "thickness_mm": thickness * unit_mm,
-        "glass": _glass(named, block["GLAS"]) if "GLAS" in block else None,
+        "glass": _glass(named, block["GLAS"], before, catalogues) if "GLAS" in block else None,
         "conic": _number(named, block.get("CONI", ["0"])),
+        "aspheric": _aspheric(named, block, unit_mm) if kind == "EVENASPH" else None,
         "diameter_mm": 2 * diameter * unit_mm if diameter else None,
         "stop": "STOP" in block,
     }
 
 
-def _glass(named: str, words: list[str]) -> Any:
-    """Return a catalogue name, or index and Abbe number where the line has them: name, two flags, n, V."""
-    name = words[0] if words else ""
+def _aspheric(named: str, block: dict[str, list[str]], unit_mm: float) -> list[float] | None:
+    """Return the coefficients of r², r⁴, … in mm, which the file has in its unit; None if all are 0."""
+    given = {key[5:]: _number(named, words) for key, words in block.items() if key.startswith("PARM ")}
+    places = [str(i + 1) for i in range(MOST_ASPHERIC)]
+    if over := [place for place, value in given.items() if value and place not in places]:
+        raise ValueError(f"{named}: PARM {over[0]} of an even asphere: 1 to {MOST_ASPHERIC} are read")
+    coefficients = [given.get(place, 0.0) * unit_mm ** (1 - 2 * power) for power, place in enumerate(places, 1)]
+    return coefficients if any(coefficients) else None
+
+
+def _glass(named: str, words: list[str], before: list[dict[str, Any]], catalogues: list[str]) -> Any:
+    """Return a catalogue name, or the index and Abbe number of a model glass.
+
+    Raises
+    ------
+    ValueError
+        If the catalogue has no such glass, a model glass has another glass's name, or a pickup has no source.
+    """
+    name, solve, source = (*words[:3], *["", FIXED, "0"][len(words) :])
     if name == "MIRROR":
         raise ValueError(f"{named} is a mirror: refracting surfaces are read")
-    for known in (name, f"N-{name}"):
-        if known in CATALOGUE:
-            return known
-    ior = _number(named, words[3:4] or ["0"])
+    if solve == MODEL:
+        return _model(named, name, words)
+    if solve == PICKUP:
+        earlier = {str(i): surface["glass"] for i, surface in enumerate(before) if i}
+        if earlier.get(source) is None:
+            raise ValueError(f"{named} has the glass of surface {source}: an earlier surface with glass is needed")
+        return earlier[source]
+    if solve not in (FIXED, SUBSTITUTE):
+        raise ValueError(f"{named}: glass {name!r} has the solve {solve}: 0, 1, 2 and 3 are read")
+    try:
+        found = known_glass(name)
+    except ValueError as error:
+        raise ValueError(f"{named}: {error}; others are read as model glasses, of index and Abbe number") from None
+    # Makers have glasses of the same short name: F2 of CDGM has an index of 1.61293, that of Schott 1.62004.
+    other = catalogues and not any(found.maker[:4].upper() in word.upper() for word in catalogues)
+    if other and found.maker in MAKERS and not PREFIX.match(found.glass.name):
+        listed = " ".join(catalogues)
+        raise ValueError(f"{named}: glass {name!r} is known from {found.maker}, and the file names only {listed}")
+    return found.glass.name
+
+
+def _model(named: str, name: str, words: list[str]) -> dict[str, Any]:
+    """Return index and Abbe number of a line; one without an Abbe number has no dispersion."""
+    ior, abbe = (_number(named, words[i : i + 1] or ["0"]) for i in (3, 4))
     if not ior > 1:
-        raise ValueError(f"{named}: unknown glass {name!r} without an index: known are {', '.join(CATALOGUE)}")
-    abbe = _number(named, words[4:5] or ["0"])
+        raise ValueError(f"{named}: model glass {name!r} has the index {ior:g}: more than 1 is needed")
+    printed = catalogue().get(name.upper())
+    if printed and (abs(ior - printed.ior) > SAME_INDEX or (abbe > 0 and abs(abbe / printed.abbe - 1) > SAME_ABBE)):
+        raise ValueError(
+            f"{named}: model glass {name!r} has index {ior:g} and Abbe number {abbe:g}, the catalogue glass of this "
+            f"name {printed.ior:g} and {printed.abbe:g}: another name is needed"
+        )
     return {"name": name, "ior": ior, **({"abbe": abbe} if abbe > 0 else {})}
 
 
