@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from ..base.checks import MOST_MM, Pair, checked, instance, length, place, view_size, whole, within
 from ..base.colour import linear, srgb
-from ..base.jit import exact_kernel
 from ..camera.camera import IICamera
 from ..camera.optics import Lenslet, unit_disk
 from ..picture.picture import IIPicture
+from .eye_kernel import Emitters, Gaze, Lenses, Panel, Refraction, see
 from .model import LAYOUTS, DisplayModel
 
 RAYS = 64  # rays per point of the view, for a pupil that is no point
@@ -132,34 +132,28 @@ def eye_image(
     half = _half(display)
     step = 2 * half / (width, height)
     light, seen = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
-    place = _place(camera, eye)
-    see(
-        picture.pixels,
-        _table(picture.pixels.dtype),
-        (np.arange(width) + 0.5) * step[0] - half[0],
-        half[1] - (np.arange(height) + 0.5) * step[1],
-        _rays(count, eye.pupil_mm, step),
-        place,
-        np.array([*display.lens_pitch_mm, *half, *display.shift_mm, *display.axes]),
-        np.array([*camera.lens_pitch_mm, camera.size_mm[0] / 2, camera.size_mm[1] / 2, camera.pixel_pitch_mm]),
-        _lens(display, place[2], -1.0 if picture.erect else 1.0),
-        _emitters(display),
-        LAYOUTS.index(display.layout),
-        picture.lenses,
-        picture.ei_pixels,
-        light,
-        seen,
+    distance = _distance(camera, eye)
+    gaze = Gaze(
+        columns=(np.arange(width) + 0.5) * step[0] - half[0],
+        rows=half[1] - (np.arange(height) + 0.5) * step[1],
+        rays=_rays(count, eye.pupil_mm, step),
+        x=float(eye.position_mm[0] - camera.origin_mm[0]),
+        y=float(eye.position_mm[1] - camera.origin_mm[1]),
+        blur=0.0 if eye.focus_mm is None else 1 - distance / eye.focus_mm,
     )
+    lens = _refraction(display, distance, -1.0 if picture.erect else 1.0)
+    table, emitters = _table(picture.pixels.dtype), _emitters(display)
+    see(picture.pixels, table, gaze, _lenses(display, half), _panel(camera), lens, emitters, light, seen)
     return EyeImage(light, seen)
 
 
-def _place(camera: IICamera, eye: Eye) -> NDArray[np.float64]:
-    """Return the eye's x, y and distance d from the lens plane, and its defocus there, 1 − d/F."""
-    x, y, z = (a - b for a, b in zip(eye.position_mm, camera.origin_mm, strict=True))
+def _distance(camera: IICamera, eye: Eye) -> float:
+    """Return the distance of the eye from the lens plane."""
+    z = eye.position_mm[2] - camera.origin_mm[2]
     distance = camera.gap_mm - z
     if not distance > 0:
         raise ValueError(f"eye is at z {z:g} mm, not before the lens plane at {camera.gap_mm:g} mm: z < 0 is needed")
-    return np.array([x, y, distance, 0.0 if eye.focus_mm is None else 1 - distance / eye.focus_mm])
+    return distance
 
 
 def _half(display: DisplayModel) -> NDArray[np.float64]:
@@ -169,22 +163,46 @@ def _half(display: DisplayModel) -> NDArray[np.float64]:
     return np.array([(size if pitch == made else count * pitch) / 2 for size, made, pitch, count in own])
 
 
-def _lens(display: DisplayModel, distance: float, sign: float) -> NDArray[np.float64]:
-    """Return the effect of a lens on a ray: offset on the panel in pixels, slope there, aperture, parallax."""
+def _lenses(display: DisplayModel, half: NDArray[np.float64]) -> Lenses:
+    """Return the lens array; ``half`` is half its size."""
+    (columns, rows), (pitch_x, pitch_y) = display.camera.lenses, display.lens_pitch_mm
+    (shift_x, shift_y), (cos, sin) = display.shift_mm, display.axes
+    return Lenses(
+        columns=columns, rows=rows, pitch_x=pitch_x, pitch_y=pitch_y, half_x=half[0], half_y=half[1],
+        shift_x=shift_x, shift_y=shift_y, cos=cos, sin=sin,
+    )  # fmt: skip
+
+
+def _panel(camera: IICamera) -> Panel:
+    """Return the panel of a camera's pixels."""
+    (pitch_x, pitch_y), (width, height), (u, v) = camera.lens_pitch_mm, camera.size_mm, camera.ei_pixels
+    return Panel(
+        pitch_x=float(pitch_x), pitch_y=float(pitch_y), half_x=width / 2, half_y=height / 2,
+        pixel=float(camera.pixel_pitch_mm), u=u, v=v,
+    )  # fmt: skip
+
+
+def _refraction(display: DisplayModel, distance: float, sign: float) -> Refraction:
+    """Return the effect of a lens on rays from so far; ``sign`` is −1 for erect elementary images."""
     lens, gap, pitch = display.optics, display.gap_mm, display.camera.pixel_pitch_mm
     spread, bend, radius = 0.0, 0.0, math.inf
     if isinstance(lens, Lenslet):
         spread = 1 + gap / distance - gap / float(lens.focal_mm)  # type: ignore[arg-type]  # one, by DisplayModel
         bend = (spread - 1) / gap
         radius = lens.aperture_mm / 2 if lens.aperture_mm else math.inf
-    vertical = float(lens.vertical_parallax)
-    return np.array([sign * gap / (distance * pitch), spread / pitch, 1 / distance, bend, radius, vertical])
+    return Refraction(
+        to_pixels=sign * gap / (distance * pitch), spread=spread / pitch, slope=1 / distance, bend=bend,
+        radius=float(radius), vertical=float(lens.vertical_parallax),
+    )  # fmt: skip
 
 
-def _emitters(display: DisplayModel) -> NDArray[np.float64]:
-    """Return half the side of the emitting area in sub-pixels; fill, lobe, brightness, black level, crosstalk."""
-    reach = math.sqrt(display.fill) / 2
-    return np.array([reach, display.fill, display.lobe, display.brightness, display.black, display.crosstalk])
+def _emitters(display: DisplayModel) -> Emitters:
+    """Return the emitting areas of the panel."""
+    return Emitters(
+        layout=LAYOUTS.index(display.layout), reach=math.sqrt(display.fill) / 2, fill=float(display.fill),
+        lobe=float(display.lobe), brightness=float(display.brightness), black=float(display.black),
+        crosstalk=float(display.crosstalk),
+    )  # fmt: skip
 
 
 def _table(dtype: np.dtype[Any]) -> NDArray[np.float32]:
@@ -204,83 +222,3 @@ def _rays(count: int, pupil_mm: float, step: NDArray[np.float64]) -> NDArray[np.
     unit = (0.5 + np.arange(count)[:, None] * root ** -np.arange(1.0, 5.0)) % 1
     on_pupil = np.stack(unit_disk(unit[:, :2]), axis=-1) * (pupil_mm / 2)
     return np.concatenate([on_pupil, (unit[:, 2:] - 0.5) * step], axis=1)
-
-
-@exact_kernel
-def see(pixels, table, points_x, points_y, rays, eye, array, panel, lens, light, layout, lenses, ei, out, seen):
-    """Fill ``out`` and ``seen`` of `eye_image`, for every point of the view and every ray to it."""
-    x, y, _, blur = eye
-    pitch_x, pitch_y, half_x, half_y, shift_x, shift_y, cos, sin = array
-    made_x, made_y, edge_x, edge_y, pixel = panel
-    to_pixels, spread, slope, bend, radius, vertical = lens
-    reach, fill, lobe, brightness, black, crosstalk = light
-    rows, columns = pixels.shape[0], pixels.shape[1]
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            red, green, blue, met = 0.0, 0.0, 0.0, 0
-            for r in range(len(rays)):
-                ex, ey = x + rays[r, 0], y + rays[r, 1]
-                # intersection of the ray with the lens plane, and its lens
-                ax = points_x[j] + rays[r, 2] + rays[r, 0] * blur
-                ay = points_y[i] + rays[r, 3] + rays[r, 1] * blur
-                dx, dy = ax - shift_x, ay - shift_y
-                k = math.floor((dx * cos + dy * sin + half_x) / pitch_x)
-                l = math.floor((half_y - (dy * cos - dx * sin)) / pitch_y)
-                if k < 0 or l < 0 or k >= lenses[0] or l >= lenses[1]:
-                    continue
-                lx, ly = (k + 0.5) * pitch_x - half_x, half_y - (l + 0.5) * pitch_y
-                cx, cy = lx * cos - ly * sin + shift_x, lx * sin + ly * cos + shift_y
-                off_x, off_y = ax - cx, ay - cy
-                if off_x * off_x + off_y * off_y > radius * radius:
-                    continue
-                # distance in pixels of that lens from the lens that its elementary image is made for
-                wrong_x = (cx - ((k + 0.5) * made_x - edge_x)) / pixel
-                wrong_y = (cy - (edge_y - (l + 0.5) * made_y)) / pixel
-                px = k * ei[0] + (ei[0] - 1) / 2 - (cx - ex) * to_pixels - off_x * spread - wrong_x
-                py = l * ei[1] + (ei[1] - 1) / 2 + ((cy - ey) * to_pixels + off_y * spread + wrong_y) * vertical
-                m, n = math.floor(px + 0.5), math.floor(py + 0.5)
-                if m < 0 or n < 0 or m >= columns or n >= rows:
-                    continue
-                met += 1
-                weight = brightness
-                if lobe > 0.0:
-                    tx, ty = (cx - ex) * slope + off_x * bend, (cy - ey) * slope + off_y * bend
-                    weight *= (1.0 + tx * tx + ty * ty) ** (-lobe / 2)
-                # the emitter there, and its brightness relative to the panel's mean
-                first, last = 0, 3
-                across, down = px + 0.5 - m, py + 0.5 - n
-                if layout == 1:
-                    first = min(int(3 * across), 2)
-                    across, last = 3 * across - first, first + 1
-                    weight *= 3.0
-                elif layout == 2:
-                    right = across >= 0.5
-                    first = 1 if right else 2 * ((m + n) % 2)
-                    across, last = (2 * across - 1 if right else 2 * across), first + 1
-                    weight *= 2.0 if right else 4.0
-                if abs(across - 0.5) > reach or abs(down - 0.5) > reach:
-                    continue
-                weight /= fill
-                for c in range(first, last):
-                    value = signal(pixels, table, n, m, c)
-                    if crosstalk > 0.0:
-                        beside = signal(pixels, table, n, max(m - 1, 0), c)
-                        beside += signal(pixels, table, n, min(m + 1, columns - 1), c)
-                        beside += signal(pixels, table, max(n - 1, 0), m, c)
-                        beside += signal(pixels, table, min(n + 1, rows - 1), m, c)
-                        value = (1.0 - crosstalk) * value + crosstalk * beside / 4
-                    value = weight * (black + (1.0 - black) * value)
-                    if c == 0:
-                        red += value
-                    elif c == 1:
-                        green += value
-                    else:
-                        blue += value
-            out[i, j, 0], out[i, j, 1], out[i, j, 2] = red / len(rays), green / len(rays), blue / len(rays)
-            seen[i, j] = met / len(rays)
-
-
-@exact_kernel
-def signal(pixels, table, n, m, c):
-    """Return the linear light of one code."""
-    return table[int(pixels[n, m, c])] if len(table) else pixels[n, m, c]
