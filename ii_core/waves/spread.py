@@ -232,7 +232,8 @@ def _by_wave(period: int, disk: float, ring: float, aberration: float) -> tuple[
 
 def _by_rays(period: int, disk: float, ring: float, aberration: float) -> tuple[NDArray[Any], NDArray[Any], float]:
     """Transfer of a spot of rays folded with Airy's pattern, where that is narrower than a pixel; as `_by_wave`."""
-    f = np.fft.fftfreq(SAMPLES // period * period, 1 / (SAMPLES // period))
+    fine = max(4, SAMPLES // period)  # samples a pixel
+    f = np.fft.fftfreq(fine * period, 1 / fine)
     radius = np.hypot(f[:, None], f)
     table = np.linspace(0, radius.max(), 16 + math.ceil(16 * radius.max() * max(1, _extent(disk, aberration))))
     higher = abs(f).max() / (np.arange(64) + 0.5) * 64  # evenly in 1/f, as sinc² falls

@@ -120,6 +120,13 @@ def test_without_wavelength_it_is_the_disk_of_rays():
     assert (kernel.sum(axis=0) * x * x).sum() == pytest.approx(36 / 16 + 1 / 6, rel=0.01)
 
 
+def test_a_disk_of_many_pixels_is_even():
+    """150 pixels of a lens of 200."""
+    kernel = _kernel(150.0, 1e-3, 0.0, 200)
+    np.testing.assert_allclose(kernel[200, 140:261], 4 / math.pi / 150**2, rtol=0.02)
+    assert kernel[200, 280:].max() < 1e-7 and kernel.sum() == pytest.approx(1, abs=2e-3)
+
+
 def test_a_sharp_lens_leaves_the_picture_as_it_is():
     made = camera(k=2, width=0.1)
     rng = np.random.default_rng(0)
