@@ -5,7 +5,7 @@ PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 p
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo study test lint bench docs clean
+.PHONY: demo study test test-all lint kernels bench docs gallery clean
 
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py
@@ -13,8 +13,21 @@ demo: $(VENV)/.installed
 study: $(VENV)/.installed
 	$(BIN)/python -m benchmarks run study --publish
 
-test: lint
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+# files in the order of their names: those that take longest come first
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+
+test: $(VENV)/.installed
+	$(MAKE) --no-print-directory -j2 lint kernels
+	$(PYTEST) -m "not slow"
+
+# the slow tests, which `test` leaves out
+test-all: $(VENV)/.installed kernels
+	$(PYTEST) -m slow
+
+# each kernel is compiled once, in two processes; without this both workers of the tests compile most of them
+kernels: kernels-light-field kernels-others
+kernels-%: $(VENV)/.installed
+	$(BIN)/python -m tests.support.kernels $*
 
 lint: $(VENV)/.installed
 	$(BIN)/ruff check .
@@ -25,11 +38,14 @@ lint: $(VENV)/.installed
 bench: $(VENV)/.installed
 	$(BIN)/python -m benchmarks run ratios
 
-# the gallery's pages take some 20 minutes of CPU time once; make docs GALLERY_SCALE=16 makes small ones in one
-GALLERY_SCALE ?= 2
+# seconds; with the viewer pages of the gallery if `make gallery` has made them
 docs: $(VENV)/.docs
-	$(BIN)/python -m benchmarks run gallery --missing --scale $(GALLERY_SCALE)
 	$(BIN)/mkdocs build --strict -f docs/site/mkdocs.yml
+
+# some 20 minutes of CPU time; one with GALLERY_SCALE=16, for small pages
+GALLERY_SCALE ?= 2
+gallery: $(VENV)/.installed
+	$(BIN)/python -m benchmarks run gallery --missing --scale $(GALLERY_SCALE)
 
 $(VENV)/.docs: $(VENV)/.installed
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e ".[docs]"

@@ -150,6 +150,7 @@ BENCHMARKS = {
         Benchmark("coding.disparity", records=OWN),
         Benchmark("coding.orders", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.headers", records=OWN, fills=("docs/structure.md",)),
+        Benchmark("pages.floors_chart", needs="records of headers", writes=(f"{IMAGES}/floors.*",)),
         Benchmark("coding.cost", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.coders", records=OWN),
         Benchmark("coding.bframes", records=OWN),
@@ -239,10 +240,10 @@ BENCHMARKS = {
         Benchmark("pages.gallery", needs=f"{BROWSER} for --stills", writes=("docs/gallery/*",)),
         Benchmark(
             "pages.readme",
-            needs="out/demo and out/full of examples/demo.py; records of disparity and ratios",
+            needs="out/demo and out/full of examples/demo.py; records of the coders, ratios, Mitsuba and POV-Ray",
             records="*_rd.json",
-            fills=("README.md", "docs/study.md"),
-            writes=tuple(f"{IMAGES}/{name}_*" for name in ("apples", "cuboid", "demo", "full")),
+            fills=("README.md", "docs/study.md", "docs/speed_accuracy.md"),
+            writes=(f"{IMAGES}/apples_*", f"{IMAGES}/demo_*"),
         ),
         Benchmark(
             "study",

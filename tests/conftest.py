@@ -8,7 +8,6 @@ from hypothesis import settings
 
 from raytrace_ii import cli
 from tests.support import browser as browsers
-from tests.support import workers
 from tests.support.browser import browser, show, show_once  # noqa: F401
 
 # The first call of a kernel compiles it, which would exceed any deadline. CI uses the same examples every time.
@@ -21,11 +20,9 @@ def pytest_addoption(parser):
     parser.addoption("--make-golden", action="store_true", help="code what tests/golden lacks")
 
 
-@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items):
-    """Mark tests by what they need and where they run."""
+    """Mark tests by what they need."""
     browsers.mark(items)
-    workers.group(items)
 
 
 @pytest.fixture

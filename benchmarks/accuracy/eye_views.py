@@ -175,21 +175,28 @@ def measured(found: list[dict[str, Any]]) -> list[str]:
 
 
 def simulated_table() -> list[str]:
-    """PLCC, SROCC, RMSE and outlier ratio of each measure for all stimuli; PLCC by scene and by scheme."""
+    """PLCC, SROCC, RMSE and outlier ratio of each measure for all stimuli; range of PLCC by scene and by scheme."""
     if not rows():
         return []
     found = finest()
     made = simulated()
     groups = [group for group in dict.fromkeys(group for _, group in made.predictions) if group != "all"]
+    scenes = {one["scene"] for one in found}
     lines = [
-        f"| measure | PLCC | SROCC | RMSE | outliers | {' | '.join(groups)} |",
-        "|---|" + "---|" * (4 + len(groups)),
+        "| measure | PLCC | SROCC | RMSE | outliers | PLCC by scene | by scheme |",
+        "|---|---|---|---|---|---|---|",
     ]
     for measure in measured(found):
         every = made.predictions[measure, "all"]
-        each = " | ".join(f"{made.predictions[measure, group].plcc:.2f}" for group in groups)
+        ranges = [
+            f"{min(each):.2f}–{max(each):.2f}" if each else "–"
+            for each in (
+                [made.predictions[measure, group].plcc for group in groups if (group in scenes) == by_scene]
+                for by_scene in (True, False)
+            )
+        ]
         head = f"{every.plcc:.3f} | {every.srocc:.3f} | {every.rmse:.2f} | {every.outlier_ratio:.0%}"
-        lines.append(f"| `{measure}` | {head} | {each} |")
+        lines.append(f"| `{measure}` | {head} | {' | '.join(ranges)} |")
     return [*lines, "", origin(found)]
 
 

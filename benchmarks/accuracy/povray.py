@@ -27,7 +27,7 @@ from benchmarks.accuracy.analytic import Array, Ball, Floor, World, still_life
 from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, origin, with_commits
+from benchmarks.records import ROOT, Records, origin
 from ii_core import IICamera, preset
 from ii_core.base.colour import srgb
 from raytrace_ii import Light, Material, trace
@@ -102,16 +102,23 @@ def compare(world: World, camera: IICamera, mesh: bool) -> tuple[list[dict[str, 
 
 
 def tables() -> Tables:
-    """Return the table of the page of stability."""
+    """Return the table of the page of stability: rows by what is seen, columns by camera; equal columns are one."""
     pairs = ("POV-Ray / closed form", "POV-Ray / ours", "ours / closed form")
-    lines = ["| camera | rays by | seen | " + " | ".join(f"{pair}, dB" for pair in pairs) + " |", "|---" * 6 + "|"]
-    measured, commits = RECORDS.rows(scale=SCALE), []
+    measured = RECORDS.rows(scale=SCALE)
+    columns: dict[str, dict[str, str]] = {}
     for one in measured:
-        for row in one["rows"]:
-            cells = " | ".join(f"{row[f'{pair}, dB']:.1f}" for pair in pairs)
-            lines.append(f"| {one['camera']} | {one['rays by']} | {row['seen']} | {cells} |")
-            commits.append([one["commit"]])
-    return {("docs/stability.md", "povray"): [*with_commits(lines, commits), "", origin(measured)]}
+        cells = {row["seen"]: " · ".join(f"{row[f'{pair}, dB']:.1f}" for pair in pairs) for row in one["rows"]}
+        if columns.get(one["camera"], cells) == cells:
+            columns[one["camera"]] = cells
+        else:
+            columns[f"{one['camera']}, rays by {one['rays by']}"] = cells
+    rows = dict.fromkeys(name for cells in columns.values() for name in cells)
+    lines = [
+        f"| | {' | '.join(columns)} |",
+        "|---" * (len(columns) + 1) + "|",
+        *(f"| {name} | " + " | ".join(cells.get(name, "") for cells in columns.values()) + " |" for name in rows),
+    ]
+    return {("docs/stability.md", "povray"): [*lines, "", origin(measured)]}
 
 
 def _psnr(error: Array) -> float:

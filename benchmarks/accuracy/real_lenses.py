@@ -185,14 +185,14 @@ def draw() -> None:
 
 
 def tables() -> Tables:
-    """Return the table of errors at four fields, and that of coding."""
+    """Return the table of errors at two fields, and that of coding."""
     rows = RECORDS.rows(part="field")
     lines = [
         "| lens | field | light | disparity error, tangential · sagittal | depth error | bend |",
         "|---" * 6 + "|",
     ]
     for row in rows:
-        for point in row["fields"][:: (FIELDS - 1) // 4][1:]:
+        for point in row["fields"][:: (FIELDS - 1) // 2][1:]:
             t, s = point["tangential"], point["sagittal"]
             lines.append(
                 f"| {row['lens']} | {point['field_mm']:.1f} mm | {t['passing']:.0%} | {t['disparity']:+.4f} · "

@@ -211,8 +211,8 @@ def limits_table() -> list[str]:
         return []
     slits = RECORDS.by("sweep", SWEEPS, wavelength_nm=WAVELENGTH, lens="slit")
     lines = [
-        "| varied | rays: 40 dB at | maps: 40 dB at | worst of maps | slit: rays at, worst of model | wave | maps |",
-        "|---|---|---|---|---|---|---|",
+        "| varied | rays: 40 dB at (pixel) | maps: 40 dB, worst | slit: rays at, worst of model | wave | maps |",
+        "|---|---|---|---|---|---|",
     ]
     for row in rows:
         points, slit = row["points"], slits[row["sweep"]]["points"]
@@ -220,7 +220,7 @@ def limits_table() -> list[str]:
         crossed = [crossing(points, f"{k}_db") for k in ("rays", "model")]
         worst, narrow = (min(p["model_db"] for p in one) for one in (points, slit))
         lines.append(
-            f"| {row['sweep']} | {crossed[0]} | {crossed[1]} | {worst:.1f} dB | "
+            f"| {row['sweep']} | {crossed[0]} | {crossed[1]}, {worst:.1f} dB | "
             f"{crossing(slit, 'rays_db')}, {narrow:.1f} dB | {wave:.0f} ms | {model:.1f} ms |"
         )
     return [*lines, "", origin(rows)]
@@ -235,8 +235,8 @@ def crossing(points: list[dict[str, float]], key: str) -> str:
             value, pixel = (
                 math.exp((1 - t) * math.log(a[k]) + t * math.log(b[k])) for k in ("value", "pixel_over_spread")
             )
-            return f"{value:.3g} (pixel of {pixel:.1f} λΛ/δL)"
-    return "nowhere: always " + ("above" if number(points[0][key]) > ENOUGH_DB else "below")
+            return f"{value:.3g} ({pixel:.1f} λΛ/δL)"
+    return "always " + ("above" if number(points[0][key]) > ENOUGH_DB else "below")
 
 
 def setup1_table() -> list[str]:
@@ -261,9 +261,9 @@ def field_table() -> list[str]:
     rows = RECORDS.rows(field="diagonal")
     if not rows:
         return []
-    lines = ["| pixels from the axis | all rays | maps |", "|---|---|---|"]
+    lines = ["| pixels from the axis | all rays, px | maps, px |", "|---|---|---|"]
     lines += [
-        f"| {p['from_axis_px']:.1f} | {p['traced_px']:.2f} px | {p['maps_px']:.2f} px |" for p in rows[0]["pixels"]
+        f"| {p['from_axis_px']:.1f} | {p['traced_px']:.2f} | {p['maps_px']:.2f} |" for p in rows[0]["pixels"][1::2]
     ]
     return [*lines, "", origin(rows)]
 

@@ -188,19 +188,38 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return sorted(out, key=lambda row: (row["mean"] is None, row["mean"] or 0.0))
 
 
-def table(rows: list[dict[str, Any]]) -> list[str]:
-    """Return the lines of a Markdown table."""
+def table(rows: list[dict[str, Any]], best: Sequence[Mapping[str, Any]] | None = None) -> list[str]:
+    """Return the lines of a Markdown table of a `summary`, that of the rows unless another is given."""
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    lines = [f"| scheme | {' | '.join(scenes)} | mean | CPU s |", "|---" * (len(scenes) + 3) + "|"]
-    best = summary(rows)
+    head = " | ".join(f"{scene}, %" for scene in scenes)
+    lines = [f"| scheme | {head} | mean, % | CPU s |", "|---" * (len(scenes) + 3) + "|"]
+    best = summary(rows) if best is None else best
     for row in best:
         cells = [_percent(row["rates"][scene]) for scene in scenes]
         lines.append(f"| `{row['scheme']}` | {' | '.join(cells)} | {_percent(row['mean'])} | {row['seconds']:.2f} |")
     return with_commits(lines, [row["commits"] for row in best])
 
 
+def shortened(best: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return a `summary` without repeated rates, and with one setting only of each scheme that is no SI scheme.
+
+    Of rates that look equal in the table, the shortest name remains: a default before its preset. Of other schemes
+    than SI schemes the setting of the least mean rate remains, or the shortest name if there is no mean.
+    """
+    kept: dict[Any, Mapping[str, Any]] = {}
+    for row in best:
+        scheme, cells = row["scheme"], tuple(map(_percent, row["rates"].values()))
+        base = scheme.partition(":")[0]
+        key = (base, cells) if base.startswith("si-") else base
+        first = kept.setdefault(key, row)
+        alike = row["mean"] is None or tuple(map(_percent, first["rates"].values())) == cells
+        if alike and len(scheme) < len(first["scheme"]):
+            kept[key] = row
+    return list(kept.values())
+
+
 def _percent(rate: float | None) -> str:
-    return "–" if rate is None else f"{rate:+.0f} %"
+    return "–" if rate is None else f"{rate:+.0f}"
 
 
 def front(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

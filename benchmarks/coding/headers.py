@@ -11,6 +11,7 @@ of ``benchmarks/results/headers.jsonl``; tables go into ``docs/structure.md``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -28,6 +29,7 @@ from raytrace_ii import load_scene, render
 RECORDS = Records("headers", ("benchmarks.coding.headers",))
 SCENE, SCALE = "apples", 4  # conditions of the page
 SIDES = (16, 32, 64, 128, 256)
+SHOWN = (16, 64, 256)  # sides in the table of bits
 RATES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
 KINDS = ("si", "ei", "ri")
 
@@ -107,76 +109,60 @@ def tables() -> Tables:
     """Return the tables of the page of structures."""
     floors, duels = (RECORDS.rows(part=part, scene=SCENE, scale=SCALE) for part in ("floor", "duel"))
     floors.sort(key=lambda row: (row["scheme"], row["side"]))
+    page = "docs/structure.md"
     return {
-        ("docs/structure.md", mark): [origin(rows), "", *made(rows)]
-        for mark, made, rows in (
-            ("floors", floor_table, floors), ("parts", part_table, floors), ("duels", duel_table, duels)
-        )
-    }  # fmt: skip
-
-
-def floor_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Return rates of black / scene at the coarsest quantiser, bpp, one column per structure."""
-    lines = ["| scheme | " + " | ".join(f"{side}²" for side in SIDES) + " |", "|---|" + "---|" * len(SIDES)]
-    commits = []
-    for scheme in dict.fromkeys(row["scheme"] for row in rows):
-        those = {row["side"]: row for row in rows if row["scheme"] == scheme}
-        cells = [floor_cell(those[side]) if side in those else "" for side in SIDES]
-        lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
-        commits.append([row["commit"] for row in those.values()])
-    return with_commits(lines, commits)
-
-
-def floor_cell(row: dict[str, Any]) -> str:
-    """Return rates of black / scene, and the PSNR of the scene."""
-    if "refused" in row:
-        return "–"
-    quality = "lossless" if row["floor_db"] is None else f"{row['floor_db']:.1f}"
-    return f"{row['black_bpp']:.2g} / {row['floor_bpp']:.2g} ({quality})"
+        (page, "floors"): [origin(floors)],  # a chart has the numbers: `benchmarks.pages.floors_chart`
+        (page, "parts"): [origin(floors), "", *part_table(floors)],
+        (page, "duels"): [origin(duels), "", *duel_table(duels)],
+    }
 
 
 def part_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Return the bits per frame of a black picture by purpose."""
+    """Return the bits per frame of a black picture by purpose, over the structures."""
     lines = [
-        "| scheme | EI | frames | start codes, lengths | parameter sets | slice headers | data | bits per frame |",
-        "|---|---|---|---|---|---|---|---|",
+        "| scheme | start codes, lengths | parameter sets | slice headers | data | bits per frame |",
+        "|---|---|---|---|---|---|",
     ]
-    shown = [row for row in rows if "parts" in row and row["side"] in (16, 64, 256)]
-    for row in shown:
-        p, j = row["parts"], row["frames"]
-        headers = "(in data)" if p["headers"] is None else f"{p['headers'] / j:.1f}"
-        total = sum(p[name] or 0 for name in ("framing", "parameters", "messages", "headers", "data"))
-        lines.append(
-            f"| `{row['scheme']}` | {row['side']}² | {j} | {p['framing'] / j:.1f} | {p['parameters'] / j:.1f} | "
-            f"{headers} | {(p['data'] + p['messages']) / j:.1f} | {total / j:.1f} |"
-        )
-    return with_commits(lines, [[row["commit"]] for row in shown])
+    shown = [row for row in rows if "parts" in row and row["side"] in SHOWN]
+    commits = []
+    for scheme in dict.fromkeys(row["scheme"] for row in shown):
+        own = [row for row in shown if row["scheme"] == scheme]
+        bits = [_per_frame(row["parts"], row["frames"]) for row in own]
+        cells = ["(in data)" if None in some else _range(some) for some in zip(*bits, strict=True)]
+        lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
+        commits.append([row["commit"] for row in own])
+    return with_commits(lines, commits)
+
+
+def _per_frame(p: dict[str, Any], frames: int) -> list[float | None]:
+    """Return bits of framing, parameter sets, slice headers (None if in the data), data, and all, per frame."""
+    data = p["data"] + p["messages"]
+    total = p["framing"] + p["parameters"] + (p["headers"] or 0) + data
+    sums = (p["framing"], p["parameters"], p["headers"], data, total)
+    return [None if bits is None else bits / frames for bits in sums]
+
+
+def _range(values: Sequence[float]) -> str:
+    """Return the least and the greatest value, once if they look alike."""
+    return "–".join(dict.fromkeys(f"{value:.1f}" for value in (min(values), max(values))))
 
 
 def duel_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Return predictions and results of SI against EI and RI."""
+    """Return gains of SI over EI and RI and the lowest rates that were reached."""
     lines = [
-        "| EI | SI before EI by (5.14) | fewer bits black | mean gain | lowest rate SI, EI | SI before RI by (5.15) "
-        "| fewer bits black | mean gain | lowest rate RI |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| EI | over EI, dB | over RI, dB | lowest rate SI, EI, RI, bpp |",
+        "|---|---|---|---|",
     ]
     for row in rows:
-        ei, ri = row["ei"], row["ri"]
-        cells = [yes(ei["predicted"]), yes(ei["fewer_header_bits"]), gain(ei)]
-        cells += [f"{ei['lowest']['si'] or '–'}, {ei['lowest']['ei'] or '–'}"]
-        cells += [yes(ri["predicted"]), yes(ri["fewer_header_bits"]), gain(ri), f"{ri['lowest']['ri'] or '–'}"]
-        lines.append(f"| {row['side']}² | " + " | ".join(cells) + " |")
+        reached = (row["ei"]["lowest"]["si"], row["ei"]["lowest"]["ei"], row["ri"]["lowest"]["ri"])
+        lowest = ", ".join("–" if rate is None else f"{rate:g}" for rate in reached)
+        lines.append(f"| {row['side']}² | {gain(row['ei'])} | {gain(row['ri'])} | {lowest} |")
     return with_commits(lines, [[row["commit"]] for row in rows])
-
-
-def yes(value: bool) -> str:
-    """Return yes or no for a table."""
-    return "yes" if value else "no"
 
 
 def gain(row: dict[str, Any]) -> str:
     """Return a gain in dB with the number of rates."""
-    return "–" if row["gain_db"] is None else f"{row['gain_db']:+.1f} dB ({len(row['rates_both'])} rates)"
+    return "–" if row["gain_db"] is None else f"{row['gain_db']:+.1f} ({len(row['rates_both'])} rates)"
 
 
 if __name__ == "__main__":

@@ -113,7 +113,10 @@ def tables() -> Tables:
         lines.append(f"| {name} | {SETTINGS[setting]} | {' | '.join(cells)} |")
     used = [row for row in compared if row["picture"] in names]
     alone = [name for name in names if sum((name, setting) in rows for setting in SETTINGS) < len(SETTINGS)]
-    missing = [f"Only one of the two settings is measured for {', '.join(alone)}.", ""] if alone else []
+    missing = []
+    if alone:
+        which = "" if alone == names else f" for {', '.join(alone)}"
+        missing = [f"Only one of the two settings is measured{which}.", ""]
     return {("docs/lf.md", "lf-jplm"): [*lines, "", *missing, origin([*rows.values(), *used])]}
 
 

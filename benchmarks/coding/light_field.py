@@ -136,7 +136,7 @@ def tables() -> Tables:
     curves = {(row["picture"], row["scheme"]): row["points"] for row in rows if "points" in row}
     exact = {(row["picture"], row["scheme"]): row["bpp"] for row in rows if "bpp" in row}
     names = [name for name in (*SCENES, *FIELDS, IMPORTED) if (name, OURS) in curves]
-    marks = ("lf-against", "lf-tools", "lf-lossless")
+    marks = ("lf-against", "lf-tools")
     against_all = {
         ("docs/lf.md", "lf-targets"): targets({scale: coders.RECORDS.rows(scale=scale) for scale in TARGET_SCALES})
     }
@@ -144,23 +144,20 @@ def tables() -> Tables:
         return against_all | {("docs/lf.md", mark): ["Not measured yet."] for mark in marks}
     against = ["| picture | " + " | ".join(f"`{other}`" for other in OTHERS) + " | encode µs | decode µs |"]
     against.append("|---|" + "---|" * (len(OTHERS) + 2))
-    tools = ["| picture | " + " | ".join(TOOLS.values()) + " |", "|---|" + "---|" * len(TOOLS)]
+    heads = [*TOOLS.values(), *(f"`{scheme}`, bpp" for scheme in LOSSLESS)]
+    tools = ["| picture | " + " | ".join(heads) + " |", "|---|" + "---|" * len(heads)]
     for name in names:
         ours = curves[name, OURS]
         cells = [difference(curves.get((name, other)), ours) for other in OTHERS]
         times = [f"{np.median([point[key] for point in ours]):.1f}" for key in ("encode_us", "decode_us")]
         against.append(f"| {name} | {' | '.join(cells + times)} |")
         without = [difference(ours, curves.get((name, tool))) for tool in TOOLS]
-        tools.append(f"| {name} | {' | '.join(without)} |")
-    lossless = ["| picture | " + " | ".join(f"`{scheme}`" for scheme in LOSSLESS) + " |"]
-    lossless.append("|---|" + "---|" * len(LOSSLESS))
-    for name in names:
         rates = [exact.get((name, scheme)) for scheme in LOSSLESS]
-        lossless.append(f"| {name} | " + " | ".join("–" if rate is None else f"{rate:.2f}" for rate in rates) + " |")
+        without += ["–" if rate is None else f"{rate:.2f}" for rate in rates]
+        tools.append(f"| {name} | {' | '.join(without)} |")
     said = [origin(rows)]
     return against_all | {
-        ("docs/lf.md", mark): [*lines, "", *said]
-        for mark, lines in zip(marks, (against, tools, lossless), strict=True)
+        ("docs/lf.md", mark): [*lines, "", *said] for mark, lines in zip(marks, (against, tools), strict=True)
     }
 
 
@@ -170,8 +167,8 @@ def targets(records: Mapping[int, Sequence[Mapping[str, Any]]]) -> list[str]:
     Schemes are in order of their Bjøntegaard rate against the anchor of `coders`; each then meets the best so far.
     """
     lines = [
-        "| scale | scene | `si-lf` | least rate of all others | others | rate of `si-lf` |",
-        "|---|---|---|---|---|---|",
+        "| scale | scene | least rate of all others | others | rate of `si-lf` |",
+        "|---|---|---|---|---|",
     ]
     for scale, rows in records.items():
         for scene in SCENES:
@@ -179,7 +176,7 @@ def targets(records: Mapping[int, Sequence[Mapping[str, Any]]]) -> list[str]:
             others = [name for name in curves if not _is_ours(name)]
             best = least_rate(curves, others)
             lines += [
-                f"| {scale} | {scene} | `{name}` | `{best}` | {len(others)} | "
+                f"| {scale} | {scene}{'' if name == OURS else f', `{name}`'} | `{best}` | {len(others)} | "
                 f"{difference(curves[best], curves[name])} |"
                 for name in filter(_is_ours, curves if best else ())
             ]

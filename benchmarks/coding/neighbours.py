@@ -26,6 +26,7 @@ from ii_core import IIVideo, sub_images, video_of
 
 RECORDS = Records("neighbours", ("benchmarks.coding.neighbours", "benchmarks.coding.takes"))
 BLOCK, REACH, FINE = 8, 16, 4  # side of a block, search range each way in pixels, steps per pixel
+ESTIMATE = "estimate"  # begins the table's rows of estimated bits
 QUANTISERS = (27, 32)  # H.264's quantisers; the distortion of a block is at most Δ²/12
 SAME = 0.5  # bits of a vector component that equals that of the last block; others are exponential Golomb codes
 Floats = NDArray[np.float32]
@@ -216,8 +217,8 @@ def _predict(image, fine, weight, out, bits):  # type: ignore[no-untyped-def]
 
 
 def tables() -> Tables:
-    """Return the table of the page of videos."""
-    return {("docs/video.md", "takes-neighbours"): table()}
+    """Return the table of the page of videos: codings without the estimates."""
+    return {("docs/video.md", "takes-neighbours"): [line for line in table() if ESTIMATE not in line]}
 
 
 def table() -> list[str]:
@@ -226,22 +227,21 @@ def table() -> list[str]:
     if not rows:
         return ["Not measured yet."]
     takes = [take for take in TAKES if any(key[0] == take for key in rows)]
-    lines = ["| | " + " | ".join(takes) + " |", "|---|" + "---|" * len(takes)]
+    lines = ["| | " + " | ".join(f"{take}, %" for take in takes) + " |", "|---|" + "---|" * len(takes)]
     names = {"view": "last view alone", "better": "the better of both", "mean": "the better of both, or their mean"}
-    for qp in map(str, QUANTISERS):
-        for name, text in names.items():
-            cells = []
-            for take in takes:
-                found = rows.get((take, "bits"))
-                parts = found and found["bits_per_pixel"][qp]
-                cells.append(f"{100 * (parts[name] / parts['time'] - 1):+.1f} %" if parts else "–")
-            lines.append(f"| predicted from {text}, step of quantiser {qp} | " + " | ".join(cells) + " |")
+    for name, text in names.items():
+        cells = []
+        for take in takes:
+            found = rows.get((take, "bits"))
+            bits = [found["bits_per_pixel"][str(qp)] for qp in QUANTISERS] if found else []
+            cells.append(", ".join(f"{100 * (parts[name] / parts['time'] - 1):+.1f}" for parts in bits) or "–")
+        lines.append(f"| {ESTIMATE}, {text} | " + " | ".join(cells) + " |")
     for what in CODINGS:
         cells = []
         for take in takes:
             pair = [rows.get((take, name)) for name in (ANCHOR, what)]
             off = None if None in pair else difference(*(row["points"] for row in pair if row))
-            cells.append("anchor" if what == ANCHOR else "–" if off is None else f"{off:+.1f} %")
+            cells.append("anchor" if what == ANCHOR else "–" if off is None else f"{off:+.1f}")
         lines.append(f"| x264, {what} | " + " | ".join(cells) + " |")
     return [origin(rows.values()), "", *lines]
 

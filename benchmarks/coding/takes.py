@@ -169,7 +169,10 @@ def plan_table() -> list[str]:
     rows = by_plan()
     if not rows:
         return ["Not measured yet."]
-    lines = ["| plan | frames for one SI, mean | " + " | ".join(rows) + " |", "|---|---|" + "---|" * len(rows)]
+    lines = [
+        "| plan | frames for one SI, mean | " + " | ".join(f"{take}, %" for take in rows) + " |",
+        "|---|---|" + "---|" * len(rows),
+    ]
     commits = []
     for plan in PLANS:
         cost = component_cost(PLANS[plan], 256, FRAMES)
@@ -192,9 +195,10 @@ def coder_table() -> list[str]:
     if not rows:
         return ["Not measured yet."]
     lines = [
-        "| coder | order | " + " | ".join(f"{take}, own | H.264" for take in TAKES) + " | CPU over encoder's |",
-        "|---|---|" + "---|---|" * len(TAKES) + "---|",
+        "| coder | order | " + " | ".join(f"{take}, own, % | H.264, %" for take in TAKES) + " |",
+        "|---|---|" + "---|---|" * len(TAKES),
     ]
+    cost = []
     for coder in CODERS:
         for order in ORDERS:
             cells = []
@@ -206,31 +210,35 @@ def coder_table() -> list[str]:
             there = [rows[coder, order, take] for take in TAKES if (coder, order, take) in rows]
             times = [p["encode_seconds"] / p["codec_seconds"] for row in there for p in row["points"]]
             if there:
-                lines.append(f"| {coder} | {order} | " + " | ".join(cells) + f" | {median(times):.3f} |")
-    return [origin(rows.values()), "", *lines]
+                lines.append(f"| {coder} | {order} | " + " | ".join(cells) + " |")
+                cost.append(median(times))
+    whole = f"CPU time of `encode_take` over that inside the encoder: {min(cost):.3f}–{max(cost):.3f}, by row."
+    return [origin(rows.values()), "", *lines, "", whole]
 
 
 def rate_text(off: float | None) -> str:
     """Return a Bjøntegaard rate as text of a cell."""
-    return "–" if off is None else f"{off:+.1f} %"
+    return "–" if off is None else f"{off:+.1f}"
 
 
 def speed_table() -> list[str]:
-    """Return a table by take and speed: correlations, and rate of time-first against view-first."""
-    rows = [row for row in RECORDS.rows(scale=SCALE) if "step" in row]
+    """Return a table by take and speed: ratio of decorrelations, and rate of time-first against view-first."""
+    rows = {(row["take"], row["step"]): row for row in RECORDS.rows(scale=SCALE) if "step" in row}
     if not rows:
         return ["Not measured yet."]
-    lines = [
-        "| take | speed | 1 − c in time | 1 − c in view | time-first against view-first |",
-        "|---|---|---|---|---|",
-    ]
-    for row in sorted(rows, key=lambda row: (TAKES.index(row["take"]), row["step"])):
-        off = difference(*(row["curves"][name] for name in ONE_WAY))
-        lines.append(
-            f"| {row['take']} | ×{row['step']} | {1 - row['time_correlation']:.4f} | "
-            f"{1 - row['view_correlation']:.4f} | {rate_text(off)} |"
-        )
-    return [origin(rows), "", *lines]
+    lines = ["| take | " + " | ".join(f"speed ×{step}" for step in STEPS) + " |", "|---|" + "---|" * len(STEPS)]
+    for take in TAKES:
+        cells = []
+        for step in STEPS:
+            row = rows.get((take, step))
+            if row is None:
+                cells.append("–")
+                continue
+            ratio = (1 - row["time_correlation"]) / (1 - row["view_correlation"])
+            off = rate_text(difference(*(row["curves"][name] for name in ONE_WAY)))
+            cells.append(f"{ratio:.2g}: {off}")
+        lines.append(f"| {take} | " + " | ".join(cells) + " |")
+    return [origin(rows.values()), "", *lines]
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ the tables to ``docs/volume.md``.
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -52,9 +53,7 @@ def main() -> None:
     keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
         RECORDS.measure(key, lambda key=key: study(**key))
-    for scene in RECORDS.rows(scale=asked.scale):
-        for line in rows(scene["scene"], scene):
-            print(line, flush=True)
+    print("\n".join(rate_table(RECORDS.rows(scale=asked.scale))))
     publish(tables())
 
 
@@ -111,35 +110,39 @@ def apart(picture: IIPicture, squared_error: float = 10.0) -> dict[str, float]:
     }
 
 
-def rows(name: str, scene: dict[str, Any]) -> list[str]:
-    """Return the scene's lines of the table."""
-    anchor = list(zip(*scene["curves"][ANCHOR], strict=True))
-    lines = []
-    for scheme, points in scene["curves"].items():
-        curve = list(zip(*points, strict=True))
-        try:
-            gain = f"{bd_rate(*anchor, *curve):+.0f} %"
-        except ValueError:
-            gain = "no overlap"
-        low, high = points[0], points[-1]
-        if low[0] > high[0]:
-            low, high = high, low
-        spans = f"{low[0]:.3f}–{high[0]:.2f} | {low[1]:.1f}–{high[1]:.1f}"
-        exact = scene["lossless_bpp"].get(scheme)
-        lines.append(f"| {name} | `{scheme}` | {gain} | {spans} | {'' if exact is None else f'{exact:.2f}'} |")
-    return lines
+def cells(scene: dict[str, Any], scheme: str) -> list[str]:
+    """Return Bjøntegaard rate, spans of rate and PSNR, and lossless rate of a scheme."""
+    points = scene["curves"][scheme]
+    anchor, curve = (list(zip(*some, strict=True)) for some in (scene["curves"][ANCHOR], points))
+    try:
+        gain = f"{bd_rate(*anchor, *curve):+.0f}"
+    except ValueError:
+        gain = "no overlap"
+    low, high = sorted((points[0], points[-1]))
+    exact = scene["lossless_bpp"].get(scheme)
+    return [
+        gain,
+        f"{low[0]:.3f}–{high[0]:.2f}",
+        f"{low[1]:.1f}–{high[1]:.1f}",
+        "" if exact is None else f"{exact:.2f}",
+    ]
+
+
+def rate_table(scenes: list[dict[str, Any]]) -> list[str]:
+    """Return a row per scheme, with rates and qualities of each scene."""
+    head = " | ".join(f"{scene['scene']}: rate, % | bpp | dB | lossless, bpp" for scene in scenes)
+    table = [f"| scheme | {head} |", "|---|" + "---|---|---|---|" * len(scenes)]
+    for scheme in dict.fromkeys(scheme for scene in scenes for scheme in scene["curves"]):
+        line = [cells(scene, scheme) if scheme in scene["curves"] else [""] * 4 for scene in scenes]
+        table.append(f"| `{scheme}` | " + " | ".join(chain(*line)) + " |")
+    return with_commits(table, [[scene["commit"] for scene in scenes]] * (len(table) - 2))
 
 
 def tables() -> Tables:
     """Return the tables of the page."""
     scenes = RECORDS.rows(scale=SCALE)
-    table = ["| scene | scheme | rate | bpp | dB | lossless, bpp |", "|---|---|---|---|---|---|"]
     apart_table = ["| scene | a stream each, bpp | of it headers | one stream, bpp |", "|---|---|---|---|"]
-    commits: list[list[str]] = []
     for scene in scenes:
-        lines = rows(scene["scene"], scene)
-        table += lines
-        commits += [[scene["commit"]]] * len(lines)
         a = scene["apart"]
         apart_table.append(
             f"| {scene['scene']} | {a['apart_bpp']:.3f} | {a['headers_bpp']:.3f} | {a['together_bpp']:.3f} "
@@ -147,7 +150,7 @@ def tables() -> Tables:
         )
     page, told = "docs/volume.md", origin(scenes)
     return {
-        (page, "rates"): [told, "", *with_commits(table, commits)],
+        (page, "rates"): [told, "", *rate_table(scenes)],
         (page, "apart"): [told, "", *with_commits(apart_table, [[scene["commit"]] for scene in scenes])],
     }
 

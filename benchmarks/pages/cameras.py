@@ -90,18 +90,21 @@ KINDS = {
 
 INTRODUCTION = """# Cameras
 
-A camera is a location and a direction for every pixel. Each strip shows, from left to right:
+With this page you can choose a camera of the package and the format of its maps. A camera is a
+location and a direction for every pixel. Each strip shows (`python -m benchmarks run cameras`; an
+eighth of the lenses each way, of several arrays the first):
 
 1. the locations L over the whole array, with x, y and z as red, green and blue;
-2. the directions D of a few lenses, in the same colours;
+2. the directions D of a few lenses, in the same colours, black if blocked;
 3. the same few lenses of *Apples*, rendered through L and D;
-4. the view of a viewer in front of the display.
+4. the view of a viewer in front of the display; with a main lens, the middle sub-image, upright.
 
-`raytrace-ii camera NAME -o dir/` stores L and D as pictures. `raytrace-ii camera NAME --report`
-prints properties and limits of a camera. The pictures have an eighth of the lenses each way
-(`python -m benchmarks run cameras`). [Camera files](camera_files.md) lists all keys and elements,
-for a camera or a display of your own. The [glossary](glossary.md) lists the terms.
+Unless given, cameras have pinholes, 8192×4096 px, 512×256 lenses in a rectangular array, 16×16 px
+each, and a viewing angle α = 29.9°. `raytrace-ii camera NAME -o dir/` stores L and D as pictures,
+`--report` prints properties and limits. [Camera files](camera_files.md) lists all keys and
+elements.
 """
+USUAL = ("pinhole", "8192×4096 px", "512×256 lenses", "rectangular", "16×16 px each", "α = 29.9°")
 
 
 def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
@@ -111,16 +114,19 @@ def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
     chain = " → ".join(e.kind for e in first.optics)
     _, _, weight = shown.weighted_rays()
     blocked = "" if weight is None or weight.all() else f", {1 - (weight > 0).mean():.0%} of the rays blocked"
-    arrays = f"{len(full)} arrays of " if len(full) > 1 else ""
-    facts = (
-        f"{arrays}{first.pixels[0]}×{first.pixels[1]} px, {first.lenses[0]}×{first.lenses[1]} lenses, "
-        f"{first.lattice}, {u:.4g}×{v:.4g} px each, α = {first.view_angle_deg:.1f}°; {chain}{blocked}"
-    )
+    facts = [
+        f"{first.pixels[0]}×{first.pixels[1]} px", f"{first.lenses[0]}×{first.lenses[1]} lenses", first.lattice,
+        f"{u:.4g}×{v:.4g} px each", f"α = {first.view_angle_deg:.1f}°",
+    ]  # fmt: skip
+    arrays = [f"{len(full)} arrays"] if len(full) > 1 else []
+    facts = [f"{chain}{blocked}", *arrays, *facts]
+    facts = [fact for fact in facts if fact not in USUAL]
     sheet = json.loads((CAMERAS / f"{name}.json").read_text(encoding="utf-8"))
     about = sheet["about"][:1].upper() + sheet["about"][1:]
-    picture = f"![L, D, detail and view of {name}](images/cameras/{file_name(name)})"
-    text, facts = (fill(text, 100, break_on_hyphens=False) for text in (f"{about}. {sheet['notes']}", f"{facts}."))
-    return f"\n### {name}\n\n{text}\n\n{facts}\n\n{picture}\n"
+    picture = f"![{name}](images/cameras/{file_name(name)})"
+    given = f" *{', '.join(facts)}.*" if facts else ""
+    text = fill(f"{about}. {sheet['notes']}{given}", 100, break_on_hyphens=False)
+    return f"\n### {name}\n\n{text}\n\n{picture}\n"
 
 
 def all_scenes() -> NDArray[np.uint8]:
@@ -137,23 +143,23 @@ def all_scenes() -> NDArray[np.uint8]:
 
 
 def precision() -> str:
-    """Return the errors of cameras stored as pictures, from `benchmarks.accuracy.map_precision`."""
+    """Return the errors of cameras stored as pictures by format, from `benchmarks.accuracy.map_precision`."""
     rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
     lines = [
         "\n## Stored as pictures: which format is enough\n",
-        "Errors of maps stored as pictures, at a quarter of the lenses each way: angle between stored and",
-        "true direction, distance between stored and true location, and PSNR of the picture against that of",
-        "float maps.\n",
-        "| camera | format | bytes per ray | angle max · rms | location max · rms | PSNR apples · cuboid |",
-        "|---|---|---|---|---|---|",
+        "Greatest errors of the maps of `setup1`, `setup3` and `spherical` at a quarter of the lenses each way,",
+        "and PSNR of *Apples* and *Cuboid* against pictures of float maps:\n",
+        "| format | bytes per ray | angle | location | PSNR |",
+        "|---|---|---|---|---|",
     ]
-    for row in rows:
-        psnr = [row[f"psnr_{scene}"] for scene in ("apples", "cuboid")]
-        shown = " · ".join("reference" if value is None else f"{value:.1f} dB" for value in psnr)
+    for name in dict.fromkeys(row["format"] for row in rows):
+        of = [row for row in rows if row["format"] == name]
+        size = [row["bytes_per_pixel"] for row in of]
+        psnr = [row[f"psnr_{scene}"] for row in of for scene in ("apples", "cuboid")]
+        shown = "reference" if None in psnr else f"{min(psnr):.1f}–{max(psnr):.1f} dB"
+        angle, place = (max(row[what] for row in of) for what in ("angle_max_urad", "place_max_um"))
         lines.append(
-            f"| {row['camera']} | {row['format']} | {row['bytes_per_pixel']:.2g} "
-            f"| {figure(row['angle_max_urad'])} · {figure(row['angle_rms_urad'])} µrad "
-            f"| {figure(row['place_max_um'])} · {figure(row['place_rms_um'])} µm | {shown} |"
+            f"| {name} | {min(size):.2g}–{max(size):.2g} | {figure(angle)} µrad | {figure(place)} µm | {shown} |"
         )
     return "\n".join([*lines, "", origin(rows), "", VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""])
 
@@ -163,30 +169,30 @@ def in_scene() -> str:
     (study,) = camera_in_scene.RECORDS.rows(scale=camera_in_scene.SCALE)
     lines = [
         IN_SCENE,
-        "| *Apples* | aperture | triangles of the camera | as it is | Fresnel's losses added | no stray light |",
+        "| *Apples* lit | aperture | triangles | as it is | Fresnel's losses added | no stray light |",
         "|---|---|---|---|---|---|",
     ]
     lines += [
-        f"| {row['scene'].removeprefix('apples').lstrip(', ') or 'lit as usual'} | {row['aperture_of_pitch']:.2f} | "
-        f"{row['triangles_of_the_camera']} | {row['psnr_db']:.1f} dB | {row['psnr_with_fresnel_db']:.1f} dB | "
-        f"{row['psnr_direct_light_db']:.1f} dB |"
+        f"| {row['scene'].removeprefix('apples, lit ').replace('apples', 'as usual')} | "
+        f"{row['aperture_of_pitch']:.2f} | {row['triangles_of_the_camera']} | {row['psnr_db']:.1f} dB | "
+        f"{row['psnr_with_fresnel_db']:.1f} dB | {row['psnr_direct_light_db']:.1f} dB |"
         for row in study["rows"]
-        if row["what"] in ("picture", "tessellation")
+        if (row["what"] == "picture" and row["samples"] > 1)
+        or (row["what"] == "tessellation" and row["segments"] in SEGMENTS)
     ]
     return "\n".join(
         [*lines, "", origin([study]), "", "![both pictures and their differences](images/camera_in_scene.jpg)", ""]
     )
 
 
+SEGMENTS = (2, 64)  # around a lens, of the meshes on the page
 IN_SCENE = """
 ## Against a camera of glass inside the scene
 
-A second way to simulate a camera is to model its lenses as bodies of glass in the scene, and to
-start rays at the pixels. The table gives PSNR of that picture against the picture through L and D
-of `spherical`. L and D do not include Fresnel losses, stray light in the glass, and the shadow of
-the camera on the scene. Without these effects, the remaining difference comes from the faces of the
-lenses' meshes: 6 dB for every doubling. L and D take at most a third of the time, and can be
-exchanged as files.
+PSNR of pictures through lenses of glass in the scene against those through L and D of `spherical`,
+which do not include Fresnel losses, stray light in the glass, and the camera's shadow. Without
+these, the remaining difference comes from the faces of the lenses' meshes: 6 dB for every doubling.
+L and D take at most a third of the time, and can be exchanged as files.
 """
 
 
@@ -197,9 +203,8 @@ def figure(value: float) -> str:
 
 VERDICT = """**PNG-16** is sufficient for all pictures with sensor noise, which alone gives 47.5 dB: pixels
 change only where a ray grazes an edge. **EXR** is for pictures that must agree to the bit.
-**PNG-8** and **RGBE** are for viewing a camera, not for rendering. An error of a milliradian moves
-a point 100 mm away by a tenth of a millimetre, a whole lens of `setup1`. RGBE is the worst format
-in spite of its size, because its eight bits are relative to the largest of the three numbers."""
+**PNG-8** and **RGBE** (`hdr`) are for viewing: an error of a milliradian moves a point 100 mm away
+by a tenth of a millimetre, a whole lens of `setup1`."""
 
 
 def strip(scene: Scene, camera: IICamera, name: str) -> NDArray[np.uint8]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from benchmarks.pages.tables import Tables, publish
 from metrics.benchmark.card import CAPTION, card_table
 from metrics.benchmark.profile import profile, profile_names
@@ -16,8 +18,19 @@ def tables() -> Tables:
     """Return one table for each profile of the package, with one caption."""
     lines: list[str] = []
     for name in profile_names():
-        lines += [f"**{name}**", "", *card_table(profile(name))[:-2], ""]
+        lines += [*short_table(name, card_table(profile(name))[:-2]), ""]
     return {("docs/benchmark.md", "data-card"): [*lines, CAPTION]}
+
+
+def short_table(name: str, lines: Sequence[str]) -> list[str]:
+    """Return a table under its name; what is the same in all rows is in the heading in place of a column."""
+    head, _, *rows = ([cell.strip() for cell in line.strip("|").split("|")] for line in lines)
+    columns = list(zip(head, *rows, strict=True))
+    same = [f"{title}: {first}" for title, first, *rest in columns if set(rest) == {first}]
+    kept = [column for column in columns if len(set(column[1:])) > 1]
+    titles, *cells = zip(*kept, strict=True)
+    table = [f"| {' | '.join(titles)} |", "|" + "---|" * len(titles), *(f"| {' | '.join(row)} |" for row in cells)]
+    return ["; ".join([f"**{name}**", *same]), "", *table]
 
 
 if __name__ == "__main__":

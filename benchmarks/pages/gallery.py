@@ -2,7 +2,7 @@
 
     python -m benchmarks run gallery [--scenes twins hairdo] [--missing] [--stills] [--scale 2]
 
-Pages go to ``docs/gallery``. Git does not keep them; ``make docs`` writes those that are missing. With ``--stills`` a
+Pages go to ``docs/gallery``. Git does not keep them; ``make gallery`` writes missing ones. With ``--stills`` a
 browser draws the stills of the scenes, which git keeps, and ``docs/gallery/README.md`` is written.
 """
 
@@ -27,10 +27,11 @@ SAMPLES = 16
 SCALE = 2  # 256×128 lenses: pages of a few megabytes
 INTRODUCTION = f"""# Gallery
 
-The reference scenes as pages of `raytrace-ii view`: stills here, pages that open in any browser, without a network,
-after `make docs` or `python -m benchmarks run gallery`. Each is *setup1* with half of the lenses each way,
-{SAMPLES} samples a pixel, JPEG of quality {QUALITY}. *Mountains* and the ground behind the *Twins* are so far away
-that each lens sees them whole: no display of this kind can resolve them.
+Here you choose a reference scene. `make gallery` makes a [viewer](../viewer.md) page of each, which
+opens in any browser without a network, in 20 minutes of CPU time. Each is
+`setup1` with half of the lenses each way, {SAMPLES} samples per pixel, JPEG of quality {QUALITY}. *Mountains* and
+the ground behind the *Twins* are so far away that each lens sees them whole: no display of this
+kind can resolve them.
 """
 
 

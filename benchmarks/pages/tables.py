@@ -85,7 +85,7 @@ def stale(owners: Iterable[str] = OWNERS, root: Path = ROOT) -> list[str]:
             text = (root / page).read_text(encoding="utf-8")
             if filled(text, mark, lines) != text:
                 wrong.append(f"{page}: table {mark} differs from the records: type python -m benchmarks run tables")
-    pages = [root / "README.md", *sorted((root / "docs").glob("*.md"))]
+    pages = [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
     marks = {(p.relative_to(root).as_posix(), mark) for p in pages for mark in MARK.findall(p.read_text("utf-8"))}
     return wrong + [f"{page}: no benchmark fills {mark}" for page, mark in sorted(marks - owned - ELSEWHERE)]
 

@@ -310,39 +310,41 @@ def tables() -> Tables:
 
 
 def uses_table(scenes: dict[str, Any]) -> list[str]:
-    """Return the rays per camera ray by kind, and the numbers of bodies by feature."""
-    kinds = ("shadow", "reflection", "refraction", "passed")
-    what = [key for key in next(iter(scenes.values()))["uses"] if key not in ("bodies", "lights")]
-    lines = [f"| scene | {' | '.join(kinds)} | lights | {' | '.join(what)} |", "|---" * (len(what) + 6) + "|"]
+    """Return the rays per camera ray by kind."""
+    kinds = ("shadow", "reflection", "refraction")
+    lines = [f"| scene | {' | '.join(kinds)} |", "|---" * (len(kinds) + 1) + "|"]
     for name, one in scenes.items():
         rays = [f"{one['rays'][kind]:.2f}" if kind in one["rays"] else "–" for kind in kinds]
-        held = [str(one["uses"][key] or "–") for key in what]
-        lines.append(f"| {name} | {' | '.join(rays)} | {one['uses']['lights']} | {' | '.join(held)} |")
+        lines.append(f"| {name} | {' | '.join(rays)} |")
     return lines
 
 
 def least_table(scenes: dict[str, Any]) -> list[str]:
-    """Return the limits and the cheapest model of every scene."""
+    """Return the limits and the cheapest model of every scene that can do without a feature."""
     lines = [
         "| scene | features left out | PSNR | SSIM, worst view | error of the 99.9th percentile | CPU time |",
         "|---" * 6 + "|",
     ]
     for name, one in scenes.items():
         least, limit = one["least"], one["limit"]
-        without, time = ", ".join(least["without"]) or "nothing", least["time"] if least["without"] else 0
-        db = "the same" if least["psnr"] is None else f"{least['psnr']:.1f} dB"
-        lines.append(
-            f"| {name} | {without} | {db} (≥ {limit['psnr']:.1f}) | {least['worst']:.4f} (≥ {limit['worst']:.4f}) | "
-            f"{least['rare']:.1f} steps (≤ {limit['rare']:.1f}) | {percent(time)} |"
-        )
+        if least["without"]:
+            db = "the same" if least["psnr"] is None else f"{least['psnr']:.1f} dB"
+            lines.append(
+                f"| {name} | {', '.join(least['without'])} | {db} (≥ {limit['psnr']:.1f}) | {least['worst']:.4f} "
+                f"(≥ {limit['worst']:.4f}) | {least['rare']:.1f} steps (≤ {limit['rare']:.1f}) | "
+                f"{percent(least['time'])} |"
+            )
     return lines
 
 
 def ablation_table(scenes: dict[str, Any]) -> list[str]:
-    """Return a table of features by scenes: PSNR, SSIM, time; indistinguishable ones in bold."""
+    """Return a table of features by scenes: PSNR in dB, SSIM, time in %; indistinguishable ones in bold.
+
+    Bounces and triangles are in the chart, and in tables of `benchmarks.speed.pareto`.
+    """
     parts = [row["what"] for one in scenes.values() for row in one["left_out"]]
     lines = [f"| without | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]
-    for part in sorted(dict.fromkeys(parts), key=_place):
+    for part in sorted({*parts} & {SHADOWS, *WITHOUT}, key=_place):
         cells = []
         for one in scenes.values():
             row = next((row for row in one["left_out"] if row["what"] == part), None)
@@ -357,8 +359,8 @@ def _place(part: str) -> tuple[int, str]:
 
 
 def cell(row: dict[str, Any], limit: dict[str, float]) -> str:
-    db = "same" if row["psnr"] is None else f"{row['psnr']:.1f} dB"
-    text = f"{db}, {row['q_view']:.3f}" + ("" if row["time"] is None else f", {percent(row['time'])}")
+    db = "same" if row["psnr"] is None else f"{row['psnr']:.1f}"
+    text = f"{db}, {row['q_view']:.3f}" + ("" if row["time"] is None else f", {percent(row['time']).rstrip(' %')}")
     return f"**{text}**" if row["psnr"] is None or alike(row, limit) else text
 
 
@@ -367,12 +369,15 @@ def percent(share: float) -> str:
 
 
 def fewer_table(scenes: dict[str, Any]) -> list[str]:
-    """Return the table of half the lenses and half the pixels."""
+    """Return the table of half the lenses and half the pixels, ranges over the scenes."""
     rows = [(row["what"], row["by"]) for row in next(iter(scenes.values()))["fewer"]]
-    lines = [f"| half the | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]
+    lines = ["| half the | PSNR, dB | SSIM | CPU time, % |", "|---|---|---|---|"]
     for i, (what, by) in enumerate(rows):
-        cells = [cell(one["fewer"][i], one["limit"]) for one in scenes.values()]
-        lines.append(f"| {what}, {by} | {' | '.join(cells)} |")
+        found = [one["fewer"][i] for one in scenes.values()]
+        psnr, ssim = ([row[key] for row in found] for key in ("psnr", "q_view"))
+        time = [f"{100 * end(row['time'] for row in found):+.0f}".replace("-", "−") for end in (min, max)]
+        cells = f"{min(psnr):.1f} to {max(psnr):.1f} | {min(ssim):.3f} to {max(ssim):.3f} | {' to '.join(time)}"
+        lines.append(f"| {what}, {by} | {cells} |")
     return lines
 
 

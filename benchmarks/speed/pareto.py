@@ -298,25 +298,19 @@ def chart(data: dict[str, Any], target: Path) -> None:
 
 
 def fronts_table(data: dict[str, Any], fine: dict[str, Any]) -> list[str]:
-    """Return the caption of the chart and, if the earlier code was measured, the factors at equal PSNR."""
-    rule = "no other setting is both faster and nearer to the reference."
+    """Return the factors between the CPU times of the earlier and the present code at equal PSNR."""
     if not all("before" in one for one in data.values()):
-        return [f"The grey staircase is the Pareto front: {rule}"]
+        return [f"`{COMMIT}` is not measured."]
     scales = {SCALE: data, **({FINE_SCALE: fine} if set(fine) == set(data) else {})}
     lines = [
-        f"The dark staircase is the Pareto front: {rule} The light one is the front of commit `{COMMIT}`. The code "
-        "of both renders each setting in turn. The table gives the factor between the CPU times at equal PSNR, that "
-        f"of the recommended setting of `{COMMIT}`; between two settings of the dark front it is interpolated.",
-        "",
-        f"| scene | setting of `{COMMIT}` | PSNR | CPU time | {' | '.join(f'faster at scale {s}' for s in scales)} |",
-        "|---" * (4 + len(scales)) + "|",
+        f"| scene | PSNR | {' | '.join(f'faster at scale {s}' for s in scales)} |",
+        "|---" * (2 + len(scales)) + "|",
     ]
     for name, one in data.items():
-        aim = one["before"]["recommended"]
         factors = " | ".join(_factor(speedup(rows[name])) for rows in scales.values())
-        lines.append(f"| {name} | {aim['setting']} | {aim['psnr']:.1f} dB | {aim['seconds']:.2f} s | {factors} |")
+        lines.append(f"| {name} | {one['before']['recommended']['psnr']:.1f} dB | {factors} |")
     means = " | ".join(_factor(_mean([speedup(one) for one in rows.values()])) for rows in scales.values())
-    lines.append(f"| geometric mean | | | | {means} |")
+    lines.append(f"| geometric mean | | {means} |")
     if FINE_SCALE in scales:
         (columns, rows), commits = band(preset("setup1", scale=FINE_SCALE)).pixels, by_scene(fine)
         lines += [
@@ -336,13 +330,14 @@ def _mean(times: Sequence[float]) -> float:
 
 
 def recommended_table(data: dict[str, Any]) -> list[str]:
-    """Return the recommended setting of every scene beside one sample per pixel."""
-    lines = ["| scene | setting | PSNR | CPU time | criterion | one sample |", "|---|---|---|---|---|---|"]
+    """Return the recommended setting of every scene, in bold below sensor noise, beside one sample per pixel."""
+    lines = ["| scene | setting | PSNR | CPU time | one sample |", "|---|---|---|---|---|"]
     for name, one in data.items():
         pick = one["recommended"]
         (first,) = [r for r in one["rows"] if r["sweep"] == "samples" and r["samples"] == 1]
+        how = f"**{pick['setting']}**" if pick["psnr"] >= SENSOR_DB else pick["setting"]
         lines.append(
-            f"| {name} | {pick['setting']} | {pick['psnr']:.1f} dB | {pick['seconds']:.2f} s | {pick['rule']} | "
+            f"| {name} | {how} | {pick['psnr']:.1f} dB | {pick['seconds']:.2f} s | "
             f"{first['psnr']:.1f} dB, {first['seconds']:.2f} s |"
         )
     return lines
@@ -362,23 +357,18 @@ def samples_table(data: dict[str, Any]) -> list[str]:
 
 
 def depth_table(data: dict[str, Any]) -> list[str]:
-    """Return PSNR and time over recursion depth, at BASE samples."""
-    lines = [
-        "| scene | " + " | ".join(map(str, DEPTHS)) + " | the scene's |",
-        "|---" * (len(DEPTHS) + 2) + "|",
-    ]
+    """Return PSNR and time over recursion depth, at BASE samples, of scenes with mirrors or glass."""
+    lines = [f"| scene | {' | '.join(map(str, DEPTHS))} | the scene's |", "|---" * (len(DEPTHS) + 2) + "|"]
     for name, one in data.items():
-        if not one["bounces"]:
-            lines.append(f"| {name} |" + " |" * len(DEPTHS) + " nothing mirrors |")
-            continue
-        at = {r["depth"]: r for r in one["rows"] if r["samples"] == BASE and r["sweep"] in ("samples", "depth")}
-        cells = " | ".join(f"{at[d]['psnr']:.1f} dB, {at[d]['seconds']:.2f} s" for d in DEPTHS)
-        lines.append(f"| {name} | {cells} | {one['max_depth']} |")
+        if one["bounces"]:
+            at = {r["depth"]: r for r in one["rows"] if r["samples"] == BASE and r["sweep"] in ("samples", "depth")}
+            cells = " | ".join(f"{at[d]['psnr']:.1f}, {at[d]['seconds']:.2f}" for d in DEPTHS)
+            lines.append(f"| {name} | {cells} | {one['max_depth']} |")
     return lines
 
 
 def cut_table(data: dict[str, Any]) -> list[str]:
-    """Return PSNR and time over tessellation, at BASE samples."""
+    """Return faces, PSNR and time over tessellation, at BASE samples."""
     lines = ["| scene | " + " | ".join(f"×{cut:g}" for cut in CUTS) + " |", "|---" * (len(CUTS) + 1) + "|"]
     for name, one in data.items():
         if len(one["faces"]) == 1:
@@ -387,7 +377,7 @@ def cut_table(data: dict[str, Any]) -> list[str]:
         for cut in CUTS:
             rows = [r for r in one["rows"] if r["cut"] == cut and r["samples"] == BASE and r["error"] is None]
             (row,) = [r for r in rows if r["sweep"] in ("samples", "cut")]
-            cells.append(f"{one['faces'][str(cut)] / 1e3:.0f} k faces, {row['psnr']:.1f} dB, {row['seconds']:.2f} s")
+            cells.append(f"{one['faces'][str(cut)] / 1e3:.0f}, {row['psnr']:.1f}, {row['seconds']:.2f}")
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return lines
 

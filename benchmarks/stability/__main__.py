@@ -17,6 +17,7 @@ from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
 from benchmarks.stability import curves, depth, geometry, light, picture, pictures
+from benchmarks.stability.excerpts import EXCERPTS, Excerpt
 from benchmarks.stability.geometry import Row
 from ii_core.display.figure import COLOURS
 from metrics.depth.focus import METHODS
@@ -73,28 +74,49 @@ def measured() -> dict[str, dict[str, Any]]:
 
 def tables() -> Tables:
     """Return the tables of the page of stability."""
-    page = "docs/stability.md"
-    cases = {
-        (page, name): [*table(row["rows"], PIVOTS.get(name)), "", origin([row])] for name, row in measured().items()
-    }
-    return {**cases, (page, "convergence"): orders()}
+    page, cases = "docs/stability.md", measured()
+    parts = {name: excerpt(name, row["rows"]) for name, row in cases.items()}
+    made = {**parts, "convergence": orders(), "origins": origins(cases)}
+    return {(page, name): lines for name, lines in made.items()}
+
+
+def excerpt(name: str, rows: list[Row]) -> list[str]:
+    """Return the table of a case's shown part."""
+    shown = EXCERPTS.get(name, Excerpt(across=False))
+    part = shown.of(rows)
+    return table(part, PIVOTS.get(name)) if not shown.across else table(across(part))
+
+
+def across(rows: list[Row]) -> list[Row]:
+    """Return a row for each column but the first, whose values become columns."""
+    first, *rest = rows[0]
+    return [{first: name, **{number(row[first]): row.get(name) for row in rows}} for name in rest]
+
+
+def origins(cases: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return a sentence with the commit of most cases, then the others'."""
+    by_commit: dict[str, list[str]] = {}
+    for name, row in cases.items():
+        by_commit.setdefault(row["commit"], []).append(name)
+    most, *others = sorted(by_commit, key=lambda commit: -len(by_commit[commit]))
+    rest = [f"{', '.join(f'`{name}`' for name in by_commit[commit])} by `{commit}`" for commit in others]
+    return ["; ".join([f"Cases are measured by `{most}`", *rest]) + "."]
 
 
 def orders() -> list[str]:
     """Return fitted and expected orders of convergence, and the lens images."""
     found = convergence.measured()
     first, last = found["rows"][0], found["rows"][-1]
-    heads = ["error", f"{first['segments']} segments", f"{last['segments']} segments", "order", "expected"]
+    heads = ["error", f"{first['segments']} segments", f"{last['segments']} segments", "order"]
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for name, expected in found["expected"].items():
-        values = [name.replace("_", ", "), *map(number, (first[name], last[name], found["orders"][name])), expected]
-        lines.append(f"| {' | '.join(map(str, values))} |")
+        values = [name.replace("_", ", "), *map(number, (first[name], last[name], found["orders"][name]))]
+        lines.append(f"| {' | '.join(values)} ({expected}) |")
     for lens, orders in found["lens_orders"].items():
         rows = [row for row in found["lenses"] if row["lens"] == lens]
         for kind, expected in (("flat", 1), ("smooth", 2)):
             ends = number(rows[0][kind]), number(rows[-1][kind])
-            text = f"{lens} lens, {kind}, mm at the focus"
-            lines.append(f"| {text} | {ends[0]} (coarsest) | {ends[1]} | {number(orders[kind])} | {expected} |")
+            lines.append(f"| {lens} lens, {kind} | {ends[0]} | {ends[1]} | {number(orders[kind])} ({expected}) |")
     worst = max(abs(row["off"]) for row in found["images"])
     return [
         *lines,

@@ -32,12 +32,16 @@ EVEN_VIEW = 0.02  # tolerance of MSSIM: one point in the chart of the dissertati
 
 @dataclass(frozen=True)
 class Claim:
-    """One result of the dissertation and ours."""
+    """One result of the dissertation and ours: numbers as text, by name.
+
+    ``scene`` is empty if the names are scenes. ``theirs`` is empty if the dissertation gives ranks or signs only.
+    """
 
     figure: str
     what: str
-    theirs: str
-    ours: str
+    scene: str
+    theirs: Mapping[str, str]
+    ours: Mapping[str, str]
     verdict: Verdict
 
 
@@ -75,20 +79,20 @@ def gains(results: Results) -> Iterator[Claim]:
         ("SI-PVI", theirs.GAIN_VOLUME, (VOLUME, VOLUME)),
         ("EI-PVS", theirs.GAIN_EI, ("ei-h264:chroma=420", "ei-h264")),
     ):
-        for chroma, scheme, against in zip(("4:2:0", "4:4:4"), (SI, "si-h264"), other, strict=True):
+        for scheme, against in zip((SI, "si-h264"), other, strict=True):
             ours = {scene: gain(result["points"], scheme, against) for scene, result in made.items()}
             if ours:
-                yield claim("5.10", f"SI-PVS over {what}, {chroma}, dB", numbers, ours, "+.1f")
+                yield claim("5.10", f"SI-PVS over {what}, dB", numbers, ours, "+.1f")
 
 
 def models(results: Results) -> Iterator[Claim]:
     """Compare Figure 5.10: SI-PVS over the volume by the verification model, and by ours with each colour alone."""
     made, coded = of_scenes(results, "rates"), of_scenes(results, "volume")
     for how, volume in (("by the verification model", MODEL), ("of ours, each colour alone", APART)):
-        for chroma, scheme in (("4:2:0", SI), ("4:4:4", "si-h264")):
+        for scheme in (SI, "si-h264"):  # 4:2:0, 4:4:4
             ours = {s: lead(made[s]["points"], scheme, coded[s]["points"], volume) for s in made if s in coded}
             if ours:
-                yield claim("5.10", f"SI-PVS over SI-PVI {how}, {chroma}, dB", theirs.GAIN_VOLUME, ours, "+.1f")
+                yield claim("5.10", f"SI-PVS over SI-PVI {how}, dB", theirs.GAIN_VOLUME, ours, "+.1f")
 
 
 def lead(points: Points, scheme: str, others: Points, other: str) -> float | None:
@@ -108,16 +112,38 @@ def by_rate(points: Points, scheme: str) -> list[Mapping[str, Any]]:
 
 
 def claim(
-    figure: str, what: str, numbers: Mapping[str, float], ours: Mapping[str, float | None], form: str, **rules: Any
+    figure: str,
+    what: str,
+    numbers: Mapping[str, float],
+    ours: Mapping[str, float | None],
+    form: str,
+    *,
+    scene: str = "",
+    **rules: Any,
 ) -> Claim:
     """Return the comparison of numbers by name, for the names of ours."""
     numbers = {name: value for name, value in numbers.items() if name in ours}
-    return Claim(figure, what, listed(numbers, form), listed(ours, form), compare(numbers, ours, **rules))
+    return Claim(figure, what, scene, texts(numbers, form), texts(ours, form), compare(numbers, ours, **rules))
 
 
-def listed(numbers: Mapping[str, float | None], form: str) -> str:
-    """Return names and numbers as text of a cell."""
-    return " · ".join(f"{name} {shown(value, form)}" for name, value in numbers.items())
+def ranked(
+    figure: str,
+    what: str,
+    ranks: Mapping[str, float],
+    ours: Mapping[str, float | None],
+    form: str,
+    *,
+    scene: str,
+    only: str = "order",
+    even: float = 0.0,
+) -> Claim:
+    """Return the comparison of our numbers with ranks or signs."""
+    return Claim(figure, what, scene, {}, texts(ours, form), compare(ranks, ours, only=only, even=even))
+
+
+def texts(numbers: Mapping[str, float | None], form: str) -> dict[str, str]:
+    """Return numbers as text, by name."""
+    return {name: shown(value, form) for name, value in numbers.items()}
 
 
 def shown(value: float | None, form: str) -> str:
@@ -137,11 +163,13 @@ def factors(results: Results) -> Iterator[Claim]:
     made = of_scenes(results, "rates")
     ours = {s: rate_ratio(made[s]["points"], SI, REFERENCE, None) for s in theirs.RATE_JPEG2000 if s in made}
     if ours:
-        what = "JPEG 2000's rate over SI-PVS's, at the best quality of JPEG 2000 up to 1 bpp that SI-PVS has too"
+        what = "rate of JPEG 2000 over SI-PVS's, at JPEG 2000's best quality up to 1 bpp, times"
         yield claim("5.10", what, theirs.RATE_JPEG2000, ours, ".0f", only="size")
     ours = {s: rate_ratio(made[s]["points"], SI, VOLUME, 30.0) for s in made}
     if ours:
-        yield claim("5.10", "SI-PVI's rate over SI-PVS's at 30 dB", theirs.RATE_VOLUME, ours, ".1f", only="size")
+        yield claim(
+            "5.10", "rate of SI-PVI over SI-PVS's at 30 dB, times", theirs.RATE_VOLUME, ours, ".1f", only="size"
+        )
 
 
 def rate_ratio(points: Points, scheme: str, other: str, quality: float | None) -> float | None:
@@ -183,9 +211,7 @@ def orders(results: Results) -> Iterator[Claim]:
         ours = {
             order: gain(result["points"], f"{SI},order={order}", f"{SI},order=parallel") for order in theirs.ORDERS
         }
-        verdict = compare(theirs.ORDERS, ours, only="order")
-        best = "parallel > row > zigzag, spiral > column"
-        yield Claim("5.11", f"orders, {scene}, dB against parallel", best, listed(ours, "+.2f"), verdict)
+        yield ranked("5.11", "orders", theirs.ORDERS, ours, "+.2f", scene=scene)
 
 
 def duels(results: Results) -> Iterator[Claim]:
@@ -195,15 +221,9 @@ def duels(results: Results) -> Iterator[Claim]:
             continue
         made = results[f"plane-{scene}-1"]["duels"]
         ours = {str(duel["side"]): advantage(duel) for duel in made}
-        lead = [side for side, value in theirs.DUELS.items() if value > 0]
-        found = Claim(
-            "5.12",
-            f"SI-PVS over EI-PVS by pixels of an EI, {scene}, dB",
-            "+ for " + ", ".join(lead) + ", − for the rest",
-            " · ".join(f"{duel['side']} {words(duel)}" for duel in made),
-            compare({side: theirs.DUELS[side] for side in ours}, ours, only="sign"),
-        )
-        yield found
+        verdict = compare({side: theirs.DUELS[side] for side in ours}, ours, only="sign")
+        signs = {side: "+" if value > 0 else "−" for side, value in theirs.DUELS.items()}
+        yield Claim("5.12", "lead", scene, signs, {str(duel["side"]): words(duel) for duel in made}, verdict)
 
 
 def advantage(duel: Mapping[str, Any], other: str = "ei") -> float | None:
@@ -233,15 +253,14 @@ def picture_types(results: Results) -> Iterator[Claim]:
     """Compare Table 5.5, without and with B pictures as references."""
     numbers = {f"{i}{j}": theirs.TYPES[i][j] for i in range(len(GOPS)) for j in range(len(BFRAMES))}
     for step, what, more in (
-        ("types-apples", "picture types and GOP, dB", ()),
-        ("types-as-references-apples", "the same, B predict B, dB", ("pyramid=1",)),
+        ("types-apples", "picture types", ()),
+        ("types-as-references-apples", "picture types, B predict B", ("pyramid=1",)),
     ):
         if step not in results:
             continue
         table = type_table(results[step], *more)
         ours = {f"{i}{j}": table[i][j] for i in range(len(GOPS)) for j in range(len(BFRAMES))}
-        cells = [" ".join(shown(value, "+.2f") for value in row) for row in (theirs.TYPES[0], table[0])]
-        yield Claim("Table 5.5", f"{what} (row J)", cells[0], cells[1], compare(numbers, ours))
+        yield claim("Table 5.5", what, numbers, ours, "+.2f", scene="apples")
 
 
 def ranges(results: Results) -> Iterator[Claim]:
@@ -254,12 +273,12 @@ def ranges(results: Results) -> Iterator[Claim]:
         names = [str(r) for r in RANGES]
         ours = {n: gain(points, scheme, schemes[0]) for n, scheme in zip(names, schemes, strict=True)}
         numbers = dict(zip(names, theirs.RANGE_DB[scene], strict=True))
-        yield claim("Table 5.6", f"motion range, {scene}, dB", numbers, ours, "+.2f")
+        yield claim("Table 5.6", "dB", numbers, ours, "+.2f", scene=scene)
         took = {
             n: seconds(points, scheme) / seconds(points, schemes[0]) for n, scheme in zip(names, schemes, strict=True)
         }
         numbers = dict(zip(names, theirs.RANGE_TIME[scene], strict=True))
-        yield claim("Table 5.6", f"motion range, {scene}, times", numbers, took, ".1f", only="order size")
+        yield claim("Table 5.6", "times", numbers, took, ".1f", scene=scene, only="order size")
 
 
 def seconds(points: Points, scheme: str, what: str = "encode_seconds") -> float:
@@ -277,12 +296,13 @@ def controls(results: Results) -> Iterator[Claim]:
         first = f"{SI},rate={CONTROLS[0]}"
         schemes = {name: f"{SI},rate={name}" for name in CONTROLS[1:]}
         better = {name: gain(points, scheme, first) for name, scheme in schemes.items()}
-        yield claim("Table 5.7", f"rate control against CBR, {scene}, dB", theirs.CONTROL_DB[scene], better, "+.2f")
+        yield claim("Table 5.7", "dB", theirs.CONTROL_DB[scene], better, "+.2f", scene=scene)
         took = {name: seconds(points, scheme) / seconds(points, first) for name, scheme in schemes.items()}
         numbers = theirs.CONTROL_TIME[scene]
-        yield claim("Table 5.7", f"rate control, {scene}, times", numbers, took, ".2f", only="order size")
+        yield claim("Table 5.7", "times", numbers, took, ".2f", scene=scene, only="order size")
 
 
+MODEL_TIME = "SI-PVI by the verification model"
 TIMED = {
     "SI-PVS": SI,
     "JPEG 2000": REFERENCE,
@@ -299,16 +319,14 @@ def times(results: Results) -> Iterator[Claim]:
         ours = {name: value / own["SI-PVS"] for name, value in own.items() if name != "SI-PVS"}
         column = list(SCENES).index(scene)
         numbers = {name: theirs.ENCODE[name][column] / theirs.ENCODE["SI-PVS"][column] for name in ours}
-        what = f"time of encoding over SI-PVS's, {scene}"
-        yield claim("Table 5.8", what, numbers, ours, ".3g", only="order size")
+        yield claim("Table 5.8", "times", numbers, ours, ".3g", scene=scene, only="order size")
     volumes, made = of_scenes(results, "volume"), of_scenes(results, "rates")
     both = [scene for scene in volumes if scene in made]
     if both:
         ours = {s: seconds(volumes[s]["points"], MODEL) / seconds(made[s]["points"], SI) for s in both}
         columns = {scene: list(SCENES).index(scene) for scene in both}
         numbers = {s: theirs.ENCODE["SI-PVI"][i] / theirs.ENCODE["SI-PVS"][i] for s, i in columns.items()}
-        what = "time of SI-PVI by the verification model over SI-PVS's"
-        yield claim("Table 5.8", what, numbers, ours, ".3g", only="order size")
+        yield claim("Table 5.8", MODEL_TIME, numbers, ours, ".3g", only="order size")
 
 
 def views(results: Results) -> Iterator[Claim]:
@@ -317,49 +335,33 @@ def views(results: Results) -> Iterator[Claim]:
         places = theirs.VIEW_PLACES[scene]
         ranks = {name: float(-place) for place, names in enumerate(places) for name in names}
         ours = {NAMES[p["scheme"]]: p["q_view"] for p in result["points"] if p["reached"]}
-        yield Claim(
-            "5.19",
-            f"Q_view at 0.15 bpp, {scene}",
-            " > ".join(" = ".join(names) for names in places),
-            listed(dict(sorted(ours.items(), key=lambda item: -item[1])), ".3f"),
-            compare(ranks, ours, only="order", even=EVEN_VIEW),
-        )
+        yield ranked("5.19", "Q_view", ranks, ours, ".3f", scene=scene, even=EVEN_VIEW)
 
 
 def depths(results: Results) -> Iterator[Claim]:
     """Compare Figures 5.20 to 5.23, which the dissertation has for *Apples* alone."""
     for scene, result in of_scenes(results, "equal").items():
-        but = "" if scene == "apples" else " (Apples)"
         rows = {NAMES[row["scheme"]]: row for row in result["rows"]}
         if scene == "apples":
             ours = {name: rows[name]["bpp"] for name in theirs.RATE_28_DB}
-            quality = listed({name: row["q_global"] for name, row in rows.items()}, ".1f")
-            what = f"bpp for 28 dB, {scene} (ours have {quality})"
-            yield claim("5.20", what, theirs.RATE_28_DB, ours, ".2f", only="order size")
+            yield claim("5.20", "bpp for 28 dB", theirs.RATE_28_DB, ours, ".2f", scene=scene, only="order size")
         for key, held, how in (
-            ("q_depth", "depth_pixels", ""),
-            ("q_depth_focus", "focus_pixels", ", depth by focus"),
+            ("q_depth", "depth_pixels", "true depth"),
+            ("q_depth_focus", "focus_pixels", "depth by focus"),
         ):
             if held not in result:
                 continue
             pixels = np.array(result[held])
             layers = {name: np.array([number(v) for v in row[key]]) for name, row in rows.items()}
             lost = {name: decline(layers[name], pixels) for name in theirs.DECLINE}
-            what = f"decline of Q_depth from near to far at equal Q_global, {scene}{how}, dB"
-            words = f"EI, JPEG 2000 > SI{but}"
-            yield Claim("5.21", what, words, listed(lost, "+.1f"), compare(theirs.DECLINE, lost, only="order"))
+            yield ranked("5.21", f"decline, {how}", theirs.DECLINE, lost, "+.1f", scene=scene)
             spread = {name: fluctuation(layers[name], pixels) for name in theirs.FLUCTUATION}
-            what = f"fluctuation of Q_depth at equal Q_global, {scene}{how}, dB"
-            words = f"EI, JPEG 2000 > SI > PVI{but}"
-            yield Claim("5.21", what, words, listed(spread, ".1f"), compare(theirs.FLUCTUATION, spread, only="order"))
+            yield ranked("5.21", f"fluctuation, {how}", theirs.FLUCTUATION, spread, ".1f", scene=scene)
     for scene, result in of_scenes(results, "views").items():
         for quality, word in (("q_depth_mean", "mean"), ("q_depth_min", "least")):
             for chroma, scheme in (("4:2:0", SI), ("4:4:4", "si-h264")):
-                value = gain(result["points"], scheme, REFERENCE, quality)
-                verdict = compare({"x": 1.0}, {"x": value}, only="sign")
-                what = f"{word} Q_depth of SI-PVS over JPEG 2000's, {scene}, {chroma}, dB"
-                words = "+" if scene == "apples" else "+ (Apples)"
-                yield Claim("5.23", what, words, shown(value, "+.1f"), verdict)
+                ours = {scene: gain(result["points"], scheme, REFERENCE, quality)}
+                yield ranked("5.23", f"{word}, {chroma}", {scene: 1.0}, ours, "+.1f", scene=scene, only="sign")
 
 
 def pooled(values: np.ndarray, pixels: np.ndarray) -> float:

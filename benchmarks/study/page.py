@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import gzip
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 from benchmarks.coding import coders
-from benchmarks.coding.coders import ANCHOR
 from benchmarks.coding.rd import climbing
 from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, filled
-from benchmarks.records import ROOT, origin, with_commits
+from benchmarks.records import ROOT, origin
 from ii_core.base.files import atomic_path
 from ii_core.base.json_lines import lines_of, read_records
 from metrics import bd_psnr, bd_rate
 from metrics.rates.rd import UndefinedDifference
 
-from . import theirs
+from . import beside, theirs
 from .charts import LABELS, draw_all
 from .claims import Claim, Results, by_detail, claims, gain, of_scenes, shown, type_table
 from .coding import SCENES
@@ -31,18 +31,8 @@ PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "stu
 ENDING = ".jsonl.gz"  # suffix of published records, compressed to a sixth of their size
 CODERS_SCALE = 4
 PHOTOGRAPHS = {"component-images": ".jpg", "other-cameras": ".jpg", "artefacts-": ".webp", "equal-": ".webp"}
+TIMED_RATES = (0.015, 0.15, 0.63, 1.5)  # bpp
 OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
-# Figures by part of the page.
-SECTIONS = {
-    "rates": ("5.10",),
-    "orders": ("5.11",),
-    "structures": ("5.12",),
-    "types": ("Table 5.5",),
-    "settings": ("Table 5.6", "Table 5.7"),
-    "times": ("Table 5.8",),
-    "views": ("5.19",),
-    "depths": ("5.20", "5.21", "5.23"),
-}
 
 
 def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Path = KEPT) -> None:
@@ -72,7 +62,7 @@ def tables(kept: Path = KEPT) -> Tables:
         **shown_tables(results, best),
         "gain-by-size": sizes(everything),
         "view-by-size": views_by_size(everything),
-        "bjontegaard": bjontegaard(coders.RECORDS.rows(scale=CODERS_SCALE)),
+        "gains-coders": coder_gains(coders.RECORDS.rows(scale=CODERS_SCALE)),
     }
     return {("docs/study.md", mark): lines for mark, lines in made.items()}
 
@@ -111,14 +101,14 @@ def largest(some: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
 
 
 def sizes(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
-    """Return a table of the gain of SI-PVS over JPEG 2000 by number of lenses, from all measured sizes."""
+    """Return a table of the gain of SI-PVS over JPEG 2000 by number of lenses, below full size."""
     found: dict[tuple[str, int], str] = {}
     for scene in SCENES:
         for record in everything.get(f"rates-{scene}", ()):
             points = record["result"]["points"]
             pair = (gain(points, scheme, REFERENCE) for scheme in (SI, "si-h264"))
             found[scene, record["parameters"]["scale"]] = " · ".join(shown(value, "+.1f") for value in pair)
-    scales = sorted({scale for _, scale in found}, reverse=True)
+    scales = sorted({scale for _, scale in found if scale > 1}, reverse=True)
     lines = ["| lenses | " + " | ".join(SCENES) + " |", "|---" * (len(SCENES) + 1) + "|"]
     for scale in scales:
         cells = [found.get((scene, scale), "") for scene in SCENES]
@@ -127,7 +117,7 @@ def sizes(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
 
 
 def views_by_size(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
-    """Return a table of Q_view at 0.15 bpp of sub-images and elementary images by number of lenses of setup 3."""
+    """Return a table of Q_view at 0.15 bpp of sub-images and elementary images by lenses, below full setup 3."""
     found: dict[tuple[str, int], str] = {}
     for scene in SCENES:
         for record in everything.get(f"artefacts-{scene}", ()):
@@ -136,7 +126,7 @@ def views_by_size(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list
             cell = " · ".join(f"{p['q_view']:.3f}" + ("" if p["reached"] else f" ({p['bpp']:.2f} bpp)") for p in pair)
             found[scene, record["parameters"]["scale"]] = cell
     lines = ["| lenses | " + " | ".join(SCENES) + " |", "|---" * (len(SCENES) + 1) + "|"]
-    for scale in sorted({scale for _, scale in found}, reverse=True):
+    for scale in sorted({scale for _, scale in found if scale > 1}, reverse=True):
         cells = [found.get((scene, scale), "") for scene in SCENES]
         lines.append(f"| {64 // scale}×{64 // scale} | " + " | ".join(cells) + " |")
     return lines
@@ -161,14 +151,9 @@ def smaller(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
 def shown_tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
     """Return the lines of each mark of the page."""
     made = claims(results)
-    parts = {
-        f"claims-{name}": claim_table(claim for claim in made if claim.figure in figures)
-        for name, figures in SECTIONS.items()
-    }
     return {
-        "smaller": smaller(best),
-        "agreement": summary(made),
-        **parts,
+        "agreement": [*summary(made), "", *smaller(best)],
+        **beside.tables(made),
         "gains-modern": gains_modern(results),
         "table-types": types_beside(results),
         "volume-model": volume_table(results),
@@ -181,15 +166,6 @@ def shown_tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dic
         "artefact-rates": artefact_table(results),
         "records": record_table(best),
     }
-
-
-def claim_table(made: Iterable[Claim]) -> list[str]:
-    """Return a table with one row per claim."""
-    lines = ["| Olsson 2008 | what | theirs | ours | sign | order | size |", "|---|---|---|---|---|---|---|"]
-    return lines + [
-        f"| {called(c.figure)} | {c.what} | {c.theirs} | {c.ours} | " + " | ".join(c.verdict.cells()) + " |"
-        for c in made
-    ]
 
 
 def called(figure: str) -> str:
@@ -244,42 +220,54 @@ def volume_table(results: Results) -> list[str]:
 
 
 def framing_table(results: Results) -> list[str]:
-    """Return a table of the least rate of EI-PVS by container."""
+    """Return a table of the least rate of EI-PVS by container, in bpp."""
     if "framing" not in results:
         return []
-    lines = ["| file | bytes a frame | bpp | with delimiters | bpp |", "|---|---|---|---|---|"]
     rows = results["framing"]["rows"]
-    for container in dict.fromkeys(row["container"] for row in rows):
-        cells = [f"{row['bytes']:.1f} | {row['bpp']:.2f}" for row in rows if row["container"] == container]
-        name = "the stream alone" if container == "h264" else container.upper()
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return lines
+    by_container: dict[str, list[str]] = {}
+    for row in rows:
+        by_container.setdefault(row["container"], []).append(f"{row['bpp']:.2f}")
+    heads = ["the stream alone" if name == "h264" else name.upper() for name in by_container]
+    return beside.grid(["", *heads], [["bpp", *map(" · ".join, by_container.values())]])
 
 
 def search_table(results: Results) -> list[str]:
-    """Return a table of time and rate against a range of 16, for both searches."""
-    lines = ["| | search | " + " | ".join(str(r) for r in RANGES) + " |", "|---" * (len(RANGES) + 2) + "|"]
+    """Return a table of time and rate against the least range, for both searches."""
+    lines = ["| | search | " + " | ".join(str(r) for r in RANGES[1:]) + " |", "|---" * (len(RANGES) + 1) + "|"]
     for scene in SCENES:
         rows = results.get(f"search-{scene}", {}).get("rows", [])
         for search in dict.fromkeys(row["search"] for row in rows):
             own = [row for row in rows if row["search"] == search]
             cells = [
                 f"×{row['seconds'] / own[0]['seconds']:.1f}, {100 * (row['bytes'] / own[0]['bytes'] - 1):+.1f} %"
-                for row in own
+                for row in own[1:]
             ]
             lines.append(f"| {scene} | {search} | " + " | ".join(cells).replace("-", "−") + " |")
     return lines
 
 
 def table_2008(results: Results) -> list[str]:
-    """Return a table of the gain of B pictures with x264 of today and of 2008, by size of the picture."""
+    """Return a table of the gain of coarser B pictures with x264 of today and of 2008, by size of the picture."""
     there = [results[name] for name in OLDER if name in results]
-    lines = ["| x264 set as | | " + " | ".join("{}×{} lenses".format(*one["lenses"]) for one in there) + " |"]
-    lines.append("|---" * (2 + len(there)) + "|")
+    lines = ["| x264 set as | " + " | ".join("{}×{} lenses".format(*one["lenses"]) for one in there) + " |"]
+    lines.append("|---" * (1 + len(there)) + "|")
+    lower: list[float] = []  # dB of B pictures as fine as P below those of coarser ones
+    by_set: dict[str, list[Sequence[float]]] = {}
     for rows in zip(*(one["rows"] for one in there), strict=True):
-        cells = [" · ".join(shown(value, "+.2f") for value in row["db"]) for row in rows]
-        lines.append(f"| {rows[0]['set']} | {rows[0]['b']} | " + " | ".join(cells) + " |")
-    return lines if there else []
+        values = [row["db"] for row in rows]
+        coarser = by_set.setdefault(rows[0]["set"], values)
+        if coarser is values:
+            cells = [" · ".join(shown(value, "+.2f") for value in row) for row in values]
+            lines.append(f"| {rows[0]['set']} | " + " | ".join(cells) + " |")
+        else:
+            lower += [
+                a - b
+                for first, second in zip(coarser, values, strict=True)
+                for a, b in zip(first, second, strict=True)
+            ]
+    if not there:
+        return []
+    return [*lines, "", f"B pictures as fine as P: {min(lower):.2f}–{max(lower):.2f} dB less in each case."]
 
 
 def time_table(results: Results) -> list[str]:
@@ -288,7 +276,7 @@ def time_table(results: Results) -> list[str]:
     if not made:
         return []
     points = next(iter(made.values()))["points"]
-    rates = sorted({p["target_bpp"] for p in points if p["scheme"] == REFERENCE})
+    rates = sorted({p["target_bpp"] for p in points if p["scheme"] == REFERENCE}.intersection(TIMED_RATES))
     lines = ["| | " + " | ".join(f"{rate:g} bpp" for rate in rates) + " |", "|---" * (len(rates) + 1) + "|"]
     for scheme in (SI, REFERENCE):
         own = {p["target_bpp"]: p for p in points if p["scheme"] == scheme}
@@ -300,9 +288,10 @@ def time_table(results: Results) -> list[str]:
 
 
 def frame_table(results: Results) -> list[str]:
-    """Return a table of the time per elementary image by their number."""
+    """Return a table of the time per elementary image for the least and the largest number of them."""
     rows = results.get("frames", {}).get("rows", [])
     counts = sorted({row["frames"] for row in rows})
+    counts = counts[:: len(counts) - 1 or 1]
     lines = ["| frames | " + " | ".join(map(str, counts)) + " |", "|---" * (len(counts) + 1) + "|"]
     for what in dict.fromkeys(row["set"] for row in rows):
         own = {row["frames"]: 1e6 * row["seconds"] / row["frames"] for row in rows if row["set"] == what}
@@ -321,13 +310,14 @@ def detail_table(results: Results) -> list[str]:
         cells = []
         for scene in scenes:
             row, depth_mm = judged[scene]["rows"][place]["q_depth"], judged[scene]["depth_mm"]
-            cells.append("{:.1f} · {:.2f} · {:.1f}".format(*by_detail(row, depth_mm, detail[scene])))
+            _, correlation, left = by_detail(row, depth_mm, detail[scene])
+            cells.append(f"{correlation:.2f} · {left:.1f}")
         lines.append(f"| {LABELS[first['scheme']]} | " + " | ".join(cells).replace("-", "−") + " |")
     return lines
 
 
 def artefact_table(results: Results) -> list[str]:
-    """Return a table of rate and quality of the pictures of Figures 5.13 to 5.18."""
+    """Return PSNR of the front view and Q_view of the pictures of Figures 5.13 to 5.18, with a rate not reached."""
     steps = {"setup 1, apples": "artefacts-setup1", **{f"setup 3, {s}": f"artefacts-{s}" for s in SCENES}}
     there = {what: results[step] for what, step in steps.items() if step in results}
     if not there:
@@ -335,7 +325,10 @@ def artefact_table(results: Results) -> list[str]:
     schemes = [p["scheme"] for p in next(iter(there.values()))["points"]]
     lines = ["| | " + " | ".join(LABELS[s] for s in schemes) + " |", "|---" * (len(schemes) + 1) + "|"]
     for what, result in there.items():
-        cells = [f"{p['bpp']:.2f} bpp, {p['front_db']:.1f} dB, {p['q_view']:.3f}" for p in result["points"]]
+        cells = [
+            f"{p['front_db']:.1f} · {p['q_view']:.3f}" + ("" if p["reached"] else f" ({p['bpp']:.2f} bpp)")
+            for p in result["points"]
+        ]
         lines.append(f"| {what} | " + " | ".join(cells) + " |")
     return lines
 
@@ -359,24 +352,21 @@ def gains_modern(results: Results) -> list[str]:
     return lines
 
 
-def bjontegaard(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return a table of all schemes of `coders`: rate to SI-PVS and JPEG 2000, and gain in dB."""
+def coder_gains(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the mean gain over JPEG 2000 of all schemes of `coders` at their default options, best first."""
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     curves = {(row["scene"], row["scheme"]): pairs(row["points"]) for row in rows}
-    lines, commits = ["| scheme | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"], []
-    for scheme in dict.fromkeys(row["scheme"] for row in rows if ":" not in row["scheme"]):
-        cells = []
-        for scene in scenes:
-            own = curves.get((scene, scheme), [])
-            first, second = (curves.get((scene, anchor), []) for anchor in (ANCHOR, REFERENCE))
-            cells.append(f"{rate_cell(first, own)} · {rate_cell(second, own)} · {gain_cell(second, own)}")
-        lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
-        commits.append([row["commit"] for row in rows if row["scheme"] == scheme])
-    conditions = (
-        f"Setup 1 at scale {CODERS_SCALE}: rate at equal quality against `{ANCHOR}` · against `jpeg2000`, "
-        "and mean gain over JPEG 2000 at equal rate."
+    found = {
+        scheme: [bd_gain(curves.get((scene, REFERENCE), []), curves.get((scene, scheme), [])) for scene in scenes]
+        for scheme in dict.fromkeys(row["scheme"] for row in rows if ":" not in row["scheme"])
+        if scheme != REFERENCE
+    }
+    ranked = sorted(
+        found.items(), key=lambda item: -fmean([value for value in item[1] if value is not None] or [-99])
     )
-    return [conditions, origin(rows), "", *with_commits(lines, commits)]
+    lines = ["| dB | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"]
+    lines += [f"| `{name}` | " + " | ".join(shown(value, "+.1f") for value in row) + " |" for name, row in ranked]
+    return [*lines, "", origin(rows)]
 
 
 def pairs(points: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
@@ -386,31 +376,30 @@ def pairs(points: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
 
 
 def rate_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float, float]]) -> str:
-    """Return the Bjøntegaard rate, or a dash if it is undefined."""
+    """Return the Bjøntegaard rate in percent, or a dash if it is undefined."""
     try:
-        return f"{bd_rate(*zip(*anchor, strict=True), *zip(*curve, strict=True)):+.0f} %".replace("-", "−")
+        return shown(bd_rate(*zip(*anchor, strict=True), *zip(*curve, strict=True)), "+.0f")
     except (UndefinedDifference, TypeError):
         return "–"
 
 
-def gain_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float, float]]) -> str:
-    """Return the Bjøntegaard gain in dB, or a dash if it is undefined."""
+def bd_gain(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float, float]]) -> float | None:
+    """Return the Bjøntegaard gain in dB, or None if it is undefined."""
     try:
-        return f"{bd_psnr(*zip(*anchor, strict=True), *zip(*curve, strict=True)):+.1f} dB".replace("-", "−")
+        return bd_psnr(*zip(*anchor, strict=True), *zip(*curve, strict=True))
     except (UndefinedDifference, TypeError):
-        return "–"
+        return None
 
 
 def record_table(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Return a table of provenance: step, scale, commit, time."""
-    lines = ["| step | shows | scale | commit | CPU s | again |", "|---|---|---|---|---|---|"]
+    """Return the records by the commit that measured them, with CPU seconds; a tick if a repetition was equal."""
+    by_commit: dict[str, list[str]] = {}
     for name, record in best.items():
         git = record["git"] or {"commit": "none", "dirty": False}
-        commit = git["commit"][:10] + (", dirty" if git["dirty"] else "")
-        again = {True: "the same to the bit", False: "**not the same**", None: ""}[record.get("repeats")]
-        scale = record["parameters"].get("scale", "")
+        again = {True: " ✓", False: " **not the same**", None: ""}[record.get("repeats")]
+        seconds = f" {record['cpu_seconds']:.0f}" if "cpu_seconds" in record else ""
         link = f"[{name}](../benchmarks/results/study/{name}{ENDING})"
-        lines.append(
-            f"| {link} | {record['shows']} | {scale} | {commit} | {record.get('cpu_seconds', '')} | {again} |"
-        )
-    return lines
+        commit = git["commit"][:10] + (", dirty" if git["dirty"] else "")
+        by_commit.setdefault(commit, []).append(f"{link}{seconds}{again}")
+    lines = ["| commit | records, CPU seconds |", "|---|---|"]
+    return lines + [f"| {commit} | {', '.join(records)} |" for commit, records in by_commit.items()]

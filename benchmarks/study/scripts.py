@@ -18,7 +18,7 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("cameras", "Figures 3.6, 3.7, 5.9: every camera with its maps, all scenes", ()),
     ("concepts", "Figures 2.24, 5.4: component images, orders", ()),
     ("camera_in_scene", "Table 3.2: a camera of glass inside the scene", ()),
-    ("demo", "the README's chart", ()),
+    ("demo", "the tutorial's chart and pictures", ()),
     ("demo", "the same at full size", ("--scale", "1", "-o", "out/full")),
     ("disparity", "occlusion and texture of scenes against their gain", ("--scenes", "apples,twins,car,cuboid")),
     ("orders", "Table 5.4", ()),
@@ -38,7 +38,7 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("texture_filter", "cost and benefit of filtered textures", ()),
     ("metrics_speed", "cost of metrics", ()),
     ("ratios", "ratios to bare libraries", ()),
-    ("readme", "tables of the README", ()),
+    ("readme", "tables of the README, gains, speed ratios", ()),
 )
 
 

@@ -66,10 +66,6 @@ class Verdict:
     order: tuple[int, int]
     size: tuple[int, int]
 
-    def cells(self) -> list[str]:
-        """Return three cells of a table."""
-        return [said(*pair) for pair in (self.sign, self.order, self.size)]
-
 
 def compare(
     theirs: Mapping[str, float], ours: Mapping[str, float | None], *, only: str = "sign order size", even: float = 0.0

@@ -1,7 +1,7 @@
 """What the site does to the pages of docs/, so that the same pages read well in the repository.
 
-A link out of docs/, to a script or to measured numbers, leads to that file: the site carries it along. A still of the
-gallery leads to its page, which `make docs` makes. A public name that the reference lacks is a warning.
+The site has a plain copy of every file outside docs/ that a page links to. A still of the gallery leads to its viewer
+page, if `make gallery` has made it. A public name that the reference lacks is a warning.
 """
 
 from __future__ import annotations
@@ -13,29 +13,42 @@ from pathlib import Path
 from typing import Any
 
 from mkdocs.structure.files import File, Files
+from mkdocs.utils import is_markdown_file
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-OUTWARD = re.compile(r"\]\((?P<path>(?:\.\./)+[^)#\s]+)")
+OUTWARD = re.compile(r"\]\((?P<path>(?:\.\./)+[^)#\s]+)(?P<anchor>#[^)\s]*)?")
 STILL = re.compile(r"!\[\w+\]\((?P<name>\w+)\.jpg\)")
 log = logging.getLogger("mkdocs.hooks.docs")
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
-    """Turn links to files outside docs/ into links to copies in the site."""
+    """Turn links to files outside docs/ into links to plain copies in the site.
+
+    Copies of Markdown files end in ``.txt``: MkDocs renders files by their ending, and fails on a page that it meets
+    after it has read the others. Anchors are dropped, for plain text has none.
+    """
 
     def inside(match: re.Match[str]) -> str:
         path = (DOCS / page.file.src_uri).parent.joinpath(match["path"]).resolve()
         if not path.is_file() or path.is_relative_to(DOCS) or not path.is_relative_to(ROOT):
             return match[0]  # the build finds out whether that is a dead link
         uri = f"source/{path.relative_to(ROOT).as_posix()}"
+        if is_markdown_file(uri):
+            uri += ".txt"
         if files.get_file_from_path(uri) is None:
             files.append(File.generated(config, uri, abs_src_path=str(path)))
         return f"]({'../' * page.file.src_uri.count('/')}{uri}"
 
     if page.file.src_uri == "gallery/README.md":
-        markdown = STILL.sub(r"[\g<0>](\g<name>.html)", markdown)
+        markdown = STILL.sub(linked_still, markdown)
     return OUTWARD.sub(inside, markdown)
+
+
+def linked_still(match: re.Match[str]) -> str:
+    """Return a still of the gallery as a link to its viewer page, or alone if there is no such page."""
+    page = f"{match['name']}.html"
+    return f"[{match[0]}]({page})" if (DOCS / "gallery" / page).is_file() else match[0]
 
 
 def on_page_content(html: str, page: Any, config: Any, files: Files) -> None:

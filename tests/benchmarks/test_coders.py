@@ -5,7 +5,7 @@ from itertools import combinations
 import pytest
 from matplotlib.figure import Figure
 
-from benchmarks.coding.coders import LETTERS, offsets, summary, table, touch
+from benchmarks.coding.coders import LETTERS, offsets, shortened, summary, table, touch
 
 ROWS = [
     {"scene": scene, "scheme": scheme, "bd_rate": rate, "seconds": seconds, "commit": "abcdef0"}
@@ -28,7 +28,24 @@ def test_the_mean_rate_needs_all_scenes():
 
 
 def test_a_scene_that_was_not_measured_is_a_dash():
-    assert "| `once` | -90 % | – | – | 2.00 |" in table(ROWS)
+    assert "| `once` | -90 | – | – | 2.00 |" in table(ROWS)
+
+
+def test_the_short_table_has_the_best_setting_of_each_scheme_that_is_no_si_scheme():
+    rates = {
+        "si-a:best": 10.2,
+        "si-a:fast": 30.0,
+        "si-a": 10.4,
+        "ei-a:best": 40.0,
+        "ei-a": 50.0,
+        "b:best": None,
+        "b": None,
+    }
+    rows = [
+        {"scene": "car", "scheme": name, "bd_rate": rate, "seconds": 1.0, "commit": "abcdef0"}
+        for name, rate in rates.items()
+    ]
+    assert [row["scheme"] for row in shortened(summary(rows))] == ["si-a", "si-a:fast", "ei-a:best", "b"]
 
 
 def test_labels_of_neighbouring_points_do_not_overlap():

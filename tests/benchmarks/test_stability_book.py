@@ -6,6 +6,7 @@ import pytest
 
 from benchmarks.stability import __main__ as book
 from benchmarks.stability import curves, depth, geometry, light, picture
+from benchmarks.stability.excerpts import EXCERPTS, Excerpt
 from raytrace_ii.tracing.lift import LIFT
 
 ROOT = Path(__file__).parents[2]
@@ -120,9 +121,24 @@ def test_tables_hold_every_row():
     assert book.table(rows, (("b",), "a", ("c",)))[0] == "| b | 1: c |", "columns of numbers"
 
 
+def test_excerpts_hold_chosen_rows_and_columns_with_the_swept_quantity_across():
+    rows = [{"a": 1e-5, "b": True, "c": 2}, {"a": 0.5, "b": None, "c": 3}, {"a": None, "b": False, "c": 4}]
+    part = Excerpt(keep={"a": (1e-5, None)}, columns=("a", "b")).of(rows)
+    assert part == [{"a": 1e-5, "b": True}, {"a": None, "b": False}]
+    assert book.table(book.across(part)) == ["| a | 1e-05 | – |", "|---|---|---|", "| b | yes | no |"]
+
+
+@pytest.mark.parametrize("name", EXCERPTS)
+def test_excerpts_name_values_and_columns_that_are_measured(name):
+    rows, excerpt = book.measured()[name]["rows"], EXCERPTS[name]
+    assert set(excerpt.columns) | set(excerpt.keep) <= set(rows[0])
+    for column, values in excerpt.keep.items():
+        assert all(Excerpt(keep={column: (value,)}).of(rows) for value in values), column
+
+
 def test_every_case_has_a_table_on_the_page():
     page = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
-    for name in [*book.CASES, "convergence"]:
+    for name in [*book.CASES, "convergence", "origins"]:
         assert page.count(f"<!-- {name} -->\n") == page.count(f"<!-- /{name} -->") == 1, name
     assert {case for case, *_ in book.PANELS} <= set(book.CASES)
     assert pytest.approx(4e-6) == LIFT, "the page says 4·10⁻⁶"

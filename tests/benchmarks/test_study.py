@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.pages.tables import filled
 from benchmarks.registry import BENCHMARKS
-from benchmarks.study import claims, reasons, theirs
+from benchmarks.study import beside, claims, reasons, theirs
 from benchmarks.study.__main__ import main
 from benchmarks.study.page import PAGE, largest, publish, tables
 from benchmarks.study.runner import Step, code_of, known, perform, records, timeless
@@ -98,10 +98,7 @@ def test_a_small_study_resumes_repeats_and_fills_the_page(tmp_path, capsys):
         lines = gzip.decompress((tmp_path / "kept" / "floors.jsonl.gz").read_bytes()).splitlines()
         assert [json.loads(line).get("repeats") for line in lines] == [None, True]
     assert (tmp_path / "images" / "artefacts-setup1_views.webp").exists()
-    assert (
-        "| Fig. 5.10 | lowest rate of a black picture, bpp | EI-PVS 0.63 | EI-PVS 0.31 |  |  | no |"
-        in page.read_text()
-    )
+    assert "Lowest rate of a black picture, bpp, by EI-PVS: 0.63 · 0.31." in page.read_text()
 
 
 def test_a_small_study_does_not_replace_a_large_one():
@@ -197,6 +194,19 @@ def test_the_lower_rate_wins_without_a_common_rate():
     assert claims.advantage(duel(None, 0.1, None)) == 1 and claims.words(duel(None, 0.1, None)) == "SI alone"
     assert claims.advantage(duel(None, None, 0.05)) == -1
     assert claims.advantage(duel(None, None, None)) is None
+
+
+def test_a_cell_holds_their_number_and_ours():
+    four = [
+        claims.claim("5.10", "lead", {"car": 4.0, "apples": 5.0}, {"car": value}, "+.1f") for value in (3.0, None)
+    ]
+    assert beside.cell("car", *four) == "+4.0 · +3.0 · –" and beside.cell("apples", *four) == ""
+    assert beside.rates(four) == [
+        "|  | apples | twins | car | cuboid |", "|---|---|---|---|---|", "| lead |  |  | +4.0 · +3.0 · – |  |"
+    ]  # fmt: skip
+    signs = claims.ranked("5.23", "mean", {"car": 1.0}, {"car": -2.0}, "+.1f", scene="car", only="sign")
+    assert signs.verdict.sign == (0, 1) and beside.by_what([signs]) == ["|  | mean |", "|---|---|", "| car | −2.0 |"]
+    assert all(not lines for lines in beside.tables([]).values())
 
 
 def test_decline_and_fluctuation_over_depth():

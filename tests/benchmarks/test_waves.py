@@ -23,8 +23,8 @@ def test_crossing_is_interpolated():
         {"value": 1.0, "pixel_over_spread": 2.0, "rays_db": 30.0},
         {"value": 4.0, "pixel_over_spread": 8.0, "rays_db": 50.0},
     ]
-    assert waves.crossing(points, "rays_db") == "2 (pixel of 4.0 λΛ/δL)"
-    assert waves.crossing(points[1:], "rays_db") == "nowhere: always above"
+    assert waves.crossing(points, "rays_db") == "2 (4.0 λΛ/δL)"
+    assert waves.crossing(points[1:], "rays_db") == "always above"
 
 
 def test_round_kernels_agree_where_the_field_gives_way_to_airys_pattern():

@@ -26,7 +26,6 @@ from raytrace_ii.files.toml_schema import (  # fmt: skip
     SceneFile,
     TrackTable,
 )
-from raytrace_ii.shapes.implicit_parts import Part
 
 DOCS = (Path(__file__).parents[2] / "docs" / "scenes.md").read_text(encoding="utf-8")
 MODELS = {
@@ -36,22 +35,43 @@ MODELS = {
     "material": MaterialTable,
     "object": ObjectTable,
     "mesh": MeshFile,
-    "parts": Part,
     "animation": AnimationTable,
     "track": TrackTable,
     **{
-        f"{kind} {name}": model
-        for kind, models in (("light", LIGHTS), ("texture", TEXTURES), ("shape", SHAPES), ("part", SHAPE_PARTS))
+        f"{table} {name}": model
+        for table, models in (("light", LIGHTS), ("texture", TEXTURES), ("shape", SHAPES), ("parts", SHAPE_PARTS))
         for name, model in models.items()
     },
 }
-SECTIONS = {
-    " ".join(re.findall(r"`(\w+)`", head)): [
-        (key, default.strip())
-        for key, default in re.findall(r"^\| `(\w+)` \|[^\n]*\| ([^|\n]+) \|$", text, re.M)
-    ]
-    for head, text in re.findall(r"^### (`[^\n]+`)\n(.*?)(?=^##|\Z)", DOCS, re.M | re.S)
-}  # fmt: skip
+
+
+TAGS = {"light": "kind", "texture": "kind", "shape": "shape", "parts": "part"}
+KEY = r"(?P<bold>\*\*)?`(?P<key>\w+)(?: = (?P<value>[^`]+))?`(?:\*\*)?(?: = \*(?P<words>[^*]+)\*)?"
+ITEM = re.compile(rf"^- (?P<keys>{re.sub('P<.*?>', ':', KEY)}(?:, {re.sub('P<.*?>', ':', KEY)})*)"
+                  r"(?: \(\*(?P<kinds>[\w, ]+)\*\))?:", re.M)  # fmt: skip
+
+
+def sections(text):
+    """Return the keys with their defaults of each table, of each kind that its heading lists.
+
+    Defaults are ``...`` for needed keys, None for absent ones, else as on the page, ``*in words*`` too.
+    """
+    found = {}
+    for head, body in re.findall(r"^### (`[^\n]+`)\n(.*?)(?=^##|\Z)", text, re.M | re.S):
+        table, *kinds = re.findall(r"`(\w+)`", head)
+        for kind in kinds or [""]:
+            keys = found[f"{table} {kind}".strip()] = [(TAGS[table], ...)] if kind else []
+            for item in ITEM.finditer(body):
+                of = (item["kinds"] or "").split(", ")
+                assert of == [""] or set(of) < set(kinds), f"{head}: kinds {of}"
+                if of == [""] or kind in of:
+                    for one in re.finditer(KEY, item["keys"]):
+                        words = one["words"] and f"*{one['words']}*"
+                        keys.append((one["key"], ... if one["bold"] else one["value"] or words))
+    return found
+
+
+SECTIONS = sections(DOCS)
 
 
 BALL = """
@@ -70,25 +90,23 @@ def test_every_table_of_a_file_has_its_section():
 
 @pytest.mark.parametrize("name", MODELS)
 def test_every_key_is_documented_with_its_default_and_no_other(name):
-    fields = dict(MODELS[name].model_fields)
-    if name.startswith("part "):
-        fields = {key: field for key, field in fields.items() if key not in Part.model_fields}
+    fields = MODELS[name].model_fields
     documented = dict(SECTIONS[name])
     assert len(documented) == len(SECTIONS[name]), "a key twice"
     assert set(documented) == set(fields)
     for key, said in documented.items():
         field = fields[key]
         if field.default is PydanticUndefined:
-            assert said == "*needed*", key
+            assert said is ..., key
         elif field.default is None:
-            assert said == "*none*", key
+            assert said is None, key
         elif said == "*black*":
             assert field.default == BackgroundTable(horizon="#000000"), key
         elif said.startswith("*linear"):
             numbers = [float(n) for n in re.findall(r"[\d.]+", said)]
             np.testing.assert_allclose(np.ravel(field.default), np.resize(numbers, np.size(field.default)))
         else:
-            value = tomllib.loads(f"x = {said.strip('`')}")["x"]
+            value = tomllib.loads(f"x = {said}")["x"]
             reads = [m.func for m in field.metadata if hasattr(m, "func")] or [
                 TypeAdapter(field.annotation).validate_python
             ]

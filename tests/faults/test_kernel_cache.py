@@ -1,10 +1,18 @@
-"""Cache of compiled kernels: kernels run with any content of the cache, which is repaired."""
+"""Cache of compiled kernels: kernels run with any content of the cache, which is repaired.
 
+A module imported anew has new kernels, which read the cache as those of a new process do.
+"""
+
+import importlib
 import os
+import shutil
 import subprocess
 import sys
 
+import numba
 import pytest
+
+from ii_core.base import jit
 
 KERNEL = """
 from ii_core.base.jit import kernel
@@ -20,74 +28,101 @@ print(found.doubled(21), len(found.doubled.stats.cache_hits))
 """
 
 
-def call(folder, module, **environment):
+def called_in_a_process(folder, module):
+    """Return what a kernel gives in a new process, and the number of its cache hits."""
+    paths = os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", ""), os.getcwd()])
     done = subprocess.run(
         [sys.executable, "-c", CALL, module],
         capture_output=True,
         text=True,
         cwd=folder,
-        env={
-            **os.environ,
-            "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", ""), os.getcwd()]),
-        }
-        | environment,
+        env={**os.environ, "PYTHONPATH": paths, "NUMBA_CACHE_DIR": ""},
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    return done.stdout.split()
+    return tuple(map(int, done.stdout.split()))
 
 
 @pytest.fixture
-def package(tmp_path):
-    """A package with a kernel that has been compiled and kept."""
-    (tmp_path / "old").mkdir()
-    (tmp_path / "old" / "__init__.py").write_text("")
-    (tmp_path / "old" / "kernels.py").write_text(KERNEL)
-    assert call(tmp_path, "old.kernels") == ["42", "0"]
-    assert call(tmp_path, "old.kernels") == ["42", "1"], "it is kept"
-    return tmp_path
+def called(monkeypatch, recwarn, capfd):
+    """A function that returns what a kernel of a newly imported module gives, and the number of its cache hits."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits within a second would have one time stamp
+
+    def call(folder, module):
+        for name in [name for name in sys.modules if name.partition(".")[0] in ("old", "new")]:
+            del sys.modules[name]
+        with monkeypatch.context() as here:
+            here.syspath_prepend(folder)
+            jit._sources.cache_clear()
+            doubled = importlib.import_module(module).doubled
+            found = doubled(21), len(doubled.stats.cache_hits)
+        assert not recwarn.list and capfd.readouterr() == ("", "")
+        return found
+
+    return call
 
 
-@pytest.mark.slow
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """A package with a kernel that a process has compiled and kept."""
+    folder = tmp_path_factory.mktemp("kept")
+    (folder / "old").mkdir()
+    (folder / "old" / "__init__.py").write_text("")
+    (folder / "old" / "kernels.py").write_text(KERNEL)
+    assert called_in_a_process(folder, "old.kernels") == (42, 0)
+    assert called_in_a_process(folder, "old.kernels") == (42, 1), "it is kept"
+    return folder
+
+
+@pytest.fixture
+def package(kept, tmp_path):
+    """A copy of it."""
+    return shutil.copytree(kept, tmp_path / "copy")
+
+
+def test_a_copied_cache_is_read(called, package):
+    assert called(package, "old.kernels") == (42, 1)
+
+
 @pytest.mark.parametrize("end", ["nbi", "nbc"])
 @pytest.mark.parametrize("cut", [0, 1, 30, 0.5, 0.95])
-def test_a_file_cut_short_is_made_again(package, end, cut):
+def test_a_file_cut_short_is_made_again(called, package, end, cut):
     (file,) = (package / "old" / "__pycache__").glob(f"*.{end}")
     whole = file.read_bytes()
     file.write_bytes(whole[: int(cut * len(whole)) if isinstance(cut, float) else cut])
-    assert call(package, "old.kernels") == ["42", "0"]
-    assert call(package, "old.kernels") == ["42", "1"]
+    assert called(package, "old.kernels") == (42, 0)
+    assert called(package, "old.kernels") == (42, 1)
 
 
-@pytest.mark.slow
 def test_a_renamed_folder(package):
     """The cache names missing modules, but the time stamp of the source file, which numba checks, is unchanged."""
     (package / "old").rename(package / "new")
-    assert call(package, "new.kernels")[0] == "42"
-    assert call(package, "new.kernels") == ["42", "1"]
+    assert called_in_a_process(package, "new.kernels")[0] == 42
+    assert called_in_a_process(package, "new.kernels") == (42, 1)
 
 
-def test_foreign_files(package):
+def test_foreign_files(called, package):
     for file in (package / "old" / "__pycache__").glob("*.nb?"):
         file.write_bytes(b"\x80\x05cos\nabsent\n.")
-    assert call(package, "old.kernels") == ["42", "0"]
+    assert called(package, "old.kernels") == (42, 0)
 
 
 def test_a_cache_that_cannot_be_written(package):
     limited = package / "limited.py"
     limited.write_text("import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n" + KERNEL)
-    assert call(package, "limited") == ["42", "0"]
+    assert called_in_a_process(package, "limited") == (42, 0)
 
 
-def test_an_edit_of_a_file_beside_it(package):
+def test_an_edit_of_a_file_beside_it(called, package):
     """A kernel may call a kernel of another file in its folder; numba's own cache would keep the old copy."""
     (package / "old" / "twice.py").write_text(KERNEL.replace("doubled", "twice"))
     (package / "old" / "kernels.py").write_text(
         "from ii_core.base.jit import kernel\nfrom .twice import twice\n\n"
         "@kernel\ndef doubled(x):\n    return twice(x)\n"
     )
-    assert call(package, "old.kernels") == ["42", "0"]
-    assert call(package, "old.kernels") == ["42", "1"]
+    assert called(package, "old.kernels") == (42, 0)
+    assert called(package, "old.kernels") == (42, 1)
     (package / "old" / "twice.py").write_text(KERNEL.replace("doubled", "twice").replace("2 * x", "3 * x"))
-    assert call(package, "old.kernels") == ["63", "0"]
-    assert call(package, "old.kernels") == ["63", "1"]
+    assert called(package, "old.kernels") == (63, 0)
+    assert called(package, "old.kernels") == (63, 1)

@@ -43,9 +43,11 @@ _UNIT = np.float32(1 << 14)  # unit of the colour matrix in the header
 class Sperr(Coder):
     """Component images of one kind as slices of a volume.
 
-    The payload is a header of 54 bytes, the SPECK stream of each colour, and zeros up to one byte per 4096 pixels.
-    The header holds the colour matrix, and means, steps and lengths of the three colours. A constant colour has no
-    stream.
+    The payload, little-endian, is a header of 54 bytes, the SPECK stream of each colour without the header that SPERR
+    writes, and zeros up to one byte per 4096 pixels. The header holds the rows of the colour matrix (nine numbers of
+    16 bits in units of 2⁻¹⁴), then of each of the three colours the means (float32, in 8-bit codes about 128), the
+    steps of the last of 32 bit planes (float32, 0 for a constant colour) and the lengths of streams (uint32). A
+    constant colour has no stream.
 
     References
     ----------

@@ -1,4 +1,22 @@
-"""Materials of glTF 2.0 as Whitted materials; docs/scenes.md explains the mapping."""
+"""Materials of glTF 2.0 as Whitted materials.
+
+With base colour b, metallic m, roughness r, transmission t, index of refraction n and F0 = ((n − 1)/(n + 1))² ·
+specular strength and colour:
+
+==========================  ==========================================================================================
+``metallic, roughness``     m and r: a GGX lobe of α = r² per texel, single scattering (glTF, appendix B)
+``mirror``                  (1 − t)·F0 of the part that is not metal; constant over the angle, no Schlick term
+matt share × ``colour``     (1 − m)(1 − t)·b·(1 − F0): light reflected by a dielectric does not reach its pigment
+``transmission``            (1 − m)·t·b, which the tracer divides by exact Fresnel
+``shininess``               2/r⁴ − 2, r at least 0.05: a lobe as wide as a microfacet lobe of α = r² (Karis 2013); at
+                            half height up to 1.3 times as wide as GGX, without its tails
+``specular``                mean of m·b + (1 − m)·F0, times (1 − r)(shininess + 2)/8, at most 1: Blinn–Phong,
+                            normalised at normal incidence; zero if matt; at most as bright as the light
+``absorption_per_mm``       −ln(attenuationColor)/attenuationDistance, per unit of the file over ``scale``
+``ior`` of a thin sheet     1, and t(1 − m)·F0 more of mirror: a sheet without an interior does not refract light
+``ior``, dispersion         three indices n ± (n − 1)·dispersion/40: 20/dispersion is the Abbe number
+==========================  ==========================================================================================
+"""
 
 from __future__ import annotations
 
