@@ -24,8 +24,9 @@ def focused_view(
     size: Pair | None = None,
     depth_mm: float | None = None,
     aperture_px: float = 1.0,
+    shares: tuple[float, float] = (1.0, 1.0),
 ) -> NDArray[np.uint8]:
-    """Return the view of the whole lens array from a viewpoint, at any size, focused on one plane.
+    """Return the view of the lens array from a viewpoint, at any size, focused on one plane.
 
     Parameters
     ----------
@@ -38,6 +39,8 @@ def focused_view(
     aperture_px : float
         Radius of the aperture in pixels under a lens. 1, the minimum, interpolates linearly between neighbouring
         views; larger apertures blur other planes.
+    shares : (across, down)
+        Shares of the lens array, around its centre, that the view covers. Beyond the array it is black.
 
     Returns
     -------
@@ -57,8 +60,10 @@ def focused_view(
         raise ValueError(f"aperture is {aperture_px} px: at least 1 is needed")
     x, y = view_positions(camera, viewpoint_mm, erect=picture.erect)
     # Positions are linear over lenses, also between two lenses.
-    across, down = (np.arange(n) + 0.5 for n in (width, height))
-    lens_x, lens_y = across * k / width - 0.5, down * l / height - 0.5
+    lens_x, lens_y = (
+        ((np.arange(n) + 0.5) * share + (1 - share) * n / 2) * lenses / n - 0.5
+        for n, lenses, share in zip((width, height), (k, l), shares, strict=True)
+    )
     pixel_x, pixel_y = _line(x, u, lens_x), _line(y, v, lens_y)
     shift = _shifts(camera, picture.erect, depth_mm)
     out = np.zeros((height, width, 3), np.uint8)
@@ -160,15 +165,28 @@ def viewpoints_around(picture: IIPicture, count: int, *, cone: float = 0.9) -> N
     return np.array([_turned(picture, cone * math.cos(a), cone * math.sin(a)) for a in angles])
 
 
-def _turned(picture: IIPicture, x: float, y: float) -> NDArray[np.float64]:
-    """Return the viewpoint at shares x and y of the zone's half angles, at the distance of `five_viewpoints`."""
+def _half_angles(picture: IIPicture) -> tuple[float, float]:
+    """Half angles of the viewing zone, across and down, radians."""
     camera = camera_of(picture)
     views, plane = five_viewpoints(camera), camera.origin_mm[2] + camera.gap_mm
-    distance = plane - views["front"][2]
     phi, theta = (
         math.atan2(abs(views[name][axis] - camera.origin_mm[axis]), plane - views[name][2])
         for name, axis in (("left", 0), ("up", 1))
     )
+    return phi, theta
+
+
+def zone_half_deg(picture: IIPicture) -> float:
+    """Return half the angle of the viewing zone across, degrees."""
+    return math.degrees(_half_angles(picture)[0])
+
+
+def _turned(picture: IIPicture, x: float, y: float) -> NDArray[np.float64]:
+    """Return the viewpoint at shares x and y of the zone's half angles, at the distance of `five_viewpoints`."""
+    camera = camera_of(picture)
+    plane = camera.origin_mm[2] + camera.gap_mm
+    distance = plane - five_viewpoints(camera)["front"][2]
+    phi, theta = _half_angles(picture)
     sx, sy = math.sin(x * phi), math.sin(y * theta)
     return np.array([*camera.origin_mm[:2], plane]) + distance * np.array(
         [sx, sy, -math.sqrt(max(0.01, 1 - sx * sx - sy * sy))]
@@ -176,8 +194,14 @@ def _turned(picture: IIPicture, x: float, y: float) -> NDArray[np.float64]:
 
 
 def display_views(
-    picture: IIPicture, count: int, *, size: Pair, depth_mm: float | None = None, cone: float = 1.0
+    picture: IIPicture,
+    count: int,
+    *,
+    size: Pair,
+    depth_mm: float | None = None,
+    cone: float = 1.0,
+    shares: tuple[float, float] = (1.0, 1.0),
 ) -> Iterator[NDArray[np.uint8]]:
     """Yield views from left to right for a multi-view display; parameters as for `focused_view`."""
     for place in viewpoints_across(picture, count, cone=cone):
-        yield focused_view(picture, place, size=size, depth_mm=depth_mm)
+        yield focused_view(picture, place, size=size, depth_mm=depth_mm, shares=shares)

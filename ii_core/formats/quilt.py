@@ -68,9 +68,12 @@ def quilt_pixels(views: Iterable[NDArray[Any]], tiles: Pair) -> NDArray[Any]:
 
 
 def quilt_name(path: str | os.PathLike[str], tiles: Pair, aspect: float) -> Path:
-    """Return the path with ``_qsCxRaA`` after its stem: tiles and the aspect of a view."""
+    """Return the path with ``_qsCxRaA`` after its stem: tiles, and the aspect of the display.
+
+    Tiles of other sides are stretched to that aspect: a display of 16:9 has square ones.
+    """
     path = Path(path)
-    return path.with_name(f"{QUILT.sub('', path.stem)}_qs{tiles[0]}x{tiles[1]}a{aspect:.4g}{path.suffix}")
+    return path.with_name(f"{QUILT.sub('', path.stem)}_qs{tiles[0]}x{tiles[1]}a{aspect:.6g}{path.suffix}")
 
 
 @checks.checked(picture=checks.instance(IIPicture), path=checks.path, row=checks.whole)

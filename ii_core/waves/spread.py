@@ -33,10 +33,13 @@ from .wave import WAVELENGTHS_NM
 
 special = Lazy("scipy.special")
 FIRST_ZERO = 1.2196698912665045  # of Airy's pattern, in λΛ/δL
-FINE = 4  # samples across a pixel, at least
+WAVES = 2.6  # samples across a first ring: twice the highest frequency, 1.22 over it, and a margin
+ACROSS = 16  # samples of the field across a pupil's radius, at least
+SAMPLES = 512  # of a transfer by rays, across
 STEPS = 16  # of widths: 1/32 pixel where they are small, 6 % where they are large
+MOST_WAVES = 100.0  # periods a pixel: beyond, a spot of rays passes next to nothing, and little of it counts
 LEAST_RING = 0.1  # pixels: narrower rings need no field, but many samples of it
-ENERGY = 0.999  # of a kernel, within its reach
+ENERGY = 0.999  # of a kernel's light, within its reach
 LEVELS = 1 << 16  # steps of a width: sinh(LEVELS/2/STEPS) pixels is beyond every length
 
 
@@ -134,8 +137,8 @@ def spread_maps(
 def spread_picture(picture: IIPicture, maps: SpreadMaps) -> IIPicture:
     """Return the picture with the light of every pixel spread by its point-spread function.
 
-    Light stays under its lens: a function that is wider than the elementary image fills it evenly, with its whole
-    light. Widths are rounded to steps of 1/32 pixel, or 6 % where that is more.
+    Light stays under its lens: a function that is cut at the border of the elementary image keeps its light, and what
+    falls farther away fills the image evenly. Widths are rounded to steps of 1/32 pixel, or 6 % where that is more.
 
     Parameters
     ----------
@@ -158,9 +161,10 @@ def spread_picture(picture: IIPicture, maps: SpreadMaps) -> IIPicture:
         found, level = np.unique(_codes(maps, c), return_inverse=True)
         table = [_kernel(*_widths(code), max(u, v)) for code in found.tolist()]
         reach = np.array([_reach(kernel) for kernel in table])
+        held = np.array([kernel.sum() for kernel in table])
         light = pixels[..., c] if pixels.dtype.kind == "f" else linear(pixels[..., c] / peak(pixels.dtype))
         done = np.zeros(pixels.shape[:2])
-        work = (light.astype(np.float64), level.reshape(pixels.shape[:2]), np.stack(table), reach, u, v, done)
+        work = (light.astype(np.float64), level.reshape(pixels.shape[:2]), np.stack(table), held, reach, u, v, done)
         over_rows(partial(scatter, *work), pixels.shape[0], step=v)
         if pixels.dtype.kind != "f":
             done = np.rint(np.clip(srgb(done), 0, 1) * peak(pixels.dtype))
@@ -186,21 +190,21 @@ def _widths(code: int) -> tuple[float, float, float]:
 
 
 def _kernel(disk: float, ring: float, aberration: float, side: int) -> NDArray[np.float64]:
-    """Light of a square pixel on the pixels around it, (2·side + 1,)², of sum 1; widths in pixels."""
+    """Share of a square pixel's light on the pixels around it, (2·side + 1,)²; widths in pixels.
+
+    The rest of the light falls beyond. The pixel of the source and the receiving one are a factor sinc² each way:
+    their triangle has a kink, which samples of a pixel miss.
+    """
     wide = _extent(disk, aberration)
-    if wide >= 3 * side:  # it covers the elementary image from any of its pixels
-        return np.full((2 * side + 1, 2 * side + 1), (2 * side + 1.0) ** -2)
-    near = min(side, math.ceil(wide + 8 * ring) + 3)  # beyond, there is less than 1 % of the light
-    wave = ring >= LEAST_RING
-    fine = max(FINE, math.ceil(1.3 / ring)) if wave else FINE  # samples a pixel that the field needs
-    count = 3 * near * fine
-    f = np.hypot(*np.meshgrid(*[np.fft.fftfreq(count, 1 / fine)] * 2))
-    spread = np.fft.fftshift((_by_wave if wave else _by_rays)(f, disk, ring, aberration))
-    # averaged over the source pixel and over the receiving one: a triangle of twice a pixel's width
-    x = (np.arange(count) - count // 2) / fine
-    triangles = np.clip(1 - abs(x - np.arange(-near, near + 1)[:, None]), 0, None)
-    kernel = np.maximum(triangles @ spread @ triangles.T, 0)
-    return np.pad(kernel / kernel.sum(), side - near)
+    if wide >= 3 * side or ring >= 4 * side:  # it covers the elementary image from any of its pixels
+        return np.zeros((2 * side + 1, 2 * side + 1))
+    near = min(side, math.ceil(wide / 2 + 16 * ring) + 2)  # beyond 16 rings there is 1 % of the light
+    f, transfer, rest = (_by_wave if ring >= LEAST_RING else _by_rays)(3 * near, disk, ring, aberration)
+    places = np.arange(-near, near + 1)[:, None]
+    waves = np.cos(2 * math.pi * f * places) * np.sinc(f) ** 2 * f[1]
+    whole = waves.sum(axis=1)
+    unheard = (places == 0) * (places.T == 0) - np.outer(whole, whole)  # by frequencies that are left out
+    return np.pad(np.maximum(waves @ transfer @ waves.T + rest * unheard, 0), side - near)
 
 
 def _extent(disk: float, aberration: float) -> float:
@@ -209,31 +213,50 @@ def _extent(disk: float, aberration: float) -> float:
     return max(abs(disk + aberration), 2 / 3 * disk * math.sqrt(turn) if 0 < turn < 1 else 0.0)
 
 
-def _by_wave(f: NDArray[Any], disk: float, ring: float, aberration: float) -> NDArray[np.float64]:
-    """Intensity of the field behind a round lens out of focus: its pupil's Fourier transform, squared."""
-    place = f * 2 * ring / FIRST_ZERO  # in the pupil, 1 at its rim
-    step = f[0, 1] * 2 * ring / FIRST_ZERO
-    rim = np.clip((1 - place) / step + 0.5, 0, 1)
+def _by_wave(period: int, disk: float, ring: float, aberration: float) -> tuple[NDArray[Any], NDArray[Any], float]:
+    """Transfer of a round lens out of focus: the spectrum of its field's intensity.
+
+    Returns frequencies in periods a pixel, (n,), the transfer of each pair, (n, n), and that of all higher ones.
+    """
+    period = max(period, math.ceil(2 * ACROSS * ring / FIRST_ZERO))
+    count = period * math.ceil(WAVES / ring)
+    f = np.fft.fftfreq(count, period / count)
+    pupil = np.hypot(f[:, None], f) * 2 * ring / FIRST_ZERO  # 1 at its rim
+    rim = np.clip((1 - pupil) / (f[1] * 2 * ring / FIRST_ZERO) + 0.5, 0, 1)
     # the slope of this phase at the rim sends a ray to the rim of the disk
-    phase = 0.25 * math.pi * FIRST_ZERO / ring * (disk + aberration / 2 * place**2) * place**2
-    return np.abs(np.fft.ifft2(rim * np.exp(1j * phase))) ** 2
+    phase = 0.25 * math.pi * FIRST_ZERO / ring * (disk + aberration / 2 * pupil**2) * pupil**2
+    transfer = np.fft.fft2(np.abs(np.fft.ifft2(rim * np.exp(1j * phase))) ** 2).real * (count**2 / rim.sum())
+    transfer[0, 0] = 1  # samples on the rim carry the right amplitude but, squared, too little light
+    return f, transfer, 0.0
 
 
-def _by_rays(f: NDArray[Any], disk: float, ring: float, aberration: float) -> NDArray[np.float64]:
-    """The spot of rays folded with Airy's pattern, where that is narrower than a pixel: a product of transfers."""
+def _by_rays(period: int, disk: float, ring: float, aberration: float) -> tuple[NDArray[Any], NDArray[Any], float]:
+    """Transfer of a spot of rays folded with Airy's pattern, where that is narrower than a pixel; as `_by_wave`."""
+    fine = max(4, SAMPLES // period)  # samples a pixel
+    f = np.fft.fftfreq(fine * period, 1 / fine)
+    radius = np.hypot(f[:, None], f)
+    table = np.linspace(0, radius.max(), 16 + math.ceil(16 * radius.max() * max(1, _extent(disk, aberration))))
+    higher = abs(f).max() / (np.arange(64) + 0.5) * 64  # evenly in 1/f, as sinc² falls
+    return (
+        f,
+        np.interp(radius, table, _ray_transfer(table, disk, ring, aberration)),
+        _ray_transfer(higher, disk, ring, aberration).mean(),
+    )
+
+
+def _ray_transfer(f: NDArray[Any], disk: float, ring: float, aberration: float) -> NDArray[np.float64]:
+    """Product of the transfers of a spot of rays and of Airy's pattern."""
     cut = np.clip(f * ring / FIRST_ZERO, 0, 1)  # the lens passes no frequency beyond δL/λΛ
     passed = (np.arccos(cut) - cut * np.sqrt(1 - cut * cut)) * 2 / math.pi
     if aberration:
-        table = np.linspace(0, f.max(), 16 + math.ceil(16 * f.max() * _extent(disk, aberration)))
-        return np.fft.ifft2(passed * np.interp(f, table, _spot(table, disk, aberration))).real
+        return passed * _spot(f, disk, aberration)
     v = math.pi * disk * f
-    passed *= np.where(v == 0, 1.0, 2 * special.j1(v) / np.where(v == 0, 1.0, v))
-    return np.fft.ifft2(passed).real
+    return np.asarray(passed * np.where(v == 0, 1.0, 2 * special.j1(v) / np.where(v == 0, 1.0, v)))
 
 
 def _spot(f: NDArray[Any], disk: float, aberration: float) -> NDArray[np.float64]:
     """Transfer of the spot of rays, ∫ J₀(2πf·ε) dρ² with ε = (disk·ρ + aberration·ρ³)/2 from the middle."""
-    count = 64 + math.ceil(8 * f.max() * (disk + abs(aberration)))
+    count = 64 + math.ceil(8 * min(f.max(), MOST_WAVES) * (disk + abs(aberration)))
     share = (np.arange(count) + 0.5) / count  # of the pupil's area, ρ²
     way = math.pi * (disk + aberration * share) * np.sqrt(share)
     return np.array([special.j0(one * way).mean() for one in f])
@@ -243,24 +266,34 @@ def _reach(kernel: NDArray[Any]) -> int:
     """Pixels to each side that hold `ENERGY` of a kernel."""
     side = len(kernel) // 2
     held = (kernel[side - r : side + r + 1, side - r : side + r + 1].sum() for r in range(side + 1))
-    return next((r for r, energy in enumerate(held) if energy >= ENERGY), side)
+    return next((r for r, energy in enumerate(held) if energy >= ENERGY * kernel.sum()), side)
 
 
 @exact_kernel
-def scatter(light, level, table, reach, u, v, out, first, last):
-    """Add the light of each pixel to those around it under its lens, by its kernel, which is cut there."""
+def scatter(light, level, table, held, reach, u, v, out, first, last):
+    """Add the light of each pixel to those around it under its lens.
+
+    The kernel is cut there and keeps its light, ``held``: at the border, neighbouring lenses give what they take.
+    The rest fell far away and is spread evenly. Rows from ``first`` to ``last`` are whole elementary images.
+    """
     side = table.shape[1] // 2
-    for n in range(first, last):
-        top, bottom = n // v * v, n // v * v + v
-        for m in range(light.shape[1]):
-            left, right, t = m // u * u, m // u * u + u, level[n, m]
-            r = reach[t]
-            a, b, c, d = max(n - r, top), min(n + r + 1, bottom), max(m - r, left), min(m + r + 1, right)
-            total = 0.0
-            for i in range(a, b):
-                for j in range(c, d):
-                    total += table[t, i - n + side, j - m + side]
-            share = light[n, m] / total
-            for i in range(a, b):
-                for j in range(c, d):
-                    out[i, j] += share * table[t, i - n + side, j - m + side]
+    for top in range(first, last, v):
+        for left in range(0, light.shape[1], u):
+            beyond = 0.0
+            for n in range(top, top + v):
+                for m in range(left, left + u):
+                    t = level[n, m]
+                    r = reach[t]
+                    a, b, c, d = max(n - r, top), min(n + r + 1, top + v), max(m - r, left), min(m + r + 1, left + u)
+                    total = 0.0
+                    for i in range(a, b):
+                        for j in range(c, d):
+                            total += table[t, i - n + side, j - m + side]
+                    share = light[n, m] * held[t] / total if total > 0.0 else 0.0
+                    for i in range(a, b):
+                        for j in range(c, d):
+                            out[i, j] += share * table[t, i - n + side, j - m + side]
+                    beyond += light[n, m] * (1.0 - held[t])
+            for i in range(top, top + v):
+                for j in range(left, left + u):
+                    out[i, j] += beyond / (u * v)

@@ -1,7 +1,7 @@
 """Wave optics of one lenslet, and point-spread functions of pixels.
 
 Scalar fields in one or two dimensions; a field in one dimension is that of a slit with a cylinder lens, which is also
-each axis of a square lens near the axis. Lengths in mm, intensities of sum 1.
+each axis of a square lens near the axis. Lengths in mm, intensities in shares of the light through the lens.
 
 References
 ----------
@@ -36,6 +36,8 @@ from ..picture.picture import IIPicture
 ndimage, special = Lazy("scipy.ndimage"), Lazy("scipy.special")
 WAVELENGTHS_NM = (610.0, 550.0, 465.0)  # of sRGB's primaries, by dominant wavelength to 5 nm
 SAMPLES = 6.0  # for each period of the fastest phase
+ACROSS = 64  # samples across a lens, at least: small, slow ones have hardly any phase
+WINDOW = {1: 40.0, 2: 24.0}  # of a field, in λΛ/δL beyond lens and blur; round lenses need the square of it
 MOST = {1: 1 << 20, 2: 1 << 12}  # samples across a field, by its dimensions
 ENERGY = 0.9  # of a point-spread function, within what counts as its width
 Floats = NDArray[np.float64]
@@ -118,12 +120,13 @@ def lens_spread(
     x : ndarray, (n,)
         Places on the pixel plane from the axis, mm.
     intensity : ndarray, (n,) or (n, n)
-        Of sum 1.
+        Share of the light through the lens. The outer rings, 1–2 % of the light, lie beyond ``x``.
 
     Raises
     ------
     ValueError
-        If a length is not positive or the field would need more samples across than `MOST`.
+        If a length is not positive or the field would need more samples across than `MOST`: round lenses of a Fresnel
+        number below 0.1, or of some 100 and more.
     """
     width, gap, wavelength = length("width_mm", width_mm), length("gap_mm", gap_mm), _mm(wavelength_nm)
     focal = gap if focal_mm is None else length("focal_mm", focal_mm)
@@ -132,11 +135,14 @@ def lens_spread(
     blur = abs(defocus_mm(width, gap, focal_mm=focal, depth_mm=depth_mm)) + 16 * abs(error) * gap / width
     slope = 8 * abs(error) / width  # of the phases of lens, source and aberration at the rim
     slope += sum(width / 2 / math.hypot(width / 2, one) for one in (min(gap, focal, depth_mm), gap))
-    step = wavelength / slope / SAMPLES * 2
-    window = 2 * (width + blur) + 40 * wavelength * gap / width
+    step = min(wavelength / slope / SAMPLES * 2, width / ACROSS)
+    window = 2 * (width + blur) + WINDOW[dimensions] * wavelength * gap / width
     count = 1 << math.ceil(math.log2(window / step))
     if count > MOST[dimensions]:
-        raise ValueError(f"a lens {width:g} mm wide needs a field of {count} samples: a narrower one is needed")
+        raise ValueError(
+            f"a lens {width:g} mm wide and {gap:g} mm from the pixels needs a field of {count} samples across, "
+            f"{MOST[dimensions]} are computed: one of a Fresnel number δL²/4λΛ nearer to 1 is needed"
+        )
     x: Floats = (np.arange(count) - count // 2) * np.float64(step)
     squared = x * x if dimensions == 1 else x[:, None] ** 2 + x * x
     phase = -(np.sqrt(squared + focal**2) - focal)
@@ -146,8 +152,9 @@ def lens_spread(
     # a sample on the rim counts by the share of it within
     rim = np.clip((width / 2 - np.sqrt(squared)) / step + 0.5, 0, 1)
     field = angular_spectrum(rim * np.exp(2j * math.pi / wavelength * phase), step, wavelength, gap)
-    intensity = np.abs(field) ** 2
-    return x, np.asarray(intensity / intensity.sum(), np.float64)
+    # by the lens's own light: samples on the rim carry the right amplitude but, squared, too little light
+    cell = step / width if dimensions == 1 else 4 / math.pi * (step / width) ** 2
+    return x, np.asarray(np.abs(field) ** 2 * cell, np.float64)
 
 
 @checked(width_mm=number, gap_mm=number)
@@ -223,8 +230,13 @@ def pixel_kernel(x: NDArray[Any], intensity: NDArray[Any], pixel_mm: float, reac
     x = _places(x)
     intensity = _intensity(x, intensity)
     offsets = np.arange(-reach, reach + 1) * length("pixel_mm", pixel_mm)
-    triangles = np.clip(1 - abs(x - offsets[:, None]) / pixel_mm, 0, None)
-    kernel = triangles @ intensity
+    # by the triangle's transform, sinc²: the triangle itself has a kink that samples miss
+    step = (x[-1] - x[0]) / (len(x) - 1)
+    f = np.fft.rfftfreq(len(x), step)
+    light = np.fft.rfft(intensity) * np.sinc(f * pixel_mm) ** 2
+    light[1:] *= 2  # frequencies below 0
+    kernel = (np.exp(2j * math.pi * f * (offsets[:, None] - x[0])) @ light).real
+    kernel[abs(offsets - x.mean()) > len(x) * step / 2] = 0  # no light is known there
     return kernel / kernel.sum()
 
 

@@ -6,11 +6,13 @@ import pytest
 from PIL import Image
 
 from ii_core import IICamera, IIPicture, five_viewpoints, preset, view_image
+from ii_core.display.devices import DEVICES, device
 from ii_core.display.film import write_animation
 from ii_core.display.lenticular import lenticular
-from ii_core.display.look import focused_view, look, viewpoints_across, viewpoints_around
-from ii_core.display.quilt import quilt
+from ii_core.display.look import focused_view, look, viewpoints_across, viewpoints_around, zone_half_deg
+from ii_core.display.quilt import cone_share, quilt
 from ii_core.display.simulate import display_simulation
+from ii_core.formats.quilt import quilt_name
 from ii_core.picture.assumed import with_assumed_camera
 from raytrace_ii import load_scene, render
 
@@ -65,6 +67,38 @@ def test_kernel_without_compilation(apples):
         kernel(field, *arguments, np.array([0.7, -0.4]), np.array([1.8, 1.0]), out)
         results.append(out)
     np.testing.assert_array_equal(*results)
+
+
+@pytest.mark.parametrize("aspect", [0.5625, 1.0, 2.0, 3.2])
+@pytest.mark.parametrize("whole", [False, True])
+def test_a_circle_stays_one_on_a_display_of_any_aspect(aspect, whole):
+    """A disc painted on the lens array, through a tile whose pixels the display stretches to its own aspect."""
+    camera = preset("setup1", scale=8)  # 64×32 lenses, 2:1
+    k, l = camera.lenses
+    y, x = np.mgrid[:l, :k]
+    disc = (np.hypot(x - (k - 1) / 2, y - (l - 1) / 2) < 8).astype(np.uint8) * 255
+    pixels = np.repeat(np.repeat(disc, 16, 0), 16, 1)[..., None].repeat(3, axis=2)
+    picture = IIPicture(pixels, camera.lenses, camera.ei_pixels, camera)
+    made = quilt(picture, (1, 1), size=(200, 200), aspect=aspect, whole=whole)[..., 0] > 127
+    rows, columns = np.flatnonzero(made.any(axis=1)), np.flatnonzero(made.any(axis=0))
+    across, down = np.ptp(columns) / 200 * aspect, np.ptp(rows) / 200  # in heights of the display
+    assert across == pytest.approx(down, rel=0.06)
+    all_rows = (aspect <= k / l) != whole  # the display is as high as the array, otherwise as wide
+    assert down == pytest.approx(16 / l if all_rows else 16 * aspect / k, rel=0.08)
+
+
+@pytest.mark.parametrize("name", DEVICES)
+def test_quilts_of_devices_have_their_makers_sizes(name):
+    """Tiles fill the quilt up to less than a pixel of each."""
+    one = device(name)
+    for tile, tiles, side in zip(one.tile, one.tiles, one.quilt, strict=True):
+        assert 0 <= side - tile * tiles < tiles
+    assert quilt_name("a.png", one.tiles, one.aspect).stem.startswith(f"a_qs{one.tiles[0]}x{one.tiles[1]}a")
+
+
+def test_the_cone_of_a_display_is_a_share_of_the_zone(apples):
+    half = zone_half_deg(apples)
+    assert cone_share(apples, half) == pytest.approx(0.5) and cone_share(apples, 3 * half) == 1.0
 
 
 def test_quilt_has_the_leftmost_view_at_the_bottom_left(apples):
