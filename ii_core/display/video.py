@@ -15,32 +15,43 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.files import one_line
 from ..camera.camera import Pair
 from ..formats.grid import camera_views
-from ..formats.quilt import QUILT, quilt_path, quilt_row
+from ..formats.quilt import QUILT, quilt_name
 from ..picture.assumed import with_assumed_camera
 from ..picture.picture import IIPicture, codes8
 from ..video.video import IIVideo
 from .film import write_animation
 from .look import focused_view
+from .quilt import quilt
 
 Progress = Callable[[int, int], None] | None
 
 
 def write_quilt_video(
-    video: IIVideo, path: str | os.PathLike[str], *, row: int | None = None, progress: Progress = None
+    video: IIVideo,
+    path: str | os.PathLike[str],
+    tiles: Pair,
+    *,
+    size: Pair,
+    aspect: float | None = None,
+    whole: bool = False,
+    depth_mm: float | None = None,
+    cone: float = 1.0,
+    progress: Progress = None,
 ) -> Path:
-    """Write one row of views as an MP4 of quilts, ``name_qsCxRaA.mp4``, with the tiles of `write_quilt`.
+    """Write an MP4 of quilts, ``name_qsCxRaA.mp4``: a `quilt` of every frame, with the same parameters.
 
     Raises
     ------
     ValueError
-        If there is no such row, or the path is no MP4.
+        If a parameter is out of range, or the path is no MP4.
     OSError
         If it cannot be written.
     """
-    target = quilt_path(path, video.structure)
+    target = quilt_name(path, tiles, size[0] / size[1] if aspect is None else aspect)
     if target.suffix.lower() != ".mp4":
         raise ValueError(f"{target} is no .mp4: a quilt video is one")
-    quilts = (quilt_row(eight_bit(picture), row) for picture in video)
+    options: dict[str, Any] = {"size": size, "aspect": aspect, "whole": whole, "depth_mm": depth_mm, "cone": cone}
+    quilts = (quilt(with_assumed_camera(eight_bit(picture)), tiles, **options) for picture in video)
     return write_animation(target, _told(quilts, video.frames, progress), fps=video.fps)
 
 

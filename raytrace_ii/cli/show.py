@@ -11,6 +11,7 @@ import typer
 from .common import Force, app, check_outputs, check_page, image_file, load_any, pair
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, say_done, spinner
+from .quilts import SIZE, For, QuiltPlan, Tiles, Whole
 from .video import coding, compared_takes, is_take_source
 
 if TYPE_CHECKING:
@@ -94,14 +95,20 @@ def display(
         ),
     ],
     kind: Annotated[str, typer.Option("--as", help="quilt, lenticular, simulation or parallax.")] = "parallax",
+    device: For = None,
     size: Annotated[
-        str, typer.Option(help="Pixels of a tile, of the panel, of the eye's picture or of a frame.")
-    ] = "800x400",
+        str | None,
+        typer.Option(help="Pixels of a tile, of the panel, of the eye's picture or of a frame; 800x400 by default."),
+    ] = None,
     depth: Annotated[
         float | None, typer.Option(help="z in mm of the scene plane that appears in the plane of the display.")
     ] = None,
-    cone: Annotated[float, typer.Option(help="Share of the viewing zone that the views cover.")] = 0.9,
-    tiles: Annotated[str, typer.Option(help="Quilt: columns x rows.")] = "8x6",
+    cone: Annotated[
+        float | None,
+        typer.Option(help="Share of the viewing zone that the views cover; 0.9 by default, or the display's."),
+    ] = None,
+    tiles: Tiles = None,
+    whole: Whole = False,
     pitch: Annotated[float, typer.Option(help="Lenticular: lens pitch in pixels.")] = 5.0,
     slope: Annotated[float, typer.Option(help="Lenticular: shift of lenses to the left per row, in pixels.")] = 0.0,
     centre: Annotated[
@@ -123,7 +130,6 @@ def display(
     from ii_core.display.lenticular import lenticular
     from ii_core.display.quilt import quilt
     from ii_core.display.simulate import display_simulation
-    from ii_core.formats.quilt import quilt_name
     from ii_core.picture.assumed import with_assumed_camera
 
     if is_take_source(picture):
@@ -131,19 +137,22 @@ def display(
     kinds = ("quilt", "lenticular", "simulation", "parallax")
     if kind not in kinds:
         raise ValueError(f"unknown kind {kind!r}: known are {', '.join(kinds)}")
-    pixels, grid = pair("size", size), pair("tiles", tiles)
-    if kind == "quilt":
-        output = quilt_name(output, grid, pixels[0] / pixels[1])
+    if kind != "quilt" and (device is not None or tiles is not None or whole):
+        raise ValueError(f"--for, --tiles and --whole are options of quilts: leave them out for {kind}")
+    plan = QuiltPlan(device, tiles, size, cone, whole) if kind == "quilt" else None
+    pixels, share = pair("size", SIZE if size is None else size), 0.9 if cone is None else cone
+    if plan is not None:
+        output = plan.path(output)
     if kind == "parallax":
         check_outputs([output], force)
-        _film(picture, output, pixels, depth, cone, frames, fps)
+        _film(picture, output, pixels, depth, share, frames, fps)
         return
     check_outputs(image_file(output, "uint8"), force)
     original = with_assumed_camera(IIPicture.load(picture))
-    options: dict[str, Any] = {"size": pixels, "depth_mm": depth, "cone": cone}
+    options: dict[str, Any] = {"size": pixels, "depth_mm": depth, "cone": share}
     with spinner(f"{kind} of {picture.name}"):
-        if kind == "quilt":
-            made = quilt(original, grid, **options)
+        if plan is not None:
+            made = quilt(original, plan.tiles, **plan.options(original, depth))
         elif kind == "lenticular":
             made = lenticular(original, pitch_px=pitch, slope=slope, centre_px=centre, **options)
         else:

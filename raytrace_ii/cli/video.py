@@ -10,6 +10,7 @@ import typer
 
 from .common import Force, app, check_folder, check_outputs, pair
 from .progress import progress_bar, say_done
+from .quilts import SIZE, For, QuiltPlan, Tiles, Whole
 
 if TYPE_CHECKING:
     from ii_core import IIVideo
@@ -26,28 +27,37 @@ def video(
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder; for quilt and parallax an .mp4.")],
     to: Annotated[str, typer.Option(help="frames, views, quilt, films (one per view) or parallax.")] = "parallax",
     fps: Annotated[float | None, typer.Option(help="Frames per second, in place of the source's.")] = None,
-    row: Annotated[int | None, typer.Option(help="Quilt: row of views; the middle one if not given.")] = None,
-    size: Annotated[str, typer.Option(help="Parallax: pixels of a frame.")] = "800x400",
+    device: For = None,
+    tiles: Tiles = None,
+    whole: Whole = False,
+    size: Annotated[
+        str | None, typer.Option(help="Pixels of a tile or of a frame of parallax; 800x400 by default.")
+    ] = None,
     depth: Annotated[
         float | None,
-        typer.Option(help="Parallax: z in mm of the plane in focus."),
+        typer.Option(help="Quilt, parallax: z in mm of the plane in focus."),
     ] = None,
-    cone: Annotated[float, typer.Option(help="Parallax: share of the viewing zone.")] = 0.9,
+    cone: Annotated[
+        float | None,
+        typer.Option(help="Quilt, parallax: share of the viewing zone; 0.9 by default, or the display's."),
+    ] = None,
     force: Force = False,
 ) -> None:
     """Convert II-video to folders of frames or views, quilt videos, films of each view or of a moving viewer."""
     from ii_core import write_view_folders
     from ii_core.display.look import viewpoints_around
     from ii_core.display.video import write_path_film, write_quilt_video, write_view_films
-    from ii_core.formats.quilt import quilt_path
     from ii_core.picture.assumed import with_assumed_camera
 
     if to not in TO:
         raise ValueError(f"unknown form {to!r}: known are {', '.join(TO)}")
-    pixels = pair("size", size)
+    if to != "quilt" and (device is not None or tiles is not None or whole):
+        raise ValueError(f"--for, --tiles and --whole are options of quilts: leave them out for {to}")
+    plan = QuiltPlan(device, tiles, size, cone, whole) if to == "quilt" else None
+    pixels = pair("size", SIZE if size is None else size)
     shown = opened(source, fps)
     if to in ("quilt", "parallax"):
-        target = quilt_path(output, shown.structure) if to == "quilt" else output
+        target = output if plan is None else plan.path(output)
         if target.suffix.lower() != ".mp4" and not (to == "parallax" and target.suffix in (".gif", ".webp")):
             raise ValueError(f"{output} is no film: .mp4 is needed")
         check_outputs([target], force)
@@ -62,13 +72,16 @@ def video(
             made: Any = shown.save(output, told)
         elif to == "views":
             made = write_view_folders(shown, output, told)
-        elif to == "quilt":
-            made = write_quilt_video(shown, output, row=row, progress=told)
+        elif plan is not None:
+            options = plan.options(with_assumed_camera(shown.structure), depth)
+            made = write_quilt_video(shown, output, plan.tiles, progress=told, **options)
         elif to == "films":
             made = output
             write_view_films(shown, output, progress=told)
         else:
-            places = viewpoints_around(with_assumed_camera(shown.structure), shown.frames, cone=cone)
+            places = viewpoints_around(
+                with_assumed_camera(shown.structure), shown.frames, cone=0.9 if cone is None else cone
+            )
             made = write_path_film(shown, output, places, size=pixels, depth_mm=depth, progress=told)
     say_done(f"{made}: {shown.frames} frames, {shown.fps:g} a second")
 

@@ -191,6 +191,9 @@ def test_animation_holds_its_frames(tmp_path, apples, name):
         (["-o", "a.mp4", "--size", "big"], "two whole numbers"),
         (["--as", "lenticular", "-o", "a.png", "--pitch", "0"], "pitch_px"),
         (["--as", "quilt", "-o", "a.png", "--tiles", "0x2"], "tiles"),
+        (["--as", "quilt", "-o", "a.png", "--for", "visor"], "unknown device 'visor': known are go, portrait, 16"),
+        (["--as", "quilt", "-o", "a.png", "--for", "go", "--tiles", "8x6"], "those of the display go"),
+        (["--as", "lenticular", "-o", "a.png", "--whole"], "options of quilts"),
         (["--as", "simulation", "-o", "a.png", "--at", "0,0,5"], "before the lens plane"),
         (["--as", "simulation", "-o", "a.png", "--fill", "2"], "fill is 2"),
     ],
@@ -211,3 +214,8 @@ def test_the_command_writes_displays(run, apples, tmp_path):
         )
     assert run("display", tmp_path / "p.png", "-o", tmp_path / "p.webp", "--frames", "3", "--size", "80x40")[0] == 0
     assert Image.open(tmp_path / "quilt_qs8x6a2.png").size == (640, 240)
+    code, out, err = run(
+        "display", tmp_path / "p.png", "--as", "quilt", "--for", "portrait", "-o", tmp_path / "q.png"
+    )
+    assert code == 0 and Image.open(tmp_path / "q_qs8x6a0.75.png").size == (3360, 3360)
+    assert "38% of the width and 100% of the height" in out + err

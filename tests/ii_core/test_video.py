@@ -7,6 +7,7 @@ import pytest
 
 from ii_core import IIVideo, open_video, preset, sub_images, video_of, view_image, write_view_folders
 from ii_core.display.look import viewpoints_across
+from ii_core.display.quilt import quilt
 from ii_core.display.video import open_quilt_video, write_path_film, write_quilt_video, write_view_films
 from ii_core.picture.picture import IIPicture
 from ii_core.video.video import KEPT, blank
@@ -122,14 +123,16 @@ def smooth(count):
 
 def test_a_quilt_video_has_its_name_its_rate_and_its_views(tmp_path):
     shown = smooth(3)
-    path = write_quilt_video(video_of(shown, fps=12), tmp_path / "take.mp4", row=5)
-    assert path.name == "take_qs4x4a2.mp4"
+    options = {"size": (32, 16), "depth_mm": 60.0, "cone": 0.5}
+    path = write_quilt_video(video_of(shown, fps=12), tmp_path / "take.mp4", (4, 2), **options)
+    assert path.name == "take_qs4x2a2.mp4"
     back = open_quilt_video(path)
-    assert (back.frames, back.fps, back.structure.lenses, back.structure.ei_pixels) == (3, 12, (16, 8), (16, 1))
+    assert (back.frames, back.fps, back.structure.lenses, back.structure.ei_pixels) == (3, 12, (32, 16), (8, 1))
     for frame in (2, 0):  # backwards, too
-        for u in (0, 7, 15):
+        views = quilt(shown[frame], (8, 1), **options).reshape(16, 8, 32, 3)
+        for u in (0, 3, 7):
             view = back.component(frame, "si", (u, 0)).astype(int)
-            assert np.abs(view - sub_images(shown[frame])[5, u]).mean() < 4, (frame, u)  # a frame is 20 from the next
+            assert np.abs(view - views[:, u]).mean() < 4, (frame, u)  # a frame is 20 from the next
     with pytest.raises(ValueError, match="grid of tiles"):
         open_quilt_video(path.rename(tmp_path / "plain.mp4"))
     (tmp_path / "no_qs2x2a1.mp4").write_bytes(b"no video")
