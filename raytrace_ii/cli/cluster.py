@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+ANSWER_SECONDS = 5  # until which a scheduler has to answer
 Dask = Annotated[str | None, typer.Option(help="Work on the cluster of this dask scheduler: host:port.")]
 
 
@@ -26,7 +27,7 @@ def cluster(address: str | None, identity: Callable[[], Mapping[str, str]]) -> I
     load("distributed")
     try:
         _check_address(address)
-        client = load("distributed").Client(address, timeout=5, set_as_default=False)
+        client = load("distributed").Client(address, timeout=ANSWER_SECONDS, set_as_default=False)
     except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:  # also tls:// without certificates
         raise OSError(f"no dask scheduler answers at {address}: {error}") from None
     try:

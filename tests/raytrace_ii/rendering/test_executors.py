@@ -20,6 +20,7 @@ import pytest
 from ii_core import IIPicture, preset
 from ii_core.base import executors as calls
 from raytrace_ii import Scene, load_scene, render
+from raytrace_ii.cli import cluster as cluster_option
 from raytrace_ii.rendering import executors, job
 from raytrace_ii.tracing.packing import packed
 from tests.support.trace_scenes import body, hall, wall
@@ -105,6 +106,16 @@ def test_a_cluster_of_processes_loses_nothing_when_one_is_killed(scene, whole, r
         np.testing.assert_array_equal(IIPicture.load(tmp_path / "p.png").pixels, expected.pixels)
 
 
+def test_a_cluster_in_this_process_gives_the_same_picture(scene, whole):
+    distributed = pytest.importorskip("distributed")
+    options = {"processes": False, "dashboard_address": None, "silence_logs": 50}
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, **options) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        assert_same(whole, render(scene, CAMERA, executor=client, **OPTIONS))
+
+
 @pytest.fixture
 def cluster():
     """A dask scheduler and workers as processes of their own: ``start(tree)`` adds a worker that runs that tree."""
@@ -140,6 +151,7 @@ def cluster():
         client.close(timeout=1)
 
 
+@pytest.mark.slow
 def test_a_worker_with_other_code_is_refused_by_name(cluster, run, refused, tmp_path):
     """On b1dc540 its blocks went into the picture: a quarter of the pixels differed."""
     other = tmp_path / "other"
@@ -168,6 +180,7 @@ def test_a_worker_that_differs_renders_no_block(scene, name, monkeypatch, tmp_pa
         calls.in_process(str(tmp_path / "no.job"), (slice(0, 1), slice(0, 1)), executors.identity, ours)
 
 
+@pytest.mark.slow
 def test_a_lost_scheduler_is_one_line(cluster, scene):
     cluster.add()
 
@@ -239,6 +252,7 @@ def test_invalid_executors_are_refused(wrong, says):
 
 def test_a_missing_cluster_is_one_line(run, refused, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster_option, "ANSWER_SECONDS", 0.2)
     command = ("render", "objects", "--scale", 128, "-o", tmp_path / "p.png", "--dask")
     refused(run(*command, "127.0.0.1:1"), "no dask scheduler answers at 127.0.0.1:1")
     refused(run(*command, "127.0.0.1:1", "--workers", 2), "--workers is for threads of this machine")
