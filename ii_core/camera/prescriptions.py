@@ -72,7 +72,7 @@ def lens(name: str | os.PathLike[str]) -> Prescription:
     Raises
     ------
     ValueError
-        If the name is unknown, or the file is no prescription of spherical and conic surfaces.
+        If the name is unknown, or the file is no prescription of spheres, conics and even aspheres.
     OSError
         If the file is missing.
     """

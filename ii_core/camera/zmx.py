@@ -46,6 +46,8 @@ def read_zmx(path: str | os.PathLike[str]) -> dict[str, Any]:
     surfaces: list[dict[str, Any]] = []
     for block in blocks[:-1]:
         surfaces.append(_surface(block, UNITS_MM[unit], surfaces, head.get("GCAT", [])))
+    if surfaces[0]["glass"] is not None:
+        raise ValueError("surface 0, the object, has glass: a lens in air is needed")
     found = surfaces[1:]
     back = found[-1]["thickness_mm"]
     kept: list[dict[str, Any]] = []

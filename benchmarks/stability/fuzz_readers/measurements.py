@@ -157,7 +157,16 @@ def lens(rng: Generator, folder: Path) -> Read:
         path.write_bytes(_json(pick(rng, _lenses()), rng, _lenses()))
     else:
         path = folder / "lens.zmx"
-        lines = ("  GLAS ___BLANK 1 0 1.5 60", "  PARM 1 0.1", "SURF 9", "  GLAS MIRROR", "  DISZ -1", "UNIT IN")
+        lines = (
+            "  GLAS ___BLANK 1 0 1.5 60",
+            "  GLAS F2 2 1",
+            "  PARM 1 0.1",
+            "  PARM 4 1e99",
+            "SURF 9",
+            "  GLAS MIRROR",
+            "  DISZ -1",
+            "UNIT IN",
+        )
         path.write_bytes(text_file(ZMX, rng, lines))
     return partial(read_lens, path)
 

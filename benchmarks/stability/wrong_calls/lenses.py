@@ -46,7 +46,7 @@ def lens_calls(folder: Path) -> dict[str, Call]:
         "Lens": (optics.Lens, {"z_mm": 10.0, "focal_mm": 50.0, "diameter_mm": 20.0}),
         "element": (optics.element, {"data": {"kind": "lens", "z_mm": 10.0, "focal_mm": 50.0}}),
         "Surface": (surfaces.Surface, {"radius_mm": 50.0, "thickness_mm": 2.0, "glass": "N-BK7", "conic": 0.0,
-            "diameter_mm": 20.0, "stop": False}),
+            "aspheric": (0.0, 1e-6), "diameter_mm": 20.0, "stop": False}),
         "Surfaces": (surfaces.Surfaces, {"z_mm": 10.0, "surfaces": built.surfaces, "wavelength_nm": 550.0}),
         "Surfaces.moved": (built.moved, {"by_mm": 1.0}),
         "Surfaces.image_mm": (built.image_mm, {"z_mm": 500.0}),
