@@ -397,10 +397,10 @@ def _refracted(ray: tuple[Any, ...], surface: Surface, vertex: float, index: flo
         x, y, depth = x0 + dx * t, y0 + dy * t, dz * t
         with np.errstate(over="ignore", invalid="ignore"):
             steep = _slope(np.where(through, x * x + y * y, 0.0), surface)
-            size = np.sqrt(4 * steep * steep * (x * x + y * y) + 1)
-        through = through & np.isfinite(size)
-        steep, size = np.where(through, steep, 0.0), np.where(through, size, 1.0)
-        nx, ny, nz = 2 * steep * x / size, 2 * steep * y / size, 1 / size
+            tilt: Any = np.sqrt(4 * steep * steep * (x * x + y * y) + 1)
+        through = through & np.isfinite(tilt)
+        steep, tilt = np.where(through, steep, 0.0), np.where(through, tilt, 1.0)
+        nx, ny, nz = 2 * steep * x / tilt, 2 * steep * y / tilt, 1 / tilt
         z = vertex + depth
         through = through & (dx * nx + dy * ny + dz * nz > 0) & (to_plane + t >= -TOUCH_MM)
     elif c:
