@@ -8,13 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, app, check_outputs, check_page, image_file, load_any, pair
+from .common import Force, app, check_outputs, check_page, check_unused, image_file, load_any, pair
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, say_done, spinner
 from .video import coding, compared_takes, is_take_source
 
 if TYPE_CHECKING:
     from ii_core import IIPicture
+
+ACROSS = {"depth", "cone"}  # options of views over the viewing zone
+USED = {
+    "quilt": {"tiles", *ACROSS},
+    "lenticular": {"pitch", "slope", "centre", *ACROSS},
+    "simulation": {"at", "fill"},
+    "parallax": {"frames", "fps", *ACROSS},
+}
 
 
 @app.command()
@@ -84,6 +92,7 @@ def _compared(picture: Path, compare: Path | None) -> tuple[IIPicture, IIPicture
 
 @app.command()
 def display(
+    context: typer.Context,
     picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar.")],
     output: Annotated[
         Path,
@@ -128,9 +137,9 @@ def display(
 
     if is_take_source(picture):
         raise ValueError(f"{picture} is a take: raytrace-ii video {picture} shows takes, as quilts and films")
-    kinds = ("quilt", "lenticular", "simulation", "parallax")
-    if kind not in kinds:
-        raise ValueError(f"unknown kind {kind!r}: known are {', '.join(kinds)}")
+    if kind not in USED:
+        raise ValueError(f"unknown kind {kind!r}: known are {', '.join(USED)}")
+    check_unused(context, f"--as {kind}", *set().union(*USED.values()) - USED[kind])
     pixels, grid = pair("size", size), pair("tiles", tiles)
     if kind == "quilt":
         output = quilt_name(output, grid, pixels[0] / pixels[1])

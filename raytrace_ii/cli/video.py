@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, app, check_folder, check_outputs, pair
+from .common import Force, app, check_folder, check_outputs, check_unused, pair
 from .progress import progress_bar, say_done
 
 if TYPE_CHECKING:
@@ -16,10 +16,13 @@ if TYPE_CHECKING:
 
 FILMS = (".mp4", ".mov", ".mkv", ".webm")
 TO = ("frames", "views", "quilt", "films", "parallax")
+PARALLAX = {"size", "depth", "cone"}  # options of parallax alone
+USED = {"quilt": {"row"}, "parallax": PARALLAX}
 
 
 @app.command()
 def video(
+    context: typer.Context,
     source: Annotated[
         Path, typer.Argument(help="A folder of frames, a coded take, or a quilt video: name_qsCxRaA.mp4.")
     ],
@@ -36,7 +39,8 @@ def video(
     force: Force = False,
 ) -> None:
     """Convert II-video to folders of frames or views, quilt videos, films of each view or of a moving viewer."""
-    from ii_core import write_view_folders
+    from ii_core import IIVideo, write_view_folders
+    from ii_core.base.atomic import atomic_folder
     from ii_core.display.look import viewpoints_around
     from ii_core.display.video import write_path_film, write_quilt_video, write_view_films
     from ii_core.formats.quilt import quilt_path
@@ -44,6 +48,7 @@ def video(
 
     if to not in TO:
         raise ValueError(f"unknown form {to!r}: known are {', '.join(TO)}")
+    check_unused(context, f"--to {to}", *{"row", *PARALLAX} - USED.get(to, set()))
     pixels = pair("size", size)
     shown = opened(source, fps)
     if to in ("quilt", "parallax"):
@@ -53,23 +58,21 @@ def video(
         check_outputs([target], force)
     else:
         check_folder(output, force)
+    made = output
     with progress_bar(f"video {source.name}") as report:
 
         def told(done: int, total: int) -> None:
             report(done, total, "")
 
-        if to == "frames":
-            made: Any = shown.save(output, told)
-        elif to == "views":
-            made = write_view_folders(shown, output, told)
-        elif to == "quilt":
+        if to == "quilt":
             made = write_quilt_video(shown, output, row=row, progress=told)
-        elif to == "films":
-            made = output
-            write_view_films(shown, output, progress=told)
-        else:
+        elif to == "parallax":
             places = viewpoints_around(with_assumed_camera(shown.structure), shown.frames, cone=cone)
             made = write_path_film(shown, output, places, size=pixels, depth_mm=depth, progress=told)
+        else:
+            writers: dict[str, Any] = {"frames": IIVideo.save, "views": write_view_folders, "films": write_view_films}
+            with atomic_folder(output) as folder:
+                writers[to](shown, folder, progress=told)
     say_done(f"{made}: {shown.frames} frames, {shown.fps:g} a second")
 
 
