@@ -87,6 +87,27 @@ def folder_beside(path: Path) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
+def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A temporary folder that becomes the folder ``path`` if the block succeeds.
+
+    A folder that is there already keeps its files, and gets the new ones at the end of the block.
+    """
+    target = Path(os.path.realpath(path))
+    with disk_errors(path), folder_beside(target) as temporary:
+        yield temporary
+        try:
+            os.replace(temporary, target)  # of no folder, or of an empty one
+        except OSError:
+            for file in sorted(temporary.rglob("*")):
+                place = target / file.relative_to(temporary)
+                if file.is_dir():
+                    place.mkdir(parents=True, exist_ok=True)
+                else:
+                    place.parent.mkdir(parents=True, exist_ok=True)
+                    os.replace(file, place)
+
+
+@contextlib.contextmanager
 def disk_errors(*paths: str | os.PathLike[str]) -> Iterator[None]:
     """Name the files in errors of a full or broken disk."""
     try:

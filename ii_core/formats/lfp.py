@@ -134,6 +134,8 @@ def read_packed(path: str | os.PathLike[str], metadata: str | os.PathLike[str]) 
     check_file(path)
     try:
         return _picture(Path(path).read_bytes(), read_json(metadata))
+    except ValueError as error:  # numbers in the metadata that are text, echoed by Python in full
+        raise ValueError(one_line(error)) from None
     except (TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
         raise ValueError(f"{os.fspath(metadata)} does not describe a raw picture: {one_line(repr(error))}") from None
 

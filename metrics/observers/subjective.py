@@ -57,9 +57,9 @@ class Prediction(NamedTuple):
     Attributes
     ----------
     plcc, rmse, outlier_ratio : float
-        After the monotone fit: Pearson's correlation, root mean square error over N − d degrees of freedom (N stimuli,
-        d parameters of the fit), and the share of stimuli off by more than the half width of their interval (NaN
-        without intervals).
+        After the monotone fit: Pearson's correlation, root mean square error over N − d degrees of freedom (N
+        stimuli, d parameters of the fit), and the share of stimuli off by more than the half width of their interval
+        (NaN without intervals).
     srocc : float
         Spearman's rank correlation, before the fit.
     fitted : ndarray, (stimuli,)

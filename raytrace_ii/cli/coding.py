@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .common import Force, app, check_outputs, columns, image_file, picture_files
+from .common import Force, app, check_outputs, check_unused, columns, image_file, picture_files
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, say_done, spinner
 from .tables import print_table
@@ -36,6 +36,7 @@ def schemes(
 
 @app.command()
 def encode(
+    context: typer.Context,
     picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar, or a folder of frames.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The coded file.")],
     scheme: Annotated[str, typer.Option(help="From `raytrace-ii schemes`, options after a colon.")] = "si-h264",
@@ -67,6 +68,7 @@ def encode(
         plan = Plan(walk=walk, span=span, group=group, strip=strip)
         encode_frames(picture, output, scheme, plan, bpp=bpp, qp=qp, rate=rate)
         return
+    check_unused(context, f"{picture} is one picture, which", "walk", "span", "group", "strip", "rate")
     if quality is not None and quality.is_integer():
         quality = int(quality)  # schemes of whole qualities
     original = IIPicture.load(picture)

@@ -159,10 +159,28 @@ def pair(name: str, text: str, limit: int = 1 << 16) -> tuple[int, int]:
 
 def check_only(context: typer.Context, reason: str, allowed: Set[str]) -> None:
     """Raise ValueError if a command was given options other than these."""
-    sources = {name: context.get_parameter_source(name) for name in context.params}
-    given = [name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"]
-    if others := [name for name in given if name not in {*allowed, "quiet"}]:
+    if others := [name for name in _given(context) if name not in {*allowed, "quiet"}]:
         raise ValueError(f"{reason}: leave out --{others[0].replace('_', '-')}")
+
+
+def check_unused(context: typer.Context, mode: str, *unused: str) -> None:
+    """Raise ValueError if a command was given an option that its mode does not use.
+
+    Parameters
+    ----------
+    mode : str
+        What does not use the options: an option with its value, such as ``--as quilt``, or words.
+    unused : str
+        Names of parameters.
+    """
+    if others := [name for name in _given(context) if name in unused]:
+        raise ValueError(f"{mode} does not use --{others[0].rstrip('_').replace('_', '-')}: leave it out")
+
+
+def _given(context: typer.Context) -> list[str]:
+    """Return the names of the parameters on the command line."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    return [name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"]
 
 
 def columns(rows: dict[str, str]) -> None:

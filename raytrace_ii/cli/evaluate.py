@@ -10,7 +10,7 @@ import typer
 
 from .cluster import Dask, cluster
 from .coding import study_orders
-from .common import Force, Workers, app, check_outputs, columns, load_any
+from .common import Force, Workers, app, check_outputs, check_unused, columns, load_any
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, spinner
 from .tables import print_table
@@ -45,6 +45,7 @@ def measures(plugin: Plugins = None) -> None:
 
 @app.command()
 def measure(
+    context: typer.Context,
     reference: Annotated[Path, typer.Argument(help="The original II-picture, or a folder of frames.")],
     decoded: Annotated[
         Path, typer.Argument(help="The decoded II-picture, a plain picture of the same size, or a coded file.")
@@ -79,10 +80,13 @@ def measure(
     if reference.is_dir():
         from .take import measure_frames
 
-        if depth or focus or layers or ssim or mask:
-            raise ValueError("--depth, --focus, --layers, --ssim and --mask are for single pictures")
+        check_unused(context, f"{reference} is a take, which", "depth", "focus", "method", "layers", "ssim", "mask")
         measure_frames(reference, decoded, json, plots, force)
         return
+    if not (depth or focus or plots):
+        check_unused(context, "a measurement without --focus, --depth or --plots", "method", "layers")
+    if depth:
+        check_unused(context, "--depth", "method", "focus")
     if plots:
         load("matplotlib")  # before the work
         from metrics import PLOTS, plot_all
@@ -153,6 +157,7 @@ def _layers(text: str | None, picture: IIPicture) -> Any:
 
 @app.command()
 def study(
+    context: typer.Context,
     pictures: Annotated[list[Path], typer.Argument(help="II-pictures with their sidecars.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder for charts and numbers.")],
     schemes: Annotated[
@@ -189,8 +194,12 @@ def study(
     from ii_core import IIPicture
     from ii_core.base.extras import load
     from ii_core.base.files import read_depth
+    from metrics.measures.measure import measure_of
     from metrics.rates.rd import identity
 
+    if orders:
+        coding = ("schemes", "anchor", "rates", "measures", "depth", "method", "layers", "workers", "dask")
+        check_unused(context, "--orders", *coding)
     if dask and workers is not None:
         raise ValueError("--workers is for threads of this machine: leave it out with --dask")
     if workers is not None and workers < 1:
@@ -216,6 +225,10 @@ def study(
     if depth is not None and len(pictures) > 1:
         raise ValueError(f"--depth is the map of one picture, {len(pictures)} are given: study them one by one")
     targets, wanted = _rates(rates), _measures(measures)
+    if not any(measure_of(name).needs.depth for name in wanted):
+        check_unused(context, f"--measures {measures}", "depth", "method", "layers")
+    if depth is not None:
+        check_unused(context, "--depth", "method")
     files = [file for stem in stems for file in study_files(output, stem, wanted)]
     check_outputs([*files, *([output / PICTURES] if len(stems) > 1 else [])], force, make_folder=True)
     originals = [IIPicture.load(picture) for picture in pictures]

@@ -154,6 +154,7 @@ def export(
 ) -> None:
     """Export an II-picture for other light-field programs."""
     from ii_core import write_hci, write_quilt, write_views
+    from ii_core.base.atomic import atomic_folder
     from ii_core.base.files import read_depth, write_image
     from ii_core.formats.quilt import quilt_path
 
@@ -165,12 +166,12 @@ def export(
     original = load_any(picture)
     if to in ("views", "hci"):
         check_folder(output, force)
-        with spinner(f"export {picture.name}"):
+        with spinner(f"export {picture.name}"), atomic_folder(output) as folder:
             if to == "views":
-                write_views(original, output)
+                write_views(original, folder)
             else:
                 z = None if depth is None else read_depth(depth, size=original.size)
-                write_hci(original, output, depth=z)
+                write_hci(original, folder, depth=z)
         (k, l), (u, v) = original.lenses, original.ei_pixels
         say_done(f"{output}: {u * v} views of {k}×{l} px")
         return
@@ -201,6 +202,7 @@ def components(
     import numpy as np
 
     from ii_core import component_images
+    from ii_core.base.atomic import atomic_folder
     from ii_core.base.files import write_image
     from ii_core.picture.component import KINDS
 
@@ -215,9 +217,9 @@ def components(
     names = [output / f"{type}_{row:0{digits}}_{col:0{digits}}{suffix}" for row, col in np.ndindex(rows, cols)]
     check_outputs([*image_file(sheet, stack.dtype.name), *names], force, make_folder=True)
     check_folder(output, force)
-    with progress_bar(f"write {output}") as report:
+    with progress_bar(f"write {output}") as report, atomic_folder(output) as folder:
         for i, (name, image) in enumerate(zip(names, stack.reshape(-1, height, width, 3), strict=True)):
-            write_image(name, image)
+            write_image(folder / name.name, image)
             report(i + 1, rows * cols, "")
     if sheet:
         lined = np.zeros((rows, height + 1, cols, width + 1, 3), stack.dtype)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, app, check_outputs, check_page, image_file, load_any, pair
+from .common import Force, app, check_outputs, check_page, check_unused, image_file, load_any, pair
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, say_done, spinner
 from .quilts import SIZE, For, QuiltPlan, Tiles, Whole
@@ -16,6 +16,14 @@ from .video import coding, compared_takes, is_take_source
 
 if TYPE_CHECKING:
     from ii_core import IIPicture
+
+ACROSS = {"depth", "cone"}  # options of views over the viewing zone
+USED = {
+    "quilt": {"for_", "tiles", "whole", *ACROSS},
+    "lenticular": {"pitch", "slope", "centre", *ACROSS},
+    "simulation": {"at", "fill"},
+    "parallax": {"frames", "fps", *ACROSS},
+}
 
 
 @app.command()
@@ -85,6 +93,7 @@ def _compared(picture: Path, compare: Path | None) -> tuple[IIPicture, IIPicture
 
 @app.command()
 def display(
+    context: typer.Context,
     picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar.")],
     output: Annotated[
         Path,
@@ -95,7 +104,7 @@ def display(
         ),
     ],
     kind: Annotated[str, typer.Option("--as", help="quilt, lenticular, simulation or parallax.")] = "parallax",
-    device: For = None,
+    for_: For = None,
     size: Annotated[
         str | None,
         typer.Option(help="Pixels of a tile, of the panel, of the eye's picture or of a frame; 800x400 by default."),
@@ -134,12 +143,10 @@ def display(
 
     if is_take_source(picture):
         raise ValueError(f"{picture} is a take: raytrace-ii video {picture} shows takes, as quilts and films")
-    kinds = ("quilt", "lenticular", "simulation", "parallax")
-    if kind not in kinds:
-        raise ValueError(f"unknown kind {kind!r}: known are {', '.join(kinds)}")
-    if kind != "quilt" and (device is not None or tiles is not None or whole):
-        raise ValueError(f"--for, --tiles and --whole are options of quilts: leave them out for {kind}")
-    plan = QuiltPlan(device, tiles, size, cone, whole) if kind == "quilt" else None
+    if kind not in USED:
+        raise ValueError(f"unknown kind {kind!r}: known are {', '.join(USED)}")
+    check_unused(context, f"--as {kind}", *set().union(*USED.values()) - USED[kind])
+    plan = QuiltPlan(for_, tiles, size, cone, whole) if kind == "quilt" else None
     pixels, share = pair("size", SIZE if size is None else size), 0.9 if cone is None else cone
     if plan is not None:
         output = plan.path(output)

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .common import Force, app, check_outputs, columns, pair
+from .common import Force, app, check_only, check_outputs, columns, pair
 from .progress import progress_bar
 from .words import say
 
@@ -30,6 +30,7 @@ def cameras() -> None:
 
 @app.command()
 def camera(
+    context: typer.Context,
     name: Annotated[str, typer.Argument(help="A camera's name, or a .json file.")] = "",
     output: Annotated[
         Path | None,
@@ -60,9 +61,11 @@ def camera(
 
     check_format(format)
     if solve is not None:
+        check_only(context, "--solve is all of its command", {"solve"})
         _print_solution(solve)
         return
     if design is not None:
+        check_only(context, "--design describes the camera", {"design", "output", "report", "force"})
         _design(design, output, force)
         return
     if not name:

@@ -82,6 +82,7 @@ def decode_frames(
 ) -> None:
     """Decode a take into a folder, or one frame or component image of it into a file."""
     from codec import EncodedTake, open_take
+    from ii_core.base.atomic import atomic_folder
     from ii_core.base.files import write_image
 
     stream = EncodedTake.load(coded, partial=options.pop("partial"))
@@ -90,8 +91,8 @@ def decode_frames(
         if place is not None:
             raise ValueError("a component image of a take needs its --frame")
         check_folder(output, force)
-        with progress_bar(f"decode {coded.name}") as report:
-            video.save(output, lambda done, total: report(done, total, ""))
+        with progress_bar(f"decode {coded.name}") as report, atomic_folder(output) as folder:
+            video.save(folder, lambda done, total: report(done, total, ""))
         say_done(f"{output}: {video.frames} frames")
         return
     if not 0 <= frame < video.frames:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, app, check_folder, check_outputs, pair
+from .common import Force, app, check_folder, check_outputs, check_unused, pair
 from .progress import progress_bar, say_done
 from .quilts import SIZE, For, QuiltPlan, Tiles, Whole
 
@@ -17,17 +17,21 @@ if TYPE_CHECKING:
 
 FILMS = (".mp4", ".mov", ".mkv", ".webm")
 TO = ("frames", "views", "quilt", "films", "parallax")
+PARALLAX = {"size", "depth", "cone"}
+QUILT = {"for_", "tiles", "whole", *PARALLAX}
+USED = {"quilt": QUILT, "parallax": PARALLAX}  # options that other forms do not use
 
 
 @app.command()
 def video(
+    context: typer.Context,
     source: Annotated[
         Path, typer.Argument(help="A folder of frames, a coded take, or a quilt video: name_qsCxRaA.mp4.")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder; for quilt and parallax an .mp4.")],
     to: Annotated[str, typer.Option(help="frames, views, quilt, films (one per view) or parallax.")] = "parallax",
     fps: Annotated[float | None, typer.Option(help="Frames per second, in place of the source's.")] = None,
-    device: For = None,
+    for_: For = None,
     tiles: Tiles = None,
     whole: Whole = False,
     size: Annotated[
@@ -44,16 +48,16 @@ def video(
     force: Force = False,
 ) -> None:
     """Convert II-video to folders of frames or views, quilt videos, films of each view or of a moving viewer."""
-    from ii_core import write_view_folders
+    from ii_core import IIVideo, write_view_folders
+    from ii_core.base.atomic import atomic_folder
     from ii_core.display.look import viewpoints_around
     from ii_core.display.video import write_path_film, write_quilt_video, write_view_films
     from ii_core.picture.assumed import with_assumed_camera
 
     if to not in TO:
         raise ValueError(f"unknown form {to!r}: known are {', '.join(TO)}")
-    if to != "quilt" and (device is not None or tiles is not None or whole):
-        raise ValueError(f"--for, --tiles and --whole are options of quilts: leave them out for {to}")
-    plan = QuiltPlan(device, tiles, size, cone, whole) if to == "quilt" else None
+    check_unused(context, f"--to {to}", *QUILT - USED.get(to, set()))
+    plan = QuiltPlan(for_, tiles, size, cone, whole) if to == "quilt" else None
     pixels = pair("size", SIZE if size is None else size)
     shown = opened(source, fps)
     if to in ("quilt", "parallax"):
@@ -63,26 +67,23 @@ def video(
         check_outputs([target], force)
     else:
         check_folder(output, force)
+    made = output
     with progress_bar(f"video {source.name}") as report:
 
         def told(done: int, total: int) -> None:
             report(done, total, "")
 
-        if to == "frames":
-            made: Any = shown.save(output, told)
-        elif to == "views":
-            made = write_view_folders(shown, output, told)
-        elif plan is not None:
+        if plan is not None:
             options = plan.options(with_assumed_camera(shown.structure), depth)
             made = write_quilt_video(shown, output, plan.tiles, progress=told, **options)
-        elif to == "films":
-            made = output
-            write_view_films(shown, output, progress=told)
-        else:
-            places = viewpoints_around(
-                with_assumed_camera(shown.structure), shown.frames, cone=0.9 if cone is None else cone
-            )
+        elif to == "parallax":
+            share = 0.9 if cone is None else cone
+            places = viewpoints_around(with_assumed_camera(shown.structure), shown.frames, cone=share)
             made = write_path_film(shown, output, places, size=pixels, depth_mm=depth, progress=told)
+        else:
+            writers: dict[str, Any] = {"frames": IIVideo.save, "views": write_view_folders, "films": write_view_films}
+            with atomic_folder(output) as folder:
+                writers[to](shown, folder, progress=told)
     say_done(f"{made}: {shown.frames} frames, {shown.fps:g} a second")
 
 

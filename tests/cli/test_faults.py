@@ -3,6 +3,7 @@
 import http.client
 import json
 import os
+import pkgutil
 import signal
 import struct
 import subprocess
@@ -13,7 +14,7 @@ import zlib
 import numpy as np
 import pytest
 
-from ii_core import IICamera, IIPicture
+from ii_core import IICamera, IIPicture, video_of
 from ii_core.base.files import MAX_TEXT, write_image
 from ii_core.camera.camera import MOST_ALONG
 from ii_core.picture.picture import sidecar
@@ -250,6 +251,67 @@ def test_a_damaged_manifest_is_one_line(run, refused, tmp_path, text):
 def test_strange_options_are_one_line(run, refused, picture, tmp_path, monkeypatch, command, said):
     monkeypatch.chdir(tmp_path)
     refused(run(*command), said)
+
+
+UNUSED = {
+    ("display", "p.png", "-o", "f.mp4"): ["--pitch inf", "--slope 1", "--centre 0", "--tiles 8x6", "--at 1,2,3"],
+    ("display", "p.png", "-o", "f.png", "--as", "quilt"): ["--fps 25", "--frames 0", "--pitch 5", "--fill 1"],
+    ("display", "p.png", "-o", "f.png", "--as", "lenticular"): ["--tiles 0x0", "--fps 25", "--at x"],
+    ("display", "p.png", "-o", "f.png", "--as", "simulation"): ["--cone nan", "--depth inf", "--tiles 8x6"],
+    ("video", "take", "-o", "out"): ["--whole", "--tiles 8x6"],
+    ("video", "take", "-o", "out", "--to", "views"): ["--cone nan", "--size 0x0", "--depth nan", "--for go"],
+    ("measure", "p.png", "p.png"): ["--method 1,2", "--layers 5"],
+    ("measure", "p.png", "p.png", "--depth", "d.exr"): ["--method robust", "--focus"],
+    ("measure", "take", "take"): ["--focus", "--ssim", "--method robust"],
+    ("encode", "p.png", "--qp", "30", "-o", "x.ii"): ["--walk x", "--span 8", "--strip 4", "--rate take"],
+    ("study", "p.png", "-o", "s"): ["--method robust", "--layers 5", "--depth d.exr"],
+    ("study", "p.png", "-o", "s", "--orders"): ["--schemes x", "--rates 1", "--workers 0", "--measures q_view"],
+    ("camera", "--solve", "pitch=0.39,gap=0.73,pixel=0.0061"): ["--scale 3", "--report", "-o cam"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("command", "option"), [(c, o) for c, several in UNUSED.items() for o in several])
+def test_options_that_the_mode_does_not_use_are_refused(
+    run, refused, picture, tmp_path, monkeypatch, command, option
+):
+    """They were accepted in silence, whatever their value."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "take").mkdir()
+    name = "--output" if option.startswith("-o ") else option.split()[0]
+    refused(run(*command, *option.split()), f"{name}")
+    assert {path.name for path in tmp_path.iterdir()} == {"p.png", "p.png.json", "take"}
+
+
+WRITERS = {
+    ("video", "--to", "views"): "ii_core.write_view_folders",
+    ("video", "--to", "frames"): "ii_core.IIVideo.save",
+    ("export", "--to", "views"): "ii_core.write_views",
+    ("export", "--to", "hci"): "ii_core.write_hci",
+    ("components",): "ii_core.base.files.write_image",
+}
+
+
+@pytest.mark.parametrize("command", WRITERS, ids=" ".join)
+def test_a_stopped_command_leaves_no_partial_folder(run, picture, tmp_path, monkeypatch, command):
+    """A partial folder had the final name, and the same command refused to go on."""
+    out, (name, *options) = tmp_path / "out", command
+    source = tmp_path / "take" if name == "video" else picture
+    if name == "video":
+        video_of([IIPicture.load(picture)] * 2, fps=25).save(source)
+    module, _, function = WRITERS[command].rpartition(".")
+    whole = getattr(pkgutil.resolve_name(module), function)
+
+    def stopped(*arguments, **more):
+        whole(*arguments, **more)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(WRITERS[command], stopped)
+        assert run(name, source, *options, "-o", out)[0] == 130
+    assert not out.exists()
+    code, _, err = run(name, source, *options, "-o", out)
+    assert code == 0 and any(out.iterdir()), err
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
 def test_brackets_in_names_are_printed_unchanged(run, picture, tmp_path, monkeypatch):

@@ -138,3 +138,26 @@ def test_a_mosaic_of_a_long_name_is_refused_in_a_short_line(tmp_path, mosaic):
     with pytest.raises(ValueError, match="its mosaic") as error:
         read_raw(tmp_path / "a.raw")
     assert len(str(error.value)) < 1000
+
+
+def leaves(tree, way=()):
+    for key, value in tree.items():
+        yield from leaves(value, (*way, key)) if isinstance(value, dict) else [(*way, key)]
+
+
+@pytest.mark.parametrize("way", list(leaves(metadata(np.zeros((4, 6)), 10))), ids=".".join)
+def test_long_values_of_the_metadata_are_shortened_in_messages(tmp_path, way):
+    """A rotation of 5000 letters was echoed in full."""
+    about = metadata(np.zeros((4, 6)), 10)
+    at = about
+    for key in way[:-1]:
+        at = at[key]
+    at[way[-1]] = "x" * 5000
+    (tmp_path / "a.raw").write_bytes(bytes(60))
+    (tmp_path / "a.json").write_text(json.dumps(about), encoding="utf-8")
+    (tmp_path / "a.lfp").write_bytes(lfp_container(bytes(60), json.dumps(about).encode()))
+    for name in ("a.raw", "a.lfp"):
+        try:
+            read_raw(tmp_path / name)
+        except ValueError as error:
+            assert len(str(error)) < 700 + len(str(tmp_path)) and "\n" not in str(error)

@@ -171,7 +171,8 @@ NAME = "a_$b^{"
 def _studied():
     point = {
         "scheme": NAME, "options": {}, "target_bpp": 0.1, "bpp": 0.1, "nbytes": 10, "q_global": 30.0, "reached": True,
-        "q_depth_min": 20.0, "q_depth_mean": 30.0, "q_depth_max": 40.0, "q_depth": [20.0, 40.0], "depth_mm": [1.0, 2.0],
+        "q_depth_min": 20.0, "q_depth_mean": 30.0, "q_depth_max": 40.0, "q_depth": [20.0, 40.0],
+        "depth_mm": [1.0, 2.0],
     }  # fmt: skip
     points = [{**point, "bpp": bpp, "target_bpp": bpp, "scheme": scheme} for bpp in (0.1, 0.2) for scheme in NAMES]
     return {"picture": {"name": NAME}, "points": points}

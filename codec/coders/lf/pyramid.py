@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
 
+import numpy as np
+from numpy.typing import NDArray
+
 Place = tuple[int, int]
 BATCH = 16  # views that are held in memory at once
 NEAREST = 24  # decoded views among which references are looked for
@@ -43,10 +46,11 @@ def pyramid(rows: int, cols: int, log_stride: int, references: int, sources: int
     """
     middle = (rows // 2, cols // 2)
     levels: list[tuple[Node, ...]] = [(Node(*middle, 0, 0, (), ()),)]
-    done: dict[Place, None] = {middle: None}
+    done = np.zeros((rows, cols), bool)
+    done[middle] = True
     for level in range(1, log_stride + 2):
         stride = 1 << (log_stride + 1 - level)
-        grid = [(row, col) for row in _stops(rows, stride) for col in _stops(cols, stride) if (row, col) not in done]
+        grid = [(row, col) for row in _stops(rows, stride) for col in _stops(cols, stride) if not done[row, col]]
         if level == 1:
             grid.sort(key=lambda place: (_apart(place, middle), place))
             phases = [[place] for place in grid]
@@ -61,7 +65,8 @@ def pyramid(rows: int, cols: int, log_stride: int, references: int, sources: int
                 near = _near(done, place, 2 * stride)
                 predicting = _spread(near, place, references, ALIKE[0]), _spread(near, place, sources, ALIKE[1])
                 nodes.append(Node(*place, level, phase, *predicting))
-            done.update(dict.fromkeys(places))
+            for place in places:
+                done[place] = True
         levels.append(tuple(nodes))
     return tuple(levels)
 
@@ -83,13 +88,31 @@ def _stops(count: int, stride: int) -> list[int]:
     return sorted({*range(0, count, stride), count - 1})
 
 
-def _near(done: dict[Place, None], place: Place, reach: int) -> list[Place]:
-    """Decoded views by distance; within ``reach`` if there are enough."""
-    row, col = place
-    across = range(col - reach, col + reach + 1)
-    window = [(r, c) for r in range(row - reach, row + reach + 1) for c in across if (r, c) in done]
-    found = window if len(window) >= 8 else list(done)
-    return sorted(found, key=lambda other: (_apart(other, place), other))[:NEAREST]
+def _near(done: NDArray[np.bool_], place: Place, reach: int) -> list[Place]:
+    """Return the nearest decoded views by distance, then by row and column; of a square of ``reach`` if it has 8.
+
+    Otherwise the square grows until no view outside it is among the nearest: 16 384 views in a row took 67 s when all
+    decoded views were sorted for each (2026-11-23).
+    """
+    rows, cols = _within(done, place, reach)
+    if len(rows) < 8:
+        while reach < max(done.shape) and np.count_nonzero(_squared(rows, cols, place) <= reach**2) < NEAREST:
+            reach = min(4 * reach, max(done.shape))
+            rows, cols = _within(done, place, reach)
+    order = np.lexsort((cols, rows, _squared(rows, cols, place)))[:NEAREST]
+    return list(zip(rows[order].tolist(), cols[order].tolist(), strict=True))
+
+
+def _within(done: NDArray[np.bool_], place: Place, reach: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return rows and columns of the decoded views in a square around a place."""
+    top, left = (max(0, middle - reach) for middle in place)
+    rows, cols = np.nonzero(done[top : place[0] + reach + 1, left : place[1] + reach + 1])
+    return rows + top, cols + left
+
+
+def _squared(rows: NDArray[np.intp], cols: NDArray[np.intp], place: Place) -> NDArray[np.intp]:
+    """Return squared distances from a place."""
+    return np.square(rows - place[0]) + np.square(cols - place[1])
 
 
 def _spread(near: list[Place], place: Place, count: int, alike: int) -> tuple[Place, ...]:

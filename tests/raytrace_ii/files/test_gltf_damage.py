@@ -106,7 +106,7 @@ WRONG = [
     (
         "extensionsRequired",
         ["KHR_draco_mesh_compression"],
-        "extensionsRequired: KHR_draco_mesh_compression: convert the file with `gltf-transform copy in.glb out.glb` (",
+        "extensionsRequired: KHR_draco_mesh_compression: convert the file with `gltf-transform copy in.glb ",
     ),
     (
         "extensionsRequired",
