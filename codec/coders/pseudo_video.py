@@ -42,7 +42,7 @@ QUANTISER_RUNS, SHARE_RUNS = 8, 4
 # From this target on a lossless finest quantiser is tried first. Where it meets the target, quantisers above it take
 # more bytes for a worse picture.
 NEARLY_LOSSLESS_BPP = 2.0
-LOSS_DB = 0.1  # largest loss of other runs below the line between two quantisers
+LOSS_DB = 0.2  # largest loss of other runs below the line between two quantisers
 START = 0.6  # first trial of a search, as a share of the range of quantisers from the finest on
 
 Settings = TypeVar("Settings")
@@ -95,16 +95,16 @@ class Source(Generic[Settings]):
         return float(sum(sums)) / pixels.size
 
     def on_curve(self, run: Run, coarse: Run, fine: Run) -> bool:
-        """Whether a run is at most `LOSS_DB` below the line between two quantisers, in dB over the log of the rate.
+        """Whether a run is as good as the coarser of two quantisers, and near the line between both (`LOSS_DB`).
 
-        A run longer than the finer quantiser's is below it: that quantiser is better for fewer bytes.
+        A run that is longer than the finer quantiser's is worse: that quantiser is better for fewer bytes.
         """
         sizes = [math.log(len(each.payload)) for each in (coarse, run, fine)]
         if not sizes[1] < sizes[2]:
             return False
         share = max(0.0, (sizes[1] - sizes[0]) / (sizes[2] - sizes[0]))
         low, found, high = (-10 * math.log10(max(self.error(each), LEAST_ERROR)) for each in (coarse, run, fine))
-        return found >= low + share * (high - low) - LOSS_DB
+        return found >= max(low, low + share * (high - low) - LOSS_DB)
 
 
 class PseudoVideo(Coder, Generic[Settings]):
