@@ -35,8 +35,8 @@ from .contract import (
     checked_options,
     find,
     fractions,
+    given_options,
     is_number,
-    parse_scheme,
 )
 from .progress import Report, reported
 from .search import Axis, CodingResult, Run, meet_size, within
@@ -243,8 +243,11 @@ def encode(
     """
     started = cpu_seconds()
     report = _report(progress, "encode")
-    coder, settings = parse_scheme(scheme, **options)
+    coder, given = given_options(scheme, **options)
+    settings = checked_options(coder, given)
     goal = checked_goal(coder, settings, bpp, qp, quality)
+    if goal.bpp is not None:
+        settings = checked_options(coder, {**coder.rated, **given})
     with foreign_errors(f"scheme {coder.name} failed to encode", coder):
         check_picture(coder, settings, picture)
         coded = Encoded(

@@ -110,6 +110,8 @@ class Coder(ABC):
         Range of qualities on the coder's own scale; whole numbers unless the bounds are floats.
     scale_about : str
         Meaning of ``qp`` or ``quality``.
+    rated : mapping of str to options
+        Options for a target rate where they are not given, since their defaults cost quality.
     kind : str
         Kind of component images that the scheme codes: "ei", "si" or "ri"; empty for the whole picture.
     components_alone : bool
@@ -127,6 +129,7 @@ class Coder(ABC):
     qp_range: ClassVar[tuple[int, int] | None] = None
     quality_range: ClassVar[tuple[float, float] | None] = None
     scale_about: ClassVar[str] = ""
+    rated: ClassVar[Options] = {}
     kind: str = ""
     components_alone: ClassVar[bool] = False
 
@@ -259,7 +262,13 @@ def options(scheme: str) -> dict[str, str]:
 
 
 def parse_scheme(scheme: str, **options: Value) -> tuple[Coder, dict[str, Value]]:
-    """Return a coder and all its options.
+    """Return a coder and all its options; see `given_options`."""
+    coder, given = given_options(scheme, **options)
+    return coder, checked_options(coder, given)
+
+
+def given_options(scheme: str, **options: Value) -> tuple[Coder, dict[str, Value]]:
+    """Return a coder and its given options, those of a preset included.
 
     Parameters
     ----------
@@ -301,7 +310,7 @@ def parse_scheme(scheme: str, **options: Value) -> tuple[Coder, dict[str, Value]
             raise ValueError(f"scheme {scheme!r}: {item!r} is no option=value and no preset: known are {known}")
     if len(presets) > 1:
         raise ValueError(f"scheme {scheme!r}: {presets[1]!r} is a second preset")
-    return coder, checked_options(coder, {**(coder.presets[presets[0]] if presets else {}), **given})
+    return coder, {**(coder.presets[presets[0]] if presets else {}), **given}
 
 
 def checked_options(coder: Coder, given: Mapping[str, Any]) -> dict[str, Value]:

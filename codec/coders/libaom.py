@@ -49,6 +49,7 @@ class Avif(PseudoVideo[Settings]):
     min_frame_bytes = 4
     octave = 9.0
     qp_range = (0, 63)
+    finest_lossless = True
     scale_about = "libaom's quantiser; 0 is lossless but for colour"
     # The stream names an identity matrix; its G, B and R are Y, Cb and Cr of BT.709.
     relabel = "av1_metadata=color_primaries=1:transfer_characteristics=13:matrix_coefficients=1:color_range=pc"

@@ -7,13 +7,14 @@ from typing import ClassVar
 
 from ..contract import Option, Options
 from ..frames import Film
-from ..search import CodingResult, Run, meet_rate
+from ..search import CodingResult, Run, meet_rate, nearest
 from .pseudo_video import Source
 from .video import COMMON, Settings, Video
 
 FINEST, COARSEST = 1, 31
 FRAME_RATE = 25  # the standard allows a few rates
 MAX_BIT_RATE = 1 << 30
+RERUNS = 6  # FFmpeg's rate control converges slowly on few frames
 
 
 class Mpeg2(Video):
@@ -42,19 +43,21 @@ class Mpeg2(Video):
         return _settings(options, {"qmin": scale, "qmax": scale, "mbqmin": scale})
 
     def meet(self, target: float, source: Source[Settings]) -> CodingResult:
-        """Meet a target by FFmpeg's rate control."""
+        """Meet a target by the quantiser; then by FFmpeg's rate control between two quantisers."""
+        tried = self.quantisers(target, source)
+        pair = self.pair(tried, source)
+        if pair is None:
+            return CodingResult(run=nearest(tried).result, runs=len(tried))
+        coarse, fine = pair
 
         def at_rate(size: float) -> Run:
             bits = round(min(max(8 * size / source.film.frames * FRAME_RATE, 1), MAX_BIT_RATE))
-            return source.run(_settings(source.options, {"qmin": str(FINEST), "qmax": str(COARSEST)}, bits))
+            bounds = {"qmin": f"{fine.setting:g}", "qmax": f"{coarse.setting:g}"}
+            return source.run(_settings(source.options, bounds, bits))
 
-        return meet_rate(
-            at_rate,
-            target,
-            coarsest=lambda: source.run_at(COARSEST),
-            finest=lambda: source.run_at(FINEST),
-            reruns=10,
-        )
+        rated = meet_rate(at_rate, target, coarsest=lambda: coarse.result, finest=lambda: fine.result, reruns=RERUNS)
+        run = self.kept(tried, [rated.run], target, source)
+        return CodingResult(run=run, runs=len(tried) + rated.runs)
 
 
 def _settings(options: Options, rate: Mapping[str, str], bit_rate: int | None = None) -> Settings:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from ..contract import Coder, Goal, Option, Options, Pixels
 from ..frames import Film, layout
 from ..order import BY, ORDERS, selection_order
 from ..progress import frames_done
-from ..search import Axis, CodingResult, Run, Trial, bracket, met, nearest, size_miss, trials
+from ..search import TOLERANCE, Axis, CodingResult, Run, Trial, bracket, met, nearest, size_miss, trials
 from . import groups
 from .decoding import copy_plane, decoded_frames
 
@@ -33,9 +34,15 @@ ORDER: dict[str, Option] = {
 }
 DEPTH = Option(about="bits of a sample inside the coder", default="10", choices=("8", "10"))
 
+ERROR_ROWS = 256  # rows of pixels compared at once
+LEAST_ERROR = 1e-9  # of lossless runs, instead of 0
 MAX_TARGET = 1e18  # bytes; upper cap on the target size
 # Budgets of encoder runs: for the quantiser, and for the share of frames coded finer.
-QUANTISER_RUNS, SHARE_RUNS = 5, 4
+QUANTISER_RUNS, SHARE_RUNS = 8, 4
+# From this target on a lossless finest quantiser is tried first. Where it meets the target, quantisers above it take
+# more bytes for a worse picture.
+NEARLY_LOSSLESS_BPP = 2.0
+LOSS_DB = 0.2  # largest loss of other runs below the line between two quantisers
 START = 0.6  # first trial of a search, as a share of the range of quantisers from the finest on
 
 Settings = TypeVar("Settings")
@@ -77,6 +84,28 @@ class Source(Generic[Settings]):
         payload = framing.pack(runs[0].first, packets) if self.coder.framed else b"".join(packets)
         return Run(payload, sum(run.seconds for run in runs))
 
+    def error(self, run: Run) -> float:
+        """Return the mean squared error of a run, decoded."""
+        pixels, _ = self.coder.decode_film(run.payload, self.film, self.pixels)
+        blocks = range(0, len(pixels), ERROR_ROWS)
+        sums = (
+            np.sum((pixels[i : i + ERROR_ROWS].astype(np.float64) - self.pixels[i : i + ERROR_ROWS]) ** 2)
+            for i in blocks
+        )
+        return float(sum(sums)) / pixels.size
+
+    def on_curve(self, run: Run, coarse: Run, fine: Run) -> bool:
+        """Whether a run is as good as the coarser of two quantisers, and near the line between both (`LOSS_DB`).
+
+        A run that is longer than the finer quantiser's is worse: that quantiser is better for fewer bytes.
+        """
+        sizes = [math.log(len(each.payload)) for each in (coarse, run, fine)]
+        if not sizes[1] < sizes[2]:
+            return False
+        share = max(0.0, (sizes[1] - sizes[0]) / (sizes[2] - sizes[0]))
+        low, found, high = (-10 * math.log10(max(self.error(each), LEAST_ERROR)) for each in (coarse, run, fine))
+        return found >= max(low, low + share * (high - low) - LOSS_DB)
+
 
 class PseudoVideo(Coder, Generic[Settings]):
     """Component images of one kind as a pseudo video sequence.
@@ -102,6 +131,8 @@ class PseudoVideo(Coder, Generic[Settings]):
         Least bytes of a frame that the encoder writes. Lower rates are not searched.
     octave : float
         Quantiser steps that about halve the rate.
+    finest_lossless : bool
+        Whether the finest quantiser codes YCbCr lossless.
     quantiser_step : float
         Finest step of the quantiser; see `step`.
     relabel : str
@@ -122,6 +153,7 @@ class PseudoVideo(Coder, Generic[Settings]):
     min_coded_frame: ClassVar[int] = 1
     min_frame_bytes: ClassVar[int] = 1
     octave: ClassVar[float] = 6.0
+    finest_lossless: ClassVar[bool] = False
     quantiser_step: ClassVar[float] = 1.0
     relabel: ClassVar[str] = ""
     presets: ClassVar[Mapping[str, Options]] = {}
@@ -173,12 +205,31 @@ class PseudoVideo(Coder, Generic[Settings]):
 
     def between(self, tried: list[Trial[Run]], target: float, source: Source[Settings]) -> CodingResult:
         """Meet a target between two quantisers: the first frames take the finer one, the rest the coarser one."""
-        best, pair = nearest(tried), bracket(tried, self.axis(source.options))
-        if met(best.miss) or pair is None or pair[1].setting > pair[0].setting:
-            return CodingResult(run=best.result, runs=len(tried))
-        coarse, fine = pair
-        if self.mixed(fine.setting, coarse.setting, 1, source.film, source.options) is None:
-            return CodingResult(run=best.result, runs=len(tried))
+        pair = self.pair(tried, source)
+        if pair is None or self.mixed(pair[1].setting, pair[0].setting, 1, source.film, source.options) is None:
+            return CodingResult(run=nearest(tried).result, runs=len(tried))
+        mixes = self.mixes(*pair, target, source)
+        return CodingResult(run=self.kept(tried, mixes, target, source), runs=len(tried) + len(mixes))
+
+    def pair(self, tried: list[Trial[Run]], source: Source[Settings]) -> tuple[Trial[Run], Trial[Run]] | None:
+        """Return the coarser and finer quantiser around a target; None if there are none or one meets it."""
+        pair = bracket(tried, self.axis(source.options))
+        return None if met(nearest(tried).miss) or pair is None or pair[1].setting > pair[0].setting else pair
+
+    def kept(self, tried: list[Trial[Run]], others: list[Run], target: float, source: Source[Settings]) -> Run:
+        """Return the run nearest to a target, of the quantisers and of other runs that are `Source.on_curve`."""
+        best, pair = nearest(tried), self.pair(tried, source)
+        assert pair is not None  # other runs are between two quantisers
+        ends = pair[0].result, pair[1].result
+        for run in sorted(others, key=lambda run: abs(size_miss(run, target))):
+            if abs(size_miss(run, target)) >= abs(best.miss):
+                break
+            if run in ends or source.on_curve(run, *ends):
+                return run
+        return best.result
+
+    def mixes(self, coarse: Trial[Run], fine: Trial[Run], target: float, source: Source[Settings]) -> list[Run]:
+        """Return runs that approach a target by the share of frames that take the finer of two quantisers."""
 
         def at_share(share: float) -> Run:
             frames = round(share * source.film.frames)
@@ -188,8 +239,12 @@ class PseudoVideo(Coder, Generic[Settings]):
 
         axis = Axis(low=0.0, high=1.0, start=0.5, octave=1.0, runs=SHARE_RUNS)
         ends = [Trial(0.0, coarse.miss, coarse.result), Trial(1.0, fine.miss, fine.result)]
-        more = list(trials(at_share, lambda run: size_miss(run, target), axis, known=ends))
-        return CodingResult(run=nearest([best, *more]).result, runs=len(tried) + len(more))
+        made = []
+        for trial in trials(at_share, lambda run: size_miss(run, target), axis, known=ends):
+            made.append(trial.result)
+            if trial.miss >= fine.miss:  # one more I picture costs more than the finer quantiser
+                break
+        return made
 
     def mixed(
         self, fine: float, coarse: float, frames: int, film: Film, options: Options
@@ -242,7 +297,11 @@ class PseudoVideo(Coder, Generic[Settings]):
         if target < self.min_frame_bytes * film.frames:  # headers alone exceed it
             assert self.qp_range is not None
             return CodingResult(run=source.run_at(self.qp_range[1]))
-        return self.meet(target, source)
+        near = self.finest_lossless and goal.bpp >= NEARLY_LOSSLESS_BPP
+        if near and len((finest := source.run_at(0)).payload) <= (1 + TOLERANCE) * target:
+            return CodingResult(run=finest)
+        found = self.meet(target, source)
+        return CodingResult(run=found.run, runs=found.runs + near)
 
     def decode(self, payload: bytes, blank: IIPicture, options: Options) -> tuple[Pixels, float]:
         """Decode frame by frame, at most one batch in memory."""

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from ..contract import Option, Options
 from ..frames import Film
-from ..search import CodingResult, Run, bracket, meet_rate, met, nearest, size_miss, within
+from ..search import CodingResult, Run, meet_rate, nearest, within
 from .pseudo_video import Source
 from .video import COMMON, Settings, Video, chroma, fine_rate
 
@@ -22,6 +22,7 @@ class Vp9(Video):
     min_coded_frame = 2
     octave = 9.0
     qp_range = (0, 63)
+    finest_lossless = True
     scale_about = "libvpx's constant quality; 0 is lossless but for colour"
     options: ClassVar[Mapping[str, Option]] = {
         **COMMON,
@@ -38,9 +39,9 @@ class Vp9(Video):
     def meet(self, target: float, source: Source[Settings]) -> CodingResult:
         """Meet a target by the quality; then by rate control between two qualities; then by two sequences."""
         tried = self.quantisers(target, source)
-        best, pair = nearest(tried), bracket(tried, self.axis(source.options))
-        if met(best.miss) or pair is None or pair[1].setting > pair[0].setting:
-            return CodingResult(run=best.result, runs=len(tried))
+        pair = self.pair(tried, source)
+        if pair is None:
+            return CodingResult(run=nearest(tried).result, runs=len(tried))
         coarse, fine = pair
 
         def at_rate(size: float) -> Run:
@@ -49,11 +50,11 @@ class Vp9(Video):
             return source.run(_settings(source.options, bounds, frame_rate, 1000 * kilobits))
 
         rated = meet_rate(at_rate, target, coarsest=lambda: coarse.result, finest=lambda: fine.result)
-        if within(len(rated.run.payload), target):
+        if within(len(rated.run.payload), target) and source.on_curve(rated.run, coarse.result, fine.result):
             return CodingResult(run=rated.run, runs=len(tried) + rated.runs)
-        mixed = self.between(tried, target, source)
-        best_run = min(rated.run, mixed.run, key=lambda run: abs(size_miss(run, target)))
-        return CodingResult(run=best_run, runs=rated.runs + mixed.runs)
+        mixed = self.mixes(coarse, fine, target, source)
+        run = self.kept(tried, [rated.run, *mixed], target, source)
+        return CodingResult(run=run, runs=len(tried) + rated.runs + len(mixed))
 
     def mixed(
         self, fine: float, coarse: float, frames: int, film: Film, options: Options

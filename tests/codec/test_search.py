@@ -5,7 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from codec import decode, encode, schemes
+from codec.contract import find, parse_scheme
 from codec.search import Axis, Run, Trial, bracket, meet_rate, meet_size, size_miss, trials
+
+from .test_contract import psnr, quick, textured
 
 
 class Fake:
@@ -199,3 +203,49 @@ def test_a_coder_that_jumps_past_the_target_ends_the_search():
     found, runs = search(lambda db: 100 if db < 31.4 else 900, 500, **DB)
     assert found in (100, 900)
     assert runs <= Axis(**DB).runs
+
+
+SCALED = [
+    name for name in sorted(schemes()) if find(name).takes_rate and (find(name).qp_range or find(name).quality_range)
+]
+
+
+def middle_of_scale(scheme):
+    """Return goals from coarse to fine around the middle of a scheme's scale."""
+    coder = find(scheme)
+    name, (low, high) = ("qp", coder.qp_range) if coder.qp_range else ("quality", coder.quality_range)
+    step = 1 if isinstance(low, int) else (high - low) / 60
+    goals = [{name: type(low)((low + high) // 2 + step * away)} for away in (-2, -1, 0, 1, 2)]
+    return goals[::-1] if name == "qp" else goals
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", SCALED)
+def test_a_target_rate_is_as_good_as_the_quantiser(scheme):
+    """At equal or fewer bits no setting of the scale is better by more than 0.1 dB; targets between two settings."""
+    picture = textured(32, 16, 4, 4)
+    points = [encode(picture, quick(scheme), **goal) for goal in middle_of_scale(scheme)]
+    curve = [(coded.bpp, psnr(picture, decode(coded))) for coded in points]
+    for part in (0.3, 0.7):
+        coded = encode(picture, quick(scheme), bpp=points[2].bpp ** (1 - part) * points[3].bpp ** part)
+        best = max((quality for bpp, quality in curve if bpp <= coded.bpp), default=-np.inf)
+        assert psnr(picture, decode(coded)) >= best - 0.1
+
+
+def test_constant_bit_rate_stays_where_it_is_given():
+    """`si-h264` meets a rate by the quantiser; its header says so. With ``rate=cbr`` it is constant bit rate."""
+    picture = textured(32, 16, 4, 4)
+    alone, given = (encode(picture, scheme, bpp=1.5) for scheme in ("si-h264", "si-h264:rate=cbr"))
+    assert (alone.options["rate"], given.options["rate"]) == ("cq", "cbr")
+    assert encode(picture, "si-h264", bpp=1.5, rate="cbr").payload == given.payload != alone.payload
+    assert psnr(picture, decode(alone)) > psnr(picture, decode(given))
+    assert encode(picture, "si-h264:fast", bpp=1.5).options["rate"] == "crf"
+    assert encode(picture, "si-h264", qp=30).options == parse_scheme("si-h264")[1]
+
+
+def test_two_sequences_with_one_more_intra_picture_are_dropped_where_they_are_worse():
+    """With libaom and 16 frames one more I picture costs more than the next finer quantiser."""
+    picture = textured(32, 16, 4, 4)
+    coarse, fine = (encode(picture, "si-avif:fast", qp=qp) for qp in (31, 30))
+    coded = encode(picture, "si-avif:fast", bpp=(coarse.bpp * fine.bpp) ** 0.5)
+    assert coded.payload in (coarse.payload, fine.payload)
