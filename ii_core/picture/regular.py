@@ -12,13 +12,13 @@ owners.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base import checks
-from ..base.jit import kernel
+from ..base.jit import exact_stage_kernel, kernel
 from ..base.parallel import over_rows
 from ..camera.camera import MOST_PIXELS, IICamera, Pair, whole_pair
 from ..camera.elements import LensModel
@@ -29,6 +29,16 @@ from .picture import IIPicture, picture_order
 Ints = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 BLOCK = 64  # rows of pixels in one call of numpy: bounds its temporary arrays
+
+
+class Grid(NamedTuple):
+    """Points at which lenses' cells are resampled, in pixels."""
+
+    x: Any  # (L, K) centres of the lenses
+    y: Any
+    dx: Any  # (V, U) places from them
+    dy: Any
+    inside: Any  # (V, U) whether a place lies in the cell
 
 
 @checks.checked(picture=checks.instance(IIPicture))
@@ -166,7 +176,8 @@ def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: boo
     owner = owners(lattice, picture.size)
     pixels, valid = np.zeros((l, v, k, u, 3), source.dtype), np.zeros((l, v, k, u), np.bool_)
     whole = source.dtype.kind != "f"
-    over_rows(lambda a, b: resample_cells(source, owner, x, y, dx, dy, inside, whole, a, b, pixels, valid), l)
+    grid = Grid(x, y, dx, dy, inside)
+    over_rows(lambda a, b: resample_cells(source, owner, grid, whole, a, b, pixels, valid), l)
     if deshift and lattice.hexagonal:
         average_odd_rows(pixels, valid, whole)
     camera = _regular_camera(picture.camera, (u, v), shrink=False) if picture.camera is not None else None
@@ -321,35 +332,19 @@ def put_back(source, owner, left, top, first, last, out):
 
 
 @kernel
-def resample_cells(source, owner, x, y, dx, dy, inside, whole, first, last, out, valid):
+def resample_cells(source, owner, grid, whole, first, last, out, valid):
     """out[l, v, k, u] = the value at the lens centre (x, y)[l, k] + (dx, dy)[v, u], for l from first to last."""
     height, width = owner.shape
-    across = x.shape[1]
     for l in range(first, last):
-        for v in range(dy.shape[0]):
-            for k in range(across):
-                lens = l * across + k
-                for u in range(dx.shape[1]):
-                    px, py = x[l, k] + dx[v, u], y[l, k] + dy[v, u]
-                    row = np.int64(np.floor(py - 0.5))
-                    down = py - 0.5 - row
+        for v in range(grid.dy.shape[0]):
+            for k in range(grid.x.shape[1]):
+                for u in range(grid.dx.shape[1]):
+                    px, py = grid.x[l, k] + grid.dx[v, u], grid.y[l, k] + grid.dy[v, u]
                     if not (0 <= px <= width and 0 <= py <= height):
                         continue
-                    column = np.int64(np.floor(px - 0.5))
-                    right = px - 0.5 - column
-                    total, red, green, blue = 0.0, 0.0, 0.0, 0.0
-                    for n in (row, row + 1):
-                        for m in (column, column + 1):
-                            if n < 0 or n >= height or m < 0 or m >= width:
-                                continue
-                            weight = (down if n > row else 1 - down) * (right if m > column else 1 - right)
-                            if weight > 0 and owner[n, m] == lens:
-                                total += weight
-                                red += weight * source[n, m, 0]
-                                green += weight * source[n, m, 1]
-                                blue += weight * source[n, m, 2]
+                    total, red, green, blue = _owned_sum(source, owner, l * grid.x.shape[1] + k, px, py)
                     if total > 1e-9:  # otherwise the owned pixels are at least a pixel away, within rounding
-                        valid[l, v, k, u] = inside[v, u]
+                        valid[l, v, k, u] = grid.inside[v, u]
                         red, green, blue = red / total, green / total, blue / total
                     else:
                         n, m = min(np.int64(py), height - 1), min(np.int64(px), width - 1)
@@ -357,6 +352,26 @@ def resample_cells(source, owner, x, y, dx, dy, inside, whole, first, last, out,
                     if whole:
                         red, green, blue = np.rint(red), np.rint(green), np.rint(blue)
                     out[l, v, k, u, 0], out[l, v, k, u, 1], out[l, v, k, u, 2] = red, green, blue
+
+
+@exact_stage_kernel
+def _owned_sum(source, owner, lens, px, py):
+    """Return the bilinear weights of the four pixels around a place that a lens owns, and their weighted colours."""
+    height, width = owner.shape
+    row, column = np.int64(np.floor(py - 0.5)), np.int64(np.floor(px - 0.5))
+    down, right = py - 0.5 - row, px - 0.5 - column
+    total, red, green, blue = 0.0, 0.0, 0.0, 0.0
+    for n in range(row, row + 2):
+        for m in range(column, column + 2):
+            if n < 0 or n >= height or m < 0 or m >= width:
+                continue
+            weight = (down if n > row else 1 - down) * (right if m > column else 1 - right)
+            if weight > 0 and owner[n, m] == lens:
+                total += weight
+                red += weight * source[n, m, 0]
+                green += weight * source[n, m, 1]
+                blue += weight * source[n, m, 2]
+    return total, red, green, blue
 
 
 @kernel

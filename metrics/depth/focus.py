@@ -236,7 +236,7 @@ def _dissertation(
     where = np.column_stack([np.searchsorted(across, lenses[:, 0]), np.searchsorted(down, lenses[:, 1])])
     members = np.stack([(lenses[:, None] == p).all(axis=2).any(axis=1) for p in (base, reference)], axis=1)
     cost, smooth = (np.empty((l, k, layers.size), np.float32) for _ in range(2))
-    _by_rows(workers, l, kernels.focus_cost, pixels, *cols, *rows, where, members, cost)
+    _by_rows(workers, l, kernels.focus_cost, pixels, kernels.Tables(*cols, *rows), where, members, cost)
     _by_rows(workers, l, kernels.weigh, cost, h, np.zeros((l, k, 3)), np.inf, smooth)
     return smooth
 
@@ -259,8 +259,8 @@ def _robust(picture: IIPicture, layers: Floats, h: Floats, nearest: bool, worker
     sides = np.column_stack([where < middle, where > middle])
     step = peak(picture.pixels.dtype) / 255
     cost, smooth = (np.empty((l, k, layers.size), np.float32) for _ in range(2))
-    partners, limit = (where, sides, len(where) - 1), OTHER_SURFACE * step
-    _by_rows(workers, l, kernels.half_cost, pixels, *cols, *rows, *partners, limit, cost)
+    tables, partners = kernels.Tables(*cols, *rows), kernels.Star(where, sides, len(where) - 1)
+    _by_rows(workers, l, kernels.half_cost, pixels, tables, partners, OTHER_SURFACE * step, cost)
     view = view_image(picture, virtual_viewpoint(camera), interpolation="nearest")[0].astype(np.float64)
     _by_rows(workers, l, kernels.weigh, cost, h, view, ALIKE * step, smooth)
     total = cost  # its memory

@@ -3,13 +3,31 @@
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, kernel
+from ii_core.base.jit import exact_stage_kernel, inline_kernel, kernel
 
 # Least neighbours of a half: a single one often agrees by chance. More would also exclude lenses at the border.
 FEWEST = 2
+
+
+class Tables(NamedTuple):
+    """Pixels that see the point of each layer: `lens_tables.pixel_tables` or `views.view_tables`."""
+
+    cols: Any  # (layers, n, K)
+    col_weights: Any
+    rows: Any  # (layers, n, L)
+    row_weights: Any
+
+
+class Star(NamedTuple):
+    """Neighbours of a lens in eight directions."""
+
+    where: Any  # (n, 2) table rows of each
+    sides: Any  # (n, 4) the halves that it belongs to
+    own: Any  # the neighbour at step 0
 
 
 @inline_kernel
@@ -25,12 +43,24 @@ def _between(pixels, m, n, x, y):
     )
 
 
+@exact_stage_kernel
+def _sees(tables, where, i, d, l, k):
+    """Whether a neighbour sees the point of layer ``d`` at lens (k, l)."""
+    return tables.cols[d, where[i, 0], k] >= 0 and tables.rows[d, where[i, 1], l] >= 0
+
+
+@exact_stage_kernel
+def _colour(pixels, tables, where, i, d, l, k):
+    """Return the colour of that point under a neighbour that sees it."""
+    m, n = tables.cols[d, where[i, 0], k], tables.rows[d, where[i, 1], l]
+    return _between(pixels, m, n, tables.col_weights[d, where[i, 0], k], tables.row_weights[d, where[i, 1], l])
+
+
 @kernel
-def focus_cost(pixels, cols, col_weights, rows, row_weights, where, members, out, first, last):
+def focus_cost(pixels, tables, where, members, out, first, last):
     """out[l, k, d] = Σ_rgb |B_d − R_d|, NaN without a comparison, for lens rows ``first`` to ``last``.
 
-    The tables are those of `pixel_tables`. ``where`` (n, 2) holds the table rows of the neighbours, ``members`` (n,
-    2) their membership in B and R.
+    ``where`` (n, 2) holds the table rows of the neighbours, ``members`` (n, 2) their membership in B and R.
     """
     for l in range(first, last):
         for d in range(out.shape[2]):
@@ -39,11 +69,9 @@ def focus_cost(pixels, cols, col_weights, rows, row_weights, where, members, out
                 b0, b1, b2, r0, r1, r2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
                 in_b, in_r, in_both = 0, 0, 0
                 for i in range(where.shape[0]):
-                    m, n = cols[d, where[i, 0], k], rows[d, where[i, 1], l]
-                    if m < 0 or n < 0:
+                    if not _sees(tables, where, i, d, l, k):
                         continue
-                    x, y = col_weights[d, where[i, 0], k], row_weights[d, where[i, 1], l]
-                    p0, p1, p2 = _between(pixels, m, n, x, y)
+                    p0, p1, p2 = _colour(pixels, tables, where, i, d, l, k)
                     if members[i, 0]:
                         b0, b1, b2 = b0 + p0, b1 + p1, b2 + p2
                         in_b += 1
@@ -57,41 +85,46 @@ def focus_cost(pixels, cols, col_weights, rows, row_weights, where, members, out
 
 
 @kernel
-def half_cost(pixels, cols, col_weights, rows, row_weights, where, sides, own, limit, out, first, last):
+def half_cost(pixels, tables, star, limit, out, first, last):
     """out[l, k, d] = min over halves of the mean over their neighbours of min(Σ_rgb |p − p_own|, limit), or NaN.
 
-    As `focus_cost`. ``sides`` (n, 4) holds the halves of each neighbour, ``own`` is the neighbour at step 0.
+    For lens rows ``first`` to ``last``.
     """
     total, count = np.empty(4), np.empty(4)
     for l in range(first, last):
         for d in range(out.shape[2]):
             for k in range(out.shape[1]):
-                out[l, k, d] = np.nan
-                total[:], count[:] = 0.0, 0.0
-                q0, q1, q2 = 0.0, 0.0, 0.0
-                for step in range(-1, where.shape[0]):
-                    i = own if step < 0 else step
-                    m, n = cols[d, where[i, 0], k], rows[d, where[i, 1], l]
-                    if (m < 0 or n < 0) and step < 0:
-                        break
-                    if m < 0 or n < 0 or step == own:
-                        continue
-                    x, y = col_weights[d, where[i, 0], k], row_weights[d, where[i, 1], l]
-                    p0, p1, p2 = _between(pixels, m, n, x, y)
-                    if step < 0:
-                        q0, q1, q2 = p0, p1, p2
-                        continue
-                    difference = min(abs(p0 - q0) + abs(p1 - q1) + abs(p2 - q2), limit)
-                    for s in range(4):
-                        if sides[i, s]:
-                            total[s] += difference
-                            count[s] += 1
-                best = np.inf
-                for s in range(4):
-                    if count[s] >= FEWEST:
-                        best = min(best, total[s] / count[s])
-                if best < np.inf:
-                    out[l, k, d] = best
+                if _sees(tables, star.where, star.own, d, l, k):
+                    _add_halves(pixels, tables, star, limit, d, l, k, total, count)
+                    out[l, k, d] = _least_mean(total, count)
+                else:
+                    out[l, k, d] = np.nan
+
+
+@exact_stage_kernel
+def _add_halves(pixels, tables, star, limit, d, l, k, total, count):
+    """Sum differences to the own lens's colour over the neighbours of each half, and count them."""
+    total[:], count[:] = 0.0, 0.0
+    q0, q1, q2 = _colour(pixels, tables, star.where, star.own, d, l, k)
+    for i in range(star.where.shape[0]):
+        if i == star.own or not _sees(tables, star.where, i, d, l, k):
+            continue
+        p0, p1, p2 = _colour(pixels, tables, star.where, i, d, l, k)
+        difference = min(abs(p0 - q0) + abs(p1 - q1) + abs(p2 - q2), limit)
+        for s in range(4):
+            if star.sides[i, s]:
+                total[s] += difference
+                count[s] += 1
+
+
+@exact_stage_kernel
+def _least_mean(total, count):
+    """Return the least mean of the halves with enough neighbours; NaN without one."""
+    best = np.inf
+    for s in range(4):
+        if count[s] >= FEWEST:
+            best = min(best, total[s] / count[s])
+    return best if best < np.inf else np.nan
 
 
 @kernel

@@ -16,7 +16,7 @@ from ..scene.textures import Image
 from . import lift
 from .intersect import Intersector
 from .kernels import tables
-from .kernels.arrays import Surfaces, Surroundings
+from .kernels.arrays import FaceTables, Surfaces, Surroundings
 from .kernels.tables import DIRECTIONAL, LEAST_WEIGHT, MATERIAL_COLUMNS, POINT, SPOT
 from .texture_table import TextureTable
 
@@ -105,7 +105,11 @@ class PackedScene:
         self.surfaces = Surfaces(
             self.corners, self.faces, self.normals, self.coordinates, self.object_of_face, self.materials,
             self.corners.reshape(-1), self.faces.reshape(-1), self.normals.reshape(-1),
-            self.materials.reshape(-1),             self.textures.table, self.textures.texels, self.textures.alphas,
+            self.materials.reshape(-1), self.textures.table, self.textures.texels, self.textures.alphas,
+        )  # fmt: skip
+        self.face_tables = FaceTables(
+            self.corners, self.faces, self.coordinates, self.object_of_face, self.materials, self.textures.table,
+            self.textures.alphas,
         )  # fmt: skip
         self.surroundings = Surroundings(self.lights, self.background, self.fog, self.ambient)
 

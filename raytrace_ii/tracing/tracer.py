@@ -16,7 +16,7 @@ from ..scene.scene import Scene
 from .intersect import Hits
 from .kernels.addresses import addresses
 from .kernels.appearance import attenuate, look_closely, paint
-from .kernels.arrays import Generation, Passage, Rays, Recorded, ShadowRays, Stages
+from .kernels.arrays import Generation, Onward, Passage, Rays, Recorded, ShadowRays, Stages
 from .kernels.attributes import footprints
 from .kernels.clear import pass_clear_face, pass_faces, start_inside, tell_inside
 from .kernels.lanes import work
@@ -351,22 +351,14 @@ class Tracer:
             return found
         table, rows = found, _NO_ROWS
         n = len(rays.pixels)
-        origins, directions, onward = (
-            np.empty((n, 3), np.float32),
-            np.empty((n, 3), np.float32),
-            np.empty(n, np.int32),
-        )
+        onward = Onward(np.empty((n, 3), np.float32), np.empty((n, 3), np.float32), np.empty(n, np.int32))
         for _ in range(MOST_CLEAR_FACES):
-            count = pass_faces(
-                *found, rows, *table, rays.directions, rays.inside,
-                s.corners, s.faces, s.coordinates, s.object_of_face, s.materials, s.textures.table, s.textures.alphas,
-                origins, directions, onward,
-            )  # fmt: skip
+            count = pass_faces(found, rows, table, rays.directions, rays.inside, s.face_tables, onward)
             if not count:
                 break
             self.count.rays["passed"] += count
-            rows = onward[:count].copy()
-            found = self._nearest(origins[:count], directions[:count])
+            rows = onward.rows[:count].copy()
+            found = self._nearest(onward.origins[:count], onward.directions[:count])
         return table
 
     def _nearest(self, origins: NDArray[np.float32], directions: NDArray[np.float32], placed: bool = True) -> Hits:
@@ -402,17 +394,12 @@ class Tracer:
         if not s.lets_through:
             add_unblocked(found, shadow.colours, shadow.pixels, radiance)
             return
-        rays: list[NDArray[Any]] = list(shadow)
-        kept = keep_unblocked(found, *rays)
+        kept = keep_unblocked(found, *shadow)
         for _ in range(MOST_CLEAR_FACES):
-            origins, directions, reach, colours, pixels, inside = rays = [array[:kept] for array in rays]
-            hits, seconds = s.intersector.nearest_clear(origins, directions, reach)
+            shadow = _rows(shadow, slice(kept))
+            hits, seconds = s.intersector.nearest_clear(shadow.origins, shadow.directions, shadow.reach)
             self.count.embree_seconds += seconds
-            kept = pass_clear_face(
-                *hits, origins, directions, reach, colours, pixels, inside,
-                s.corners, s.faces, s.coordinates, s.object_of_face, s.materials,
-                s.textures.table, s.textures.alphas, s.opaque_faces, radiance,
-            )  # fmt: skip
+            kept = pass_clear_face(hits, shadow, s.face_tables, s.opaque_faces, radiance)
             if not kept:
                 return
             self.count.rays["shadow"] += kept

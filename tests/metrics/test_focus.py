@@ -10,7 +10,7 @@ import pytest
 from ii_core import IICamera, IIPicture, orthoscopic, preset
 from metrics import depth_from_focus, linear_layers, logarithmic_layers, q_depth
 from metrics.depth.focus import BASE, FILTER, REFERENCE
-from metrics.depth.kernels import choose, focus_cost, half_cost, judge, pass_on, weigh
+from metrics.depth.kernels import Star, Tables, choose, focus_cost, half_cost, judge, pass_on, weigh
 from metrics.depth.layers import nearest_layer
 from metrics.depth.lens_tables import NOWHERE, pixel_tables, pixels_per_lens, star, whole_pixel_steps
 from metrics.depth.virtual_camera import virtual_camera_pixels
@@ -191,7 +191,7 @@ def test_cost_is_that_of_the_naive_sum():
     across = np.unique(lenses[:, 0])
     cols, rows = pixel_tables(a.camera, LAYERS, across, across)
     cost = np.zeros((8, 12, 6), np.float32)
-    focus_cost(a.pixels, *cols, *rows, np.searchsorted(across, lenses), members, cost, 0, 8)
+    focus_cost(a.pixels, Tables(*cols, *rows), np.searchsorted(across, lenses), members, cost, 0, 8)
     expected = naive_cost(a, LAYERS, BASE, REFERENCE, nearest=False)
     # Kept in float32; sums of 25 values in float64 in another order.
     np.testing.assert_allclose(np.moveaxis(cost, 2, 0), expected, rtol=1e-6, atol=1e-4)
@@ -210,8 +210,8 @@ def test_kernels_against_their_python():
         layer, fit, confidence = np.zeros((4, 5), np.int64), np.zeros((4, 5)), np.zeros((4, 5), np.float32)
         sides, own = np.column_stack([lenses < 0, lenses > 0]), int(np.flatnonzero((lenses == 0).all(axis=1))[0])
         view = a.pixels[::6, ::6].astype(float)
-        getattr(focus_cost, kind)(a.pixels, *cols, *rows, where, members, cost, 0, 4)
-        getattr(half_cost, kind)(a.pixels, *cols, *rows, where, sides, own, 90.0, halves, 0, 4)
+        getattr(focus_cost, kind)(a.pixels, Tables(*cols, *rows), where, members, cost, 0, 4)
+        getattr(half_cost, kind)(a.pixels, Tables(*cols, *rows), Star(where, sides, own), 90.0, halves, 0, 4)
         getattr(weigh, kind)(halves, FILTER, view, 60.0, smooth, 0, 4)
         for down, back in product((False, True), repeat=2):
             lines = 5 if down else 4
@@ -346,7 +346,7 @@ def test_robust_cost_in_the_open():
     where = star(middle, middle)
     sides = np.column_stack([where < middle, where > middle])
     cost = np.zeros((9, 9, 6), np.float32)
-    half_cost(a.pixels, *cols, *rows, where, sides, len(where) - 1, 30.0, cost, 0, 9)
+    half_cost(a.pixels, Tables(*cols, *rows), Star(where, sides, len(where) - 1), 30.0, cost, 0, 9)
     expected = np.full(cost.shape, np.nan)
     n0, m0 = virtual_camera_pixels(a.camera)
     for d, l, k in np.ndindex(6, 9, 9):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,16 +17,27 @@ from .textures import is_cut_out, share_there
 from .vectors import put, put_behind
 
 
+class Crossing(NamedTuple):
+    """The next face on the way of a shadow ray.
+
+    ``free`` is the share of the light that a blended surface leaves free, ``solid`` says that the rest goes nowhere,
+    ``clear`` that it goes through. At a face that is cut out all goes on.
+    """
+
+    face: Any
+    body: Any
+    entering: bool
+    solid: bool
+    clear: bool
+    free: float
+
+
 @kernel
-def pass_faces(
-    found, found_u, found_v, found_distances, rows, primitives, u, v, distances, directions, inside,
-    corners, faces, coordinates, object_of_face, materials, textures, alphas,
-    out_origins, out_directions, out_rows,
-):  # fmt: skip
+def pass_faces(found, rows, hits, directions, inside, tables, onward):
     """Let rays pass the faces that are not there: cut out by alpha, or hidden in a body of higher priority.
 
-    ``found`` are hits of the rays ``rows``, or of all if it is of no length; they are entered in the table of hits
-    ``primitives``, ``u``, ``v``, ``distances``, from the ray's start. Rays that pass go into the ``out_`` arrays.
+    ``found`` are hits of the rays ``rows``, or of all if it is of no length; they are entered in the table ``hits``,
+    from the ray's start. Rays that pass go into ``onward``.
 
     Returns
     -------
@@ -33,37 +45,42 @@ def pass_faces(
         How many rays pass.
     """
     count = 0
-    for j in range(found.shape[0]):
+    for j in range(found.faces.shape[0]):
         i = j
         if rows.shape[0] > 0:
             i = rows[j]
-            primitives[i], u[i], v[i] = found[j], found_u[j], found_v[j]
-            distances[i] += found_distances[j]
-        f = primitives[i]
+            hits.faces[i], hits.u[i], hits.v[i] = found.faces[j], found.u[j], found.v[j]
+            hits.distances[i] += found.distances[j]
+        f = hits.faces[i]
         if f < 0:
             continue
-        body = object_of_face[f]
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-        entering = faces[f, 0] * dx + faces[f, 1] * dy + faces[f, 2] * dz < 0.0
-        if not is_cut_out(coordinates, textures, alphas, materials, body, f, u[i], v[i]):
-            if not transmits(materials, body):
-                continue
-            before, after = media_at(inside, i, materials, body, entering)
-            if before != after:
-                continue
-            cross(inside, i, body, entering)
-        put_behind(out_origins, count, corners, faces, f, u[i], v[i], entering)
-        put(out_directions, count, dx, dy, dz)
-        out_rows[count] = i
-        count += 1
+        entering = tables.faces[f, 0] * dx + tables.faces[f, 1] * dy + tables.faces[f, 2] * dz < 0.0
+        if _passes(tables, f, hits.u[i], hits.v[i], inside, i, entering):
+            put_behind(onward.origins, count, tables.corners, tables.faces, f, hits.u[i], hits.v[i], entering)
+            put(onward.directions, count, dx, dy, dz)
+            onward.rows[count] = i
+            count += 1
     return count
 
 
+@stage_kernel
+def _passes(tables, f, u, v, inside, i, entering):
+    """Return whether a face is not there; note the body whose hidden face a ray passes."""
+    body = tables.object_of_face[f]
+    if is_cut_out(tables.coordinates, tables.textures, tables.alphas, tables.materials, body, f, u, v):
+        return True
+    if not transmits(tables.materials, body):
+        return False
+    before, after = media_at(inside, i, tables.materials, body, entering)
+    if before != after:
+        return False
+    cross(inside, i, body, entering)
+    return True
+
+
 @kernel
-def pass_clear_face(
-    primitives, u, v, distances, origins, directions, reach, colours, pixels, inside,
-    corners, faces, coordinates, object_of_face, materials, textures, alphas, first_clear, radiance,
-):  # fmt: skip
+def pass_clear_face(hits, rays, tables, first_clear, radiance):
     """Take shadow rays through the next transmissive or cut-out face: coloured shadows.
 
     A ray that met no face arrives and its light is added; the others are dimmed by Fresnel, colour and absorption,
@@ -77,59 +94,86 @@ def pass_clear_face(
         How many rays were kept.
     """
     kept = 0
-    for i in range(primitives.shape[0]):
-        dx, dy, dz = np.float64(directions[i, 0]), np.float64(directions[i, 1]), np.float64(directions[i, 2])
+    for i in range(hits.faces.shape[0]):
+        dx, dy, dz = (
+            np.float64(rays.directions[i, 0]), np.float64(rays.directions[i, 1]), np.float64(rays.directions[i, 2]),
+        )  # fmt: skip
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        hit = primitives[i] >= 0
-        f = primitives[i] + first_clear
-        body = object_of_face[f] if hit else -1
-        entering = hit and faces[f, 0] * dx + faces[f, 1] * dy + faces[f, 2] * dz < 0.0
-        there = hit and not is_cut_out(coordinates, textures, alphas, materials, body, f, u[i], v[i])
-        past = 0.0  # the share that the body leaves free
-        if there and materials[body, ALPHA_BLEND] > 0.0:
-            past = 1.0 - share_there(
-                coordinates, textures, alphas, materials, body, f, u[i], v[i], 0.0, 0.0, 0.0, 0.0
-            )
-        clear = there and transmits(materials, body)
-        if there and past == 0.0 and not clear:
+        met = hits.faces[i] >= 0
+        at = Crossing(-1, -1, False, False, False, 0.0)
+        if met:
+            at = _crossing(tables, hits.faces[i] + first_clear, hits.u[i], hits.v[i], dx, dy, dz)
+        if at.solid and at.free == 0.0:
             continue
-        if clear and not entering:
-            enter(inside, i, body)
-        way = min(float(distances[i]), reach[i]) if hit else reach[i]
-        medium = medium_of(inside, i, materials, -1)
-        if medium >= 0 and way < FAR:
+        if at.clear and not at.entering:
+            enter(rays.inside, i, at.body)
+        way = min(float(hits.distances[i]), rays.reach[i]) if met else rays.reach[i]
+        _absorb(rays.colours, i, tables.materials, medium_of(rays.inside, i, tables.materials, -1), way, length)
+        if not met:
             for c in range(3):
-                colours[i, c] *= math.exp(-materials[medium, ABSORPTION + c] * way * length)
-        if not hit:
-            for c in range(3):
-                radiance[pixels[i], c] += colours[i, c]
+                radiance[rays.pixels[i], c] += rays.colours[i, c]
             continue
-        strongest = 0.0
-        before, after = -1, -1
-        if clear:
-            before, after = media_at(inside, i, materials, body, entering)
-        for c in range(3):
-            through = 0.0 if there and not clear else 1.0
-            if before != after:
-                through = materials[body, TRANSMISSION + c] * (
-                    1.0 - _straight_reflectance(materials, before, after, c, faces, f, dx, dy, dz, length)
-                )
-            colours[i, c] *= past + (1.0 - past) * through
-            colours[kept, c] = colours[i, c]
-            strongest = max(strongest, colours[kept, c])
-        if strongest < LEAST_WEIGHT:
-            continue
-        for j in range(inside.shape[1]):
-            inside[kept, j] = inside[i, j]
-        if clear:
-            cross(inside, kept, body, entering)
-        put_behind(origins, kept, corners, faces, f, u[i], v[i], entering)
-        put(directions, kept, dx, dy, dz)
-        # A point light's direction ends at the light: what is left of it, as a share of the same direction.
-        reach[kept] = reach[i] - distances[i] if reach[i] < FAR else FAR
-        pixels[kept] = pixels[i]
-        kept += 1
+        if _dim(rays.colours, i, tables, at, rays.inside, dx, dy, dz, length) >= LEAST_WEIGHT:
+            _keep(rays, i, kept, at)
+            put_behind(rays.origins, kept, tables.corners, tables.faces, at.face, hits.u[i], hits.v[i], at.entering)
+            put(rays.directions, kept, dx, dy, dz)
+            # A point light's direction ends at the light: what is left of it, as a share of the same direction.
+            rays.reach[kept] = rays.reach[i] - hits.distances[i] if rays.reach[i] < FAR else FAR
+            kept += 1
     return kept
+
+
+@stage_kernel
+def _crossing(tables, f, u, v, dx, dy, dz):
+    """Return what a shadow ray meets at a place of a face."""
+    body = np.int64(tables.object_of_face[f])
+    entering = tables.faces[f, 0] * dx + tables.faces[f, 1] * dy + tables.faces[f, 2] * dz < 0.0
+    coordinates, textures, alphas, materials = tables.coordinates, tables.textures, tables.alphas, tables.materials
+    there = not is_cut_out(coordinates, textures, alphas, materials, body, f, u, v)
+    free = 0.0
+    if there and materials[body, ALPHA_BLEND] > 0.0:
+        free = 1.0 - share_there(coordinates, textures, alphas, materials, body, f, u, v, 0.0, 0.0, 0.0, 0.0)
+    clear = there and transmits(materials, body)
+    return Crossing(f, body, entering, there and not clear, clear, free)
+
+
+@stage_kernel
+def _absorb(colours, i, materials, medium, way, length):
+    """Dim a ray by the medium of its way, in lengths of its direction."""
+    if medium >= 0 and way < FAR:
+        for c in range(3):
+            colours[i, c] *= math.exp(-materials[medium, ABSORPTION + c] * way * length)
+
+
+@stage_kernel
+def _dim(colours, i, tables, at, inside, dx, dy, dz, length):
+    """Dim a ray by the face that it crosses; return its strongest colour."""
+    materials = tables.materials
+    strongest = 0.0
+    before, after = -1, -1
+    if at.clear:
+        before, after = media_at(inside, i, materials, at.body, at.entering)
+    for c in range(3):
+        through = 0.0 if at.solid else 1.0
+        if before != after:
+            through = materials[at.body, TRANSMISSION + c] * (
+                1.0 - _straight_reflectance(materials, before, after, c, tables.faces, at.face, dx, dy, dz, length)
+            )
+        colours[i, c] *= at.free + (1.0 - at.free) * through
+        strongest = max(strongest, colours[i, c])
+    return strongest
+
+
+@stage_kernel
+def _keep(rays, i, kept, at):
+    """Move a ray's colour, pixel and bodies to the front."""
+    for c in range(3):
+        rays.colours[kept, c] = rays.colours[i, c]
+    for j in range(rays.inside.shape[1]):
+        rays.inside[kept, j] = rays.inside[i, j]
+    if at.clear:
+        cross(rays.inside, kept, at.body, at.entering)
+    rays.pixels[kept] = rays.pixels[i]
 
 
 @stage_kernel
