@@ -11,7 +11,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.records import RESULTS, ROOT, seconds_in
+from benchmarks.records import RESULTS, ROOT, key_of, seconds_in
 from ii_core.base.json_lines import lines_of
 
 LEAST = 6.0  # seconds: shorter sums are times of single calls, not of the run
@@ -113,12 +113,8 @@ class Benchmark:
 
 
 def newest(path: Path) -> list[Mapping[str, Any]]:
-    """Return the last record of each key of a file, of each step and size for those of the study."""
-    found = {}
-    for line in lines_of(path):
-        record = json.loads(line)
-        found[json.dumps(record.get("key", record.get("parameters")), sort_keys=True)] = record
-    return list(found.values())
+    """Return the last record of each key of a file."""
+    return list({key_of(record): record for record in map(json.loads, lines_of(path))}.values())
 
 
 def entry(module: str) -> str:
@@ -247,7 +243,7 @@ BENCHMARKS = {
         Benchmark(
             "study",
             needs="records of coders",
-            records="study/*.jsonl.gz",
+            records="study.jsonl.gz",
             fills=("docs/study.md",),
             tables_in="study.page",
             writes=(f"{IMAGES}/study/*",),

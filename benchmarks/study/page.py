@@ -27,8 +27,8 @@ from .runner import FORMAT, VERSION, digest_of
 from .theirs import said
 from .volume_model import APART, MODEL
 
-PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
-ENDING = ".jsonl.gz"  # suffix of published records, compressed to a sixth of their size
+PAGE, IMAGES = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study"
+KEPT = ROOT / "benchmarks/results/study.jsonl.gz"  # compressed to a sixth of its size
 CODERS_SCALE = 4
 PHOTOGRAPHS = {"component-images": ".jpg", "other-cameras": ".jpg", "artefacts-": ".webp", "equal-": ".webp"}
 OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
@@ -47,10 +47,8 @@ SECTIONS = {
 
 def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Path = KEPT) -> None:
     """Add the records of a folder to the kept ones, copy its pictures, draw the charts and fill the page."""
-    for place in (images, kept):
-        place.mkdir(parents=True, exist_ok=True)
-    for path in sorted(folder.glob("*.jsonl")):
-        keep(path, kept / f"{path.name}.gz")
+    images.mkdir(parents=True, exist_ok=True)
+    keep(sorted(folder.glob("*.jsonl")), kept)
     everything = published(kept)
     best = {name: largest(some) for name, some in everything.items()}
     copy_pictures(folder, images, best)
@@ -91,17 +89,19 @@ def page_name(name: str) -> str:
 
 
 def published(kept: Path) -> dict[str, list[dict[str, Any]]]:
-    """Return the published records of every step."""
-    paths = sorted(kept.glob(f"*{ENDING}"))
-    return {path.name.removesuffix(ENDING): read_records(path, FORMAT, VERSION) for path in paths}
+    """Return the published records of every step, by its name."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for record in read_records(kept, FORMAT, VERSION):
+        found.setdefault(record["step"], []).append(record)
+    return dict(sorted(found.items()))
 
 
-def keep(new: Path, old: Path) -> None:
-    """Append the lines of one file that another, compressed one lacks; equal lines make an equal file."""
-    there = lines_of(old) if old.exists() else []
-    lines = [line for line in lines_of(new) if line not in there]
-    with atomic_path(old) as temporary:
-        temporary.write_bytes(gzip.compress(b"".join([*there, *lines]), mtime=0))
+def keep(new: Iterable[Path], kept: Path) -> None:
+    """Append the lines of files that another, compressed one lacks; equal lines make an equal file."""
+    lines = dict.fromkeys(lines_of(kept) if kept.exists() else [])
+    lines |= dict.fromkeys(line for path in new for line in lines_of(path))
+    with atomic_path(kept) as temporary:
+        temporary.write_bytes(gzip.compress(b"".join(lines), mtime=0))
 
 
 def largest(some: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
@@ -409,8 +409,7 @@ def record_table(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
         commit = git["commit"][:10] + (", dirty" if git["dirty"] else "")
         again = {True: "the same to the bit", False: "**not the same**", None: ""}[record.get("repeats")]
         scale = record["parameters"].get("scale", "")
-        link = f"[{name}](../benchmarks/results/study/{name}{ENDING})"
         lines.append(
-            f"| {link} | {record['shows']} | {scale} | {commit} | {record.get('cpu_seconds', '')} | {again} |"
+            f"| {name} | {record['shows']} | {scale} | {commit} | {record.get('cpu_seconds', '')} | {again} |"
         )
     return lines

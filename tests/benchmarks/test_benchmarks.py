@@ -79,6 +79,14 @@ def test_list_names_all_benchmarks_without_importing_them():
     assert heads == list(BENCHMARKS)
 
 
+def test_prune_removes_older_records_of_a_benchmark(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr("benchmarks.registry.RESULTS", tmp_path)
+    (tmp_path / "orders.jsonl").write_text('{"key": 1, "run": 0}\n{"key": 1, "run": 1}\n')
+    command.main(["prune", "orders"])
+    assert capsys.readouterr().out == "orders.jsonl: 1 older records removed\n"
+    assert (tmp_path / "orders.jsonl").read_text() == '{"key": 1, "run": 1}\n'
+
+
 def test_run_passes_options_to_the_benchmark(monkeypatch):
     seen = []
     monkeypatch.setattr("benchmarks.coding.orders.main", lambda: seen.append(sys.argv))
