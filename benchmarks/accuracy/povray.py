@@ -6,7 +6,7 @@ POV-Ray intersects balls and planes in closed form. Its ``mesh_camera`` takes on
 triangles: from the centroid along the normal, so that any L and D can be passed. Its picture is compared with ours
 (triangles) and with `analytic` (closed form, too): PSNR of linear light by object, and a picture of the difference.
 ``povray`` must be on the path (Debian: ``apt-get install povray``); without it the script prints this and ends.
-Numbers and pictures go to ``benchmarks/results/povray.jsonl`` and ``docs/images/povray.jpg``.
+Numbers and pictures go to ``benchmarks/results/povray.jsonl`` and ``docs/images/povray.webp``.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def main() -> None:
             print("  ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
     if len(pictures) == 2:
         gap = np.full((8, pictures[0].shape[1], 3), 255, np.uint8)
-        write_picture(IMAGES / "povray.jpg", np.concatenate([pictures[0], gap, pictures[1]]))
+        write_picture(IMAGES / "povray.webp", np.concatenate([pictures[0], gap, pictures[1]]))
     publish(tables())
 
 

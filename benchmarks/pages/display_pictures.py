@@ -27,7 +27,7 @@ def main() -> None:
     """Render a picture, compute the views and write them."""
     picture = render(load_scene("apples"), preset("setup1", scale=SCALE), samples=4, support=()).picture
     images = faults(picture)
-    write_picture(IMAGES / "display_eye.jpg", sheet([*images.values()], 3, [*images]))
+    write_picture(IMAGES / "display_eye.webp", sheet([*images.values()], 3, [*images]))
     path = IMAGES / "display_zones.png"
     save(zones(), path)
     write_picture(path, path)

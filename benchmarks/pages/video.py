@@ -146,7 +146,7 @@ def taken() -> None:
         u, v = video.structure.ei_pixels
         views = [video.component(frame, "si", (u // 2, v // 2)) for frame in SHOWN]
         rows.append(np.hstack([np.asarray(Image.fromarray(view).resize((2 * HEIGHT, HEIGHT), 0)) for view in views]))
-    write_picture(IMAGES / "takes_frames.jpg", np.vstack(rows))
+    write_picture(IMAGES / "takes_frames.webp", np.vstack(rows))
     video = rendered("car", SCALE)
     some = video_of([video[frame] for frame in range(INSTANTS)], fps=video.fps)
     path = viewpoints_around(some.structure, INSTANTS)

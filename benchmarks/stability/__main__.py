@@ -56,8 +56,8 @@ def main() -> None:
     for key in RECORDS.todo(({"case": name} for name in asked), arguments.again):
         record = RECORDS.measure(key, lambda name=key["case"]: {"rows": CASES[name]()})
         print(f"{key['case']}: {record['seconds']:.0f} s", flush=True)
-    write_picture(IMAGES / "stability_pictures.webp", pictures.rendering())
-    write_picture(IMAGES / "stability_pictures_2.webp", pictures.coding_and_depth())
+    write_picture(IMAGES / "stability_pictures.webp", pictures.rendering(), lossless=True)
+    write_picture(IMAGES / "stability_pictures_2.webp", pictures.coding_and_depth(), lossless=True)
     cases = {name: row["rows"] for name, row in measured().items()}
     if missing := set(CASES) - set(cases):
         print(f"the page lacks results of {', '.join(sorted(missing))}")

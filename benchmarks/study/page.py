@@ -51,10 +51,10 @@ def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Pat
     keep(sorted(folder.glob("*.jsonl")), kept)
     everything = published(kept)
     best = {name: largest(some) for name, some in everything.items()}
-    copy_pictures(folder, images, best)
     for path in draw_all({name: record["result"] for name, record in best.items()}, images):
         write_picture(path, path)
     text = page.read_text(encoding="utf-8")
+    copy_pictures(folder, images, best, text)
     for (_, mark), lines in tables(kept).items():
         text = filled(text, mark, lines)
     with atomic_path(page) as temporary:
@@ -75,16 +75,17 @@ def tables(kept: Path = KEPT) -> Tables:
     return {("docs/study.md", mark): lines for mark, lines in made.items()}
 
 
-def copy_pictures(folder: Path, images: Path, best: Mapping[str, Mapping[str, Any]]) -> None:
-    """Copy the pictures of the shown records that are in this folder."""
+def copy_pictures(folder: Path, images: Path, best: Mapping[str, Mapping[str, Any]], text: str) -> None:
+    """Copy the pictures of the shown records that are in this folder and on the page of this text."""
     for record in best.values():
         for name, digest in record["pictures"].items():
-            if (folder / name).exists() and digest_of(folder / name) == digest:
+            there = page_name(name) in text and (folder / name).exists()
+            if there and digest_of(folder / name) == digest:
                 write_picture(images / page_name(name), folder / name)
 
 
 def page_name(name: str) -> str:
-    """Return the name of a picture on the page: photographs are JPEG, those of coding artefacts WebP without loss."""
+    """Return the name of a picture on the page: photographs are JPEG, those of coded pictures WebP."""
     return next((name.replace(".png", end) for kind, end in PHOTOGRAPHS.items() if name.startswith(kind)), name)
 
 

@@ -17,7 +17,7 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 OUTWARD = re.compile(r"\]\((?P<path>(?:\.\./)+[^)#\s]+)")
-STILL = re.compile(r"!\[\w+\]\((?P<name>\w+)\.jpg\)")
+STILL = re.compile(r"!\[\w+\]\((?P<name>\w+)\.webp\)")
 log = logging.getLogger("mkdocs.hooks.docs")
 
 
