@@ -16,7 +16,7 @@ import sys
 from collections.abc import Sequence
 
 from benchmarks.records import prune
-from benchmarks.registry import BENCHMARKS, Benchmark
+from benchmarks.registry import BENCHMARKS, CLOSED, LAST, Benchmark
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -38,6 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             parser.error(f"{asked.command} takes names alone, not {options[0]}")
         for name in asked.names or BENCHMARKS:
             show(BENCHMARKS[name])
+        if asked.command == "list" and not asked.names:
+            print(f"    closed experiments, in git up to {LAST}: {', '.join(CLOSED)}")
         return
     if not asked.names:
         parser.error("run needs a name: python -m benchmarks list prints them")

@@ -128,8 +128,22 @@ def source(module: str) -> Path:
     return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
 
 
-HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
 IMAGES = "docs/images"
+# Closed experiments: their numbers and pictures stay on pages, script and records are in git up to this commit.
+LAST = "018e29e"
+CLOSED: dict[str, tuple[str, ...]] = {
+    "benchmarks/accuracy/lens_rays.py": (),
+    "benchmarks/coding/crossing.py": (f"{IMAGES}/takes_crossing.png",),
+    "benchmarks/coding/jplm.py": (),
+    "benchmarks/coding/light_field_bounds.py": (f"{IMAGES}/lf_bounds.png",),
+    "benchmarks/coding/light_field_threads.py": (),
+    "benchmarks/coding/neighbours.py": (),
+    "benchmarks/pages/make_textures.py": (),
+    "benchmarks/speed/before_after.py": (),
+    "benchmarks/speed/mitsuba.py": (),
+    "benchmarks/study/volume_model.py": (),
+}
+HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
 # In the order of a whole study: pages after the measurements that they show.
 BENCHMARKS = {
     benchmark.name: benchmark
@@ -139,7 +153,6 @@ BENCHMARKS = {
         Benchmark("accuracy.sample_places", records=OWN, fills=("docs/speed_accuracy.md",)),
         Benchmark("accuracy.camera_in_scene", records=OWN, writes=(f"{IMAGES}/camera_in_scene.*",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",), tables_in="pages.calibration"),
-        Benchmark("accuracy.lens_rays", needs="--peer, an interpreter with optiland", records=OWN),
         Benchmark(
             "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)
         ),
@@ -156,17 +169,10 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/coders*",),
         ),
         Benchmark("coding.takes", records=OWN, fills=("docs/video.md",)),
-        Benchmark("coding.neighbours", records=OWN, fills=("docs/video.md",)),
-        Benchmark("coding.crossing", records=OWN, fills=("docs/video.md",)),
-        Benchmark("pages.video", needs="records of takes and crossing", writes=(f"{IMAGES}/takes_*",)),
+        Benchmark("pages.video", needs="records of takes", writes=(f"{IMAGES}/takes_[aft]*",)),
         Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
-        Benchmark("coding.light_field_threads", records=OWN, fills=("docs/lf.md",)),
-        Benchmark("coding.jplm", needs="jpl-encoder-bin and jpl-decoder-bin", records=OWN, fills=("docs/lf.md",)),
-        Benchmark("coding.light_field_bounds", records=OWN, fills=("docs/lf_bounds.md",)),
-        Benchmark("pages.lf_bounds_chart", needs="records of light_field_bounds", writes=(f"{IMAGES}/lf_bounds.*",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
-        Benchmark("pages.make_textures", writes=("assets/textures/*",)),
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
         Benchmark("stability.wrong_calls", records=OWN, fills=("docs/stability.md",)),
         Benchmark("stability.install", needs="package registries", records=OWN, fills=("docs/tutorial.md",)),
@@ -226,8 +232,6 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/depth_cost.*", f"{IMAGES}/depth_pareto.*"),
         ),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
-        Benchmark("speed.before_after", needs="git history", records=OWN),
-        Benchmark("speed.mitsuba", needs="Mitsuba 3 and an LLVM library", records=OWN),
         Benchmark("speed.take_cost", records=OWN, fills=("docs/video.md",)),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
         Benchmark("pages.display_pictures", writes=(f"{IMAGES}/display_*",)),

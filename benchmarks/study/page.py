@@ -22,10 +22,9 @@ from . import theirs
 from .charts import LABELS, draw_all
 from .claims import Claim, Results, by_detail, claims, gain, of_scenes, shown, type_table
 from .coding import SCENES
-from .rates import BFRAMES, GOPS, MODERN, PVS, RANGES, REFERENCE, SI, VOLUME
+from .rates import APART, BFRAMES, GOPS, MODEL, MODERN, PVS, RANGES, REFERENCE, SI, VOLUME
 from .runner import FORMAT, VERSION, digest_of
 from .theirs import said
-from .volume_model import APART, MODEL
 
 PAGE, IMAGES = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study"
 KEPT = ROOT / "benchmarks/results/study.jsonl.gz"  # compressed to a sixth of its size

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import pictures, rates, reasons, scripts, structures, views, volume_model
+from . import pictures, rates, reasons, scripts, structures, views
 from .runner import Step
 
 
@@ -20,7 +20,6 @@ def all_steps(scale: int) -> list[Step]:
         *pictures.steps(scale),
         *rates.steps(scale),
         *reasons.steps(scale),
-        *volume_model.steps(scale),
         *views.steps(scale),
         *structures.steps(scale),
         *scripts.steps(scale),

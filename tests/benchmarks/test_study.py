@@ -213,3 +213,12 @@ def test_the_search_for_a_quality_interpolates_over_log_rate():
     assert towards(line, 23.0) == pytest.approx(0.2)
     assert towards(line[:1], 23.0) == pytest.approx(0.2)  # 3 dB for a doubling, to begin with
     assert towards(line, 32.0) == pytest.approx(1.6)
+
+
+def test_a_lead_is_measured_at_the_rates_of_the_other_scheme():
+    """A line of 3 dB per octave is 6 dB above another at all rates of that; rates beyond its ends do not count."""
+    mine = [{"scheme": "a", "bpp": rate, "q_global": 30 + 3 * math.log2(rate)} for rate in (0.1, 0.4, 1.6)]
+    its = [{"scheme": "b", "bpp": rate, "q_global": 24 + 3 * math.log2(rate)} for rate in (0.15, 0.7, 1.3)]
+    beyond = [{"scheme": "b", "bpp": rate, "q_global": -99} for rate in (0.09, 1.7)]
+    assert claims.lead(mine, "a", [*its, *beyond], "b") == pytest.approx(6)
+    assert claims.lead(mine, "a", beyond, "b") is None
