@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +81,12 @@ class Records:
         stamp(self.modules)  # again after the measurement: its child processes may have loaded code later
         append_record(self.path, record)
         return record
+
+    def run(self, keys: Iterable[Mapping[str, Any]], call: Callable[..., Mapping[str, Any]], again: str) -> None:
+        """Measure the keys of `todo` by ``call(**key)``, one after the other, and print each with its time."""
+        for key in self.todo(keys, again):
+            record = self.measure(key, partial(call, **key))
+            print(f"{self.name}, {', '.join(map(str, key.values()))}: {record['seconds']:.0f} s", flush=True)
 
     def todo(self, keys: Iterable[Mapping[str, Any]], again: str = CHANGED) -> list[dict[str, Any]]:
         """Return the keys that are to be measured.
@@ -205,6 +211,23 @@ def by_scene(scenes: Mapping[str, Any]) -> str:
     if len(commits) == 1:
         return origin(scenes.values())
     return "Measured by " + ", ".join(f"`{commit}` ({', '.join(names)})" for commit, names in commits.items()) + "."
+
+
+def table(
+    heads: str, rows: Iterable[str | Sequence[object]], commits: Sequence[Iterable[str]] | None = None
+) -> list[str]:
+    """Return a Markdown table; heads and cells are separated by " | ", or rows are lists of cells.
+
+    Parameters
+    ----------
+    heads : str
+    rows : iterable of str or of sequence
+    commits : sequence of iterables of str, optional
+        Commits of each row's records, as for `with_commits`.
+    """
+    lines = [f"| {heads} |", "|---" * len(heads.split(" | ")) + "|"]
+    lines += [f"| {row if isinstance(row, str) else ' | '.join(map(str, row))} |" for row in rows]
+    return lines if commits is None else with_commits(lines, commits)
 
 
 def with_commits(lines: Sequence[str], commits: Sequence[Iterable[str]]) -> list[str]:

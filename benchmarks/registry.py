@@ -141,6 +141,11 @@ CLOSED: dict[str, tuple[str, ...]] = {
     "benchmarks/pages/make_textures.py": (),
     "benchmarks/speed/before_after.py": (),
     "benchmarks/speed/mitsuba.py": (),
+    "benchmarks/speed/feature_ablation.py": (f"{IMAGES}/feature_ablation.png",),
+    "benchmarks/speed/take_cost.py": (),
+    "benchmarks/speed/texture_filter.py": (f"{IMAGES}/texture_filter.png",),
+    "benchmarks/stability/install.py": (),
+    "benchmarks/study/reasons.py": (),
     "benchmarks/study/volume_model.py": (),
 }
 HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
@@ -175,7 +180,6 @@ BENCHMARKS = {
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
         Benchmark("stability.wrong_calls", records=OWN, fills=("docs/stability.md",)),
-        Benchmark("stability.install", needs="package registries", records=OWN, fills=("docs/tutorial.md",)),
         Benchmark("pages.focus_patterns", writes=(f"{IMAGES}/focus_patterns.*",)),
         Benchmark("pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)),
         Benchmark(
@@ -214,25 +218,12 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/pareto.*", f"{IMAGES}/pareto_fine.*"),
         ),
         Benchmark(
-            "speed.feature_ablation",
-            records=OWN,
-            fills=("docs/speed_accuracy.md",),
-            writes=(f"{IMAGES}/feature_ablation.*",),
-        ),
-        Benchmark(
-            "speed.texture_filter",
-            records=OWN,
-            fills=("docs/speed_accuracy.md",),
-            writes=(f"{IMAGES}/texture_filter.*",),
-        ),
-        Benchmark(
             "speed.metrics_speed",
             records=OWN,
             fills=("docs/metrics.md", "docs/speed_accuracy.md"),
             writes=(f"{IMAGES}/depth_cost.*", f"{IMAGES}/depth_pareto.*"),
         ),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
-        Benchmark("speed.take_cost", records=OWN, fills=("docs/video.md",)),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
         Benchmark("pages.display_pictures", writes=(f"{IMAGES}/display_*",)),
         Benchmark("pages.hero", writes=(f"{IMAGES}/apples.webp",)),

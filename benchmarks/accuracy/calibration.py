@@ -187,7 +187,3 @@ def main() -> None:
         RECORDS.measure(key, row)
     for line in RECORDS.rows():
         print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in line.items()))
-
-
-if __name__ == "__main__":
-    main()

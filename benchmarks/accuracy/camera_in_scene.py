@@ -303,7 +303,3 @@ def _faces(scene: Scene) -> int:
 def _unit(x: Any, y: Any, z: Any) -> NDArray[np.float64]:
     vectors = np.stack(np.broadcast_arrays(x, y, z), axis=-1)
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
-if __name__ == "__main__":
-    main()

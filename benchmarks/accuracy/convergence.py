@@ -340,7 +340,3 @@ def chart(result: dict[str, Any], path: Path) -> None:
     geometry.set_ylim(bottom=1e-7)
     figure.savefig(path, dpi=130)
     write_picture(path, path)
-
-
-if __name__ == "__main__":
-    main()

@@ -277,7 +277,3 @@ def _pooled(rows: list[dict[str, Any]], kind: str) -> float:
     held = [row for row in rows if row[f"pixels_{kind}"]]
     right = sum(row[f"pixels_{kind}"] * row[f"within_10_%_{kind}"] for row in held)
     return 100 * right / max(sum(row[f"pixels_{kind}"] for row in held), 1)
-
-
-if __name__ == "__main__":
-    main()

@@ -191,7 +191,3 @@ def simulated_table() -> list[str]:
         head = f"{every.plcc:.3f} | {every.srocc:.3f} | {every.rmse:.2f} | {every.outlier_ratio:.0%}"
         lines.append(f"| `{measure}` | {head} | {each} |")
     return [*lines, "", origin(found)]
-
-
-if __name__ == "__main__":
-    main()

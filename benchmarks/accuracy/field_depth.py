@@ -99,7 +99,3 @@ def tables() -> Tables:
         "setup1 at scale 8, 64×32 lenses of 16×16 pixels. 4 samples a pixel."
     )
     return {("docs/metrics.md", "field-depth"): [*lines, "", told, "", origin(measured)]}
-
-
-if __name__ == "__main__":
-    main()

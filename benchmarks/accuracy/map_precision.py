@@ -112,7 +112,3 @@ def chart(rows: list[dict[str, Any]], path: Path) -> None:
     axes.legend(fontsize="small")
     figure.savefig(path, dpi=120)
     write_picture(path, path)
-
-
-if __name__ == "__main__":
-    main()

@@ -249,7 +249,3 @@ def finish(m: Material, world: World) -> str:
         f"pigment {{ rgb {vector(m.colour)} }} finish {{ ambient rgb {ambient} diffuse {local:.9g} {shine} "
         f"reflection {{ rgb {vector(m.mirror)} }} }}"
     )
-
-
-if __name__ == "__main__":
-    main()

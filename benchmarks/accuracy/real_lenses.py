@@ -211,7 +211,3 @@ def _coding_table() -> Tables:
         for row in rows
     ]
     return {("docs/real_lenses.md", "coding"): [*table, "", origin(rows)]} if rows else {}
-
-
-if __name__ == "__main__":
-    main()

@@ -155,7 +155,3 @@ def tables() -> Tables:
         cells = [f"{one[axis] * 100:.1f} %" if one else "" for axis in (0, 1) for one in sets]
         lines.append(f"| {samples} | {' | '.join(cells)} |")
     return {(PAGE, "sample-places"): [*lines, "", origin(rows.values())]}
-
-
-if __name__ == "__main__":
-    main()

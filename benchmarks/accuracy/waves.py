@@ -266,7 +266,3 @@ def field_table() -> list[str]:
         f"| {p['from_axis_px']:.1f} | {p['traced_px']:.2f} px | {p['maps_px']:.2f} px |" for p in rows[0]["pixels"]
     ]
     return [*lines, "", origin(rows)]
-
-
-if __name__ == "__main__":
-    main()

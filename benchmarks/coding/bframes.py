@@ -108,7 +108,3 @@ def curve(
         points.append({"bpp": point.bpp, "psnr": point.q_global})
     kept = climbing(points)
     return [point["bpp"] for point in kept], [point["psnr"] for point in kept]
-
-
-if __name__ == "__main__":
-    main()

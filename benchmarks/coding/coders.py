@@ -295,7 +295,3 @@ def offsets(named: list[tuple[str, tuple[float, float], str]], axes: Any) -> lis
 def touch(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
     """Return whether two boxes (left, bottom, right, top) overlap."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
-
-
-if __name__ == "__main__":
-    main()

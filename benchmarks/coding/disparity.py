@@ -72,7 +72,3 @@ def has_partner(depth: NDArray[np.float32], moved: NDArray[Any]) -> NDArray[np.b
     other = depth[1:][s, r, np.clip(there, 0, columns - 1)]
     same = np.where(hit, np.abs(other - depth[:-1]) < 0.03 * depth[:-1], np.isnan(other))
     return inside & same
-
-
-if __name__ == "__main__":
-    main()

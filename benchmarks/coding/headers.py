@@ -177,7 +177,3 @@ def yes(value: bool) -> str:
 def gain(row: dict[str, Any]) -> str:
     """Return a gain in dB with the number of rates."""
     return "–" if row["gain_db"] is None else f"{row['gain_db']:+.1f} dB ({len(row['rates_both'])} rates)"
-
-
-if __name__ == "__main__":
-    main()

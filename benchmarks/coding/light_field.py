@@ -223,7 +223,3 @@ def _percent(rate: float) -> str:
 
 def _column(points: list[dict[str, float]], key: str) -> list[float]:
     return [point[key] for point in points]
-
-
-if __name__ == "__main__":
-    main()

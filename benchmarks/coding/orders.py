@@ -67,7 +67,3 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
         lines.append(f"| {scene} | {kind.upper()} | " + " | ".join(cells) + " |")
         commits.append([row["commit"] for row in those.values()])
     return [origin(rows), "", *with_commits(lines, commits)]
-
-
-if __name__ == "__main__":
-    main()

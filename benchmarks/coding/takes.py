@@ -231,7 +231,3 @@ def speed_table() -> list[str]:
             f"{1 - row['view_correlation']:.4f} | {rate_text(off)} |"
         )
     return [origin(rows), "", *lines]
-
-
-if __name__ == "__main__":
-    main()

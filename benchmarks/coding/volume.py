@@ -150,7 +150,3 @@ def tables() -> Tables:
         (page, "rates"): [told, "", *with_commits(table, commits)],
         (page, "apart"): [told, "", *with_commits(apart_table, [[scene["commit"]] for scene in scenes])],
     }
-
-
-if __name__ == "__main__":
-    main()

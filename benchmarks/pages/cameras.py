@@ -266,7 +266,3 @@ def fitted(pixels: NDArray[Any], how: Image.Resampling) -> NDArray[np.uint8]:
     image = Image.fromarray(np.ascontiguousarray(pixels))
     share = min(PANEL[0] / image.width, PANEL[1] / image.height)
     return np.asarray(image.resize((max(1, round(image.width * share)), max(1, round(image.height * share))), how))
-
-
-if __name__ == "__main__":
-    main()

@@ -77,7 +77,3 @@ def size(scale: int, rows: list[dict[str, Any]]) -> list[str]:
     """Return conditions of the table: pictures, times, commits."""
     conditions = f"Pictures of `setup1` at scale {scale}; CPU seconds of one run, mean over qualities and scenes."
     return [conditions, origin(rows)]
-
-
-if __name__ == "__main__":
-    main()

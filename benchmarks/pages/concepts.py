@@ -190,7 +190,3 @@ def draw_sequence(picture: IIPicture) -> Any:
         show(axis, frames[index], f"frame {51 * j}: SI {index % U}, {index // U}")
         axis.set_axis_off()
     return figure
-
-
-if __name__ == "__main__":
-    main()

@@ -18,7 +18,3 @@ def tables() -> Tables:
     for name in profile_names():
         lines += [f"**{name}**", "", *card_table(profile(name))[:-2], ""]
     return {("docs/benchmark.md", "data-card"): [*lines, CAPTION]}
-
-
-if __name__ == "__main__":
-    main()

@@ -100,7 +100,3 @@ def zone_displays(camera: IICamera, distance: float) -> dict[str, DisplayModel]:
         "lens pitch P/(1 + g/d)": DisplayModel(camera=camera, lens_pitch_mm=(meeting, meeting)),
         "gap 30 % more": DisplayModel(camera=camera, gap_mm=1.3 * camera.gap_mm),
     }
-
-
-if __name__ == "__main__":
-    main()

@@ -76,7 +76,3 @@ def _whole_pixels(axes: Any) -> None:
     axes.set_ylabel("depth layer d")
     axes.set_title("where a point falls on whole pixels", loc="left", fontsize=10)
     axes.legend(loc="lower right", frameon=False)
-
-
-if __name__ == "__main__":
-    main()

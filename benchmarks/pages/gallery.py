@@ -80,7 +80,3 @@ def draw_stills(names: Sequence[str]) -> None:
             )
     lines = [f"## {name}\n\n{about}.\n\n![{name}]({name}.webp)\n" for name, about in scene_names().items()]
     (GALLERY / "README.md").write_text("\n".join([INTRODUCTION, *lines]), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

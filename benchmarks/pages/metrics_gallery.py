@@ -65,7 +65,3 @@ def photograph(name: str, draw: Callable[[Path], Any]) -> None:
         drawn = Path(folder) / "figure.png"
         draw(drawn)
         write_picture(IMAGES / name, drawn)
-
-
-if __name__ == "__main__":
-    main()

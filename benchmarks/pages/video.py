@@ -107,7 +107,3 @@ def taken() -> None:
     out = ROOT / "out" / "takes_time.png"
     out.parent.mkdir(exist_ok=True)
     write_picture(IMAGES / "takes_time.png", time_chart(measured, out))
-
-
-if __name__ == "__main__":
-    main()

@@ -78,7 +78,3 @@ def table() -> list[str]:
             f"| {row['scale']} | {1e3 * view:.1f} ms | {1e3 * eye:.1f} ms | {eye / view:.1f} | {share:.2f} |"
         )
     return [*lines, "", origin(rows)]
-
-
-if __name__ == "__main__":
-    main()

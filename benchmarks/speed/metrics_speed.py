@@ -342,7 +342,3 @@ def _peak(call: Callable[[], object]) -> float:
         return tracemalloc.get_traced_memory()[1] / 2**20
     finally:
         tracemalloc.stop()
-
-
-if __name__ == "__main__":
-    main()

@@ -14,12 +14,8 @@ from __future__ import annotations
 
 import json
 import math
-import re
-import shutil
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +29,13 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, by_scene, origin
 from benchmarks.speed.before import COMMIT, worktree
 from benchmarks.speed.shots import Shots, shots
+from benchmarks.speed.tessellation import scene_text, sizes
 from ii_core import IICamera, preset
 from ii_core.display.figure import COLOURS
-from raytrace_ii import Scene, load_scene
-from raytrace_ii.tracing.packing import packed, share
+from raytrace_ii import load_scene
+from raytrace_ii.tracing.packing import packed
 
-MODULES = ("benchmarks.speed.pareto", "benchmarks.speed.shots", "benchmarks.speed.before")
+MODULES = tuple(f"benchmarks.speed.{name}" for name in ("pareto", "shots", "before", "tessellation"))
 RECORDS, SCALE = Records("pareto", MODULES), 32  # scale on the page
 FINE_SCALE = 4  # of which the page shows times at equal PSNR
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
@@ -171,48 +168,6 @@ def settings(
     for cut in cuts:
         if cut != 1:
             yield "cut", cut, most_depth, BASE, None
-
-
-def at_depth(scene: Scene, depth: int) -> Scene:
-    """Return the scene with another recursion depth and the same acceleration structure."""
-    other = scene.with_depth(depth)
-    share(scene, other)
-    return other
-
-
-def scene_text(name: str) -> str:
-    return Path(str(files("assets") / "scenes" / f"{name}.toml")).read_text(encoding="utf-8")
-
-
-def sizes(text: str) -> list[str]:
-    """Return the objects of a scene file with a tessellation."""
-    return [block for block in re.split(r"(?m)^(?=\[\[object\]\])", text) if _cut(block, 2.0) != block]
-
-
-def _cut(block: str, factor: float) -> str:
-    """Return an object with ``factor`` times the tessellation."""
-    if re.search(r'(?m)^shape = "(sphere|cylinder|revolve)"', block):
-        if not re.search(r"(?m)^segments", block):
-            block = re.sub(r"(?m)^shape = .*$", r"\g<0>\nsegments = 96", block, count=1)
-        if '"revolve"' in block and not re.search(r"(?m)^steps", block):
-            block = re.sub(r"(?m)^shape = .*$", r"\g<0>\nsteps = 64", block, count=1)
-        block = re.sub(
-            r"(?m)^(segments|steps) = (\d+)", lambda m: f"{m[1]} = {max(4, round(int(m[2]) * factor))}", block
-        )
-    return re.sub(r"(?m)^cell_mm = ([\d.]+)", lambda m: f"cell_mm = {float(m[1]) / factor:g}", block)
-
-
-def cut_scene(name: str, factor: float) -> Scene:
-    """Return a reference scene with ``factor`` times the tessellation, where its file sets one."""
-    if factor == 1:
-        return load_scene(name)
-    blocks = re.split(r"(?m)^(?=\[\[object\]\])", scene_text(name))
-    with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(Path(str(files("assets") / "textures")), Path(folder) / "textures")
-        (Path(folder) / "scenes").mkdir()
-        path = Path(folder) / "scenes" / f"{name}.toml"
-        path.write_text("".join(_cut(block, factor) for block in blocks), encoding="utf-8")
-        return load_scene(path)
 
 
 def front(rows: Sequence[dict[str, Any]]) -> list[int]:
@@ -403,7 +358,3 @@ def maps_table(rows: list[dict[str, Any]]) -> list[str]:
         cells = f"{row['bytes_per_pixel']:.2f} | {row['angle_max_urad']:.2g} µrad | {psnr[0]} | {psnr[1]}"
         lines.append(f"| {row['format']} | {cells} |")
     return [*lines, "", origin(rows)]
-
-
-if __name__ == "__main__":
-    main()

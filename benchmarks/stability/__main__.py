@@ -206,7 +206,3 @@ def chart(cases: Mapping[str, list[Row]], target: Path) -> None:
             axes.legend(frameon=False, fontsize=9)
     figure.savefig(target, dpi=150)
     write_picture(target, target)
-
-
-if __name__ == "__main__":
-    main()

@@ -22,7 +22,7 @@ from . import theirs
 from .charts import LABELS, draw_all
 from .claims import Claim, Results, by_detail, claims, gain, of_scenes, shown, type_table
 from .coding import SCENES
-from .rates import APART, BFRAMES, GOPS, MODEL, MODERN, PVS, RANGES, REFERENCE, SI, VOLUME
+from .rates import APART, BFRAMES, GOPS, MODEL, MODERN, PVS, REFERENCE, SI, VOLUME
 from .runner import FORMAT, VERSION, digest_of
 from .theirs import said
 
@@ -30,7 +30,6 @@ PAGE, IMAGES = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study"
 KEPT = ROOT / "benchmarks/results/study.jsonl.gz"  # compressed to a sixth of its size
 CODERS_SCALE = 4
 PHOTOGRAPHS = {"component-images": ".jpg", "other-cameras": ".jpg", "artefacts-": ".webp", "equal-": ".webp"}
-OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
 # Figures by part of the page.
 SECTIONS = {
     "rates": ("5.10",),
@@ -172,11 +171,7 @@ def shown_tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dic
         "gains-modern": gains_modern(results),
         "table-types": types_beside(results),
         "volume-model": volume_table(results),
-        "framing": framing_table(results),
-        "search": search_table(results),
-        "types-2008": table_2008(results),
         "times-by-rate": time_table(results),
-        "frames": frame_table(results),
         "detail": detail_table(results),
         "artefact-rates": artefact_table(results),
         "records": record_table(best),
@@ -243,45 +238,6 @@ def volume_table(results: Results) -> list[str]:
     return lines if scenes else []
 
 
-def framing_table(results: Results) -> list[str]:
-    """Return a table of the least rate of EI-PVS by container."""
-    if "framing" not in results:
-        return []
-    lines = ["| file | bytes a frame | bpp | with delimiters | bpp |", "|---|---|---|---|---|"]
-    rows = results["framing"]["rows"]
-    for container in dict.fromkeys(row["container"] for row in rows):
-        cells = [f"{row['bytes']:.1f} | {row['bpp']:.2f}" for row in rows if row["container"] == container]
-        name = "the stream alone" if container == "h264" else container.upper()
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return lines
-
-
-def search_table(results: Results) -> list[str]:
-    """Return a table of time and rate against a range of 16, for both searches."""
-    lines = ["| | search | " + " | ".join(str(r) for r in RANGES) + " |", "|---" * (len(RANGES) + 2) + "|"]
-    for scene in SCENES:
-        rows = results.get(f"search-{scene}", {}).get("rows", [])
-        for search in dict.fromkeys(row["search"] for row in rows):
-            own = [row for row in rows if row["search"] == search]
-            cells = [
-                f"×{row['seconds'] / own[0]['seconds']:.1f}, {100 * (row['bytes'] / own[0]['bytes'] - 1):+.1f} %"
-                for row in own
-            ]
-            lines.append(f"| {scene} | {search} | " + " | ".join(cells).replace("-", "−") + " |")
-    return lines
-
-
-def table_2008(results: Results) -> list[str]:
-    """Return a table of the gain of B pictures with x264 of today and of 2008, by size of the picture."""
-    there = [results[name] for name in OLDER if name in results]
-    lines = ["| x264 set as | | " + " | ".join("{}×{} lenses".format(*one["lenses"]) for one in there) + " |"]
-    lines.append("|---" * (2 + len(there)) + "|")
-    for rows in zip(*(one["rows"] for one in there), strict=True):
-        cells = [" · ".join(shown(value, "+.2f") for value in row["db"]) for row in rows]
-        lines.append(f"| {rows[0]['set']} | {rows[0]['b']} | " + " | ".join(cells) + " |")
-    return lines if there else []
-
-
 def time_table(results: Results) -> list[str]:
     """Return a table of CPU seconds of SI-PVS and JPEG 2000 by rate: encoding, decoding."""
     made = of_scenes(results, "rates")
@@ -297,17 +253,6 @@ def time_table(results: Results) -> list[str]:
         ]
         lines.append(f"| {LABELS[scheme]} | " + " | ".join(cells) + " |")
     return lines
-
-
-def frame_table(results: Results) -> list[str]:
-    """Return a table of the time per elementary image by their number."""
-    rows = results.get("frames", {}).get("rows", [])
-    counts = sorted({row["frames"] for row in rows})
-    lines = ["| frames | " + " | ".join(map(str, counts)) + " |", "|---" * (len(counts) + 1) + "|"]
-    for what in dict.fromkeys(row["set"] for row in rows):
-        own = {row["frames"]: 1e6 * row["seconds"] / row["frames"] for row in rows if row["set"] == what}
-        lines.append(f"| {what} | " + " | ".join(f"{own[count]:.0f}" for count in counts) + " |")
-    return lines if rows else []
 
 
 def detail_table(results: Results) -> list[str]:

@@ -34,8 +34,6 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("convergence", "accuracy of triangle meshes", ()),
     ("stability", "where methods fail", ()),
     ("pareto", "speed against accuracy of rendering", ()),
-    ("feature_ablation", "effect of each scene feature", ()),
-    ("texture_filter", "cost and benefit of filtered textures", ()),
     ("metrics_speed", "cost of metrics", ()),
     ("ratios", "ratios to bare libraries", ()),
     ("readme", "tables of the README", ()),

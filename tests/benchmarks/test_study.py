@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.pages.tables import filled
 from benchmarks.registry import BENCHMARKS
-from benchmarks.study import claims, reasons, theirs
+from benchmarks.study import claims, theirs
 from benchmarks.study.__main__ import main
 from benchmarks.study.page import PAGE, largest, publish, tables
 from benchmarks.study.runner import Step, code_of, known, perform, records, timeless
@@ -17,7 +17,6 @@ from benchmarks.study.scripts import SCRIPTS
 from benchmarks.study.sheets import STRIP
 from benchmarks.study.steps import all_steps
 from benchmarks.study.views import towards
-from ii_core import IIPicture
 from ii_core.base.files import read_image, write_image
 
 calls = []
@@ -143,15 +142,6 @@ def test_fluctuation_explained_by_detail():
     assert (spread, correlation) == pytest.approx((math.sqrt(31.25), 1.0)) and left < 1e-9
     spread, correlation, left = claims.by_detail([30.0, 40.0, 40.0, 30.0], layers["depth_mm"], layers)
     assert correlation == pytest.approx(0, abs=1e-9) and left == pytest.approx(spread)
-
-
-@pytest.mark.parametrize("encoder", [reasons.H264of2008("si"), reasons.PlainH264("si")])
-def test_the_encoders_of_2008_search_exhaustively_without_later_features(encoder):
-    options = {name: option.default for name, option in encoder.options.items()} | {"rate": "cq"}
-    picture = IIPicture(np.zeros((64, 64, 3), np.uint8), (4, 4), (16, 16))
-    asked = encoder.constant(30, encoder.film(picture, options), options).parameters["x264-params"].split(":")
-    assert {"me=esa", "merange=16", "ref=1", "trellis=0", "qp=30"} <= set(asked) and "me=umh" not in asked
-    assert ("direct=none" in asked) == ("subme=1" in asked) == isinstance(encoder, reasons.PlainH264)
 
 
 def test_agreement_is_counted():

@@ -129,7 +129,3 @@ def tables() -> Tables:
         f"files, {counts.get('taken', 0)} values that were right, {counts.get('accidental', 0)} accidental errors."
     )
     return {("docs/stability.md", "wrong-calls"): [line, "", origin(rows)]}
-
-
-if __name__ == "__main__":
-    main()
