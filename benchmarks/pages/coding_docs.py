@@ -33,7 +33,7 @@ def tables() -> Tables:
         (page, "coders"): [*size(SCALE, others), "", *table(others), "", f"Pareto front of rate and time: {best}."],
         (page, "full"): [*size(1, full), "", *table(full)],
         (page, "trials"): [*size(SCALE, trials), "", *table(trials)],
-        (page, "bframes"): bframes.table(),
+        (page, "bframes"): bframes.conditions_table(),
         ("docs/speed_accuracy.md", "coding"): [*size(SCALE, others), "", *front_table(coders)],
     }
 

@@ -12,6 +12,7 @@ from PIL import Image
 
 from benchmarks.records import ROOT
 from ii_core.base.files import atomic_path
+from ii_core.display.figure import save
 
 IMAGES = ROOT / "docs" / "images"
 WIDEST = 1500  # pixels: twice the column of a page
@@ -59,6 +60,19 @@ def write_picture(
         raise ValueError(f"a picture of a page is a .png, .webp or .jpg, not {os.fspath(path)}")
     with atomic_path(path) as temporary:
         temporary.write_bytes(data.getvalue())
+
+
+def write_chart(figure: Any, name: str, dpi: int = 130) -> None:
+    """Write a figure of matplotlib as a picture of a page."""
+    write_picture(IMAGES / name, save(figure, IMAGES / name, dpi=dpi))
+
+
+def tidy(*panels: Any, axis: str = "both") -> None:
+    """Give panels of a chart a light grid behind the lines, and no frame at the top and to the right."""
+    for axes in panels:
+        axes.grid(True, axis=axis, color="0.9", linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
 
 
 def with_palette(picture: Image.Image) -> Image.Image:

@@ -25,7 +25,7 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("headers", "(5.11) to (5.15): header portions", ()),
     ("cost", "(5.16), Table 5.8: time and memory of every scheme", ()),
     ("coders", "every scheme and setting at equal quality", ("--workers", "2")),
-    ("bframes", "why B pictures hurt in Table 5.5", ("--workers", "2")),
+    ("bframes", "why B pictures hurt in Table 5.5", ()),
     ("coding_docs", "tables of docs/coding.md", ()),
     ("volume", "gain of the volume", ("--scenes", "apples,twins,car,cuboid")),
     ("metrics_gallery", "Figure 4.9; Q_angle, views and Q_depth of one picture", ()),
