@@ -179,7 +179,8 @@ def code_hash(modules: Sequence[str]) -> str:
         if found is None or found.origin is None:
             raise ValueError(f"there is no module {module}: results cannot come from it")
         origin = Path(found.origin)
-        for path in sorted(origin.parent.glob("*.py")) if origin.name == "__init__.py" else [origin]:
+        parts = (path for path in origin.parent.iterdir() if path.suffix in SOURCES)
+        for path in sorted(parts) if origin.name == "__init__.py" else [origin]:
             digest.update(path.read_bytes())
     return digest.hexdigest()
 

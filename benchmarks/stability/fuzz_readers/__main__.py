@@ -30,7 +30,7 @@ import numpy as np
 from benchmarks.arguments import command_line
 from benchmarks.coding.fuzz import cpu_seconds
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, origin
+from benchmarks.records import ROOT, Records, origin, table
 from benchmarks.workers import cases
 
 from . import measurements as measurements  # registers its readers
@@ -89,24 +89,14 @@ def main() -> None:
 def tables() -> Tables:
     """Return the table of the page of stability."""
     rows = {row["reader"]: row for row in RECORDS.rows()}  # the newest number of cases of each reader
-    lines = [
-        "| reader | cases | valid object | refused in one line | findings | longest, CPU s | most memory, MB |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    lines = []
     for name, row in rows.items():
-        counts = row["counts"]
+        counts, total = row["counts"], sum(row["counts"].values())
         good = [counts.get(kind, 0) for kind in GOOD]
-        bad = sum(counts.values()) - sum(good)
-        cells = [
-            name,
-            sum(counts.values()),
-            *good,
-            bad,
-            f"{row['longest_seconds']:.2f}",
-            f"{row['most_megabytes']:.0f}",
-        ]
-        lines.append("| " + " | ".join(map(str, cells)) + " |")
-    return {("docs/stability.md", "fuzz-readers"): [*lines, "", origin(rows.values())] if rows else []}
+        ends = [f"{row['longest_seconds']:.2f}", f"{row['most_megabytes']:.0f}"]
+        lines.append([name, total, *good, total - sum(good), *ends])
+    heads = "reader | cases | valid object | refused in one line | findings | longest, CPU s | most memory, MB"
+    return {("docs/stability.md", "fuzz-readers"): [*table(heads, lines), "", origin(rows.values())] if rows else []}
 
 
 def watched(name: str, seed: int, count: int) -> dict[str, Any]:
