@@ -129,24 +129,31 @@ def source(module: str) -> Path:
 
 
 IMAGES = "docs/images"
-# Closed experiments: their numbers and pictures stay on pages, script and records are in git up to this commit.
+# Closed experiments with their pictures: they stay on pages, script and records are in git up to this commit.
 LAST = "018e29e"
 CLOSED: dict[str, tuple[str, ...]] = {
-    "benchmarks/accuracy/lens_rays.py": (),
-    "benchmarks/coding/crossing.py": (f"{IMAGES}/takes_crossing.png",),
-    "benchmarks/coding/jplm.py": (),
-    "benchmarks/coding/light_field_bounds.py": (f"{IMAGES}/lf_bounds.png",),
-    "benchmarks/coding/light_field_threads.py": (),
-    "benchmarks/coding/neighbours.py": (),
-    "benchmarks/pages/make_textures.py": (),
-    "benchmarks/speed/before_after.py": (),
-    "benchmarks/speed/mitsuba.py": (),
-    "benchmarks/speed/feature_ablation.py": (f"{IMAGES}/feature_ablation.png",),
-    "benchmarks/speed/take_cost.py": (),
-    "benchmarks/speed/texture_filter.py": (f"{IMAGES}/texture_filter.png",),
-    "benchmarks/stability/install.py": (),
-    "benchmarks/study/reasons.py": (),
-    "benchmarks/study/volume_model.py": (),
+    "accuracy/eye_views": ("opinions_simulated.png",),
+    "accuracy/lens_rays": (),
+    "accuracy/real_lenses": ("real_lenses.png",),
+    "coding/crossing": ("takes_crossing.png",),
+    "coding/jplm": (),
+    "coding/light_field_bounds": ("lf_bounds.png",),
+    "coding/light_field_threads": (),
+    "coding/neighbours": (),
+    "pages/concepts": tuple(
+        f"concepts/{n}.png" for n in ("components", "maps", "pixels", "rays", "sequence", "views")
+    ),
+    "pages/display_pictures": ("display_eye.webp", "display_zones.png"),
+    "pages/focus_patterns": ("focus_patterns.png",),
+    "pages/make_textures": (),
+    "speed/before_after": (),
+    "speed/feature_ablation": ("feature_ablation.png",),
+    "speed/mitsuba": (),
+    "speed/take_cost": (),
+    "speed/texture_filter": ("texture_filter.png",),
+    "stability/install": (),
+    "study/reasons": (),
+    "study/volume_model": (),
 }
 HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
 # In the order of a whole study: pages after the measurements that they show.
@@ -154,13 +161,9 @@ BENCHMARKS = {
     benchmark.name: benchmark
     for benchmark in (
         Benchmark("pages.cameras", writes=("docs/cameras.md", f"{IMAGES}/cameras/*", f"{IMAGES}/scenes.*")),
-        Benchmark("pages.concepts", writes=(f"{IMAGES}/concepts/*",)),
         Benchmark("accuracy.sample_places", records=OWN, fills=("docs/speed_accuracy.md",)),
         Benchmark("accuracy.camera_in_scene", records=OWN, writes=(f"{IMAGES}/camera_in_scene.*",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",), tables_in="pages.calibration"),
-        Benchmark(
-            "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)
-        ),
         Benchmark("coding.disparity", records=OWN),
         Benchmark("coding.orders", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.headers", records=OWN, fills=("docs/structure.md",)),
@@ -180,7 +183,6 @@ BENCHMARKS = {
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
         Benchmark("stability.wrong_calls", records=OWN, fills=("docs/stability.md",)),
-        Benchmark("pages.focus_patterns", writes=(f"{IMAGES}/focus_patterns.*",)),
         Benchmark("pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)),
         Benchmark(
             "accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",), writes=(f"{IMAGES}/depth_truth.*",)
@@ -188,12 +190,6 @@ BENCHMARKS = {
         Benchmark("accuracy.field_depth", records=OWN, fills=("docs/metrics.md",)),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
         Benchmark("speed.eye", records=OWN, fills=("docs/display.md",)),
-        Benchmark(
-            "accuracy.eye_views",
-            records=OWN,
-            fills=("docs/display.md", "docs/observers.md"),
-            writes=(f"{IMAGES}/opinions_simulated.*",),
-        ),
         Benchmark("accuracy.map_precision", records=OWN, writes=(f"{IMAGES}/map_precision.*",)),
         Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),
         Benchmark(
@@ -225,7 +221,6 @@ BENCHMARKS = {
         ),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
-        Benchmark("pages.display_pictures", writes=(f"{IMAGES}/display_*",)),
         Benchmark("pages.hero", writes=(f"{IMAGES}/apples.webp",)),
         Benchmark("pages.gallery", needs=f"{BROWSER} for --stills", writes=("docs/gallery/*",)),
         Benchmark(

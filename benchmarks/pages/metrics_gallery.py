@@ -14,7 +14,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from benchmarks.pages.focus_patterns import main as draw_patterns
 from benchmarks.pages.pictures import write_picture
 from benchmarks.records import ROOT
 from codec import decode, encode, timed_decode
@@ -42,7 +41,6 @@ SCHEMES, RATES = ("si-h264", "ei-h264", "jpeg2000"), (0.08, 0.15, 0.4, 1.0, 2.0)
 def main() -> None:
     """Render, code, measure and draw."""
     IMAGES.mkdir(parents=True, exist_ok=True)
-    draw_patterns()
     shot = render(load_scene("apples"), preset("setup1", scale=4), noise=1.0, support=("depth",))
     picture, decoded = shot.picture, decode(encode(shot.picture, "si-h264", bpp=0.15))
     plot_angle(picture, decoded, IMAGES / "q_angle.png")

@@ -16,7 +16,6 @@ DEMO = "examples.demo"
 # Script, purpose, arguments. The order matters: `coding_docs` and `readme` use results of others.
 SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("cameras", "Figures 3.6, 3.7, 5.9: every camera with its maps, all scenes", ()),
-    ("concepts", "Figures 2.24, 5.4: component images, orders", ()),
     ("camera_in_scene", "Table 3.2: a camera of glass inside the scene", ()),
     ("demo", "the README's chart", ()),
     ("demo", "the same at full size", ("--scale", "1", "-o", "out/full")),
