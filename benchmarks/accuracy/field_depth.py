@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, origin
+from benchmarks.records import Records, origin, table
 from ii_core import IICamera, camera_pose, disparity_of_depth, preset
 from metrics import depth_from_focus
 from metrics.depth.focus import METHODS
@@ -35,8 +35,7 @@ def main() -> None:
     """Measure, keep and print."""
     asked = command_line(__doc__, scenes=tuple(PLACES)).parse_args()
     keys = [{"scene": name, "kind": kind} for name in asked.scenes for kind in KINDS]
-    for key in RECORDS.todo(keys, asked.again):
-        RECORDS.measure(key, lambda key=key: errors(key["scene"], key["kind"]))
+    RECORDS.run(keys, errors, asked.again)
     publish(tables())
 
 
@@ -50,11 +49,11 @@ def field(views: int = 9, side: int = 128) -> IICamera:
     )  # fmt: skip
 
 
-def errors(name: str, kind: str) -> dict[str, Any]:
+def errors(scene: str, kind: str) -> dict[str, Any]:
     """Return the errors of both methods, and the range of the true disparity."""
     camera = field() if kind == "converged" else preset("setup1", scale=8)
-    pose = camera_pose((0, 0, PLACES[name] if kind == "converged" else 0))
-    shot = render(load_scene(name), camera, samples=4, pose=pose, support=("depth",))
+    pose = camera_pose((0, 0, PLACES[scene] if kind == "converged" else 0))
+    shot = render(load_scene(scene), camera, samples=4, pose=pose, support=("depth",))
     assert shot.depth is not None
     true = disparity_of_depth(camera, shot.depth[virtual_camera_pixels(camera)])
     hit = np.isfinite(true)
@@ -73,29 +72,25 @@ def errors(name: str, kind: str) -> dict[str, Any]:
             f"{method}_sure": float(sure.mean()),
             f"{method}_bad_where_sure": float(bad[sure].mean()) if sure.any() else None,
         }
-    print({"scene": name, "kind": kind, **row}, flush=True)
     return row
 
 
 def tables() -> Tables:
     """Return the table of the page of measures."""
-    head = ("scene", "views", "disparity, 1–99 %", "median error", "error above 0.07 px", "sure", "bad where sure")
-    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
-    measured = RECORDS.rows()
-    if not measured:
-        return {("docs/metrics.md", "field-depth"): ["No record yet: the command above measures it."]}
+    measured, lines = RECORDS.rows(), []
     for row in measured:
+        bad = [row[f"{m}_bad_where_sure"] for m in METHODS]
         cells = [
             row["scene"], row["kind"], f"{row['low']:+.2f} … {row['high']:+.2f} px",
             " → ".join(f"{row[f'{m}_median_px']:.3f}" for m in METHODS) + " px",
             " → ".join(f"{row[f'{m}_bad']:.0%}" for m in METHODS),
             " → ".join(f"{row[f'{m}_sure']:.0%}" for m in METHODS),
-            " → ".join("–" if row[f"{m}_bad_where_sure"] is None else f"{row[f'{m}_bad_where_sure']:.0%}"
-                       for m in METHODS),
+            " → ".join("–" if share is None else f"{share:.0%}" for share in bad),
         ]  # fmt: skip
-        lines.append(f"| {' | '.join(cells)} |")
+        lines.append(cells)
+    heads = "scene | views | disparity, 1–99 % | median error | error above 0.07 px | sure | bad where sure"
     told = (
         "Each cell: the dissertation's method → the robust one. Converged: 9×9 views of 128² pixels. Parallel: "
         "setup1 at scale 8, 64×32 lenses of 16×16 pixels. 4 samples a pixel."
     )
-    return {("docs/metrics.md", "field-depth"): [*lines, "", told, "", origin(measured)]}
+    return {("docs/metrics.md", "field-depth"): [*table(heads, lines), "", told, "", origin(measured)]}

@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.arguments import command_line
 from benchmarks.coding.rd import rd_point
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, origin, with_commits
+from benchmarks.records import Records, origin, table
 from codec import decode, encode
 from codec.bitstream.jpeg2000 import whole_codestream
 from codec.coders.planes import decode_planes, encode_planes
@@ -47,14 +47,9 @@ LOSSLESS = ("si-jp3d", "si-jp3d:levels=1", "ri-jp3d", "ei-jp3d", "si-jpeg2000", 
 
 
 def main() -> None:
-    """Measure, print and record."""
+    """Measure, record and fill the page."""
     asked = command_line(__doc__, scale=SCALE, scenes=("apples", "cuboid")).parse_args()
-    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
-    for key in RECORDS.todo(keys, asked.again):
-        RECORDS.measure(key, lambda key=key: study(**key))
-    for scene in RECORDS.rows(scale=asked.scale):
-        for line in rows(scene["scene"], scene):
-            print(line, flush=True)
+    RECORDS.run(({"scene": name, "scale": asked.scale} for name in asked.scenes), study, asked.again)
     publish(tables())
 
 
@@ -116,37 +111,31 @@ def rows(name: str, scene: dict[str, Any]) -> list[str]:
     anchor = list(zip(*scene["curves"][ANCHOR], strict=True))
     lines = []
     for scheme, points in scene["curves"].items():
-        curve = list(zip(*points, strict=True))
         try:
-            gain = f"{bd_rate(*anchor, *curve):+.0f} %"
+            gain = f"{bd_rate(*anchor, *zip(*points, strict=True)):+.0f} %"
         except ValueError:
             gain = "no overlap"
-        low, high = points[0], points[-1]
-        if low[0] > high[0]:
-            low, high = high, low
-        spans = f"{low[0]:.3f}–{high[0]:.2f} | {low[1]:.1f}–{high[1]:.1f}"
+        low, high = sorted((points[0], points[-1]))
         exact = scene["lossless_bpp"].get(scheme)
-        lines.append(f"| {name} | `{scheme}` | {gain} | {spans} | {'' if exact is None else f'{exact:.2f}'} |")
+        spans = f"{low[0]:.3f}–{high[0]:.2f} | {low[1]:.1f}–{high[1]:.1f}"
+        lines.append(f"{name} | `{scheme}` | {gain} | {spans} | {'' if exact is None else f'{exact:.2f}'}")
     return lines
 
 
 def tables() -> Tables:
     """Return the tables of the page."""
     scenes = RECORDS.rows(scale=SCALE)
-    table = ["| scene | scheme | rate | bpp | dB | lossless, bpp |", "|---|---|---|---|---|---|"]
-    apart_table = ["| scene | a stream each, bpp | of it headers | one stream, bpp |", "|---|---|---|---|"]
-    commits: list[list[str]] = []
+    each = [(line, [scene["commit"]]) for scene in scenes for line in rows(scene["scene"], scene)]
+    streams = []
     for scene in scenes:
-        lines = rows(scene["scene"], scene)
-        table += lines
-        commits += [[scene["commit"]]] * len(lines)
         a = scene["apart"]
-        apart_table.append(
-            f"| {scene['scene']} | {a['apart_bpp']:.3f} | {a['headers_bpp']:.3f} | {a['together_bpp']:.3f} "
-            f"({100 * (a['together_bpp'] / a['apart_bpp'] - 1):+.1f} %) |"
-        )
+        saved = 100 * (a["together_bpp"] / a["apart_bpp"] - 1)
+        rates = f"{a['apart_bpp']:.3f} | {a['headers_bpp']:.3f} | {a['together_bpp']:.3f} ({saved:+.1f} %)"
+        streams.append(f"{scene['scene']} | {rates}")
+    rate_table = table("scene | scheme | rate | bpp | dB | lossless, bpp", *map(list, zip(*each, strict=True)))
+    heads = "scene | a stream each, bpp | of it headers | one stream, bpp"
     page, told = "docs/volume.md", origin(scenes)
     return {
-        (page, "rates"): [told, "", *with_commits(table, commits)],
-        (page, "apart"): [told, "", *with_commits(apart_table, [[scene["commit"]] for scene in scenes])],
+        (page, "rates"): [told, "", *rate_table],
+        (page, "apart"): [told, "", *table(heads, streams, [[scene["commit"]] for scene in scenes])],
     }
