@@ -130,7 +130,7 @@ class Records:
 
     def by(self, name: str, values: Iterable[str], **only: Any) -> dict[str, dict[str, Any]]:
         """Return the row of each of these values of a key, in their order; values without a row are left out."""
-        rows = {row[name]: row for row in self.rows(**only)}
+        rows = {row[name]: row for row in self.rows(**only) if name in row}
         return {value: rows[value] for value in values if value in rows}
 
     def rows(self, *, unsure: bool | None = None, **only: Any) -> list[dict[str, Any]]:
@@ -226,7 +226,7 @@ def table(
     commits : sequence of iterables of str, optional
         Commits of each row's records, as for `with_commits`.
     """
-    lines = [f"| {heads} |", "|---" * len(heads.split(" | ")) + "|"]
+    lines = [head := f"| {heads} |", "|---" * (head.count("|") - 1) + "|"]
     lines += [f"| {row if isinstance(row, str) else ' | '.join(map(str, row))} |" for row in rows]
     return lines if commits is None else with_commits(lines, commits)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.pages import coding_docs
-from benchmarks.speed import metrics_speed, pareto, tessellation
+from benchmarks.speed import pareto, tessellation
 from ii_core import preset
 from raytrace_ii import load_scene
 from raytrace_ii.tracing.packing import packed
@@ -41,9 +41,8 @@ def test_another_depth_shares_the_tree():
     assert packed(tessellation.at_depth(scene, 2)) is packed(scene) and tessellation.at_depth(scene, 2).max_depth == 2
 
 
-def test_one_setting_of_coding_and_of_evaluation_is_recommended():
-    fronts = (coding_docs.front_table(coding_docs.studied(4)), metrics_speed.front_table(metrics_speed.data()))
-    assert all(sum("**" in line for line in lines) >= 1 for lines in fronts)
+def test_one_setting_of_coding_is_recommended():
+    assert sum("**" in line for line in coding_docs.front_table(coding_docs.studied(4))) == 1
 
 
 def test_a_band_is_the_middle_rows_of_lenses():
