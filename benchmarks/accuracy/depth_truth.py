@@ -20,19 +20,19 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import write_picture
+from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, origin, with_commits
+from benchmarks.records import Records, origin, table
 from codec import decode, encode
 from ii_core import IIPicture, add_sensor_noise, preset
-from ii_core.display.figure import COLOURS, new_figure, save
+from ii_core.display.figure import COLOURS, new_figure
 from ii_core.picture.view import camera_of
 from metrics import DepthQuality, FocusDepth, depth_from_focus, linear_layers, q_depth
 from metrics.depth.focus import METHODS
 from metrics.depth.virtual_camera import virtual_camera_pixels
 from raytrace_ii import Scene, Shot, load_scene, render
 
-RECORDS, CHART = Records("depth_truth", ("benchmarks.accuracy.depth_truth",)), ROOT / "docs/images/depth_truth.png"
+RECORDS = Records("depth_truth", ("benchmarks.accuracy.depth_truth",))
 SCALE = 2  # scale on the page
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
 KINDS = ("textured", "flat", "edge", "mirror", "clear")
@@ -51,10 +51,8 @@ def main() -> None:
     keys = [
         {"scene": name, "scale": scale, "bpp": BPP} for name in asked.scenes for scale in (NOISE_SCALE, asked.scale)
     ]
-    for key in RECORDS.todo(keys, asked.again):
-        RECORDS.measure(key, lambda key=key: study(key["scene"], key["scale"]))
-    save(draw(data()), CHART)
-    write_picture(CHART, CHART)
+    RECORDS.run(keys, lambda scene, scale, bpp: study(scene, scale), asked.again)
+    write_chart(draw(data()), "depth_truth.png")
     publish(tables())
 
 
@@ -67,7 +65,6 @@ def study(name: str, scale: int) -> dict[str, Any]:
         found = estimates(add_sensor_noise(shot.picture, noise, seed=1))
         for method, (depth, seconds) in found.items():
             rows.append({"noise": noise, "method": method, **errors(depth, shot, kinds), "cpu_seconds": seconds})
-            say({"scene": name, "scale": scale, **rows[-1]})
     return {"errors": rows, "q_depth": None if scale == NOISE_SCALE else quality(shot, found)}
 
 
@@ -83,29 +80,25 @@ def data() -> dict[str, list[dict[str, Any]]]:
 
 def tables() -> Tables:
     """Return the table of the records."""
-    return {("docs/metrics.md", "depth-truth"): table(data())}
+    return {("docs/metrics.md", "depth-truth"): truth_table(data())}
 
 
-def table(data: dict[str, Any]) -> list[str]:
+def truth_table(data: dict[str, Any]) -> list[str]:
     """Return a table of both methods, scene by scene, without noise."""
-    head = ("scene", "scale", "median", "90 %", "within 1 layer", "within 10 %", "Q_depth off")
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    commits = []
+    lines, commits = [], []
     for row in data["rows"]:
         if row["noise"] or row["method"] != METHODS[0]:
             continue
         both = [_only(data["rows"], **{**_key(row), "method": method})[0] for method in METHODS]
         curve = _only(data["q_depth"], scene=row["scene"], scale=row["scale"])
         off = [f"{curve[0][f'{method}_off_db']:.1f}" for method in METHODS] if curve else ["–", "–"]
-        cells = [
-            *(" → ".join(f"{r[key]:.0f}" for r in both) for key in ("median_layers", "p90_layers")),
-            *(" → ".join(f"{r[key]:.0%}" for r in both) for key in ("within_one_layer", "within_10_%")),
-            " → ".join(off) + (" dB" if curve else ""),
-        ]
-        lines.append(f"| {row['scene']} | {row['scale']} | " + " | ".join(cells) + " |")
+        layers = (" → ".join(f"{r[key]:.0f}" for r in both) for key in ("median_layers", "p90_layers"))
+        shares = (" → ".join(f"{r[key]:.0%}" for r in both) for key in ("within_one_layer", "within_10_%"))
+        lines.append([row["scene"], row["scale"], *layers, *shares, " → ".join(off) + (" dB" if curve else "")])
         commits.append([row["commit"]])
     told = "Each cell: the dissertation's method → the robust one. Errors are in layers."
-    return [*with_commits(lines, commits), "", told, origin(data["rows"])]
+    heads = "scene | scale | median | 90 % | within 1 layer | within 10 % | Q_depth off"
+    return [*table(heads, lines, commits), "", told, origin(data["rows"])]
 
 
 def _key(row: dict[str, Any]) -> dict[str, Any]:
@@ -120,12 +113,6 @@ def estimates(picture: IIPicture) -> dict[str, tuple[FocusDepth, float]]:
         depth = depth_from_focus(picture, method=method, layers_mm=linear_layers(camera_of(picture)))
         found[method] = depth, time.process_time() - started
     return found
-
-
-def say(row: dict[str, Any]) -> None:
-    """Print the summary of a row."""
-    shown = ("scene", "scale", "noise", "method", "median_layers", "p90_layers", "within_one_layer", "within_10_%")
-    print("  ".join(f"{row[k]:.3g}" if isinstance(row[k], float) else str(row[k]) for k in shown), flush=True)
 
 
 def errors(found: FocusDepth, shot: Shot, kinds: NDArray[np.int64]) -> dict[str, Any]:
@@ -189,7 +176,6 @@ def quality(shot: Shot, found: dict[str, tuple[FocusDepth, float]]) -> dict[str,
         pairs = [(a, b) for a, b in zip(row["true"], row[method], strict=True) if a is not None and b is not None]
         row[f"{method}_off_db"] = float(np.mean([abs(a - b) for a, b in pairs]))
         row[f"{method}_bins_made_up"] = sum(b is not None for b in row[method]) - len(pairs)
-        print(f"Q_depth {method}: {row[f'{method}_off_db']:.2f} dB off in {len(pairs)} bins")
     return row
 
 
@@ -248,10 +234,7 @@ def draw(data: dict[str, Any]) -> Any:
     by_noise.set_xlabel("sensor noise σ [steps of 8 bits]")
     by_noise.set_ylabel("depth right within 10 % [%]")
     by_noise.set_title(f"all scenes, scale {NOISE_SCALE}", loc="left", fontsize=10)
-    for axes in (*panels.flat, by_scene, by_kind, by_noise):
-        axes.grid(True, axis="y", color="0.9", linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+    tidy(*panels.flat, by_scene, by_kind, by_noise, axis="y")
     return figure
 
 

@@ -9,7 +9,7 @@ Takes are rendered once into ``out/takes``. Numbers go to ``benchmarks/results/t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
+from itertools import product
 from statistics import median
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, origin, with_commits
+from benchmarks.records import ROOT, Records, origin, table
 from codec import Plan, component_cost, encode_take, open_take
 from ii_core import IIVideo, open_video, preset, sub_images, video_of
 from metrics import bd_rate, measure_take
@@ -70,11 +70,7 @@ def main() -> None:
         for take in takes
         if coder != "si-lf" or order in WHOLE_INSTANTS
     ]
-    for key in RECORDS.todo(keys, asked.again):
-        video = rendered(key["take"], asked.scale)
-        RECORDS.measure(key, partial(coded, video, **key))
-        print(key, flush=True)
-    print("\n".join(line for lines in tables().values() for line in lines))
+    RECORDS.run(keys, coded, asked.again)
     publish(tables())
 
 
@@ -86,10 +82,9 @@ def rendered(take: str, scale: int) -> IIVideo:
     return open_video(folder)
 
 
-def coded(
-    video: IIVideo, take: str, scale: int, plan: str = "", step: int = 0, coder: str = "", order: str = ""
-) -> dict[str, Any]:
+def coded(take: str, scale: int, plan: str = "", step: int = 0, coder: str = "", order: str = "") -> dict[str, Any]:
     """Return points of one plan, of a coder in one order, or of both one-way orders on every step-th frame."""
+    video = rendered(take, scale)
     if coder:
         some = video_of([video[i] for i in range(INSTANTS)], fps=video.fps)
         return {"points": points(some, PLANS[order], *CODERS[coder])}
@@ -167,47 +162,33 @@ def tables() -> Tables:
 def plan_table() -> list[str]:
     """Return a table with a row per plan: random access, Bjøntegaard rate of each take against its stills."""
     rows = by_plan()
-    if not rows:
-        return ["Not measured yet."]
-    lines = ["| plan | frames for one SI, mean | " + " | ".join(rows) + " |", "|---|---|" + "---|" * len(rows)]
-    commits = []
+    lines, commits = [], []
     for plan in PLANS:
-        cost = component_cost(PLANS[plan], 256, FRAMES)
-        cells = []
-        for take in rows.values():
-            if plan not in take or "stills" not in take:
-                cells.append("–")
-                continue
-            off = difference(take["stills"]["points"], take[plan]["points"])
-            cells.append("anchor" if plan == "stills" else rate_text(off))
-        lines.append(f"| {plan} | {cost.mean:g} | " + " | ".join(cells) + " |")
-        commits.append([take[plan]["commit"] for take in rows.values() if plan in take])
+        offs = [difference(take["stills"]["points"], take[plan]["points"]) for take in rows.values()]
+        cells = ["anchor" if plan == "stills" else rate_text(off) for off in offs]
+        lines.append([plan, f"{component_cost(PLANS[plan], 256, FRAMES).mean:g}", *cells])
+        commits.append([take[plan]["commit"] for take in rows.values()])
     every = [row for take in rows.values() for row in take.values()]
-    return [origin(every), "", *with_commits(lines, commits)]
+    return [origin(every), "", *table(" | ".join(["plan | frames for one SI, mean", *rows]), lines, commits)]
 
 
 def coder_table() -> list[str]:
     """Return a table by coder and order: rate against its first order, and against H.264 in that order."""
     rows = {(row["coder"], row["order"], row["take"]): row for row in RECORDS.rows(scale=SCALE) if "order" in row}
-    if not rows:
-        return ["Not measured yet."]
-    lines = [
-        "| coder | order | " + " | ".join(f"{take}, own | H.264" for take in TAKES) + " | CPU over encoder's |",
-        "|---|---|" + "---|---|" * len(TAKES) + "---|",
-    ]
-    for coder in CODERS:
-        for order in ORDERS:
-            cells = []
-            for take in TAKES:
-                for anchor in (coder, "H.264"):
-                    pair = [rows.get((name, by, take)) for name, by in ((anchor, ORDERS[0]), (coder, order))]
-                    off = None if None in pair else difference(*(row["points"] for row in pair if row))
-                    cells.append("anchor" if (anchor, ORDERS[0]) == (coder, order) else rate_text(off))
-            there = [rows[coder, order, take] for take in TAKES if (coder, order, take) in rows]
-            times = [p["encode_seconds"] / p["codec_seconds"] for row in there for p in row["points"]]
-            if there:
-                lines.append(f"| {coder} | {order} | " + " | ".join(cells) + f" | {median(times):.3f} |")
-    return [origin(rows.values()), "", *lines]
+    lines = []
+    for coder, order in product(CODERS, ORDERS):
+        there = [rows[coder, order, take] for take in TAKES if (coder, order, take) in rows]
+        cells = []
+        for take in TAKES:
+            for anchor in (coder, "H.264"):
+                pair = [rows.get((name, by, take)) for name, by in ((anchor, ORDERS[0]), (coder, order))]
+                off = None if None in pair else difference(*(row["points"] for row in pair if row))
+                cells.append("anchor" if (anchor, ORDERS[0]) == (coder, order) else rate_text(off))
+        if there:
+            times = median(p["encode_seconds"] / p["codec_seconds"] for row in there for p in row["points"])
+            lines.append([coder, order, *cells, f"{times:.3f}"])
+    heads = " | ".join(["coder | order", *(f"{take}, own | H.264" for take in TAKES), "CPU over encoder's"])
+    return [origin(rows.values()), "", *table(heads, lines)]
 
 
 def rate_text(off: float | None) -> str:
@@ -218,16 +199,10 @@ def rate_text(off: float | None) -> str:
 def speed_table() -> list[str]:
     """Return a table by take and speed: correlations, and rate of time-first against view-first."""
     rows = [row for row in RECORDS.rows(scale=SCALE) if "step" in row]
-    if not rows:
-        return ["Not measured yet."]
     lines = [
-        "| take | speed | 1 − c in time | 1 − c in view | time-first against view-first |",
-        "|---|---|---|---|---|",
+        f"{row['take']} | ×{row['step']} | {1 - row['time_correlation']:.4f} | {1 - row['view_correlation']:.4f} | "
+        + rate_text(difference(*(row["curves"][name] for name in ONE_WAY)))
+        for row in sorted(rows, key=lambda row: (TAKES.index(row["take"]), row["step"]))
     ]
-    for row in sorted(rows, key=lambda row: (TAKES.index(row["take"]), row["step"])):
-        off = difference(*(row["curves"][name] for name in ONE_WAY))
-        lines.append(
-            f"| {row['take']} | ×{row['step']} | {1 - row['time_correlation']:.4f} | "
-            f"{1 - row['view_correlation']:.4f} | {rate_text(off)} |"
-        )
-    return [origin(rows), "", *lines]
+    heads = "take | speed | 1 − c in time | 1 − c in view | time-first against view-first"
+    return [origin(rows), "", *table(heads, lines)]

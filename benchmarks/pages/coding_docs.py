@@ -6,10 +6,9 @@ import statistics
 from typing import Any
 
 from benchmarks.coding import bframes
-from benchmarks.coding.coders import ANCHOR, NEAR, TRIALS, chart, front, recommended, studied, summary, table
-from benchmarks.pages.pictures import IMAGES
+from benchmarks.coding.coders import ANCHOR, NEAR, TRIALS, chart, front, rate_table, recommended, studied, summary
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import origin, with_commits
+from benchmarks.records import origin, table
 
 SCALE = 4  # scale of the large study; the small study is at full size
 
@@ -18,7 +17,7 @@ def main() -> None:
     """Fill the pages and draw the charts from the records."""
     publish(tables())
     for scale, name in ((SCALE, "coders.png"), (1, "coders_full.png")):
-        chart(studied(scale), scale, IMAGES / name)
+        chart(studied(scale), scale, name)
 
 
 def tables() -> Tables:
@@ -30,9 +29,15 @@ def tables() -> Tables:
     page = "docs/coding.md"
     return {
         (page, "which"): [*size(SCALE, others), "", *which(others)],
-        (page, "coders"): [*size(SCALE, others), "", *table(others), "", f"Pareto front of rate and time: {best}."],
-        (page, "full"): [*size(1, full), "", *table(full)],
-        (page, "trials"): [*size(SCALE, trials), "", *table(trials)],
+        (page, "coders"): [
+            *size(SCALE, others),
+            "",
+            *rate_table(others),
+            "",
+            f"Pareto front of rate and time: {best}.",
+        ],
+        (page, "full"): [*size(1, full), "", *rate_table(full)],
+        (page, "trials"): [*size(SCALE, trials), "", *rate_table(trials)],
         (page, "bframes"): bframes.conditions_table(),
         ("docs/speed_accuracy.md", "coding"): [*size(SCALE, others), "", *front_table(coders)],
     }
@@ -53,24 +58,30 @@ CHOICES = {
 def which(rows: list[dict[str, Any]]) -> list[str]:
     """Return a table of schemes by purpose."""
     known = {row["scheme"]: row for row in summary(rows)}
-    lines = ["| you want | take | rate at equal PSNR | CPU s |", "|---|---|---|---|"]
+    lines = []
     for wish, scheme in CHOICES.items():
         row = known[scheme]
         rate = "curves share too little" if row["mean"] is None else f"{1 + row['mean'] / 100:.2f} ×"
-        lines.append(f"| {wish} | `{scheme}` | {rate} | {row['seconds']:.2f} |")
-    return with_commits(lines, [known[scheme]["commits"] for scheme in CHOICES.values()])
+        lines.append(f"{wish} | `{scheme}` | {rate} | {row['seconds']:.2f}")
+    commits = [known[scheme]["commits"] for scheme in CHOICES.values()]
+    return table("you want | take | rate at equal PSNR | CPU s", lines, commits)
 
 
 def front_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return the Pareto front as a table, the recommended setting in bold."""
-    lines = ["| scheme | rate at equal PSNR | encoder, CPU s | decoder, CPU s |", "|---|---|---|---|"]
+    lines = []
     pick = recommended(rows)["scheme"]
     for row in front([row for row in rows if row["scheme"] not in TRIALS]):
         points = [point for one in rows if one["scheme"] == row["scheme"] for point in one["points"]]
         decode = statistics.mean(point["decode_seconds"] for point in points)
         name = f"**`{row['scheme']}`**" if row["scheme"] == pick else f"`{row['scheme']}`"
-        lines.append(f"| {name} | {1 + row['mean'] / 100:.2f} × | {row['seconds']:.2f} | {decode:.2f} |")
-    return [*lines, "", f"Bold: the fastest scheme whose rate is within {100 * NEAR:.0f} % of the least."]
+        lines.append(f"{name} | {1 + row['mean'] / 100:.2f} × | {row['seconds']:.2f} | {decode:.2f}")
+    heads = "scheme | rate at equal PSNR | encoder, CPU s | decoder, CPU s"
+    return [
+        *table(heads, lines),
+        "",
+        f"Bold: the fastest scheme whose rate is within {100 * NEAR:.0f} % of the least.",
+    ]
 
 
 def size(scale: int, rows: list[dict[str, Any]]) -> list[str]:
