@@ -27,13 +27,12 @@ from benchmarks.accuracy.analytic import Array, Ball, Floor, World, still_life
 from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, origin, with_commits
+from benchmarks.records import Records, origin, table
 from ii_core import IICamera, preset
 from ii_core.base.colour import srgb
 from raytrace_ii import Light, Material, trace
 
 RECORDS = Records("povray", ("benchmarks.accuracy.povray", "benchmarks.accuracy.analytic"))
-DOCS = ROOT / "docs"
 SCALE = 16  # scale on the page
 SEGMENTS = 384
 SIDE = 1.0  # mm from corner to centroid of a triangle that stands for a ray; POV-Ray drops very small ones
@@ -104,14 +103,15 @@ def compare(world: World, camera: IICamera, mesh: bool) -> tuple[list[dict[str, 
 def tables() -> Tables:
     """Return the table of the page of stability."""
     pairs = ("POV-Ray / closed form", "POV-Ray / ours", "ours / closed form")
-    lines = ["| camera | rays by | seen | " + " | ".join(f"{pair}, dB" for pair in pairs) + " |", "|---" * 6 + "|"]
-    measured, commits = RECORDS.rows(scale=SCALE), []
-    for one in measured:
-        for row in one["rows"]:
-            cells = " | ".join(f"{row[f'{pair}, dB']:.1f}" for pair in pairs)
-            lines.append(f"| {one['camera']} | {one['rays by']} | {row['seen']} | {cells} |")
-            commits.append([one["commit"]])
-    return {("docs/stability.md", "povray"): [*with_commits(lines, commits), "", origin(measured)]}
+    measured = RECORDS.rows(scale=SCALE)
+    each = [(one, row) for one in measured for row in one["rows"]]
+    lines = [
+        [one["camera"], one["rays by"], row["seen"], *(f"{row[f'{pair}, dB']:.1f}" for pair in pairs)]
+        for one, row in each
+    ]
+    heads = " | ".join(["camera | rays by | seen", *(f"{pair}, dB" for pair in pairs)])
+    commits = [[one["commit"]] for one, _ in each]
+    return {("docs/stability.md", "povray"): [*table(heads, lines, commits), "", origin(measured)]}
 
 
 def _psnr(error: Array) -> float:

@@ -12,13 +12,14 @@ of ``benchmarks/results/headers.jsonl``; tables go into ``docs/structure.md``.
 from __future__ import annotations
 
 from dataclasses import asdict
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, origin, with_commits
+from benchmarks.records import Records, origin, table
 from codec import decode, encode, schemes
 from codec.inspect.header_bits import coarsest, floor, frames, parts, si_below_ei, si_below_ri
 from ii_core import IIPicture, preset
@@ -39,23 +40,25 @@ def main() -> None:
     parser.add_argument("--sides", default=",".join(map(str, SIDES)))
     asked = parser.parse_args()
     picture_of = {"scene": asked.scene, "scale": asked.scale}
+    keys: list[dict[str, Any]] = []
     for side in map(int, asked.sides.split(",")):
-        keys: list[dict[str, Any]] = [
-            {"part": "floor", **picture_of, "side": side, "scheme": scheme} for scheme in asked.schemes
-        ]
+        keys += [{"part": "floor", **picture_of, "side": side, "scheme": scheme} for scheme in asked.schemes]
         if asked.schemes == parser.get_default("schemes"):
             keys.append({"part": "duel", **picture_of, "side": side})
-        if not (keys := RECORDS.todo(keys, asked.again)):
-            continue
-        camera = preset(f"setup2-{side}", scale=asked.scale)
-        picture = render(load_scene(asked.scene), camera, support=(), noise=1.0).picture
-        for key in keys:
-
-            def found(key: dict[str, Any] = key, picture: IIPicture = picture) -> dict[str, Any]:
-                return lowest(key["scheme"], picture) if key["part"] == "floor" else duel(picture)
-
-            print(key, RECORDS.measure(key, found)["result"], flush=True)
+    RECORDS.run(keys, measured, asked.again)
     publish(tables())
+
+
+def measured(part: str, scene: str, scale: int, side: int, scheme: str = "") -> dict[str, Any]:
+    """Return the floor of a scheme, or the duel of the kinds."""
+    picture = pictured(scene, scale, side)
+    return lowest(scheme, picture) if part == "floor" else duel(picture)
+
+
+@lru_cache(maxsize=1)
+def pictured(scene: str, scale: int, side: int) -> IIPicture:
+    """Return a scene with sensor noise through elementary images of a size."""
+    return render(load_scene(scene), preset(f"setup2-{side}", scale=scale), support=(), noise=1.0).picture
 
 
 def lowest(scheme: str, picture: IIPicture) -> dict[str, Any]:
@@ -117,14 +120,12 @@ def tables() -> Tables:
 
 def floor_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return rates of black / scene at the coarsest quantiser, bpp, one column per structure."""
-    lines = ["| scheme | " + " | ".join(f"{side}²" for side in SIDES) + " |", "|---|" + "---|" * len(SIDES)]
-    commits = []
+    lines, commits = [], []
     for scheme in dict.fromkeys(row["scheme"] for row in rows):
         those = {row["side"]: row for row in rows if row["scheme"] == scheme}
-        cells = [floor_cell(those[side]) if side in those else "" for side in SIDES]
-        lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
+        lines.append([f"`{scheme}`", *(floor_cell(those[side]) if side in those else "" for side in SIDES)])
         commits.append([row["commit"] for row in those.values()])
-    return with_commits(lines, commits)
+    return table(" | ".join(["scheme", *(f"{side}²" for side in SIDES)]), lines, commits)
 
 
 def floor_cell(row: dict[str, Any]) -> str:
@@ -137,36 +138,34 @@ def floor_cell(row: dict[str, Any]) -> str:
 
 def part_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return the bits per frame of a black picture by purpose."""
-    lines = [
-        "| scheme | EI | frames | start codes, lengths | parameter sets | slice headers | data | bits per frame |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    lines = []
     shown = [row for row in rows if "parts" in row and row["side"] in (16, 64, 256)]
     for row in shown:
         p, j = row["parts"], row["frames"]
         headers = "(in data)" if p["headers"] is None else f"{p['headers'] / j:.1f}"
         total = sum(p[name] or 0 for name in ("framing", "parameters", "messages", "headers", "data"))
         lines.append(
-            f"| `{row['scheme']}` | {row['side']}² | {j} | {p['framing'] / j:.1f} | {p['parameters'] / j:.1f} | "
-            f"{headers} | {(p['data'] + p['messages']) / j:.1f} | {total / j:.1f} |"
+            f"`{row['scheme']}` | {row['side']}² | {j} | {p['framing'] / j:.1f} | {p['parameters'] / j:.1f} | "
+            f"{headers} | {(p['data'] + p['messages']) / j:.1f} | {total / j:.1f}"
         )
-    return with_commits(lines, [[row["commit"]] for row in shown])
+    heads = "scheme | EI | frames | start codes, lengths | parameter sets | slice headers | data | bits per frame"
+    return table(heads, lines, [[row["commit"]] for row in shown])
 
 
 def duel_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return predictions and results of SI against EI and RI."""
-    lines = [
-        "| EI | SI before EI by (5.14) | fewer bits black | mean gain | lowest rate SI, EI | SI before RI by (5.15) "
-        "| fewer bits black | mean gain | lowest rate RI |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
+    lines = []
     for row in rows:
         ei, ri = row["ei"], row["ri"]
         cells = [yes(ei["predicted"]), yes(ei["fewer_header_bits"]), gain(ei)]
         cells += [f"{ei['lowest']['si'] or '–'}, {ei['lowest']['ei'] or '–'}"]
         cells += [yes(ri["predicted"]), yes(ri["fewer_header_bits"]), gain(ri), f"{ri['lowest']['ri'] or '–'}"]
-        lines.append(f"| {row['side']}² | " + " | ".join(cells) + " |")
-    return with_commits(lines, [[row["commit"]] for row in rows])
+        lines.append([f"{row['side']}²", *cells])
+    heads = (
+        "EI | SI before EI by (5.14) | fewer bits black | mean gain | lowest rate SI, EI | SI before RI by (5.15) "
+        "| fewer bits black | mean gain | lowest rate RI"
+    )
+    return table(heads, lines, [[row["commit"]] for row in rows])
 
 
 def yes(value: bool) -> str:

@@ -16,7 +16,6 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,14 +23,14 @@ import numpy as np
 from benchmarks.accuracy.map_precision import RECORDS as MAPS
 from benchmarks.accuracy.map_precision import SCALE as MAPS_SCALE
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, by_scene, origin
+from benchmarks.records import ROOT, Records, by_scene, origin, table
 from benchmarks.speed.before import COMMIT, worktree
 from benchmarks.speed.shots import Shots, shots
 from benchmarks.speed.tessellation import scene_text, sizes
 from ii_core import IICamera, preset
-from ii_core.display.figure import COLOURS
+from ii_core.display.figure import COLOURS, new_figure
 from raytrace_ii import load_scene
 from raytrace_ii.tracing.packing import packed
 
@@ -64,7 +63,7 @@ def main() -> None:
         print(f"{key['scene']}: {best['setting']}, {best['psnr']:.1f} dB, {record['seconds']:.0f} s", flush=True)
     for scale, target in ((SCALE, "pareto.png"), (FINE_SCALE, "pareto_fine.png")):
         if set(scenes := measured(scale)) == set(SCENES):
-            chart(scenes, IMAGES / target)
+            write_chart(chart(scenes), target, dpi=150)
     if set(measured()) == set(SCENES):
         publish(tables())
 
@@ -202,14 +201,11 @@ NAMES = {
 }  # fmt: skip
 
 
-def chart(data: dict[str, Any], target: Path) -> None:
+def chart(data: dict[str, Any]) -> Any:
     """Draw one panel per scene."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    figure = Figure(figsize=(8.5, 12), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(8.5, 12)
     for axes, (name, one) in zip(figure.subplots(4, 2).flat, data.items(), strict=True):
         rows = one["rows"]
         best = [rows[i] for i in one["front"]]
@@ -235,9 +231,7 @@ def chart(data: dict[str, Any], target: Path) -> None:
         axes.xaxis.set_major_locator(LogLocator(base=10, subs=(1, 2, 5)))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.grid(True, color="0.92", linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+    tidy(*figure.axes)
     for axes in figure.axes[6:]:
         axes.set_xlabel("CPU time [s]")
     for axes in figure.axes[::2]:
@@ -248,8 +242,7 @@ def chart(data: dict[str, Any], target: Path) -> None:
     figure.legend(
         [*handles.values()], [*handles], loc="outside lower center", ncols=3, frameon=False, fontsize=9
     )  # fmt: skip
-    figure.savefig(target, dpi=150)
-    write_picture(target, target)
+    return figure
 
 
 def fronts_table(data: dict[str, Any], fine: dict[str, Any]) -> list[str]:
@@ -292,49 +285,44 @@ def _mean(times: Sequence[float]) -> float:
 
 def recommended_table(data: dict[str, Any]) -> list[str]:
     """Return the recommended setting of every scene beside one sample per pixel."""
-    lines = ["| scene | setting | PSNR | CPU time | criterion | one sample |", "|---|---|---|---|---|---|"]
+    lines = []
     for name, one in data.items():
         pick = one["recommended"]
         (first,) = [r for r in one["rows"] if r["sweep"] == "samples" and r["samples"] == 1]
         lines.append(
-            f"| {name} | {pick['setting']} | {pick['psnr']:.1f} dB | {pick['seconds']:.2f} s | {pick['rule']} | "
-            f"{first['psnr']:.1f} dB, {first['seconds']:.2f} s |"
+            f"{name} | {pick['setting']} | {pick['psnr']:.1f} dB | {pick['seconds']:.2f} s | {pick['rule']} | "
+            f"{first['psnr']:.1f} dB, {first['seconds']:.2f} s"
         )
-    return lines
+    return table("scene | setting | PSNR | CPU time | criterion | one sample", lines)
 
 
 def samples_table(data: dict[str, Any]) -> list[str]:
     """Return PSNR over samples, and the adaptive setting nearest to the largest number."""
-    heads = " | ".join(f"{s}" for s in SAMPLES)
-    head = f"| scene | {heads} | adaptive to ½ step | its time / {MOST} samples |"
-    lines = [head, "|---" * (len(SAMPLES) + 3) + "|"]
+    lines = []
     for name, one in data.items():
         plain = {r["samples"]: r for r in one["rows"] if r["sweep"] == "samples"}
         (fine,) = [r for r in one["rows"] if r["error"] == min(ERRORS)]
-        cells = " | ".join(f"{plain[s]['psnr']:.1f}" for s in SAMPLES)
-        lines.append(f"| {name} | {cells} | {fine['psnr']:.1f} | {fine['seconds'] / plain[MOST]['seconds']:.2f} |")
-    return lines
+        share = fine["seconds"] / plain[MOST]["seconds"]
+        lines.append([name, *(f"{plain[s]['psnr']:.1f}" for s in SAMPLES), f"{fine['psnr']:.1f}", f"{share:.2f}"])
+    return table(" | ".join(["scene", *map(str, SAMPLES), f"adaptive to ½ step | its time / {MOST} samples"]), lines)
 
 
 def depth_table(data: dict[str, Any]) -> list[str]:
     """Return PSNR and time over recursion depth, at BASE samples."""
-    lines = [
-        "| scene | " + " | ".join(map(str, DEPTHS)) + " | the scene's |",
-        "|---" * (len(DEPTHS) + 2) + "|",
-    ]
+    lines = []
     for name, one in data.items():
         if not one["bounces"]:
-            lines.append(f"| {name} |" + " |" * len(DEPTHS) + " nothing mirrors |")
+            lines.append(f"{name} |" + " |" * len(DEPTHS) + " nothing mirrors")
             continue
         at = {r["depth"]: r for r in one["rows"] if r["samples"] == BASE and r["sweep"] in ("samples", "depth")}
         cells = " | ".join(f"{at[d]['psnr']:.1f} dB, {at[d]['seconds']:.2f} s" for d in DEPTHS)
-        lines.append(f"| {name} | {cells} | {one['max_depth']} |")
-    return lines
+        lines.append(f"{name} | {cells} | {one['max_depth']}")
+    return table(" | ".join(["scene", *map(str, DEPTHS), "the scene's"]), lines)
 
 
 def cut_table(data: dict[str, Any]) -> list[str]:
     """Return PSNR and time over tessellation, at BASE samples."""
-    lines = ["| scene | " + " | ".join(f"×{cut:g}" for cut in CUTS) + " |", "|---" * (len(CUTS) + 1) + "|"]
+    lines = []
     for name, one in data.items():
         if len(one["faces"]) == 1:
             continue
@@ -343,18 +331,16 @@ def cut_table(data: dict[str, Any]) -> list[str]:
             rows = [r for r in one["rows"] if r["cut"] == cut and r["samples"] == BASE and r["error"] is None]
             (row,) = [r for r in rows if r["sweep"] in ("samples", "cut")]
             cells.append(f"{one['faces'][str(cut)] / 1e3:.0f} k faces, {row['psnr']:.1f} dB, {row['seconds']:.2f} s")
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return lines
+        lines.append([name, *cells])
+    return table(" | ".join(["scene", *(f"×{cut:g}" for cut in CUTS)]), lines)
 
 
 def maps_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return the results of `benchmarks.accuracy.map_precision` for setup1."""
-    lines = ["| stored as | bytes per ray | largest angular error | apples | cuboid |", "|---|---|---|---|---|"]
+    lines = []
     for row in rows:
-        psnr = [
-            "exact" if p is None or not np.isfinite(p) else f"{p:.1f} dB"
-            for p in (row["psnr_apples"], row["psnr_cuboid"])
-        ]
-        cells = f"{row['bytes_per_pixel']:.2f} | {row['angle_max_urad']:.2g} µrad | {psnr[0]} | {psnr[1]}"
-        lines.append(f"| {row['format']} | {cells} |")
-    return [*lines, "", origin(rows)]
+        each = (row["psnr_apples"], row["psnr_cuboid"])
+        psnr = ["exact" if p is None or not np.isfinite(p) else f"{p:.1f} dB" for p in each]
+        bits = [row["format"], f"{row['bytes_per_pixel']:.2f}", f"{row['angle_max_urad']:.2g} µrad"]
+        lines.append([*bits, *psnr])
+    return [*table("stored as | bytes per ray | largest angular error | apples | cuboid", lines), "", origin(rows)]
