@@ -1,10 +1,12 @@
-"""Command line of the benchmarks: `list` and `run`.
+"""Command line of the benchmarks: `list`, `run` and `prune`.
 
     python -m benchmarks list [NAME ...]
     python -m benchmarks run NAME ... [OPTION ...]
+    python -m benchmarks prune [NAME ...]
 
 Options belong to the benchmark: ``python -m benchmarks run coders --scale 8``, ``run stability -- bd_overlap``; they
-need a single name. ``python -m benchmarks run NAME --help`` prints them.
+need a single name. ``python -m benchmarks run NAME --help`` prints them. ``prune`` removes records that have a newer
+one of the same key.
 """
 
 from __future__ import annotations
@@ -13,7 +15,8 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from benchmarks.registry import BENCHMARKS, Benchmark
+from benchmarks.records import prune
+from benchmarks.registry import BENCHMARKS, CLOSED, LAST, Benchmark
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -24,16 +27,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("command", choices=("list", "run"), nargs="?", default="list")
+    parser.add_argument("command", choices=("list", "run", "prune"), nargs="?", default="list")
     parser.add_argument("names", nargs="*", metavar="NAME")
     asked = parser.parse_args(words)
     if unknown := [name for name in asked.names if name not in BENCHMARKS]:
         parser.error(f"there is no benchmark {unknown[0]!r}: known are {', '.join(sorted(BENCHMARKS))}")
-    if asked.command == "list":
+    if asked.command != "run":
+        show = listed if asked.command == "list" else pruned
         if options:
-            parser.error(f"list takes names alone, not {options[0]}")
+            parser.error(f"{asked.command} takes names alone, not {options[0]}")
         for name in asked.names or BENCHMARKS:
-            print(description(BENCHMARKS[name]))
+            show(BENCHMARKS[name])
+        if asked.command == "list" and not asked.names:
+            print(f"    closed experiments, in git up to {LAST}: {', '.join(CLOSED)}")
         return
     if not asked.names:
         parser.error("run needs a name: python -m benchmarks list prints them")
@@ -41,6 +47,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.error(f"options such as {options[0]} need a single name: {len(asked.names)} were given")
     for name in asked.names:
         BENCHMARKS[name].run(options[1:] if options[:1] == ["--"] else options)
+
+
+def listed(benchmark: Benchmark) -> None:
+    """Print the description of a benchmark."""
+    print(description(benchmark))
+
+
+def pruned(benchmark: Benchmark) -> None:
+    """Prune the records of a benchmark, and print what was removed."""
+    for path in benchmark.result_files():
+        if ".jsonl" in path.suffixes and (removed := prune(path)):
+            print(f"{path.name}: {removed} older records removed")
 
 
 def description(benchmark: Benchmark) -> str:

@@ -1,12 +1,13 @@
 """Append-only records of benchmarks: every row has its own commit, machine, versions and date.
 
 A record is a line of JSON in ``benchmarks/results/NAME.jsonl``. The script that measures a row appends it when its
-measurement ends; nothing else writes there, and no line is changed afterwards. Readers take the newest record of
-each key. `check` verifies these rules.
+measurement ends, and no line is changed afterwards. Readers take the newest record of each key; `prune` removes the
+older ones, which git keeps. `check` verifies these rules.
 """
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import importlib.util
 import json
@@ -17,12 +18,13 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
+from ii_core.base.atomic import atomic_path
 from ii_core.base.identity import source_hash
-from ii_core.base.json_lines import append_record, read_records
+from ii_core.base.json_lines import append_record, lines_of, read_records
 from metrics import provenance
 
 Record = dict[str, Any]
@@ -80,6 +82,12 @@ class Records:
         append_record(self.path, record)
         return record
 
+    def run(self, keys: Iterable[Mapping[str, Any]], call: Callable[..., Mapping[str, Any]], again: str) -> None:
+        """Measure the keys of `todo` by ``call(**key)``, one after the other, and print each with its time."""
+        for key in self.todo(keys, again):
+            record = self.measure(key, partial(call, **key))
+            print(f"{self.name}, {', '.join(map(str, key.values()))}: {record['seconds']:.0f} s", flush=True)
+
     def todo(self, keys: Iterable[Mapping[str, Any]], again: str = CHANGED) -> list[dict[str, Any]]:
         """Return the keys that are to be measured.
 
@@ -90,11 +98,11 @@ class Records:
             "changed": keys without a record by the present code and libraries; "missing": keys without a record by
             any code; "all": every key.
         """
-        there = {_name(record["key"]): record for record in self.newest()}
+        there = {key_of(record): record for record in self.newest()}
         now = {"code": code_hash(self.modules), "versions": provenance()["versions"]}
 
         def wanted(key: Mapping[str, Any]) -> bool:
-            record = there.get(_name(plain(key)))
+            record = there.get(key_of({"key": plain(key)}))
             if again == ALL or record is None or "unsure" in record:
                 return True
             return again == CHANGED and any(record[name] != value for name, value in now.items())
@@ -113,7 +121,7 @@ class Records:
         """
         found: dict[str, Record] = {}
         for record in read_records(self.path, FORMAT, VERSION):
-            name = _name(record["key"])
+            name = key_of(record)
             if unsure is not None and ("unsure" in record) is not unsure:
                 continue
             if "unsure" not in record or "unsure" in found.get(name, record):
@@ -122,7 +130,7 @@ class Records:
 
     def by(self, name: str, values: Iterable[str], **only: Any) -> dict[str, dict[str, Any]]:
         """Return the row of each of these values of a key, in their order; values without a row are left out."""
-        rows = {row[name]: row for row in self.rows(**only)}
+        rows = {row[name]: row for row in self.rows(**only) if name in row}
         return {value: rows[value] for value in values if value in rows}
 
     def rows(self, *, unsure: bool | None = None, **only: Any) -> list[dict[str, Any]]:
@@ -171,7 +179,8 @@ def code_hash(modules: Sequence[str]) -> str:
         if found is None or found.origin is None:
             raise ValueError(f"there is no module {module}: results cannot come from it")
         origin = Path(found.origin)
-        for path in sorted(origin.parent.glob("*.py")) if origin.name == "__init__.py" else [origin]:
+        parts = (path for path in origin.parent.iterdir() if path.suffix in SOURCES)
+        for path in sorted(parts) if origin.name == "__init__.py" else [origin]:
             digest.update(path.read_bytes())
     return digest.hexdigest()
 
@@ -205,6 +214,23 @@ def by_scene(scenes: Mapping[str, Any]) -> str:
     return "Measured by " + ", ".join(f"`{commit}` ({', '.join(names)})" for commit, names in commits.items()) + "."
 
 
+def table(
+    heads: str, rows: Iterable[str | Sequence[object]], commits: Sequence[Iterable[str]] | None = None
+) -> list[str]:
+    """Return a Markdown table; heads and cells are separated by " | ", or rows are lists of cells.
+
+    Parameters
+    ----------
+    heads : str
+    rows : iterable of str or of sequence
+    commits : sequence of iterables of str, optional
+        Commits of each row's records, as for `with_commits`.
+    """
+    lines = [head := f"| {heads} |", "|---" * (head.count("|") - 1) + "|"]
+    lines += [f"| {row if isinstance(row, str) else ' | '.join(map(str, row))} |" for row in rows]
+    return lines if commits is None else with_commits(lines, commits)
+
+
 def with_commits(lines: Sequence[str], commits: Sequence[Iterable[str]]) -> list[str]:
     """Return a Markdown table, with a column of commits unless a single commit measured all rows.
 
@@ -234,11 +260,12 @@ def check(path: Path) -> list[str]:
 
     Every record needs all fields and an existing commit, if this checkout has a history. Two records of different
     commits must not have the same measured seconds, unless the seconds of their whole measurements differ, too: short
-    times are rounded to milliseconds and may be equal by chance. Committed lines must not be changed or removed,
-    unless their commit is unknown. Records converted from an earlier file format have no code hash and no date.
-    Records marked ``unsure`` have no commit either: several commits measured them, but their file named only one.
+    times are rounded to milliseconds and may be equal by chance. Committed lines must not be changed, or removed
+    without a newer record of the same key, unless their commit is unknown. Records converted from an earlier file
+    format have no code hash and no date. Records marked ``unsure`` have no commit either: several commits measured
+    them, but their file named only one.
     """
-    wrong, seen = [], dict[tuple[float, ...], Record]()
+    wrong, seen, newest = [], dict[tuple[float, ...], Record](), dict[str, str]()
     for number, record in enumerate(read_records(path, FORMAT, VERSION), 1):
         where = f"{path.name}, line {number}"
         if missing := [name for name in FIELDS if name not in record]:
@@ -255,9 +282,36 @@ def check(path: Path) -> list[str]:
         if any(seconds) and _copied(seen.setdefault(seconds, record), record):
             first = commit_of(seen[seconds])
             wrong.append(f"{where}: seconds identical to a row of {first}, stamped {commit_of(record)}")
+        newest[key_of(record)] = record["when"] or ""
     lines = set(path.read_text(encoding="utf-8").splitlines())
-    lost = [line for line in committed(path) if line not in lines and _counts(line)]
+    lost = [line for line in committed(path) if line not in lines and _counts(line) and not _replaced(line, newest)]
     return wrong + [f"{path.name}: a committed row was changed or removed"] * bool(lost)
+
+
+def _replaced(line: str, newest: Mapping[str, str]) -> bool:
+    """Return whether a newer record of the same key is there; dates by key."""
+    record = json.loads(line)
+    return newest.get(key_of(record), "") > (record["when"] or "")
+
+
+def prune(path: Path) -> int:
+    """Remove all but the newest record of each key from a file; return the number of removed lines."""
+    lines, newest = lines_of(path), dict[str, tuple[Record, bytes]]()
+    for line in lines:
+        record = json.loads(line)
+        if "unsure" not in record or "unsure" in newest.get(key_of(record), (record,))[0]:
+            newest[key_of(record)] = record, line
+    data = b"".join(line for _, line in newest.values())
+    if len(newest) < len(lines):
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(gzip.compress(data, mtime=0) if path.suffix == ".gz" else data)
+    return len(lines) - len(newest)
+
+
+def key_of(record: Mapping[str, Any]) -> str:
+    """Return the key of a record as text; that of the study has a step and its parameters."""
+    names = ("key",) if "key" in record else ("step", "parameters")
+    return json.dumps([record[name] for name in names], sort_keys=True)
 
 
 def _copied(first: Record, second: Record) -> bool:
@@ -333,7 +387,3 @@ def _finite(value: Any) -> Any:
 def number(value: Any) -> float:
     """Return the number of a value from `plain`."""
     return math.nan if value is None else float(value)
-
-
-def _name(key: Mapping[str, Any]) -> str:
-    return json.dumps(key, sort_keys=True)

@@ -11,7 +11,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.records import RESULTS, ROOT, seconds_in
+from benchmarks.records import RESULTS, ROOT, key_of, seconds_in
 from ii_core.base.json_lines import lines_of
 
 LEAST = 6.0  # seconds: shorter sums are times of single calls, not of the run
@@ -113,12 +113,8 @@ class Benchmark:
 
 
 def newest(path: Path) -> list[Mapping[str, Any]]:
-    """Return the last record of each key of a file, of each step and size for those of the study."""
-    found = {}
-    for line in lines_of(path):
-        record = json.loads(line)
-        found[json.dumps(record.get("key", record.get("parameters")), sort_keys=True)] = record
-    return list(found.values())
+    """Return the last record of each key of a file."""
+    return list({key_of(record): record for record in map(json.loads, lines_of(path))}.values())
 
 
 def entry(module: str) -> str:
@@ -132,17 +128,38 @@ def source(module: str) -> Path:
     return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
 
 
-HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
 IMAGES = "docs/images"
+# Closed experiments with their pictures: they stay on pages, script and records are in git up to this commit.
+LAST = "018e29e"
+CLOSED: dict[str, tuple[str, ...]] = {
+    "accuracy/eye_views": ("opinions_simulated.png",),
+    "coding/crossing": ("takes_crossing.png",),
+    "coding/light_field_bounds": ("lf_bounds.png",),
+    "coding/light_field_threads": (),
+    "coding/neighbours": (),
+    "pages/concepts": tuple(
+        f"concepts/{n}.png" for n in ("components", "maps", "pixels", "rays", "sequence", "views")
+    ),
+    "pages/display_pictures": ("display_eye.webp", "display_zones.png"),
+    "pages/focus_patterns": ("focus_patterns.png",),
+    "pages/make_textures": (),
+    "speed/before_after": (),
+    "speed/feature_ablation": ("feature_ablation.png",),
+    "speed/take_cost": (),
+    "speed/texture_filter": ("texture_filter.png",),
+    "stability/install": (),
+    "study/reasons": (),
+    "study/volume_model": (),
+}
+HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
 # In the order of a whole study: pages after the measurements that they show.
 BENCHMARKS = {
     benchmark.name: benchmark
     for benchmark in (
         Benchmark("pages.cameras", writes=("docs/cameras.md", f"{IMAGES}/cameras/*", f"{IMAGES}/scenes.*")),
-        Benchmark("pages.concepts", writes=(f"{IMAGES}/concepts/*",)),
         Benchmark("accuracy.sample_places", records=OWN, fills=("docs/speed_accuracy.md",)),
         Benchmark("accuracy.camera_in_scene", records=OWN, writes=(f"{IMAGES}/camera_in_scene.*",)),
-        Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",), tables_in="pages.calibration"),
+        Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",)),
         Benchmark("accuracy.lens_rays", needs="--peer, an interpreter with optiland", records=OWN),
         Benchmark(
             "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)
@@ -150,6 +167,7 @@ BENCHMARKS = {
         Benchmark("coding.disparity", records=OWN),
         Benchmark("coding.orders", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.headers", records=OWN, fills=("docs/structure.md",)),
+        Benchmark("pages.floors_chart", needs="records of headers", writes=(f"{IMAGES}/floors.*",)),
         Benchmark("pages.floors_chart", needs="records of headers", writes=(f"{IMAGES}/floors.*",)),
         Benchmark("coding.cost", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.coders", records=OWN),
@@ -161,21 +179,13 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/coders*",),
         ),
         Benchmark("coding.takes", records=OWN, fills=("docs/video.md",)),
-        Benchmark("coding.neighbours", records=OWN, fills=("docs/video.md",)),
-        Benchmark("coding.crossing", records=OWN, fills=("docs/video.md",)),
-        Benchmark("pages.video", needs="records of takes and crossing", writes=(f"{IMAGES}/takes_*",)),
+        Benchmark("pages.video", needs="records of takes", writes=(f"{IMAGES}/takes_[aft]*",)),
         Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
-        Benchmark("coding.light_field_threads", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.jplm", needs="jpl-encoder-bin and jpl-decoder-bin", records=OWN, fills=("docs/lf.md",)),
-        Benchmark("coding.light_field_bounds", records=OWN, fills=("docs/lf_bounds.md",)),
-        Benchmark("pages.lf_bounds_chart", needs="records of light_field_bounds", writes=(f"{IMAGES}/lf_bounds.*",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
-        Benchmark("pages.make_textures", writes=("assets/textures/*",)),
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
         Benchmark("stability.wrong_calls", records=OWN, fills=("docs/stability.md",)),
-        Benchmark("stability.install", needs="package registries", records=OWN, fills=("docs/tutorial.md",)),
-        Benchmark("pages.focus_patterns", writes=(f"{IMAGES}/focus_patterns.*",)),
         Benchmark("pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)),
         Benchmark(
             "accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",), writes=(f"{IMAGES}/depth_truth.*",)
@@ -183,12 +193,6 @@ BENCHMARKS = {
         Benchmark("accuracy.field_depth", records=OWN, fills=("docs/metrics.md",)),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
         Benchmark("speed.eye", records=OWN, fills=("docs/display.md",)),
-        Benchmark(
-            "accuracy.eye_views",
-            records=OWN,
-            fills=("docs/display.md", "docs/observers.md"),
-            writes=(f"{IMAGES}/opinions_simulated.*",),
-        ),
         Benchmark("accuracy.map_precision", records=OWN, writes=(f"{IMAGES}/map_precision.*",)),
         Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),
         Benchmark(
@@ -213,29 +217,14 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/pareto.*", f"{IMAGES}/pareto_fine.*"),
         ),
         Benchmark(
-            "speed.feature_ablation",
-            records=OWN,
-            fills=("docs/speed_accuracy.md",),
-            writes=(f"{IMAGES}/feature_ablation.*",),
-        ),
-        Benchmark(
-            "speed.texture_filter",
-            records=OWN,
-            fills=("docs/speed_accuracy.md",),
-            writes=(f"{IMAGES}/texture_filter.*",),
-        ),
-        Benchmark(
             "speed.metrics_speed",
             records=OWN,
             fills=("docs/metrics.md", "docs/speed_accuracy.md"),
             writes=(f"{IMAGES}/depth_cost.*", f"{IMAGES}/depth_pareto.*"),
         ),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
-        Benchmark("speed.before_after", needs="git history", records=OWN),
         Benchmark("speed.mitsuba", needs="Mitsuba 3 and an LLVM library", records=OWN),
-        Benchmark("speed.take_cost", records=OWN, fills=("docs/video.md",)),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
-        Benchmark("pages.display_pictures", writes=(f"{IMAGES}/display_*",)),
         Benchmark("pages.hero", writes=(f"{IMAGES}/apples.webp",)),
         Benchmark("pages.gallery", needs=f"{BROWSER} for --stills", writes=("docs/gallery/*",)),
         Benchmark(
@@ -248,7 +237,7 @@ BENCHMARKS = {
         Benchmark(
             "study",
             needs="records of coders",
-            records="study/*.jsonl.gz",
+            records="study.jsonl.gz",
             fills=("docs/study.md",),
             tables_in="study.page",
             writes=(f"{IMAGES}/study/*",),

@@ -12,6 +12,7 @@ moves with the field: distance of the centres from the light without noise, with
 from __future__ import annotations
 
 import math
+import textwrap
 import time
 import tracemalloc
 from dataclasses import replace
@@ -21,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.arguments import command_line
-from benchmarks.records import Records
+from benchmarks.pages.tables import Tables, publish
+from benchmarks.records import Records, origin, table
 from ii_core import IICamera, calibrate, preset
 from ii_core.calibration import Calibration
 from ii_core.camera.optics import Lens
@@ -162,7 +164,7 @@ def behind_glass(scale: int) -> dict[str, float]:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure, record and fill the page."""
     asked = command_line(__doc__).parse_args()
     small = [
         {"lattice": lattice, "bad": bad, "pixels": "300-700", "cameras": CAMERAS}
@@ -170,24 +172,48 @@ def main() -> None:
         for bad in (0.0, 0.3)
     ]
     large = [{"lattice": "hexagonal", "bad": 0.3, "pixels": "7728x5368", "cameras": 1}]
-    glass = [{"main_lens": "double-gauss", "scale": 8}]
-    for key in RECORDS.todo([*small, *large, *glass], asked.again):
-
-        def row(key: dict[str, Any] = key) -> dict[str, Any]:
-            if "main_lens" in key:
-                return behind_glass(key["scale"])
-            size = None if "-" in key["pixels"] else tuple(map(int, key["pixels"].split("x")))
-            found = [trial(i, key["lattice"] == "hexagonal", key["bad"], size) for i in range(key["cameras"])]  # type: ignore[arg-type]
-            result: dict[str, Any] = {}
-            for name in found[0]:
-                values = np.array([trial[name] for trial in found])
-                result |= {f"{name}_worst": float(values.max()), f"{name}_median": float(np.median(values))}
-            return result
-
-        RECORDS.measure(key, row)
-    for line in RECORDS.rows():
-        print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in line.items()))
+    RECORDS.run([*small, *large], trials, asked.again)
+    RECORDS.run(
+        [{"main_lens": "double-gauss", "scale": 8}], lambda main_lens, scale: behind_glass(scale), asked.again
+    )
+    publish(tables())
 
 
-if __name__ == "__main__":
-    main()
+def trials(lattice: str, bad: float, pixels: str, cameras: int) -> dict[str, float]:
+    """Return worst and median errors of random cameras."""
+    size: Any = None if "-" in pixels else tuple(map(int, pixels.split("x")))
+    found = [trial(i, lattice == "hexagonal", bad, size) for i in range(cameras)]
+    result = {}
+    for name in found[0]:
+        values = np.array([one[name] for one in found])
+        result |= {f"{name}_worst": float(values.max()), f"{name}_median": float(np.median(values))}
+    return result
+
+
+def tables() -> Tables:
+    """Return the table of the page of calibration."""
+    rows = RECORDS.rows()
+    measured = [row for row in rows if "lattice" in row]
+    lines = [
+        f"{row['lattice']} | {row['bad']:.0%} | {row['pixels'].replace('-', '–').replace('x', '×')} | "
+        f"{row['cameras']} | {row['pitch_worst']:.1e} ({row['pitch_median']:.1e}) | "
+        f"{row['turn_deg_worst']:.4f}° ({row['turn_deg_median']:.4f}°) | "
+        f"{row['centres_px_worst']:.4f} px ({row['centres_px_median']:.4f} px)"
+        for row in measured
+    ]
+    large = [
+        f"The picture of {row['pixels'].replace('x', '×')} px took {row['calibrate_cpu_seconds_worst']:.0f} s of CPU "
+        f"time and {row['calibrate_peak_bytes_worst'] / 1e9:.1f} GB at the most."
+        for row in measured
+        if "calibrate_peak_bytes_worst" in row
+    ]
+    glass = [
+        f"Behind a double Gauss (`plenoptic1-double-gauss`, scale {row['scale']}, its stop at 80 %), centres lie "
+        f"{row['straight_px']:.3f} px rms off the best straight grid and {row['followed_px']:.3f} px off the "
+        "calibrated one; truth is the light of micro-images without noise."
+        for row in rows
+        if "main_lens" in row
+    ]
+    told = [line for text in (*large, *glass) for line in ("", *textwrap.wrap(text, 100, break_on_hyphens=False))]
+    heads = "lattice | lenses dark or saturated | pixels a side | cameras | pitch, worst (median) | turn | centres"
+    return {("docs/calibration.md", "calibration"): [*table(heads, lines), *told, "", origin(rows)]}

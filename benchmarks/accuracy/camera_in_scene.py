@@ -220,8 +220,7 @@ def transmitted(camera: IICamera) -> tuple[float, float]:
 def main() -> None:
     """Compare, time and record."""
     asked = command_line(__doc__, scale=SCALE).parse_args()
-    for key in RECORDS.todo([{"scale": asked.scale}], asked.again):
-        RECORDS.measure(key, lambda: study(asked.scale))
+    RECORDS.run([{"scale": asked.scale}], study, asked.again)
 
 
 def study(scale: int) -> dict[str, Any]:
@@ -240,13 +239,7 @@ def study(scale: int) -> dict[str, Any]:
             "aperture_of_pitch": aperture, **options, **found,
         }  # fmt: skip
         rows.append(row)
-        print(
-            f"{what:<13} {scene.name:<25} {c.lenses[0]}×{c.lenses[1]} lenses of {segments:>2}² squares, "
-            f"{samples} rays, aperture {aperture:.2f}: {row['psnr_db']:.1f} dB, with Fresnel "
-            f"{row['psnr_with_fresnel_db']:.1f}, direct light {row['psnr_direct_light_db']:.1f}, "
-            f"{100 * row['pixels_off_by_more_than_1']:.2f} % of that off by > 1",
-            flush=True,
-        )
+        print(row, flush=True)
         return pictures
 
     pictures = add("picture", apples, camera, 16, 4)
@@ -264,11 +257,8 @@ def study(scale: int) -> dict[str, Any]:
         values = ratio(apples, camera, segments, samples, direct=direct)
         middle = statistics.median(values)
         times.append({"segments": segments, "samples": samples, "direct": direct, "median": middle, "all": values})
-        light = "direct light" if direct else "all light"
-        print(f"CPU time in scene / L/D, {segments}² squares, {samples} rays, {light}: {middle:.2f}")
     shares = transmitted(camera)
     stray = {name: stray_light(c, 16) for name, c in (("preset", camera), ("full aperture", wide))}
-    print(f"Fresnel lets {shares[0]:.4f} to {shares[1]:.4f} through; stray light {stray}")
     write_picture(IMAGES / "camera_in_scene.jpg", side_by_side(pictures))
     numbers = {"fresnel_transmits": shares, "stray_light": stray, "rows": rows, "cpu_ratio": times}
     return {"camera": camera.to_json(), **numbers}
@@ -303,7 +293,3 @@ def _faces(scene: Scene) -> int:
 def _unit(x: Any, y: Any, z: Any) -> NDArray[np.float64]:
     vectors = np.stack(np.broadcast_arrays(x, y, z), axis=-1)
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
-if __name__ == "__main__":
-    main()

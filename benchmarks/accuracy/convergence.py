@@ -13,7 +13,6 @@ Numbers and chart go to ``benchmarks/results/convergence.jsonl`` and
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,11 +21,11 @@ from numpy.typing import NDArray
 from benchmarks.accuracy.analytic import Array, Ball, World, still_life
 from benchmarks.accuracy.camera_in_scene import lens_bodies
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.records import Records
 from ii_core import IICamera, preset
 from ii_core.camera.optics import SphericalLenslet
-from ii_core.display.figure import COLOURS
+from ii_core.display.figure import COLOURS, new_figure
 from raytrace_ii import Body, Light, Material, Scene, trace
 from raytrace_ii.scene.textures import Image
 
@@ -48,7 +47,7 @@ ORDERS = {
 
 
 def main() -> None:
-    """Measure, print, record and draw."""
+    """Measure, record and draw."""
     parser = command_line(__doc__)
     parser.add_argument("--finest", type=int, default=FINEST, help="segments of the finest ball")
     asked = parser.parse_args()
@@ -59,14 +58,9 @@ def main() -> None:
         "plano-convex lens": lambda: plano_convex([4, 8, 16, 32, 64]),
         "images": lambda: images(max(levels)),
     }
-    for key in RECORDS.todo(({"part": part, "finest": asked.finest} for part in parts), asked.again):
-        RECORDS.measure(key, lambda part=key["part"]: {"rows": parts[part]()})
-    result = measured(asked.finest)
-    for part in ("rows", "lenses", "images"):
-        for row in result[part]:
-            print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
-    print("orders", result["orders"], result["lens_orders"])
-    chart(result, IMAGES / "convergence.png")
+    keys = [{"part": part, "finest": asked.finest} for part in parts]
+    RECORDS.run(keys, lambda part, finest: {"rows": parts[part]()}, asked.again)
+    write_chart(chart(measured(asked.finest)), "convergence.png")
 
 
 def measured(finest: int = FINEST) -> dict[str, Any]:
@@ -290,13 +284,9 @@ def _angle(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> Array:
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
 
 
-def chart(result: dict[str, Any], path: Path) -> None:
+def chart(result: dict[str, Any]) -> Any:
     """Draw errors of geometry, picture and lenses, each with its expected slope."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(13, 4.4), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(13, 4.4)
     geometry, picture, lens = figure.subplots(1, 3)
     rows, orders = result["rows"], result["orders"]
     segments = [row["segments"] for row in rows]
@@ -328,19 +318,12 @@ def chart(result: dict[str, Any], path: Path) -> None:
             lens.loglog(x, [row[kind] for row in chosen], "os"[i] + "-:"[j], color=COLOURS[2 * i + j], label=label)
     lens.set_title("lenses of triangles: where rays end, against Snell", loc="left", fontsize=10)
     lens.set_ylabel("root mean square error at the focus [mm]")
+    tidy(geometry, picture, lens)
     for axes in (geometry, picture, lens):
         axes.set_xlabel("segments around a full circle, 2π/h")
-        axes.grid(True, color="0.9", linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
         axes.set_xticks(segments, [str(s) for s in segments])
         axes.minorticks_off()
         axes.legend(frameon=False, fontsize=8, loc="lower right" if axes is picture else "lower left")
     picture.set_ylim(bottom=0)
     geometry.set_ylim(bottom=1e-7)
-    figure.savefig(path, dpi=130)
-    write_picture(path, path)
-
-
-if __name__ == "__main__":
-    main()
+    return figure

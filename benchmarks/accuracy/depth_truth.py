@@ -20,19 +20,19 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import write_picture
+from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, origin
+from benchmarks.records import Records, origin, table
 from codec import decode, encode
 from ii_core import IIPicture, add_sensor_noise, preset
-from ii_core.display.figure import COLOURS, new_figure, save
+from ii_core.display.figure import COLOURS, new_figure
 from ii_core.picture.view import camera_of
 from metrics import DepthQuality, FocusDepth, depth_from_focus, linear_layers, q_depth
 from metrics.depth.focus import METHODS
 from metrics.depth.virtual_camera import virtual_camera_pixels
 from raytrace_ii import Scene, Shot, load_scene, render
 
-RECORDS, CHART = Records("depth_truth", ("benchmarks.accuracy.depth_truth",)), ROOT / "docs/images/depth_truth.png"
+RECORDS = Records("depth_truth", ("benchmarks.accuracy.depth_truth",))
 SCALE = 2  # scale on the page
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
 KINDS = ("textured", "flat", "edge", "mirror", "clear")
@@ -51,10 +51,8 @@ def main() -> None:
     keys = [
         {"scene": name, "scale": scale, "bpp": BPP} for name in asked.scenes for scale in (NOISE_SCALE, asked.scale)
     ]
-    for key in RECORDS.todo(keys, asked.again):
-        RECORDS.measure(key, lambda key=key: study(key["scene"], key["scale"]))
-    save(draw(data()), CHART)
-    write_picture(CHART, CHART)
+    RECORDS.run(keys, lambda scene, scale, bpp: study(scene, scale), asked.again)
+    write_chart(draw(data()), "depth_truth.png")
     publish(tables())
 
 
@@ -67,7 +65,6 @@ def study(name: str, scale: int) -> dict[str, Any]:
         found = estimates(add_sensor_noise(shot.picture, noise, seed=1))
         for method, (depth, seconds) in found.items():
             rows.append({"noise": noise, "method": method, **errors(depth, shot, kinds), "cpu_seconds": seconds})
-            say({"scene": name, "scale": scale, **rows[-1]})
     return {"errors": rows, "q_depth": None if scale == NOISE_SCALE else quality(shot, found)}
 
 
@@ -83,13 +80,12 @@ def data() -> dict[str, list[dict[str, Any]]]:
 
 def tables() -> Tables:
     """Return the table of the records."""
-    return {("docs/metrics.md", "depth-truth"): table(data())}
+    return {("docs/metrics.md", "depth-truth"): truth_table(data())}
 
 
-def table(data: dict[str, Any]) -> list[str]:
+def truth_table(data: dict[str, Any]) -> list[str]:
     """Return a table of both methods without noise: median and range over the scenes at each scale."""
-    head = ("scale", "median error, layers", "within 1 layer, %", "within 10 % of the depth, %")
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    lines = []
     formats = {"median_layers": ".0f", "within_one_layer": ".0%", "within_10_%": ".0%"}
     for scale in (SCALE, NOISE_SCALE):
         cells = []
@@ -98,10 +94,11 @@ def table(data: dict[str, Any]) -> list[str]:
                 [row[key] for row in _only(data["rows"], scale=scale, noise=0, method=method)] for method in METHODS
             ]
             cells.append(" → ".join(f"{np.median(x):{form}} ({min(x):{form}}–{max(x):{form}})" for x in each))
-        lines.append(f"| {scale} | {' | '.join(cells).replace('%', '')} |")
+        lines.append([scale, *(cell.replace("%", "") for cell in cells)])
+    heads = "scale | median error, layers | within 1 layer, % | within 10 % of the depth, %"
     scenes = len({row["scene"] for row in data["rows"]})
     told = f"Median (range) of {scenes} scenes through `setup1`, the dissertation's method → the robust one."
-    return [*lines, "", f"{told} {origin(data['rows'])}"]
+    return [*table(heads, lines), "", f"{told} {origin(data['rows'])}"]
 
 
 def estimates(picture: IIPicture) -> dict[str, tuple[FocusDepth, float]]:
@@ -112,12 +109,6 @@ def estimates(picture: IIPicture) -> dict[str, tuple[FocusDepth, float]]:
         depth = depth_from_focus(picture, method=method, layers_mm=linear_layers(camera_of(picture)))
         found[method] = depth, time.process_time() - started
     return found
-
-
-def say(row: dict[str, Any]) -> None:
-    """Print the summary of a row."""
-    shown = ("scene", "scale", "noise", "method", "median_layers", "p90_layers", "within_one_layer", "within_10_%")
-    print("  ".join(f"{row[k]:.3g}" if isinstance(row[k], float) else str(row[k]) for k in shown), flush=True)
 
 
 def errors(found: FocusDepth, shot: Shot, kinds: NDArray[np.int64]) -> dict[str, Any]:
@@ -181,7 +172,6 @@ def quality(shot: Shot, found: dict[str, tuple[FocusDepth, float]]) -> dict[str,
         pairs = [(a, b) for a, b in zip(row["true"], row[method], strict=True) if a is not None and b is not None]
         row[f"{method}_off_db"] = float(np.mean([abs(a - b) for a, b in pairs]))
         row[f"{method}_bins_made_up"] = sum(b is not None for b in row[method]) - len(pairs)
-        print(f"Q_depth {method}: {row[f'{method}_off_db']:.2f} dB off in {len(pairs)} bins")
     return row
 
 
@@ -240,10 +230,7 @@ def draw(data: dict[str, Any]) -> Any:
     by_noise.set_xlabel("sensor noise σ [steps of 8 bits]")
     by_noise.set_ylabel("depth right within 10 % [%]")
     by_noise.set_title(f"all scenes, scale {NOISE_SCALE}", loc="left", fontsize=10)
-    for axes in (*panels.flat, by_scene, by_kind, by_noise):
-        axes.grid(True, axis="y", color="0.9", linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+    tidy(*panels.flat, by_scene, by_kind, by_noise, axis="y")
     return figure
 
 
@@ -269,7 +256,3 @@ def _pooled(rows: list[dict[str, Any]], kind: str) -> float:
     held = [row for row in rows if row[f"pixels_{kind}"]]
     right = sum(row[f"pixels_{kind}"] * row[f"within_10_%_{kind}"] for row in held)
     return 100 * right / max(sum(row[f"pixels_{kind}"] for row in held), 1)
-
-
-if __name__ == "__main__":
-    main()

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, origin
+from benchmarks.records import Records, origin, table
 from ii_core import IICamera, camera_pose, disparity_of_depth, preset
 from metrics import depth_from_focus
 from metrics.depth.focus import METHODS
@@ -38,8 +38,7 @@ def main() -> None:
     """Measure, keep and print."""
     asked = command_line(__doc__, scenes=tuple(PLACES)).parse_args()
     keys = [{"scene": name, "kind": kind} for name in asked.scenes for kind in KINDS]
-    for key in RECORDS.todo(keys, asked.again):
-        RECORDS.measure(key, lambda key=key: errors(key["scene"], key["kind"]))
+    RECORDS.run(keys, errors, asked.again)
     publish(tables())
 
 
@@ -53,11 +52,11 @@ def field(views: int = 9, side: int = 128) -> IICamera:
     )  # fmt: skip
 
 
-def errors(name: str, kind: str) -> dict[str, Any]:
+def errors(scene: str, kind: str) -> dict[str, Any]:
     """Return the errors of both methods, and the range of the true disparity."""
     camera = field() if kind == "converged" else preset("setup1", scale=8)
-    pose = camera_pose((0, 0, PLACES[name] if kind == "converged" else 0))
-    shot = render(load_scene(name), camera, samples=4, pose=pose, support=("depth",))
+    pose = camera_pose((0, 0, PLACES[scene] if kind == "converged" else 0))
+    shot = render(load_scene(scene), camera, samples=4, pose=pose, support=("depth",))
     assert shot.depth is not None
     true = disparity_of_depth(camera, shot.depth[virtual_camera_pixels(camera)])
     hit = np.isfinite(true)
@@ -76,7 +75,6 @@ def errors(name: str, kind: str) -> dict[str, Any]:
             f"{method}_sure": float(sure.mean()),
             f"{method}_bad_where_sure": float(bad[sure].mean()) if sure.any() else None,
         }
-    print({"scene": name, "kind": kind, **row}, flush=True)
     return row
 
 
@@ -85,14 +83,14 @@ def tables() -> Tables:
     if not (measured := RECORDS.rows()):
         return {("docs/metrics.md", "field-depth"): ["No record yet: the command above measures it."]}
     groups = {kind: [row for row in measured if row["kind"] == kind] for kind in KINDS}
-    head = ("views", "median error, px", "error above 0.07 px, %", "sure, %", "bad where sure, %")
-    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+    lines = []
     for kind, rows in groups.items():
         cells = []
         for what, form in WHATS.items():
             each = [[row[f"{m}_{what}"] for row in rows if row[f"{m}_{what}"] is not None] for m in METHODS]
             cells.append(" → ".join(f"{statistics.median(x):{form}} ({min(x):{form}}–{max(x):{form}})" for x in each))
-        lines.append(f"| {kind} | {' | '.join(cells).replace('%', '')} |")
+        lines.append([kind, *(cell.replace("%", "") for cell in cells)])
+    heads = "views | median error, px | error above 0.07 px, % | sure, % | bad where sure, %"
     reach = " and ".join(
         f"{min(row['low'] for row in rows):+.1f} … {max(row['high'] for row in rows):+.1f} px"
         for rows in groups.values()
@@ -102,8 +100,10 @@ def tables() -> Tables:
         "9×9 views of 128² pixels. Parallel: behind setup1, scale 8. Disparities are "
         f"{reach} (1–99 %). 4 samples a pixel. {origin(measured)}"
     )
-    return {("docs/metrics.md", "field-depth"): [*lines, "", *textwrap.wrap(told, 100, break_on_hyphens=False)]}
-
-
-if __name__ == "__main__":
-    main()
+    return {
+        ("docs/metrics.md", "field-depth"): [
+            *table(heads, lines),
+            "",
+            *textwrap.wrap(told, 100, break_on_hyphens=False),
+        ]
+    }

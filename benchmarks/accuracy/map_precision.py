@@ -10,16 +10,18 @@ to ``benchmarks/results/map_precision.jsonl`` and ``docs/images/map_precision.pn
 from __future__ import annotations
 
 import tempfile
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.pages.pictures import write_chart
 from benchmarks.records import Records, number
-from ii_core import IICamera, preset, read_maps, write_maps
+from ii_core import IICamera, IIPicture, preset, read_maps, write_maps
 from ii_core.camera.maps import FORMATS
+from ii_core.display.figure import new_figure
 from metrics import q_global
 from raytrace_ii import load_scene, render
 
@@ -30,33 +32,30 @@ CAMERAS = ("setup1", "setup3", "spherical")
 
 
 def main() -> None:
-    """Measure, print, keep and draw."""
+    """Measure, keep and draw."""
     asked = command_line(__doc__, scale=SCALE, cameras=CAMERAS).parse_args()
-    scenes = {name: load_scene(name) for name in SCENES}
-    for name in asked.cameras:
-        keys = RECORDS.todo(
-            ({"scale": asked.scale, "camera": name, "format": format} for format in FORMATS), asked.again
-        )
-        if not keys:
-            continue
-        camera = preset(name, scale=asked.scale)
-        exact = {
-            scene: render(loaded, stored(camera, "exr")[0], support=()).picture for scene, loaded in scenes.items()
-        }
-        for key in keys:
+    keys = [{"scale": asked.scale, "camera": name, "format": form} for name in asked.cameras for form in FORMATS]
+    RECORDS.run(keys, measured, asked.again)
+    write_chart(chart(RECORDS.rows(scale=SCALE)), "map_precision.png", dpi=120)
 
-            def row(format: str = key["format"], camera: IICamera = camera, exact: Any = exact) -> dict[str, Any]:
-                maps, size = stored(camera, format)
-                psnr = {
-                    f"psnr_{scene}": q_global(exact[scene], render(loaded, maps, support=()).picture)
-                    for scene, loaded in scenes.items()
-                }
-                return {"bytes_per_pixel": size / camera.pixels[0] / camera.pixels[1], **errors(camera, maps), **psnr}
 
-            RECORDS.measure(key, row)
-    for line in RECORDS.rows(scale=asked.scale):
-        print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in line.items()))
-    chart(RECORDS.rows(scale=SCALE), IMAGES / "map_precision.png")
+def measured(scale: int, camera: str, format: str) -> dict[str, Any]:
+    """Return bytes, errors of rays, and PSNR of pictures of one format."""
+    of = preset(camera, scale=scale)
+    maps, size = stored(of, format)
+    psnr = {f"psnr_{scene}": q_global(exact(scene, camera, scale), shown(scene, maps)) for scene in SCENES}
+    return {"bytes_per_pixel": size / of.pixels[0] / of.pixels[1], **errors(of, maps), **psnr}
+
+
+@lru_cache(maxsize=len(SCENES))
+def exact(scene: str, camera: str, scale: int) -> IIPicture:
+    """Return a scene's picture from float maps."""
+    return shown(scene, stored(preset(camera, scale=scale), "exr")[0])
+
+
+def shown(scene: str, maps: Any) -> IIPicture:
+    """Return a scene's picture from maps."""
+    return render(load_scene(scene), maps, support=()).picture
 
 
 def stored(camera: IICamera, format: str) -> tuple[Any, int]:
@@ -83,11 +82,9 @@ def errors(camera: IICamera, maps: Any) -> dict[str, float]:
     }
 
 
-def chart(rows: list[dict[str, Any]], path: Path) -> None:
+def chart(rows: list[dict[str, Any]]) -> Any:
     """Draw PSNR over bytes: one marker per format, one colour per camera."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 4.5), layout="constrained")
+    figure = new_figure(10, 4.5)
     markers = dict(zip(FORMATS, "osD^", strict=True))
     colours = dict(zip(CAMERAS, ("#0072B2", "#D55E00", "#009E73"), strict=True))
     for axes, scene in zip(figure.subplots(1, 2, sharey=True), SCENES, strict=True):
@@ -110,9 +107,4 @@ def chart(rows: list[dict[str, Any]], path: Path) -> None:
     for name in CAMERAS:
         axes.plot([], [], "s", color=colours[name], label=name)
     axes.legend(fontsize="small")
-    figure.savefig(path, dpi=120)
-    write_picture(path, path)
-
-
-if __name__ == "__main__":
-    main()
+    return figure

@@ -6,7 +6,7 @@ POV-Ray intersects balls and planes in closed form. Its ``mesh_camera`` takes on
 triangles: from the centroid along the normal, so that any L and D can be passed. Its picture is compared with ours
 (triangles) and with `analytic` (closed form, too): PSNR of linear light by object, and a picture of the difference.
 ``povray`` must be on the path (Debian: ``apt-get install povray``); without it the script prints this and ends.
-Numbers and pictures go to ``benchmarks/results/povray.jsonl`` and ``docs/images/povray.jpg``.
+Numbers and pictures go to ``benchmarks/results/povray.jsonl`` and ``docs/images/povray.webp``.
 """
 
 from __future__ import annotations
@@ -27,13 +27,12 @@ from benchmarks.accuracy.analytic import Array, Ball, Floor, World, still_life
 from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, origin
+from benchmarks.records import Records, origin, table
 from ii_core import IICamera, preset
 from ii_core.base.colour import srgb
 from raytrace_ii import Light, Material, trace
 
 RECORDS = Records("povray", ("benchmarks.accuracy.povray", "benchmarks.accuracy.analytic"))
-DOCS = ROOT / "docs"
 SCALE = 16  # scale on the page
 SEGMENTS = 384
 SIDE = 1.0  # mm from corner to centroid of a triangle that stands for a ray; POV-Ray drops very small ones
@@ -67,7 +66,7 @@ def main() -> None:
             print("  ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
     if len(pictures) == 2:
         gap = np.full((8, pictures[0].shape[1], 3), 255, np.uint8)
-        write_picture(IMAGES / "povray.jpg", np.concatenate([pictures[0], gap, pictures[1]]))
+        write_picture(IMAGES / "povray.webp", np.concatenate([pictures[0], gap, pictures[1]]))
     publish(tables())
 
 
@@ -113,12 +112,9 @@ def tables() -> Tables:
         else:
             columns[f"{one['camera']}, rays by {one['rays by']}"] = cells
     rows = dict.fromkeys(name for cells in columns.values() for name in cells)
-    lines = [
-        f"| | {' | '.join(columns)} |",
-        "|---" * (len(columns) + 1) + "|",
-        *(f"| {name} | " + " | ".join(cells.get(name, "") for cells in columns.values()) + " |" for name in rows),
-    ]
-    return {("docs/stability.md", "povray"): [*lines, "", origin(measured)]}
+    lines = [[name, *(cells.get(name, "") for cells in columns.values())] for name in rows]
+    heads = " | ".join(["", *columns]).strip()
+    return {("docs/stability.md", "povray"): [*table(heads, lines), "", origin(measured)]}
 
 
 def _psnr(error: Array) -> float:
@@ -256,7 +252,3 @@ def finish(m: Material, world: World) -> str:
         f"pigment {{ rgb {vector(m.colour)} }} finish {{ ambient rgb {ambient} diffuse {local:.9g} {shine} "
         f"reflection {{ rgb {vector(m.mirror)} }} }}"
     )
-
-
-if __name__ == "__main__":
-    main()

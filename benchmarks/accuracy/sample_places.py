@@ -20,7 +20,7 @@ from scipy.optimize import minimize
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, origin
+from benchmarks.records import Records, origin, table
 from raytrace_ii.tracing.kernels.sampling import places
 from raytrace_ii.tracing.sample_places import MOST, doubling_places, fixed_places
 
@@ -47,8 +47,7 @@ def main() -> None:
         for samples, some in {**found, "doubling": doubling()}.items():
             print(samples, np.rint(some * 1000).astype(int).tolist(), flush=True)
         return
-    for key in RECORDS.todo([{"samples": samples} for samples in SHOWN], asked.again):
-        RECORDS.measure(key, lambda samples=key["samples"]: measured(samples))
+    RECORDS.run([{"samples": samples} for samples in SHOWN], measured, asked.again)
     publish(tables())
 
 
@@ -144,18 +143,12 @@ def _without(quarters: list[list[int]], taken: tuple[int, ...]) -> list[list[int
 
 def tables() -> Tables:
     """Return the table of the page."""
-    rows = RECORDS.by("samples", SHOWN)
-    lines = [
-        "| samples | edges of all angles, sequence | own places | doubling | along rows and columns, sequence | own "
-        "places | doubling |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    rows, lines = RECORDS.by("samples", SHOWN), []
     for samples, row in rows.items():
         sets = [row.get(name) for name in ("sequence", "own", "doubling")]
-        cells = [f"{one[axis] * 100:.1f} %" if one else "" for axis in (0, 1) for one in sets]
-        lines.append(f"| {samples} | {' | '.join(cells)} |")
-    return {(PAGE, "sample-places"): [*lines, "", origin(rows.values())]}
-
-
-if __name__ == "__main__":
-    main()
+        lines.append([samples, *(f"{one[axis] * 100:.1f} %" if one else "" for axis in (0, 1) for one in sets)])
+    heads = (
+        "samples | edges of all angles, sequence | own places | doubling | along rows and columns, sequence | own "
+        "places | doubling"
+    )
+    return {(PAGE, "sample-places"): [*table(heads, lines), "", origin(rows.values())]}

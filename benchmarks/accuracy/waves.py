@@ -23,14 +23,14 @@ from numpy.typing import NDArray
 
 from benchmarks.accuracy.lens_setup1 import LENSES, oblique, spread_scene
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, number, origin
+from benchmarks.records import Records, number, origin, table
 from ii_core import IICamera, IIPicture
 from ii_core.camera.optics import Lenslet
 from ii_core.waves.spread import spread_maps, spread_picture
 from ii_core.waves.wave import diffraction_limit, lens_spread, model_spread, pixel_kernel
-from metrics.plots.rd_chart import COLOURS, MARKERS, new_figure, save
+from metrics.plots.rd_chart import COLOURS, MARKERS, new_figure
 
 RECORDS = Records("waves", ("benchmarks.accuracy.waves", "benchmarks.accuracy.lens_setup1"))
 PIXELS = 16  # under a lens
@@ -57,12 +57,8 @@ def main() -> None:
     if unknown := set(asked.parts) - set(PARTS):
         parser.error(f"no part {min(unknown)!r}: known are {', '.join(PARTS)}")
     for part in asked.parts:
-        keys, measured = PARTS[part]
-        for key in RECORDS.todo(keys, asked.again):
-            RECORDS.measure(key, lambda key=key, measured=measured: measured(**key))
-    path = IMAGES / "waves.png"
-    save(draw(), path)
-    write_picture(path, path)
+        RECORDS.run(*PARTS[part], asked.again)
+    write_chart(draw(), "waves.png")
     publish(tables())
 
 
@@ -96,18 +92,15 @@ def sweep_points(name: str, wavelength_nm: float, shape: str) -> list[dict[str, 
         gap = pitch * (value if name == "gap" else RATIO)
         pixel = pitch / (value if name == "pixels" else PIXELS)
         depth = value * gap if name == "depth" else math.inf
-        true, model, wave_seconds, model_seconds = kernels(pitch, gap, pixel, wavelength_nm, depth)
+        true, model, *seconds = kernels(pitch, gap, pixel, wavelength_nm, depth)
         points.append(
             {
-                "value": value,
-                "pixel_over_spread": pixel / (wavelength_nm * 1e-6 * gap / pitch),
+                "value": value, "pixel_over_spread": pixel / (wavelength_nm * 1e-6 * gap / pitch),
                 "blur_px": pitch * gap / depth / pixel,
-                "rays_db": error_db(np.eye(1, 2 * REACH + 1, REACH)[0], true),
-                "model_db": error_db(model, true),
-                "wave_seconds": wave_seconds,
-                "model_seconds": model_seconds,
+                "rays_db": error_db(np.eye(1, 2 * REACH + 1, REACH)[0], true), "model_db": error_db(model, true),
+                "wave_seconds": seconds[0], "model_seconds": seconds[1],
             }
-        )
+        )  # fmt: skip
     return points
 
 
@@ -171,7 +164,7 @@ def error_db(kernel: Any, true: Any) -> float:
 def draw() -> Any:
     """Draw one panel per sweep: rays as solid lines, the point-spread model as dotted lines."""
     figure = new_figure(8.5, 7.5)
-    for axes, (name, (_, label)) in zip(figure.subplots(2, 2).flat, SWEEPS.items(), strict=True):
+    for axes, (name, (_, across)) in zip(figure.subplots(2, 2).flat, SWEEPS.items(), strict=True):
         for i, wavelength in enumerate(WAVELENGTHS):
             rows = RECORDS.rows(sweep=name, wavelength_nm=wavelength, lens="round")
             points = rows[0]["points"] if rows else []
@@ -179,19 +172,11 @@ def draw() -> Any:
             for model, line in (("rays", "-"), ("model", ":")):
                 y = [p[f"{model}_db"] for p in points]
                 what = "rays" if model == "rays" else "point-spread maps"
-                axes.plot(
-                    x,
-                    y,
-                    line,
-                    marker=MARKERS[i],
-                    color=COLOURS[i],
-                    markersize=4,
-                    label=f"{what}, {wavelength:.0f} nm",
-                )
+                label = f"{what}, {wavelength:.0f} nm"
+                axes.plot(x, y, line, marker=MARKERS[i], color=COLOURS[i], markersize=4, label=label)
         axes.axhline(ENOUGH_DB, color="0.4", linewidth=1)
-        axes.set(xscale="log", xlabel=label, title=name)
-        axes.grid(True, color="0.92", linewidth=0.8)
-        axes.spines[["top", "right"]].set_visible(False)
+        axes.set(xscale="log", xlabel=across, title=name)
+        tidy(axes)
     for axes in figure.axes[::2]:
         axes.set_ylabel("PSNR against the wave [dB]")
     handles, names = figure.axes[0].get_legend_handles_labels()
@@ -207,23 +192,19 @@ def tables() -> Tables:
 
 def limits_table() -> list[str]:
     """Return the value at which each model crosses `ENOUGH_DB`, by sweep, at 550 nm, and the pixels there."""
-    if not (rows := RECORDS.rows(wavelength_nm=WAVELENGTH, lens="round")):
-        return []
+    rows, lines = RECORDS.rows(wavelength_nm=WAVELENGTH, lens="round"), []
     slits = RECORDS.by("sweep", SWEEPS, wavelength_nm=WAVELENGTH, lens="slit")
-    lines = [
-        "| varied | rays: 40 dB at (pixel) | maps: 40 dB, worst | slit: rays at, worst of model | wave | maps |",
-        "|---|---|---|---|---|---|",
-    ]
     for row in rows:
         points, slit = row["points"], slits[row["sweep"]]["points"]
         wave, model = (1e3 * float(np.median([p[f"{k}_seconds"] for p in points])) for k in ("wave", "model"))
         crossed = [crossing(points, f"{k}_db") for k in ("rays", "model")]
         worst, narrow = (min(p["model_db"] for p in one) for one in (points, slit))
         lines.append(
-            f"| {row['sweep']} | {crossed[0]} | {crossed[1]}, {worst:.1f} dB | "
-            f"{crossing(slit, 'rays_db')}, {narrow:.1f} dB | {wave:.0f} ms | {model:.1f} ms |"
+            f"{row['sweep']} | {crossed[0]} | {crossed[1]}, {worst:.1f} dB | "
+            f"{crossing(slit, 'rays_db')}, {narrow:.1f} dB | {wave:.0f} ms | {model:.1f} ms"
         )
-    return [*lines, "", origin(rows)]
+    heads = "varied | rays: 40 dB at (pixel) | maps: 40 dB, worst | slit: rays at, worst of model | wave | maps"
+    return [*table(heads, lines), "", origin(rows)]
 
 
 def crossing(points: list[dict[str, float]], key: str) -> str:
@@ -241,19 +222,15 @@ def crossing(points: list[dict[str, float]], key: str) -> str:
 
 def setup1_table() -> list[str]:
     """Error by spread light, disparity, and the coding gain, of each lens."""
-    if not (rows := [row for row in RECORDS.rows(scale=SCALE) if "lens" in row]):
-        return []
-    lines = [
-        "| scene | lens | PSNR | Q_view | disparity: median change | error, median | gain of SI-PVS |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    rows, lines = [row for row in RECORDS.rows(scale=SCALE) if "lens" in row], []
     for row in rows:
         same = row["lens"] == "rays"
         head = "– | –" if same else f"{row['psnr']:.1f} dB | {row['q_view']:.4f}"
         moved = "–" if same else f"{row['disparity_change']:.3f}"
         tail = f"{moved} | {row['disparity_error']:.3f} | {row['gain']:+.2f} dB"
-        lines.append(f"| {row['scene']} | {row['lens']} | {head} | {tail} |")
-    return [*lines, "", origin(rows)]
+        lines.append(f"{row['scene']} | {row['lens']} | {head} | {tail}")
+    heads = "scene | lens | PSNR | Q_view | disparity: median change | error, median | gain of SI-PVS"
+    return [*table(heads, lines), "", origin(rows)]
 
 
 def field_table() -> list[str]:
@@ -266,7 +243,3 @@ def field_table() -> list[str]:
         f"| {p['from_axis_px']:.1f} | {p['traced_px']:.2f} | {p['maps_px']:.2f} |" for p in rows[0]["pixels"][1::2]
     ]
     return [*lines, "", origin(rows)]
-
-
-if __name__ == "__main__":
-    main()

@@ -7,12 +7,12 @@ pictures, one row per scene and condition in ``benchmarks/results/bframes.jsonl`
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 from typing import Any
 
 from benchmarks.arguments import command_line
 from benchmarks.coding.rd import climbing, rd_point
-from benchmarks.records import Records, origin, with_commits
+from benchmarks.records import Records, origin, table
 from ii_core import IIPicture, preset
 from metrics import bd_psnr
 from metrics.rates.rd import UndefinedDifference
@@ -48,40 +48,39 @@ CONDITIONS: list[tuple[str, str, list[dict[str, Any]]]] = [
 
 
 def main() -> None:
-    """Measure, print and record."""
-    parser = command_line(__doc__, scale=SCALE, scenes=("apples", "twins", "car", "cuboid"))
-    parser.add_argument("--workers", type=int, default=1)
-    asked = parser.parse_args()
-    conditions = {name: rest for name, *rest in CONDITIONS}
-    for scene in asked.scenes:
-        keys = RECORDS.todo(
-            ({"scene": scene, "scale": asked.scale, "condition": name} for name in conditions), asked.again
-        )
-        if not keys:
-            continue
-        picture = render(load_scene(scene), preset("setup1", scale=asked.scale), noise=1.0, support=()).picture
-
-        def row(key: dict[str, Any], picture: IIPicture = picture) -> None:
-            scheme, goals = conditions[key["condition"]]
-            found = RECORDS.measure(key, lambda: {"scheme": scheme, "psnr": differences(picture, scheme, goals)})
-            print(f"{key['scene']:<8} {key['condition']:<44} {found['result']['psnr']}", flush=True)
-
-        with ThreadPoolExecutor(asked.workers) as pool:
-            list(pool.map(row, keys))
+    """Measure and record."""
+    asked = command_line(__doc__, scale=SCALE, scenes=("apples", "twins", "car", "cuboid")).parse_args()
+    conditions = [name for name, *_ in CONDITIONS]
+    RECORDS.run(
+        ({"scene": scene, "scale": asked.scale, "condition": name} for scene in asked.scenes for name in conditions),
+        measured,
+        asked.again,
+    )
 
 
-def table() -> list[str]:
+def measured(scene: str, scale: int, condition: str) -> dict[str, Any]:
+    """Return the scheme of a condition, and its differences."""
+    ((scheme, goals),) = (rest for name, *rest in CONDITIONS if name == condition)
+    return {"scheme": scheme, "psnr": differences(pictured(scene, scale), scheme, goals)}
+
+
+@lru_cache(maxsize=1)
+def pictured(scene: str, scale: int) -> IIPicture:
+    """Return a scene with sensor noise."""
+    return render(load_scene(scene), preset("setup1", scale=scale), noise=1.0, support=()).picture
+
+
+def conditions_table() -> list[str]:
     """Return the table of differences in dB to no B pictures, by condition and number."""
     rows = [row for row in RECORDS.rows(scale=SCALE) if row["condition"] not in LITTLE]
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    lines = [f"| `setup1` at scale {SCALE} | {' | '.join(scenes)} |", "|---" * (len(scenes) + 1) + "|"]
-    commits = []
+    cells, commits = [], []
     for condition in dict.fromkeys(row["condition"] for row in rows):
         own = {row["scene"]: row for row in rows if row["condition"] == condition}
-        cells = [", ".join(map(_decibel, own[s]["psnr"].values())) if s in own else "–" for s in scenes]
-        lines.append(f"| {condition} | {' | '.join(cells)} |")
+        each = [", ".join(map(_decibel, own[s]["psnr"].values())) if s in own else "–" for s in scenes]
+        cells.append([condition, *each])
         commits.append([row["commit"] for row in own.values()])
-    return [origin(rows), "", *with_commits(lines, commits)]
+    return [origin(rows), "", *table(" | ".join([f"`setup1` at scale {SCALE}", *scenes]), cells, commits)]
 
 
 def _decibel(value: float | None) -> str:
@@ -113,7 +112,3 @@ def curve(
         points.append({"bpp": point.bpp, "psnr": point.q_global})
     kept = climbing(points)
     return [point["bpp"] for point in kept], [point["psnr"] for point in kept]
-
-
-if __name__ == "__main__":
-    main()

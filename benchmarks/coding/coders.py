@@ -15,19 +15,19 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatch
 from itertools import count
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.arguments import command_line
 from benchmarks.coding.rd import climbing, compiled, rd_point
-from benchmarks.pages.pictures import write_picture
-from benchmarks.records import Records, origin, with_commits
+from benchmarks.pages.pictures import write_chart
+from benchmarks.records import Records, origin, table
 from codec import parse_scheme, schemes
 from codec.contract import find
 from ii_core import IIPicture, preset
 from ii_core.base.parallel import for_each
+from ii_core.display.figure import new_figure
 from metrics import bd_rate
 from metrics.rates.rd import UndefinedDifference
 from raytrace_ii import load_scene, render
@@ -96,13 +96,10 @@ def main() -> None:
         if keys:
             picture = render(load_scene(scene), preset("setup1", scale=asked.scale), noise=1.0, support=()).picture
             measure(picture, keys, asked.workers)
-    for line in table(studied(asked.scale)):
-        print(line)
 
 
 def measure(picture: IIPicture, keys: Sequence[Mapping[str, Any]], workers: int) -> None:
     """Measure and record curves of one picture; an interrupt drops the curves not yet started."""
-
     done = count(1)
 
     def row(key: Mapping[str, Any]) -> None:
@@ -145,21 +142,15 @@ def qualities(scheme: str) -> list[dict[str, Any]]:
 
 def curve(picture: IIPicture, scheme: str) -> list[dict[str, float]]:
     """Return rate, PSNR and CPU seconds of one encoder run at every quality."""
-    points = []
     compiled(scheme, **qualities(scheme)[0])
-    for goal in qualities(scheme):
-        point = rd_point(picture, scheme, **goal)
-        points.append(
-            {
-                "bpp": point.bpp,
-                "psnr": point.q_global,
-                "codec_seconds": point.encoder_seconds or 0.0,
-                "encode_seconds": point.encode_seconds or 0.0,
-                "decode_seconds": point.decode_seconds,
-                "runs": point.runs,
-            }
-        )
-    return points
+    points = (rd_point(picture, scheme, **goal) for goal in qualities(scheme))
+    return [
+        {
+            "bpp": p.bpp, "psnr": p.q_global, "codec_seconds": p.encoder_seconds or 0.0,
+            "encode_seconds": p.encode_seconds or 0.0, "decode_seconds": p.decode_seconds, "runs": p.runs,
+        }
+        for p in points
+    ]  # fmt: skip
 
 
 def compared(anchor: list[dict[str, float]], points: list[dict[str, float]]) -> dict[str, Any]:
@@ -188,16 +179,17 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return sorted(out, key=lambda row: (row["mean"] is None, row["mean"] or 0.0))
 
 
-def table(rows: list[dict[str, Any]], best: Sequence[Mapping[str, Any]] | None = None) -> list[str]:
+def rate_table(rows: list[dict[str, Any]], best: Sequence[Mapping[str, Any]] | None = None) -> list[str]:
     """Return the lines of a Markdown table of a `summary`, that of the rows unless another is given."""
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    head = " | ".join(f"{scene}, %" for scene in scenes)
-    lines = [f"| scheme | {head} | mean, % | CPU s |", "|---" * (len(scenes) + 3) + "|"]
     best = summary(rows) if best is None else best
-    for row in best:
-        cells = [_percent(row["rates"][scene]) for scene in scenes]
-        lines.append(f"| `{row['scheme']}` | {' | '.join(cells)} | {_percent(row['mean'])} | {row['seconds']:.2f} |")
-    return with_commits(lines, [row["commits"] for row in best])
+    lines = [
+        [f"`{row['scheme']}`", *(_percent(row["rates"][scene]) for scene in scenes), _percent(row["mean"]),
+         f"{row['seconds']:.2f}"]
+        for row in best
+    ]  # fmt: skip
+    heads = ["scheme", *(f"{scene}, %" for scene in scenes), "mean, % | CPU s"]
+    return table(" | ".join(heads), lines, [row["commits"] for row in best])
 
 
 def shortened(best: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
@@ -250,15 +242,12 @@ def together(shown: list[dict[str, Any]]) -> list[tuple[str, dict[str, Any]]]:
     return labels
 
 
-def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
+def chart(rows: list[dict[str, Any]], scale: int, name: str) -> None:
     """Draw encoding time against rate with the Pareto front."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    figure, axes = plt.subplots(figsize=(9, 11), constrained_layout=True)
+    figure = new_figure(9, 11)
+    axes = figure.subplots()
     colours = {"h264": "C0", "hevc": "C1", "av1": "C2", "vp9": "C4", "mpeg2": "C5"}
     shapes = {"ei": "s", "ri": "^", "si": "o"}
     shown = [row for row in summary(rows) if row["mean"] is not None and row["scheme"] not in TRIALS]
@@ -289,9 +278,7 @@ def chart(rows: list[dict[str, Any]], scale: int, path: Path) -> None:
     figure.canvas.draw()  # draw to fix the positions of points
     for (names, at, _), offset in zip(named, offsets(named, axes), strict=True):
         axes.annotate(names, at, offset, textcoords="offset points", fontsize=LETTERS)
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
-    write_picture(path, path)
+    write_chart(figure, name, dpi=150)
 
 
 def offsets(named: list[tuple[str, tuple[float, float], str]], axes: Any) -> list[tuple[float, float]]:
@@ -314,7 +301,3 @@ def offsets(named: list[tuple[str, tuple[float, float], str]], axes: Any) -> lis
 def touch(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
     """Return whether two boxes (left, bottom, right, top) overlap."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
-
-
-if __name__ == "__main__":
-    main()

@@ -22,7 +22,7 @@ from typing import Any
 from benchmarks.arguments import command_line
 from benchmarks.coding.fuzz import sample
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, origin, with_commits
+from benchmarks.records import Records, origin, table
 from codec import Encoded, encode, schemes, timed_decode
 from codec.contract import find
 from ii_core import IIPicture, preset
@@ -46,23 +46,19 @@ def main() -> None:
         print(json.dumps(measured(arguments.one[0], IIPicture.load(arguments.one[1]), arguments.runs)))
         return
     picture_of = {"scene": arguments.scene, "scale": arguments.scale}
-    names = arguments.schemes
-    keys = RECORDS.todo(({**picture_of, "scheme": name, "runs": arguments.runs} for name in names), arguments.again)
+    keys = [{**picture_of, "scheme": name, "runs": arguments.runs} for name in arguments.schemes]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "picture.png"
-        if keys:
+        if RECORDS.todo(keys, arguments.again):
             camera = preset("setup1", scale=arguments.scale)
             render(load_scene(arguments.scene), camera, support=(), noise=1.0).picture.save(path)
-        for key in keys:
-            print(
-                RECORDS.measure(key, lambda key=key: apart(key["scheme"], path, arguments.runs))["result"], flush=True
-            )
+        RECORDS.run(keys, lambda scheme, runs, **_: apart(scheme, path, runs), arguments.again)
     publish(tables())
 
 
 def tables() -> Tables:
     """Return the table of the page of structures."""
-    return {("docs/structure.md", "cost"): table(RECORDS.rows(scene=SCENE, scale=SCALE, runs=RUNS))}
+    return {("docs/structure.md", "cost"): cost_table(RECORDS.rows(scene=SCENE, scale=SCALE, runs=RUNS))}
 
 
 def apart(scheme: str, path: Path, runs: int) -> dict[str, Any]:
@@ -129,20 +125,18 @@ def peak() -> int:
     raise OSError("this system does not report the peak of resident memory")
 
 
-def table(rows: list[dict[str, Any]]) -> list[str]:
+def cost_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return a table of CPU seconds and memory in pictures, one row per scheme, and our share of the seconds."""
-    lines = [
-        "| scheme | bpp | dB | encoder, s | decoder, s | peak encoding, pictures | peak decoding, pictures |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    lines = []
     for r in rows:
         quality = "lossless" if r["q_global"] is None else format(r["q_global"], ".1f")
         lines.append(
-            f"| `{r['scheme']}` | {r['bpp']:.3g} | {quality} | {r['encoder_seconds']:.2f} | "
-            f"{r['decoder_seconds']:.2f} | {r['encode_peak']:.1f} | {r['decode_peak']:.1f} |"
+            f"`{r['scheme']}` | {r['bpp']:.3g} | {quality} | {r['encoder_seconds']:.2f} | "
+            f"{r['decoder_seconds']:.2f} | {r['encode_peak']:.1f} | {r['decode_peak']:.1f}"
         )
+    heads = "scheme | bpp | dB | encoder, s | decoder, s | peak encoding, pictures | peak decoding, pictures"
     said = [ours(rows, encoding=True), ours(rows, encoding=False)]
-    return [origin(rows), "", *with_commits(lines, [[r["commit"]] for r in rows]), "", *said]
+    return [origin(rows), "", *table(heads, lines, [[r["commit"]] for r in rows]), "", *said]
 
 
 def ours(rows: list[dict[str, Any]], *, encoding: bool) -> str:

@@ -24,21 +24,18 @@ MOTION_RANGE = 16  # pixels, the coders' default
 
 
 def main() -> None:
-    """Print and record a table."""
+    """Measure and record."""
     parser = command_line(__doc__, scenes=("apples", "cuboid"))
     parser.add_argument("--scale", type=int, nargs="+", default=[1, 2])
     asked = parser.parse_args()
     keys = [{"scene": name, "scale": scale} for name in asked.scenes for scale in asked.scale]
-    for key in RECORDS.todo(keys, asked.again):
-        RECORDS.measure(key, lambda key=key: analyse(key["scene"], key["scale"]))
-    for row in RECORDS.rows():
-        print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
+    RECORDS.run(keys, analyse, asked.again)
 
 
-def analyse(name: str, scale: int) -> dict[str, float]:
+def analyse(scene: str, scale: int) -> dict[str, float]:
     """Return disparities and partners between horizontal neighbours in the middle row of sub-images."""
     camera = preset("setup1", scale=scale)
-    shot = render(load_scene(name), camera, support=("depth",))
+    shot = render(load_scene(scene), camera, support=("depth",))
     assert shot.depth is not None
     middle = camera.ei_pixels[1] // 2
     pixels = sub_images(shot.picture)[middle].astype(np.float32)
@@ -72,7 +69,3 @@ def has_partner(depth: NDArray[np.float32], moved: NDArray[Any]) -> NDArray[np.b
     other = depth[1:][s, r, np.clip(there, 0, columns - 1)]
     same = np.where(hit, np.abs(other - depth[:-1]) < 0.03 * depth[:-1], np.isnan(other))
     return inside & same
-
-
-if __name__ == "__main__":
-    main()

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, origin, with_commits
+from benchmarks.records import Records, origin, table
 from codec import decode, encode, schemes
 from codec.inspect.header_bits import coarsest, floor, frames, parts, si_below_ei, si_below_ri
 from ii_core import IIPicture, preset
@@ -41,23 +42,25 @@ def main() -> None:
     parser.add_argument("--sides", default=",".join(map(str, SIDES)))
     asked = parser.parse_args()
     picture_of = {"scene": asked.scene, "scale": asked.scale}
+    keys: list[dict[str, Any]] = []
     for side in map(int, asked.sides.split(",")):
-        keys: list[dict[str, Any]] = [
-            {"part": "floor", **picture_of, "side": side, "scheme": scheme} for scheme in asked.schemes
-        ]
+        keys += [{"part": "floor", **picture_of, "side": side, "scheme": scheme} for scheme in asked.schemes]
         if asked.schemes == parser.get_default("schemes"):
             keys.append({"part": "duel", **picture_of, "side": side})
-        if not (keys := RECORDS.todo(keys, asked.again)):
-            continue
-        camera = preset(f"setup2-{side}", scale=asked.scale)
-        picture = render(load_scene(asked.scene), camera, support=(), noise=1.0).picture
-        for key in keys:
-
-            def found(key: dict[str, Any] = key, picture: IIPicture = picture) -> dict[str, Any]:
-                return lowest(key["scheme"], picture) if key["part"] == "floor" else duel(picture)
-
-            print(key, RECORDS.measure(key, found)["result"], flush=True)
+    RECORDS.run(keys, measured, asked.again)
     publish(tables())
+
+
+def measured(part: str, scene: str, scale: int, side: int, scheme: str = "") -> dict[str, Any]:
+    """Return the floor of a scheme, or the duel of the kinds."""
+    picture = pictured(scene, scale, side)
+    return lowest(scheme, picture) if part == "floor" else duel(picture)
+
+
+@lru_cache(maxsize=1)
+def pictured(scene: str, scale: int, side: int) -> IIPicture:
+    """Return a scene with sensor noise through elementary images of a size."""
+    return render(load_scene(scene), preset(f"setup2-{side}", scale=scale), support=(), noise=1.0).picture
 
 
 def lowest(scheme: str, picture: IIPicture) -> dict[str, Any]:
@@ -119,19 +122,16 @@ def tables() -> Tables:
 
 def part_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return the bits per frame of a black picture by purpose, over the structures."""
-    lines = [
-        "| scheme | start codes, lengths | parameter sets | slice headers | data | bits per frame |",
-        "|---|---|---|---|---|---|",
-    ]
     shown = [row for row in rows if "parts" in row and row["side"] in SHOWN]
-    commits = []
+    lines, commits = [], []
     for scheme in dict.fromkeys(row["scheme"] for row in shown):
         own = [row for row in shown if row["scheme"] == scheme]
         bits = [_per_frame(row["parts"], row["frames"]) for row in own]
         cells = ["(in data)" if None in some else _range(some) for some in zip(*bits, strict=True)]
-        lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
+        lines.append([f"`{scheme}`", *cells])
         commits.append([row["commit"] for row in own])
-    return with_commits(lines, commits)
+    heads = "scheme | start codes, lengths | parameter sets | slice headers | data | bits per frame"
+    return table(heads, lines, commits)
 
 
 def _per_frame(p: dict[str, Any], frames: int) -> list[float | None]:
@@ -149,21 +149,15 @@ def _range(values: Sequence[float]) -> str:
 
 def duel_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return gains of SI over EI and RI and the lowest rates that were reached."""
-    lines = [
-        "| EI | over EI, dB | over RI, dB | lowest rate SI, EI, RI, bpp |",
-        "|---|---|---|---|",
-    ]
+    lines = []
     for row in rows:
         reached = (row["ei"]["lowest"]["si"], row["ei"]["lowest"]["ei"], row["ri"]["lowest"]["ri"])
         lowest = ", ".join("–" if rate is None else f"{rate:g}" for rate in reached)
-        lines.append(f"| {row['side']}² | {gain(row['ei'])} | {gain(row['ri'])} | {lowest} |")
-    return with_commits(lines, [[row["commit"]] for row in rows])
+        lines.append([f"{row['side']}²", gain(row["ei"]), gain(row["ri"]), lowest])
+    heads = "EI | over EI, dB | over RI, dB | lowest rate SI, EI, RI, bpp"
+    return table(heads, lines, [[row["commit"]] for row in rows])
 
 
 def gain(row: dict[str, Any]) -> str:
     """Return a gain in dB with the number of rates."""
     return "–" if row["gain_db"] is None else f"{row['gain_db']:+.1f} ({len(row['rates_both'])} rates)"
-
-
-if __name__ == "__main__":
-    main()

@@ -16,7 +16,7 @@ from functools import partial
 from typing import Any
 
 from benchmarks.arguments import command_line
-from benchmarks.coding.light_field import FIELDS, IMPORTED, OURS, SCENES, difference, picture, rate_change
+from benchmarks.coding.light_field import FIELDS, IMPORTED, OURS, SCENES, difference, pictured, rate_change
 from benchmarks.coding.light_field import RECORDS as OTHERS
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
@@ -48,7 +48,7 @@ def main() -> None:
         except ValueError as error:
             parser.error(f"{error}; the programs of JPEG Pleno's reference software must be on PATH")
     for key in todo:
-        original = picture(key["picture"], asked.flower)
+        original = pictured(key["picture"], asked.flower)
         row = RECORDS.measure(key, partial(measured, original, key["setting"]))
         print(key, f"{row['cpu_seconds']:.0f} s", flush=True)
     publish(tables())

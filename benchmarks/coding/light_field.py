@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from itertools import chain
 from typing import Any
 
@@ -23,7 +23,7 @@ from benchmarks.arguments import command_line
 from benchmarks.coding import coders
 from benchmarks.coding.rd import compiled
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, origin
+from benchmarks.records import Records, origin, table
 from codec import encode, timed_decode
 from ii_core import IIPicture, preset
 from ii_core.formats.find import find_views, picture_of
@@ -59,15 +59,12 @@ def main() -> None:
     asked = parser.parse_args()
     names = dict.fromkeys([*asked.pictures, *([IMPORTED] if asked.flower else [])])
     keys = [{"picture": name, "scheme": scheme} for scheme in asked.schemes for name in names]
-    for key in RECORDS.todo(keys, asked.again):
-        original = picture(key["picture"], asked.flower)
-        RECORDS.measure(key, partial(measured, original, key["scheme"]))
-        print(key, flush=True)
+    RECORDS.run(keys, lambda picture, scheme: measured(pictured(picture, asked.flower), scheme), asked.again)
     publish(tables())
 
 
 @cache
-def picture(name: str, flower: str | None = None) -> IIPicture:
+def pictured(name: str, flower: str | None = None) -> IIPicture:
     """Return a picture of this benchmark."""
     if name == IMPORTED:
         whole, _ = picture_of(find_views(str(flower)))
@@ -136,29 +133,24 @@ def tables() -> Tables:
     curves = {(row["picture"], row["scheme"]): row["points"] for row in rows if "points" in row}
     exact = {(row["picture"], row["scheme"]): row["bpp"] for row in rows if "bpp" in row}
     names = [name for name in (*SCENES, *FIELDS, IMPORTED) if (name, OURS) in curves]
-    marks = ("lf-against", "lf-tools")
-    against_all = {
-        ("docs/lf.md", "lf-targets"): targets({scale: coders.RECORDS.rows(scale=scale) for scale in TARGET_SCALES})
-    }
-    if not names:
-        return against_all | {("docs/lf.md", mark): ["Not measured yet."] for mark in marks}
-    against = ["| picture | " + " | ".join(f"`{other}`" for other in OTHERS) + " | encode µs | decode µs |"]
-    against.append("|---|" + "---|" * (len(OTHERS) + 2))
-    heads = [*TOOLS.values(), *(f"`{scheme}`, bpp" for scheme in LOSSLESS)]
-    tools = ["| picture | " + " | ".join(heads) + " |", "|---|" + "---|" * len(heads)]
+    against, tools = [], []
     for name in names:
         ours = curves[name, OURS]
         cells = [difference(curves.get((name, other)), ours) for other in OTHERS]
         times = [f"{np.median([point[key] for point in ours]):.1f}" for key in ("encode_us", "decode_us")]
-        against.append(f"| {name} | {' | '.join(cells + times)} |")
+        against.append([name, *cells, *times])
         without = [difference(ours, curves.get((name, tool))) for tool in TOOLS]
         rates = [exact.get((name, scheme)) for scheme in LOSSLESS]
         without += ["–" if rate is None else f"{rate:.2f}" for rate in rates]
-        tools.append(f"| {name} | {' | '.join(without)} |")
-    said = [origin(rows)]
-    return against_all | {
-        ("docs/lf.md", mark): [*lines, "", *said] for mark, lines in zip(marks, (against, tools), strict=True)
+        tools.append([name, *without])
+    heads = [*TOOLS.values(), *(f"`{scheme}`, bpp" for scheme in LOSSLESS)]
+    made = {
+        "lf-against": table(" | ".join(["picture", *map(_code, OTHERS), "encode µs | decode µs"]), against),
+        "lf-tools": table(" | ".join(["picture", *heads]), tools),
     }
+    own = {("docs/lf.md", mark): [*lines, "", origin(rows)] for mark, lines in made.items()}
+    peers = {scale: coders.RECORDS.rows(scale=scale) for scale in TARGET_SCALES}
+    return {("docs/lf.md", "lf-targets"): targets(peers), **own}
 
 
 def targets(records: Mapping[int, Sequence[Mapping[str, Any]]]) -> list[str]:
@@ -166,21 +158,23 @@ def targets(records: Mapping[int, Sequence[Mapping[str, Any]]]) -> list[str]:
 
     Schemes are in order of their Bjøntegaard rate against the anchor of `coders`; each then meets the best so far.
     """
-    lines = [
-        "| scale | scene | least rate of all others | others | rate of `si-lf` |",
-        "|---|---|---|---|---|",
-    ]
+    lines: list[str] = []
     for scale, rows in records.items():
         for scene in SCENES:
             curves = {row["scheme"]: row["points"] for row in rows if row["scene"] == scene}
             others = [name for name in curves if not _is_ours(name)]
             best = least_rate(curves, others)
             lines += [
-                f"| {scale} | {scene}{'' if name == OURS else f', `{name}`'} | `{best}` | {len(others)} | "
-                f"{difference(curves[best], curves[name])} |"
+                f"{scale} | {scene}{'' if name == OURS else f', `{name}`'} | `{best}` | {len(others)} | "
+                f"{difference(curves[best], curves[name])}"
                 for name in filter(_is_ours, curves if best else ())
             ]
-    return [*lines, "", origin(chain(*records.values()))] if len(lines) > 2 else ["Not measured yet."]
+    heads = "scale | scene | least rate of all others | others | rate of `si-lf`"
+    return [*table(heads, lines), "", origin(chain(*records.values()))] if lines else ["Not measured yet."]
+
+
+def _code(scheme: str) -> str:
+    return f"`{scheme}`"
 
 
 def least_rate(curves: Mapping[str, Any], names: Sequence[str]) -> str:
@@ -220,7 +214,3 @@ def _percent(rate: float) -> str:
 
 def _column(points: list[dict[str, float]], key: str) -> list[float]:
     return [point[key] for point in points]
-
-
-if __name__ == "__main__":
-    main()

@@ -12,7 +12,7 @@ from typing import Any
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, origin, with_commits
+from benchmarks.records import Records, origin, table
 from codec.inspect.order_analysis import analyse_orders
 from codec.order import ORDERS
 from ii_core import preset
@@ -25,10 +25,7 @@ SCALE = 2  # scale on the page
 def main() -> None:
     """Measure, print, record and fill the table."""
     asked = command_line(__doc__, scale=SCALE, scenes=("apples", "twins", "car", "cuboid")).parse_args()
-    keys = [{"scene": name, "scale": asked.scale} for name in asked.scenes]
-    for key in RECORDS.todo(keys, asked.again):
-        RECORDS.measure(key, lambda key=key: analysed(**key))
-    print("\n".join(table(measured(asked.scale))))
+    RECORDS.run(({"scene": name, "scale": asked.scale} for name in asked.scenes), analysed, asked.again)
     publish(tables())
 
 
@@ -49,25 +46,20 @@ def measured(scale: int) -> list[dict[str, Any]]:
 
 def tables() -> Tables:
     """Return the table of the page of structures."""
-    return {("docs/structure.md", "orders"): table(measured(SCALE))}
+    return {("docs/structure.md", "orders"): orders_table(measured(SCALE))}
 
 
-def table(rows: list[dict[str, Any]]) -> list[str]:
+def orders_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return a table of scenes and kinds by orders: mean correlation ± deviation, energy per sample."""
-    lines = ["| scene | images | " + " | ".join(ORDERS) + " |", "|---|---|" + "---|" * len(ORDERS)]
-    commits = []
+    cells, commits = [], []
     for scene, kind in dict.fromkeys((row["scene"], row["kind"]) for row in rows):
         those = {row["order"]: row for row in rows if (row["scene"], row["kind"]) == (scene, kind)}
         best = max(those, key=lambda order: those[order]["correlation_mean"])
-        cells = []
-        for order in ORDERS:
-            r = those[order]
-            cell = f"{r['correlation_mean']:.3f} ± {r['correlation_sigma']:.3f}, {r['energy_per_sample']:.0f}"
-            cells.append(f"**{cell}**" if order == best else cell)
-        lines.append(f"| {scene} | {kind.upper()} | " + " | ".join(cells) + " |")
+        each = {
+            order: f"{r['correlation_mean']:.3f} ± {r['correlation_sigma']:.3f}, {r['energy_per_sample']:.0f}"
+            for order, r in those.items()
+        }
+        each[best] = f"**{each[best]}**"
+        cells.append([scene, kind.upper(), *(each[order] for order in ORDERS)])
         commits.append([row["commit"] for row in those.values()])
-    return [origin(rows), "", *with_commits(lines, commits)]
-
-
-if __name__ == "__main__":
-    main()
+    return [origin(rows), "", *table(" | ".join(["scene | images", *ORDERS]), cells, commits)]

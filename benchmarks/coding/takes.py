@@ -9,7 +9,7 @@ Takes are rendered once into ``out/takes``. Numbers go to ``benchmarks/results/t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
+from itertools import product
 from statistics import median
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, origin, with_commits
+from benchmarks.records import ROOT, Records, origin, table
 from codec import Plan, component_cost, encode_take, open_take
 from ii_core import IIVideo, open_video, preset, sub_images, video_of
 from metrics import bd_rate, measure_take
@@ -70,11 +70,7 @@ def main() -> None:
         for take in takes
         if coder != "si-lf" or order in WHOLE_INSTANTS
     ]
-    for key in RECORDS.todo(keys, asked.again):
-        video = rendered(key["take"], asked.scale)
-        RECORDS.measure(key, partial(coded, video, **key))
-        print(key, flush=True)
-    print("\n".join(line for lines in tables().values() for line in lines))
+    RECORDS.run(keys, coded, asked.again)
     publish(tables())
 
 
@@ -86,10 +82,9 @@ def rendered(take: str, scale: int) -> IIVideo:
     return open_video(folder)
 
 
-def coded(
-    video: IIVideo, take: str, scale: int, plan: str = "", step: int = 0, coder: str = "", order: str = ""
-) -> dict[str, Any]:
+def coded(take: str, scale: int, plan: str = "", step: int = 0, coder: str = "", order: str = "") -> dict[str, Any]:
     """Return points of one plan, of a coder in one order, or of both one-way orders on every step-th frame."""
+    video = rendered(take, scale)
     if coder:
         some = video_of([video[i] for i in range(INSTANTS)], fps=video.fps)
         return {"points": points(some, PLANS[order], *CODERS[coder])}
@@ -167,53 +162,35 @@ def tables() -> Tables:
 def plan_table() -> list[str]:
     """Return a table with a row per plan: random access, Bjøntegaard rate of each take against its stills."""
     rows = by_plan()
-    if not rows:
-        return ["Not measured yet."]
-    lines = [
-        "| plan | frames for one SI, mean | " + " | ".join(f"{take}, %" for take in rows) + " |",
-        "|---|---|" + "---|" * len(rows),
-    ]
-    commits = []
+    lines, commits = [], []
     for plan in PLANS:
-        cost = component_cost(PLANS[plan], 256, FRAMES)
-        cells = []
-        for take in rows.values():
-            if plan not in take or "stills" not in take:
-                cells.append("–")
-                continue
-            off = difference(take["stills"]["points"], take[plan]["points"])
-            cells.append("anchor" if plan == "stills" else rate_text(off))
-        lines.append(f"| {plan} | {cost.mean:g} | " + " | ".join(cells) + " |")
-        commits.append([take[plan]["commit"] for take in rows.values() if plan in take])
+        offs = [difference(take["stills"]["points"], take[plan]["points"]) for take in rows.values()]
+        cells = ["anchor" if plan == "stills" else rate_text(off) for off in offs]
+        lines.append([plan, f"{component_cost(PLANS[plan], 256, FRAMES).mean:g}", *cells])
+        commits.append([take[plan]["commit"] for take in rows.values()])
     every = [row for take in rows.values() for row in take.values()]
-    return [origin(every), "", *with_commits(lines, commits)]
+    heads = ["plan | frames for one SI, mean", *(f"{take}, %" for take in rows)]
+    return [origin(every), "", *table(" | ".join(heads), lines, commits)]
 
 
 def coder_table() -> list[str]:
     """Return a table by coder and order: rate against its first order, and against H.264 in that order."""
     rows = {(row["coder"], row["order"], row["take"]): row for row in RECORDS.rows(scale=SCALE) if "order" in row}
-    if not rows:
-        return ["Not measured yet."]
-    lines = [
-        "| coder | order | " + " | ".join(f"{take}, own, % | H.264, %" for take in TAKES) + " |",
-        "|---|---|" + "---|---|" * len(TAKES),
-    ]
-    cost = []
-    for coder in CODERS:
-        for order in ORDERS:
-            cells = []
-            for take in TAKES:
-                for anchor in (coder, "H.264"):
-                    pair = [rows.get((name, by, take)) for name, by in ((anchor, ORDERS[0]), (coder, order))]
-                    off = None if None in pair else difference(*(row["points"] for row in pair if row))
-                    cells.append("anchor" if (anchor, ORDERS[0]) == (coder, order) else rate_text(off))
-            there = [rows[coder, order, take] for take in TAKES if (coder, order, take) in rows]
-            times = [p["encode_seconds"] / p["codec_seconds"] for row in there for p in row["points"]]
-            if there:
-                lines.append(f"| {coder} | {order} | " + " | ".join(cells) + " |")
-                cost.append(median(times))
+    lines, cost = [], []
+    for coder, order in product(CODERS, ORDERS):
+        there = [rows[coder, order, take] for take in TAKES if (coder, order, take) in rows]
+        cells = []
+        for take in TAKES:
+            for anchor in (coder, "H.264"):
+                pair = [rows.get((name, by, take)) for name, by in ((anchor, ORDERS[0]), (coder, order))]
+                off = None if None in pair else difference(*(row["points"] for row in pair if row))
+                cells.append("anchor" if (anchor, ORDERS[0]) == (coder, order) else rate_text(off))
+        if there:
+            lines.append([coder, order, *cells])
+            cost.append(median(p["encode_seconds"] / p["codec_seconds"] for row in there for p in row["points"]))
+    heads = " | ".join(["coder | order", *(f"{take}, own, % | H.264, %" for take in TAKES)])
     whole = f"CPU time of `encode_take` over that inside the encoder: {min(cost):.3f}–{max(cost):.3f}, by row."
-    return [origin(rows.values()), "", *lines, "", whole]
+    return [origin(rows.values()), "", *table(heads, lines), "", whole]
 
 
 def rate_text(off: float | None) -> str:
@@ -224,9 +201,7 @@ def rate_text(off: float | None) -> str:
 def speed_table() -> list[str]:
     """Return a table by take and speed: ratio of decorrelations, and rate of time-first against view-first."""
     rows = {(row["take"], row["step"]): row for row in RECORDS.rows(scale=SCALE) if "step" in row}
-    if not rows:
-        return ["Not measured yet."]
-    lines = ["| take | " + " | ".join(f"speed ×{step}" for step in STEPS) + " |", "|---|" + "---|" * len(STEPS)]
+    lines = []
     for take in TAKES:
         cells = []
         for step in STEPS:
@@ -237,9 +212,6 @@ def speed_table() -> list[str]:
             ratio = (1 - row["time_correlation"]) / (1 - row["view_correlation"])
             off = rate_text(difference(*(row["curves"][name] for name in ONE_WAY)))
             cells.append(f"{ratio:.2g}: {off}")
-        lines.append(f"| {take} | " + " | ".join(cells) + " |")
-    return [origin(rows.values()), "", *lines]
-
-
-if __name__ == "__main__":
-    main()
+        lines.append([take, *cells])
+    heads = " | ".join(["take", *(f"speed ×{step}" for step in STEPS)])
+    return [origin(rows.values()), "", *table(heads, lines)]

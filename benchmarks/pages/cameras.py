@@ -42,7 +42,7 @@ BACK = {
     "depth-control": 70, "grin-hexagonal-depth-control": 70, "plenoptic1": 150, "plenoptic2": 150,
     "plenoptic1-double-gauss": 130, "plenoptic2-triplet": 150,
 }  # fmt: skip
-SMALL = ("plenoptic1-double-gauss", "plenoptic2-triplet")  # stored as JPEG, a third of the bytes of PNG
+SMALL = ("plenoptic1-double-gauss", "plenoptic2-triplet")  # stored as JPEG, a third of the bytes without loss
 
 
 def main() -> None:
@@ -51,9 +51,9 @@ def main() -> None:
     folder = DOCS / "images" / "cameras"
     folder.mkdir(parents=True, exist_ok=True)
     for name in (name for names in KINDS.values() for name in names):
-        write_picture(folder / file_name(name), strip(scene, shown(name), name))
+        write_picture(folder / file_name(name), strip(scene, shown(name), name), lossless=True)
         print(name, flush=True)
-    write_picture(DOCS / "images" / "scenes.jpg", all_scenes())
+    write_picture(DOCS / "images" / "scenes.webp", all_scenes())
     (DOCS / "cameras.md").write_text(page(), encoding="utf-8")
 
 
@@ -271,7 +271,3 @@ def fitted(pixels: NDArray[Any], how: Image.Resampling) -> NDArray[np.uint8]:
     image = Image.fromarray(np.ascontiguousarray(pixels))
     share = min(PANEL[0] / image.width, PANEL[1] / image.height)
     return np.asarray(image.resize((max(1, round(image.width * share)), max(1, round(image.height * share))), how))
-
-
-if __name__ == "__main__":
-    main()

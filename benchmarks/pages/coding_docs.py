@@ -12,15 +12,14 @@ from benchmarks.coding.coders import (
     TRIALS,
     chart,
     front,
+    rate_table,
     recommended,
     shortened,
     studied,
     summary,
-    table,
 )
-from benchmarks.pages.pictures import IMAGES
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import origin, with_commits
+from benchmarks.records import origin, table
 
 SCALE = 4  # scale of the large study; the small study is at full size
 
@@ -29,7 +28,7 @@ def main() -> None:
     """Fill the pages and draw the charts from the records."""
     publish(tables())
     for scale, name in ((SCALE, "coders.png"), (1, "coders_full.png")):
-        chart(studied(scale), scale, IMAGES / name)
+        chart(studied(scale), scale, name)
 
 
 def tables() -> Tables:
@@ -40,10 +39,10 @@ def tables() -> Tables:
     page = "docs/coding.md"
     return {
         (page, "which"): which(others),
-        (page, "coders"): [*size(SCALE, others), "", *table(others, shortened(summary(others)))],
-        (page, "full"): [*size(1, full), "", *table(full)],
+        (page, "coders"): [*size(SCALE, others), "", *rate_table(others, shortened(summary(others)))],
+        (page, "full"): [*size(1, full), "", *rate_table(full)],
         (page, "trials"): [*size(SCALE, trials), "", *trial_table(trials)],
-        (page, "bframes"): bframes.table(),
+        (page, "bframes"): bframes.conditions_table(),
         ("docs/speed_accuracy.md", "coding"): [*size(SCALE, others), "", *front_table(coders)],
     }
 
@@ -63,41 +62,42 @@ CHOICES = {
 def which(rows: list[dict[str, Any]]) -> list[str]:
     """Return a table of schemes by purpose; conditions and commits are those of the table of all schemes."""
     known = {row["scheme"]: row for row in summary(rows)}
-    lines = ["| you want | take | rate at equal PSNR | CPU s |", "|---|---|---|---|"]
+    lines = []
     for wish, scheme in CHOICES.items():
         row = known[scheme]
         rate = "curves share too little" if row["mean"] is None else f"{1 + row['mean'] / 100:.2f} ×"
-        lines.append(f"| {wish} | `{scheme}` | {rate} | {row['seconds']:.2f} |")
-    return lines
+        lines.append(f"{wish} | `{scheme}` | {rate} | {row['seconds']:.2f}")
+    return table("you want | take | rate at equal PSNR | CPU s", lines)
 
 
 def front_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return the Pareto front as a table, the recommended setting in bold."""
-    lines = ["| scheme | rate at equal PSNR | encoder, CPU s | decoder, CPU s |", "|---|---|---|---|"]
+    lines = []
     pick = recommended(rows)["scheme"]
     for row in front([row for row in rows if row["scheme"] not in TRIALS]):
         points = [point for one in rows if one["scheme"] == row["scheme"] for point in one["points"]]
         decode = statistics.mean(point["decode_seconds"] for point in points)
         name = f"**`{row['scheme']}`**" if row["scheme"] == pick else f"`{row['scheme']}`"
-        lines.append(f"| {name} | {1 + row['mean'] / 100:.2f} × | {row['seconds']:.2f} | {decode:.2f} |")
-    return [*lines, "", f"Bold: the fastest scheme whose rate is within {100 * NEAR:.0f} % of the least."]
+        lines.append(f"{name} | {1 + row['mean'] / 100:.2f} × | {row['seconds']:.2f} | {decode:.2f}")
+    heads = "scheme | rate at equal PSNR | encoder, CPU s | decoder, CPU s"
+    return [
+        *table(heads, lines),
+        "",
+        f"Bold: the fastest scheme whose rate is within {100 * NEAR:.0f} % of the least.",
+    ]
 
 
 def trial_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return mean rate and time of each trial; rates of the scenes are in the records."""
-    lines = ["| scheme | mean, % | CPU s |", "|---|---|---|"]
+    lines = []
     best = summary(rows)
     for row in best:
         mean = "–" if row["mean"] is None else f"{row['mean']:+.0f}"
-        lines.append(f"| `{row['scheme']}` | {mean} | {row['seconds']:.2f} |")
-    return with_commits(lines, [row["commits"] for row in best])
+        lines.append(f"`{row['scheme']}` | {mean} | {row['seconds']:.2f}")
+    return table("scheme | mean, % | CPU s", lines, [row["commits"] for row in best])
 
 
 def size(scale: int, rows: list[dict[str, Any]]) -> list[str]:
     """Return conditions of the table: pictures, times, commits."""
     conditions = f"Pictures of `setup1` at scale {scale}; CPU seconds of one run, mean over qualities and scenes."
     return [conditions, origin(rows)]
-
-
-if __name__ == "__main__":
-    main()

@@ -31,7 +31,3 @@ def short_table(name: str, lines: Sequence[str]) -> list[str]:
     titles, *cells = zip(*kept, strict=True)
     table = [f"| {' | '.join(titles)} |", "|" + "---|" * len(titles), *(f"| {' | '.join(row)} |" for row in cells)]
     return ["; ".join([f"**{name}**", *same]), "", *table]
-
-
-if __name__ == "__main__":
-    main()

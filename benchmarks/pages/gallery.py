@@ -9,9 +9,14 @@ browser draws the stills of the scenes, which git keeps, and ``docs/gallery/READ
 from __future__ import annotations
 
 import argparse
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+from PIL import Image
+
+from benchmarks.pages.pictures import write_picture
 from benchmarks.records import ROOT
 from benchmarks.speed.viewer import tab
 from ii_core import preset
@@ -71,10 +76,8 @@ def draw_stills(names: Sequence[str]) -> None:
             page.goto(f"file://{page_of(name)}{STILLS.get(name, '')}")
             page.evaluate("async () => { await ii.ready }")
             page.wait_for_timeout(1000)
-            page.screenshot(path=GALLERY / f"{name}.jpg", type="jpeg", quality=80)
-    lines = [f"## {name}\n\n{about}.\n\n![{name}]({name}.jpg)\n" for name, about in scene_names().items()]
+            write_picture(
+                GALLERY / f"{name}.webp", np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
+            )
+    lines = [f"## {name}\n\n{about}.\n\n![{name}]({name}.webp)\n" for name, about in scene_names().items()]
     (GALLERY / "README.md").write_text("\n".join([INTRODUCTION, *lines]), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

@@ -28,7 +28,3 @@ def film(picture: IIPicture, path: str | os.PathLike[str]) -> None:
     """Write the film of views along the ellipse."""
     places = viewpoints_around(picture, FRAMES)
     write_animation(path, (focused_view(picture, place, size=SIZE, depth_mm=DEPTH_MM) for place in places), fps=FPS)
-
-
-if __name__ == "__main__":
-    main()

@@ -14,7 +14,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from benchmarks.pages.focus_patterns import main as draw_patterns
 from benchmarks.pages.pictures import write_picture
 from benchmarks.records import ROOT
 from codec import decode, encode, timed_decode
@@ -42,14 +41,14 @@ SCHEMES, RATES = ("si-h264", "ei-h264", "jpeg2000"), (0.08, 0.15, 0.4, 1.0, 2.0)
 def main() -> None:
     """Render, code, measure and draw."""
     IMAGES.mkdir(parents=True, exist_ok=True)
-    draw_patterns()
     shot = render(load_scene("apples"), preset("setup1", scale=4), noise=1.0, support=("depth",))
     picture, decoded = shot.picture, decode(encode(shot.picture, "si-h264", bpp=0.15))
     plot_angle(picture, decoded, IMAGES / "q_angle.png")
-    photograph("views", lambda path: plot_views(picture, decoded, path))
-    photograph("errors_views", lambda path: plot_error_views(picture, decoded, path))
+    photograph("views.webp", lambda path: plot_views(picture, decoded, path))
+    photograph("errors_views.jpg", lambda path: plot_error_views(picture, decoded, path))
     truth: Any = {"depth": shot.depth, "layers_mm": linear_layers(camera_of(picture))}
-    photograph("errors_depth", lambda path: plot_error_layers(picture, q_depth(picture, decoded, **truth), path))
+    quality = q_depth(picture, decoded, **truth)
+    photograph("errors_depth.webp", lambda path: plot_error_layers(picture, quality, path))
     measure = measuring(picture, ["q_depth_min", "q_depth_mean", "q_depth_max", "q_view"], **truth)
     records = rate_distortion(picture, SCHEMES, RATES, encode=encode, decode=timed_decode, measure=measure)
     write_study(STUDY, "Apples", records, {"scale": 4, "noise": 1.0}, picture=picture)
@@ -59,12 +58,8 @@ def main() -> None:
 
 
 def photograph(name: str, draw: Callable[[Path], Any]) -> None:
-    """Write a figure that holds photographs, as JPEG."""
+    """Write a figure that holds photographs."""
     with TemporaryDirectory() as folder:
         drawn = Path(folder) / "figure.png"
         draw(drawn)
-        write_picture(IMAGES / f"{name}.jpg", drawn)
-
-
-if __name__ == "__main__":
-    main()
+        write_picture(IMAGES / name, drawn)

@@ -12,24 +12,30 @@ from PIL import Image
 
 from benchmarks.records import ROOT
 from ii_core.base.files import atomic_path
+from ii_core.display.figure import save
 
 IMAGES = ROOT / "docs" / "images"
 WIDEST = 1500  # pixels: twice the column of a page
-QUALITY = 80  # JPEG quality
+JPEG, WEBP = 80, 85  # qualities
 MANY = 16384  # colours; a chart with more contains photographs, in which a palette would cause banding
+FEW, OFF = 64, 32  # colours of a chart, and the largest error by them; 256 colours are a third larger
 
 
-def write_picture(path: str | os.PathLike[str], source: NDArray[np.uint8] | str | os.PathLike[str]) -> None:
+def write_picture(
+    path: str | os.PathLike[str], source: NDArray[np.uint8] | str | os.PathLike[str], *, lossless: bool = False
+) -> None:
     """Write a picture of a page from pixels or from a file, which may be the picture itself.
 
     Parameters
     ----------
     path : path
-        ``.png``, ``.webp`` without loss for photographs whose pixels matter (a quarter smaller), or ``.jpg`` for
-        JPEG of quality 80 without subsampled colour; replaced, whole.
+        ``.png`` for charts, ``.webp`` for photographs, or ``.jpg`` for photographs whose colours change from pixel to
+        pixel: its colour is not subsampled; replaced, whole.
     source : (H, W, 3) uint8 or path
         Pictures wider than 1500 pixels are reduced to that width. Charts, which are files with an alpha channel, get
-        a palette of 256 colours; other PNG keep their colours.
+        a palette; other PNG keep their colours.
+    lossless : bool
+        Whether a ``.webp`` keeps every pixel.
 
     Raises
     ------
@@ -47,18 +53,34 @@ def write_picture(path: str | os.PathLike[str], source: NDArray[np.uint8] | str 
     if ending == "png":
         (with_palette(picture) if chart else picture).save(data, "PNG", optimize=True)
     elif ending == "webp":
-        picture.save(data, "WEBP", lossless=True, quality=100, method=6)
+        picture.save(data, "WEBP", lossless=lossless, quality=100 if lossless else WEBP, method=6)
     elif ending == "jpg":
-        picture.save(data, "JPEG", quality=QUALITY, subsampling=0, optimize=True, progressive=True)
+        picture.save(data, "JPEG", quality=JPEG, subsampling=0, optimize=True, progressive=True)
     else:
         raise ValueError(f"a picture of a page is a .png, .webp or .jpg, not {os.fspath(path)}")
     with atomic_path(path) as temporary:
         temporary.write_bytes(data.getvalue())
 
 
+def write_chart(figure: Any, name: str, dpi: int = 130) -> None:
+    """Write a figure of matplotlib as a picture of a page."""
+    write_picture(IMAGES / name, save(figure, IMAGES / name, dpi=dpi))
+
+
+def tidy(*panels: Any, axis: str = "both") -> None:
+    """Give panels of a chart a light grid behind the lines, and no frame at the top and to the right."""
+    for axes in panels:
+        axes.grid(True, axis=axis, color="0.9", linewidth=0.8)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+
+
 def with_palette(picture: Image.Image) -> Image.Image:
-    """Return an RGB picture reduced to 256 colours, unless it has more than `MANY`."""
+    """Return an RGB picture reduced to 64 or 256 colours, unless it has more than `MANY`."""
     colours = picture.getcolors(MANY)
     if colours is None:
         return picture
+    few = picture.quantize(FEW, method=Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE)
+    if np.abs(np.asarray(few.convert("RGB"), np.int16) - np.asarray(picture)).max() <= OFF:
+        return few
     return picture.quantize(min(len(colours), 256), method=Image.Quantize.MEDIANCUT)

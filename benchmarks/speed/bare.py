@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,14 +12,12 @@ from codec.coders.video import Video, new_frame, open_encoder
 from ii_core import IIPicture
 
 
-def bare_encoder(picture: IIPicture, scheme: str, qp: int, *, search: str = "umh") -> Callable[[], int]:
-    """Return a function that encodes prepared frames with PyAV, with another motion search of x264 if given."""
+def bare_encoder(picture: IIPicture, scheme: str, qp: int) -> Callable[[], int]:
+    """Return a function that encodes prepared frames with PyAV."""
     coder, options = parse_scheme(scheme)
     assert isinstance(coder, Video)
     film = coder.film(picture, options)
     settings = coder.constant(qp, film, options)
-    parameters = {key: value.replace("me=umh", f"me={search}") for key, value in settings.parameters.items()}
-    settings = replace(settings, parameters=parameters)
     context = open_encoder(coder, film, settings)
     frames: list[Any] = []
     size = np.dtype(film.format.dtype).itemsize

@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, origin
+from benchmarks.records import Records, origin, table
 from ii_core import DisplayModel, Eye, IIPicture, eye_image, five_viewpoints, preset, view_image
 
 RECORDS = Records("eye", ("benchmarks.speed.eye",))
@@ -27,18 +27,17 @@ SCALES, RUNS, PUPIL_MM, RAYS = (4, 2, 1), 9, 4.0, 64
 def main() -> None:
     """Measure, keep, fill the page."""
     asked = command_line(__doc__).parse_args()
-    for key in RECORDS.todo(({"camera": "setup1", "scale": scale} for scale in SCALES), asked.again):
-        RECORDS.measure(key, lambda key=key: measured(key["scale"]))
+    RECORDS.run(({"camera": "setup1", "scale": scale} for scale in SCALES), measured, asked.again)
     publish(tables())
 
 
-def measured(scale: int) -> dict[str, Any]:
+def measured(camera: str, scale: int) -> dict[str, Any]:
     """Return CPU seconds and peaks of memory of both views of one picture."""
-    camera = preset("setup1", scale=scale)
-    pixels = np.random.default_rng(0).integers(0, 256, (*camera.pixels[::-1], 3), np.uint8)
-    picture = IIPicture(pixels, camera.lenses, camera.ei_pixels, camera)
-    place: Any = tuple(map(float, five_viewpoints(camera)["front"]))
-    display, eye = DisplayModel(camera=camera), Eye(position_mm=place, pupil_mm=PUPIL_MM)
+    of = preset(camera, scale=scale)
+    pixels = np.random.default_rng(0).integers(0, 256, (*of.pixels[::-1], 3), np.uint8)
+    picture = IIPicture(pixels, of.lenses, of.ei_pixels, of)
+    place: Any = tuple(map(float, five_viewpoints(of)["front"]))
+    display, eye = DisplayModel(camera=of), Eye(position_mm=place, pupil_mm=PUPIL_MM)
     calls: dict[str, Callable[[], Any]] = {
         "view": lambda: view_image(picture, place),
         "eye": lambda: eye_image(picture, display, eye, rays=RAYS),
@@ -62,23 +61,11 @@ def measured(scale: int) -> dict[str, Any]:
 
 
 def tables() -> Tables:
-    """Return the table of the display's page."""
-    return {("docs/display.md", "eye-speed"): table()}
-
-
-def table() -> list[str]:
-    """Return times, their ratio, and memory in pictures, by scale."""
-    if not (rows := RECORDS.rows()):
-        return []
-    lines = ["| scale | `view_image` | `eye_image` | ratio | peak of memory, pictures |", "|---|---|---|---|---|"]
+    """Return the table of the display's page: times, their ratio, and memory in pictures, by scale."""
+    rows, lines = RECORDS.rows(), []
     for row in rows:
         view, eye = row["view_seconds"], row["eye_seconds"]
         share = row["eye_peak_bytes"] / row["picture_bytes"]
-        lines.append(
-            f"| {row['scale']} | {1e3 * view:.1f} ms | {1e3 * eye:.1f} ms | {eye / view:.1f} | {share:.2f} |"
-        )
-    return [*lines, "", origin(rows)]
-
-
-if __name__ == "__main__":
-    main()
+        lines.append(f"{row['scale']} | {1e3 * view:.1f} ms | {1e3 * eye:.1f} ms | {eye / view:.1f} | {share:.2f}")
+    heads = "scale | `view_image` | `eye_image` | ratio | peak of memory, pictures"
+    return {("docs/display.md", "eye-speed"): [*table(heads, lines), "", origin(rows)]}

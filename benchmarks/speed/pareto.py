@@ -14,13 +14,8 @@ from __future__ import annotations
 
 import json
 import math
-import re
-import shutil
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,17 +23,18 @@ import numpy as np
 from benchmarks.accuracy.map_precision import RECORDS as MAPS
 from benchmarks.accuracy.map_precision import SCALE as MAPS_SCALE
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, by_scene, origin
+from benchmarks.records import ROOT, Records, by_scene, origin, table
 from benchmarks.speed.before import COMMIT, worktree
 from benchmarks.speed.shots import Shots, shots
+from benchmarks.speed.tessellation import scene_text, sizes
 from ii_core import IICamera, preset
-from ii_core.display.figure import COLOURS
-from raytrace_ii import Scene, load_scene
-from raytrace_ii.tracing.packing import packed, share
+from ii_core.display.figure import COLOURS, new_figure
+from raytrace_ii import load_scene
+from raytrace_ii.tracing.packing import packed
 
-MODULES = ("benchmarks.speed.pareto", "benchmarks.speed.shots", "benchmarks.speed.before")
+MODULES = tuple(f"benchmarks.speed.{name}" for name in ("pareto", "shots", "before", "tessellation"))
 RECORDS, SCALE = Records("pareto", MODULES), 32  # scale on the page
 FINE_SCALE = 4  # of which the page shows times at equal PSNR
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
@@ -67,7 +63,7 @@ def main() -> None:
         print(f"{key['scene']}: {best['setting']}, {best['psnr']:.1f} dB, {record['seconds']:.0f} s", flush=True)
     for scale, target in ((SCALE, "pareto.png"), (FINE_SCALE, "pareto_fine.png")):
         if set(scenes := measured(scale)) == set(SCENES):
-            chart(scenes, IMAGES / target)
+            write_chart(chart(scenes), target, dpi=150)
     if set(measured()) == set(SCENES):
         publish(tables())
 
@@ -173,48 +169,6 @@ def settings(
             yield "cut", cut, most_depth, BASE, None
 
 
-def at_depth(scene: Scene, depth: int) -> Scene:
-    """Return the scene with another recursion depth and the same acceleration structure."""
-    other = scene.with_depth(depth)
-    share(scene, other)
-    return other
-
-
-def scene_text(name: str) -> str:
-    return Path(str(files("assets") / "scenes" / f"{name}.toml")).read_text(encoding="utf-8")
-
-
-def sizes(text: str) -> list[str]:
-    """Return the objects of a scene file with a tessellation."""
-    return [block for block in re.split(r"(?m)^(?=\[\[object\]\])", text) if _cut(block, 2.0) != block]
-
-
-def _cut(block: str, factor: float) -> str:
-    """Return an object with ``factor`` times the tessellation."""
-    if re.search(r'(?m)^shape = "(sphere|cylinder|revolve)"', block):
-        if not re.search(r"(?m)^segments", block):
-            block = re.sub(r"(?m)^shape = .*$", r"\g<0>\nsegments = 96", block, count=1)
-        if '"revolve"' in block and not re.search(r"(?m)^steps", block):
-            block = re.sub(r"(?m)^shape = .*$", r"\g<0>\nsteps = 64", block, count=1)
-        block = re.sub(
-            r"(?m)^(segments|steps) = (\d+)", lambda m: f"{m[1]} = {max(4, round(int(m[2]) * factor))}", block
-        )
-    return re.sub(r"(?m)^cell_mm = ([\d.]+)", lambda m: f"cell_mm = {float(m[1]) / factor:g}", block)
-
-
-def cut_scene(name: str, factor: float) -> Scene:
-    """Return a reference scene with ``factor`` times the tessellation, where its file sets one."""
-    if factor == 1:
-        return load_scene(name)
-    blocks = re.split(r"(?m)^(?=\[\[object\]\])", scene_text(name))
-    with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(Path(str(files("assets") / "textures")), Path(folder) / "textures")
-        (Path(folder) / "scenes").mkdir()
-        path = Path(folder) / "scenes" / f"{name}.toml"
-        path.write_text("".join(_cut(block, factor) for block in blocks), encoding="utf-8")
-        return load_scene(path)
-
-
 def front(rows: Sequence[dict[str, Any]]) -> list[int]:
     """Return the Pareto front of time and error, by time."""
     best: list[int] = []
@@ -247,14 +201,11 @@ NAMES = {
 }  # fmt: skip
 
 
-def chart(data: dict[str, Any], target: Path) -> None:
+def chart(data: dict[str, Any]) -> Any:
     """Draw one panel per scene."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    figure = Figure(figsize=(8.5, 12), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(8.5, 12)
     for axes, (name, one) in zip(figure.subplots(4, 2).flat, data.items(), strict=True):
         rows = one["rows"]
         best = [rows[i] for i in one["front"]]
@@ -280,9 +231,7 @@ def chart(data: dict[str, Any], target: Path) -> None:
         axes.xaxis.set_major_locator(LogLocator(base=10, subs=(1, 2, 5)))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.grid(True, color="0.92", linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+    tidy(*figure.axes)
     for axes in figure.axes[6:]:
         axes.set_xlabel("CPU time [s]")
     for axes in figure.axes[::2]:
@@ -293,8 +242,7 @@ def chart(data: dict[str, Any], target: Path) -> None:
     figure.legend(
         [*handles.values()], [*handles], loc="outside lower center", ncols=3, frameon=False, fontsize=9
     )  # fmt: skip
-    figure.savefig(target, dpi=150)
-    write_picture(target, target)
+    return figure
 
 
 def fronts_table(data: dict[str, Any], fine: dict[str, Any]) -> list[str]:
@@ -331,45 +279,43 @@ def _mean(times: Sequence[float]) -> float:
 
 def recommended_table(data: dict[str, Any]) -> list[str]:
     """Return the recommended setting of every scene, in bold below sensor noise, beside one sample per pixel."""
-    lines = ["| scene | setting | PSNR | CPU time | one sample |", "|---|---|---|---|---|"]
+    lines = []
     for name, one in data.items():
         pick = one["recommended"]
         (first,) = [r for r in one["rows"] if r["sweep"] == "samples" and r["samples"] == 1]
         how = f"**{pick['setting']}**" if pick["psnr"] >= SENSOR_DB else pick["setting"]
         lines.append(
-            f"| {name} | {how} | {pick['psnr']:.1f} dB | {pick['seconds']:.2f} s | "
-            f"{first['psnr']:.1f} dB, {first['seconds']:.2f} s |"
+            f"{name} | {how} | {pick['psnr']:.1f} dB | {pick['seconds']:.2f} s | "
+            f"{first['psnr']:.1f} dB, {first['seconds']:.2f} s"
         )
-    return lines
+    return table("scene | setting | PSNR | CPU time | one sample", lines)
 
 
 def samples_table(data: dict[str, Any]) -> list[str]:
     """Return PSNR over samples, and the adaptive setting nearest to the largest number."""
-    heads = " | ".join(f"{s}" for s in SAMPLES)
-    head = f"| scene | {heads} | adaptive to ½ step | its time / {MOST} samples |"
-    lines = [head, "|---" * (len(SAMPLES) + 3) + "|"]
+    lines = []
     for name, one in data.items():
         plain = {r["samples"]: r for r in one["rows"] if r["sweep"] == "samples"}
         (fine,) = [r for r in one["rows"] if r["error"] == min(ERRORS)]
-        cells = " | ".join(f"{plain[s]['psnr']:.1f}" for s in SAMPLES)
-        lines.append(f"| {name} | {cells} | {fine['psnr']:.1f} | {fine['seconds'] / plain[MOST]['seconds']:.2f} |")
-    return lines
+        share = fine["seconds"] / plain[MOST]["seconds"]
+        lines.append([name, *(f"{plain[s]['psnr']:.1f}" for s in SAMPLES), f"{fine['psnr']:.1f}", f"{share:.2f}"])
+    return table(" | ".join(["scene", *map(str, SAMPLES), f"adaptive to ½ step | its time / {MOST} samples"]), lines)
 
 
 def depth_table(data: dict[str, Any]) -> list[str]:
     """Return PSNR and time over recursion depth, at BASE samples, of scenes with mirrors or glass."""
-    lines = [f"| scene | {' | '.join(map(str, DEPTHS))} | the scene's |", "|---" * (len(DEPTHS) + 2) + "|"]
+    lines = []
     for name, one in data.items():
         if one["bounces"]:
             at = {r["depth"]: r for r in one["rows"] if r["samples"] == BASE and r["sweep"] in ("samples", "depth")}
             cells = " | ".join(f"{at[d]['psnr']:.1f}, {at[d]['seconds']:.2f}" for d in DEPTHS)
-            lines.append(f"| {name} | {cells} | {one['max_depth']} |")
-    return lines
+            lines.append(f"{name} | {cells} | {one['max_depth']}")
+    return table(" | ".join(["scene", *map(str, DEPTHS), "the scene's"]), lines)
 
 
 def cut_table(data: dict[str, Any]) -> list[str]:
     """Return faces, PSNR and time over tessellation, at BASE samples."""
-    lines = ["| scene | " + " | ".join(f"×{cut:g}" for cut in CUTS) + " |", "|---" * (len(CUTS) + 1) + "|"]
+    lines = []
     for name, one in data.items():
         if len(one["faces"]) == 1:
             continue
@@ -378,22 +324,16 @@ def cut_table(data: dict[str, Any]) -> list[str]:
             rows = [r for r in one["rows"] if r["cut"] == cut and r["samples"] == BASE and r["error"] is None]
             (row,) = [r for r in rows if r["sweep"] in ("samples", "cut")]
             cells.append(f"{one['faces'][str(cut)] / 1e3:.0f}, {row['psnr']:.1f}, {row['seconds']:.2f}")
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return lines
+        lines.append([name, *cells])
+    return table(" | ".join(["scene", *(f"×{cut:g}" for cut in CUTS)]), lines)
 
 
 def maps_table(rows: list[dict[str, Any]]) -> list[str]:
     """Return the results of `benchmarks.accuracy.map_precision` for setup1."""
-    lines = ["| stored as | bytes per ray | largest angular error | apples | cuboid |", "|---|---|---|---|---|"]
+    lines = []
     for row in rows:
-        psnr = [
-            "exact" if p is None or not np.isfinite(p) else f"{p:.1f} dB"
-            for p in (row["psnr_apples"], row["psnr_cuboid"])
-        ]
-        cells = f"{row['bytes_per_pixel']:.2f} | {row['angle_max_urad']:.2g} µrad | {psnr[0]} | {psnr[1]}"
-        lines.append(f"| {row['format']} | {cells} |")
-    return [*lines, "", origin(rows)]
-
-
-if __name__ == "__main__":
-    main()
+        each = (row["psnr_apples"], row["psnr_cuboid"])
+        psnr = ["exact" if p is None or not np.isfinite(p) else f"{p:.1f} dB" for p in each]
+        bits = [row["format"], f"{row['bytes_per_pixel']:.2f}", f"{row['angle_max_urad']:.2g} µrad"]
+        lines.append([*bits, *psnr])
+    return [*table("stored as | bytes per ray | largest angular error | apples | cuboid", lines), "", origin(rows)]

@@ -43,13 +43,12 @@ def main() -> None:
     wanted = {
         what: call for what, (_, call) in targets().items() if any(fnmatch(what, p) for p in asked.only.split(","))
     }
-    for key in RECORDS.todo(({"what": what} for what in wanted), asked.again):
 
-        def row(call: Callable[[], list[float]] = wanted[key["what"]]) -> dict[str, Any]:
-            values = call()
-            return {"median": statistics.median(values), "all": values, "cpu_flags": cpu_flags()}
+    def row(what: str) -> dict[str, Any]:
+        values = wanted[what]()
+        return {"median": statistics.median(values), "all": values, "cpu_flags": cpu_flags()}
 
-        RECORDS.measure(key, row)
+    RECORDS.run(({"what": what} for what in wanted), row, asked.again)
     for found in measured():
         span = f"({min(found['all']):.2f} … {max(found['all']):.2f})"
         print(f"{found['what']:<52} {found['target']:>6}  {found['median']:.2f}   {span}")
@@ -223,7 +222,3 @@ def _wall(call: Callable[[], object]) -> float:
     start = time.perf_counter()
     call()
     return time.perf_counter() - start
-
-
-if __name__ == "__main__":
-    main()

@@ -47,11 +47,11 @@ def _serve(scene: str, camera_json: str, cuts_json: str) -> None:
     ii_core, raytrace_ii = importlib.import_module("ii_core"), importlib.import_module("raytrace_ii")
     q_global = importlib.import_module("metrics").q_global
     try:
-        pareto: Any = importlib.import_module("benchmarks.speed.pareto")
-    except ModuleNotFoundError:
-        pareto = importlib.import_module("benchmarks.pareto")
+        tessellation: Any = importlib.import_module("benchmarks.speed.tessellation")
+    except ModuleNotFoundError:  # the earlier code
+        tessellation = importlib.import_module("benchmarks.pareto")
     camera = ii_core.IICamera.from_json(json.loads(camera_json))
-    scenes = {cut: pareto.cut_scene(scene, cut) for cut in json.loads(cuts_json)}
+    scenes = {cut: tessellation.cut_scene(scene, cut) for cut in json.loads(cuts_json)}
     truth = None
     for line in map(str.strip, sys.stdin):
         if line == "facts":
@@ -61,7 +61,7 @@ def _serve(scene: str, camera_json: str, cuts_json: str) -> None:
         cut, depth, repeats, options = json.loads(line)
         if isinstance(options["samples"], list):
             options["samples"] = tuple(options["samples"])
-        of = pareto.at_depth(scenes[cut], depth)
+        of = tessellation.at_depth(scenes[cut], depth)
         made = [raytrace_ii.render(of, camera, dtype="uint16", support=(), **options) for _ in range(repeats)]
         truth = made[0].picture if truth is None else truth
         seconds = min(shot.stats.cpu_seconds for shot in made)

@@ -113,7 +113,3 @@ def report(page: Path) -> None:
         f"Drawn by {data['renderer']}, on {data['machine']['cpus']} cores, commit {data['git']['commit'][:7]}.",
     ]
     page.write_text(filled(page.read_text(encoding="utf-8"), "viewer", lines), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

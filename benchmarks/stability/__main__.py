@@ -8,18 +8,18 @@ with those of ``benchmarks.accuracy.convergence``.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 from benchmarks.accuracy import convergence
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.pages.pictures import IMAGES, tidy, write_chart, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
+from benchmarks.records import table as markdown
 from benchmarks.stability import curves, depth, geometry, light, picture, pictures
 from benchmarks.stability.excerpts import EXCERPTS, Excerpt
 from benchmarks.stability.geometry import Row
-from ii_core.display.figure import COLOURS
+from ii_core.display.figure import COLOURS, new_figure
 from metrics.depth.focus import METHODS
 
 ACCURACY = tuple(f"benchmarks.accuracy.{name}" for name in ("analytic", "map_precision", "depth_truth"))
@@ -54,16 +54,14 @@ def main() -> None:
     asked = arguments.cases or list(CASES)
     if unknown := set(asked) - set(CASES):
         parser.error(f"unknown case {', '.join(sorted(unknown))}: known are {', '.join(CASES)}")
-    for key in RECORDS.todo(({"case": name} for name in asked), arguments.again):
-        record = RECORDS.measure(key, lambda name=key["case"]: {"rows": CASES[name]()})
-        print(f"{key['case']}: {record['seconds']:.0f} s", flush=True)
-    write_picture(IMAGES / "stability_pictures.webp", pictures.rendering())
-    write_picture(IMAGES / "stability_pictures_2.webp", pictures.coding_and_depth())
+    RECORDS.run(({"case": name} for name in asked), lambda case: {"rows": CASES[case]()}, arguments.again)
+    write_picture(IMAGES / "stability_pictures.webp", pictures.rendering(), lossless=True)
+    write_picture(IMAGES / "stability_pictures_2.webp", pictures.coding_and_depth(), lossless=True)
     cases = {name: row["rows"] for name, row in measured().items()}
     if missing := set(CASES) - set(cases):
         print(f"the page lacks results of {', '.join(sorted(missing))}")
         return
-    chart(cases, IMAGES / "stability.png")
+    write_chart(chart(cases), "stability.png", dpi=150)
     publish(tables())
 
 
@@ -107,44 +105,34 @@ def orders() -> list[str]:
     """Return fitted and expected orders of convergence, and the lens images."""
     found = convergence.measured()
     first, last = found["rows"][0], found["rows"][-1]
-    heads = ["error", f"{first['segments']} segments", f"{last['segments']} segments", "order"]
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    lines = []
     for name, expected in found["expected"].items():
         values = [name.replace("_", ", "), *map(number, (first[name], last[name], found["orders"][name]))]
-        lines.append(f"| {' | '.join(values)} ({expected}) |")
+        lines.append(f"{' | '.join(values)} ({expected})")
     for lens, orders in found["lens_orders"].items():
         rows = [row for row in found["lenses"] if row["lens"] == lens]
         for kind, expected in (("flat", 1), ("smooth", 2)):
             ends = number(rows[0][kind]), number(rows[-1][kind])
-            lines.append(f"| {lens} lens, {kind} | {ends[0]} | {ends[1]} | {number(orders[kind])} ({expected}) |")
+            lines.append(f"{lens} lens, {kind} | {ends[0]} | {ends[1]} | {number(orders[kind])} ({expected})")
     worst = max(abs(row["off"]) for row in found["images"])
-    return [
-        *lines,
-        "",
-        origin(found["parts"]),
-        f"Images of a ball lens lie where Gauss puts them to {worst:.1g} of their distance.",
-    ]
+    heads = f"error | {first['segments']} segments | {last['segments']} segments | order"
+    told = f"Images of a ball lens lie where Gauss puts them to {worst:.1g} of their distance."
+    return [*markdown(heads, lines), "", origin(found["parts"]), told]
 
 
 def table(rows: list[Row], pivot: Any = None) -> list[str]:
     """Return rows as Markdown: all of them, or one cell for every value of a column."""
     if pivot is None:
-        heads = list(rows[0])
-        body = [[number(row.get(head)) for head in heads] for row in rows]
-    else:
-        index, column, shown = pivot
-        columns = list(dict.fromkeys(row[column] for row in rows))
-        heads = [*index, *(f"{name}: {', '.join(shown)}" if i == 0 else name for i, name in enumerate(columns))]
-        grid: dict[tuple[Any, ...], dict[Any, str]] = {}
-        for row in rows:
-            cell = " · ".join(number(row[key]) for key in shown)
-            grid.setdefault(tuple(row[key] for key in index), {})[row[column]] = cell
-        body = [[*map(number, key), *(cells.get(name, "") for name in columns)] for key, cells in grid.items()]
-    return [
-        f"| {' | '.join(map(str, heads))} |",
-        "|---" * len(heads) + "|",
-        *(f"| {' | '.join(row)} |" for row in body),
-    ]
+        return markdown(" | ".join(rows[0]), ([number(row.get(head)) for head in rows[0]] for row in rows))
+    index, column, shown = pivot
+    columns = list(dict.fromkeys(row[column] for row in rows))
+    heads = [*index, *(f"{name}: {', '.join(shown)}" if i == 0 else str(name) for i, name in enumerate(columns))]
+    grid: dict[tuple[Any, ...], dict[Any, str]] = {}
+    for row in rows:
+        cell = " · ".join(number(row[key]) for key in shown)
+        grid.setdefault(tuple(row[key] for key in index), {})[row[column]] = cell
+    body = ([*map(number, key), *(cells.get(name, "") for name in columns)] for key, cells in grid.items())
+    return markdown(" | ".join(heads), body)
 
 
 def number(value: Any) -> str:
@@ -197,13 +185,9 @@ PANELS: list[tuple[str, str, list[str], str, str]] = [
 ]
 
 
-def chart(cases: Mapping[str, list[Row]], target: Path) -> None:
+def chart(cases: Mapping[str, list[Row]]) -> Any:
     """Draw one panel per sweep."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.5, 19), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(8.5, 19)
     for axes, (case, across, names, logarithmic, title) in zip(figure.subplots(8, 2).flat, PANELS, strict=True):
         rows = [row for row in cases[case] if row[across] is not None]
         smallest = min(row[across] for row in rows if row[across] > 0)
@@ -216,19 +200,9 @@ def chart(cases: Mapping[str, list[Row]], target: Path) -> None:
             axes.set_xscale("log")
         if "y" in logarithmic:
             axes.set_yscale("log")
-        if across == "segments":
-            axes.set_xticks([row[across] for row in rows], [str(row[across]) for row in rows])
-            axes.minorticks_off()
         axes.set_title(title, loc="left", fontsize=10)
         axes.set_xlabel(across)
-        axes.grid(True, color="0.92", linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+        tidy(axes)
         if len(names) > 1:
             axes.legend(frameon=False, fontsize=9)
-    figure.savefig(target, dpi=150)
-    write_picture(target, target)
-
-
-if __name__ == "__main__":
-    main()
+    return figure

@@ -46,7 +46,3 @@ def main(arguments: list[str] | None = None) -> None:
         publish(folder)
     if broken := [record["step"] for record in made if record.get("repeats") is False]:
         sys.exit(f"not the same as before: {', '.join(broken)}")
-
-
-if __name__ == "__main__":
-    main()

@@ -14,9 +14,8 @@ from benchmarks.records import number
 
 from . import theirs
 from .coding import SCENES
-from .rates import BFRAMES, CONTROLS, GOPS, RANGES, REFERENCE, SI, VOLUME, types
+from .rates import APART, BFRAMES, CONTROLS, GOPS, MODEL, RANGES, REFERENCE, SI, VOLUME, types
 from .theirs import Verdict, compare
-from .volume_model import APART, MODEL
 
 Points = Sequence[Mapping[str, Any]]
 Results = Mapping[str, Mapping[str, Any]]

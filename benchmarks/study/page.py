@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gzip
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -22,13 +22,12 @@ from . import beside, theirs
 from .charts import LABELS, draw_all
 from .claims import Claim, Results, by_detail, claims, gain, of_scenes, shown, type_table
 from .coding import SCENES
-from .rates import BFRAMES, GOPS, MODERN, PVS, RANGES, REFERENCE, SI, VOLUME
+from .rates import APART, BFRAMES, GOPS, MODEL, MODERN, PVS, REFERENCE, SI, VOLUME
 from .runner import FORMAT, VERSION, digest_of
 from .theirs import said
-from .volume_model import APART, MODEL
 
-PAGE, IMAGES, KEPT = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study", ROOT / "benchmarks/results/study"
-ENDING = ".jsonl.gz"  # suffix of published records, compressed to a sixth of their size
+PAGE, IMAGES = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study"
+KEPT = ROOT / "benchmarks/results/study.jsonl.gz"  # compressed to a sixth of its size
 CODERS_SCALE = 4
 PHOTOGRAPHS = {"component-images": ".jpg", "other-cameras": ".jpg", "artefacts-": ".webp", "equal-": ".webp"}
 TIMED_RATES = (0.015, 0.15, 0.63, 1.5)  # bpp
@@ -37,16 +36,14 @@ OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to
 
 def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Path = KEPT) -> None:
     """Add the records of a folder to the kept ones, copy its pictures, draw the charts and fill the page."""
-    for place in (images, kept):
-        place.mkdir(parents=True, exist_ok=True)
-    for path in sorted(folder.glob("*.jsonl")):
-        keep(path, kept / f"{path.name}.gz")
+    images.mkdir(parents=True, exist_ok=True)
+    keep(sorted(folder.glob("*.jsonl")), kept)
     everything = published(kept)
     best = {name: largest(some) for name, some in everything.items()}
-    copy_pictures(folder, images, best)
     for path in draw_all({name: record["result"] for name, record in best.items()}, images):
         write_picture(path, path)
     text = page.read_text(encoding="utf-8")
+    copy_pictures(folder, images, best, text)
     for (_, mark), lines in tables(kept).items():
         text = filled(text, mark, lines)
     with atomic_path(page) as temporary:
@@ -67,31 +64,34 @@ def tables(kept: Path = KEPT) -> Tables:
     return {("docs/study.md", mark): lines for mark, lines in made.items()}
 
 
-def copy_pictures(folder: Path, images: Path, best: Mapping[str, Mapping[str, Any]]) -> None:
-    """Copy the pictures of the shown records that are in this folder."""
+def copy_pictures(folder: Path, images: Path, best: Mapping[str, Mapping[str, Any]], text: str) -> None:
+    """Copy the pictures of the shown records that are in this folder and on the page of this text."""
     for record in best.values():
         for name, digest in record["pictures"].items():
-            if (folder / name).exists() and digest_of(folder / name) == digest:
+            there = page_name(name) in text and (folder / name).exists()
+            if there and digest_of(folder / name) == digest:
                 write_picture(images / page_name(name), folder / name)
 
 
 def page_name(name: str) -> str:
-    """Return the name of a picture on the page: photographs are JPEG, those of coding artefacts WebP without loss."""
+    """Return the name of a picture on the page: photographs are JPEG, those of coded pictures WebP."""
     return next((name.replace(".png", end) for kind, end in PHOTOGRAPHS.items() if name.startswith(kind)), name)
 
 
 def published(kept: Path) -> dict[str, list[dict[str, Any]]]:
-    """Return the published records of every step."""
-    paths = sorted(kept.glob(f"*{ENDING}"))
-    return {path.name.removesuffix(ENDING): read_records(path, FORMAT, VERSION) for path in paths}
+    """Return the published records of every step, by its name."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for record in read_records(kept, FORMAT, VERSION):
+        found.setdefault(record["step"], []).append(record)
+    return dict(sorted(found.items()))
 
 
-def keep(new: Path, old: Path) -> None:
-    """Append the lines of one file that another, compressed one lacks; equal lines make an equal file."""
-    there = lines_of(old) if old.exists() else []
-    lines = [line for line in lines_of(new) if line not in there]
-    with atomic_path(old) as temporary:
-        temporary.write_bytes(gzip.compress(b"".join([*there, *lines]), mtime=0))
+def keep(new: Iterable[Path], kept: Path) -> None:
+    """Append the lines of files that another, compressed one lacks; equal lines make an equal file."""
+    lines = dict.fromkeys(lines_of(kept) if kept.exists() else [])
+    lines |= dict.fromkeys(line for path in new for line in lines_of(path))
+    with atomic_path(kept) as temporary:
+        temporary.write_bytes(gzip.compress(b"".join(lines), mtime=0))
 
 
 def largest(some: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
@@ -157,11 +157,7 @@ def shown_tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dic
         "gains-modern": gains_modern(results),
         "table-types": types_beside(results),
         "volume-model": volume_table(results),
-        "framing": framing_table(results),
-        "search": search_table(results),
-        "types-2008": table_2008(results),
         "times-by-rate": time_table(results),
-        "frames": frame_table(results),
         "detail": detail_table(results),
         "artefact-rates": artefact_table(results),
         "records": record_table(best),
@@ -219,57 +215,6 @@ def volume_table(results: Results) -> list[str]:
     return lines if scenes else []
 
 
-def framing_table(results: Results) -> list[str]:
-    """Return a table of the least rate of EI-PVS by container, in bpp."""
-    if "framing" not in results:
-        return []
-    rows = results["framing"]["rows"]
-    by_container: dict[str, list[str]] = {}
-    for row in rows:
-        by_container.setdefault(row["container"], []).append(f"{row['bpp']:.2f}")
-    heads = ["the stream alone" if name == "h264" else name.upper() for name in by_container]
-    return beside.grid(["", *heads], [["bpp", *map(" · ".join, by_container.values())]])
-
-
-def search_table(results: Results) -> list[str]:
-    """Return a table of time and rate against the least range, for both searches."""
-    lines = ["| | search | " + " | ".join(str(r) for r in RANGES[1:]) + " |", "|---" * (len(RANGES) + 1) + "|"]
-    for scene in SCENES:
-        rows = results.get(f"search-{scene}", {}).get("rows", [])
-        for search in dict.fromkeys(row["search"] for row in rows):
-            own = [row for row in rows if row["search"] == search]
-            cells = [
-                f"×{row['seconds'] / own[0]['seconds']:.1f}, {100 * (row['bytes'] / own[0]['bytes'] - 1):+.1f} %"
-                for row in own[1:]
-            ]
-            lines.append(f"| {scene} | {search} | " + " | ".join(cells).replace("-", "−") + " |")
-    return lines
-
-
-def table_2008(results: Results) -> list[str]:
-    """Return a table of the gain of coarser B pictures with x264 of today and of 2008, by size of the picture."""
-    there = [results[name] for name in OLDER if name in results]
-    lines = ["| x264 set as | " + " | ".join("{}×{} lenses".format(*one["lenses"]) for one in there) + " |"]
-    lines.append("|---" * (1 + len(there)) + "|")
-    lower: list[float] = []  # dB of B pictures as fine as P below those of coarser ones
-    by_set: dict[str, list[Sequence[float]]] = {}
-    for rows in zip(*(one["rows"] for one in there), strict=True):
-        values = [row["db"] for row in rows]
-        coarser = by_set.setdefault(rows[0]["set"], values)
-        if coarser is values:
-            cells = [" · ".join(shown(value, "+.2f") for value in row) for row in values]
-            lines.append(f"| {rows[0]['set']} | " + " | ".join(cells) + " |")
-        else:
-            lower += [
-                a - b
-                for first, second in zip(coarser, values, strict=True)
-                for a, b in zip(first, second, strict=True)
-            ]
-    if not there:
-        return []
-    return [*lines, "", f"B pictures as fine as P: {min(lower):.2f}–{max(lower):.2f} dB less in each case."]
-
-
 def time_table(results: Results) -> list[str]:
     """Return a table of CPU seconds of SI-PVS and JPEG 2000 by rate: encoding, decoding."""
     made = of_scenes(results, "rates")
@@ -285,18 +230,6 @@ def time_table(results: Results) -> list[str]:
         ]
         lines.append(f"| {LABELS[scheme]} | " + " | ".join(cells) + " |")
     return lines
-
-
-def frame_table(results: Results) -> list[str]:
-    """Return a table of the time per elementary image for the least and the largest number of them."""
-    rows = results.get("frames", {}).get("rows", [])
-    counts = sorted({row["frames"] for row in rows})
-    counts = counts[:: len(counts) - 1 or 1]
-    lines = ["| frames | " + " | ".join(map(str, counts)) + " |", "|---" * (len(counts) + 1) + "|"]
-    for what in dict.fromkeys(row["set"] for row in rows):
-        own = {row["frames"]: 1e6 * row["seconds"] / row["frames"] for row in rows if row["set"] == what}
-        lines.append(f"| {what} | " + " | ".join(f"{own[count]:.0f}" for count in counts) + " |")
-    return lines if rows else []
 
 
 def detail_table(results: Results) -> list[str]:
@@ -398,8 +331,7 @@ def record_table(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
         git = record["git"] or {"commit": "none", "dirty": False}
         again = {True: " ✓", False: " **not the same**", None: ""}[record.get("repeats")]
         seconds = f" {record['cpu_seconds']:.0f}" if "cpu_seconds" in record else ""
-        link = f"[{name}](../benchmarks/results/study/{name}{ENDING})"
         commit = git["commit"][:10] + (", dirty" if git["dirty"] else "")
-        by_commit.setdefault(commit, []).append(f"{link}{seconds}{again}")
+        by_commit.setdefault(commit, []).append(f"{name}{seconds}{again}")
     lines = ["| commit | records, CPU seconds |", "|---|---|"]
     return lines + [f"| {commit} | {', '.join(records)} |" for commit, records in by_commit.items()]

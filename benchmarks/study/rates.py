@@ -15,6 +15,9 @@ from .runner import Step
 PVS = tuple(f"{kind}-h264{chroma}" for chroma in (":chroma=420", "") for kind in ("si", "ei", "ri"))
 VOLUME = "si-jp3d:wavelet=53"  # CDF 5/3, as the dissertation's
 REFERENCE = "jpeg2000"
+# Volumes of each colour alone: coded by the verification model of JPEG 2000 Part 10, and by our coder. Records alone
+# are left: OpenJPEG has no model from version 2.5 on, and the step that ran it is in git up to 018e29e.
+MODEL, APART = "verification model", f"{VOLUME}, colours apart"
 MODERN = ("si-hevc", "si-av1", "si-jp3d")
 SI = "si-h264:chroma=420"
 GOPS = (0, 128, 32, 16)  # 0: one I picture for all

@@ -16,7 +16,6 @@ DEMO = "examples.demo"
 # Script, purpose, arguments. The order matters: `coding_docs` and `readme` use results of others.
 SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("cameras", "Figures 3.6, 3.7, 5.9: every camera with its maps, all scenes", ()),
-    ("concepts", "Figures 2.24, 5.4: component images, orders", ()),
     ("camera_in_scene", "Table 3.2: a camera of glass inside the scene", ()),
     ("demo", "the tutorial's chart and pictures", ()),
     ("demo", "the same at full size", ("--scale", "1", "-o", "out/full")),
@@ -25,7 +24,7 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("headers", "(5.11) to (5.15): header portions", ()),
     ("cost", "(5.16), Table 5.8: time and memory of every scheme", ()),
     ("coders", "every scheme and setting at equal quality", ("--workers", "2")),
-    ("bframes", "why B pictures hurt in Table 5.5", ("--workers", "2")),
+    ("bframes", "why B pictures hurt in Table 5.5", ()),
     ("coding_docs", "tables of docs/coding.md", ()),
     ("volume", "gain of the volume", ("--scenes", "apples,twins,car,cuboid")),
     ("metrics_gallery", "Figure 4.9; Q_angle, views and Q_depth of one picture", ()),
@@ -34,8 +33,6 @@ SCRIPTS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("convergence", "accuracy of triangle meshes", ()),
     ("stability", "where methods fail", ()),
     ("pareto", "speed against accuracy of rendering", ()),
-    ("feature_ablation", "effect of each scene feature", ()),
-    ("texture_filter", "cost and benefit of filtered textures", ()),
     ("metrics_speed", "cost of metrics", ()),
     ("ratios", "ratios to bare libraries", ()),
     ("readme", "tables of the README, gains, speed ratios", ()),

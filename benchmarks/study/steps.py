@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import pictures, rates, reasons, scripts, structures, views, volume_model
+from . import pictures, rates, scripts, structures, views
 from .runner import Step
 
 
@@ -19,8 +19,6 @@ def all_steps(scale: int) -> list[Step]:
     return [
         *pictures.steps(scale),
         *rates.steps(scale),
-        *reasons.steps(scale),
-        *volume_model.steps(scale),
         *views.steps(scale),
         *structures.steps(scale),
         *scripts.steps(scale),

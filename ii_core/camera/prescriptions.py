@@ -48,6 +48,7 @@ class Prescription:
         wavelengths_nm: Any = None,
     ) -> Surfaces:  # fmt: skip
         """Return the lens with its last vertex at ``z_mm``, all its lengths times ``enlarge``; see `Surfaces`."""
+        checks.length("enlarge", enlarge)
         wavelength = self.wavelength_nm if wavelength_nm is None else wavelength_nm
         if wavelengths_nm is not None and wavelength_nm is None:
             wavelength = LINE_D_NM  # that of the prescription gives way

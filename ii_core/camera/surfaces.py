@@ -194,7 +194,7 @@ class Surfaces(FrontElement):
             for surface in self.surfaces:
                 _ = 1.0 if surface.glass is None else surface.glass.index(wavelength)
         red, green, blue = map(float, given)
-        if self.wavelength_nm not in (LINE_D_NM, green):
+        if number("surfaces: wavelength_nm", self.wavelength_nm) not in (LINE_D_NM, green):
             raise ValueError(
                 f"surfaces: wavelength_nm is {self.wavelength_nm:g} beside wavelengths_nm: one of them is needed"
             )

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import __main__ as command
-from benchmarks.registry import BENCHMARKS, entry, newest, source
+from benchmarks.registry import BENCHMARKS, CLOSED, IMAGES, LAST, entry, newest, source
 from benchmarks.study.scripts import SCRIPTS
 
 ROOT = Path(__file__).parents[2]
@@ -41,12 +41,23 @@ def test_every_file_of_results_and_every_picture_has_one_owner():
             for path in ROOT.glob(pattern)
             if path.suffix in endings
         ]
+        if folder == "docs":
+            owned += [f"{IMAGES}/{picture}" for pictures in CLOSED.values() for picture in pictures]
         there = [
             path.relative_to(ROOT).as_posix()
             for path in (ROOT / folder).rglob("*")
             if path.suffix in endings and not (path.parent / "LICENSE.txt").exists()  # pictures of third parties
         ]
         assert sorted(owned) == sorted(there)
+
+
+def test_scripts_of_closed_experiments_are_in_git():
+    if subprocess.run(["git", "cat-file", "-e", LAST], cwd=ROOT, capture_output=True).returncode:
+        pytest.skip("no history, or a shallow one")
+    there = subprocess.run(["git", "ls-tree", "-r", "--name-only", LAST], cwd=ROOT, capture_output=True, text=True)
+    paths = {name: f"benchmarks/{name.partition(':')[0]}.py" for name in CLOSED}
+    assert set(paths.values()) <= set(there.stdout.splitlines())
+    assert not any((ROOT / path).exists() for name, path in paths.items() if ":" not in name)
 
 
 @pytest.mark.parametrize("one", [one for one in BENCHMARKS.values() if one.tables], ids=lambda one: one.name)
@@ -77,6 +88,14 @@ def test_list_names_all_benchmarks_without_importing_them():
     assert run.returncode == 0
     heads = [line.split(" (")[0] for line in run.stdout.splitlines() if not line.startswith(" ")]
     assert heads == list(BENCHMARKS)
+
+
+def test_prune_removes_older_records_of_a_benchmark(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr("benchmarks.registry.RESULTS", tmp_path)
+    (tmp_path / "orders.jsonl").write_text('{"key": 1, "run": 0}\n{"key": 1, "run": 1}\n')
+    command.main(["prune", "orders"])
+    assert capsys.readouterr().out == "orders.jsonl: 1 older records removed\n"
+    assert (tmp_path / "orders.jsonl").read_text() == '{"key": 1, "run": 1}\n'
 
 
 def test_run_passes_options_to_the_benchmark(monkeypatch):

@@ -1,6 +1,7 @@
-"""Demo and the example of the README, run as a user runs them."""
+"""Demo, the example of the README, and that of an external coder, run as a user runs them."""
 
 import json
+import os
 import re
 import sys
 from pathlib import Path
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.coding import disparity
-from examples import demo
+from examples import demo, jplm_encoder
 from ii_core import IIPicture, preset
 from ii_core.base.files import read_image
 
@@ -58,3 +59,24 @@ def test_disparity_between_sub_images():
     assert disparity.has_partner(depth, np.ones((1, 1, 4))).tolist() == [[[True, True, True, False]]]
     depth[1, 0, 2] = 3.0  # a nearer point occludes the place of the second point
     assert disparity.has_partner(depth, np.ones((1, 1, 4))).tolist() == [[[True, False, True, False]]]
+
+
+SIZED = """#!{python} -IS
+import pathlib, sys
+words = sys.argv[1:]
+value = lambda name: words[words.index(name) + 1]
+assert (value("--number_of_rows"), value("--transform_size_maximum_intra_view_horizontal")) == ("6", "40")
+pathlib.Path(value("-o")).write_bytes(bytes(int(8e5 / (1000 + float(value("--lambda"))))))
+"""
+
+
+@pytest.mark.parametrize("limit", [100, 250, 799, 2000])
+def test_the_example_meets_a_target(tmp_path, monkeypatch, limit):
+    (tmp_path / "jpl-encoder-bin").write_text(SIZED.format(python=sys.executable))
+    (tmp_path / "jpl-encoder-bin").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    file = tmp_path / "coded"
+    words = ["jplm_encoder.py", str(tmp_path), str(file), str(limit), "6", "4", "40", "5"]
+    monkeypatch.setattr(sys, "argv", words)
+    jplm_encoder.main()
+    assert 0.98 * min(limit, 800) < file.stat().st_size <= limit

@@ -1,5 +1,6 @@
 """Records of benchmarks: appended row by row; pages equal to the records."""
 
+import gzip
 import json
 import signal
 import subprocess
@@ -13,9 +14,9 @@ from benchmarks import records
 from benchmarks.accuracy import povray
 from benchmarks.coding import coders, fuzz, rd
 from benchmarks.pages import tables
-from benchmarks.records import ALL, MISSING, Records, check, commit_of, origin, with_commits
+from benchmarks.records import ALL, MISSING, Records, check, commit_of, origin, prune, with_commits
 from ii_core import preset
-from ii_core.base.json_lines import append_record
+from ii_core.base.json_lines import append_record, lines_of
 from raytrace_ii import load_scene, render
 
 ROOT = Path(__file__).parents[2]
@@ -74,7 +75,7 @@ def test_the_stamp_of_one_commit_over_rows_of_another_is_found(tmp_path):
 
 
 def test_committed_rows_must_not_change(tmp_path, monkeypatch):
-    """Lines are only added; rows of unknown commit may be removed after they are measured again."""
+    """Rows may go if they are measured again, or if their commit is unknown."""
     for command in (["init", "-q"], ["config", "user.email", "a@b.c"], ["config", "user.name", "a"]):
         git(*command, cwd=tmp_path)
     TOY.measure({"row": 1}, lambda: {"value": 1})
@@ -88,6 +89,31 @@ def test_committed_rows_must_not_change(tmp_path, monkeypatch):
     assert check(TOY.path) == []
     TOY.path.write_text(lines[1])
     assert [line.partition(": ")[2] for line in check(TOY.path)] == ["a committed row was changed or removed"]
+    append_record(TOY.path, {**json.loads(lines[0]), "when": "2999-01-01", "result": {"value": 2}})
+    assert check(TOY.path) == []
+
+
+def test_pruning_keeps_the_newest_row_of_each_key():
+    for value in range(3):
+        TOY.measure({"row": value % 2}, lambda value=value: {"value": value})
+    append_record(TOY.path, {**TOY.newest()[1], "unsure": "by hand", "git": None})
+    before = TOY.rows()
+    assert [row["value"] for row in before] == [2, 1]
+    assert prune(TOY.path) == 2 and prune(TOY.path) == 0
+    assert TOY.rows() == before and len(TOY.path.read_text().splitlines()) == 2
+
+
+def test_pruning_keeps_each_step_of_the_study_at_each_size(tmp_path):
+    path = tmp_path / "study.jsonl.gz"
+    rows = [
+        {"step": step, "parameters": {"scale": scale}, "run": run}
+        for step in "ab"
+        for scale in (1, 8)
+        for run in (0, 1)
+    ]
+    path.write_bytes(gzip.compress("".join(json.dumps(row) + "\n" for row in rows).encode()))
+    assert prune(path) == 4
+    assert [json.loads(line) for line in lines_of(path)] == rows[1::2]
 
 
 def git(*arguments, cwd=ROOT):

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.pages.tables import filled
 from benchmarks.registry import BENCHMARKS
-from benchmarks.study import beside, claims, reasons, theirs
+from benchmarks.study import beside, claims, theirs
 from benchmarks.study.__main__ import main
 from benchmarks.study.page import PAGE, largest, publish, tables
 from benchmarks.study.runner import Step, code_of, known, perform, records, timeless
@@ -17,7 +17,6 @@ from benchmarks.study.scripts import SCRIPTS
 from benchmarks.study.sheets import STRIP
 from benchmarks.study.steps import all_steps
 from benchmarks.study.views import towards
-from ii_core import IIPicture
 from ii_core.base.files import read_image, write_image
 
 calls = []
@@ -91,7 +90,8 @@ def test_a_small_study_resumes_repeats_and_fills_the_page(tmp_path, capsys):
     assert (differences[:STRIP, :70] < 128).any()  # under its name
     page = tmp_path / "study.md"
     page.write_text(
-        "".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in [mark for _, mark in tables(tmp_path)])
+        "".join(f"<!-- {mark} -->\n<!-- /{mark} -->\n" for mark in [mark for _, mark in tables(tmp_path / "kept.gz")])
+        + "![views](images/study/artefacts-setup1_views.webp)"
     )
     for _ in range(2):  # publishing twice adds no record twice
         publish(tmp_path / "out", page=page, images=tmp_path / "images", kept=tmp_path / "kept")
@@ -138,15 +138,6 @@ def test_fluctuation_explained_by_detail():
     assert (spread, correlation) == pytest.approx((math.sqrt(31.25), 1.0)) and left < 1e-9
     spread, correlation, left = claims.by_detail([30.0, 40.0, 40.0, 30.0], layers["depth_mm"], layers)
     assert correlation == pytest.approx(0, abs=1e-9) and left == pytest.approx(spread)
-
-
-@pytest.mark.parametrize("encoder", [reasons.H264of2008("si"), reasons.PlainH264("si")])
-def test_the_encoders_of_2008_search_exhaustively_without_later_features(encoder):
-    options = {name: option.default for name, option in encoder.options.items()} | {"rate": "cq"}
-    picture = IIPicture(np.zeros((64, 64, 3), np.uint8), (4, 4), (16, 16))
-    asked = encoder.constant(30, encoder.film(picture, options), options).parameters["x264-params"].split(":")
-    assert {"me=esa", "merange=16", "ref=1", "trellis=0", "qp=30"} <= set(asked) and "me=umh" not in asked
-    assert ("direct=none" in asked) == ("subme=1" in asked) == isinstance(encoder, reasons.PlainH264)
 
 
 def test_agreement_is_counted():
@@ -221,3 +212,12 @@ def test_the_search_for_a_quality_interpolates_over_log_rate():
     assert towards(line, 23.0) == pytest.approx(0.2)
     assert towards(line[:1], 23.0) == pytest.approx(0.2)  # 3 dB for a doubling, to begin with
     assert towards(line, 32.0) == pytest.approx(1.6)
+
+
+def test_a_lead_is_measured_at_the_rates_of_the_other_scheme():
+    """A line of 3 dB per octave is 6 dB above another at all rates of that; rates beyond its ends do not count."""
+    mine = [{"scheme": "a", "bpp": rate, "q_global": 30 + 3 * math.log2(rate)} for rate in (0.1, 0.4, 1.6)]
+    its = [{"scheme": "b", "bpp": rate, "q_global": 24 + 3 * math.log2(rate)} for rate in (0.15, 0.7, 1.3)]
+    beyond = [{"scheme": "b", "bpp": rate, "q_global": -99} for rate in (0.09, 1.7)]
+    assert claims.lead(mine, "a", [*its, *beyond], "b") == pytest.approx(6)
+    assert claims.lead(mine, "a", beyond, "b") is None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks.pages.pictures import WIDEST, write_picture
+from benchmarks.pages.pictures import WIDEST, with_palette, write_picture
 
 ROOT = Path(__file__).parents[2]
 FILE, RECORDS, TREE = 1.0, 2.0, 15.0  # largest sizes in MB
@@ -62,6 +62,14 @@ def test_pictures_are_unique_and_not_wider_than_shown():
                 assert picture.width <= WIDEST, f"{path} is {picture.width} pixels wide, {WIDEST} are shown"
 
 
+def test_charts_get_few_colours_if_none_changes_much():
+    ramp = np.linspace(0, 255, 256).astype(np.uint8)
+    grey = Image.fromarray(np.repeat(np.tile(ramp, (20, 1))[..., None], 3, axis=2))
+    assert len(with_palette(grey).getcolors()) == 64
+    colours = np.stack(np.meshgrid(*[ramp[::16]] * 3), axis=-1).reshape(64, 64, 3)
+    assert len(with_palette(Image.fromarray(colours)).getcolors()) > 64
+
+
 def test_charts_get_a_palette_and_photographs_keep_their_colours(tmp_path):
     chart = np.full((20, 2000, 4), 255, np.uint8)
     chart[5:15, :, :3] = (255, 0, 0)
@@ -74,8 +82,11 @@ def test_charts_get_a_palette_and_photographs_keep_their_colours(tmp_path):
     noise = np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8)
     write_picture(tmp_path / "photo.png", noise)
     assert np.array_equal(np.asarray(Image.open(tmp_path / "photo.png")), noise)
-    write_picture(tmp_path / "photo.webp", noise)
+    write_picture(tmp_path / "photo.webp", noise, lossless=True)
     assert np.array_equal(np.asarray(Image.open(tmp_path / "photo.webp")), noise)
+    exact = (tmp_path / "photo.webp").stat().st_size
+    write_picture(tmp_path / "photo.webp", noise)
+    assert (tmp_path / "photo.webp").stat().st_size < exact
     write_picture(tmp_path / "photo.jpg", np.repeat(np.repeat(noise[:4, :4], 16, 0), 16, 1))
     assert Image.open(tmp_path / "photo.jpg").format == "JPEG"
     with pytest.raises(ValueError, match=r"\.png, \.webp or \.jpg, not .*photo\.gif"):

@@ -1,12 +1,14 @@
 """Golden files: every scheme decodes the streams of earlier versions.
 
-``pytest tests/codec/test_golden.py --make-golden`` writes missing files of new schemes, and replaces none.
+``pytest -n 0 tests/codec/test_golden.py --make-golden`` adds missing files of new schemes to the archive; it replaces
+none.
 """
 
 import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 import pytest
@@ -17,6 +19,8 @@ from ii_core import IICamera, IIPicture
 from ii_core.base.files import read_image, write_image, write_json
 
 FOLDER = Path(__file__).parents[1] / "golden"
+ARCHIVE = FOLDER / "coders.zip"
+NAMES = sorted(Path(name).stem for name in ZipFile(ARCHIVE).namelist() if name.endswith(".ii"))
 TOTAL_BYTES = 200_000
 # Tolerance in codes. The video standards except MPEG-2, and reversible wavelets, define decoding to the bit; inverse
 # cosine transforms, floating wavelets and colour conversion inside a library may round differently in another version
@@ -55,11 +59,28 @@ def coded(scheme):
     return encode(original(), scheme, quality=type(low)((low + high) / 2))
 
 
-def test_one_golden_file_has_the_compact_header(request):
-    path = FOLDER / "compact-header.ii"
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Return a folder with the files of the archive."""
+    unpacked = tmp_path_factory.mktemp("golden")
+    with ZipFile(ARCHIVE) as archive:
+        archive.extractall(unpacked)
+    return unpacked
+
+
+def made(path, coded):
+    """Write the file of a new scheme and its pixels, and add both to the archive."""
+    coded.save(path)
+    write_image(path.with_suffix(".png"), decode(path).pixels)
+    with ZipFile(ARCHIVE, "a", ZIP_DEFLATED) as archive:
+        for file in (path, path.with_suffix(".png")):
+            archive.writestr(ZipInfo(file.name), file.read_bytes(), ZIP_DEFLATED)  # without the date of today
+
+
+def test_one_golden_file_has_the_compact_header(request, folder):
+    path = folder / "compact-header.ii"
     if request.config.getoption("--make-golden") and not path.exists():
-        compact().save(path)
-        write_image(path.with_suffix(".png"), decode(path).pixels)
+        made(path, compact())
     coded = Encoded.load(path)
     assert path.read_bytes()[4] == 2
     assert (coded.scheme, coded.dtype, coded.target_bpp) == ("ri-h264", "uint8", 5.3)
@@ -70,12 +91,10 @@ def test_one_golden_file_has_the_compact_header(request):
 
 
 @pytest.mark.parametrize("scheme", sorted(schemes()))
-def test_every_scheme_has_a_golden_file(scheme, request):
-    path = FOLDER / f"{scheme}.ii"
+def test_every_scheme_has_a_golden_file(scheme, request, folder):
+    path = folder / f"{scheme}.ii"
     if request.config.getoption("--make-golden") and not path.exists():
-        made = coded(scheme)
-        made.save(path)
-        write_image(path.with_suffix(".png"), decode(made).pixels)
+        made(path, coded(scheme))
     assert path.exists(), f"make {path.name} with --make-golden and commit it"
 
 
@@ -112,10 +131,10 @@ def test_defaults_of_options_stay(scheme, request):
     assert now == kept[scheme]
 
 
-def test_old_ray_space_images_keep_their_order():
+def test_old_ray_space_images_keep_their_order(folder):
     """Files of the first version have the grid transposed; see `codec.file_header`."""
-    assert Encoded.load(FOLDER / "ri-h264.ii").options["by"] == "columns"
-    assert Encoded.load(FOLDER / "compact-header.ii").options["by"] == "rows"
+    assert Encoded.load(folder / "ri-h264.ii").options["by"] == "columns"
+    assert Encoded.load(folder / "compact-header.ii").options["by"] == "rows"
 
 
 def test_golden_files_are_small():

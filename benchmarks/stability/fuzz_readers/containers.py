@@ -13,31 +13,16 @@ from benchmarks.coding.fuzz import damaged
 from .trees import pick
 
 INTEGERS = (
-    0,
-    1,
-    2,
-    3,
-    0x7F,
-    0x80,
-    0xFF,
-    0x7FFF,
-    0xFFFF,
-    0x10000,
-    0xFFFFFF,
-    0x7FFFFFFF,
-    0x80000000,
-    0xFFFFFFFF,
-    2**63,
-    2**64 - 1,
-)
+    0, 1, 2, 3, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 0x10000, 0xFFFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF,
+    2**63, 2**64 - 1,
+)  # fmt: skip
 FLOATS = (float("nan"), float("inf"), -float("inf"), 1e38, -1e38, 1e-45, 0.0)
 TOKENS = (
     "", "0", "-1", "1", "2", "3", "1.5", "-0", "nan", "inf", "-inf", "1e400", "1e38", "1e-400", "2147483648",
-    "4294967296",
-    "99999999999999999999", "9" * 5000, "1/1/1", "1//1", "1/2/3/4", "//", "-1/-1/-1", "0x10", "1_0", "١", "é", "\0",
-    "\x1b[31m",
-    "a b", "../../etc/passwd", "/dev/zero", ".", "#", "\\", "%(x)s", "=", "[x]",
+    "4294967296", "99999999999999999999", "9" * 5000, "1/1/1", "1//1", "1/2/3/4", "//", "-1/-1/-1", "0x10", "1_0",
+    "١", "é", "\0", "\x1b[31m", "a b", "../../etc/passwd", "/dev/zero", ".", "#", "\\", "%(x)s", "=", "[x]",
 )  # fmt: skip
+CHUNKS = (b"tRNS", b"PLTE", b"iCCP", b"gAMA", b"acTL", b"eXIf", b"zTXt", b"sBIT")
 
 
 def bytes_changed(data: bytes, rng: Generator) -> bytes:
@@ -121,10 +106,7 @@ def png_changed(data: bytes, rng: Generator) -> bytes:
             case 1:
                 chunks.insert(i, (kind, body))
             case 2:
-                chunks.insert(
-                    i,
-                    (pick(rng, (b"tRNS", b"PLTE", b"iCCP", b"gAMA", b"acTL", b"eXIf", b"zTXt", b"sBIT")), body[:24]),
-                )
+                chunks.insert(i, (pick(rng, CHUNKS), body[:24]))
             case 3 if kind == b"IDAT":
                 try:
                     rows = zlib.decompress(body)
@@ -196,10 +178,5 @@ def glb(text: bytes, chunk: bytes, rng: Generator) -> bytes:
     if rng.random() < 0.25:
         numbers[int(rng.integers(6))] = pick(rng, INTEGERS[:14])
     version, total, first, kind, second, binary = numbers
-    parts = [
-        struct.pack("<4sIIII", b"glTF", version, total, first, kind),
-        text,
-        struct.pack("<II", second, binary),
-        chunk,
-    ]
-    return b"".join(parts)
+    head = struct.pack("<4sIIII", b"glTF", version, total, first, kind)
+    return head + text + struct.pack("<II", second, binary) + chunk

@@ -60,21 +60,7 @@ def point_spread(rng: Generator, folder: Path) -> Read:
     return partial(read_spread, case)
 
 
-ABOUT = {
-    "image": {
-        "width": 8,
-        "height": 6,
-        "rawDetails": {
-            "pixelFormat": {"black": {"r": 20, "b": 20}, "white": {"r": 1000, "b": 1000}},
-            "pixelPacking": {"endianness": "big", "bitsPerPixel": 12},
-            "mosaic": {"tile": "r,gr:gb,b", "upperLeftPixel": "b"},
-        },
-    },
-    "devices": {
-        "sensor": {"pixelPitch": 1.4e-6},
-        "mla": {"tiling": "hexUniformRowMajor", "lensPitch": 2e-5, "rotation": 0.001, "sensorOffset": {"z": 3.7e-5}},
-    },
-}
+ABOUT, ZMX = seeds.DATA["RAW"], seeds.DATA["ZMX"]
 
 
 def lfp_section(kind: bytes, content: bytes) -> tuple[bytes, str]:
@@ -118,35 +104,6 @@ def _lenses() -> tuple[Any, ...]:
     """Prescriptions of the package."""
     found = sorted((Path(str(files("assets"))) / "lenses").glob("*.json"))
     return tuple(json.loads(path.read_text("utf-8")) for path in found)
-
-
-ZMX = """VERS 140124 0 0
-NAME doublet
-UNIT MM X W X CM MR CPMM
-WAVM 1 0.5876 1.0
-PWAV 1
-SURF 0
-  TYPE STANDARD
-  CURV 0.0
-  DISZ INFINITY
-SURF 1
-  STOP
-  TYPE STANDARD
-  CURV 0.016
-  DISZ 6.0
-  GLAS N-BK7 0 0 1.5168 64.17 0
-  DIAM 12.7 1 0 0 1
-SURF 2
-  TYPE EVENASPH
-  CURV -0.022
-  CONI -0.5
-  DISZ 97.0
-  DIAM 12.7
-SURF 3
-  TYPE STANDARD
-  CURV 0.0
-  DISZ 0.0
-"""
 
 
 @reader("lens")

@@ -102,9 +102,8 @@ def maps(rng: Generator, folder: Path) -> Read:
     damaged = pick(rng, sorted(images)) if rng.random() < 0.3 else ""
     case = folder / "case"
     case.mkdir(exist_ok=True)
-    (case / "camera.json").write_bytes(
-        json_text(sheet).encode() if damaged else _json(sheet, rng, seeds.structures())
-    )
+    text = json_text(sheet).encode() if damaged else _json(sheet, rng, seeds.structures())
+    (case / "camera.json").write_bytes(text)
     for name, data in images.items():
         (case / name).write_bytes(_picture_changed(name, data, rng) if name == damaged else data)
 
@@ -235,9 +234,8 @@ def stl(rng: Generator, folder: Path) -> Read:
     """An STL file, ASCII or binary."""
     binary, text = seeds.stl_files()
     path = folder / "case.stl"
-    path.write_bytes(
-        bytes_changed(binary, rng) if rng.random() < 0.5 else text_file(text.decode(), rng, ("endsolid",))
-    )
+    damaged = bytes_changed(binary, rng) if rng.random() < 0.5 else text_file(text.decode(), rng, ("endsolid",))
+    path.write_bytes(damaged)
     return partial(_mesh_alone, path, rng.random() < 0.2)
 
 
@@ -249,6 +247,19 @@ def _fresh(folder: Path) -> Path:
     return case
 
 
+ODD_VIEWS = ("view_٣_00", "view_1.5_00", "a" * 200)
+QUILTS = (
+    "q_qs4x2a1.5",
+    "q_qs1x1",
+    "q_qs0x0a1",
+    "q_qs99999999999x1",
+    "q_qs4x2a0",
+    "q_qs٤x٢",
+    "q",
+    f"q_qs{'9' * 200}x1",
+)
+
+
 def _view_names(rng: Generator, form: str) -> list[str]:
     """Names of 3×3 views, some of them changed."""
     names = [form.format(i // 3, i % 3, i) for i in range(9)]
@@ -256,16 +267,7 @@ def _view_names(rng: Generator, form: str) -> list[str]:
         for _ in range(int(rng.integers(1, 4))):
             at = int(rng.integers(len(names)))
             stem = names[at][:-4]
-            others = (
-                "",
-                "view_99999999999999999999_00",
-                "view_-1_00",
-                "view",
-                stem + "_7",
-                "view_٣_00",
-                "view_1.5_00",
-                "a" * 200,
-            )
+            others = ("", "view_99999999999999999999_00", "view_-1_00", "view", stem + "_7", *ODD_VIEWS)
             changed = pick(rng, others) + pick(rng, (".png", ".png", ".PNG", ".jpg", ".exr", ""))
             names[at : at + 1] = [] if rng.random() < 0.3 else [changed]
     return [name for name in dict.fromkeys(names) if name]
@@ -309,14 +311,10 @@ def hci_folder(rng: Generator, folder: Path) -> Read:
         path = case / "map.pfm"
         path.write_bytes(headed(data, b"-1.0\n", rng))
         return partial(read_pfm, path)
-    _put_views(
-        rng,
-        case,
-        _view_names(rng, "input_Cam{2:03}.png") if rng.random() < 0.3 else [f"input_Cam{i:03}.png" for i in range(9)],
-    )
-    (case / "parameters.cfg").write_bytes(
-        text_file(seeds.CONFIG, rng, ("[extrinsics]", "num_cams_x = 0", "num_cams_x"))
-    )
+    form = "input_Cam{2:03}.png"
+    _put_views(rng, case, _view_names(rng, form) if rng.random() < 0.3 else [form.format(0, 0, i) for i in range(9)])
+    lines = ("[extrinsics]", "num_cams_x = 0", "num_cams_x")
+    (case / "parameters.cfg").write_bytes(text_file(seeds.CONFIG, rng, lines))
     return lambda: picture_of(find_views(case))
 
 
@@ -324,19 +322,7 @@ def hci_folder(rng: Generator, folder: Path) -> Read:
 def quilt(rng: Generator, folder: Path) -> Read:
     """A quilt, whose name contains its grid of tiles."""
     case = _fresh(folder)
-    stem = pick(
-        rng,
-        (
-            "q_qs4x2a1.5",
-            "q_qs1x1",
-            "q_qs0x0a1",
-            "q_qs99999999999x1",
-            "q_qs4x2a0",
-            "q_qs٤x٢",
-            "q",
-            f"q_qs{'9' * 200}x1",
-        ),
-    )
+    stem = pick(rng, QUILTS)
     path = case / f"{stem}{pick(rng, ('.png', '.png', '.PNG', '.exr'))}"
     path.write_bytes(pick(rng, seeds.png_files()) if rng.random() < 0.5 else png_changed(_view_bytes(), rng))
     grid = pick(rng, (None, None, (2, 4), (0, 1), (-1, -1), (10**9, 10**9)))

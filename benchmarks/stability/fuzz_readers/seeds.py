@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import tomllib
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -16,6 +17,8 @@ from PIL import Image
 
 from ii_core import IIPicture, preset
 
+DATA = tomllib.loads(Path(__file__).with_name("seeds.toml").read_text(encoding="utf-8"))
+OBJ, MTL, CONFIG, SCENES = (DATA[name] for name in ("OBJ", "MTL", "CONFIG", "SCENES"))
 SIZE = 16, 8  # pixels across and down
 SEED_CAMERAS = "setup1", "hexagonal", "multi-focus", "spherical", "grin-hexagonal-depth-control", "plenoptic"
 
@@ -86,9 +89,8 @@ def gltf() -> tuple[dict[str, Any], bytes]:
 
     def accessor(values: NDArray[Any], component: int, kind: str, **more: Any) -> int:
         number = view(values.tobytes())
-        accessors.append(
-            {"bufferView": number, "componentType": component, "count": len(values), "type": kind, **more}
-        )
+        row = {"bufferView": number, "componentType": component, "count": len(values), "type": kind}
+        accessors.append({**row, **more})
         return len(accessors) - 1
 
     attributes = {
@@ -102,18 +104,11 @@ def gltf() -> tuple[dict[str, Any], bytes]:
     sparse = {"count": 1, "indices": {"bufferView": places, "componentType": 5123}, "values": {"bufferView": moved}}
     accessors.append({**accessors[0], "sparse": sparse})
     image = view(encoded("PNG"))
-    texture = {
-        "index": 0,
-        "texCoord": 0,
-        "extensions": {"KHR_texture_transform": {"offset": [0.1, 0], "scale": [2, 2]}},
-    }
+    moving = {"KHR_texture_transform": {"offset": [0.1, 0], "scale": [2, 2]}}
+    texture = {"index": 0, "texCoord": 0, "extensions": moving}
     glass = {"KHR_materials_transmission": {"transmissionFactor": 0.9}, "KHR_materials_ior": {"ior": 1.5}}
-    spot = {
-        "type": "spot",
-        "intensity": 3,
-        "color": [1, 1, 1],
-        "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5},
-    }
+    cone = {"innerConeAngle": 0.1, "outerConeAngle": 0.5}
+    spot = {"type": "spot", "intensity": 3, "color": [1, 1, 1], "spot": cone}
     return {
         "asset": {"version": "2.0"},
         "scene": 0,
@@ -153,66 +148,9 @@ def embedded(chunk: bytes) -> str:
     return "data:application/octet-stream;base64," + base64.b64encode(chunk).decode()
 
 
-OBJ = """mtllib part.mtl
-o pyramid
-v -1 -1 0 1 0 0
-v 1 -1 0 0 1 0
-v 1 1 0 0 0 1
-v -1 1 0 1 1 1
-v 0 0 1 0.5 0.5 0.5
-vt 0 0
-vt 1 0
-vt 1 1
-vn 0 0 1
-vn 0 1 0
-usemtl painted
-s 1
-f 1/1/1 2/2/1 5/3/1
-f 2/1/1 3/2/1 5/3/2
-s off
-f -3/1/1 -2/2/2 -1/3/1
-g other
-usemtl glass
-f 1 2 3 4
-l 1 2
-"""
-MTL = """newmtl painted
-Kd 0.8 0.7 0.6
-Ks 0.2 0.2 0.2
-Ke 0 0 0
-Ns 50
-illum 2
-map_Kd -s 1 1 1 part.png
-newmtl glass
-d 0.2
-Tf 1 0.9 1
-Ni 1.5
-illum 7
-"""
-
-
 @lru_cache
 def ply_files() -> tuple[bytes, ...]:
     """Return PLY in ASCII and both binary orders, with normals, colours, texture coordinates and a strip."""
-    header = """ply
-format {} 1.0
-comment pyramid
-element vertex 5
-property float x
-property float y
-property float z
-property float nx
-property float ny
-property float nz
-property uchar red
-property uchar green
-property uchar blue
-element face 6
-property list uchar int vertex_indices
-element tristrips 1
-property list int int vertex_indices
-end_header
-"""
     found = []
     for order, name in ((">", "binary_big_endian"), ("<", "binary_little_endian"), ("", "ascii")):
         strip = [0, 1, 2, -1, 2, 3, 4]
@@ -225,7 +163,7 @@ end_header
             vertices = np.array([((*place, 0, 0, 1), (200, 100, 50)) for place in CORNERS.tolist()], kind)
             faces = np.array([(3, face) for face in FACES.tolist()], np.dtype([("n", "u1"), ("i", order + "i4", 3)]))
             body = vertices.tobytes() + faces.tobytes() + np.array([7, *strip], order + "i4").tobytes()
-        found.append(header.format(name).encode() + body)
+        found.append(DATA["PLY"].format(name).encode() + body)
     return tuple(found)
 
 
@@ -241,95 +179,6 @@ def stl_files() -> tuple[bytes, ...]:
     head = b"binary".ljust(80) + len(FACES).to_bytes(4, "little")
     return head + triangles.tobytes(), "\n".join([*text, "endsolid pyramid", ""]).encode()
 
-
-def _scene(*objects: dict[str, Any], **more: Any) -> dict[str, Any]:
-    matt = {"matt": {"colour": "#cfc4b2", "specular": 0.3, "shininess": 40, "mirror": "#383020"}}
-    light = {"kind": "directional", "direction": [0.6, -1.0, 0.5], "colour": "#fff4e0", "intensity": 0.8}
-    background = {"horizon": "#e9eef2", "zenith": "#5d8fc4", "nadir": "#c9c6bf", "spread_deg": 40}
-    head = {"title": "Case", "ambient": 0.3, "max_depth": 4, "background": background, "light": [light]}
-    return {**head, "material": matt, "object": [{"material": "matt", **one} for one in objects], **more}
-
-
-BALL = {
-    "name": "ball",
-    "shape": "sphere",
-    "radius_mm": 6,
-    "segments": 8,
-    "position_mm": [12, -7, 29],
-    "scale": [1, 2, 1],
-}
-SCENES = (
-    _scene(BALL, {"shape": "box", "size_mm": [1, 2, 3], "rotate_deg": [0, 30, 0]}, {"shape": "plane",
-    "size_mm": [40, 24]}),
-    _scene(
-        {"shape": "cylinder", "radius_mm": 9.5, "top_mm": 0, "height_mm": 24, "segments": 8},
-        {
-            "shape": "revolve", "profile_mm": [[0, 0], [2, 1], [1, 3], [0, 4]], "segments": 8, "steps": 4, "lobes": 3,
-            "lobe_depth": 0.1, "sideways_mm": [0.1, 0],
-        },
-        {
-            "shape": "box_grid", "count": [2, 2, 1], "spacing_mm": [4, 4, 4], "box_mm": 2, "jitter": 0.5, "grow": 0.1,
-            "tiles": 4, "seed": 3,
-        },
-    ),
-    _scene(
-        {
-            "shape": "implicit", "cell_mm": 2.0, "grow_mm": 0.1, "front_mm": [0, 0, 10, 10],
-            "parts": [
-                {"part": "block", "size_mm": [8, 8, 8], "round_mm": 0.6, "rotate_deg": [0, 9, 0]},
-                {"part": "ball", "op": "cut", "radii_mm": [3, 3, 3], "at_mm": [2, 2, 2], "blend_mm": 1.0,
-                "colour": "#ff0000"},
-                {"part": "capsule", "to_mm": [5, 5, 5], "radius_mm": 2, "end_radius_mm": 1, "mirrored": True},
-                {"part": "tube", "points_mm": [[0, 0, 0, 2], [5, 0, 0, 2], [9, 3, 0, 1]], "steps": 3},
-            ],
-        },
-    ),
-    _scene(
-        {
-            "shape": "heightfield", "size_mm": [40, 40], "widen": 1.5, "cells": [6, 6], "height_mm": 5, "swell": True,
-            "feature_mm": 9, "octaves": 2, "rough": 0.5, "ridged": True, "rise_mm": 1, "valley_mm": 2,
-            "colours": [[0, "#00ff00"], [3, "#ffffff"]], "steep": "#808080", "seed": 7,
-        },
-        {
-            "shape": "strands", "count": 5, "radii_mm": [5, 5, 5], "length_mm": 9, "width_mm": 0.5, "steps": 3,
-            "volume": 0.2,
-            "parting_mm": 1, "weight": 0.3, "wave_mm": 1, "wavelength_mm": 4, "face": 0.5, "colours": ["#201008",
-            "#402010"],
-            "seed": 5,
-        },
-    ),
-    _scene(
-        {**BALL, "material": "painted"},
-        {"mesh": "part.obj", "smooth": False},
-        {"mesh": "part.glb", "lights": 0.5, "material": "glass"},
-        background={"image": "part.exr", "turn_deg": 30.0, "intensity": 0.8},
-        fog={"colour": "#808080", "density_per_mm": 0.01},
-        light=[
-            {"kind": "point", "position_mm": [40, 60, -40], "colour": "#dfe8ff", "intensity": 0.14},
-            {"kind": "spot", "position_mm": [4, 6, -4], "direction": [0, 0, 1], "cone_deg": [10, 20]},
-        ],
-        texture={
-            "image": {"kind": "image", "file": "part.png", "repeat": [2, 2], "wrap": "mirror"},
-            "checker": {"kind": "checker", "colours": ["#ff0000", "#ffffff"], "size": 4, "on": "surface"},
-            "stripes": {"kind": "stripes", "colours": ["#ff0000", [0, 0, 0.5]], "width": 4, "axis": [0, 1, 0],
-            "soft": 0.1},
-            "noise": {"kind": "noise", "colours": ["#ff0000", "#ffffff"], "size": [1, 2, 3], "octaves": 3, "seed": 4},
-            "vertex": {"kind": "vertex"},
-        },
-        material={
-            "matt": {"texture": "checker"},
-            "painted": {
-                "texture": "image", "roughness": 0.5, "metallic": 0.2, "normal_map": "part.png", "normal_scale": 0.8,
-                "metallic_roughness_map": "part.png", "emission_map": "part.png", "emission_strength": 2,
-                "alpha_cutoff": 0.5,
-            },
-            "glass": {
-                "colour": "#000000", "transmission": [0.9, 0.9, 0.9], "ior": [1.51, 1.52, 1.53], "priority": 2,
-                "absorption_per_mm": [0.2, 0.02, 0.11],
-            },
-        },
-    ),
-)  # fmt: skip
 
 POINT = {
     "scheme": "si-h264", "options": {"gop": 16, "order": "serpentine"}, "target_bpp": 0.1, "bpp": 0.0991,
@@ -362,13 +211,3 @@ MANIFEST = {
     "scenes": {"apples": {"hash": "0" * 64, "products": {"picture": PRODUCT, "flat": PRODUCT}}},
     "contact.png": {"key": "0" * 64, "files": {"contact.png": FILE}},
 }
-CONFIG = """[intrinsics]
-image_resolution_x_px = 16
-image_resolution_y_px = 8
-[extrinsics]
-num_cams_x = 3
-num_cams_y = 3
-[meta]
-disp_min = -1.0
-disp_max = 1.0
-"""

@@ -22,22 +22,8 @@ from .containers import bytes_changed
 from .readers import Read, _as_file, _companions, _fresh, _json, reader
 from .trees import json_text, mutated, pick, toml_text
 
-
-def _track(of: Any, key: str, values: list[list[float]], *, frames: Any = (0, 5), **how: str) -> dict[str, Any]:
-    return {"of": of, "key": key, "frames": list(frames), "values": values, **how}
-
-
-TRACKS = (
-    _track(["object.ball"], "position_mm", [[12, -7, 29], [0, -7, 29]]),
-    _track("object.b*", "scale", [[1, 1, 1], [2, 2, 2], [1, 1, 1]], frames=(0, 2, 5), how="smooth"),
-    _track("object.ball", "rotate_deg", [[0, 0, 0], [0, 360, 0]]),
-    _track("material.matt", "shininess", [[40], [80]], how="step"),
-    _track("light.0", "intensity", [[0.8], [0.1]]),
-    _track("background", "zenith", [[0, 0, 1], [0.5, 0, 0]]),
-    _track("camera", "position_mm", [[-6, 0, -2], [6, 1, 2]]),
-    _track("camera", "look_at_mm", [[0, 0, 40]], frames=(0,)),
-)
-ANIMATION = {"frames": 6, "fps": 24, "track": list(TRACKS)}
+ANIMATION = seeds.DATA["ANIMATION"]
+TRACKS = ANIMATION["track"]
 STILL = np.eye(4).tolist()
 FRAME = {"key": "0" * 64, "pose": STILL, "files": {"frame_0000.png": seeds.FILE}, "seconds": 1.5, "rays": {}}
 MANIFEST = {

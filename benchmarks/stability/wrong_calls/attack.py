@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .good import Call
+from .calls import Call
 
 
 class Odd:
