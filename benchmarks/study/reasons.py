@@ -178,7 +178,7 @@ def counted(picture: IIPicture) -> Iterator[tuple[str, Callable[[int], int]]]:
 
     for what, scheme, goal in (
         ("constant quantiser", "h264:chroma=420", {"qp": QUANTISER}),
-        ("constant bit rate", "h264:chroma=420", {"bpp": 1.0}),
+        ("constant bit rate", "h264:chroma=420,rate=cbr", {"bpp": 1.0}),
         ("two passes", "h264:chroma=420,rate=2pass", {"bpp": 1.0}),
         ("2008, range 128", "h264of2008:chroma=420,rate=cq,merange=128", {"qp": QUANTISER}),
     ):

@@ -276,7 +276,7 @@ BAD_CODINGS = {
     "bpp is 0": ["--bpp", 0],
     "bpp is -1": ["--bpp", -1],
     "bpp is nan": ["--bpp", "nan"],
-    "no bpp or qp is given: exactly one of bpp and qp is needed": [],
+    "no bpp or qp or quality is given: exactly one of bpp and qp and quality is needed": [],
     "qp is 99": ["--qp", 99],
 }
 

@@ -138,7 +138,7 @@ def test_a_missing_encoder_is_named_with_schemes_that_work(monkeypatch):
 def test_a_missing_decoder_is_named(monkeypatch):
     coded = encode(PICTURE, "si-vp9", qp=30)
     without(monkeypatch, "vp9")
-    with pytest.raises(NotInstalled, match="decoding of VP9 needs vp9 in PyAV .*, which is not installed"):
+    with pytest.raises(NotInstalled, match=r"decoding of VP9 needs vp9 in PyAV .*, which is not installed"):
         decode(coded)
 
 
