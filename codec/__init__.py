@@ -13,7 +13,7 @@ from .coders.volume import Separate, Volume
 from .coders.vp9 import Vp9
 from .coders.x264 import H264
 from .coders.x265 import Hevc
-from .contract import Coder, Goal, Option, options, parse_scheme, register, schemes
+from .contract import Coder, Goal, Option, general_scheme, options, parse_scheme, register, schemes
 from .inspect.extract import extract
 from .inspect.order_analysis import analyse_orders
 from .inspect.progressive import DecodedView, Stage, decode_levels, decode_view
@@ -64,6 +64,7 @@ __all__ = [
     "encode",
     "encode_take",
     "extract",
+    "general_scheme",
     "is_take",
     "light_field_cost",
     "meet_size",

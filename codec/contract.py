@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
+from ii_core.base.extras import NotInstalled
 from ii_core.base.plugins import load_plugins
 
 from .checks import check_type
@@ -139,6 +140,11 @@ class Coder(ABC):
         return self.rate_control or self.qp_range is not None or self.quality_range is not None
 
     @property
+    def missing(self) -> str:
+        """Name of a library that coding needs and this installation lacks; empty if there is none."""
+        return ""
+
+    @property
     @abstractmethod
     def versions(self) -> dict[str, str]:
         """Name to version."""
@@ -233,12 +239,56 @@ def find(name: str) -> Coder:
 
 
 def schemes() -> dict[str, str]:
-    """Return the name of every scheme and its description in one line, presets included."""
+    """Return the name of every scheme and its description in one line, presets and missing libraries included."""
     _load_plugins()
-    return {
-        name: ". ".join([coder.about, *(["Presets: " + ", ".join(coder.presets)] if coder.presets else [])])
-        for name, coder in sorted(_CODERS.items())
-    }
+    return {name: _line(coder) for name, coder in sorted(_CODERS.items())}
+
+
+def _line(coder: Coder) -> str:
+    presets = ["Presets: " + ", ".join(coder.presets)] if coder.presets else []
+    return ". ".join([coder.about, *presets, *([f"NOT INSTALLED: {coder.missing}"] if coder.missing else [])])
+
+
+def check_installed(coder: Coder) -> None:
+    """Raise NotInstalled if a library of a coder is missing; the message names schemes of its kind that work."""
+    if not coder.missing:
+        return
+    others = (other for _, other in sorted(_CODERS.items()) if other.kind == coder.kind and other.name != coder.name)
+    names = ", ".join(other.name for other in others if not other.missing)
+    raise NotInstalled(
+        f"scheme {coder.name} needs {coder.missing}, which is not installed"
+        + (f": take one of {names}" if names else "")
+    )
+
+
+# Schemes that take any picture of several views, and any picture, the smallest files first.
+OF_VIEWS, OF_PICTURES = ("si-lf", "si-hevc", "si-avif"), ("jpeg2000", "jpegxl", "jpeg")
+
+
+def general_scheme(picture: IIPicture, bpp: Any = None, qp: Any = None, quality: Any = None) -> str:
+    """Return the scheme with the smallest files that takes a picture and a goal.
+
+    It is one for light fields if the picture has 2×2 views or more, else one for plain pictures.
+
+    Raises
+    ------
+    ValueError
+        If none takes them; the message is that of the first scheme.
+    """
+    check_type("picture", picture, IIPicture, "an IIPicture")
+    refused: Exception | None = None
+    for name in (*(OF_VIEWS if min(picture.ei_pixels) >= 2 else ()), *OF_PICTURES):
+        coder, settings = parse_scheme(name)
+        try:
+            check_installed(coder)
+            checked_goal(coder, settings, bpp, qp, quality)
+            check_picture(coder, settings, picture)
+        except (ValueError, NotInstalled) as error:
+            refused = refused or error
+        else:
+            return name
+    assert refused is not None
+    raise refused
 
 
 def options(scheme: str) -> dict[str, str]:
@@ -360,6 +410,7 @@ def check_picture(coder: Coder, options: Options, picture: Any) -> None:
         raise ValueError(
             f"pixels are {picture.pixels.dtype.name}: scheme {coder.name} takes {', '.join(coder.dtypes)}"
         )
+    check_installed(coder)
     picture.check_regular()
     width, height = picture.size
     if width * height > MAX_PIXELS:

@@ -40,7 +40,7 @@ CONDITIONS: list[tuple[str, str, list[dict[str, Any]]]] = [
     ("GOP of 32", "si-h264:rate=cq,chroma=420,gop=32", CQ),
     ("order row, not parallel", "si-h264:rate=cq,chroma=420,order=row", CQ),
     ("an encoder in haste (veryfast)", "si-h264:rate=cq,chroma=420,preset=veryfast", CQ),
-    ("constant bit rate", "si-h264:chroma=420", [{"bpp": bpp} for bpp in RATES]),
+    ("constant bit rate", "si-h264:chroma=420,rate=cbr", [{"bpp": bpp} for bpp in RATES]),
     ("rate factor, macroblock tree, B predict B", "si-h264:rate=crf,chroma=420,pyramid=1", CQ),
     ("MPEG-2", "si-mpeg2", [{"qp": quantiser} for quantiser in (2, 4, 8, 14, 22)]),
     ("HEVC, constant quantiser", "si-hevc:rate=cq,preset=medium,chroma=420", CQ),

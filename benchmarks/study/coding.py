@@ -9,6 +9,7 @@ from typing import Any
 
 from benchmarks.coding.coders import qualities
 from benchmarks.coding.rd import rd_point
+from codec.contract import find
 from ii_core import IIPicture, preset
 from ii_core.base.parallel import cores
 from raytrace_ii import Shot, load_scene, render
@@ -69,7 +70,13 @@ def goals_of(scheme: str) -> list[dict[str, Any]]:
     """Return the goals of a scheme: the dissertation's rates, or quantisers for schemes with a long search."""
     if scheme.startswith(BY_QUANTISER):
         return sorted(qualities(scheme), key=lambda goal: -goal["qp"])
-    return [{"bpp": rate} for rate in RATES]
+    return [rated(scheme, rate) for rate in RATES]
+
+
+def rated(scheme: str, bpp: float) -> dict[str, Any]:
+    """Return the goal of a rate: the dissertation's constant bit rate for H.264 that names no other rate control."""
+    plain = "-h264" in scheme and find(scheme.partition(":")[0]).rated and "rate=" not in scheme
+    return {"bpp": bpp, "rate": "cbr"} if plain else {"bpp": bpp}
 
 
 def curves(

@@ -29,7 +29,7 @@ from metrics import (
 from metrics.depth.layers import virtual_viewpoint
 from raytrace_ii import Shot
 
-from .coding import CODED, SCENES, curves, setup3_scale, shot
+from .coding import CODED, SCENES, curves, rated, setup3_scale, shot
 from .rates import REFERENCE, VOLUME
 from .runner import Step
 from .sheets import enlarged, sheet
@@ -89,7 +89,7 @@ def artefacts(folder: Path, *, scene: str, scale: int, camera: str, crop: int | 
     """
     picture = shot(scene, camera, scale).picture
     with ThreadPoolExecutor(cores()) as pool:
-        coded = list(pool.map(lambda scheme: encode(picture, scheme, bpp=ARTEFACT_RATE), SHOWN))
+        coded = list(pool.map(lambda scheme: encode(picture, scheme, **rated(scheme, ARTEFACT_RATE)), SHOWN))
         decoded = list(pool.map(decode, coded))
     views = [front(one) for one in (picture, *decoded)]
     apart = [255 - np.abs(view.astype(np.int16) - views[0]).astype(np.uint8) for view in views]
@@ -175,7 +175,7 @@ def at_quality(picture: IIPicture, scheme: str, quality: float) -> tuple[Any, II
     """Return the coded picture nearest to a target Q_global, within 0.05 dB if possible."""
 
     def coding(rate: float) -> tuple[Any, IIPicture, float]:
-        coded = encode(picture, scheme, bpp=rate)
+        coded = encode(picture, scheme, **rated(scheme, rate))
         decoded = decode(coded)
         return coded, decoded, q_global(picture, decoded)
 

@@ -9,6 +9,8 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core.base.extras import NotInstalled
+
 from ..bitstream import framing
 from ..bitstream.obu import temporal_units
 from ..frames import Film
@@ -27,8 +29,21 @@ class Stream(Protocol):
     def framed(self) -> bool: ...
 
 
+def missing_codec(name: str) -> str:
+    """Return FFmpeg's name of a codec and the library that lacks it, if it does; else an empty text."""
+    return "" if name in av.codecs_available else f"{name} in PyAV {av.__version__}"
+
+
 def open_decoder(coder: Stream, film: Film) -> Any:
-    """Return the decoder, ready for packets."""
+    """Return the decoder, ready for packets.
+
+    Raises
+    ------
+    NotInstalled
+        If PyAV lacks it.
+    """
+    if missing := missing_codec(coder.decoder):
+        raise NotInstalled(f"decoding of {coder.standard} needs {missing}, which is not installed")
     context: Any = av.CodecContext.create(coder.decoder, "r")
     context.thread_count = 1
     # Refuse larger frames before they take memory. The decoder counts what it allocates: whole blocks, and rows

@@ -24,7 +24,7 @@ from ..order import BY, ORDERS, selection_order
 from ..progress import frames_done
 from ..search import TOLERANCE, Axis, CodingResult, Run, Trial, bracket, met, nearest, size_miss, trials
 from . import groups
-from .decoding import copy_plane, decoded_frames
+from .decoding import copy_plane, decoded_frames, missing_codec
 
 NAMES = {"ei": "Elementary images", "si": "Sub-images", "ri": "Ray-space images"}
 
@@ -163,6 +163,11 @@ class PseudoVideo(Coder, Generic[Settings]):
         self.kind = kind
         self.name = f"{kind}-{type(self).__name__.lower()}"
         self.about = f"{NAMES[kind]} as a pseudo video sequence, {self.standard} by {self.encoder}"
+
+    @property
+    def missing(self) -> str:
+        """Return the name of FFmpeg's decoder if PyAV lacks it: target rates need it, too."""
+        return missing_codec(self.decoder)
 
     @property
     def versions(self) -> dict[str, str]:

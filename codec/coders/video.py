@@ -18,6 +18,7 @@ from ..contract import Option
 from ..frames import Film
 from ..progress import frames_done
 from ..search import Run
+from .decoding import missing_codec
 from .pseudo_video import ORDER, Packets, PseudoVideo, Source
 
 # Options of every FFmpeg encoder.
@@ -59,6 +60,11 @@ class Settings:
 
 class Video(PseudoVideo[Settings]):
     """Pseudo video sequence by an FFmpeg encoder; ``encoder`` is its name in FFmpeg."""
+
+    @property
+    def missing(self) -> str:
+        """Return the name of FFmpeg's encoder or decoder if PyAV lacks it."""
+        return missing_codec(self.encoder) or super().missing
 
     def run_encoder(self, pixels: NDArray[Any], film: Film, settings: Settings) -> Packets:
         """Code the frames of a film once."""

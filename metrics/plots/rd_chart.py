@@ -17,7 +17,7 @@ from ii_core.base.extras import load
 from ii_core.display.figure import COLOURS, LINES, MARKERS, check_suffix, new_figure, plain_text, save
 
 from ..measures.measure import measure_of
-from ..rates.points import check_measured, is_study
+from ..rates.points import check_measured, is_study, limit_of
 
 
 @checks.checked(study=is_study, path=checks.path, measure=checks.text)
@@ -25,7 +25,8 @@ def rd_chart(study: Mapping[str, Any], path: str | os.PathLike[str], *, measure:
     """Draw a quality over rate, one line per scheme.
 
     Filled markers are targets met, joined by lines. A hollow marker is the nearest rate to a target that the scheme
-    does not meet; a dotted line marks its least (or largest) rate. Lossless points lie on the upper edge.
+    does not meet; a dotted line marks it if it is the least (or largest) rate of the scheme. Lossless points lie on
+    the upper edge.
 
     Parameters
     ----------
@@ -101,8 +102,9 @@ def _draw(axes: Any, points: Sequence[Mapping[str, Any]], i: int, measure: str) 
     lossless = sorted({p["bpp"] for p in points if p[measure] == measure_of(measure).best})
 
     label = plain_text(points[0]["scheme"])
-    floor = min((p["bpp"] for p in points if not p["reached"] and p["bpp"] > p["target_bpp"]), default=None)
-    ceiling = max((p["bpp"] for p in points if not p["reached"] and p["bpp"] <= p["target_bpp"]), default=None)
+    limits = [(limit_of(point, points), point["bpp"]) for point in points if not point["reached"]]
+    floor = min((rate for limit, rate in limits if limit == "floor"), default=None)
+    ceiling = max((rate for limit, rate in limits if limit == "ceiling"), default=None)
     for limit, words in ((floor, "not below"), (ceiling, "not above")):
         if limit is not None:
             label += f"  ({words} {limit:.2g} bpp)"

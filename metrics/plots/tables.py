@@ -14,7 +14,7 @@ from ii_core.base.files import atomic_path
 
 from ..measures.measure import Measure, measure_of
 from ..rates.against_anchor import anchor_of, differences
-from ..rates.points import FIELDS, check_measured, check_points, is_study, measures_of
+from ..rates.points import FIELDS, check_measured, check_points, is_study, limit_of, measures_of
 
 
 @checks.checked(path=checks.path, records=checks.sequence)
@@ -63,8 +63,9 @@ def summary_table(
     Returns
     -------
     list of dict
-        ``scheme``; one column per target rate with the quality, or the least or largest rate of a scheme that does
-        not meet it; ``gain``, the mean difference to the anchor over the target rates that both meet; ``BD-rate``,
+        ``scheme``; one column per target rate with the quality; if the scheme does not meet it, with its least or
+        largest rate, or the quality at the nearest rate found; ``gain``, the mean difference to the anchor at the
+        target rates, see `differences`; ``BD-rate``,
         and ``BD-PSNR`` for qualities in dB or ``BD-quality`` for others, or the reason why they are undefined.
 
     Raises
@@ -83,7 +84,7 @@ def summary_table(
     for scheme in schemes:
         row = {"scheme": scheme}
         for target in targets:
-            row[f"{target:g}"] = _cell(by_target[scheme].get(target), measure)
+            row[f"{target:g}"] = _cell(by_target[scheme].get(target), points, measure)
         if scheme == anchor_of(study, anchor):
             row |= dict.fromkeys(("gain", "BD-rate", bd_quality), "anchor")
         else:
@@ -108,12 +109,14 @@ def _differences(found: Mapping[str, Any], kind: Measure, bd_quality: str) -> di
     return cells
 
 
-def _cell(point: Mapping[str, Any] | None, measure: str) -> str:
+def _cell(point: Mapping[str, Any] | None, points: Sequence[Mapping[str, Any]], measure: str) -> str:
     if point is None:
         return ""
+    shown = measure_of(measure).shown(point[measure])
     if point["reached"]:
-        return measure_of(measure).shown(point[measure])
-    return f"– ({'floor' if point['bpp'] > point['target_bpp'] else 'ceiling'} {point['bpp']:.3g})"
+        return shown
+    limit = limit_of(point, points)
+    return f"– ({limit} {point['bpp']:.3g})" if limit else f"{shown} (nearest {point['bpp']:.3g})"
 
 
 def _signed(value: float, digits: int, unit: str) -> str:

@@ -13,6 +13,7 @@ from .points import are_studies, check_measured, is_study
 from .rd import UndefinedDifference, bd_psnr, bd_rate
 
 Points = list[tuple[float, float]]
+NEARLY = 1.25  # a target missed by a smaller factor counts, if points on both sides of it are known
 VALUES = ("gain", "bd_rate_percent", "bd_quality")
 
 
@@ -40,9 +41,11 @@ def differences(
     Returns
     -------
     dict of str to dict
-        By scheme, without the anchor: ``gain``, the mean difference in quality over the target rates that both reach;
-        ``rates``, their number; ``bd_rate_percent``, see `bd_rate`, of quality that grows where lower is better, too;
-        ``bd_quality``, see `bd_psnr`. An undefined value is None, and ``why`` holds the reason in a few words.
+        By scheme, without the anchor: ``gain``, the mean difference in quality over the target rates that both reach,
+        or miss by less than a quarter with points on both sides, between which quality is interpolated linearly over
+        the logarithm of the rate; ``rates``, their number; ``bd_rate_percent``, see `bd_rate`, of quality that grows
+        where lower is better, too; ``bd_quality``, see `bd_psnr`. An undefined value is None, and ``why`` holds the
+        reason in a few words.
 
     Raises
     ------
@@ -101,13 +104,28 @@ def _growing(points: Points, measure: Measure) -> Points:
 
 
 def _gains(points: Sequence[Mapping[str, Any]], anchor: str, scheme: str, measure: str) -> list[float]:
-    """Differences in quality at the target rates that both reach."""
+    """Differences in quality at the target rates that both reach, or nearly reach."""
     reached: dict[str, dict[float, float]] = {anchor: {}, scheme: {}}
     for point in points:
-        if point["scheme"] in reached and point["reached"]:
-            reached[point["scheme"]][point["target_bpp"]] = point[measure]
+        if point["scheme"] in reached:
+            quality = point[measure] if point["reached"] else _interpolated(point, points, measure)
+            reached[point["scheme"]][point["target_bpp"]] = quality
     both = reached[scheme].keys() & reached[anchor].keys()
     return [gain for target in both if math.isfinite(gain := reached[scheme][target] - reached[anchor][target])]
+
+
+def _interpolated(missed: Mapping[str, Any], points: Sequence[Mapping[str, Any]], measure: str) -> float:
+    """Return the quality at a missed target between the points around it; NaN if that is impossible."""
+    target = missed["target_bpp"]
+    if abs(math.log(missed["bpp"] / target)) > math.log(NEARLY):
+        return math.nan
+    found = operating_points(points, missed["scheme"], measure)
+    under = max((point for point in found if point[0] <= target), default=None)
+    over = min((point for point in found if point[0] > target), default=None)
+    if under is None or over is None:
+        return math.nan
+    share = math.log(target / under[0]) / math.log(over[0] / under[0])
+    return under[1] + share * (over[1] - under[1])
 
 
 @checks.checked(studies=are_studies, anchor=checks.text, measure=checks.text)

@@ -47,6 +47,20 @@ def check_measured(points: Sequence[Mapping[str, Any]], measure: str) -> None:
         raise ValueError(f"the study has no {measure}: it has {', '.join(measures_of(points))}")
 
 
+NEAR = 1.02  # rates within this factor count as equal
+
+
+def limit_of(point: Mapping[str, Any], points: Sequence[Mapping[str, Any]]) -> str:
+    """Return whether a missed rate is the "floor" or the "ceiling" of its scheme; empty if the scheme goes beyond it.
+
+    ``points`` may hold other schemes.
+    """
+    rates = [other["bpp"] for other in points if other["scheme"] == point["scheme"]]
+    if point["bpp"] > point["target_bpp"]:
+        return "floor" if point["bpp"] <= NEAR * min(rates) else ""
+    return "ceiling" if NEAR * point["bpp"] >= max(rates) else ""
+
+
 def spelt(value: Any) -> Any:
     """Return plain values for JSON: infinities as text, null for NaN."""
     if isinstance(value, Mapping):

@@ -13,6 +13,8 @@ from .progress import progress_bar, say_done, spinner
 from .tables import print_table
 from .words import say
 
+TAKE_SCHEME = "si-h264"  # of a folder of frames, if none is given
+
 
 @app.command()
 def schemes(
@@ -39,7 +41,10 @@ def encode(
     context: typer.Context,
     picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar, or a folder of frames.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The coded file.")],
-    scheme: Annotated[str, typer.Option(help="From `raytrace-ii schemes`, options after a colon.")] = "si-h264",
+    scheme: Annotated[
+        str | None,
+        typer.Option(help="From `raytrace-ii schemes`, options after a colon; if not given, the best general one."),
+    ] = None,
     bpp: Annotated[float | None, typer.Option(help="Target rate, bits per pixel.")] = None,
     qp: Annotated[int | None, typer.Option(help="Constant quantiser.")] = None,
     quality: Annotated[float | None, typer.Option(help="Quality on the scheme's own scale.")] = None,
@@ -52,7 +57,7 @@ def encode(
     force: Force = False,
 ) -> None:
     """Code an II-picture, or a folder of frames as II-video."""
-    from codec import Plan, encode
+    from codec import Plan, encode, general_scheme
     from ii_core import IIPicture
     from ii_core.base.files import IMAGE_TYPES
 
@@ -66,17 +71,20 @@ def encode(
         if quality is not None:
             raise ValueError(f"quality is {quality:g}: II-video is coded by --bpp or --qp")
         plan = Plan(walk=walk, span=span, group=group, strip=strip)
-        encode_frames(picture, output, scheme, plan, bpp=bpp, qp=qp, rate=rate)
+        encode_frames(picture, output, scheme or TAKE_SCHEME, plan, bpp=bpp, qp=qp, rate=rate)
         return
     check_unused(context, f"{picture} is one picture, which", "walk", "span", "group", "strip", "rate")
     if quality is not None and quality.is_integer():
         quality = int(quality)  # schemes of whole qualities
     original = IIPicture.load(picture)
+    chosen = scheme is None
+    scheme = scheme or general_scheme(original, bpp=bpp, qp=qp, quality=quality)
     with progress_bar(f"{scheme} codes {picture.name}", at_once=True) as report:
         coded = encode(original, scheme, bpp=bpp, qp=qp, quality=quality, progress=report)
     coded.save(output)
     runs = f" after {coded.runs} encoder runs" if coded.runs and coded.runs > 1 else ""
-    say_done(f"{output}: {coded.nbytes} bytes, {coded.bpp:.4g} bpp{runs}")
+    by = f" by {scheme}, the best general scheme for this picture" if chosen else ""
+    say_done(f"{output}: {coded.nbytes} bytes, {coded.bpp:.4g} bpp{runs}{by}")
     if not coded.reached:
         say(f"{scheme} cannot reach {bpp:g} bpp with this picture: the nearest rate is {coded.bpp:.4g} bpp")
 

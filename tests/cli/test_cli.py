@@ -170,6 +170,19 @@ def test_a_missed_rate_is_reported(run, picture, tmp_path):
     assert code == 0 and "cannot reach 0.01 bpp" in out
 
 
+def test_the_scheme_that_is_not_given_is_told(run, tmp_path, monkeypatch):
+    import av
+
+    from ii_core import IIPicture
+
+    IIPicture(np.full((8, 8, 3), 90, np.uint8), (4, 4), (2, 2)).save(tmp_path / "a.png")
+    code, out, _ = run("encode", tmp_path / "a.png", "--qp", 30, "-o", tmp_path / "a.ii")
+    assert code == 0 and "by si-lf, the best general scheme for this picture" in out
+    monkeypatch.setattr(av, "codecs_available", av.codecs_available - {"libx265"})
+    code, out, _ = run("schemes", "si-hevc")
+    assert code == 0 and "NOT INSTALLED: libx265" in " ".join(out.split())
+
+
 def test_a_picture_of_one_lens_is_upright(run, tmp_path):
     path = tmp_path / "flat.png"
     assert run("render", "apples", "--camera", "pinhole2d", "--scale", 64, "-o", path)[0] == 0
@@ -263,7 +276,7 @@ BAD_CODINGS = {
     "bpp is 0": ["--bpp", 0],
     "bpp is -1": ["--bpp", -1],
     "bpp is nan": ["--bpp", "nan"],
-    "no bpp or qp is given: exactly one of bpp and qp is needed": [],
+    "no bpp or qp or quality is given: exactly one of bpp and qp and quality is needed": [],
     "qp is 99": ["--qp", 99],
 }
 

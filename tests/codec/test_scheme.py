@@ -1,12 +1,14 @@
 """Scheme names, options and presets."""
 
+import av
 import numpy as np
 import pytest
 
-from codec import encode, options, schemes
+from codec import decode, encode, general_scheme, options, schemes
 from codec.coders.jpeg2000 import Jpeg2000
 from codec.contract import find, parse_scheme, register
 from ii_core import IIPicture
+from ii_core.base.extras import NotInstalled
 
 PICTURE = IIPicture(np.zeros((4, 4, 3), np.uint8), (2, 2), (2, 2))
 
@@ -115,3 +117,38 @@ def test_pictures_beyond_all_bounds_are_refused_before_work():
     wide = IIPicture(np.broadcast_to(np.uint8(0), (1, 20_000, 3)), (20_000, 1), (1, 1))
     with pytest.raises(ValueError, match="frames of scheme si-h264 would have 20000×1 pixels"):
         encode(wide, "si-h264", bpp=1)
+
+
+def without(monkeypatch, *codecs):
+    monkeypatch.setattr(av, "codecs_available", av.codecs_available - set(codecs))
+
+
+def test_a_missing_encoder_is_named_with_schemes_that_work(monkeypatch):
+    without(monkeypatch, "libx265")
+    message = "^scheme si-hevc needs libx265 in PyAV .*, which is not installed: take one of .*si-av1.*si-h264"
+    with pytest.raises(NotInstalled, match=message):
+        encode(PICTURE, "si-hevc", bpp=1)
+    assert "NOT INSTALLED: libx265" in schemes()["si-hevc"]
+    assert "NOT INSTALLED" not in schemes()["si-h264"]
+    with pytest.raises(NotInstalled) as caught:
+        encode(PICTURE, "ri-hevc", qp=30)
+    assert "\n" not in str(caught.value) and "hevc," not in str(caught.value)
+
+
+def test_a_missing_decoder_is_named(monkeypatch):
+    coded = encode(PICTURE, "si-vp9", qp=30)
+    without(monkeypatch, "vp9")
+    with pytest.raises(NotInstalled, match=r"decoding of VP9 needs vp9 in PyAV .*, which is not installed"):
+        decode(coded)
+
+
+def test_the_general_scheme_fits_the_picture():
+    assert general_scheme(PICTURE, bpp=1) == "si-lf"
+    plain = IIPicture(np.zeros((32, 32, 3), np.uint8), (32, 32), (1, 1))
+    assert general_scheme(plain, bpp=1) == "jpeg2000"
+    row = IIPicture(np.zeros((32, 32, 3), np.uint8), (16, 32), (2, 1))
+    assert general_scheme(row, bpp=1) == "jpeg2000"
+    with pytest.raises(ValueError, match="no bpp or qp or quality is given"):
+        general_scheme(PICTURE)
+    with pytest.raises(TypeError, match="picture is"):
+        general_scheme(PICTURE.pixels, bpp=1)

@@ -472,6 +472,33 @@ def test_table_of_a_ceiling_and_of_missing_points():
     assert row["1"] == "– (ceiling 0.8)" and row["0.35"] == "" and row["gain"] == "+12.00 dB at 3 rates"
 
 
+def missed_in_the_middle():
+    """A coder with coarse steps: the target 0.35 is missed by 0.39, and its rates go on below and above."""
+    records = made_up()
+    records[3] |= {"reached": False, "bpp": 0.39, "q_global": float(curve(0.39) + 12)}
+    return records
+
+
+def test_a_missed_rate_is_no_floor_where_the_scheme_goes_below_it():
+    row, ei, _ = summary_table({"points": missed_in_the_middle()}, anchor="jpeg2000")
+    quality = curve(0.39) + 12
+    assert row["0.35"] == f"{quality:.2f} (nearest 0.39)" and ei["0.1"] == "– (floor 0.31)"
+    labels = [line.get_label() for line in draw({"points": missed_in_the_middle()}).axes[0].lines]
+    assert "si-h264" in labels and "ei-h264  (not below 0.31 bpp)" in labels
+    records = missed_in_the_middle()
+    records[3] |= {"bpp": 0.31}
+    assert "(nearest 0.31)" in summary_table({"points": records})[0]["0.35"]  # below its target: no ceiling
+
+
+def test_a_missed_rate_counts_in_the_gain_at_the_interpolated_quality():
+    row = summary_table({"points": missed_in_the_middle()}, anchor="jpeg2000")[0]
+    between = np.interp(np.log(0.35), np.log([0.1, 0.39]), [curve(0.1), curve(0.39)]) - curve(0.35)
+    assert row["gain"] == f"{12 + between / 5:+.2f} dB at 5 rates"
+    records = missed_in_the_middle()
+    records[3] |= {"bpp": 0.6}
+    assert summary_table({"points": records}, anchor="jpeg2000")[0]["gain"].endswith("at 4 rates")
+
+
 def test_importing_metrics_is_light():
     import subprocess
     import sys
