@@ -6,7 +6,7 @@ import hashlib
 
 # Pictures and downloads are made in the page; a served page also reads the files beside it.
 POLICY = (
-    "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src data: blob:; "
+    "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src data: blob:{images}; "
     "connect-src {connect}; base-uri 'none'; form-action 'none'"
 )
 
@@ -21,4 +21,5 @@ def nonce_of(*parts: str) -> str:
 
 def policy(nonce: str, *, served: bool) -> str:
     """Return the policy of a page, for a meta element."""
-    return POLICY.format(nonce=nonce, connect="'self'" if served else "'none'")
+    images, connect = (" 'self'", "'self'") if served else ("", "'none'")
+    return POLICY.format(nonce=nonce, images=images, connect=connect)

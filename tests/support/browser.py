@@ -57,7 +57,7 @@ def pages(browser):
     yield call
     for tab in opened:
         tab.close()
-    assert complaints == []
+    assert complaints == [], "\n".join(complaints)
 
 
 def true_of(tab, expression, *, arg=None, timeout=30000):
