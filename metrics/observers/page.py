@@ -21,6 +21,7 @@ from ii_core.base import checks
 from ii_core.base.checks import Pair, view_size
 from ii_core.base.files import atomic_path
 from ii_core.display.look import focused_view, viewpoints_across, viewpoints_around
+from ii_core.display.policy import nonce_of, policy
 from ii_core.picture.assumed import with_assumed_camera
 from ii_core.picture.picture import IIPicture
 from ii_core.picture.view import camera_of, five_viewpoints
@@ -144,15 +145,16 @@ def write_test(
         fps=frames_per_second(asked.show, len(sequence), asked.seconds),
         plates=[plate.digit for plate in made],
     )
-    head, tail = _html(plan, served).split("\x00")
+    nonce = nonce_of(json.dumps(plan))
+    head, tail = _html(plan, served, nonce).split("\x00")
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         file.write(head)
         for number, plate in enumerate(made):
-            file.write(_call("plate", number, 0, plate.png))
+            file.write(_call(nonce, "plate", number, 0, plate.png))
         total, done = len(stimuli) * count, 0
         for number, one in enumerate(stimuli):
             for place, view in enumerate(_views(one.picture, asked.show, count, (width, height))):
-                file.write(_call("frame", number, place, _encoded(view)))
+                file.write(_call(nonce, "frame", number, place, _encoded(view)))
                 if file.tell() > MAX_EMBEDDED:
                     raise ValueError(
                         f"{path} would be larger than {MAX_EMBEDDED >> 20} MB: fewer frames, fewer pictures or a "
@@ -161,7 +163,7 @@ def write_test(
                 done += 1
                 if progress:
                     progress(done, total)
-        file.write("<script>ii.done()</script>" + tail)
+        file.write(f'<script nonce="{nonce}">ii.done()</script>' + tail)
     return plan
 
 
@@ -199,7 +201,7 @@ def _views(picture: IIPicture, show: str, count: int, size: Pair) -> Iterator[ND
         yield focused_view(shown, place, size=size)
 
 
-def _html(plan: Mapping[str, Any], served: bool) -> str:
+def _html(plan: Mapping[str, Any], served: bool, nonce: str) -> str:
     """Return the page, with a NUL in the place of its data."""
     folder = files(__package__)
     page, style, script = (
@@ -207,11 +209,12 @@ def _html(plan: Mapping[str, Any], served: bool) -> str:
     )
     text = json.dumps(json.dumps(plan, ensure_ascii=False), ensure_ascii=False).replace("<", "\\u003c")
     start = f"{script}\nii.start({text}, {json.dumps(served)});"
-    return Template(page).substitute(title=html.escape(plan["title"]), style=style, script=start, data="\x00")
+    texts = {"title": html.escape(plan["title"]), "style": style, "script": start, "data": "\x00"}
+    return Template(page).substitute(texts, policy=policy(nonce, served=served), nonce=nonce)
 
 
-def _call(kind: str, number: int, place: int, data: bytes) -> str:
-    return f'<script>ii.{kind}({number}, {place}, "{base64.b64encode(data).decode()}")</script>\n'
+def _call(nonce: str, kind: str, number: int, place: int, data: bytes) -> str:
+    return f'<script nonce="{nonce}">ii.{kind}({number}, {place}, "{base64.b64encode(data).decode()}")</script>\n'
 
 
 def _encoded(view: NDArray[np.uint8]) -> bytes:

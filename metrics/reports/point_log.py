@@ -56,6 +56,10 @@ class PointLog:
             if same == self._same
         }
 
+    def request(self, *further: Any) -> str:
+        """Return a hash of everything that the study depends on: the inputs of its points, and further values."""
+        return hashlib.sha256(json.dumps([self._same, *further]).encode()).hexdigest()
+
     def keep(self, point: dict[str, Any]) -> None:
         """Append a point."""
         append_record(self.path, {"format": FORMAT, "version": VERSION, "same": self._same, "point": spelt(point)})

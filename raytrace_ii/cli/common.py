@@ -94,7 +94,9 @@ def check_page(output: Path | None, serve: bool, port: int, force: bool) -> None
         raise ValueError(f"port is {port}: a number from 1 to 65535, or 0 for any free one, is needed")
 
 
-def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = False) -> None:
+def check_outputs(
+    paths: Iterable[Path], force: bool, *, make_folder: bool = False, own: Set[Path] = frozenset()
+) -> None:
     """Raise an error, before any work, unless all files of a command can be written without loss of others.
 
     Parameters
@@ -105,6 +107,8 @@ def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = Fal
         Replace existing files; folders, devices and pipes are never replaced.
     make_folder : bool
         Create missing folders; a command that fails removes those that are still empty.
+    own : set of Path
+        Files that an interrupted run of the same command has written: they are replaced.
     """
     from ii_core.base.files import check_name
 
@@ -117,7 +121,7 @@ def check_outputs(paths: Iterable[Path], force: bool, *, make_folder: bool = Fal
             raise IsADirectoryError(f"cannot write {path}: it is a folder")
         if path.exists() and not path.is_file():
             raise OSError(f"cannot write {path}: it is a device, pipe or socket, and a regular file is needed")
-        if os.path.lexists(path) and not force:
+        if os.path.lexists(path) and not force and path not in own:
             raise FileExistsError(f"{path} is there already: --force replaces it")
         if (real := os.path.realpath(path)) in seen:
             raise ValueError(f"{path} is to be written twice: every output needs a name of its own")

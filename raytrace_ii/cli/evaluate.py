@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -188,7 +189,8 @@ def study(
 ) -> None:
     """Chart quality against rate for several schemes.
 
-    Every point is written when it is measured. The same command continues a study that was stopped.
+    Every point is written when it is measured. The same command continues a study that was stopped, and draws again
+    what is measured already.
     """
     from codec import parse_scheme
     from ii_core import IIPicture
@@ -229,16 +231,26 @@ def study(
         check_unused(context, f"--measures {measures}", "depth", "method", "layers")
     if depth is not None:
         check_unused(context, "--depth", "method")
-    files = [file for stem in stems for file in study_files(output, stem, wanted)]
-    check_outputs([*files, *([output / PICTURES] if len(stems) > 1 else [])], force, make_folder=True)
-    originals = [IIPicture.load(picture) for picture in pictures]
+    means = [output / PICTURES] if len(stems) > 1 else []
+    files = [*(file for stem in stems for file in study_files(output, stem, wanted)), *means]
+    begun = not force and any(map(os.path.lexists, files)) and not all(map(os.path.lexists, files))
+    if not begun:
+        check_outputs(files, force, make_folder=True)
+    own: set[Path] = set()
+    jobs: list[tuple[IIPicture, str, dict[str, Any]]] = []
+    for picture, stem in zip(pictures, stems, strict=True):
+        original = IIPicture.load(picture)
+        z = None if depth is None else read_depth(depth, size=original.size)
+        over_depth = {"depth": z, "method": method, "layers_mm": _layers(layers, original)}
+        jobs.append((original, stem, {"measures": wanted, "anchor": anchor, **over_depth}))
+        if begun and is_measured(original, stem, names, targets, output, **jobs[-1][2]):
+            own.update(study_files(output, stem, wanted))
+    check_outputs(files, force, make_folder=True, own={*own, *means} if own else own)
     with cluster(dask, identity) as executor:
-        for stem, original in zip(stems, originals, strict=True):
-            z = None if depth is None else read_depth(depth, size=original.size)
+        for original, stem, options in jobs:
             run_study(
-                original, stem, names, targets, output, workers=workers, executor=executor, measures=wanted,
-                anchor=anchor, depth=z, method=method, layers_mm=_layers(layers, original),
-            )  # fmt: skip
+                original, stem, names, targets, output, workers=workers, executor=executor, resume=begun, **options
+            )
     if len(stems) > 1:
         write_means(output, stems, wanted)
 
@@ -285,20 +297,26 @@ def _stem(name: str, measure: str) -> str:
 def run_study(
     picture: IIPicture, name: str, schemes: Sequence[str], rates: Sequence[float] | None, folder: Path, *,
     workers: int | None = None, executor: Any = None, extra: dict[str, Any] | None = None,
-    measures: Sequence[str] = ("q_global",), anchor: str | None = None, **over_depth: Any,
+    measures: Sequence[str] = ("q_global",), anchor: str | None = None, resume: bool = False, **over_depth: Any,
 ) -> None:  # fmt: skip
     """Measure a study; write `study_files` into a folder, with charts and tables from the JSON; print the tables.
 
     Points are kept in ``NAME_rd.points.jsonl`` until all are measured; a study that was killed continues from there.
-    Rates default to `default_rates`. ``over_depth`` holds depth, layers_mm and method of `measuring`.
+    Rates default to `default_rates`. ``over_depth`` holds depth, layers_mm and method of `measuring`. With
+    ``resume``, a study whose numbers are complete is drawn without measuring it again.
     """
     from codec import encode, timed_decode
     from ii_core.base.parallel import cores
-    from metrics import PointLog, default_rates, measuring, provenance, rate_distortion, write_study
+    from metrics import default_rates, measuring, provenance, rate_distortion, write_study
 
     provenance()  # record the commit that measures, even if the checkout changes meanwhile
+    log = _log(picture, name, folder, measures, over_depth)
+    if resume and is_measured(picture, name, schemes, rates, folder, measures=measures, anchor=anchor, **over_depth):
+        log.remove()
+        draw_study(folder, name, measures)
+        return
     more = measuring(picture, measures, **over_depth) if set(measures) - {"q_global"} else None
-    log = PointLog(folder / f"{name}_rd.points.jsonl", picture, measures=sorted(measures), **over_depth)
+    request = log.request(list(schemes), None if rates is None else list(rates), anchor)
     if log.known:
         print(f"{name}: {len(log.known)} points are kept from an interrupted run")
     if workers is None and executor is None:
@@ -312,9 +330,35 @@ def run_study(
         say(f"{name}: rates {', '.join(f'{rate:g}' for rate in rates)} bpp")
     with progress_bar(f"code {name}") as report:
         records = rate_distortion(picture, schemes, rates, known=log.known, progress=report, **means)
+    extra = {**(extra or {}), "request": request}
     write_study(folder / f"{name}_rd.json", name, records, extra, picture=picture, anchor=anchor)
     log.remove()
     draw_study(folder, name, measures)
+
+
+def _log(picture: IIPicture, name: str, folder: Path, measures: Sequence[str], over_depth: dict[str, Any]) -> Any:
+    from metrics import PointLog
+
+    return PointLog(folder / f"{name}_rd.points.jsonl", picture, measures=sorted(measures), **over_depth)
+
+
+def is_measured(
+    picture: IIPicture, name: str, schemes: Sequence[str], rates: Sequence[float] | None, folder: Path, *,
+    measures: Sequence[str], anchor: str | None, **over_depth: Any,
+) -> bool:  # fmt: skip
+    """Return whether the folder holds all numbers of this study, measured by this code from the same inputs."""
+    from metrics import read_study
+
+    numbers = folder / f"{name}_rd.json"
+    if not numbers.is_file():
+        return False
+    log = _log(picture, name, folder, measures, over_depth)
+    request = log.request(list(schemes), None if rates is None else list(rates), anchor)
+    try:
+        extra = read_study(numbers).get("extra")
+    except ValueError:
+        return False
+    return isinstance(extra, dict) and extra.get("request") == request
 
 
 def draw_study(folder: Path, name: str, measures: Sequence[str]) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import codec
+import metrics
 from codec import encode
 from ii_core import IICamera, IIPicture, preset, video_of
 from ii_core.base.files import read_image
@@ -144,6 +145,38 @@ def test_a_killed_study_continues_where_it_was(run, picture, tmp_path, monkeypat
     whole = json.loads(json.dumps(points))
     assert all({**point, "lossless": False} in whole for point in kept)
     assert [point["target_bpp"] for point in points] == [0.3, 0.6, 1, 2] * 2
+
+
+@pytest.mark.parametrize("measures", ["q_global", "q_global,q_angle_min"])
+def test_a_study_killed_after_its_numbers_is_drawn_from_them(run, refused, picture, tmp_path, monkeypatch, measures):
+    """It refused to go on, and --force measured all again."""
+    other = tmp_path / "other.png"
+    IIPicture.load(picture).with_pixels(IIPicture.load(picture).pixels[:, ::-1].copy()).save(other)
+    folder = tmp_path / "s"
+    arguments = ["study", picture, other, "--schemes", "jpeg2000", "--rates", "0.5,1", "-o", folder]
+    arguments += ["--measures", measures]
+    with monkeypatch.context() as patch:
+        patch.setattr(metrics, "rd_chart", stopped)
+        assert run(*arguments)[0] == 130  # the first picture has numbers, the second nothing
+    numbers = folder / "small_rd.json"
+    assert numbers.exists() and not (folder / "small_rd.png").exists()
+    before = numbers.read_bytes()
+    refused(run(*arguments[:6], "0.5,2", *arguments[7:]), "small_rd.json is there already")  # of another study
+
+    coded = []
+    monkeypatch.setattr(codec, "encode", lambda *a, **o: (coded.append(a[0]), encode(*a, **o))[1])
+    code, _, err = run(*arguments)
+    assert code == 0, err
+    assert (
+        numbers.read_bytes() == before and len(coded) == 2 and (coded[0].pixels == IIPicture.load(other).pixels).all()
+    )
+    for stem in ("small", "other"):
+        assert all((folder / f"{stem}_rd{end}").stat().st_size for end in (".csv", ".tex", ".png", ".pdf"))
+    refused(run(*arguments), "is there already: --force replaces it")
+
+
+def stopped(*arguments, **options):
+    raise KeyboardInterrupt
 
 
 def test_points_of_another_picture_or_measure_are_not_taken(tmp_path):
@@ -297,7 +330,7 @@ def test_wrong_input_is_named(run, refused, picture, tmp_path):
     refused(run("measure", bare, bare), "bare.png.json: no JSON, line 1, column 2")
     refused(run("study", picture, "--rates", 1, "--workers", 0, "-o", tmp_path / "s"), "workers is 0")
     said = "layers are 'x': dissertation, a number, NEAR:FAR:COUNT or px:LOW:HIGH:COUNT is needed\n"
-    refused(run("measure", picture, picture, "--layers", "x"), said)
+    refused(run("measure", picture, picture, "--focus", "--layers", "x"), said)
     refused(run("camera", "--design", "panel=x,pixels=9x9,pitch=1,distance=9"), "panel is 'x'")
 
 

@@ -326,7 +326,7 @@ def test_the_centre_view_comes_first(opened, shot, tmp_path):
     """Served with every page held back: the preview stands for them."""
     write_viewer_folder(tmp_path, shot.picture, quality=None)
     text = (tmp_path / "index.html").read_text()
-    (tmp_path / "early.html").write_text(re.sub(r"<script>ii\.fetch.*</script>", "", text))
+    (tmp_path / "early.html").write_text(re.sub(r"<script[^>]*>ii\.fetch.*</script>", "", text))
     tab = opened(tmp_path / "early.html", wait=False)
     order = json.loads(re.search(r"ii\.fetch\((\[.*\])\)", text)[1])
     assert order[0][0] == "preview"
@@ -374,3 +374,18 @@ def test_served(run, monkeypatch, shot, tmp_path):
 
     code, out, _ = served(monkeypatch, run, ["view", path, "--serve"], visit)
     assert code == 0 and "shows the page" in out
+
+
+def test_the_page_may_run_its_own_scripts_alone(opened, shot, tmp_path):
+    """A content security policy: other scripts, and requests to other hosts, are refused."""
+    write_viewer(tmp_path / "v.html", shot.picture, title="<script>alert(1)</script>")
+    text = (tmp_path / "v.html").read_text(encoding="utf-8")
+    (nonce,) = set(re.findall(r"<(?:script|style) nonce=\"(\w{32})\">", text))
+    assert f"script-src 'nonce-{nonce}'" in text and "connect-src 'none'" in text
+    assert not re.search(r"<(?:script|style)>|unsafe-|<[^>]+\s(?:style|on\w+)=", text.split("<script nonce")[0])
+    (tmp_path / "x.html").write_text(text.replace("</body>", "<script>window.run = 1</script></body>"), "utf-8")
+    page = opened(tmp_path / "v.html").context.browser.new_page()  # its complaints are expected
+    page.goto(f"file://{tmp_path / 'x.html'}")
+    assert page.evaluate("() => ii.ready.then(() => window.run === undefined)")
+    assert page.evaluate("() => fetch('http://127.0.0.1:9/').then(() => false, (error) => true)")
+    page.close()

@@ -1,6 +1,7 @@
 """The page of a test with observers in a real browser. On b1dc540 there is none."""
 
 import json
+import re
 import threading
 from functools import partial
 
@@ -256,3 +257,13 @@ def test_answers_given_while_the_server_is_away_arrive_later(browser, server, tm
     tab.close()
     results = read_results([tmp_path / "results" / "observer-001.jsonl"])
     assert [grade for _, grade in results.observers[0].answers] == [4, 2, 1] and results.observers[0].complete
+
+
+@pytest.mark.parametrize(("served", "connect"), [(False, "'none'"), (True, "'self'")])
+def test_the_page_may_run_its_own_scripts_alone(tmp_path, served, connect):
+    """The tests above run under this policy: a breach is an error on the console, which fails them."""
+    written(tmp_path / "t.html", served)
+    text = (tmp_path / "t.html").read_text(encoding="utf-8")
+    (nonce,) = set(re.findall(r"<(?:script|style) nonce=\"(\w{32})\">", text))
+    assert f"default-src 'none'; script-src 'nonce-{nonce}'" in text and f"connect-src {connect};" in text
+    assert not re.search(r"<(?:script|style)>|unsafe-|<[^>]+\s(?:style|on\w+)=", text.split("<script nonce")[0])

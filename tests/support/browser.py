@@ -1,6 +1,8 @@
 """A browser for tests of pages; without one the tests are skipped with a message."""
 
 import shutil
+import time
+from functools import partial
 
 import pytest
 
@@ -41,6 +43,7 @@ def pages(browser):
         options = {"viewport": {"width": 1000, "height": 700}, "reduced_motion": "reduce", **options}
         tab = browser.new_page(**options)
         opened.append(tab)
+        tab.wait_for_function = partial(true_of, tab)
         if script:
             tab.add_init_script(script)
         tab.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
@@ -54,7 +57,16 @@ def pages(browser):
     yield call
     for tab in opened:
         tab.close()
-    assert complaints == []
+    assert complaints == [], "\n".join(complaints)
+
+
+def true_of(tab, expression, *, arg=None, timeout=30000):
+    """Wait until an expression is true: Playwright's own function needs eval, which the pages' policy forbids."""
+    until = time.monotonic() + timeout / 1000
+    while not (found := tab.evaluate(expression, arg)):
+        assert time.monotonic() < until, f"never true: {expression}"
+        tab.wait_for_timeout(20)
+    return found
 
 
 @pytest.fixture

@@ -28,6 +28,7 @@ from ...picture.assumed import ASSUMED_ANGLE_DEG, with_assumed_camera
 from ...picture.picture import IIPicture, codes8
 from ...picture.view import camera_of, five_viewpoints, lens_array_mm, view_image
 from ...video.video import IIVideo, video_of
+from ..policy import nonce_of, policy
 
 PAGE_SIDE = 2048  # texture size that every WebGL2 supports
 PREVIEW_SIDE = 512
@@ -106,7 +107,7 @@ def write_viewer(
     page = _Page(picture, decoded, **options)
     used = 0
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
-        head, tail = page.html("\x00").split("\x00")
+        head, tail = page.html("\x00", served=False).split("\x00")
         file.write(head)
         for kind, where, data in page.parts(progress):
             used += 4 * len(data) // 3
@@ -116,8 +117,10 @@ def write_viewer(
                     f"{page.what} of {picture.size[0]}×{picture.size[1]} px without one"
                 )
             arguments = "".join(f"{n}, " for n in where)
-            file.write(f'<script>ii.{kind}({arguments}"{base64.b64encode(data).decode()}")</script>\n')
-        file.write("<script>ii.done()</script>" + tail)
+            file.write(
+                f'<script nonce="{page.nonce}">ii.{kind}({arguments}"{base64.b64encode(data).decode()}")</script>\n'
+            )
+        file.write(f'<script nonce="{page.nonce}">ii.done()</script>' + tail)
     return Path(path).stat().st_size
 
 
@@ -145,7 +148,7 @@ def write_viewer_folder(
             name = f"{number}.{kind}"
             (Path(folder) / name).write_bytes(data)
             order.append([kind, name, *where])
-    text = page.html(f"<script>ii.fetch({json.dumps(order)})</script>")
+    text = page.html(f'<script nonce="{page.nonce}">ii.fetch({json.dumps(order)})</script>', served=True)
     with atomic_path(Path(folder) / "index.html") as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -194,7 +197,12 @@ class _Page:
                 f"browsers support {MOST_LAYERS} of {self.side}×{self.side} px at least"
             )
 
-    def html(self, data: str) -> str:
+    @property
+    def nonce(self) -> str:
+        """Value that marks the scripts and styles of this page."""
+        return nonce_of(self.title, *self.labels, *(text for row in self.quality_rows for text in row))
+
+    def html(self, data: str, *, served: bool) -> str:
         """Return the page with its data, a text of script elements."""
         folder = files(__package__)
         text = {name: (folder / name).read_text(encoding="utf-8") for name in ("page.html", "style.css")}
@@ -202,6 +210,8 @@ class _Page:
         meta = json.dumps(self.meta()).replace("<", "\\u003c")
         compared, plays = len(self.videos) > 1, self.frames > 1
         return Template(text["page.html"]).substitute(
+            policy=policy(self.nonce, served=served),
+            nonce=self.nonce,
             title=html.escape(self.title),
             about=html.escape(self.about()),
             style=text["style.css"],
