@@ -136,12 +136,12 @@ def test_animation_holds_its_frames(tmp_path, apples, name):
         with av.open(str(tmp_path / name)) as film:
             read = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
     else:
-        image = Image.open(tmp_path / name)
-        assert image.n_frames == 6
         read = []
-        for i in range(6):
-            image.seek(i)
-            read.append(np.array(image.convert("RGB")))
+        with Image.open(tmp_path / name) as image:
+            assert image.n_frames == 6
+            for i in range(6):
+                image.seek(i)
+                read.append(np.array(image.convert("RGB")))
     assert len(read) == 6
     for a, b in zip(read, frames, strict=True):
         assert 10 * np.log10(255**2 / np.mean((a.astype(float) - b) ** 2)) > 20  # a GIF has 256 colours, MP4 4:2:0
@@ -176,4 +176,5 @@ def test_the_command_writes_displays(run, apples, tmp_path):
             == 0
         )
     assert run("display", tmp_path / "p.png", "-o", tmp_path / "p.webp", "--frames", "3", "--size", "80x40")[0] == 0
-    assert Image.open(tmp_path / "quilt_qs8x6a2.png").size == (640, 240)
+    with Image.open(tmp_path / "quilt_qs8x6a2.png") as quilt:
+        assert quilt.size == (640, 240)
