@@ -126,12 +126,8 @@ SIZES = [
 STYLES = ["whole", "precincts", "second style", "style of a tile", "tiles"]
 
 
-@pytest.fixture(scope="module")
-def ended(tmp_path_factory):
+def decoded(cases):
     """Return how every case ended."""
-    folder = tmp_path_factory.mktemp("forged")
-    cases = [["claims"], *(["precincts", how] for how in STYLES)]
-    cases += [["forged", scheme, side, str(folder / f"{scheme}{side}.ii")] for scheme, side, _ in SIZES]
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, json.dumps(cases)], capture_output=True, text=True, timeout=300, check=False
     )
@@ -139,6 +135,15 @@ def ended(tmp_path_factory):
     results = [json.loads(line) for line in done.stdout.splitlines()]
     assert [case for case, _ in results] == cases, done.stderr[-2000:]
     return {tuple(case[:3]): answer for case, answer in results}
+
+
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory):
+    """Return how all quick cases ended."""
+    folder = tmp_path_factory.mktemp("forged")
+    cases = [["claims"], *(["precincts", how] for how in STYLES)]
+    cases += [["forged", scheme, side, str(folder / f"{scheme}{side}.ii")] for scheme, side, _ in SIZES]
+    return decoded(cases)
 
 
 def test_claims_are_refused_fast_and_small(ended):

@@ -12,6 +12,14 @@ from codec.contract import find, parse_scheme
 from ii_core import IICamera, IIPicture
 
 SCHEMES = sorted(schemes())
+
+
+def quick_ones(names):
+    """Schemes of a test of coders, not of kinds of images: other kinds than sub-images are slow tests."""
+    others = [name for name in names if name[:3] in ("ei-", "ri-") and f"si-{name[3:]}" in names]
+    return [pytest.param(name, marks=pytest.mark.slow) if name in others else name for name in names]
+
+
 # Largest error of a noise picture at the finest setting of schemes whose only loss is colour conversion.
 EXACT = {"jpeg2000": 0} | {f"{kind}-{coder}": 1 for kind in ("ei", "si", "ri") for coder in ("h264", "vp9")}
 
@@ -158,7 +166,7 @@ def test_eight_bits_come_back_to_the_bit(scheme):
     np.testing.assert_array_equal(decoded.pixels, textured().pixels)
 
 
-@pytest.mark.parametrize("scheme", RATED)
+@pytest.mark.parametrize("scheme", quick_ones(RATED))
 def test_target_rates_are_met(scheme):
     picture = large() if scheme == "ei-mpeg2" else many()  # MPEG-2 fills frames of 12×12 px up to 16×16
     coded = encode(picture, quick(scheme), bpp=1.5)
@@ -166,7 +174,7 @@ def test_target_rates_are_met(scheme):
     assert coded.bpp == pytest.approx(1.5, rel=0.02)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", quick_ones(SCHEMES))
 def test_all_bytes_are_accounted_for(scheme, tmp_path):
     picture, coded = textured(), moderate(scheme)
     path = tmp_path / "coded.ii"
@@ -177,7 +185,7 @@ def test_all_bytes_are_accounted_for(scheme, tmp_path):
     assert coded.bpp == 8 * coded.nbytes / picture.pixels[..., 0].size
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", quick_ones(SCHEMES))
 def test_coding_is_reproducible_alone_and_in_parallel(scheme):
     picture, asked = textured(), medium(scheme)
     first = moderate(scheme).payload
@@ -216,7 +224,7 @@ def test_any_size_down_to_one_pixel(scheme, lenses, ei_pixels):
         assert decode(encode(picture, quick(scheme), bpp=1.0)).pixels.shape == picture.pixels.shape
 
 
-@pytest.mark.parametrize("scheme", RATED)
+@pytest.mark.parametrize("scheme", quick_ones(RATED))
 @pytest.mark.parametrize(("bpp", "side"), [(1e-310, 1), (1e-4, 1), (1000.0, -1), (1e308, -1)])
 def test_an_unreachable_rate_gives_the_nearest_and_says_so(scheme, bpp, side):
     coded = encode(textured(16, 8, 4, 4), quick(scheme), bpp=bpp)
@@ -263,7 +271,7 @@ def test_exactly_one_goal_is_allowed(scheme):
                 encode(textured(), scheme, **{name: value})
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", quick_ones(SCHEMES))
 def test_costs_are_recorded_apart(scheme):
     coded = moderate(scheme)
     assert 0 < coded.codec_seconds <= coded.encode_seconds

@@ -170,12 +170,12 @@ def test_animation_holds_its_frames(tmp_path, apples, name):
         with av.open(str(tmp_path / name)) as film:
             read = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
     else:
-        image = Image.open(tmp_path / name)
-        assert image.n_frames == 6
         read = []
-        for i in range(6):
-            image.seek(i)
-            read.append(np.array(image.convert("RGB")))
+        with Image.open(tmp_path / name) as image:
+            assert image.n_frames == 6
+            for i in range(6):
+                image.seek(i)
+                read.append(np.array(image.convert("RGB")))
     assert len(read) == 6
     for a, b in zip(read, frames, strict=True):
         assert 10 * np.log10(255**2 / np.mean((a.astype(float) - b) ** 2)) > 20  # a GIF has 256 colours, MP4 4:2:0
@@ -213,9 +213,9 @@ def test_the_command_writes_displays(run, apples, tmp_path):
             == 0
         )
     assert run("display", tmp_path / "p.png", "-o", tmp_path / "p.webp", "--frames", "3", "--size", "80x40")[0] == 0
-    assert Image.open(tmp_path / "quilt_qs8x6a2.png").size == (640, 240)
-    code, out, err = run(
-        "display", tmp_path / "p.png", "--as", "quilt", "--for", "portrait", "-o", tmp_path / "q.png"
-    )
-    assert code == 0 and Image.open(tmp_path / "q_qs8x6a0.75.png").size == (3360, 3360)
-    assert "38% of the width and 100% of the height" in out + err
+    words = ("--as", "quilt", "--for", "portrait", "-o", tmp_path / "q.png")
+    code, out, err = run("display", tmp_path / "p.png", *words)
+    assert code == 0 and "38% of the width and 100% of the height" in out + err
+    for name, size in (("quilt_qs8x6a2.png", (640, 240)), ("q_qs8x6a0.75.png", (3360, 3360))):
+        with Image.open(tmp_path / name) as quilt:
+            assert quilt.size == size

@@ -378,9 +378,9 @@ def test_disparity_needs_a_camera_and_its_own_depth(shot, tmp_path):
     ("camera", "ei_pixels", "hexagonal"),
     [
         ("hexagonal", (16, 14), True),
-        ("hdtv", (24, 17), True),
+        pytest.param("hdtv", (24, 17), True, marks=pytest.mark.slow),
         ("setup1", (16, 16), False),
-        ("setup3", (64, 64), False),
+        pytest.param("setup3", (64, 64), False, marks=pytest.mark.slow),
     ],
 )
 def test_import_warns_of_cropping_and_hexagonal_lenses(tmp_path, camera, ei_pixels, hexagonal):

@@ -30,6 +30,11 @@ def snapshot(tab, **state):
     return np.array(got[2], np.uint8).reshape(got[1], got[0], 4)[..., :3].astype(float), got[3]
 
 
+def slow(*values):
+    """Values of a test for `make test-all`: a page takes half a second of CPU time to open."""
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
 def psnr(a, b):
     return 10 * np.log10(255**2 / max(np.mean((a - b) ** 2), 1e-9))
 
@@ -52,7 +57,7 @@ def test_upright_elementary_images_look_the_other_way(opened, shot, tmp_path):
     assert np.abs(shown - view_image(picture, viewpoint)[0]).max() <= 1
 
 
-@pytest.mark.parametrize("optics", ["pinhole", "grin"])
+@pytest.mark.parametrize("optics", [slow("pinhole"), "grin"])
 def test_viewing_zones_that_meet(opened, shot, tmp_path, optics):
     old = shot.picture.camera
     camera = replace(old, viewer_mm=150 * old.gap_mm, optics=(optics,), lens_pitch_mm=None)
@@ -66,9 +71,10 @@ def test_viewing_zones_that_meet(opened, shot, tmp_path, optics):
 
 
 @pytest.mark.parametrize(
-    ("lenses", "ei_pixels"), [((1, 1), (1, 1)), ((7, 5), (1, 1)), ((1, 1), (9, 4)), ((3, 2), (1, 6))]
+    ("lenses", "ei_pixels"),
+    [((1, 1), (1, 1)), slow((7, 5), (1, 1)), slow((1, 1), (9, 4)), ((3, 2), (1, 6))],
 )
-@pytest.mark.parametrize("with_camera", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("with_camera", [True, slow(False)])
 def test_any_structure(opened, tmp_path, lenses, ei_pixels, with_camera):
     size = lenses[0] * ei_pixels[0], lenses[1] * ei_pixels[1]
     pixels = np.random.default_rng(1).integers(0, 256, (size[1], size[0], 3), np.uint8)
@@ -125,7 +131,7 @@ def focused(picture, viewpoint, shift, radius):
     return total / weights
 
 
-@pytest.mark.parametrize("erect", [False, True])
+@pytest.mark.parametrize("erect", [slow(False), True])
 def test_focus_and_aperture(opened, tmp_path, erect):
     rng = np.random.default_rng(2)
     camera = IICamera(pixels=(40, 24), lenses=(10, 6), pixel_pitch_mm=0.01, gap_mm=0.1)
@@ -275,12 +281,13 @@ def screen(tab):
     return pixels, on, off
 
 
-@pytest.fixture(scope="module", params=[pytest.param("twins", marks=pytest.mark.slow), "mountains"])
+@pytest.fixture(scope="module", params=["twins", "mountains"])
 def far(request):
     return render(load_scene(request.param), preset("setup1", scale=16), support=("depth",))
 
 
-@pytest.mark.parametrize("with_map", [pytest.param(True, marks=pytest.mark.slow), False])
+@pytest.mark.slow
+@pytest.mark.parametrize("with_map", [True, False])
 def test_far_scenes_open_without_bands(opened, far, tmp_path, with_map):
     write_viewer(tmp_path / "v.html", far.picture, depth=far.depth if with_map else None)
     tab = opened(tmp_path / "v.html", viewport={"width": 800, "height": 420})  # wide: a border beside the array
@@ -314,6 +321,7 @@ def test_a_damaged_link_is_ignored(opened, still):
     assert (state["x"], state["r"], state["stereo"], state["mode"]) == (0, 0.35, "off", "original")
 
 
+@pytest.mark.slow
 def test_a_lost_graphics_card_is_reported(opened, still):
     tab = opened(still, again=True)
     assert not tab.locator("#failure").is_visible()

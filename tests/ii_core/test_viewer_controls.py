@@ -139,6 +139,7 @@ def test_nothing_is_cut_on_a_small_screen(tab):
     assert tab.evaluate(cut) == 0
 
 
+@pytest.mark.slow
 def test_full_screen_shows_the_picture_alone(tab):
     for leave in ("narrow", "Escape"):
         tab.locator("#wide").click()
@@ -165,6 +166,7 @@ def places(tab, count=4):
     return got
 
 
+@pytest.mark.slow
 def test_the_view_sways_until_the_first_touch(opened, still, tmp_path):
     tab = opened(with_script(still, PACE % 30, tmp_path / "v.html"), motion="no-preference")
     assert len(set(places(tab))) > 2
@@ -175,6 +177,7 @@ def test_the_view_sways_until_the_first_touch(opened, still, tmp_path):
     assert len(set(places(tab))) == 1
 
 
+@pytest.mark.slow
 def test_the_view_rests_where_motion_is_slow_or_not_wanted(tab, opened, still, tmp_path):
     assert len(set(places(tab))) == 1
     slow = opened(with_script(still, PACE % 300, tmp_path / "v.html"), motion="no-preference")
@@ -187,6 +190,7 @@ def phone(show_once, compared):
     return show_once(compared, viewport=PHONE, has_touch=True)
 
 
+@pytest.mark.slow
 def test_on_a_phone_the_picture_comes_first(phone):
     tab = phone
     box = tab.locator("#main").bounding_box()
@@ -201,6 +205,7 @@ def test_on_a_phone_the_picture_comes_first(phone):
     assert tab.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
 
 
+@pytest.mark.slow
 def test_tilting_turns_by_the_same_angle(phone):
     """Right edge and top edge away: the viewer then stands to the left of the display's axis, and below it."""
     tab = phone
@@ -222,6 +227,7 @@ def test_tilting_turns_by_the_same_angle(phone):
     assert state(tab)["x"] == 1
 
 
+@pytest.mark.slow
 def test_without_webgl2_a_still_picture_stands_under_the_message(compared, opened, tmp_path):
     page = with_script(compared, "HTMLCanvasElement.prototype.getContext = () => null", tmp_path / "v.html")
     tab = opened(page, wait=False, viewport={"width": 1280, "height": 720})

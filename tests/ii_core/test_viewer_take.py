@@ -156,13 +156,14 @@ def simply_served(folder):
     """A server without range requests, like many simple ones."""
     handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=folder)
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
+        threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
         try:
             yield f"http://127.0.0.1:{server.server_port}/"
         finally:
             server.shutdown()
 
 
+@pytest.mark.slow
 def test_a_card_without_room_for_all_frames(opened, take, tmp_path, monkeypatch):
     """Frames leave the card and come again; here from a server that always sends the whole file."""
     monkeypatch.setattr(page, "CARD_BYTES", 0)

@@ -3,6 +3,7 @@
 import json
 import math
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
 from multiprocessing import get_context
 from types import SimpleNamespace
 
@@ -109,12 +110,17 @@ def study_of(**where):
     return timeless(rate_distortion(PICTURE, ["jpeg2000", "jpegxl"], [1.0, 2.0], **means, **where))
 
 
-def test_points_are_the_same_on_every_executor():
-    expected = study_of(workers=1)
-    with ThreadPoolExecutor(2) as pool:
-        assert study_of(executor=pool) == expected
-    with ProcessPoolExecutor(2, mp_context=get_context("forkserver")) as pool:
-        assert study_of(executor=pool) == expected
+@pytest.mark.parametrize(
+    "executor",
+    [
+        ThreadPoolExecutor,
+        pytest.param(partial(ProcessPoolExecutor, mp_context=get_context("forkserver")), marks=pytest.mark.slow),
+    ],
+    ids=["threads", "processes"],
+)
+def test_points_are_the_same_on_every_executor(executor):
+    with executor(2) as pool:
+        assert study_of(executor=pool) == study_of(workers=1)
     with pytest.raises(ValueError, match="workers is 2: an executor has its own"):
         study_of(executor=pool, workers=2)
 

@@ -2,8 +2,6 @@
 
 import io
 import json
-import subprocess
-import sys
 import threading
 import urllib.error
 import urllib.request
@@ -15,6 +13,7 @@ from PIL import Image
 
 from codec import encode
 from ii_core import IIPicture, preset
+from ii_core.base.files import read_image
 from metrics.observers import Options, Stimulus, read_results, verdict, write_test
 from metrics.observers.page import plates
 from metrics.observers.plan import GRADES, duration_s, frame_order, frames_per_second, make_plan
@@ -23,6 +22,7 @@ from metrics.observers.results import sealed
 from metrics.observers.simulated import write_simulated
 from metrics.observers.store import ResultFolder
 from raytrace_ii.cli.server import Answers, PageServer
+from tests.support import serving
 
 SCENES = {"apples": 5, "car": 3, "cuboid": 4}
 
@@ -319,7 +319,7 @@ def served(tmp_path):
     folder = ResultFolder(tmp_path / "r", json.dumps(planned()))
     maker = Answers.into(folder)
     server = PageServer(("127.0.0.1", 0), lambda *args: maker(*args, directory=str(tmp_path)))
-    thread = threading.Thread(target=server.serve_forever)
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,))
     thread.start()
     yield f"http://127.0.0.1:{server.server_port}"
     server.shutdown()
@@ -333,7 +333,8 @@ def post(url, data=b"", **headers):
         with urllib.request.urlopen(urllib.request.Request(url, data, headers)) as reply:
             return reply.status, json.loads(reply.read())
     except urllib.error.HTTPError as error:
-        return error.code, None
+        with error:  # its socket
+            return error.code, None
 
 
 def test_the_server_takes_results_of_its_own_page_alone(served, tmp_path):
@@ -489,23 +490,31 @@ def test_the_commands_from_pictures_to_a_table(run, coded, tmp_path):
     code, out, err = run("opinions", tmp_path / "r", "--json", tmp_path / "o.json", "--plot", tmp_path / "o.png")
     assert code == 0, err
     assert "MOS of SIMULATED observers, 16 observers" in out and "observer-017.jsonl is empty" in out
-    assert out.count("±") == 6 and "q_view, all" in out and Image.open(tmp_path / "o.png").width > 500
+    assert out.count("±") == 6 and "q_view, all" in out and read_image(tmp_path / "o.png").shape[1] > 500
     assert json.loads((tmp_path / "o.json").read_text())["stimuli"][0]["answers"] == 16
 
 
-def test_the_command_serves_the_test_and_keeps_results(coded, tmp_path):
-    words = ["subjective", *map(str, coded[:2]), "--show", "front", "--measures", "none", "--serve"]
-    command = [sys.executable, "-m", "raytrace_ii.cli", *words, "--results", str(tmp_path / "r")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-        try:
-            assert "answers go to" in server.stdout.readline()
-            url = server.stdout.readline().split()[0]
-            with urllib.request.urlopen(url) as page:
-                assert b"ii.frame(1, 0," in page.read()
-            assert post(f"{url}results") == (200, {"observer": 1})
-            assert (tmp_path / "r" / "observer-001.jsonl").read_bytes() == b""
-        finally:
-            server.terminate()
+def test_the_command_serves_the_test_and_keeps_results(run, monkeypatch, coded, tmp_path):
+    words = [
+        "subjective",
+        *coded[:2],
+        "--show",
+        "front",
+        "--measures",
+        "none",
+        "--serve",
+        "--results",
+        tmp_path / "r",
+    ]
+
+    def visit(url):
+        with urllib.request.urlopen(url) as page:
+            assert b"ii.frame(1, 0," in page.read()
+        assert post(f"{url}results") == (200, {"observer": 1})
+        assert (tmp_path / "r" / "observer-001.jsonl").read_bytes() == b""
+
+    code, out, err = serving.served(monkeypatch, run, words, visit)
+    assert code == 0 and "answers go to" in out.splitlines()[0], err
 
 
 @pytest.mark.parametrize(

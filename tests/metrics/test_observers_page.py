@@ -74,8 +74,8 @@ def downloaded(tab, path):
     return download.value.suggested_filename
 
 
-def test_a_whole_test_gives_results_that_are_read(show, page, tmp_path):
-    tab = show(page, fragment="#observer=2")
+def test_a_whole_test_gives_results_that_are_read(opened, page, tmp_path):
+    tab = opened(page, "#observer=2")
     begun(tab)
     for key in "1425":  # one of training, then the hidden reference and two pictures, with a break after two
         answer(tab, key)
@@ -96,10 +96,10 @@ def test_a_whole_test_gives_results_that_are_read(show, page, tmp_path):
     }  # fmt: skip # nothing about the person or the machine beyond these
 
 
-def test_the_pixels_shown_are_those_of_the_views(show, tmp_path):
+def test_the_pixels_shown_are_those_of_the_views(opened, tmp_path):
     """Either picture as it stands on the canvas before it goes grey; on the screen each pixel is a square."""
     written(tmp_path / "t.html", show="front", training=0)
-    tab = show(tmp_path / "t.html")
+    tab = opened(tmp_path / "t.html")
     begun(tab)
     tab.evaluate(
         """() => { const grey = blank; ii.shown = [];
@@ -117,9 +117,9 @@ def test_the_pixels_shown_are_those_of_the_views(show, tmp_path):
         assert shown[3] == 56 * CAMERA.lenses[0]
 
 
-def test_pairs_are_answered_by_arrows_and_buttons(show, tmp_path):
+def test_pairs_are_answered_by_arrows_and_buttons(opened, tmp_path):
     written(tmp_path / "t.html", method="pairs", training=0)
-    tab = show(tmp_path / "t.html", viewport={"width": 1400, "height": 800})
+    tab = opened(tmp_path / "t.html", viewport={"width": 1400, "height": 800})
     begun(tab)
     answer(tab, "ArrowLeft")
     answer(tab, " ")
@@ -131,6 +131,7 @@ def test_pairs_are_answered_by_arrows_and_buttons(show, tmp_path):
     assert [given for _, given in one.answers] == ["left", "same", "right"]
 
 
+@pytest.mark.slow
 def test_a_closed_tab_loses_nothing(browser, page, tmp_path):
     context = browser.new_context(viewport={"width": 1000, "height": 700})
     tab = context.new_page()
@@ -158,9 +159,9 @@ def test_a_closed_tab_loses_nothing(browser, page, tmp_path):
     context.close()
 
 
-def test_a_presentation_begins_again_when_the_tab_was_out_of_sight(show, tmp_path):
+def test_a_presentation_begins_again_when_the_tab_was_out_of_sight(opened, tmp_path):
     written(tmp_path / "t.html", training=0)
-    tab = show(tmp_path / "t.html")
+    tab = opened(tmp_path / "t.html")
     begun(tab)
     tab.evaluate(
         """() => { const shown = play;
@@ -176,16 +177,16 @@ def test_a_presentation_begins_again_when_the_tab_was_out_of_sight(show, tmp_pat
     assert record["repeated"] == 1 and min(record["shown_ms"]) >= 50
 
 
-def test_a_window_that_is_too_small_is_refused(show, page):
-    tab = show(page, viewport={"width": 700, "height": 500})
+def test_a_window_that_is_too_small_is_refused(opened, page):
+    tab = opened(page, viewport={"width": 700, "height": 500})
     tab.click("#begin")
     assert tab.is_disabled("#sized") and "are needed" in tab.inner_text("#small")
     tab.set_viewport_size({"width": 1000, "height": 700})
     tab.wait_for_selector("#sized:enabled")
 
 
-def test_every_control_has_a_name_and_the_text_contrast(show, page):
-    tab = show(page)
+def test_every_control_has_a_name_and_the_text_contrast(opened, page):
+    tab = opened(page)
     nameless = tab.evaluate(
         """[...document.querySelectorAll("input, button, img")]
              .filter(e => !(e.labels?.[0]?.innerText || e.textContent || e.alt)).length"""
@@ -206,7 +207,7 @@ class Server:
         handler = partial(Answers.into(kept), directory=str(self.folder / "page"))
         self.server = PageServer(("127.0.0.1", self.port), handler)
         self.port = self.server.server_port
-        self.thread = threading.Thread(target=self.server.serve_forever)
+        self.thread = threading.Thread(target=self.server.serve_forever, args=(0.01,))
         self.thread.start()
         return self
 
@@ -222,6 +223,7 @@ def server(tmp_path):
     return Server(tmp_path, written(tmp_path / "page" / "index.html", served=True))
 
 
+@pytest.mark.slow
 def test_the_server_has_every_answer_at_once(show, server, tmp_path):
     with server:
         tab = show(f"http://127.0.0.1:{server.port}/")

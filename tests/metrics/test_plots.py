@@ -113,7 +113,9 @@ def test_cross_eyed_pair_has_the_right_eye_on_the_left():
         assert eye in axes.get_title()
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32"])
+@pytest.mark.parametrize(
+    "dtype", ["uint8", *(pytest.param(d, marks=pytest.mark.slow) for d in ("uint16", "float32"))]
+)
 def test_all_are_written_and_none_else(dtype, tmp_path):
     a = picture(dtype=dtype)
     b = a.with_pixels(a.pixels // 2 if dtype != "float32" else a.pixels / 2)

@@ -183,7 +183,7 @@ def test_the_image_of_q_depth_lies_at_its_rates_and_depths(study):
     assert (low < mean).all() and (mean < high).all()
 
 
-@pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
+@pytest.mark.parametrize("suffix", [".png", pytest.param(".pdf", marks=pytest.mark.slow), ".svg"])
 def test_the_same_study_gives_the_same_file(study, tmp_path, suffix):
     kept = read_study(study[1])
     files = [tmp_path / f"{i}{suffix}" for i in range(3)]
