@@ -15,14 +15,14 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from ii_core import IIPicture
-from ii_core.base.jit import array_kernel, lean_kernel
+from ii_core.base.jit import array_kernel, inner_kernel, lean_kernel
 
 from .. import clock
 from ..contract import Coder, Goal, Option, Options, Pixels
@@ -247,50 +247,70 @@ def _code_levels(coder, levels, sizes, plane, before):
     return 1
 
 
+class _Block(NamedTuple):
+    """Memory for one block."""
+
+    samples: Any  # (8, 8, 8), then coefficients
+    levels: Any
+    sizes: Any  # (3,) sides: elementary images, rows, columns
+    half: Any
+
+
 @array_kernel
 def _code_blocks(coder, samples, structure, groups, rows, cols, step):
     """Write or read all blocks: by rows of elementary images, groups, rows and columns of blocks, and planes."""
     count, width, height = structure
-    block = np.zeros((SIDE, SIDE, SIDE), np.int64)
-    levels = np.zeros((SIDE, SIDE, SIDE), np.int64)
-    sizes, half = np.zeros(3, np.int64), np.zeros(SIDE, np.int64)
+    side = (SIDE, SIDE, SIDE)
+    block = _Block(
+        np.zeros(side, np.int64), np.zeros(side, np.int64), np.zeros(3, np.int64), np.zeros(SIDE, np.int64)
+    )
     decoding = coder.state[DECODING]
     before = np.zeros(3, np.int64)
     for l in range(count):
         for g in range(groups.size - 1):
-            sizes[0] = groups[g + 1] - groups[g]
+            block.sizes[0] = groups[g + 1] - groups[g]
             for r in range(rows.size - 1):
-                sizes[1] = rows[r + 1] - rows[r]
+                block.sizes[1] = rows[r + 1] - rows[r]
                 for c in range(cols.size - 1):
-                    sizes[2] = cols[c + 1] - cols[c]
-                    top = l * height + rows[r]
+                    block.sizes[2] = cols[c + 1] - cols[c]
+                    top, left = l * height + rows[r], groups[g] * width + cols[c]
                     for p in range(3):
-                        levels[:] = 0
-                        block[:] = 0
+                        block.levels[:] = 0
+                        block.samples[:] = 0
                         if not decoding:
-                            for t in range(sizes[0]):
-                                left = (groups[g] + t) * width + cols[c]
-                                for y in range(sizes[1]):
-                                    for x in range(sizes[2]):
-                                        block[t, y, x] = np.int64(samples[p, top + y, left + x]) * 16
-                            _transformed(block, sizes, False, half)
-                            for t in range(sizes[0]):
-                                for y in range(sizes[1]):
-                                    for x in range(sizes[2]):
-                                        # Coefficients are in 2^-7 of a code, as the step is.
-                                        size: Any = np.int64(abs(block[t, y, x]) / step + DEAD_ZONE)
-                                        size = min(size, MOST_LEVEL)
-                                        levels[t, y, x] = -size if block[t, y, x] < 0 else size
-                        before[p] = _code_levels(coder, levels, sizes, p, before[p])
+                            _quantise(samples[p], top, left, width, block, step)
+                        before[p] = _code_levels(coder, block.levels, block.sizes, p, before[p])
                         if decoding and before[p]:
-                            for t in range(sizes[0]):
-                                for y in range(sizes[1]):
-                                    for x in range(sizes[2]):
-                                        block[t, y, x] = levels[t, y, x] * step
-                            _transformed(block, sizes, True, half)
-                            for t in range(sizes[0]):
-                                left = (groups[g] + t) * width + cols[c]
-                                for y in range(sizes[1]):
-                                    for x in range(sizes[2]):
-                                        value = (block[t, y, x] + 8) >> 4
-                                        samples[p, top + y, left + x] = min(max(value, -32768), 32767)
+                            _rebuild(samples[p], top, left, width, block, step)
+
+
+@inner_kernel
+def _quantise(plane, top, left, width, block, step):
+    """Fill the levels of a block with those of a plane's samples; ``width`` is that of an elementary image."""
+    for t in range(block.sizes[0]):
+        for y in range(block.sizes[1]):
+            for x in range(block.sizes[2]):
+                block.samples[t, y, x] = np.int64(plane[top + y, left + t * width + x]) * 16
+    _transformed(block.samples, block.sizes, False, block.half)
+    for t in range(block.sizes[0]):
+        for y in range(block.sizes[1]):
+            for x in range(block.sizes[2]):
+                # Coefficients are in 2^-7 of a code, as the step is.
+                size: Any = np.int64(abs(block.samples[t, y, x]) / step + DEAD_ZONE)
+                size = min(size, MOST_LEVEL)
+                block.levels[t, y, x] = -size if block.samples[t, y, x] < 0 else size
+
+
+@inner_kernel
+def _rebuild(plane, top, left, width, block, step):
+    """Write the samples that the levels of a block stand for to a plane."""
+    for t in range(block.sizes[0]):
+        for y in range(block.sizes[1]):
+            for x in range(block.sizes[2]):
+                block.samples[t, y, x] = block.levels[t, y, x] * step
+    _transformed(block.samples, block.sizes, True, block.half)
+    for t in range(block.sizes[0]):
+        for y in range(block.sizes[1]):
+            for x in range(block.sizes[2]):
+                value = (block.samples[t, y, x] + 8) >> 4
+                plane[top + y, left + t * width + x] = min(max(value, -32768), 32767)

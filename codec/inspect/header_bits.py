@@ -301,49 +301,21 @@ def _h264_slice_header(r: _Bits, kind: int, reference: int, sps: dict[str, int],
     """Read a slice header to its end (7.3.3)."""
     r.ue()
     slice_type = r.ue() % 5
-    is_p, is_b, is_i = slice_type in (0, 3), slice_type == 1, slice_type in (2, 4)
+    predicted, both_ways = slice_type in (0, 1, 3), slice_type == 1
     r.ue()
     if sps["separate_planes"]:
         r.u(2)
-    r.u(sps["frame_num_bits"])
-    field_picture = 0
-    if not sps["frames_only"]:
-        field_picture = r.u(1)
-        if field_picture:
-            r.u(1)
-    if kind == 5:
-        r.ue()
-    if sps["poc_type"] == 0:
-        r.u(sps["poc_bits"])
-        if pps["poc_of_field"] and not field_picture:
-            r.se()
-    elif sps["poc_type"] == 1 and not sps["poc_always_zero"]:
-        r.se()
-        if pps["poc_of_field"] and not field_picture:
-            r.se()
-    if pps["redundant"]:
-        r.ue()
-    if is_b:
+    _skip_place(r, kind, sps, pps)
+    if both_ways:
         r.u(1)
-    refs = list(pps["refs"])  # type: ignore[call-overload]
-    if (is_p or is_b) and r.u(1):
-        refs[0] = r.ue() + 1
-        if is_b:
-            refs[1] = r.ue() + 1
-    for _ in range(0 if is_i else 2 if is_b else 1):
-        if r.u(1):
-            while r.ue() != 3:
-                r.ue()
-    if (pps["weighted"] and is_p) or (pps["weighted_b"] == 1 and is_b):
-        _skip_weights(r, refs[: 2 if is_b else 1])
+    if predicted:
+        refs = _active_references(r, both_ways, pps["refs"])  # type: ignore[arg-type]
+        _skip_reordering(r, len(refs))
+        if pps["weighted_b"] == 1 if both_ways else pps["weighted"]:
+            _skip_weights(r, refs)
     if reference:
-        if kind == 5:
-            r.u(2)
-        elif r.u(1):
-            while operation := r.ue():
-                for _ in range({1: 1, 2: 1, 3: 2, 4: 1, 5: 0, 6: 1}[operation]):
-                    r.ue()
-    if pps["cabac"] and not is_i:
+        _skip_marking(r, kind)
+    if pps["cabac"] and predicted:
         r.ue()
     r.se()
     if pps["deblocking"] and r.ue() != 1:
@@ -351,6 +323,51 @@ def _h264_slice_header(r: _Bits, kind: int, reference: int, sps: dict[str, int],
         r.se()
     if pps["cabac"]:
         r.at += -r.at % 8  # arithmetic coding starts on a byte
+
+
+def _skip_place(r: _Bits, kind: int, sps: dict[str, int], pps: dict[str, int]) -> None:
+    """Skip frame number, field, and picture order count."""
+    r.u(sps["frame_num_bits"])
+    field_picture = 0 if sps["frames_only"] else r.u(1)
+    if field_picture:
+        r.u(1)
+    if kind == 5:
+        r.ue()
+    of_field = pps["poc_of_field"] and not field_picture
+    if sps["poc_type"] == 0:
+        r.u(sps["poc_bits"])
+        if of_field:
+            r.se()
+    elif sps["poc_type"] == 1 and not sps["poc_always_zero"]:
+        r.se()
+        if of_field:
+            r.se()
+    if pps["redundant"]:
+        r.ue()
+
+
+def _active_references(r: _Bits, both_ways: bool, usual: tuple[int, int]) -> list[int]:
+    """Return the number of references of each list, one list or two."""
+    lists = 2 if both_ways else 1
+    return [r.ue() + 1 for _ in range(lists)] if r.u(1) else list(usual[:lists])
+
+
+def _skip_reordering(r: _Bits, lists: int) -> None:
+    """Skip the modification of reference lists (7.3.3.1)."""
+    for _ in range(lists):
+        if r.u(1):
+            while r.ue() != 3:
+                r.ue()
+
+
+def _skip_marking(r: _Bits, kind: int) -> None:
+    """Skip the marking of decoded references (7.3.3.3)."""
+    if kind == 5:
+        r.u(2)
+    elif r.u(1):
+        while operation := r.ue():
+            for _ in range({1: 1, 2: 1, 3: 2, 4: 1, 5: 0, 6: 1}[operation]):
+                r.ue()
 
 
 def _skip_weights(r: _Bits, refs: list[int]) -> None:
