@@ -5,12 +5,14 @@
 A white image is the mean weight of every pixel's rays through a camera with a main lens; the rim of the main lens
 bounds the micro-images. Light falls off towards the corners, photons and the sensor add noise, and a given share of
 the lenses is dark or saturated. Each row holds worst and median errors of one kind of picture. The row of one large
-picture also has CPU time and memory of `calibrate`. The last row is a camera behind a main lens of glass, whose pupil
-moves with the field: distance of the centres from the light without noise, with and without the drift.
+picture also has CPU time and memory of `calibrate`. Discs on grids in perspective or with radial distortion have rows
+by the shift at the border. The last row is a camera behind a main lens of glass, whose pupil moves with the field:
+distance of the centres from the light without noise, with and without the drift.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 import tracemalloc
@@ -22,12 +24,14 @@ from numpy.typing import NDArray
 
 from benchmarks.arguments import command_line
 from benchmarks.records import Records
-from ii_core import IICamera, calibrate, preset
+from ii_core import IICamera, NoLenses, calibrate, preset
 from ii_core.calibration import Calibration
 from ii_core.camera.optics import Lens
 
 RECORDS = Records("calibration", ("benchmarks.accuracy.calibration",))
-CAMERAS = 50  # cameras per row; four rows of small pictures
+CAMERAS = 125  # cameras per row; four rows of small pictures
+DISTORTIONS, BORDER_PITCHES, DISTORTED = ("perspective", "radial"), (0.1, 0.2, 0.5, 1.0, 2.0), 5
+DISTORTED_SIZE = (480, 420)
 PIXEL_MM = 0.005
 # Distance of the main lens, in gaps and sides of the picture: its rim's images shift by a sixth of a pixel towards
 # the border. In our camera a pixel's rays pass only the lens over it: larger shifts would cut micro-images.
@@ -137,6 +141,64 @@ def trial(seed: int, hexagonal: bool, bad: float, size: tuple[int, int] | None =
     return errors(camera, found) | used
 
 
+def distorted(kind: str, border_pitches: float, seed: int) -> dict[str, float]:
+    """Return errors of centres of a grid in perspective or with radial distortion, in pixels.
+
+    ``border_pitches`` is the shift at the left or right border off the straight grid of the middle. The lenses are
+    discs on a rectangular grid turned by up to 3°; ``straight_px`` is their rms distance from the best straight grid.
+    """
+    rng = np.random.default_rng((seed, kind == "radial", round(100 * border_pitches)))
+    pitch, turn = rng.uniform(10, 16), math.radians(rng.uniform(-3, 3))
+    middle, half, shift = np.array(DISTORTED_SIZE) / 2, DISTORTED_SIZE[0] / 2, border_pitches * pitch
+    rotation = pitch * np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    start = middle + rng.uniform(-0.5, 0.5, 2) * pitch
+    steep = shift / (half - shift) / half  # of a perspective, per pixel
+
+    def bent(places: NDArray[np.float64]) -> NDArray[np.float64]:
+        p = places - middle
+        if kind == "perspective":
+            return p / (1 + steep * p[..., :1]) + middle
+        return p * (1 - shift * (p**2).sum(axis=-1, keepdims=True) / half**3) + middle
+
+    def unbent(places: NDArray[np.float64]) -> NDArray[np.float64]:
+        p = places - middle
+        if kind == "perspective":
+            return p / (1 - steep * p[..., :1]) + middle
+        for _ in range(25):  # each leaves a third of the error
+            p = (places - middle) / (1 - shift * (p**2).sum(axis=-1, keepdims=True) / half**3)
+        return p + middle
+
+    def nearest(places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        index = np.rint((unbent(places) - start) @ np.linalg.inv(rotation))
+        return index, bent(index @ rotation + start)
+
+    (width, height), samples = DISTORTED_SIZE, 4
+    corners = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1)
+    centres = nearest(np.asarray(corners + 0.5, np.float64))[1]
+    radius = 0.42 * pitch * (1 - 3 * shift / half)  # discs stay apart where the grid is narrowest
+    share = np.zeros((height, width), np.float32)
+    for i in range(samples):
+        for j in range(samples):
+            off = corners + (np.array([i, j]) + 0.5) / samples - centres
+            share += np.hypot(off[..., 0], off[..., 1]) < radius
+    x, y = np.linspace(-1, 1, width), np.linspace(-1, 1, height)[:, None]
+    light = share / samples**2 * (1 - 0.2 * (x * x + y * y))
+    image = rng.poisson(light * ELECTRONS) + rng.normal(OFFSET, READ_NOISE, share.shape)
+    found = calibrate(np.rint(image).clip(0, FULL).astype(np.uint16))
+    k, l = np.meshgrid(*(np.arange(n) for n in found.grid.lattice.lenses))
+    got = np.stack(found.grid.lattice.centres(k, l), axis=-1).reshape(-1, 2)
+    index, true = nearest(got)
+    grid = np.column_stack([np.ones(len(index)), index])
+    straight = grid @ np.linalg.lstsq(grid, true, rcond=None)[0]
+    off_found, off_straight = (np.sqrt(((places - true) ** 2).sum(axis=1)) for places in (got, straight))
+    return {
+        "centres_px": float(np.sqrt((off_found**2).mean())),
+        "greatest_px": float(off_found.max()),
+        "straight_px": float(np.sqrt((off_straight**2).mean())),
+        "drift_px": found.grid.drift_px,
+    }
+
+
 def behind_glass(scale: int) -> dict[str, float]:
     """Return rms distances of centres from the light of micro-images behind a double Gauss, in pixels.
 
@@ -161,25 +223,39 @@ def behind_glass(scale: int) -> dict[str, float]:
     return {"followed_px": rms[0], "straight_px": rms[1], "drift_px": found.grid.drift_px}
 
 
+SMALL = [
+    {"lattice": lattice, "bad": bad, "pixels": "300-700", "cameras": CAMERAS}
+    for lattice in ("rectangular", "hexagonal")
+    for bad in (0.0, 0.3)
+]
+LARGE = [{"lattice": "hexagonal", "bad": 0.3, "pixels": "7728x5368", "cameras": 1}]
+BENT = [
+    {"distortion": kind, "border_pitches": pitches, "cameras": DISTORTED}
+    for kind in DISTORTIONS
+    for pitches in BORDER_PITCHES
+]
+GLASS = [{"main_lens": "double-gauss", "scale": 8}]
+KEYS: list[dict[str, Any]] = [*BENT, *GLASS, *SMALL, *LARGE]
+
+
 def main() -> None:
     """Measure and print."""
     asked = command_line(__doc__).parse_args()
-    small = [
-        {"lattice": lattice, "bad": bad, "pixels": "300-700", "cameras": CAMERAS}
-        for lattice in ("rectangular", "hexagonal")
-        for bad in (0.0, 0.3)
-    ]
-    large = [{"lattice": "hexagonal", "bad": 0.3, "pixels": "7728x5368", "cameras": 1}]
-    glass = [{"main_lens": "double-gauss", "scale": 8}]
-    for key in RECORDS.todo([*small, *large, *glass], asked.again):
+    for key in RECORDS.todo(KEYS, asked.again):
 
         def row(key: dict[str, Any] = key) -> dict[str, Any]:
             if "main_lens" in key:
                 return behind_glass(key["scale"])
-            size = None if "-" in key["pixels"] else tuple(map(int, key["pixels"].split("x")))
-            found = [trial(i, key["lattice"] == "hexagonal", key["bad"], size) for i in range(key["cameras"])]  # type: ignore[arg-type]
-            result: dict[str, Any] = {}
-            for name in found[0]:
+            if "distortion" in key:
+                found = []
+                for seed in range(key["cameras"]):
+                    with contextlib.suppress(NoLenses):
+                        found.append(distorted(key["distortion"], key["border_pitches"], seed))
+            else:
+                size = None if "-" in key["pixels"] else tuple(map(int, key["pixels"].split("x")))
+                found = [trial(i, key["lattice"] == "hexagonal", key["bad"], size) for i in range(key["cameras"])]  # type: ignore[arg-type]
+            result: dict[str, Any] = {"refused": key["cameras"] - len(found)}
+            for name in found[0] if found else ():
                 values = np.array([trial[name] for trial in found])
                 result |= {f"{name}_worst": float(values.max()), f"{name}_median": float(np.median(values))}
             return result

@@ -28,7 +28,8 @@ LOOSE, LOOSE_YET = 0.05, 0.13  # of the pitch, median miss of centres: more, in 
 BAD_SIGMAS = 3.5  # beyond this many robust standard deviations a centre is thrown out
 BORDER = 0.93  # of the light of the middle: borders of micro-images are darker
 DARK = 0.3  # of the light of the lenses around: less, and the lens is dark
-NOTED_DRIFT = 0.03  # pixels, and three times its own error: less is not fitted, with 0.02 one in 12 000 cameras drifted
+# Pixels, and three times its own error: less is not fitted. With 0.02 one of 12 000 straight cameras drifted.
+NOTED_DRIFT = 0.03
 ENOUGH = 50  # centres for a drift: five times the terms of a cubic
 GROWTH, GROWTH_DRIFTING = 2.0, 1.5  # of the circle of centres from step to step; a drift is extrapolated less far
 MARGIN_DRIFTING = 4  # lenses sought beyond the straight grid's range
@@ -162,8 +163,8 @@ def lens_grid(grey: NDArray[np.float32], lattice: str | None = None, clipped: Bo
         saturated = ndimage.maximum_filter(clipped, max(1, int(fit.nearest_px / 2)))[_pixels(places)]
     if saturated.mean() > SATURATED:
         raise NoLenses(
-            f"no lenses are found: {int(saturated.sum())} of {len(k)} micro-images have pixels at the picture's greatest "
-            "value, the end of the sensor's scale: a shorter exposure is needed"
+            f"no lenses are found: {int(saturated.sum())} of {len(k)} micro-images have pixels at the picture's "
+            "greatest value, the end of the sensor's scale: a shorter exposure is needed"
         )
     heights, dark = summits.at(places), np.zeros(len(k), bool)
     level = _Level(places[~saturated], heights[~saturated], (width, height)) if not saturated.all() else None

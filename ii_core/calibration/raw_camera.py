@@ -117,8 +117,8 @@ class Calibration:
                 f"{r['dark_lenses']} dark, {r['saturated_lenses']} saturated",
                 *(
                     [
-                        f"centres drift by up to {drift:.2f} px, {r['drift_pitches']:.2f} of the pitch, off the straight "
-                        f"grid of the middle: the camera follows; the best straight grid misses them by "
+                        f"centres drift by up to {drift:.2f} px, {r['drift_pitches']:.2f} of the pitch, off the "
+                        f"straight grid of the middle: the camera follows; the best straight grid misses them by "
                         f"{r['straight_grid_rms_px']:.3f} px rms"
                     ]
                     if drift
@@ -157,7 +157,8 @@ def calibrate(
     """The camera of a raw lenslet picture.
 
     Its periods are found in its autocorrelation; then the centres of all micro-images, to a fraction of a pixel; then
-    the lattice through them by least squares, with a drift if there is one, outliers thrown out. See ``calibration.grid.lens_grid``.
+    the lattice through them by least squares, with a drift if there is one, outliers thrown out. See
+    ``calibration.grid.lens_grid``.
 
     Parameters
     ----------
@@ -184,7 +185,7 @@ def calibrate(
     Raises
     ------
     NoLenses
-        If there is no lens grid in the picture. It is a ValueError.
+        If there is no lens grid in the picture, or its drift is too steep for a camera. It is a ValueError.
     ValueError
         If the frames differ in size or have values that are not finite, or a length is not positive.
     """
@@ -206,8 +207,16 @@ def calibrate(
     shape = raw.shape[1::-1] if not turned else raw.shape[:2]
     source = "white image" if white is not None else "picture itself"
     content = _grey(raw, mosaic)
+    try:
+        camera = _camera(grid, (shape[0], shape[1]), pixel_pitch_mm, gap_mm, name)
+    except ValueError as error:
+        if not grid.drift_px:
+            raise
+        raise NoLenses(
+            f"centres drift by up to {grid.drift_px:.1f} px off a straight grid, which no camera can follow: {error}"
+        ) from error
     return Calibration(
-        camera=_camera(grid, (shape[0], shape[1]), pixel_pitch_mm, gap_mm, name),
+        camera=camera,
         grid=grid,
         source=source,
         types=lens_types(np.rot90(content) if turned else content, grid),
@@ -252,8 +261,8 @@ def _finite(name: str, frame: NDArray[Any]) -> None:
     nans, infinite = int(np.isnan(frame).sum()), int(np.isinf(frame).sum())
     counted = " and ".join(f"{n} {kind}" for n, kind in ((nans, "NaN"), (infinite, "infinite")) if n)
     raise ValueError(
-        f"{name} has {counted} of {frame.size} values, the first at row {row}, column {col}: finite values are needed; "
-        "replace bad pixels by the mean of their neighbours first"
+        f"{name} has {counted} of {frame.size} values, the first at row {row}, column {col}: finite values are "
+        "needed; replace bad pixels by the mean of their neighbours first"
     )
 
 
