@@ -106,6 +106,21 @@ def test_calibration_gives_back_turn_shear_and_place():
 
 
 @pytest.mark.parametrize("hexagonal", [False, True])
+def test_the_cameras_lattice_is_the_fitted_grid(hexagonal):
+    """Pitch, turn and shear of the camera give back the two fitted vectors: axes have the determinant 1."""
+    rng = np.random.default_rng(14)
+    camera = replace(random_camera(rng, (330, 300), 13.3, hexagonal), lens_turn_deg=3.0, lens_shear=0.01)
+    found = calibrate(exposed(white_image(camera), camera, rng))
+    lattice = found.camera.lens_lattice
+    k, l = (g.ravel() for g in np.meshgrid(*(np.arange(n) for n in lattice.lenses)))
+    centres = np.stack(lattice.centres(k, l), axis=1)
+    off = np.abs(centres[:, None] - found.grid.places[None]).max(axis=2).min(axis=1)
+    assert off.max() < 1e-6
+    at = np.floor(centres).astype(int).T
+    np.testing.assert_array_equal(lattice.nearest(*at), (k, l))
+
+
+@pytest.mark.parametrize("hexagonal", [False, True])
 def test_every_lens_of_the_camera_lies_in_the_picture(hexagonal):
     camera = calibrate(shot(8, hexagonal)[1]).camera
     k, l = np.meshgrid(np.arange(camera.lenses[0]), np.arange(camera.lenses[1]))
