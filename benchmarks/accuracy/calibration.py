@@ -5,12 +5,14 @@
 A white image is the mean weight of every pixel's rays through a camera with a main lens; the rim of the main lens
 bounds the micro-images. Light falls off towards the corners, photons and the sensor add noise, and a given share of
 the lenses is dark or saturated. Each row holds worst and median errors of one kind of picture. The row of one large
-picture also has CPU time and memory of `calibrate`. The last row is a camera behind a main lens of glass, whose pupil
-moves with the field: distance of the centres from the light without noise, with and without the drift.
+picture also has CPU time and memory of `calibrate`. Discs on grids in perspective or with radial distortion have rows
+by the shift at the border. The last row is a camera behind a main lens of glass, whose pupil moves with the field:
+distance of the centres from the light without noise, with and without the drift.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import textwrap
 import time
@@ -24,12 +26,14 @@ from numpy.typing import NDArray
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin, table
-from ii_core import IICamera, calibrate, preset
+from ii_core import IICamera, NoLenses, calibrate, preset
 from ii_core.calibration import Calibration
 from ii_core.camera.optics import Lens
 
 RECORDS = Records("calibration", ("benchmarks.accuracy.calibration",))
-CAMERAS = 50  # cameras per row; four rows of small pictures
+CAMERAS = 125  # cameras per row; four rows of small pictures
+DISTORTIONS, BORDER_PITCHES, DISTORTED = ("perspective", "radial"), (0.1, 0.2, 0.5, 1.0, 2.0), 5
+DISTORTED_SIZE = (480, 420)
 PIXEL_MM = 0.005
 # Distance of the main lens, in gaps and sides of the picture: its rim's images shift by a sixth of a pixel towards
 # the border. In our camera a pixel's rays pass only the lens over it: larger shifts would cut micro-images.
@@ -139,6 +143,64 @@ def trial(seed: int, hexagonal: bool, bad: float, size: tuple[int, int] | None =
     return errors(camera, found) | used
 
 
+def distorted(kind: str, border_pitches: float, seed: int) -> dict[str, float]:
+    """Return errors of centres of a grid in perspective or with radial distortion, in pixels.
+
+    ``border_pitches`` is the shift at the left or right border off the straight grid of the middle. The lenses are
+    discs on a rectangular grid turned by up to 3°; ``straight_px`` is their rms distance from the best straight grid.
+    """
+    rng = np.random.default_rng((seed, kind == "radial", round(100 * border_pitches)))
+    pitch, turn = rng.uniform(10, 16), math.radians(rng.uniform(-3, 3))
+    middle, half, shift = np.array(DISTORTED_SIZE) / 2, DISTORTED_SIZE[0] / 2, border_pitches * pitch
+    rotation = pitch * np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    start = middle + rng.uniform(-0.5, 0.5, 2) * pitch
+    steep = shift / (half - shift) / half  # of a perspective, per pixel
+
+    def bent(places: NDArray[np.float64]) -> NDArray[np.float64]:
+        p = places - middle
+        if kind == "perspective":
+            return p / (1 + steep * p[..., :1]) + middle
+        return p * (1 - shift * (p**2).sum(axis=-1, keepdims=True) / half**3) + middle
+
+    def unbent(places: NDArray[np.float64]) -> NDArray[np.float64]:
+        p = places - middle
+        if kind == "perspective":
+            return p / (1 - steep * p[..., :1]) + middle
+        for _ in range(25):  # each leaves a third of the error
+            p = (places - middle) / (1 - shift * (p**2).sum(axis=-1, keepdims=True) / half**3)
+        return p + middle
+
+    def nearest(places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        index = np.rint((unbent(places) - start) @ np.linalg.inv(rotation))
+        return index, bent(index @ rotation + start)
+
+    (width, height), samples = DISTORTED_SIZE, 4
+    corners = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1)
+    centres = nearest(np.asarray(corners + 0.5, np.float64))[1]
+    radius = 0.42 * pitch * (1 - 3 * shift / half)  # discs stay apart where the grid is narrowest
+    share = np.zeros((height, width), np.float32)
+    for i in range(samples):
+        for j in range(samples):
+            off = corners + (np.array([i, j]) + 0.5) / samples - centres
+            share += np.hypot(off[..., 0], off[..., 1]) < radius
+    x, y = np.linspace(-1, 1, width), np.linspace(-1, 1, height)[:, None]
+    light = share / samples**2 * (1 - 0.2 * (x * x + y * y))
+    image = rng.poisson(light * ELECTRONS) + rng.normal(OFFSET, READ_NOISE, share.shape)
+    found = calibrate(np.rint(image).clip(0, FULL).astype(np.uint16))
+    k, l = np.meshgrid(*(np.arange(n) for n in found.grid.lattice.lenses))
+    got = np.stack(found.grid.lattice.centres(k, l), axis=-1).reshape(-1, 2)
+    index, true = nearest(got)
+    grid = np.column_stack([np.ones(len(index)), index])
+    straight = grid @ np.linalg.lstsq(grid, true, rcond=None)[0]
+    off_found, off_straight = (np.sqrt(((places - true) ** 2).sum(axis=1)) for places in (got, straight))
+    return {
+        "centres_px": float(np.sqrt((off_found**2).mean())),
+        "greatest_px": float(off_found.max()),
+        "straight_px": float(np.sqrt((off_straight**2).mean())),
+        "drift_px": found.grid.drift_px,
+    }
+
+
 def behind_glass(scale: int) -> dict[str, float]:
     """Return rms distances of centres from the light of micro-images behind a double Gauss, in pixels.
 
@@ -163,28 +225,42 @@ def behind_glass(scale: int) -> dict[str, float]:
     return {"followed_px": rms[0], "straight_px": rms[1], "drift_px": found.grid.drift_px}
 
 
+SMALL = [
+    {"lattice": lattice, "bad": bad, "pixels": "300-700", "cameras": CAMERAS}
+    for lattice in ("rectangular", "hexagonal")
+    for bad in (0.0, 0.3)
+]
+LARGE = [{"lattice": "hexagonal", "bad": 0.3, "pixels": "7728x5368", "cameras": 1}]
+BENT = [
+    {"distortion": kind, "border_pitches": pitches, "cameras": DISTORTED}
+    for kind in DISTORTIONS
+    for pitches in BORDER_PITCHES
+]
+GLASS = [{"main_lens": "double-gauss", "scale": 8}]
+KEYS: list[dict[str, Any]] = [*BENT, *GLASS, *SMALL, *LARGE]
+
+
 def main() -> None:
     """Measure, record and fill the page."""
     asked = command_line(__doc__).parse_args()
-    small = [
-        {"lattice": lattice, "bad": bad, "pixels": "300-700", "cameras": CAMERAS}
-        for lattice in ("rectangular", "hexagonal")
-        for bad in (0.0, 0.3)
-    ]
-    large = [{"lattice": "hexagonal", "bad": 0.3, "pixels": "7728x5368", "cameras": 1}]
-    RECORDS.run([*small, *large], trials, asked.again)
-    RECORDS.run(
-        [{"main_lens": "double-gauss", "scale": 8}], lambda main_lens, scale: behind_glass(scale), asked.again
-    )
+    RECORDS.run(KEYS, measured, asked.again)
     publish(tables())
 
 
-def trials(lattice: str, bad: float, pixels: str, cameras: int) -> dict[str, float]:
-    """Return worst and median errors of random cameras."""
-    size: Any = None if "-" in pixels else tuple(map(int, pixels.split("x")))
-    found = [trial(i, lattice == "hexagonal", bad, size) for i in range(cameras)]
-    result = {}
-    for name in found[0]:
+def measured(**key: Any) -> dict[str, Any]:
+    """Return the number of refused cameras of a row, and worst and median errors of the others."""
+    if "main_lens" in key:
+        return behind_glass(key["scale"])
+    found = []
+    if "distortion" in key:
+        for seed in range(key["cameras"]):
+            with contextlib.suppress(NoLenses):
+                found.append(distorted(key["distortion"], key["border_pitches"], seed))
+    else:
+        size: Any = None if "-" in key["pixels"] else tuple(map(int, key["pixels"].split("x")))
+        found = [trial(i, key["lattice"] == "hexagonal", key["bad"], size) for i in range(key["cameras"])]
+    result: dict[str, Any] = {"refused": key["cameras"] - len(found)}
+    for name in found[0] if found else ():
         values = np.array([one[name] for one in found])
         result |= {f"{name}_worst": float(values.max()), f"{name}_median": float(np.median(values))}
     return result
@@ -192,19 +268,19 @@ def trials(lattice: str, bad: float, pixels: str, cameras: int) -> dict[str, flo
 
 def tables() -> Tables:
     """Return the table of the page of calibration."""
-    rows = RECORDS.rows()
-    measured = [row for row in rows if "lattice" in row]
+    rows = [row for row in RECORDS.rows() if any(key.items() <= row.items() for key in KEYS)]
+    grids = [row for row in rows if "lattice" in row]
     lines = [
         f"{row['lattice']} | {row['bad']:.0%} | {row['pixels'].replace('-', '–').replace('x', '×')} | "
         f"{row['cameras']} | {row['pitch_worst']:.1e} ({row['pitch_median']:.1e}) | "
         f"{row['turn_deg_worst']:.4f}° ({row['turn_deg_median']:.4f}°) | "
         f"{row['centres_px_worst']:.4f} px ({row['centres_px_median']:.4f} px)"
-        for row in measured
+        for row in grids
     ]
     large = [
         f"The picture of {row['pixels'].replace('x', '×')} px took {row['calibrate_cpu_seconds_worst']:.0f} s of CPU "
         f"time and {row['calibrate_peak_bytes_worst'] / 1e9:.1f} GB at the most."
-        for row in measured
+        for row in grids
         if "calibrate_peak_bytes_worst" in row
     ]
     glass = [
@@ -216,4 +292,25 @@ def tables() -> Tables:
     ]
     told = [line for text in (*large, *glass) for line in ("", *textwrap.wrap(text, 100, break_on_hyphens=False))]
     heads = "lattice | lenses dark or saturated | pixels a side | cameras | pitch, worst (median) | turn | centres"
-    return {("docs/calibration.md", "calibration"): [*table(heads, lines), *told, "", origin(rows)]}
+    return {
+        ("docs/calibration.md", "calibration"): [*table(heads, lines), *told, *bent_table(rows), "", origin(rows)]
+    }
+
+
+def bent_table(rows: list[dict[str, Any]]) -> list[str]:
+    """Return errors of centres by distortion, with a caption."""
+    size = "×".join(map(str, DISTORTED_SIZE))
+    caption = (
+        f"Grids that no straight grid fits: discs on {size} px, lenses of 10–16 px, with the same noise. The shift "
+        "is that of the left or right border off the straight grid of the middle. Distances are root mean squares, "
+        "worst of the cameras. Where a drift would be steeper than cameras support, `calibrate` refuses the picture."
+    )
+    lines = []
+    for row in rows:
+        if "distortion" in row:
+            found = row["refused"] < row["cameras"]
+            off = [f"{row['centres_px_worst']:.4f} px", f"{row['straight_px_worst']:.2f} px"] if found else ["–", "–"]
+            refused = f"{row['refused']} of {row['cameras']}"
+            lines.append([row["distortion"], f"{row['border_pitches']:g}", refused, *off])
+    heads = "distortion | shift at the border, pitches | cameras refused | centres | best straight grid"
+    return ["", *textwrap.wrap(caption, 100, break_on_hyphens=False), "", *table(heads, lines)]

@@ -81,6 +81,8 @@ class Calibration:
             "dark_lenses": int(grid.dark.sum()),
             "saturated_lenses": int(grid.saturated.sum()),
             "drift_px": grid.drift_px,
+            "drift_pitches": grid.drift_px / min(across, down),
+            "straight_grid_rms_px": grid.straight_rms_px,
             "lens_types": self.types.describe(),
             "pixels_outside": {
                 "left": max(0.0, left),
@@ -114,7 +116,11 @@ class Calibration:
                 f"{r['residual_greatest_px']:.2f}; {r['centres_used']} of {r['centres']} used, "
                 f"{r['dark_lenses']} dark, {r['saturated_lenses']} saturated",
                 *(
-                    [f"centres drift by up to {drift:.2f} px off a straight grid: the camera follows"]
+                    [
+                        f"centres drift by up to {drift:.2f} px, {r['drift_pitches']:.2f} of the pitch, off the "
+                        f"straight grid of the middle: the camera follows; the best straight grid misses them by "
+                        f"{r['straight_grid_rms_px']:.3f} px rms"
+                    ]
                     if drift
                     else []
                 ),
@@ -151,7 +157,8 @@ def calibrate(
     """The camera of a raw lenslet picture.
 
     Its periods are found in its autocorrelation; then the centres of all micro-images, to a fraction of a pixel; then
-    the lattice through them by least squares, outliers thrown out. See ``calibration.grid.lens_grid``.
+    the lattice through them by least squares, with a drift if there is one, outliers thrown out. See
+    ``calibration.grid.lens_grid``.
 
     Parameters
     ----------
@@ -178,9 +185,9 @@ def calibrate(
     Raises
     ------
     NoLenses
-        If there is no lens grid in the picture. It is a ValueError.
+        If there is no lens grid in the picture, or its drift is too steep for a camera. It is a ValueError.
     ValueError
-        If the frames differ in size, or a length is not positive.
+        If the frames differ in size or have values that are not finite, or a length is not positive.
     """
     from .lens_types import lens_types
 
@@ -191,6 +198,8 @@ def calibrate(
     for what, frame in frames.items():
         if frame is not None and (frame.ndim not in (2, 3) or frame.shape[:2] != raw.shape[:2]):
             raise ValueError(f"{what} is {frame.shape} and raw {raw.shape}: frames of one size are needed")
+        if frame is not None:
+            _finite(what, frame)
     picture = raw if white is None else white
     clipped = _clipped(picture)
     grey = _grey(picture, mosaic) - (0 if dark is None else _grey(dark, None))
@@ -198,8 +207,16 @@ def calibrate(
     shape = raw.shape[1::-1] if not turned else raw.shape[:2]
     source = "white image" if white is not None else "picture itself"
     content = _grey(raw, mosaic)
+    try:
+        camera = _camera(grid, (shape[0], shape[1]), pixel_pitch_mm, gap_mm, name)
+    except ValueError as error:
+        if not grid.drift_px:
+            raise
+        raise NoLenses(
+            f"centres drift by up to {grid.drift_px:.1f} px off a straight grid, which no camera can follow: {error}"
+        ) from error
     return Calibration(
-        camera=_camera(grid, (shape[0], shape[1]), pixel_pitch_mm, gap_mm, name),
+        camera=camera,
         grid=grid,
         source=source,
         types=lens_types(np.rot90(content) if turned else content, grid),
@@ -234,6 +251,19 @@ def _clipped(picture: NDArray[Any]) -> NDArray[np.bool_]:
     top = picture.max()
     clipped = picture == top if picture.ndim == 2 else (picture == top).any(axis=2)
     return clipped if clipped.mean() > 1e-3 else np.zeros(clipped.shape, bool)
+
+
+def _finite(name: str, frame: NDArray[Any]) -> None:
+    """Raise ValueError if a frame has values that are NaN or infinite."""
+    if frame.dtype.kind != "f" or np.isfinite(frame).all():
+        return
+    row, col = np.argwhere(~np.isfinite(frame))[0][:2]
+    nans, infinite = int(np.isnan(frame).sum()), int(np.isinf(frame).sum())
+    counted = " and ".join(f"{n} {kind}" for n, kind in ((nans, "NaN"), (infinite, "infinite")) if n)
+    raise ValueError(
+        f"{name} has {counted} of {frame.size} values, the first at row {row}, column {col}: finite values are "
+        "needed; replace bad pixels by the mean of their neighbours first"
+    )
 
 
 def _grey(frame: NDArray[Any], mosaic: str | None) -> NDArray[np.float32]:
@@ -309,7 +339,7 @@ def calibrated_picture(
     Raises
     ------
     ValueError
-        If the frames are not of the calibration's size, or the picture is dark.
+        If the frames are not of the calibration's size or have values that are not finite, or the picture is dark.
     """
     from .white import gain
 
@@ -320,6 +350,8 @@ def calibrated_picture(
     for what, frame in zip(("raw", "white", "dark"), frames, strict=True):
         if frame is not None and frame.shape[1::-1] != size:
             raise ValueError(f"{what} is {frame.shape}: {size[1]}×{size[0]}, the calibration's size, is needed")
+        if frame is not None:
+            _finite(what, frame)
     if calibration.turned and mosaic is not None:  # the tile turns with the picture
         tile = np.rot90(np.array(list(mosaic)).reshape(2, 2))
         if raw.shape[1] % 2:
