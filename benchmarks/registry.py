@@ -156,6 +156,7 @@ CLOSED: dict[str, tuple[str, ...]] = {
     "study/reasons": (),
     "study/volume_model": (),
 }
+STABLE, SPEED = "docs/stability.md", "docs/speed_accuracy.md"
 HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
 # In the order of a whole study: pages after the measurements that they show.
 BENCHMARKS = {
@@ -171,12 +172,8 @@ BENCHMARKS = {
         Benchmark("coding.cost", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.coders", records=OWN),
         Benchmark("coding.bframes", records=OWN),
-        Benchmark(
-            "pages.coding_docs",
-            needs="records of coders and bframes",
-            fills=("docs/coding.md", "docs/speed_accuracy.md"),
-            writes=(f"{IMAGES}/coders*",),
-        ),
+        Benchmark("pages.coding_docs", needs="records of coders and bframes", fills=("docs/coding.md", SPEED),
+            writes=(f"{IMAGES}/coders*",)),
         Benchmark("coding.takes", records=OWN, fills=("docs/video.md",)),
         Benchmark("pages.video", needs="records of takes", writes=(f"{IMAGES}/takes_[aft]*",)),
         Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
@@ -185,56 +182,29 @@ BENCHMARKS = {
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
         Benchmark("stability.wrong_calls", records=OWN, fills=("docs/stability.md",)),
         Benchmark("pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)),
-        Benchmark(
-            "accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",), writes=(f"{IMAGES}/depth_truth.*",)
-        ),
+        Benchmark("accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",),
+            writes=(f"{IMAGES}/depth_truth.*",)),
         Benchmark("accuracy.field_depth", records=OWN, fills=("docs/metrics.md",)),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
         Benchmark("speed.eye", records=OWN, fills=("docs/display.md",)),
         Benchmark("accuracy.map_precision", records=OWN, writes=(f"{IMAGES}/map_precision.*",)),
         Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),
-        Benchmark(
-            "accuracy.povray",
-            needs="povray",
-            records=OWN,
-            fills=("docs/stability.md",),
-            writes=(f"{IMAGES}/povray.*",),
-        ),
-        Benchmark(
-            "stability",
-            needs="records of convergence, map_precision and depth_truth",
-            records=OWN,
-            fills=("docs/stability.md",),
-            writes=(f"{IMAGES}/stability*",),
-        ),
-        Benchmark(
-            "speed.pareto",
-            needs="records of map_precision",
-            records=OWN,
-            fills=("docs/speed_accuracy.md",),
-            writes=(f"{IMAGES}/pareto.*", f"{IMAGES}/pareto_fine.*"),
-        ),
+        Benchmark("accuracy.povray", needs="povray", records=OWN, fills=(STABLE,), writes=(f"{IMAGES}/povray.*",)),
+        Benchmark("stability", needs="records of convergence, map_precision and depth_truth", records=OWN,
+            fills=(STABLE,), writes=(f"{IMAGES}/stability*",)),
+        Benchmark("speed.pareto", needs="records of map_precision", records=OWN, fills=(SPEED,),
+            writes=(f"{IMAGES}/pareto.*", f"{IMAGES}/pareto_fine.*")),
         Benchmark("speed.metrics_speed", records=OWN, fills=("docs/metrics.md",)),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
         Benchmark("pages.hero", writes=(f"{IMAGES}/apples.webp",)),
         Benchmark("pages.gallery", needs=f"{BROWSER} for --stills", writes=("docs/gallery/*",)),
-        Benchmark(
-            "pages.readme",
-            needs="out/demo and out/full of examples/demo.py; records of disparity and ratios",
-            records="*_rd.json",
-            fills=("README.md", "docs/study.md"),
-            writes=tuple(f"{IMAGES}/{name}_*" for name in ("apples", "cuboid", "demo", "full")),
-        ),
-        Benchmark(
-            "study",
-            needs="records of coders",
-            records="study.jsonl.gz",
-            fills=("docs/study.md",),
-            tables_in="study.page",
-            writes=(f"{IMAGES}/study/*",),
-        ),
+        Benchmark("pages.readme", needs="out/demo and out/full of examples/demo.py; records of disparity and ratios",
+            records="*_rd.json", fills=("README.md", "docs/study.md"),
+            writes=tuple(f"{IMAGES}/{name}_*" for name in ("apples", "cuboid", "demo", "full"))),
+        Benchmark("study", needs="records of coders", records="study.jsonl.gz", fills=("docs/study.md",),
+            tables_in="study.page", writes=(f"{IMAGES}/study/*",)),
         Benchmark("pages.data_card", fills=("docs/benchmark.md",)),
         Benchmark("pages.tables", needs="records of all others"),
     )
-}
+}  # fmt: skip

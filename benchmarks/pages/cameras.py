@@ -17,7 +17,7 @@ from PIL import Image
 
 from benchmarks.accuracy import camera_in_scene, map_precision
 from benchmarks.pages.pictures import write_picture
-from benchmarks.records import ROOT, origin
+from benchmarks.records import ROOT, origin, table
 from ii_core import (
     IICamera,
     IIPicture,
@@ -138,44 +138,45 @@ def all_scenes() -> NDArray[np.uint8]:
 
 def precision() -> str:
     """Return the errors of cameras stored as pictures, from `benchmarks.accuracy.map_precision`."""
-    rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
-    lines = [
-        "\n## Stored as pictures: which format is enough\n",
-        "Errors of maps stored as pictures, at a quarter of the lenses each way: angle between stored and",
-        "true direction, distance between stored and true location, and PSNR of the picture against that of",
-        "float maps.\n",
-        "| camera | format | bytes per ray | angle max · rms | location max · rms | PSNR apples · cuboid |",
-        "|---|---|---|---|---|---|",
-    ]
+    rows, lines = map_precision.RECORDS.rows(scale=map_precision.SCALE), []
     for row in rows:
         psnr = [row[f"psnr_{scene}"] for scene in ("apples", "cuboid")]
         shown = " · ".join("reference" if value is None else f"{value:.1f} dB" for value in psnr)
         lines.append(
-            f"| {row['camera']} | {row['format']} | {row['bytes_per_pixel']:.2g} "
+            f"{row['camera']} | {row['format']} | {row['bytes_per_pixel']:.2g} "
             f"| {figure(row['angle_max_urad'])} · {figure(row['angle_rms_urad'])} µrad "
-            f"| {figure(row['place_max_um'])} · {figure(row['place_rms_um'])} µm | {shown} |"
+            f"| {figure(row['place_max_um'])} · {figure(row['place_rms_um'])} µm | {shown}"
         )
-    return "\n".join([*lines, "", origin(rows), "", VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""])
+    made = table(
+        "camera | format | bytes per ray | angle max · rms | location max · rms | PSNR apples · cuboid", lines
+    )
+    return "\n".join(
+        [PRECISION, *made, "", origin(rows), "", VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""]
+    )
+
+
+PRECISION = """
+## Stored as pictures: which format is enough
+
+Errors of maps stored as pictures, at a quarter of the lenses each way: angle between stored and
+true direction, distance between stored and true location, and PSNR of the picture against that of
+float maps.
+"""
 
 
 def in_scene() -> str:
     """Return the comparison with a camera of glass in the scene, from `benchmarks.accuracy.camera_in_scene`."""
     (study,) = camera_in_scene.RECORDS.rows(scale=camera_in_scene.SCALE)
     lines = [
-        IN_SCENE,
-        "| *Apples* | aperture | triangles of the camera | as it is | Fresnel's losses added | no stray light |",
-        "|---|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {row['scene'].removeprefix('apples').lstrip(', ') or 'lit as usual'} | {row['aperture_of_pitch']:.2f} | "
+        f"{row['scene'].removeprefix('apples').lstrip(', ') or 'lit as usual'} | {row['aperture_of_pitch']:.2f} | "
         f"{row['triangles_of_the_camera']} | {row['psnr_db']:.1f} dB | {row['psnr_with_fresnel_db']:.1f} dB | "
-        f"{row['psnr_direct_light_db']:.1f} dB |"
+        f"{row['psnr_direct_light_db']:.1f} dB"
         for row in study["rows"]
         if row["what"] in ("picture", "tessellation")
     ]
-    return "\n".join(
-        [*lines, "", origin([study]), "", "![both pictures and their differences](images/camera_in_scene.jpg)", ""]
-    )
+    heads = "*Apples* | aperture | triangles of the camera | as it is | Fresnel's losses added | no stray light"
+    shown = "![both pictures and their differences](images/camera_in_scene.jpg)"
+    return "\n".join([IN_SCENE, *table(heads, lines), "", origin([study]), "", shown, ""])
 
 
 IN_SCENE = """

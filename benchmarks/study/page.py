@@ -12,7 +12,7 @@ from benchmarks.coding.coders import ANCHOR
 from benchmarks.coding.rd import climbing
 from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, filled
-from benchmarks.records import ROOT, origin, with_commits
+from benchmarks.records import ROOT, origin, table
 from ii_core.base.files import atomic_path
 from ii_core.base.json_lines import lines_of, read_records
 from metrics import bd_psnr, bd_rate
@@ -117,12 +117,17 @@ def sizes(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
             points = record["result"]["points"]
             pair = (gain(points, scheme, REFERENCE) for scheme in (SI, "si-h264"))
             found[scene, record["parameters"]["scale"]] = " · ".join(shown(value, "+.1f") for value in pair)
+    return by_size(found, (512, 256))
+
+
+def by_size(found: Mapping[tuple[str, int], str], lenses: tuple[int, int]) -> list[str]:
+    """Return a table of cells by scene and scale, from few lenses to as many as these."""
     scales = sorted({scale for _, scale in found}, reverse=True)
-    lines = ["| lenses | " + " | ".join(SCENES) + " |", "|---" * (len(SCENES) + 1) + "|"]
-    for scale in scales:
-        cells = [found.get((scene, scale), "") for scene in SCENES]
-        lines.append(f"| {512 // scale}×{256 // scale} | " + " | ".join(cells) + " |")
-    return lines
+    lines = [
+        ["×".join(str(n // scale) for n in lenses), *(found.get((scene, scale), "") for scene in SCENES)]
+        for scale in scales
+    ]
+    return table(" | ".join(["lenses", *SCENES]), lines)
 
 
 def views_by_size(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
@@ -134,11 +139,7 @@ def views_by_size(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list
             pair = (points[scheme] for scheme in (SI, "ei-h264:chroma=420"))
             cell = " · ".join(f"{p['q_view']:.3f}" + ("" if p["reached"] else f" ({p['bpp']:.2f} bpp)") for p in pair)
             found[scene, record["parameters"]["scale"]] = cell
-    lines = ["| lenses | " + " | ".join(SCENES) + " |", "|---" * (len(SCENES) + 1) + "|"]
-    for scale in sorted({scale for _, scale in found}, reverse=True):
-        cells = [found.get((scene, scale), "") for scene in SCENES]
-        lines.append(f"| {64 // scale}×{64 // scale} | " + " | ".join(cells) + " |")
-    return lines
+    return by_size(found, (64, 64))
 
 
 def smaller(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -180,11 +181,8 @@ def shown_tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dic
 
 def claim_table(made: Iterable[Claim]) -> list[str]:
     """Return a table with one row per claim."""
-    lines = ["| Olsson 2008 | what | theirs | ours | sign | order | size |", "|---|---|---|---|---|---|---|"]
-    return lines + [
-        f"| {called(c.figure)} | {c.what} | {c.theirs} | {c.ours} | " + " | ".join(c.verdict.cells()) + " |"
-        for c in made
-    ]
+    lines = ([called(c.figure), c.what, c.theirs, c.ours, *c.verdict.cells()] for c in made)
+    return table("Olsson 2008 | what | theirs | ours | sign | order | size", lines)
 
 
 def called(figure: str) -> str:
@@ -194,23 +192,22 @@ def called(figure: str) -> str:
 
 def summary(made: Sequence[Claim]) -> list[str]:
     """Return a table of agreement, one row per figure."""
-    lines = ["| Olsson 2008 | sign | order | size |", "|---|---|---|---|"]
+    lines = []
     for figure in dict.fromkeys(claim.figure for claim in made):
         own = [claim.verdict for claim in made if claim.figure == figure]
         totals = [
             tuple(sum(numbers) for numbers in zip(*(getattr(v, kind) for v in own), strict=True))
             for kind in ("sign", "order", "size")
         ]
-        lines.append(f"| {called(figure)} | " + " | ".join(said(good, of) for good, of in totals) + " |")
-    return lines
+        lines.append([called(figure), *(said(good, of) for good, of in totals)])
+    return table("Olsson 2008 | sign | order | size", lines)
 
 
 def types_beside(results: Results) -> list[str]:
     """Return Table 5.5, theirs and ours."""
     if "types-apples" not in results:
         return []
-    head = "| GOP | " + " | ".join(f"I{'B' * count}P" for count in BFRAMES) + " |"
-    lines = [head, "|---" * (len(BFRAMES) + 1) + "|"]
+    lines = []
     ours = type_table(results["types-apples"])
     referenced = results.get("types-as-references-apples")
     refs = type_table(referenced, "pyramid=1") if referenced else [[None] * len(BFRAMES)] * len(GOPS)
@@ -219,23 +216,23 @@ def types_beside(results: Results) -> list[str]:
         for j in range(len(BFRAMES)):
             cell = f"{shown(theirs.TYPES[i][j], '+.2f')} · {shown(ours[i][j], '+.2f')}"
             cells.append(cell + (f" · {shown(refs[i][j], '+.2f')}" if j else ""))
-        lines.append(f"| {gop or 'J'} | " + " | ".join(cells) + " |")
-    return lines
+        lines.append([gop or "J", *cells])
+    return table(" | ".join(["GOP", *(f"I{'B' * count}P" for count in BFRAMES)]), lines)
 
 
 def volume_table(results: Results) -> list[str]:
     """Return a table of the Bjøntegaard rate of our volume against the verification model with separate colours."""
     coded, made = of_scenes(results, "volume"), of_scenes(results, "rates")
     scenes = [scene for scene in coded if scene in made]
-    lines = ["| our volume | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"]
+    lines = []
     for what, source, scheme in (("each colour alone", coded, APART), ("colours turned", made, VOLUME)):
         cells = []
         for scene in scenes:
             model = [p for p in coded[scene]["points"] if p["scheme"] == MODEL]
             own = [p for p in source[scene]["points"] if p["scheme"] == scheme]
             cells.append(rate_cell(pairs(model), pairs(own)))
-        lines.append(f"| {what} | " + " | ".join(cells) + " |")
-    return lines if scenes else []
+        lines.append([what, *cells])
+    return table(" | ".join(["our volume", *scenes]), lines) if scenes else []
 
 
 def time_table(results: Results) -> list[str]:
@@ -245,14 +242,14 @@ def time_table(results: Results) -> list[str]:
         return []
     points = next(iter(made.values()))["points"]
     rates = sorted({p["target_bpp"] for p in points if p["scheme"] == REFERENCE})
-    lines = ["| | " + " | ".join(f"{rate:g} bpp" for rate in rates) + " |", "|---" * (len(rates) + 1) + "|"]
+    lines = []
     for scheme in (SI, REFERENCE):
         own = {p["target_bpp"]: p for p in points if p["scheme"] == scheme}
         cells = [
             f"{own[r]['encode_seconds']:.2f} · {own[r]['decode_seconds']:.2f}" if r in own else "" for r in rates
         ]
-        lines.append(f"| {LABELS[scheme]} | " + " | ".join(cells) + " |")
-    return lines
+        lines.append([LABELS[scheme], *cells])
+    return table(" | ".join(["", *(f"{rate:g} bpp" for rate in rates)]).strip(), lines)
 
 
 def detail_table(results: Results) -> list[str]:
@@ -261,14 +258,14 @@ def detail_table(results: Results) -> list[str]:
     scenes = [scene for scene in judged if scene in detail]
     if not scenes:
         return []
-    lines = ["| | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"]
+    lines = []
     for place, first in enumerate(judged[scenes[0]]["rows"]):
         cells = []
         for scene in scenes:
             row, depth_mm = judged[scene]["rows"][place]["q_depth"], judged[scene]["depth_mm"]
             cells.append("{:.1f} · {:.2f} · {:.1f}".format(*by_detail(row, depth_mm, detail[scene])))
-        lines.append(f"| {LABELS[first['scheme']]} | " + " | ".join(cells).replace("-", "−") + " |")
-    return lines
+        lines.append([LABELS[first["scheme"]], *(cell.replace("-", "−") for cell in cells)])
+    return table(" | ".join(["", *scenes]).strip(), lines)
 
 
 def artefact_table(results: Results) -> list[str]:
@@ -278,11 +275,11 @@ def artefact_table(results: Results) -> list[str]:
     if not there:
         return []
     schemes = [p["scheme"] for p in next(iter(there.values()))["points"]]
-    lines = ["| | " + " | ".join(LABELS[s] for s in schemes) + " |", "|---" * (len(schemes) + 1) + "|"]
-    for what, result in there.items():
-        cells = [f"{p['bpp']:.2f} bpp, {p['front_db']:.1f} dB, {p['q_view']:.3f}" for p in result["points"]]
-        lines.append(f"| {what} | " + " | ".join(cells) + " |")
-    return lines
+    lines = [
+        [what, *(f"{p['bpp']:.2f} bpp, {p['front_db']:.1f} dB, {p['q_view']:.3f}" for p in result["points"])]
+        for what, result in there.items()
+    ]
+    return table(" | ".join(["", *(LABELS[s] for s in schemes)]).strip(), lines)
 
 
 def gains_modern(results: Results) -> list[str]:
@@ -293,35 +290,31 @@ def gains_modern(results: Results) -> list[str]:
         scene: {s: pairs([p for p in result["points"] if p["scheme"] == s]) for s in schemes}
         for scene, result in made.items()
     }
-    lines = ["| scheme | " + " | ".join(made) + " |", "|---" * (len(made) + 1) + "|"]
+    lines = []
     for scheme in schemes:
-        cells = [
-            f"{rate_cell(curves[scene][SI], curves[scene][scheme])} · "
-            f"{rate_cell(curves[scene][REFERENCE], curves[scene][scheme])}"
-            for scene in made
-        ]
-        lines.append(f"| {LABELS.get(scheme, scheme)} | " + " | ".join(cells) + " |")
-    return lines
+        pair = ([rate_cell(curves[scene][one], curves[scene][scheme]) for one in (SI, REFERENCE)] for scene in made)
+        lines.append([LABELS.get(scheme, scheme), *(" · ".join(cells) for cells in pair)])
+    return table(" | ".join(["scheme", *made]), lines)
 
 
 def bjontegaard(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return a table of all schemes of `coders`: rate to SI-PVS and JPEG 2000, and gain in dB."""
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
     curves = {(row["scene"], row["scheme"]): pairs(row["points"]) for row in rows}
-    lines, commits = ["| scheme | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"], []
+    lines, commits = [], []
     for scheme in dict.fromkeys(row["scheme"] for row in rows if ":" not in row["scheme"]):
         cells = []
         for scene in scenes:
             own = curves.get((scene, scheme), [])
             first, second = (curves.get((scene, anchor), []) for anchor in (ANCHOR, REFERENCE))
             cells.append(f"{rate_cell(first, own)} · {rate_cell(second, own)} · {gain_cell(second, own)}")
-        lines.append(f"| `{scheme}` | " + " | ".join(cells) + " |")
+        lines.append([f"`{scheme}`", *cells])
         commits.append([row["commit"] for row in rows if row["scheme"] == scheme])
     conditions = (
         f"Setup 1 at scale {CODERS_SCALE}: rate at equal quality against `{ANCHOR}` · against `jpeg2000`, "
         "and mean gain over JPEG 2000 at equal rate."
     )
-    return [conditions, origin(rows), "", *with_commits(lines, commits)]
+    return [conditions, origin(rows), "", *table(" | ".join(["scheme", *scenes]), lines, commits)]
 
 
 def pairs(points: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
@@ -348,13 +341,11 @@ def gain_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float
 
 def record_table(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Return a table of provenance: step, scale, commit, time."""
-    lines = ["| step | shows | scale | commit | CPU s | again |", "|---|---|---|---|---|---|"]
+    lines = []
     for name, record in best.items():
         git = record["git"] or {"commit": "none", "dirty": False}
         commit = git["commit"][:10] + (", dirty" if git["dirty"] else "")
         again = {True: "the same to the bit", False: "**not the same**", None: ""}[record.get("repeats")]
         scale = record["parameters"].get("scale", "")
-        lines.append(
-            f"| {name} | {record['shows']} | {scale} | {commit} | {record.get('cpu_seconds', '')} | {again} |"
-        )
-    return lines
+        lines.append([name, record["shows"], scale, commit, record.get("cpu_seconds", ""), again])
+    return table("step | shows | scale | commit | CPU s | again", lines)
