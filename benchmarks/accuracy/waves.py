@@ -236,5 +236,6 @@ def setup1_table() -> list[str]:
 def field_table() -> list[str]:
     """Rms radius of the rays' spot along the diagonal of a lens, and that of maps."""
     rows = RECORDS.rows(field="diagonal")
-    lines = [f"{p['from_axis_px']:.1f} | {p['traced_px']:.2f} px | {p['maps_px']:.2f} px" for p in rows[0]["pixels"]]
+    places = [place for row in rows for place in row["pixels"]]
+    lines = (f"{p['from_axis_px']:.1f} | {p['traced_px']:.2f} px | {p['maps_px']:.2f} px" for p in places)
     return [*table("pixels from the axis | all rays | maps", lines), "", origin(rows)]

@@ -123,14 +123,15 @@ def rows(name: str, scene: dict[str, Any]) -> list[str]:
 def tables() -> Tables:
     """Return the tables of the page."""
     scenes = RECORDS.rows(scale=SCALE)
-    each = [(line, [scene["commit"]]) for scene in scenes for line in rows(scene["scene"], scene)]
+    each = [(line, scene["commit"]) for scene in scenes for line in rows(scene["scene"], scene)]
     streams = []
     for scene in scenes:
         a = scene["apart"]
         saved = 100 * (a["together_bpp"] / a["apart_bpp"] - 1)
         rates = f"{a['apart_bpp']:.3f} | {a['headers_bpp']:.3f} | {a['together_bpp']:.3f} ({saved:+.1f} %)"
         streams.append(f"{scene['scene']} | {rates}")
-    rate_table = table("scene | scheme | rate | bpp | dB | lossless, bpp", *map(list, zip(*each, strict=True)))
+    heads = "scene | scheme | rate | bpp | dB | lossless, bpp"
+    rate_table = table(heads, (line for line, _ in each), [[commit] for _, commit in each])
     heads = "scene | a stream each, bpp | of it headers | one stream, bpp"
     page, told = "docs/volume.md", origin(scenes)
     return {
