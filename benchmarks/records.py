@@ -68,7 +68,7 @@ class Records:
             If sources changed on disk meanwhile: the commit at the start is not that of all code that ran.
         """
         begin, started, cpu = stamp(self.modules), time.perf_counter(), cpu_seconds()
-        result = json.loads(json.dumps(_finite(call())))
+        result = json.loads(json.dumps(_stored(call(), lambda _: None)))
         record = {
             "format": FORMAT,
             "version": VERSION,
@@ -363,25 +363,17 @@ def seconds_in(value: Any) -> Iterable[float]:
 
 def plain(value: Any) -> Any:
     """Return a value as JSON can store it: lists for tuples, text for infinities, None for NaN."""
-    return json.loads(json.dumps(_spelt(value)))
+    return json.loads(json.dumps(_stored(value, str)))
 
 
-def _spelt(value: Any) -> Any:
+def _stored(value: Any, infinity: Callable[[float], Any]) -> Any:
     if isinstance(value, Mapping):
-        return {str(key): _spelt(item) for key, item in value.items()}
+        return {str(key): _stored(item, infinity) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_spelt(item) for item in value]
+        return [_stored(item, infinity) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else str(value)
+        return None if math.isnan(value) else infinity(value)
     return value
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def number(value: Any) -> float:

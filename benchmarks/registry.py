@@ -151,6 +151,7 @@ CLOSED: dict[str, tuple[str, ...]] = {
     "study/reasons": (),
     "study/volume_model": (),
 }
+STABLE, SPEED = "docs/stability.md", "docs/speed_accuracy.md"
 HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
 # In the order of a whole study: pages after the measurements that they show.
 BENCHMARKS = {
@@ -172,12 +173,8 @@ BENCHMARKS = {
         Benchmark("coding.cost", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.coders", records=OWN),
         Benchmark("coding.bframes", records=OWN),
-        Benchmark(
-            "pages.coding_docs",
-            needs="records of coders and bframes",
-            fills=("docs/coding.md", "docs/speed_accuracy.md"),
-            writes=(f"{IMAGES}/coders*",),
-        ),
+        Benchmark("pages.coding_docs", needs="records of coders and bframes", fills=("docs/coding.md", SPEED),
+            writes=(f"{IMAGES}/coders*",)),
         Benchmark("coding.takes", records=OWN, fills=("docs/video.md",)),
         Benchmark("pages.video", needs="records of takes", writes=(f"{IMAGES}/takes_[aft]*",)),
         Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
@@ -187,9 +184,8 @@ BENCHMARKS = {
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
         Benchmark("stability.wrong_calls", records=OWN, fills=("docs/stability.md",)),
         Benchmark("pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)),
-        Benchmark(
-            "accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",), writes=(f"{IMAGES}/depth_truth.*",)
-        ),
+        Benchmark("accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",),
+            writes=(f"{IMAGES}/depth_truth.*",)),
         Benchmark("accuracy.field_depth", records=OWN, fills=("docs/metrics.md",)),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
         Benchmark("speed.eye", records=OWN, fills=("docs/display.md",)),
@@ -245,4 +241,4 @@ BENCHMARKS = {
         Benchmark("pages.data_card", fills=("docs/benchmark.md",)),
         Benchmark("pages.tables", needs="records of all others"),
     )
-}
+}  # fmt: skip

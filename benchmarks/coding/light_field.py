@@ -115,15 +115,10 @@ def curve(original: IIPicture, scheme: str) -> dict[str, Any]:
     for qp in QUANTISERS[scheme if scheme in QUANTISERS else scheme.partition(":")[0]]:
         coded = encode(original, scheme, qp=qp)
         decoding = timed_decode(coded)
-        points.append(
-            {
-                "qp": qp,
-                "bpp": coded.bpp,
-                "psnr": q_global(original, decoding.picture),
-                "encode_us": 1e6 * (coded.encode_seconds or 0) / (width * height),
-                "decode_us": 1e6 * decoding.seconds / (width * height),
-            }
-        )
+        psnr = q_global(original, decoding.picture)
+        seconds = {"encode_us": coded.encode_seconds or 0, "decode_us": decoding.seconds}
+        times = {name: 1e6 * value / (width * height) for name, value in seconds.items()}
+        points.append({"qp": qp, "bpp": coded.bpp, "psnr": psnr, **times})
     return {"points": points}
 
 

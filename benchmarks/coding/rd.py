@@ -41,17 +41,12 @@ def rd_point(picture: IIPicture, scheme: str, **goal: Any) -> RDPoint:
     """
     coded = encode(picture, scheme, **goal)
     decoded = timed_decode(coded)
+    quality = q_global(picture, decoded.picture)
     return RDPoint(
-        bpp=coded.bpp,
-        q_global=q_global(picture, decoded.picture),
-        reached=coded.reached,
-        runs=coded.runs,
-        encode_seconds=coded.encode_seconds,
-        encoder_seconds=coded.codec_seconds,
-        decode_seconds=decoded.seconds,
-        decoder_seconds=decoded.codec_seconds,
-        picture=decoded.picture,
-    )
+        coded.bpp, quality, coded.reached, coded.runs, encode_seconds=coded.encode_seconds,
+        encoder_seconds=coded.codec_seconds, decode_seconds=decoded.seconds,
+        decoder_seconds=decoded.codec_seconds, picture=decoded.picture,
+    )  # fmt: skip
 
 
 def compiled(scheme: str, **goal: Any) -> None:

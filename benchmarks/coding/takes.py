@@ -105,16 +105,12 @@ def points(
         quality = measure_take(video, open_take(coded))
         found.append(
             {
-                "qp": qp,
-                "bpp": coded.bpp,
-                "mbit_per_second": coded.mbit_per_second,
-                "psnr_of_pooled_mse": quality.pooled_psnr,
-                "psnr_worst_frame": quality.worst_psnr,
-                "flicker": quality.mean_flicker,
-                "encode_seconds": coded.encode_seconds,
+                "qp": qp, "bpp": coded.bpp, "mbit_per_second": coded.mbit_per_second,
+                "psnr_of_pooled_mse": quality.pooled_psnr, "psnr_worst_frame": quality.worst_psnr,
+                "flicker": quality.mean_flicker, "encode_seconds": coded.encode_seconds,
                 "codec_seconds": coded.codec_seconds,
             }
-        )
+        )  # fmt: skip
     return found
 
 

@@ -77,10 +77,8 @@ def lossless(picture: IIPicture) -> dict[str, float]:
     """Return the rates of lossless coding, bits per pixel."""
     found = {}
     for name in LOSSLESS:
-        coded = encode(
-            picture,
-            name if name.endswith("ffv1") else f"{name}:lossless=1" if ":" not in name else f"{name},lossless=1",
-        )
+        exact = name if name.endswith("ffv1") else f"{name}{',' if ':' in name else ':'}lossless=1"
+        coded = encode(picture, exact)
         assert np.array_equal(decode(coded).pixels, picture.pixels), name
         found[name] = coded.bpp
     return found

@@ -18,7 +18,8 @@ IMAGES = ROOT / "docs" / "images"
 WIDEST = 1500  # pixels: twice the column of a page
 JPEG, WEBP = 80, 85  # qualities
 MANY = 16384  # colours; a chart with more contains photographs, in which a palette would cause banding
-FEW, OFF = 64, 32  # colours of a chart, and the largest error by them; 256 colours are a third larger
+FEW, OFF = 64, 32  # colours of a chart, and an error that few pixels may have; 256 colours are a third larger
+RARE = 0.001  # share of pixels with a larger error
 
 
 def write_picture(
@@ -81,6 +82,7 @@ def with_palette(picture: Image.Image) -> Image.Image:
     if colours is None:
         return picture
     few = picture.quantize(FEW, method=Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE)
-    if np.abs(np.asarray(few.convert("RGB"), np.int16) - np.asarray(picture)).max() <= OFF:
+    off = np.abs(np.asarray(few.convert("RGB"), np.int16) - np.asarray(picture)).max(axis=2)
+    if (off > OFF).mean() <= RARE:
         return few
     return picture.quantize(min(len(colours), 256), method=Image.Quantize.MEDIANCUT)

@@ -10,25 +10,13 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
-from matplotlib.figure import Figure
 from PIL import Image
 
-from benchmarks.coding.takes import (  # fmt: skip
-    FRAMES,
-    INSTANTS,
-    PLANS,
-    SCALE,
-    SCHEME,
-    TAKES,
-    by_plan,
-    difference,
-    rendered,
-)
-from benchmarks.pages.pictures import IMAGES, write_picture
-from benchmarks.records import ROOT
+from benchmarks.coding.takes import FRAMES, INSTANTS, PLANS, SCALE, SCHEME, TAKES, by_plan, difference, rendered
+from benchmarks.pages.pictures import IMAGES, tidy, write_chart, write_picture
 from codec import Plan, component_cost, encode_take, open_take
 from ii_core import video_of
-from ii_core.display.figure import COLOURS, MARKERS, new_figure, save
+from ii_core.display.figure import COLOURS, MARKERS, new_figure
 from ii_core.display.look import viewpoints_around
 from metrics import measure_take, time_chart
 
@@ -72,19 +60,9 @@ def access_chart() -> None:
     axes.set_xscale("log")
     axes.set_xlabel("frames decoded for one SI at one instant, mean")
     axes.set_ylabel("rate against stills at equal quality [%]")
-    finished(figure, "takes_access.png", ncols=3)
-
-
-def finished(figure: Figure, name: str, *, ncols: int) -> None:
-    """Add grid and legend to a chart, and write it among the pictures of the pages."""
-    for axes in figure.axes:
-        axes.grid(True, color="0.9", linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
-    figure.legend(loc="outside lower left", ncols=ncols, frameon=False, fontsize=8)
-    out = ROOT / "out" / name
-    out.parent.mkdir(exist_ok=True)
-    write_picture(IMAGES / name, save(figure, out, dpi=110))
+    tidy(axes)
+    figure.legend(loc="outside lower left", ncols=3, frameon=False, fontsize=8)
+    write_chart(figure, "takes_access.png", dpi=110)
 
 
 def taken() -> None:
@@ -98,12 +76,11 @@ def taken() -> None:
     write_picture(IMAGES / "takes_frames.webp", np.vstack(rows))
     video = rendered("car", SCALE)
     some = video_of([video[frame] for frame in range(INSTANTS)], fps=video.fps)
-    path = viewpoints_around(some.structure, INSTANTS)
+    places = viewpoints_around(some.structure, INSTANTS)
     plans = {"stills": Plan(span=1), "time-first, 8 instants": Plan(walk="time-first")}
     measured = {
-        name: measure_take(some, open_take(encode_take(some, SCHEME, qp=32, plan=plan)), viewpoints_mm=path)
+        name: measure_take(some, open_take(encode_take(some, SCHEME, qp=32, plan=plan)), viewpoints_mm=places)
         for name, plan in plans.items()
     }
-    out = ROOT / "out" / "takes_time.png"
-    out.parent.mkdir(exist_ok=True)
-    write_picture(IMAGES / "takes_time.png", time_chart(measured, out))
+    path = IMAGES / "takes_time.png"
+    write_picture(path, time_chart(measured, path))

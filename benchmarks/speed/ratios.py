@@ -62,43 +62,29 @@ def measured() -> list[dict[str, Any]]:
 
 def targets() -> dict[str, tuple[str, Callable[[], list[float]]]]:
     """Return target and measurement of each ratio."""
-    every: list[tuple[str, str, Callable[[], list[float]]]] = [
-        *(
-            row
-            for kind, of in (("", gain), (PLAIN, plain_gain))
-            for row in (
-                *(
-                    (f"render {name}{kind}: speed / {COMMIT}", LEAST_GAIN.get(name, "≥ 1.4"), partial(of, name))
-                    for name in scene_names()
-                ),
-                (f"render, mean of all{kind}: speed / {COMMIT}", "≥ 2.2", partial(gains, of)),
-            )
-        ),
-        *(
-            (f"render {name}{PLAIN}: pixels unlike {MENDED}{by}, %", "", partial(unlike, name, kind))
-            for kind, by in enumerate(("", " by more than 1 code"))
-            for name in scene_names()
-        ),
-        *(
-            (f"render {name}: CPU time / EmbreeScene.run", "", lambda name=name: bare_ratio(name))
-            for name in scene_names()
-        ),
-        ("render, mean of all: CPU time / EmbreeScene.run", "≤ 0.6", lambda: gains(bare_ratio)),
-        (f"render, mean of all{PLAIN}: CPU time / EmbreeScene.run", "≤ 0.6", lambda: gains(plain_bare_ratio)),
-        ("render apples: speed of 2 workers / 1 worker", "≥ 1.9", lambda: workers_ratio("apples")),
-        ("render cuboid: speed of 2 workers / 1 worker", "≥ 1.9", lambda: workers_ratio("cuboid")),
-        ("first picture of apples, nothing compiled, CPU s", "≤ 15", lambda: first_picture(cached=False)),
-        ("first picture of apples in a new process, CPU s", "≤ 2", lambda: first_picture(cached=True)),
-        ("II → EI / numpy copy, setup1", "≤ 2", lambda: rearrange_ratio("ei")),
-        ("II → SI / numpy copy, setup1", "≤ 2", lambda: rearrange_ratio("si")),
-        ("II → RI / numpy copy, setup1", "≤ 2", lambda: rearrange_ratio("ri")),
-        ("encode si-h264 / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("si-h264")),
-        ("encode ei-h264 / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("ei-h264")),
-        ("encode si-hevc / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("si-hevc")),
-        ("encode si-av1:fast / bare encoder on ready frames", "≤ 1.1", lambda: encode_ratio("si-av1:fast")),
-        ("peak memory of rendering setup1 at full size, GiB", "≤ 0.5", peak_memory),
-    ]
-    return {what: (target, call) for what, target, call in every}
+    every: dict[str, tuple[str, Callable[[], list[float]]]] = {}
+    for kind, now in (("", "now"), (PLAIN, "plain")):
+        for name in scene_names():
+            least = LEAST_GAIN.get(name, "≥ 1.4")
+            every[f"render {name}{kind}: speed / {COMMIT}"] = least, partial(ratio, "before", now, name)
+        every[f"render, mean of all{kind}: speed / {COMMIT}"] = "≥ 2.2", partial(means, "before", now)
+    for part, by in enumerate(("", " by more than 1 code")):
+        for name in scene_names():
+            every[f"render {name}{PLAIN}: pixels unlike {MENDED}{by}, %"] = "", partial(unlike, name, part)
+    for name in scene_names():
+        every[f"render {name}: CPU time / EmbreeScene.run"] = "", partial(ratio, "now", "bare", name)
+    for kind, now in (("", "now"), (PLAIN, "plain")):
+        every[f"render, mean of all{kind}: CPU time / EmbreeScene.run"] = "≤ 0.6", partial(means, now, "bare")
+    for name in ("apples", "cuboid"):
+        every[f"render {name}: speed of 2 workers / 1 worker"] = "≥ 1.9", partial(workers_ratio, name)
+    every["first picture of apples, nothing compiled, CPU s"] = "≤ 15", partial(first_picture, cached=False)
+    every["first picture of apples in a new process, CPU s"] = "≤ 2", partial(first_picture, cached=True)
+    for kind in ("ei", "si", "ri"):
+        every[f"II → {kind.upper()} / numpy copy, setup1"] = "≤ 2", partial(rearrange_ratio, kind)
+    for scheme in ("si-h264", "ei-h264", "si-hevc", "si-av1:fast"):
+        every[f"encode {scheme} / bare encoder on ready frames"] = "≤ 1.1", partial(encode_ratio, scheme)
+    every["peak memory of rendering setup1 at full size, GiB"] = "≤ 0.5", peak_memory
+    return every
 
 
 @lru_cache
@@ -107,38 +93,21 @@ def rendered(name: str) -> dict[str, list[float]]:
     return nanoseconds(name, REPEATS)
 
 
-def gain(name: str) -> list[float]:
-    """Return the speed of a render over that of the commit `before.COMMIT`, in CPU time."""
+def ratio(above: str, below: str, name: str) -> list[float]:
+    """Return the ratios of two of the CPU times of `before.nanoseconds`, turn by turn."""
     found = rendered(name)
-    return [before / now for before, now in zip(found["before"], found["now"], strict=True)]
+    return [a / b for a, b in zip(found[above], found[below], strict=True)]
 
 
-def unlike(name: str, kind: int) -> list[float]:
-    """Return one of the percentages of `before.difference`."""
-    return [difference(name)[kind]]
-
-
-def plain_gain(name: str) -> list[float]:
-    """Return `gain` with textures read at points, as that commit reads them."""
-    found = rendered(name)
-    return [before / plain for before, plain in zip(found["before"], found["plain"], strict=True)]
-
-
-def plain_bare_ratio(name: str) -> list[float]:
-    """Return `bare_ratio` with textures read at points."""
-    found = rendered(name)
-    return [plain / bare for plain, bare in zip(found["plain"], found["bare"], strict=True)]
-
-
-def bare_ratio(name: str) -> list[float]:
-    """Return CPU time of a render over that of Embree's single rays, the same rays in the order of that commit."""
-    found = rendered(name)
-    return [now / bare for now, bare in zip(found["now"], found["bare"], strict=True)]
-
-
-def gains(of: Callable[[str], list[float]]) -> list[float]:
+def means(above: str, below: str) -> list[float]:
     """Return the geometric means of a ratio over all scenes."""
-    return [math.prod(turn) ** (1 / len(turn)) for turn in zip(*map(of, scene_names()), strict=True)]
+    each = (ratio(above, below, name) for name in scene_names())
+    return [math.prod(turn) ** (1 / len(turn)) for turn in zip(*each, strict=True)]
+
+
+def unlike(name: str, part: int) -> list[float]:
+    """Return one of the percentages of `before.difference`."""
+    return [difference(name)[part]]
 
 
 def workers_ratio(name: str) -> list[float]:

@@ -159,30 +159,15 @@ PANELS: list[tuple[str, str, list[str], str, str]] = [
     ("bounces", "depth", ["light missing"], "y", "light missing in a room of mirrors"),
     ("pitches", "pixels a lens", ["PSNR, dB"], "", "resampled lenses, dB"),
     ("map_bits", "bits", ["apples, dB", "cuboid, dB"], "", "stored directions, dB"),
-    (
-        "depth_contrast",
-        "contrast, steps",
-        [f"{method}, σ {sigma}" for method in METHODS for sigma in (0, 1)],
-        "x",
-        "depth of a wall found, share",
-    ),
-    (
-        "depth_two_layers",
-        "of the light from behind",
-        [f"mirror, robust: {what}" for what in ("wall", "behind")],
-        "",
-        "depth in a half mirror, share",
-    ),
+    ("depth_contrast", "contrast, steps", [f"{method}, σ {sigma}" for method in METHODS for sigma in (0, 1)], "x",
+     "depth of a wall found, share"),
+    ("depth_two_layers", "of the light from behind", [f"mirror, robust: {what}" for what in ("wall", "behind")], "",
+     "depth in a half mirror, share"),
     ("depth_highlight", "strength", ["dissertation", "robust"], "", "depth under a highlight, share"),
-    (
-        "bd_overlap",
-        "curves share",
-        ["off the whole curves', median", "off what they share, median"],
-        "y",
-        "BD-rate of curves cut apart, % off",
-    ),
+    ("bd_overlap", "curves share", ["off the whole curves', median", "off what they share, median"], "y",
+     "BD-rate of curves cut apart, % off"),
     ("bd_points", "points a curve", ["akima, most", "cubic, most"], "y", "BD-rate by points, % off"),
-]
+]  # fmt: skip
 
 
 def chart(cases: Mapping[str, list[Row]]) -> Any:

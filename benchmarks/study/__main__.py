@@ -9,9 +9,9 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from . import __doc__ as about
+from . import pictures, rates, scripts, structures, views
 from .page import publish
-from .runner import perform
-from .steps import all_steps
+from .runner import Step, perform
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -46,3 +46,16 @@ def main(arguments: list[str] | None = None) -> None:
         publish(folder)
     if broken := [record["step"] for record in made if record.get("repeats") is False]:
         sys.exit(f"not the same as before: {', '.join(broken)}")
+
+
+def all_steps(scale: int) -> list[Step]:
+    """Return every step at a scale of the coding setups: quick steps and steps that others depend on come first.
+
+    Raises
+    ------
+    ValueError
+        If the scale does not divide setup 1.
+    """
+    if scale not in (1, 2, 4, 8, 16):
+        raise ValueError(f"scale is {scale}: 1, 2, 4, 8 or 16 is needed")
+    return [step for part in (pictures, rates, views, structures, scripts) for step in part.steps(scale)]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.pages.pictures import tidy
 from benchmarks.records import number
 from ii_core.display.figure import COLOURS, LINES, MARKERS, new_figure, save
 from metrics.plots.depth_chart import depth_rate_chart
@@ -82,9 +83,7 @@ def scene_panels(made: Mapping[str, Any]) -> tuple[Any, list[Any]]:
     panels = list(figure.subplots(rows, columns, squeeze=False).flat)
     for axes, scene in zip(panels, made, strict=False):
         axes.set_title(scene, loc="left", fontsize=10)
-        axes.grid(True, color="0.9", linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+        tidy(axes)
     return figure, panels[: len(made)]
 
 
@@ -136,10 +135,8 @@ def layers(results: Results) -> Any:
         for i, scheme in enumerate(THEIRS):
             row = next(row for row in result["rows"] if row["scheme"] == scheme)
             values = np.array([number(value) for value in row["q_depth"]])[held]
-            label = f"{label_of(scheme)}"
-            axes.plot(
-                held + 1, np.where(np.isfinite(values), values, np.nan), LINES[0], color=COLOURS[i], lw=1, label=label
-            )
+            values[~np.isfinite(values)] = np.nan
+            axes.plot(held + 1, values, color=COLOURS[i], lw=1, label=label_of(scheme))
         axes.set_xlabel("depth layer d")
     return finished(figure, panels, r"$Q_\mathrm{depth}$ [dB]")
 

@@ -42,16 +42,10 @@ def point(picture: IIPicture, scheme: str, goal: Mapping[str, Any], measure: Mea
     """Return an operating point: rate, quality, CPU seconds of one run inside encoder and decoder."""
     made = rd_point(picture, scheme, **goal)
     return {
-        "scheme": scheme,
-        "target_bpp": goal.get("bpp", made.bpp),
-        "bpp": made.bpp,
-        "reached": made.reached,
-        "runs": made.runs,
-        "q_global": made.q_global,
-        **(measure(made.picture) if measure else {}),
-        "encode_seconds": made.encoder_seconds,
-        "decode_seconds": made.decoder_seconds,
-    }
+        "scheme": scheme, "target_bpp": goal.get("bpp", made.bpp), "bpp": made.bpp, "reached": made.reached,
+        "runs": made.runs, "q_global": made.q_global, **(measure(made.picture) if measure else {}),
+        "encode_seconds": made.encoder_seconds, "decode_seconds": made.decoder_seconds,
+    }  # fmt: skip
 
 
 def curve(

@@ -12,7 +12,7 @@ from benchmarks.coding import coders
 from benchmarks.coding.rd import climbing
 from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, filled
-from benchmarks.records import ROOT, origin
+from benchmarks.records import ROOT, origin, table
 from ii_core.base.files import atomic_path
 from ii_core.base.json_lines import lines_of, read_records
 from metrics import bd_psnr, bd_rate
@@ -171,23 +171,22 @@ def called(figure: str) -> str:
 
 def summary(made: Sequence[Claim]) -> list[str]:
     """Return a table of agreement, one row per figure."""
-    lines = ["| Olsson 2008 | sign | order | size |", "|---|---|---|---|"]
+    lines = []
     for figure in dict.fromkeys(claim.figure for claim in made):
         own = [claim.verdict for claim in made if claim.figure == figure]
         totals = [
             tuple(sum(numbers) for numbers in zip(*(getattr(v, kind) for v in own), strict=True))
             for kind in ("sign", "order", "size")
         ]
-        lines.append(f"| {called(figure)} | " + " | ".join(said(good, of) for good, of in totals) + " |")
-    return lines
+        lines.append([called(figure), *(said(good, of) for good, of in totals)])
+    return table("Olsson 2008 | sign | order | size", lines)
 
 
 def types_beside(results: Results) -> list[str]:
     """Return Table 5.5, theirs and ours."""
     if "types-apples" not in results:
         return []
-    head = "| GOP | " + " | ".join(f"I{'B' * count}P" for count in BFRAMES) + " |"
-    lines = [head, "|---" * (len(BFRAMES) + 1) + "|"]
+    lines = []
     ours = type_table(results["types-apples"])
     referenced = results.get("types-as-references-apples")
     refs = type_table(referenced, "pyramid=1") if referenced else [[None] * len(BFRAMES)] * len(GOPS)
@@ -196,23 +195,23 @@ def types_beside(results: Results) -> list[str]:
         for j in range(len(BFRAMES)):
             cell = f"{shown(theirs.TYPES[i][j], '+.2f')} · {shown(ours[i][j], '+.2f')}"
             cells.append(cell + (f" · {shown(refs[i][j], '+.2f')}" if j else ""))
-        lines.append(f"| {gop or 'J'} | " + " | ".join(cells) + " |")
-    return lines
+        lines.append([gop or "J", *cells])
+    return table(" | ".join(["GOP", *(f"I{'B' * count}P" for count in BFRAMES)]), lines)
 
 
 def volume_table(results: Results) -> list[str]:
     """Return a table of the Bjøntegaard rate of our volume against the verification model with separate colours."""
     coded, made = of_scenes(results, "volume"), of_scenes(results, "rates")
     scenes = [scene for scene in coded if scene in made]
-    lines = ["| our volume | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"]
+    lines = []
     for what, source, scheme in (("each colour alone", coded, APART), ("colours turned", made, VOLUME)):
         cells = []
         for scene in scenes:
             model = [p for p in coded[scene]["points"] if p["scheme"] == MODEL]
             own = [p for p in source[scene]["points"] if p["scheme"] == scheme]
             cells.append(rate_cell(pairs(model), pairs(own)))
-        lines.append(f"| {what} | " + " | ".join(cells) + " |")
-    return lines if scenes else []
+        lines.append([what, *cells])
+    return table(" | ".join(["our volume", *scenes]), lines) if scenes else []
 
 
 def time_table(results: Results) -> list[str]:
@@ -222,14 +221,14 @@ def time_table(results: Results) -> list[str]:
         return []
     points = next(iter(made.values()))["points"]
     rates = sorted({p["target_bpp"] for p in points if p["scheme"] == REFERENCE}.intersection(TIMED_RATES))
-    lines = ["| | " + " | ".join(f"{rate:g} bpp" for rate in rates) + " |", "|---" * (len(rates) + 1) + "|"]
+    lines = []
     for scheme in (SI, REFERENCE):
         own = {p["target_bpp"]: p for p in points if p["scheme"] == scheme}
         cells = [
             f"{own[r]['encode_seconds']:.2f} · {own[r]['decode_seconds']:.2f}" if r in own else "" for r in rates
         ]
-        lines.append(f"| {LABELS[scheme]} | " + " | ".join(cells) + " |")
-    return lines
+        lines.append([LABELS[scheme], *cells])
+    return table(" | ".join(["", *(f"{rate:g} bpp" for rate in rates)]).strip(), lines)
 
 
 def detail_table(results: Results) -> list[str]:
@@ -238,15 +237,15 @@ def detail_table(results: Results) -> list[str]:
     scenes = [scene for scene in judged if scene in detail]
     if not scenes:
         return []
-    lines = ["| | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"]
+    lines = []
     for place, first in enumerate(judged[scenes[0]]["rows"]):
         cells = []
         for scene in scenes:
             row, depth_mm = judged[scene]["rows"][place]["q_depth"], judged[scene]["depth_mm"]
             _, correlation, left = by_detail(row, depth_mm, detail[scene])
             cells.append(f"{correlation:.2f} · {left:.1f}")
-        lines.append(f"| {LABELS[first['scheme']]} | " + " | ".join(cells).replace("-", "−") + " |")
-    return lines
+        lines.append([LABELS[first["scheme"]], *(cell.replace("-", "−") for cell in cells)])
+    return table(" | ".join(["", *scenes]).strip(), lines)
 
 
 def artefact_table(results: Results) -> list[str]:
@@ -274,15 +273,11 @@ def gains_modern(results: Results) -> list[str]:
         scene: {s: pairs([p for p in result["points"] if p["scheme"] == s]) for s in schemes}
         for scene, result in made.items()
     }
-    lines = ["| scheme | " + " | ".join(made) + " |", "|---" * (len(made) + 1) + "|"]
+    lines = []
     for scheme in schemes:
-        cells = [
-            f"{rate_cell(curves[scene][SI], curves[scene][scheme])} · "
-            f"{rate_cell(curves[scene][REFERENCE], curves[scene][scheme])}"
-            for scene in made
-        ]
-        lines.append(f"| {LABELS.get(scheme, scheme)} | " + " | ".join(cells) + " |")
-    return lines
+        pair = ([rate_cell(curves[scene][one], curves[scene][scheme]) for one in (SI, REFERENCE)] for scene in made)
+        lines.append([LABELS.get(scheme, scheme), *(" · ".join(cells) for cells in pair)])
+    return table(" | ".join(["scheme", *made]), lines)
 
 
 def coder_gains(rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -33,16 +33,11 @@ CLOSE = 8  # lenses across a detail of Figure 3.8
 def steps(scale: int) -> list[Step]:
     """Return all steps."""
     coarse = {"scale": max(scale, 4)}  # finer lenses are not visible at this size
+    small = {"scale": setup3_scale(scale)}
     return [
         Step(name="component-images", shows="Figure 2.25", run=components, parameters=coarse, uses=USES),
         Step(name="other-cameras", shows="Figure 3.8", run=cameras, parameters={"scale": max(scale, 8)}, uses=USES),
-        Step(
-            name="five-views",
-            shows="Figure 4.3",
-            run=five_views,
-            parameters={"scale": setup3_scale(scale)},
-            uses=USES,
-        ),
+        Step(name="five-views", shows="Figure 4.3", run=five_views, parameters=small, uses=USES),
     ]
 
 
@@ -55,11 +50,7 @@ CAMERA_LABELS = [name + part for name in _CAMERAS for part in ("", ", detail")]
 def components(folder: Path, *, scale: int) -> dict[str, Any]:
     """Draw *Twins* as elementary, sub- and ray-space images: all of them, and the central 4×4."""
     picture = shot("twins", "setup1", scale).picture
-    stacks = {
-        "ei": elementary_images(picture),
-        "si": sub_images(picture),
-        "ri": ray_space_images(picture),
-    }
+    stacks = {"ei": elementary_images(picture), "si": sub_images(picture), "ri": ray_space_images(picture)}
     whole, close = [], []
     for stack in stacks.values():
         rows, columns = stack.shape[:2]

@@ -72,17 +72,11 @@ def performed(step: Step, folder: Path) -> dict[str, Any]:
         path.unlink()  # remove pictures of an earlier version
     result = step.run(folder, **step.parameters)
     return {
-        "format": FORMAT,
-        "version": VERSION,
-        "step": step.name,
-        "shows": step.shows,
-        "parameters": plain(step.parameters),
-        **begin,
-        "seconds": round(time.perf_counter() - started, 1),
+        "format": FORMAT, "version": VERSION, "step": step.name, "shows": step.shows,
+        "parameters": plain(step.parameters), **begin, "seconds": round(time.perf_counter() - started, 1),
         "cpu_seconds": round(cpu_seconds() - cpu, 1),
-        "pictures": {path.name: digest_of(path) for path in pictures_of(step, folder)},
-        "result": plain(result),
-    }
+        "pictures": {path.name: digest_of(path) for path in pictures_of(step, folder)}, "result": plain(result),
+    }  # fmt: skip
 
 
 def pictures_of(step: Step, folder: Path) -> list[Path]:

@@ -20,22 +20,16 @@ FEWEST = (4, 2)  # least number of lenses across and down
 
 def steps(scale: int) -> list[Step]:
     """Return the steps of Figure 5.12 at a scale, and of smaller pictures."""
+    kept = [(SCENES[0], smaller) for smaller in SMALLER]  # the chart of best kinds needs one scene only
+    kept += [(scene, 1) for scene in SCENES[1:]]
     found = []
-    for scene in SCENES:
-        for smaller in SMALLER:
-            if scene != SCENES[0] and smaller > 1:
-                continue  # the chart of best kinds needs one scene only
-            sides = [side for side in SIDES if fits(side, scale * smaller)]
-            if sides:
-                found.append(
-                    Step(
-                        name=f"plane-{scene}-{smaller}",
-                        shows="Figure 5.12" if smaller == 1 else "(5.14), (5.15) for smaller pictures",
-                        run=duels,
-                        parameters={"scene": scene, "scale": scale * smaller, "sides": sides},
-                        uses=("benchmarks.coding.headers",),
-                    )
-                )
+    for scene, smaller in kept:
+        sides = [side for side in SIDES if fits(side, scale * smaller)]
+        shows = "Figure 5.12" if smaller == 1 else "(5.14), (5.15) for smaller pictures"
+        given = {"scene": scene, "scale": scale * smaller, "sides": sides}
+        name, uses = f"plane-{scene}-{smaller}", ("benchmarks.coding.headers",)
+        if sides:
+            found.append(Step(name=name, shows=shows, run=duels, parameters=given, uses=uses))
     return found
 
 

@@ -98,15 +98,11 @@ def artefacts(folder: Path, *, scene: str, scale: int, camera: str, crop: int | 
         write_image(folder / f"{name}_{kind}.png", sheet([large(middle(image, crop)) for image in images], 3, LABELS))
     points = [
         {
-            "scheme": scheme,
-            "bpp": one.bpp,
-            "reached": one.reached,
-            "q_global": q_global(picture, back),
-            "front_db": psnr(views[0], view),
-            "q_view": q_view(picture, back).mean,
+            "scheme": scheme, "bpp": one.bpp, "reached": one.reached, "q_global": q_global(picture, back),
+            "front_db": psnr(views[0], view), "q_view": q_view(picture, back).mean,
         }
         for scheme, one, back, view in zip(SHOWN, coded, decoded, views[1:], strict=True)
-    ]
+    ]  # fmt: skip
     return {"points": points}
 
 

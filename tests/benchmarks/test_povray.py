@@ -55,6 +55,6 @@ def test_the_page_states_16_bit_agreement_as_measured():
     assert found["pinhole", "matt"][closed] > rounding - 1
     assert f"{found['pinhole', 'matt'][ours]:.1f}" == "47.4"
     assert {f"{found['setup1', 'matt'][pair]:.1f}" for pair in (closed, ours)} == {"63.6"}
-    page = " ".join((povray.DOCS / "stability.md").read_text(encoding="utf-8").split())
+    page = " ".join((povray.IMAGES.parent / "stability.md").read_text(encoding="utf-8").split())
     assert "triangles of our balls (384 segments) limit it to 47.4 dB" in page
     assert "limits the agreement of both to 63.6 dB" in page

@@ -10,12 +10,11 @@ import pytest
 from benchmarks.pages.tables import filled
 from benchmarks.registry import BENCHMARKS
 from benchmarks.study import beside, claims, theirs
-from benchmarks.study.__main__ import main
+from benchmarks.study.__main__ import all_steps, main
 from benchmarks.study.page import PAGE, largest, publish, tables
 from benchmarks.study.runner import Step, code_of, known, perform, records, timeless
 from benchmarks.study.scripts import SCRIPTS
 from benchmarks.study.sheets import STRIP
-from benchmarks.study.steps import all_steps
 from benchmarks.study.views import towards
 from ii_core.base.files import read_image, write_image
 
