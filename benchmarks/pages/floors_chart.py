@@ -10,7 +10,7 @@ from typing import Any
 from matplotlib.ticker import NullFormatter
 
 from benchmarks.coding.headers import RECORDS, SCALE, SCENE, SIDES
-from benchmarks.pages.video import finished
+from benchmarks.pages.pictures import tidy, write_chart
 from ii_core.display.figure import COLOURS, MARKERS, new_figure
 
 PANELS = {
@@ -42,7 +42,9 @@ def main() -> None:
     for i, coder in enumerate(CODERS):
         panels[0].plot([], [], marker=MARKERS[i % 7], color=COLOURS[i % 7], mfc=face(i), linewidth=1, label=coder)
     panels[0].plot([], [], ":", color="0.3", label="black picture")
-    finished(figure, "floors.png", ncols=7)
+    tidy(*panels)
+    figure.legend(loc="outside lower left", ncols=7, frameon=False, fontsize=8)
+    write_chart(figure, "floors.png", dpi=110)
 
 
 def draw(axes: Any, rows: list[dict[str, Any]], i: int) -> None:
@@ -57,7 +59,3 @@ def draw(axes: Any, rows: list[dict[str, Any]], i: int) -> None:
 def face(i: int) -> str:
     """Return the colour inside the marks: those after the seventh coder are open."""
     return COLOURS[i % 7] if i < 7 else "white"
-
-
-if __name__ == "__main__":
-    main()
