@@ -116,7 +116,8 @@ def test_steps_have_names_of_their_own_and_code_that_is_there():
     for scale in (1, 2, 4, 8, 16):
         steps = all_steps(scale)
         assert len({step.name for step in steps}) == len(steps)
-        assert all(len(code_of(step)) == 64 for step in steps)
+    for step in {(step.run.__module__, step.uses): step for step in all_steps(1)}.values():
+        assert len(code_of(step)) == 64
     assert {name for name, *_ in SCRIPTS} <= {*BENCHMARKS, "demo"}
 
 
