@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,6 +12,7 @@ import typer
 
 from .cluster import Dask, cluster
 from .common import Force, Workers, app, check_only, check_outputs, image_file, picture_files
+from .option_groups import grouped
 from .progress import progress_bar, say_done
 
 if TYPE_CHECKING:
@@ -19,8 +21,120 @@ if TYPE_CHECKING:
 Exr = Path | None
 
 
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """Options of a moving scene."""
+
+    frames: Annotated[
+        str, typer.Option(help="Frames of a moving scene: 5, 0..47 or all; the output is a folder.")
+    ] = ""
+    clip: Annotated[str, typer.Option(help="Name of the animation in a glTF file.")] = ""
+    fps: Annotated[float | None, typer.Option(help="Frames per second, in place of the file's.")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """Options of where the camera stands."""
+
+    at: Annotated[str | None, typer.Option(help="Position of the camera in the scene, mm: x,y,z.")] = None
+    look_at: Annotated[str | None, typer.Option(help="Scene point on the axis of the camera, mm: x,y,z.")] = None
+    up: Annotated[str | None, typer.Option(help="Direction of the camera's top, such as 0,1,0.")] = None
+    turn: Annotated[
+        str | None, typer.Option(help="Rotation after look-at, degrees: right, or right,up or right,up,clockwise.")
+    ] = None
+
+    def pose(self, camera: Any) -> Any:
+        """Return the pose: as given; by default z = 0 fills the picture of a camera of one lens."""
+        from ii_core import camera_pose, stand_back
+
+        usual = stand_back(camera.model) if camera.lenses == (1, 1) and camera.model else None
+        if self.at is self.look_at is self.up is self.turn is None:
+            return usual
+        usual_place = (0.0, 0.0, 0.0) if usual is None else usual[:3, 3]
+        turns = _floats("turn", self.turn, 1, 3) if self.turn is not None else []
+        return camera_pose(
+            usual_place if self.at is None else _floats("at", self.at, 3, 3),
+            look_at_mm=None if self.look_at is None else _floats("look-at", self.look_at, 3, 3),
+            up=(0.0, 1.0, 0.0) if self.up is None else _floats("up", self.up, 3, 3),
+            turn_deg=turns + [0.0] * (3 - len(turns)),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sampling:
+    """Options of the samples of pixels."""
+
+    samples: Annotated[str, typer.Option(help="Rays per pixel; adaptive between two powers of 2: 4..64.")] = "1"
+    error: Annotated[
+        float | None,
+        typer.Option(help="Target standard error of adaptive samples, in 8-bit steps [0.5]."),
+    ] = None
+    seed: Annotated[int, typer.Option(help="Seed of samples and noise.")] = 0
+    noise: Annotated[float, typer.Option(help="σ of sensor noise, in 8-bit steps.")] = 0.0
+    texture_filter: Annotated[
+        bool, typer.Option(help="Read image textures over a ray's width; --no-texture-filter reads them at a point.")
+    ] = True
+    audit: Annotated[
+        float, typer.Option(help="Share of pixels to render again in full, such as 0.001, to measure the error.")
+    ] = 0.0
+    bits: Annotated[int, typer.Option(help="Bits per channel: 8, or 16 for .png and .tif.")] = 8
+
+    def check_bits(self) -> None:
+        """Raise ValueError for another number of bits than 8 and 16."""
+        if self.bits not in (8, 16):
+            raise ValueError(f"bits is {self.bits}: 8 or 16 is needed")
+
+    def options(self) -> dict[str, Any]:
+        """Return what all ways to render take, by name."""
+        samples = _samples(self.samples, self.error)
+        return {**samples, "seed": self.seed, "noise": self.noise, "texture_filter": self.texture_filter}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Images:
+    """Options of files beside the picture."""
+
+    support: Annotated[Exr, typer.Option(help="Write all support images to this .exr, as named channels.")] = None
+    depth: Annotated[Exr, typer.Option(help="Write z in mm from the pixel plane to this .exr.")] = None
+    ray_length: Annotated[Exr, typer.Option(help="Write ray length in mm from the lens to this .exr.")] = None
+    disparity: Annotated[Exr, typer.Option(help="Write disparity in pixels between lenses to this .exr.")] = None
+    normal: Annotated[Exr, typer.Option(help="Write unit normals of the faces to this .exr.")] = None
+    shading_normal: Annotated[Exr, typer.Option(help="Write unit shading normals to this .exr.")] = None
+    object_id: Annotated[Exr, typer.Option(help="Write object numbers to this .exr, −1 for none.")] = None
+    projection: Annotated[Path | None, typer.Option(help="Write the picture of a 2-D camera to this .png.")] = None
+
+    @property
+    def single(self) -> dict[str, Path]:
+        """Files of single support images, by their name."""
+        names = ("depth", "ray_length", "disparity", "normal", "object_id", "shading_normal")
+        return {name: path for name in names if (path := getattr(self, name)) is not None}
+
+    @property
+    def files(self) -> list[Path]:
+        """Files of support images, which may share one."""
+        return list(dict.fromkeys([*self.single.values(), *([self.support] if self.support else [])]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Means:
+    """Options of where the work is done."""
+
+    workers: Workers = None
+    dask: Dask = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Views:
+    """Pixel arrays of a camera, and their poses in the scene."""
+
+    arrays: Sequence[Any]
+    poses: Sequence[Any]
+
+
 @app.command()
+@grouped
 def render(
+    *,
     context: typer.Context,
     output: Annotated[
         Path, typer.Option("-o", "--output", help=".png, .tif (8 or 16 bit) or .exr (linear float); a set's folder.")
@@ -31,45 +145,15 @@ def render(
     ] = "",
     camera: Annotated[str, typer.Option(help="A camera's name, a .json file, or a folder of maps.")] = "setup1",
     scale: Annotated[int, typer.Option(help="Divides the number of lenses, at the same pixels per lens.")] = 1,
-    frames: Annotated[
-        str, typer.Option(help="Frames of a moving scene: 5, 0..47 or all; the output is a folder.")
-    ] = "",
-    clip: Annotated[str, typer.Option(help="Name of the animation in a glTF file.")] = "",
-    fps: Annotated[float | None, typer.Option(help="Frames per second, in place of the file's.")] = None,
-    at: Annotated[str | None, typer.Option(help="Position of the camera in the scene, mm: x,y,z.")] = None,
-    look_at: Annotated[str | None, typer.Option(help="Scene point on the axis of the camera, mm: x,y,z.")] = None,
-    up: Annotated[str | None, typer.Option(help="Direction of the camera's top, such as 0,1,0.")] = None,
-    turn: Annotated[
-        str | None, typer.Option(help="Rotation after look-at, degrees: right, or right,up or right,up,clockwise.")
-    ] = None,
-    samples: Annotated[str, typer.Option(help="Rays per pixel; adaptive between two powers of 2: 4..64.")] = "1",
-    error: Annotated[
-        float | None,
-        typer.Option(help="Target standard error of adaptive samples, in 8-bit steps [0.5]."),
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of samples and noise.")] = 0,
-    noise: Annotated[float, typer.Option(help="σ of sensor noise, in 8-bit steps.")] = 0.0,
-    texture_filter: Annotated[
-        bool, typer.Option(help="Read image textures over a ray's width; --no-texture-filter reads them at a point.")
-    ] = True,
-    audit: Annotated[
-        float, typer.Option(help="Share of pixels to render again in full, such as 0.001, to measure the error.")
-    ] = 0.0,
-    bits: Annotated[int, typer.Option(help="Bits per channel: 8, or 16 for .png and .tif.")] = 8,
-    support: Annotated[Exr, typer.Option(help="Write all support images to this .exr, as named channels.")] = None,
-    depth: Annotated[Exr, typer.Option(help="Write z in mm from the pixel plane to this .exr.")] = None,
-    ray_length: Annotated[Exr, typer.Option(help="Write ray length in mm from the lens to this .exr.")] = None,
-    disparity: Annotated[Exr, typer.Option(help="Write disparity in pixels between lenses to this .exr.")] = None,
-    normal: Annotated[Exr, typer.Option(help="Write unit normals of the faces to this .exr.")] = None,
-    shading_normal: Annotated[Exr, typer.Option(help="Write unit shading normals to this .exr.")] = None,
-    object_id: Annotated[Exr, typer.Option(help="Write object numbers to this .exr, −1 for none.")] = None,
-    projection: Annotated[Path | None, typer.Option(help="Write the picture of a 2-D camera to this .png.")] = None,
+    motion: Motion,
+    place: Place,
+    sampling: Sampling,
+    images: Images,
     spread: Annotated[
         str | None,
         typer.Option(help="Spread light by diffraction and defocus: auto, by the depth met, or a folder of maps."),
     ] = None,
-    workers: Workers = None,
-    dask: Dask = None,
+    means: Means,
     force: Force = False,
 ) -> None:
     """Ray trace a scene, or a set of scenes, through a camera.
@@ -87,92 +171,97 @@ def render(
 
         allowed = {"set_name", "output", "workers", "force"}
         check_only(context, "the profile of a benchmark defines its pictures", allowed)
-        render_profiles(set_name.partition(":")[2], output, force, workers)
+        render_profiles(set_name.partition(":")[2], output, force, means.workers)
         return
-    if bits not in (8, 16):
-        raise ValueError(f"bits is {bits}: 8 or 16 is needed")
-    if dask and workers is not None:
+    sampling.check_bits()
+    if means.dask and means.workers is not None:
         raise ValueError("--workers is for threads of this machine: leave it out with --dask")
-    options = {**_sampling(samples, error), "seed": seed, "noise": noise, "texture_filter": texture_filter}
-    if audit and (set_name or frames):
+    options = sampling.options()
+    if sampling.audit and (set_name or motion.frames):
         raise ValueError("--audit is of one picture: without --frames and --set")
-    wanted = {"depth": depth, "ray_length": ray_length, "disparity": disparity, "normal": normal}
-    wanted |= {"object_id": object_id, "shading_normal": shading_normal}
-    extra = {name: path for name, path in wanted.items() if path is not None}
     arrays = _cameras(camera, scale)
-    poses = [_pose(array, at, look_at, up, turn) for array in arrays]
+    views = Views(arrays=arrays, poses=[place.pose(array) for array in arrays])
     if spread is not None:
         from .spread import check_spread
 
-        if frames or set_name:
+        if motion.frames or set_name:
             raise ValueError("--spread is of one picture: without --frames and --set")
         check_spread(spread, arrays)
-    if frames:
-        from ..rendering.executors import identity
-        from .take import render_frames, support_files
-
-        if set_name or projection or len(arrays) > 1:
+    if motion.frames:
+        if set_name or images.projection or len(arrays) > 1:
             raise ValueError("--frames renders one scene through one pixel array, without --set and --projection")
-        moving = {"clip": clip or None, "fps": fps}
-        with cluster(dask, identity) as executor:
-            means = {**options, "pose": poses[0], "workers": workers, "executor": executor, "dtype": f"uint{bits}"}
-            images = support_files(_all_support(arrays[0]) if support else [], support, extra)
-            render_frames(scene, moving, frames, output, arrays[0], images, force, means)
-        return
-    if clip or fps is not None:
+        _render_frames(
+            scene, motion, output, views, images, {**options, "dtype": f"uint{sampling.bits}"}, means, force
+        )
+    elif motion.clip or motion.fps is not None:
         raise ValueError("--clip and --fps are for moving scenes: --frames is needed")
-    if set_name:
-        from ..rendering.executors import identity
-
-        if extra or support or projection:
+    elif set_name:
+        if images.files or images.projection:
             raise ValueError("a set includes all support images and projections: leave out their options")
-        with cluster(dask, identity) as executor:
-            _render_set(set_name, output, arrays, poses, options, bits, workers, executor, force)
-        return
-    if support is not None and support.suffix != ".exr":
-        raise ValueError(f"{support}: only .exr has named channels")
-    dtype = "float32" if output.suffix == ".exr" else f"uint{bits}"
-    names = [_numbered(len(arrays), i) for i in range(len(arrays))]
-    shared = dict.fromkeys([*extra.values(), *([support] if support else [])])  # support images may share a file
-    files = image_file(projection, "uint8")
-    for numbered in names:
+        options |= {"bits": sampling.bits}
+        _render_set(set_name, output, views, options, means, force)
+    else:
+        dtype = "float32" if output.suffix == ".exr" else f"uint{sampling.bits}"
+        _check_files(output, dtype, len(arrays), images, force)
+        options |= {"dtype": dtype, "audit": sampling.audit}
+        _render_scene(scene, output, views, images, options, means, spread)
+
+
+def _render_frames(
+    scene: str, motion: Motion, folder: Path, views: Views, images: Images, options: dict[str, Any], means: Means,
+    force: bool,
+) -> None:  # fmt: skip
+    """Render frames of a moving scene."""
+    from ..rendering.executors import identity
+    from .take import render_frames, support_files
+
+    array, moving = views.arrays[0], {"clip": motion.clip or None, "fps": motion.fps}
+    with cluster(means.dask, identity) as executor:
+        options = {**options, "pose": views.poses[0], "workers": means.workers, "executor": executor}
+        kinds = _all_support(array) if images.support else []
+        support = support_files(kinds, images.support, images.single)
+        render_frames(scene, moving, motion.frames, folder, array, support, force, options)
+
+
+def _check_files(output: Path, dtype: str, arrays: int, images: Images, force: bool) -> None:
+    """Raise an error unless the files of one picture, or one of each pixel array, can be written."""
+    if images.support is not None and images.support.suffix != ".exr":
+        raise ValueError(f"{images.support}: only .exr has named channels")
+    files = image_file(images.projection, "uint8")
+    for i in range(arrays):
+        numbered = _numbered(arrays, i)
         files += picture_files(numbered(output), dtype)
-        files += [file for path in shared for file in image_file(numbered(path), "float32")]
+        files += [file for path in images.files for file in image_file(numbered(path), "float32")]
     check_outputs(files, force)
-    _render_scene(
-        scene, output, arrays, poses, names, extra, support, projection, dask, workers, dtype,
-        {**options, "audit": audit}, spread,
-    )  # fmt: skip
 
 
 def _render_scene(
-    scene: str, output: Path, arrays: Sequence[Any], poses: Sequence[Any], names: Sequence[Callable[[Path], Path]],
-    extra: dict[str, Path], support: Path | None, projection: Path | None, dask: str | None, workers: int | None,
-    dtype: str, options: dict[str, Any], spread: str | None,
-) -> None:  # fmt: skip
+    scene: str, output: Path, views: Views, images: Images, options: dict[str, Any], means: Means, spread: str | None
+) -> None:
     """Render one scene through every pixel array, and its projection."""
     from ..files.load import load_scene
     from ..rendering.executors import identity
 
     loaded = load_scene(scene)
-    with cluster(dask, identity) as executor:
-        means = {"workers": workers, "executor": executor}
-        for i, (array, pose, numbered) in enumerate(zip(arrays, poses, names, strict=True)):
-            files = {name: [numbered(path)] for name, path in extra.items()}
-            for name in _all_support(array) if support else ():
-                files.setdefault(name, []).append(numbered(support))  # type: ignore[arg-type]
-            more = {"pose": pose, "upright": array.lenses == (1, 1), "support": files, "dtype": dtype}
+    with cluster(means.dask, identity) as executor:
+        how = {"workers": means.workers, "executor": executor}
+        for i, (array, pose) in enumerate(zip(views.arrays, views.poses, strict=True)):
+            numbered = _numbered(len(views.arrays), i)
+            files = {name: [numbered(path)] for name, path in images.single.items()}
+            for name in _all_support(array) if images.support else ():
+                files.setdefault(name, []).append(numbered(images.support))  # type: ignore[arg-type]
+            more = {"pose": pose, "upright": array.lenses == (1, 1), "support": files, **options, **how}
             path = numbered(output)
             shoot = partial(_shoot, scene=loaded, camera=array)
             if spread is None:
-                stats = shoot(path, **more, **options, **means)
+                stats = shoot(path, **more)
             else:
                 from .spread import shoot_spread
 
-                stats = shoot_spread(shoot, path, array, i, spread, {**more, **options, **means})
+                stats = shoot_spread(shoot, path, array, i, spread, more)
             say_done(f"{path}: {_told(stats)}")
-        if projection:
-            _save_projection(loaded, arrays[0], poses[0], projection, means)
+        if images.projection:
+            _save_projection(loaded, views.arrays[0], views.poses[0], images.projection, how)
 
 
 def _all_support(array: Any) -> list[str]:
@@ -181,7 +270,7 @@ def _all_support(array: Any) -> list[str]:
     return support_images(array)
 
 
-def _sampling(samples: str, error: float | None) -> dict[str, Any]:
+def _samples(samples: str, error: float | None) -> dict[str, Any]:
     """Return the number of samples or their range, and the target error of a range."""
     least, dots, most = samples.partition("..")
     try:
@@ -195,20 +284,19 @@ def _sampling(samples: str, error: float | None) -> dict[str, Any]:
     return {"samples": numbers, "error": error}
 
 
-def _render_set(
-    name: str, folder: Path, arrays: Sequence[Any], poses: Sequence[Any], options: dict[str, Any], bits: int,
-    workers: int | None, executor: Any, force: bool,
-) -> None:  # fmt: skip
+def _render_set(name: str, folder: Path, views: Views, options: dict[str, Any], means: Means, force: bool) -> None:
+    from ..rendering.executors import identity
     from ..rendering.render_sets import SETS, render_set
 
-    if name not in SETS:
-        raise ValueError(f"unknown set {name!r}: known are {', '.join(SETS)}")
-    check_outputs([folder / "manifest.json"], True, make_folder=True)
-    with progress_bar(f"render {name}") as report:
-        manifest = render_set(
-            name, folder, arrays, poses=poses, bits=bits, workers=workers, executor=executor, force=force,
-            progress=lambda title, done, total: report(done, total, title), **options,
-        )  # fmt: skip
+    with cluster(means.dask, identity) as executor:
+        if name not in SETS:
+            raise ValueError(f"unknown set {name!r}: known are {', '.join(SETS)}")
+        check_outputs([folder / "manifest.json"], True, make_folder=True)
+        with progress_bar(f"render {name}") as report:
+            manifest = render_set(
+                name, folder, views.arrays, poses=views.poses, workers=means.workers, executor=executor, force=force,
+                progress=lambda title, done, total: report(done, total, title), **options,
+            )  # fmt: skip
     products = [p for entry in manifest["scenes"].values() for p in entry["products"].values()]
     seconds, rays = sum(p["seconds"] for p in products), sum(sum(p["rays"].values()) for p in products)
     about = f"{rays / 1e6:.1f} M rays, all rendered in {seconds:.1f} s"
@@ -224,23 +312,6 @@ def _cameras(name: str, scale: int) -> Sequence[Any]:
     if scale != 1:
         raise ValueError(f"scale is {scale}: stored maps have a fixed size, leave --scale out")
     return read_maps(name)
-
-
-def _pose(camera: Any, at: str | None, look_at: str | None, up: str | None, turn: str | None) -> Any:
-    """Return the pose of a camera: as given; by default z = 0 fills the picture of a camera of one lens."""
-    from ii_core import camera_pose, stand_back
-
-    usual = stand_back(camera.model) if camera.lenses == (1, 1) and camera.model else None
-    if at is look_at is up is turn is None:
-        return usual
-    usual_place = (0.0, 0.0, 0.0) if usual is None else usual[:3, 3]
-    turns = _floats("turn", turn, 1, 3) if turn is not None else []
-    return camera_pose(
-        usual_place if at is None else _floats("at", at, 3, 3),
-        look_at_mm=None if look_at is None else _floats("look-at", look_at, 3, 3),
-        up=(0.0, 1.0, 0.0) if up is None else _floats("up", up, 3, 3),
-        turn_deg=turns + [0.0] * (3 - len(turns)),
-    )
 
 
 def _floats(name: str, text: str, least: int, most: int) -> list[float]:
