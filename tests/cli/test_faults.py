@@ -381,7 +381,7 @@ def test_a_signal_ends_a_run_within_two_seconds(tmp_path, number, code):
             said = running.stderr.read()
         finally:
             running.kill()
-    assert seconds < 2.5, "1.5 s of grace, and what a loaded machine adds"
+    assert seconds < 4, "1.5 s of grace, and what a loaded machine adds; the block would take minutes"
     assert "interrupted" in said and "Traceback" not in said
     assert list(tmp_path.iterdir()) == []
 
