@@ -18,6 +18,7 @@ from PIL import Image
 from codec import Coder, CodingResult, Encoded, Run, contract, decode, decode_component, decode_frame, encode, schemes
 from codec.coders.decoding import decoded_frames
 from codec.coders.pseudo_video import PseudoVideo
+from codec.coders.volume import GROUP
 from codec.contract import find
 from codec.inspect.extract import extract, suffixes
 from codec.inspect.random_access import sequence
@@ -116,7 +117,8 @@ def test_a_component_of_one_codestream_by_its_own_packets(size, options, dtype, 
         planes, "decode_planes", lambda s, shape, *a, **k: decoded.append(shape) or real(s, shape, *a, **k)
     )
     k, l, u, v = size
-    for place in {(0, 0), (u - 1, v - 1), (u // 2, v - 1)}:
+    edges = {divmod(index, u)[::-1] for index in (GROUP - 1, GROUP) if index < u * v}  # of groups of planes
+    for place in {(0, 0), (u - 1, v - 1), (u // 2, v - 1)} | edges:
         np.testing.assert_array_equal(decode_component(stream, place), whole[place[1], place[0]])
     np.testing.assert_array_equal(decode_frame(stream, u), whole[1, 0])
     assert set(decoded) == {(3, l, k)}

@@ -15,7 +15,7 @@ from codec import decode, encode
 from ii_core import IIPicture
 
 SCRIPT = """
-import json, os, resource, sys, time, traceback
+import json, os, resource, signal, sys, time, traceback
 from dataclasses import replace
 from pathlib import Path
 
@@ -110,6 +110,7 @@ for case in json.loads(sys.argv[1]):
     sys.stdout.flush()
     child = os.fork()
     if not child:
+        signal.alarm(60)  # ends a case that hangs
         try:
             print(json.dumps([case, globals()[name](*arguments)]), flush=True)
         except BaseException:

@@ -118,9 +118,11 @@ def study_of(**where):
     ],
     ids=["threads", "processes"],
 )
-def test_points_are_the_same_on_every_executor(executor):
+def test_points_are_the_same_on_every_executor(executor, monkeypatch):
     with executor(2) as pool:
-        assert study_of(executor=pool) == study_of(workers=1)
+        submit, points = pool.submit, []
+        monkeypatch.setattr(pool, "submit", lambda *call, **more: points.append(call) or submit(*call, **more))
+        assert study_of(executor=pool) == study_of(workers=1) and len(points) == 4
     with pytest.raises(ValueError, match="workers is 2: an executor has its own"):
         study_of(executor=pool, workers=2)
 
