@@ -76,6 +76,7 @@ def test_findings_exclude_times():
     assert timeless({"a": [{"codec_seconds": 1, "b": 2}]}) == {"a": [{"b": 2}]}
 
 
+@pytest.mark.slow
 def test_a_small_study_resumes_repeats_and_fills_the_page(tmp_path, capsys):
     only = ["--scale", "16", "--only", "artefacts-setup1,floors", "--out", str(tmp_path / "out")]
     main(only)

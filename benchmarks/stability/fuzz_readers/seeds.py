@@ -182,10 +182,9 @@ def stl_files() -> tuple[bytes, ...]:
 
 POINT = {
     "scheme": "si-h264", "options": {"gop": 16, "order": "serpentine"}, "target_bpp": 0.1, "bpp": 0.0991,
-    "reached": True,
-    "q_global": 33.1, "q_angle": [30.0, 31.5, None], "q_view": 32.0, "q_depth": [31.0, None, "inf"],
-    "encode_seconds": 0.5,
-    "decode_seconds": 0.1, "nbytes": 812, "lossless": False,
+    "reached": True, "q_global": 33.1, "q_angle": [30.0, 31.5, None], "q_view": 32.0,
+    "q_depth": [31.0, None, "inf"], "encode_seconds": 0.5, "decode_seconds": 0.1, "nbytes": 812,
+    "lossless": False,
 }  # fmt: skip
 STUDY = {
     "format": "ii-rd-study",
