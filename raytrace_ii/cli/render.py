@@ -79,10 +79,12 @@ class Sampling:
     ] = 0.0
     bits: Annotated[int, typer.Option(help="Bits per channel: 8, or 16 for .png and .tif.")] = 8
 
-    def check_bits(self) -> None:
-        """Raise ValueError for another number of bits than 8 and 16."""
+    def check(self, one_picture: bool) -> None:
+        """Raise ValueError for another number of bits than 8 and 16, and for an audit of several pictures."""
         if self.bits not in (8, 16):
             raise ValueError(f"bits is {self.bits}: 8 or 16 is needed")
+        if self.audit and not one_picture:
+            raise ValueError("--audit is of one picture: without --frames and --set")
 
     def options(self) -> dict[str, Any]:
         """Return what all ways to render take, by name."""
@@ -121,6 +123,11 @@ class Means:
 
     workers: Workers = None
     dask: Dask = None
+
+    def check(self) -> None:
+        """Raise ValueError for threads of this machine on a cluster."""
+        if self.dask and self.workers is not None:
+            raise ValueError("--workers is for threads of this machine: leave it out with --dask")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,18 +180,16 @@ def render(
         check_only(context, "the profile of a benchmark defines its pictures", allowed)
         render_profiles(set_name.partition(":")[2], output, force, means.workers)
         return
-    sampling.check_bits()
-    if means.dask and means.workers is not None:
-        raise ValueError("--workers is for threads of this machine: leave it out with --dask")
+    one_picture = not (set_name or motion.frames)
+    sampling.check(one_picture)
+    means.check()
     options = sampling.options()
-    if sampling.audit and (set_name or motion.frames):
-        raise ValueError("--audit is of one picture: without --frames and --set")
     arrays = _cameras(camera, scale)
     views = Views(arrays=arrays, poses=[place.pose(array) for array in arrays])
     if spread is not None:
         from .spread import check_spread
 
-        if motion.frames or set_name:
+        if not one_picture:
             raise ValueError("--spread is of one picture: without --frames and --set")
         check_spread(spread, arrays)
     if motion.frames:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import array_kernel, lean_kernel
+from ii_core.base.jit import array_kernel, inner_kernel, lean_kernel
 
 from . import contexts as at
 from . import motion
@@ -603,15 +603,7 @@ def code_block(coder, job, work, y0, x0, log):
         index = motion.noted(job, job.at, by, bx)
     kind, index, mask, direction = code_kind(coder, job, by, bx, log, kind, index, mask, direction)
     if decoding:
-        if kind == SYNTHESIS:
-            predict_synthesis(job, work, y0, x0, n)
-        elif kind == EXPLICIT:
-            predict_explicit(job, work, y0, x0, n, index, mask)
-        elif kind >= TIMED:
-            motion.predict_in_time(job, work, y0, x0, n, index, kind == MIXED)
-        else:
-            for p in range(3):
-                predict_direction(job, work, p, y0, x0, n, direction)
+        _predict(job, work, y0, x0, n, kind, index, mask, direction)
     coded = code_bit(coder, residual_context(job, by, bx, log, kind), np.int64(blocks[CODED, by, bx]))
     first = skipped = 0
     if coded and job.skipping and log <= LARGEST_SKIPPED:
@@ -619,22 +611,9 @@ def code_block(coder, job, work, y0, x0, log):
     for p in range(3):
         some = cross = 0
         if coded:
-            if p and first and job.crossed:
-                cross = code_cross(coder, p, log, np.int64(blocks[CROSS_1 + p - 1, by, bx]))
-            if not decoding:
-                some = _load_levels(job, work, p, y0, x0, n)
-            some = code_bit(coder, coded_context(p, log, kind, first, skipped), some)
+            some, cross = _code_plane(coder, job, work, y0, x0, log, p, kind, first, skipped)
             if p == 0:
                 first = some
-            if some:
-                if decoding:
-                    _clear(work.levels, n)
-                if skipped:
-                    code_samples(coder, work.levels, job.levels, y0, x0, p, log)
-                    if decoding:
-                        _note_levels(job, work, p, y0, x0, n)
-                else:
-                    code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0)
         if decoding:
             if some or cross:
                 rows, cols = rebuild(work, work.levels, log, job.step, some, cross, skipped)
@@ -644,6 +623,41 @@ def code_block(coder, job, work, y0, x0, log):
     if decoding:
         mark_block(job, by, bx, log, kind, index, mask, direction, coded)
         note_skipped(blocks, by, bx, log, skipped)
+
+
+@inner_kernel
+def _predict(job, work, y0, x0, n, kind, index, mask, direction):
+    """work.predicted = the prediction of a block."""
+    if kind == SYNTHESIS:
+        predict_synthesis(job, work, y0, x0, n)
+    elif kind == EXPLICIT:
+        predict_explicit(job, work, y0, x0, n, index, mask)
+    elif kind >= TIMED:
+        motion.predict_in_time(job, work, y0, x0, n, index, kind == MIXED)
+    else:
+        for p in range(3):
+            predict_direction(job, work, p, y0, x0, n, direction)
+
+
+@inner_kernel
+def _code_plane(coder, job, work, y0, x0, log, p, kind, first, skipped):
+    """Write or read the residual of a plane; return whether there are levels, and the factor of `cross`."""
+    n, decoding = 1 << log, coder.state[DECODING]
+    some = cross = 0
+    if p and first and job.crossed:
+        cross = code_cross(coder, p, log, np.int64(job.blocks[CROSS_1 + p - 1, y0 >> 2, x0 >> 2]))
+    if not decoding:
+        some = _load_levels(job, work, p, y0, x0, n)
+    some = code_bit(coder, coded_context(p, log, kind, first, skipped), some)
+    if some and decoding:
+        _clear(work.levels, n)
+    if some and skipped:
+        code_samples(coder, work.levels, job.levels, y0, x0, p, log)
+        if decoding:
+            _note_levels(job, work, p, y0, x0, n)
+    elif some:
+        code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0)
+    return some, cross
 
 
 @array_kernel

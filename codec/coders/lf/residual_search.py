@@ -141,13 +141,7 @@ def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit)
     bits, error, without = np.float32(0), np.float32(0), np.float32(0)
     first, coded = 0, 0
     for p in range(3):
-        least = np.float32(0)
-        for y in range(n):
-            own, predicted, block = search.original[p, np.uint64(y0 + y)], work.predicted[p, y], work.block[y]
-            for x in range(n):
-                difference = np.int32(own[np.uint64(x0 + x)] - predicted[x])
-                block[x] = difference
-                least += np.float32(difference * difference)
+        least = _subtract_prediction(search, work, p, y0, x0, n)
         without += least
         more, some, cross = _try_plane(
             costs, work, trial, p, log, step, search.weight, kind, first, job.crossed, least, skipped
@@ -162,14 +156,7 @@ def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit)
                 keep_first(work, rows, cols)
                 first = 1
             coded = 1
-            for y in range(n):
-                own, predicted, block = search.original[p, np.uint64(y0 + y)], work.predicted[p, y], work.block[y]
-                decoded = trial.trial_decoded[p, y]
-                for x in range(n):
-                    value = min(max(np.int32(predicted[x] + block[x]), np.int32(-LIMIT)), np.int32(LIMIT))
-                    decoded[x] = value
-                    difference = np.int32(own[np.uint64(x0 + x)] - value)
-                    error += np.float32(difference * difference)
+            error = _add_prediction(search, work, trial, p, y0, x0, n, error)
             _copy_block(levels, trial.trial_levels[p], n)
         else:
             _leave(trial, work, p, n)
@@ -187,6 +174,33 @@ def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit)
         for p in range(3):
             _leave(trial, work, p, n)
     return empty, without, 0
+
+
+@inner_kernel
+def _subtract_prediction(search, work, p, y0, x0, n):
+    """work.block = the difference to work.predicted; return its squared error."""
+    error = np.float32(0)
+    for y in range(n):
+        own, predicted, block = search.original[p, np.uint64(y0 + y)], work.predicted[p, y], work.block[y]
+        for x in range(n):
+            difference = np.int32(own[np.uint64(x0 + x)] - predicted[x])
+            block[x] = difference
+            error += np.float32(difference * difference)
+    return error
+
+
+@inner_kernel
+def _add_prediction(search, work, trial, p, y0, x0, n, error):
+    """trial.trial_decoded = work.predicted and the decoded difference; return ``error`` and its squared error."""
+    for y in range(n):
+        own, predicted, block = search.original[p, np.uint64(y0 + y)], work.predicted[p, y], work.block[y]
+        decoded = trial.trial_decoded[p, y]
+        for x in range(n):
+            value = min(max(np.int32(predicted[x] + block[x]), np.int32(-LIMIT)), np.int32(LIMIT))
+            decoded[x] = value
+            difference = np.int32(own[np.uint64(x0 + x)] - value)
+            error += np.float32(difference * difference)
+    return error
 
 
 @inner_kernel

@@ -204,11 +204,7 @@ def blend(s, nearest, every):
     """
     height, width = s.counts.shape
     count = s.sources.shape[0]
-    for r in range(count):
-        # Weights of a source that agrees, that does not, and that does not see the sample.
-        far = 8 + s.sources[r, 1] * s.sources[r, 1] + s.sources[r, 2] * s.sources[r, 2]
-        for kind, weight in enumerate((64, 8, 1)):
-            s.scratch[6 + kind, r] = weight if nearest else weight * 64 // far
+    _weigh_sources(s, nearest)
     for y in range(height >> 2):
         for x in range(width >> 2):
             s.doubt[y, x] = 0
@@ -226,33 +222,55 @@ def blend(s, nearest, every):
                 d = np.int64(0)
             most = np.int64(-1)
             for r in range(count):
-                across, down = s.sources[r, 1], s.sources[r, 2]
-                at_x, at_y = 256 * x + d * across, 256 * y + d * down
-                inside = -128 <= at_x <= 256 * width - 128 and -128 <= at_y <= 256 * height - 128
-                weight = s.scratch[(6 if agrees(s, r, y, x, d) else 7) if inside else 8, r]
-                if nearest:
-                    i, j = (at_x + 128) >> 8, (at_y + 128) >> 8
-                    fx, fy = at_x - (i << 8), at_y - (j << 8)
-                    away = (fx * fx + fy * fy) >> 10
-                    s.scratch[5, r] = min(away, 64)
-                    i, j = clamped(i, width), clamped(j, height)
-                    for p in range(3):
-                        s.scratch[1 + p, r] = s.views[s.sources[r, 0], p, j, i]
-                else:
-                    for p in range(3):
-                        s.scratch[1 + p, r] = s.taken[r, p, x - start]
-                s.scratch[4, r] = weight
-                if weight > most:
-                    most = weight
+                most = max(most, _take(s, r, y, x, d, nearest, x - start))
             if nearest:
-                closest = np.int64(64)
-                for r in range(count):
-                    if 2 * s.scratch[4, r] > most:
-                        closest = min(closest, s.scratch[5, r])
-                for r in range(count):
-                    s.scratch[4, r] = s.scratch[4, r] * PHASE[max(s.scratch[5, r] - closest, 0)]
+                _prefer_nearest(s, count, most)
             s.doubt[y >> 2, x >> 2] += (_weighted(s, y, x, count) + 8) >> 4
             x += 1
+
+
+@inner_kernel
+def _weigh_sources(s, nearest):
+    """s.scratch[6:9] = weights of each source where it agrees, does not, and does not see the sample."""
+    for r in range(s.sources.shape[0]):
+        far = 8 + s.sources[r, 1] * s.sources[r, 1] + s.sources[r, 2] * s.sources[r, 2]
+        for kind, weight in enumerate((64, 8, 1)):
+            s.scratch[6 + kind, r] = weight if nearest else weight * 64 // far
+
+
+@inner_kernel
+def _take(s, r, y, x, d, nearest, place):
+    """s.scratch[1:6, r] = sample, weight and distance of a source along a disparity; return the weight.
+
+    ``place`` is that of the sample in the run that `_interpolate` has made.
+    """
+    height, width = s.counts.shape
+    at_x, at_y = 256 * x + d * s.sources[r, 1], 256 * y + d * s.sources[r, 2]
+    inside = -128 <= at_x <= 256 * width - 128 and -128 <= at_y <= 256 * height - 128
+    weight = s.scratch[(6 if agrees(s, r, y, x, d) else 7) if inside else 8, r]
+    if nearest:
+        i, j = (at_x + 128) >> 8, (at_y + 128) >> 8
+        fx, fy = at_x - (i << 8), at_y - (j << 8)
+        s.scratch[5, r] = min((fx * fx + fy * fy) >> 10, 64)
+        i, j = clamped(i, width), clamped(j, height)
+        for p in range(3):
+            s.scratch[1 + p, r] = s.views[s.sources[r, 0], p, j, i]
+    else:
+        for p in range(3):
+            s.scratch[1 + p, r] = s.taken[r, p, place]
+    s.scratch[4, r] = weight
+    return weight
+
+
+@inner_kernel
+def _prefer_nearest(s, count, most):
+    """Lower the weights of samples farther from the place than the nearest of a source that sees it."""
+    closest = np.int64(64)
+    for r in range(count):
+        if 2 * s.scratch[4, r] > most:
+            closest = min(closest, s.scratch[5, r])
+    for r in range(count):
+        s.scratch[4, r] = s.scratch[4, r] * PHASE[max(s.scratch[5, r] - closest, 0)]
 
 
 @lean_kernel
