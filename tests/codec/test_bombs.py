@@ -17,6 +17,7 @@ from ii_core import IIPicture
 SCRIPT = """
 import json, os, resource, signal, sys, time, traceback
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -84,8 +85,13 @@ def forged(scheme, side, path):
     return said(path)
 
 
+@cache
+def black():
+    return encode(IIPicture(np.zeros((2048, 2048, 3), np.uint8), (256, 256), (8, 8)), "jpeg2000", bpp=1)
+
+
 def precincts(how):
-    coded = encode(IIPicture(np.zeros((2048, 2048, 3), np.uint8), (256, 256), (8, 8)), "jpeg2000", bpp=1)
+    coded = black()
     payload = coded.payload
     assert len(payload) < 1000
     at = payload.index(b"\\xff\\x52")
@@ -107,6 +113,8 @@ def precincts(how):
 
 for case in json.loads(sys.argv[1]):
     name, *arguments = case
+    if name == "precincts":
+        black()  # once, before the forks
     sys.stdout.flush()
     child = os.fork()
     if not child:

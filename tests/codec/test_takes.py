@@ -273,6 +273,7 @@ def encoder_runs(monkeypatch):
     return runs
 
 
+@pytest.mark.slow
 def test_a_killed_run_continues_after_its_last_segment(tmp_path, encoder_runs):
     take(40).save(tmp_path / "take")
     code = (

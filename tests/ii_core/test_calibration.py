@@ -178,7 +178,9 @@ def test_the_picture_itself_serves_in_place_of_a_white_image():
     assert off["centres_px"] < 0.5 and off["pitch"] < 2e-3
 
 
-@pytest.mark.parametrize("depth", [12, 40, 100])
+@pytest.mark.parametrize(
+    "depth", [pytest.param(12, marks=pytest.mark.slow), 40, pytest.param(100, marks=pytest.mark.slow)]
+)
 def test_micro_images_without_borders_are_refused(depth):
     """Behind pinholes the content repeats at more than the lens pitch, and micro-images have no dark borders."""
     camera = preset("plenoptic", scale=8)

@@ -7,6 +7,8 @@ import sys
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from ii_core.base.extras import EXTRAS
 
 ROOT = Path(__file__).parents[2]
@@ -49,6 +51,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.slow
 def test_without_extras_pictures_are_rendered_coded_and_measured_and_a_missing_library_is_one_line(tmp_path):
     """In one process, whose imports of extras fail. On b1dc540 the first import failed."""
     done = subprocess.run(

@@ -10,7 +10,7 @@ from tests.ii_core.conftest import LABELS
 from tests.support.one_tab import with_script
 
 PHONE = {"width": 390, "height": 844}
-WIDE = {"width": 780, "height": 400}  # controls stand beside the picture
+WIDE = {"width": 780, "height": 260}  # controls stand beside the picture
 
 
 @pytest.fixture

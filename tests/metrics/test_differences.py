@@ -129,7 +129,7 @@ def test_points_are_the_same_on_every_executor(executor, monkeypatch):
 
 def test_points_of_a_cluster():
     distributed = pytest.importorskip("distributed")
-    local = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    local = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": ":0"}
     with distributed.LocalCluster(**local, silence_logs=50) as cluster, distributed.Client(cluster) as client:
         assert study_of(executor=client) == study_of(workers=1)
 

@@ -117,6 +117,7 @@ def test_the_pixels_shown_are_those_of_the_views(opened, tmp_path):
         assert shown[3] == 56 * CAMERA.lenses[0]
 
 
+@pytest.mark.slow
 def test_pairs_are_answered_by_arrows_and_buttons(opened, tmp_path):
     written(tmp_path / "t.html", method="pairs", training=0)
     tab = opened(tmp_path / "t.html", viewport={"width": 1400, "height": 800})
@@ -159,6 +160,7 @@ def test_a_closed_tab_loses_nothing(browser, page, tmp_path):
     context.close()
 
 
+@pytest.mark.slow
 def test_a_presentation_begins_again_when_the_tab_was_out_of_sight(opened, tmp_path):
     written(tmp_path / "t.html", training=0)
     tab = opened(tmp_path / "t.html")
@@ -242,6 +244,7 @@ def test_the_server_has_every_answer_at_once(show, server, tmp_path):
     assert [grade for _, grade in results.observers[0].answers] == [4, 2, 1] and results.notes == []
 
 
+@pytest.mark.slow
 def test_answers_given_while_the_server_is_away_arrive_later(browser, server, tmp_path):
     """Without `show`, which fails on the browser's error about the stopped server."""
     tab = browser.new_page(viewport={"width": 1000, "height": 700})
