@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import assets
 
-from ..base.checks import number, shown, within
+from ..base.checks import number, shown, text, within
 from ..base.files import read_json
 
 LINE_D_NM, LINE_F_NM, LINE_C_NM = 587.5618, 486.1327, 656.2725  # spectral lines of the Abbe number
@@ -156,6 +156,7 @@ def known_glass(name: str) -> CatalogueGlass:
     ValueError
         If the name is unknown; the message has the nearest names.
     """
+    text("name", name)
     known = catalogue()
     found = known.get(name) or known.get(name.upper())
     if found is not None:

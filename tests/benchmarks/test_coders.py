@@ -5,7 +5,7 @@ from itertools import combinations
 import pytest
 from matplotlib.figure import Figure
 
-from benchmarks.coding.coders import LETTERS, offsets, shortened, summary, table, touch
+from benchmarks.coding.coders import LETTERS, offsets, rate_table, shortened, summary, touch
 
 ROWS = [
     {"scene": scene, "scheme": scheme, "bd_rate": rate, "seconds": seconds, "commit": "abcdef0"}
@@ -28,7 +28,7 @@ def test_the_mean_rate_needs_all_scenes():
 
 
 def test_a_scene_that_was_not_measured_is_a_dash():
-    assert "| `once` | -90 | – | – | 2.00 |" in table(ROWS)
+    assert "| `once` | -90 | – | – | 2.00 |" in rate_table(ROWS)
 
 
 def test_the_short_table_has_the_best_setting_of_each_scheme_that_is_no_si_scheme():

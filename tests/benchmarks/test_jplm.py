@@ -61,7 +61,7 @@ def test_views_reach_the_programs_and_return(tmp_path, monkeypatch, picture):
 def test_a_missing_program_is_one_line(monkeypatch, capsys):
     monkeypatch.setattr("shutil.which", lambda _: None)
     monkeypatch.setattr(sys, "argv", ["jplm", "--again", "all"])
-    monkeypatch.setattr(jplm, "picture", lambda *_: pytest.fail("rendered before the programs were looked for"))
+    monkeypatch.setattr(jplm, "pictured", lambda *_: pytest.fail("rendered before the programs were looked for"))
     with pytest.raises(SystemExit) as ended:
         jplm.main()
     assert ended.value.code == 2

@@ -38,7 +38,7 @@ def test_gop_and_b_pictures():
 
 @pytest.mark.parametrize("options", ["bframes=3", "bframes=2,gop=16", "bframes=3,merange=64", "gop=1"])
 def test_every_structure_repeats_to_the_byte_at_a_rate(options):
-    coded = [encode(textured(), f"si-h264:{options}", bpp=1.2) for _ in range(3)]
+    coded = [encode(textured(), f"si-h264:{options},rate=cbr", bpp=1.2) for _ in range(3)]
     assert len({c.payload for c in coded}) == 1
     assert coded[0].reached
     assert psnr(textured(), decode(coded[0])) > 24

@@ -3,6 +3,7 @@
 A module imported anew has new kernels, which read the cache as those of a new process do.
 """
 
+import ast
 import importlib
 import os
 import shutil
@@ -44,7 +45,8 @@ def called_in_a_process(folder, module):
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    return tuple(map(int, done.stdout.split()))
+    value, hits = done.stdout.rsplit(maxsplit=1)
+    return ast.literal_eval(value), int(hits)
 
 
 @pytest.fixture

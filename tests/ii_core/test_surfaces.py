@@ -553,7 +553,7 @@ def test_wavelengths_that_glass_does_not_have(wavelength):
         ({"prescription": "a" * 4000 + ".json"}, "at most 255 characters"),
         ({"kind": "lens"}, "an element with a prescription has"),
         ({"focal_mm": 50}, "no focal_mm"),
-        ({"enlarge": -1}, "factor is -1"),
+        ({"enlarge": -1}, "enlarge is -1"),
     ],
 )
 def test_wrong_prescriptions_in_camera_files(tmp_path, change, message):

@@ -1,8 +1,9 @@
 """One browser tab for all tests of a page: a page opens in it with a third of the CPU time of a new tab."""
 
+from functools import partial
 from pathlib import Path
 
-from tests.support.browser import READY
+from tests.support.browser import READY, true_of
 
 SMALL = {"width": 480, "height": 240}  # drawn by the processor: few pixels
 
@@ -48,6 +49,7 @@ class Tab:
 
     def _start(self):
         self.page = self.browser.new_page(viewport=self.viewport, reduced_motion="reduce")
+        self.page.wait_for_function = partial(true_of, self.page)
         self.page.on("console", lambda message: self._add(message.text) if message.type == "error" else None)
         self.page.on("pageerror", lambda error: self._add(str(error)))
         self.page.on("crash", lambda _: self._add("the page crashed"))

@@ -276,6 +276,8 @@ def of_lenses(made: Made) -> dict[str, Values]:
         "Surfaces": {"surfaces": prescriptions.lens(lens).at(10.0).surfaces, "wavelengths_nm": None},
         "Glass": {"ior": 1.5, "abbe": 60.0, "name": "a"},
         "glass": {"value": "N-BK7"},
+        "known_glass": {"name": "N-BK7"},
+        "CatalogueGlass": {"maker": "a", "glass": glass.Glass(ior=1.5), "ior": 1.5, "abbe": 60.0},
         "lens": {"name": lens},
     }  # fmt: skip
 
