@@ -13,6 +13,7 @@ from ii_core.picture.view import five_viewpoints
 from metrics.observers import Options, Stimulus, read_results, write_test
 from metrics.observers.store import ResultFolder
 from raytrace_ii.cli.server import Answers, PageServer
+from tests.support.browser import true_of
 
 CAMERA = preset("setup1", scale=32)
 QUICK = {"seconds": 0.05, "grey_seconds": 0.0, "training": 1, "block": 2, "frames": 3, "observers": 2}
@@ -248,6 +249,7 @@ def test_the_server_has_every_answer_at_once(show, server, tmp_path):
 def test_answers_given_while_the_server_is_away_arrive_later(browser, server, tmp_path):
     """Without `show`, which fails on the browser's error about the stopped server."""
     tab = browser.new_page(viewport={"width": 1000, "height": 700})
+    tab.wait_for_function = partial(true_of, tab)
     with server:
         tab.goto(f"http://127.0.0.1:{server.port}/")
         tab.evaluate("ii.ready")
