@@ -231,7 +231,7 @@ def test_any_number_of_threads_gives_the_same():
 
 
 @pytest.mark.parametrize("method", ["dissertation", "robust"])
-@pytest.mark.parametrize("d", [7, 12, 20, 40])
+@pytest.mark.parametrize("d", [7, *(pytest.param(d, marks=pytest.mark.slow) for d in (12, 20)), 40])
 def test_a_textured_wall_lies_in_its_layer(d, method):
     camera = preset("setup1", scale=8)
     shot = shoot(textured_wall(d * camera.gap_mm))

@@ -392,7 +392,7 @@ def made_up(shift=0.0):
     return records
 
 
-@pytest.mark.parametrize("suffix", [".png", ".pdf"])
+@pytest.mark.parametrize("suffix", [".png", pytest.param(".pdf", marks=pytest.mark.slow)])
 def test_chart_comes_from_the_file_alone_and_shows_its_data(tmp_path, suffix):
     import OpenImageIO as oiio
 
