@@ -32,7 +32,7 @@ SAMPLES = 16
 SCALE = 2  # 256×128 lenses: pages of a few megabytes
 INTRODUCTION = f"""# Gallery
 
-Here you choose a reference scene. `make gallery` makes a [viewer](../viewer.md) page of each, which
+Here you choose a [reference scene](../scenes.md). `make gallery` makes a [viewer](../viewer.md) page of each, which
 opens in any browser without a network, in 20 minutes of CPU time. Each is
 `setup1` with half of the lenses each way, {SAMPLES} samples per pixel, JPEG of quality {QUALITY}. *Mountains* and
 the ground behind the *Twins* are so far away that each lens sees them whole: no display of this
@@ -79,5 +79,5 @@ def draw_stills(names: Sequence[str]) -> None:
             write_picture(
                 GALLERY / f"{name}.webp", np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
             )
-    lines = [f"## {name}\n\n{about}.\n\n![{name}]({name}.webp)\n" for name, about in scene_names().items()]
+    lines = [f"## {name}\n\n![{name}]({name}.webp)\n" for name in scene_names()]
     (GALLERY / "README.md").write_text("\n".join([INTRODUCTION, *lines]), encoding="utf-8")

@@ -20,12 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.accuracy.map_precision import RECORDS as MAPS
-from benchmarks.accuracy.map_precision import SCALE as MAPS_SCALE
 from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, Records, by_scene, origin, table
+from benchmarks.records import ROOT, Records, by_scene, table
 from benchmarks.speed.before import COMMIT, worktree
 from benchmarks.speed.shots import Shots, shots
 from benchmarks.speed.tessellation import scene_text, sizes
@@ -89,7 +87,6 @@ def tables() -> Tables:
         (page, "samples"): samples_table(data),
         (page, "depth"): depth_table(data),
         (page, "cut"): cut_table(data),
-        (page, "maps"): maps_table(MAPS.rows(scale=MAPS_SCALE, camera="setup1")),
     }
 
 
@@ -326,14 +323,3 @@ def cut_table(data: dict[str, Any]) -> list[str]:
             cells.append(f"{one['faces'][str(cut)] / 1e3:.0f}, {row['psnr']:.1f}, {row['seconds']:.2f}")
         lines.append([name, *cells])
     return table(" | ".join(["scene", *(f"×{cut:g}" for cut in CUTS)]), lines)
-
-
-def maps_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Return the results of `benchmarks.accuracy.map_precision` for setup1."""
-    lines = []
-    for row in rows:
-        each = (row["psnr_apples"], row["psnr_cuboid"])
-        psnr = ["exact" if p is None or not np.isfinite(p) else f"{p:.1f} dB" for p in each]
-        bits = [row["format"], f"{row['bytes_per_pixel']:.2f}", f"{row['angle_max_urad']:.2g} µrad"]
-        lines.append([*bits, *psnr])
-    return [*table("stored as | bytes per ray | largest angular error | apples | cuboid", lines), "", origin(rows)]

@@ -320,13 +320,14 @@ def bd_gain(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float, 
 
 
 def record_table(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Return the records by the commit that measured them, with CPU seconds; a tick if a repetition was equal."""
-    by_commit: dict[str, list[str]] = {}
-    for name, record in best.items():
+    """Return a row a commit: its steps, their CPU seconds, and how many repetitions were equal."""
+    by_commit: dict[str, list[Mapping[str, Any]]] = {}
+    for record in best.values():
         git = record["git"] or {"commit": "none", "dirty": False}
-        again = {True: " ✓", False: " **not the same**", None: ""}[record.get("repeats")]
-        seconds = f" {record['cpu_seconds']:.0f}" if "cpu_seconds" in record else ""
-        commit = git["commit"][:10] + (", dirty" if git["dirty"] else "")
-        by_commit.setdefault(commit, []).append(f"{name}{seconds}{again}")
-    lines = ["| commit | records, CPU seconds |", "|---|---|"]
-    return lines + [f"| {commit} | {', '.join(records)} |" for commit, records in by_commit.items()]
+        by_commit.setdefault(git["commit"][:10] + (", dirty" if git["dirty"] else ""), []).append(record)
+    lines = []
+    for commit, records in by_commit.items():
+        again = [record["repeats"] for record in records if record.get("repeats") is not None]
+        seconds = sum(record.get("cpu_seconds", 0) for record in records)
+        lines.append([commit, len(records), f"{seconds:.0f}", f"{sum(again)} of {len(again)}" if again else "–"])
+    return table("commit | steps | CPU seconds | repeated alike", lines)
