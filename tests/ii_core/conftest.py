@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from ii_core import preset
 from ii_core.display.viewer import write_viewer
 from metrics import quality_rows
-from raytrace_ii import load_scene, render
+from tests.support import pictures
 from tests.support.one_tab import one_tab
 
 LABELS = ("original", "si-h264, 0.100 bpp, 30.32 dB")
@@ -14,7 +13,7 @@ LABELS = ("original", "si-h264, 0.100 bpp, 30.32 dB")
 
 @pytest.fixture(scope="session")
 def shot():
-    return render(load_scene("apples"), preset("setup1", scale=16), support=("depth",))
+    return pictures.shot()
 
 
 @pytest.fixture(scope="session")

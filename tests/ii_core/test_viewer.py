@@ -15,7 +15,7 @@ from ii_core.base.files import write_image
 from ii_core.display.viewer import page, write_viewer, write_viewer_folder
 from ii_core.display.viewer.page import depth_view
 from metrics import quality_rows
-from raytrace_ii import load_scene, render
+from tests.support import pictures
 from tests.support.one_tab import with_script
 from tests.support.serving import served
 
@@ -283,7 +283,7 @@ def screen(tab):
 
 @pytest.fixture(scope="module", params=["twins", "mountains"])
 def far(request):
-    return render(load_scene(request.param), preset("setup1", scale=16), support=("depth",))
+    return pictures.shot(request.param)
 
 
 @pytest.mark.slow
