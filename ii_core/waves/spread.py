@@ -33,11 +33,11 @@ from .wave import WAVELENGTHS_NM
 
 special = Lazy("scipy.special")
 FIRST_ZERO = 1.2196698912665045  # of Airy's pattern, in λΛ/δL
-WAVES = 2.6  # samples across a first ring: twice the highest frequency, 1.22 over it, and a margin
+RING_SAMPLES = 2.6  # across a first ring: twice the highest frequency, 1.22 over it, and a margin
 ACROSS = 16  # samples of the field across a pupil's radius, at least
 SAMPLES = 512  # of a transfer by rays, across
 STEPS = 16  # of widths: 1/32 pixel where they are small, 6 % where they are large
-MOST_WAVES = 100.0  # periods a pixel: beyond, a spot of rays passes next to nothing, and little of it counts
+MOST_FREQUENCY = 100.0  # periods a pixel: beyond, a spot of rays passes next to nothing, and little of it counts
 LEAST_RING = 0.1  # pixels: narrower rings need no field, but many samples of it
 ENERGY = 0.999  # of a kernel's light, within its reach
 LEVELS = 1 << 16  # steps of a width: sinh(LEVELS/2/STEPS) pixels is beyond every length
@@ -203,8 +203,8 @@ def _kernel(disk: float, ring: float, aberration: float, side: int) -> NDArray[n
     places = np.arange(-near, near + 1)[:, None]
     waves = np.cos(2 * math.pi * f * places) * np.sinc(f) ** 2 * f[1]
     whole = waves.sum(axis=1)
-    unheard = (places == 0) * (places.T == 0) - np.outer(whole, whole)  # by frequencies that are left out
-    return np.pad(np.maximum(waves @ transfer @ waves.T + rest * unheard, 0), side - near)
+    omitted = (places == 0) * (places.T == 0) - np.outer(whole, whole)  # of the frequencies above those sampled
+    return np.pad(np.maximum(waves @ transfer @ waves.T + rest * omitted, 0), side - near)
 
 
 def _extent(disk: float, aberration: float) -> float:
@@ -219,7 +219,7 @@ def _by_wave(period: int, disk: float, ring: float, aberration: float) -> tuple[
     Returns frequencies in periods a pixel, (n,), the transfer of each pair, (n, n), and that of all higher ones.
     """
     period = max(period, math.ceil(2 * ACROSS * ring / FIRST_ZERO))
-    count = period * math.ceil(WAVES / ring)
+    count = period * math.ceil(RING_SAMPLES / ring)
     f = np.fft.fftfreq(count, period / count)
     pupil = np.hypot(f[:, None], f) * 2 * ring / FIRST_ZERO  # 1 at its rim
     rim = np.clip((1 - pupil) / (f[1] * 2 * ring / FIRST_ZERO) + 0.5, 0, 1)
@@ -256,7 +256,7 @@ def _ray_transfer(f: NDArray[Any], disk: float, ring: float, aberration: float) 
 
 def _spot(f: NDArray[Any], disk: float, aberration: float) -> NDArray[np.float64]:
     """Transfer of the spot of rays, ∫ J₀(2πf·ε) dρ² with ε = (disk·ρ + aberration·ρ³)/2 from the middle."""
-    count = 64 + math.ceil(8 * min(f.max(), MOST_WAVES) * (disk + abs(aberration)))
+    count = 64 + math.ceil(8 * min(f.max(), MOST_FREQUENCY) * (disk + abs(aberration)))
     share = (np.arange(count) + 0.5) / count  # of the pupil's area, ρ²
     way = math.pi * (disk + aberration * share) * np.sqrt(share)
     return np.array([special.j0(one * way).mean() for one in f])
