@@ -201,7 +201,8 @@ def _kernel(disk: float, ring: float, aberration: float, side: int) -> NDArray[n
     near = min(side, math.ceil(wide / 2 + 16 * ring) + 2)  # beyond 16 rings there is 1 % of the light
     f, transfer, rest = (_by_wave if ring >= LEAST_RING else _by_rays)(3 * near, disk, ring, aberration)
     places = np.arange(-near, near + 1)[:, None]
-    waves = np.cos(2 * math.pi * f * places) * np.sinc(f) ** 2 * f[1]
+    both = np.where(f == 0, 1, 2)  # frequencies below 0 are alike
+    waves = np.cos(2 * math.pi * f * places) * np.sinc(f) ** 2 * f[1] * both
     whole = waves.sum(axis=1)
     omitted = (places == 0) * (places.T == 0) - np.outer(whole, whole)  # of the frequencies above those sampled
     return np.pad(np.maximum(waves @ transfer @ waves.T + rest * omitted, 0), side - near)
@@ -216,7 +217,8 @@ def _extent(disk: float, aberration: float) -> float:
 def _by_wave(period: int, disk: float, ring: float, aberration: float) -> tuple[NDArray[Any], NDArray[Any], float]:
     """Transfer of a round lens out of focus: the spectrum of its field's intensity.
 
-    Returns frequencies in periods a pixel, (n,), the transfer of each pair, (n, n), and that of all higher ones.
+    Returns frequencies from 0 on in periods a pixel, (n,), the transfer of each pair, (n, n), and that of all
+    higher ones.
     """
     period = max(period, math.ceil(2 * ACROSS * ring / FIRST_ZERO))
     count = period * math.ceil(RING_SAMPLES / ring)
@@ -226,6 +228,8 @@ def _by_wave(period: int, disk: float, ring: float, aberration: float) -> tuple[
     # the slope of this phase at the rim sends a ray to the rim of the disk
     phase = 0.25 * math.pi * FIRST_ZERO / ring * (disk + aberration / 2 * pupil**2) * pupil**2
     transfer = np.fft.fft2(np.abs(np.fft.ifft2(rim * np.exp(1j * phase))) ** 2).real * (count**2 / rim.sum())
+    transfer = transfer[: (count + 1) // 2, : (count + 1) // 2]
+    f = f[: (count + 1) // 2]
     transfer[0, 0] = 1  # samples on the rim carry the right amplitude but, squared, too little light
     return f, transfer, 0.0
 
@@ -233,7 +237,7 @@ def _by_wave(period: int, disk: float, ring: float, aberration: float) -> tuple[
 def _by_rays(period: int, disk: float, ring: float, aberration: float) -> tuple[NDArray[Any], NDArray[Any], float]:
     """Transfer of a spot of rays folded with Airy's pattern, where that is narrower than a pixel; as `_by_wave`."""
     fine = max(4, SAMPLES // period)  # samples a pixel
-    f = np.fft.fftfreq(fine * period, 1 / fine)
+    f = np.arange((fine * period + 1) // 2) / period
     radius = np.hypot(f[:, None], f)
     table = np.linspace(0, radius.max(), 16 + math.ceil(16 * radius.max() * max(1, _extent(disk, aberration))))
     higher = abs(f).max() / (np.arange(64) + 0.5) * 64  # evenly in 1/f, as sinc² falls
