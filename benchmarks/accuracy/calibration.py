@@ -8,6 +8,11 @@ the lenses is dark or saturated. Each row holds worst and median errors of one k
 picture also has CPU time and memory of `calibrate`. Discs on grids in perspective or with radial distortion have rows
 by the shift at the border. The last row is a camera behind a main lens of glass, whose pupil moves with the field:
 distance of the centres from the light without noise, with and without the drift.
+
+    python -m benchmarks run calibration --vesicle FOLDER
+
+measures and draws a picture of a light field microscope instead. The folder is ``src/napari_lf/examples/GUVExperim1``
+of github.com/PolarizedLightFieldMicroscopy/napari-LF at commit 289a067.
 """
 
 from __future__ import annotations
@@ -18,17 +23,32 @@ import textwrap
 import time
 import tracemalloc
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.arguments import command_line
+from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import Records, origin, table
-from ii_core import IICamera, NoLenses, calibrate, preset
+from benchmarks.records import ALL, Records, origin, table
+from benchmarks.study.sheets import enlarged
+from ii_core import (
+    IICamera,
+    IIPicture,
+    NoLenses,
+    calibrate,
+    calibrated_picture,
+    centres_picture,
+    preset,
+    resampled,
+    sub_images,
+)
 from ii_core.calibration import Calibration
 from ii_core.camera.optics import Lens
+from ii_core.formats.lfp import read_raw
+from ii_core.picture.picture import codes8
 
 RECORDS = Records("calibration", ("benchmarks.accuracy.calibration",))
 CAMERAS = 125  # cameras per row; four rows of small pictures
@@ -238,12 +258,20 @@ BENT = [
 ]
 GLASS = [{"main_lens": "double-gauss", "scale": 8}]
 KEYS: list[dict[str, Any]] = [*BENT, *GLASS, *SMALL, *LARGE]
+VESICLE = {"picture": "GUVExperim1 of napari-LF"}
+ENLARGED, DETAIL = 3, (32, 123, 125)  # of the microscope's picture: factor; left, top and side in pixels
+GUTTER = 6
 
 
 def main() -> None:
     """Measure, record and fill the page."""
-    asked = command_line(__doc__).parse_args()
-    RECORDS.run(KEYS, measured, asked.again)
+    parser = command_line(__doc__)
+    parser.add_argument("--vesicle", type=Path, metavar="FOLDER", help="measure and draw this picture alone")
+    asked = parser.parse_args()
+    if asked.vesicle is None:
+        RECORDS.run(KEYS, measured, asked.again)
+    else:
+        RECORDS.run([VESICLE], lambda **_: microscope(asked.vesicle), ALL)
     publish(tables())
 
 
@@ -264,6 +292,33 @@ def measured(**key: Any) -> dict[str, Any]:
         values = np.array([one[name] for one in found])
         result |= {f"{name}_worst": float(values.max()), f"{name}_median": float(np.median(values))}
     return result
+
+
+def microscope(folder: Path) -> dict[str, Any]:
+    """Return the calibration of the microscope's picture, with and without its white image, and draw it."""
+    raw, white, dark = (
+        read_raw(folder / f"{name}_GUVExperim1.tif").samples for name in ("Lightfield", "Radiometry", "DarkFrame")
+    )
+    found, alone = calibrate(raw, white=white, dark=dark), calibrate(raw, dark=dark)
+    picture = calibrated_picture(found, raw, white=white, dark=dark)
+    left, top, side = DETAIL
+    detail = slice(top, top + side), slice(left, left + side)
+    grey = np.repeat(codes8((raw / raw.max()).astype(np.float32))[..., None], 3, axis=-1)
+    marked = centres_picture(found, IIPicture(grey, picture.lenses, picture.ei_pixels), zoom=ENLARGED)
+    marked = marked[tuple(slice(s.start * ENLARGED, s.stop * ENLARGED) for s in detail)]
+    views = sub_images(resampled(picture)[0])
+    middle, border = views.shape[0] // 2, 2
+    shown = [enlarged(views[middle, u], 9) for u in (views.shape[1] // 2, border, views.shape[1] - 1 - border)]
+    page = np.full((marked.shape[0] + GUTTER + shown[0].shape[0], 2 * marked.shape[1] + GUTTER, 3), 255, np.uint8)
+    page[: marked.shape[0], : marked.shape[1]] = marked
+    page[: marked.shape[0], marked.shape[1] + GUTTER :] = enlarged(picture.pixels[detail], ENLARGED)
+    for i, view in enumerate(shown):
+        left = i * (page.shape[1] - view.shape[1]) // 2
+        page[marked.shape[0] + GUTTER :, left : left + view.shape[1]] = view
+    write_picture(IMAGES / "calibration" / "vesicle.png", page)
+    shift = np.abs(np.subtract(alone.report()["middle_px"], found.report()["middle_px"]))
+    pitch = np.abs(np.subtract(alone.grid.lattice.pitch, found.grid.lattice.pitch))
+    return {**found.report(), "alone_shift_px": shift.tolist(), "alone_pitch_px": pitch.tolist()}
 
 
 def tables() -> Tables:
@@ -293,8 +348,26 @@ def tables() -> Tables:
     told = [line for text in (*large, *glass) for line in ("", *textwrap.wrap(text, 100, break_on_hyphens=False))]
     heads = "lattice | lenses dark or saturated | pixels a side | cameras | pitch, worst (median) | turn | centres"
     return {
-        ("docs/calibration.md", "calibration"): [*table(heads, lines), *told, *bent_table(rows), "", origin(rows)]
+        ("docs/calibration.md", "vesicle"): caption(),
+        ("docs/calibration.md", "calibration"): [*table(heads, lines), *told, *bent_table(rows), "", origin(rows)],
     }
+
+
+def caption() -> list[str]:
+    """Return the caption of the microscope's picture, and what its white image brings."""
+    (row,) = RECORDS.rows(**VESICLE)
+    across, down = row["lens_pitch_px"]
+    text = (
+        "*A vesicle under a light field microscope. Above: part of the raw picture with centres, and without "
+        f"vignetting. Below: views from the middle, left and right. {'×'.join(map(str, row['lenses']))} lenses of "
+        f"{across:.3f}×{down:.3f} px, turned by {row['turn_deg']:.3f}°; centres lie {row['residual_rms_px']:.3f} px rms "
+        f"off the grid, which drifts by up to {row['drift_px']:.2f} px, and {row['straight_grid_rms_px']:.3f} px off "
+        f"the best straight grid. Without the white image the pitch moves by {max(row['alone_pitch_px']):.3f} px, the "
+        f"middle by {' and '.join(f'{v:.1f}' for v in row['alone_shift_px'])} px. Picture: "
+        "[napari-LF](https://github.com/PolarizedLightFieldMicroscopy/napari-LF), © 2022 Geneva Schlafly, "
+        f"[BSD 3-Clause](images/calibration/LICENSE.txt). {origin([row])}*"
+    )
+    return textwrap.wrap(text, 100, break_on_hyphens=False, break_long_words=False)
 
 
 def bent_table(rows: list[dict[str, Any]]) -> list[str]:
