@@ -36,7 +36,6 @@ from benchmarks.records import ALL, Records, origin, table
 from benchmarks.study.sheets import enlarged
 from ii_core import (
     IICamera,
-    IIPicture,
     NoLenses,
     calibrate,
     calibrated_picture,
@@ -304,7 +303,7 @@ def microscope(folder: Path) -> dict[str, Any]:
     left, top, side = DETAIL
     detail = slice(top, top + side), slice(left, left + side)
     grey = np.repeat(codes8((raw / raw.max()).astype(np.float32))[..., None], 3, axis=-1)
-    marked = centres_picture(found, IIPicture(grey, picture.lenses, picture.ei_pixels), zoom=ENLARGED)
+    marked = centres_picture(found, picture.with_pixels(grey), zoom=ENLARGED)
     marked = marked[tuple(slice(s.start * ENLARGED, s.stop * ENLARGED) for s in detail)]
     views = sub_images(resampled(picture)[0])
     middle, border = views.shape[0] // 2, 2
@@ -360,10 +359,10 @@ def caption() -> list[str]:
     text = (
         "*A vesicle under a light field microscope. Above: part of the raw picture with centres, and without "
         f"vignetting. Below: views from the middle, left and right. {'×'.join(map(str, row['lenses']))} lenses of "
-        f"{across:.3f}×{down:.3f} px, turned by {row['turn_deg']:.3f}°; centres lie {row['residual_rms_px']:.3f} px rms "
-        f"off the grid, which drifts by up to {row['drift_px']:.2f} px, and {row['straight_grid_rms_px']:.3f} px off "
-        f"the best straight grid. Without the white image the pitch moves by {max(row['alone_pitch_px']):.3f} px, the "
-        f"middle by {' and '.join(f'{v:.1f}' for v in row['alone_shift_px'])} px. Picture: "
+        f"{across:.3f}×{down:.3f} px, turned by {row['turn_deg']:.3f}°; centres lie {row['residual_rms_px']:.3f} px "
+        f"rms off the grid, which drifts by up to {row['drift_px']:.2f} px, and {row['straight_grid_rms_px']:.3f} px off "
+        f"the best straight grid. Without the white image the pitch moves by {max(row['alone_pitch_px']):.3f} px, "
+        f"the middle by {' and '.join(f'{v:.1f}' for v in row['alone_shift_px'])} px. Picture: "
         "[napari-LF](https://github.com/PolarizedLightFieldMicroscopy/napari-LF), © 2022 Geneva Schlafly, "
         f"[BSD 3-Clause](images/calibration/LICENSE.txt). {origin([row])}*"
     )
