@@ -307,7 +307,7 @@ def microscope(folder: Path) -> dict[str, Any]:
     marked = marked[tuple(slice(s.start * ENLARGED, s.stop * ENLARGED) for s in detail)]
     views = sub_images(resampled(picture)[0])
     middle, border = views.shape[0] // 2, 2
-    shown = [enlarged(views[middle, u], 9) for u in (views.shape[1] // 2, border, views.shape[1] - 1 - border)]
+    shown = [enlarged(views[middle, u], 8) for u in (views.shape[1] // 2, border, views.shape[1] - 1 - border)]
     page = np.full((marked.shape[0] + GUTTER + shown[0].shape[0], 2 * marked.shape[1] + GUTTER, 3), 255, np.uint8)
     page[: marked.shape[0], : marked.shape[1]] = marked
     page[: marked.shape[0], marked.shape[1] + GUTTER :] = enlarged(picture.pixels[detail], ENLARGED)
@@ -360,8 +360,9 @@ def caption() -> list[str]:
         "*A vesicle under a light field microscope. Above: part of the raw picture with centres, and without "
         f"vignetting. Below: views from the middle, left and right. {'×'.join(map(str, row['lenses']))} lenses of "
         f"{across:.3f}×{down:.3f} px, turned by {row['turn_deg']:.3f}°; centres lie {row['residual_rms_px']:.3f} px "
-        f"rms off the grid, which drifts by up to {row['drift_px']:.2f} px, and {row['straight_grid_rms_px']:.3f} px off "
-        f"the best straight grid. Without the white image the pitch moves by {max(row['alone_pitch_px']):.3f} px, "
+        f"rms off the grid, which drifts by up to {row['drift_px']:.2f} px, and {row['straight_grid_rms_px']:.3f} px "
+        "off the best straight grid. Without the white image the pitch moves by "
+        f"{max(row['alone_pitch_px']):.3f} px, "
         f"the middle by {' and '.join(f'{v:.1f}' for v in row['alone_shift_px'])} px. Picture: "
         "[napari-LF](https://github.com/PolarizedLightFieldMicroscopy/napari-LF), © 2022 Geneva Schlafly, "
         f"[BSD 3-Clause](images/calibration/LICENSE.txt). {origin([row])}*"
