@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from benchmarks.coding import jplm
-from examples import jplm_encoder
 from ii_core import IIPicture
 
 # An encoder that stores the views as they are, with its words, and a decoder that writes them.
@@ -76,27 +75,6 @@ def test_an_unknown_setting_is_refused(monkeypatch, capsys):
 
 
 # An encoder whose file has 8·10⁵ / (1000 + λ) bytes: 800 at most.
-SIZED = """#!{python} -IS
-import pathlib, sys
-words = sys.argv[1:]
-value = lambda name: words[words.index(name) + 1]
-assert (value("--number_of_rows"), value("--transform_size_maximum_intra_view_horizontal")) == ("6", "40")
-pathlib.Path(value("-o")).write_bytes(bytes(int(8e5 / (1000 + float(value("--lambda"))))))
-"""
-
-
-@pytest.mark.parametrize("limit", [100, 250, 799, 2000])
-def test_the_example_meets_a_target(tmp_path, monkeypatch, limit):
-    (tmp_path / "jpl-encoder-bin").write_text(SIZED.format(python=sys.executable))
-    (tmp_path / "jpl-encoder-bin").chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
-    file = tmp_path / "coded"
-    words = ["jplm_encoder.py", str(tmp_path), str(file), str(limit), "6", "4", "40", "5"]
-    monkeypatch.setattr(sys, "argv", words)
-    jplm_encoder.main()
-    assert 0.98 * min(limit, 800) < file.stat().st_size <= limit
-
-
 @pytest.mark.parametrize(("factor", "expected"), [(0.8, "split"), (1.2, "whole")])
 def test_the_best_setting_has_the_least_rate(factor, expected):
     curve = [{"bpp": 0.1 * 2**n, "psnr": 30 + 3.0 * n} for n in range(5)]
