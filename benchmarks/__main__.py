@@ -1,12 +1,12 @@
 """Command line of the benchmarks: `list`, `run` and `prune`.
 
-    python -m benchmarks list [NAME ...]
+    python -m benchmarks list [NAME ...] [--stale]
     python -m benchmarks run NAME ... [OPTION ...]
     python -m benchmarks prune [NAME ...]
 
 Options belong to the benchmark: ``python -m benchmarks run coders --scale 8``, ``run stability -- bd_overlap``; they
-need a single name. ``python -m benchmarks run NAME --help`` prints them. ``prune`` removes records that have a newer
-one of the same key.
+need a single name. ``python -m benchmarks run NAME --help`` prints them. ``--stale`` lists records older than the
+code that they measure. ``prune`` removes records that have a newer one of the same key.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from benchmarks.age import report
 from benchmarks.records import prune
 from benchmarks.registry import BENCHMARKS, CLOSED, LAST, Benchmark
 
@@ -22,6 +23,8 @@ from benchmarks.registry import BENCHMARKS, CLOSED, LAST, Benchmark
 def main(arguments: Sequence[str] | None = None) -> None:
     """List or run benchmarks."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if stale := given[:1] == ["list"] and "--stale" in given:
+        given.remove("--stale")
     first = next((i for i, word in enumerate(given) if word.startswith("-") and i > 1), len(given))
     words, options = given[:first], given[first:]
     parser = argparse.ArgumentParser(
@@ -33,12 +36,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if unknown := [name for name in asked.names if name not in BENCHMARKS]:
         parser.error(f"there is no benchmark {unknown[0]!r}: known are {', '.join(sorted(BENCHMARKS))}")
     if asked.command != "run":
-        show = listed if asked.command == "list" else pruned
+        show = aged if stale else listed if asked.command == "list" else pruned
         if options:
             parser.error(f"{asked.command} takes names alone, not {options[0]}")
         for name in asked.names or BENCHMARKS:
             show(BENCHMARKS[name])
-        if asked.command == "list" and not asked.names:
+        if show is listed and not asked.names:
             print(f"    closed experiments, in git up to {LAST}: {', '.join(CLOSED)}")
         return
     if not asked.names:
@@ -52,6 +55,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def listed(benchmark: Benchmark) -> None:
     """Print the description of a benchmark."""
     print(description(benchmark))
+
+
+def aged(benchmark: Benchmark) -> None:
+    """Print which records of a benchmark are older than its code."""
+    if line := report(benchmark):
+        print(line)
 
 
 def pruned(benchmark: Benchmark) -> None:

@@ -169,7 +169,6 @@ BENCHMARKS = {
         Benchmark("coding.orders", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.headers", records=OWN, fills=("docs/structure.md",)),
         Benchmark("pages.floors_chart", needs="records of headers", writes=(f"{IMAGES}/floors.*",)),
-        Benchmark("pages.floors_chart", needs="records of headers", writes=(f"{IMAGES}/floors.*",)),
         Benchmark("coding.cost", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.coders", records=OWN),
         Benchmark("coding.bframes", records=OWN),

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import __main__ as command
+from benchmarks import age
 from benchmarks.registry import BENCHMARKS, CLOSED, IMAGES, LAST, entry, newest, source
 from benchmarks.study.scripts import SCRIPTS
 
@@ -126,3 +127,18 @@ def test_wrong_arguments_are_named(words, says, capsys):
 def test_scripts_of_the_study_are_registered():
     assert {name for name, *_ in SCRIPTS} <= {*BENCHMARKS, "demo"}
     assert all(source(one.module).is_file() for one in BENCHMARKS.values())
+
+
+def test_code_is_the_same_without_words_and_imports():
+    code = age.code_hash(b'"""Text."""\nimport numpy\n\ndef f(x):\n    """Text."""\n    return x + 1  # why\n')
+    assert code == age.code_hash(b"from os import path\ndef f(x):\n    return x + 1\n")
+    assert code != age.code_hash(b"def f(x):\n    return x - 1\n")
+
+
+def test_a_benchmark_needs_what_its_names_come_from():
+    names = {str(path.relative_to(age.ROOT)) for path in age.imported("benchmarks.accuracy.sample_places")}
+    assert "raytrace_ii/tracing/sample_places.py" in names
+    assert not any(name.startswith(("codec/", "ii_core/calibration/", "benchmarks/pages/")) for name in names)
+    # a name of a package's front, and one imported inside a function
+    assert age._home("ii_core", "view_image") == "ii_core.picture.view"
+    assert age._home("raytrace_ii", "render") == "raytrace_ii.rendering.render"
