@@ -16,6 +16,7 @@ from .formats.mosaic import load_mosaic
 from .formats.quilt import write_quilt
 from .formats.rig import Rig
 from .formats.views import write_views
+from .picture.assumed import with_assumed_camera
 from .picture.component import component_images, elementary_images, picture_pixels, ray_space_images, sub_images
 from .picture.disparity import depth_of_disparity, disparity_of_depth
 from .picture.picture import IIPicture
@@ -75,6 +76,7 @@ __all__ = [
     "video_of",
     "view_image",
     "viewing_zone",
+    "with_assumed_camera",
     "write_hci",
     "write_maps",
     "write_quilt",

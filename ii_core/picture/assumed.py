@@ -8,13 +8,22 @@ from dataclasses import replace
 from ..camera.camera import IICamera
 from .picture import IIPicture
 
+ASSUMED = "assumed"  # name of such a camera
 ASSUMED_ANGLE_DEG = 20.0
 
 
-def with_assumed_camera(picture: IIPicture) -> IIPicture:
-    """Return the picture with its camera, or with an assumed one of 1 mm pixels and a viewing angle of 20°."""
+def with_assumed_camera(picture: IIPicture, angle_deg: float = ASSUMED_ANGLE_DEG) -> IIPicture:
+    """Return the picture with its camera, or with an assumed one of 1 mm pixels and this viewing angle.
+
+    Raises
+    ------
+    ValueError
+        If the angle is not between 0 and 180°.
+    """
     if picture.camera is not None:
         return picture
-    gap = picture.ei_pixels[0] / 2 / math.tan(math.radians(ASSUMED_ANGLE_DEG / 2))
-    camera = IICamera(pixels=picture.size, lenses=picture.lenses, pixel_pitch_mm=1.0, gap_mm=gap, name="assumed")
+    if not 0 < angle_deg < 180:
+        raise ValueError(f"angle is {angle_deg:g}°: an angle between 0 and 180° is needed")
+    gap = picture.ei_pixels[0] / 2 / math.tan(math.radians(angle_deg / 2))
+    camera = IICamera(pixels=picture.size, lenses=picture.lenses, pixel_pitch_mm=1.0, gap_mm=gap, name=ASSUMED)
     return replace(picture, camera=camera)

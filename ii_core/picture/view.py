@@ -258,7 +258,7 @@ def camera_of(picture: IIPicture) -> IICamera:
         If it has none.
     """
     if picture.camera is None:
-        raise ValueError("the picture has no camera: gap and pixel pitch are needed to look through its lenses")
+        raise ValueError("the picture has no camera: ii_core.with_assumed_camera gives it one of a viewing angle")
     return picture.camera
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterable, Set
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +12,7 @@ import typer
 
 from .folders import create_folder
 from .progress import App
-from .words import say
+from .words import one_line, say
 
 if TYPE_CHECKING:
     from ii_core import IIPicture
@@ -43,6 +44,9 @@ def _group(
 
 
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
+Angle = Annotated[
+    float | None, typer.Option(help="Viewing angle in degrees of a picture without camera; 20 by default.")
+]
 Workers = Annotated[int | None, typer.Option(help="Number of threads; the number of cores by default.")]
 
 
@@ -57,6 +61,27 @@ def load_any(path: Path) -> IIPicture:
 
     check_file(path)
     return decode(path)
+
+
+def with_camera(picture: IIPicture, name: str, angle_deg: float | None = None) -> IIPicture:
+    """Return a picture with its camera, or with one of an assumed viewing angle, of which the error stream tells.
+
+    Raises
+    ------
+    ValueError
+        If an angle is given for a picture with a camera.
+    """
+    from ii_core.picture.assumed import ASSUMED_ANGLE_DEG, with_assumed_camera
+
+    if picture.camera is not None:
+        if angle_deg is not None:
+            raise ValueError(f"{name} has a camera with a viewing angle: leave out --angle")
+        return picture
+    angle = ASSUMED_ANGLE_DEG if angle_deg is None else angle_deg
+    seen = with_assumed_camera(picture, angle)
+    if angle_deg is None:
+        print(f"note: {one_line(name)} has no camera: a viewing angle of {angle:g}° is assumed", file=sys.stderr)
+    return seen
 
 
 def image_file(path: Path | None, dtype: str) -> list[Path]:

@@ -1,4 +1,4 @@
-"""Command eye: the view of an eye in front of a display."""
+"""Commands look, the view image from a place, and eye, the view of an eye in front of a display."""
 
 from __future__ import annotations
 
@@ -7,11 +7,49 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .common import Force, app, check_outputs, image_file, pair
+from .common import Angle, Force, app, check_outputs, image_file, load_any, pair, with_camera
+from .plugins import Plugins, load_plugins
 from .progress import say_done, spinner
 
 if TYPE_CHECKING:
     from ii_core import DisplayModel, Eye, IIPicture
+
+
+@app.command()
+def look(
+    picture: Annotated[Path, typer.Argument(help="An II-picture of regular structure, or a coded file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A picture; of several places NAME_1, NAME_2, …")],
+    at: Annotated[
+        list[str] | None,
+        typer.Option(help="Place of the viewer: x,y,z in mm, z < 0, or front, up, down, left, right; repeatable."),
+    ] = None,
+    interpolation: Annotated[str, typer.Option(help="Between pixels under a lens: linear or nearest.")] = "linear",
+    angle: Angle = None,
+    plugin: Plugins = None,
+    force: Force = False,
+) -> None:
+    """Write the view image from a place: one pixel through each lens.
+
+    The five named places look from the front and from the borders of the viewing zone.
+    """
+    from ii_core import DisplayModel, Eye, five_viewpoints, view_image
+    from ii_core.base.files import write_image
+    from ii_core.picture.view import camera_of
+
+    load_plugins(plugin)
+    texts = at or ["front"]
+    numbers = [f"_{i}" for i in range(1, len(texts) + 1)] if len(texts) > 1 else [""]
+    paths = [output.with_stem(output.stem + number) for number in numbers]
+    shown = with_camera(load_any(picture), str(picture), angle)
+    check_outputs([file for path in paths for file in image_file(path, shown.pixels.dtype.name)], force)
+    camera = camera_of(shown)
+    named = {name: tuple(map(float, place)) for name, place in five_viewpoints(camera).items()}
+    places = [named[text] if text in named else _numbers("at", text, 3) for text in texts]
+    views = [view_image(shown, place, interpolation=interpolation) for place in places]
+    for path, place, (pixels, valid) in zip(paths, places, views, strict=True):
+        write_image(path, pixels)
+        where = _zone(DisplayModel(camera=camera), Eye(position_mm=(place[0], place[1], place[2])))
+        say_done(f"{path}: {pixels.shape[1]}×{pixels.shape[0]} px, {valid.mean():.1%} seen; {where}")
 
 
 @app.command()
@@ -23,6 +61,7 @@ def eye(
     focus: Annotated[
         float | None, typer.Option(help="Distance in focus from the eye, mm; the lens plane if not given.")
     ] = None,
+    angle: Angle = None,
     rays: Annotated[int | None, typer.Option(help="Rays per point; 64 with a pupil if not given.")] = None,
     both: Annotated[bool, typer.Option("--both", help="Two eyes, left and right of --at.")] = False,
     apart: Annotated[float, typer.Option(help="Distance between the eyes, mm.")] = 63.0,
@@ -56,7 +95,7 @@ def eye(
     check_outputs([file for path in paths for file in image_file(path, "uint8")], force)
     points = None if size is None else pair("size", size)
     across, up = _numbers("shift", shift, 2)
-    shown = IIPicture.load(picture)
+    shown = with_camera(IIPicture.load(picture), str(picture), angle)
     camera = camera_of(shown)
     display = DisplayModel(
         camera=camera, lens_pitch_mm=lens_pitch, gap_mm=gap, shift_mm=(across, up), turn_deg=turn,  # type: ignore[arg-type]

@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, app, check_outputs, check_page, check_unused, image_file, load_any, pair
+from .common import (
+    Angle,
+    Force,
+    app,
+    check_outputs,
+    check_page,
+    check_unused,
+    image_file,
+    load_any,
+    pair,
+    with_camera,
+)
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, say_done, spinner
 from .quilts import SIZE, For, QuiltPlan, Tiles, Whole
@@ -39,6 +50,7 @@ def view(
         Path | None, typer.Option(help="A decoded II-picture or take, or a coded file, to compare.")
     ] = None,
     depth: Annotated[Path | None, typer.Option(help="Map of z in mm (.exr) for focusing by a click.")] = None,
+    angle: Angle = None,
     lossless: Annotated[bool, typer.Option("--lossless", help="Lossless pixels, in a larger page.")] = False,
     serve: Annotated[
         bool, typer.Option("--serve", help="Serve the page on this machine instead of writing it.")
@@ -56,8 +68,10 @@ def view(
     is_take = is_take_source(picture)
     if depth is not None and is_take:
         raise ValueError(f"--depth is the map of one picture, {picture} is a take: leave it out")
+    if angle is not None and is_take:
+        raise ValueError(f"--angle is that of a picture, {picture} is a take: leave it out")
     options: dict[str, Any] = {"title": picture.stem, "quality": None if lossless else JPEG_QUALITY}
-    original, decoded, more = (compared_takes if is_take else _compared)(picture, compare)
+    original, decoded, more = compared_takes(picture, compare) if is_take else _compared(picture, compare, angle)
     options |= more
     if depth is not None:
         options["depth"] = read_depth(depth, size=original.size)
@@ -77,12 +91,14 @@ def view(
         serve_folder(folder.name, port)
 
 
-def _compared(picture: Path, compare: Path | None) -> tuple[IIPicture, IIPicture | None, dict[str, Any]]:
+def _compared(
+    picture: Path, compare: Path | None, angle: float | None
+) -> tuple[IIPicture, IIPicture | None, dict[str, Any]]:
     """Return both pictures, and table and labels of their comparison."""
     from ii_core import IIPicture
     from metrics import quality_rows
 
-    original = IIPicture.load(picture)
+    original = with_camera(IIPicture.load(picture), str(picture), angle)
     if compare is None:
         return original, None, {}
     decoded = load_any(compare)
@@ -116,6 +132,7 @@ def display(
         float | None,
         typer.Option(help="Share of the viewing zone that the views cover; 0.9 by default, or the display's."),
     ] = None,
+    angle: Angle = None,
     tiles: Tiles = None,
     whole: Whole = False,
     pitch: Annotated[float, typer.Option(help="Lenticular: lens pitch in pixels.")] = 5.0,
@@ -139,7 +156,6 @@ def display(
     from ii_core.display.lenticular import lenticular
     from ii_core.display.quilt import quilt
     from ii_core.display.simulate import display_simulation
-    from ii_core.picture.assumed import with_assumed_camera
 
     if is_take_source(picture):
         raise ValueError(f"{picture} is a take: raytrace-ii video {picture} shows takes, as quilts and films")
@@ -152,10 +168,10 @@ def display(
         output = plan.path(output)
     if kind == "parallax":
         check_outputs([output], force)
-        _film(picture, output, pixels, depth, share, frames, fps)
+        _film(with_camera(IIPicture.load(picture), str(picture), angle), output, pixels, depth, share, frames, fps)
         return
     check_outputs(image_file(output, "uint8"), force)
-    original = with_assumed_camera(IIPicture.load(picture))
+    original = with_camera(IIPicture.load(picture), str(picture), angle)
     options: dict[str, Any] = {"size": pixels, "depth_mm": depth, "cone": share}
     with spinner(f"{kind} of {picture.name}"):
         if plan is not None:
@@ -169,16 +185,13 @@ def display(
 
 
 def _film(
-    picture: Path, output: Path, size: tuple[int, int], depth: float | None, cone: float, count: int, fps: int
+    original: IIPicture, output: Path, size: tuple[int, int], depth: float | None, cone: float, count: int, fps: int
 ) -> None:
-    from ii_core import IIPicture
     from ii_core.display.film import write_animation
     from ii_core.display.look import focused_view, viewpoints_around
-    from ii_core.picture.assumed import with_assumed_camera
 
-    original = with_assumed_camera(IIPicture.load(picture))
     places = viewpoints_around(original, count, cone=cone)
-    with progress_bar(f"film {picture.name}") as report:
+    with progress_bar(f"film {output.name}") as report:
 
         def frames() -> Iterator[Any]:
             for done, place in enumerate(places, 1):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .common import Force, app, check_folder, check_outputs, check_unused, pair
+from .common import Force, app, check_folder, check_outputs, check_unused, pair, with_camera
 from .progress import progress_bar, say_done
 from .quilts import SIZE, For, QuiltPlan, Tiles, Whole
 
@@ -52,7 +52,6 @@ def video(
     from ii_core.base.atomic import atomic_folder
     from ii_core.display.look import viewpoints_around
     from ii_core.display.video import write_path_film, write_quilt_video, write_view_films
-    from ii_core.picture.assumed import with_assumed_camera
 
     if to not in TO:
         raise ValueError(f"unknown form {to!r}: known are {', '.join(TO)}")
@@ -74,11 +73,11 @@ def video(
             report(done, total, "")
 
         if plan is not None:
-            options = plan.options(with_assumed_camera(shown.structure), depth)
+            options = plan.options(with_camera(shown.structure, str(source)), depth)
             made = write_quilt_video(shown, output, plan.tiles, progress=told, **options)
         elif to == "parallax":
             share = 0.9 if cone is None else cone
-            places = viewpoints_around(with_assumed_camera(shown.structure), shown.frames, cone=share)
+            places = viewpoints_around(with_camera(shown.structure, str(source)), shown.frames, cone=share)
             made = write_path_film(shown, output, places, size=pixels, depth_mm=depth, progress=told)
         else:
             writers: dict[str, Any] = {"frames": IIVideo.save, "views": write_view_folders, "films": write_view_films}

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ...base.files import atomic_path
-from ...picture.assumed import ASSUMED_ANGLE_DEG, with_assumed_camera
+from ...picture.assumed import ASSUMED, with_assumed_camera
 from ...picture.picture import IIPicture, codes8
 from ...picture.view import camera_of, five_viewpoints, lens_array_mm, view_image
 from ...video.video import IIVideo, video_of
@@ -227,8 +227,8 @@ class _Page:
     def meta(self) -> dict[str, Any]:
         """Return the parameters of the script."""
         picture = self.structure
-        (u, _), assumed = picture.ei_pixels, picture.camera is None
-        camera = camera_of(with_assumed_camera(picture))
+        (u, _), camera = picture.ei_pixels, camera_of(with_assumed_camera(picture))
+        assumed = camera.name == ASSUMED
         front, left, up = (five_viewpoints(camera)[name] for name in ("front", "left", "up"))
         plane = camera.origin_mm[2] + camera.gap_mm
         far = 4.0 if assumed else (FARTHEST - 1) * camera.pixel_pitch_mm / camera.lens_pitch_mm[0]
@@ -264,7 +264,8 @@ class _Page:
         """Return one line of text on the picture."""
         picture = self.structure
         (k, l), (u, v) = picture.lenses, picture.ei_pixels
-        camera = f"camera {picture.camera.name}" if picture.camera else f"no camera: {ASSUMED_ANGLE_DEG:g}° assumed"
+        seen = camera_of(with_assumed_camera(picture))
+        camera = f"camera {seen.name}" if seen.name != ASSUMED else f"no camera: {seen.view_angle_deg:.3g}° assumed"
         frames = f", {self.frames} frames, {self.videos[0].fps:g} a second" if self.frames > 1 else ""
         return f"{k} × {l} lenses of {u} × {v} px, {camera}{frames}"
 
