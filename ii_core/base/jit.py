@@ -131,6 +131,15 @@ def part_kernel(function: Callable[..., Any], **options: Any) -> Any:
     return _part(function, **{"fastmath": {"contract"}, **options})
 
 
+def tuned_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a part as `part_kernel` does, but let LLVM optimise it for itself first, then within its callers.
+
+    A part of a part is then optimised three times: all kernels of the light-field coder would take 49 s instead of
+    34 s. Its blocks, in contrast, are decoded in 20 ms instead of 27 ms if LLVM does not meet all parts at once.
+    """
+    return _part(function, _TunedCompiler, fastmath={"contract"})
+
+
 def stage_kernel(function: Callable[..., Any]) -> Any:
     """Compile a part whose machine code is inlined into its callers, as that of `inner_kernel` is."""
     return part_kernel(function, forceinline=True)
@@ -159,6 +168,13 @@ class _Fragment(JITCodeLibrary):
         return _NoEnvironments()
 
 
+class _TunedFragment(_Fragment):
+    """Code of a part that LLVM optimises for itself, too, but translates within its callers alone."""
+
+    def _optimize_final_module(self) -> None:
+        JITCodeLibrary._optimize_final_module(self)
+
+
 class _NoEnvironments:
     """Lean kernels raise nothing and make no objects: a part needs no environment of Python."""
 
@@ -169,14 +185,22 @@ class _NoEnvironments:
 class _PartCompiler(CompilerBase):
     """Numba's compiler with a `_Fragment` for a library."""
 
+    fragment = _Fragment
+
     def define_pipelines(self) -> list[Any]:
-        self.state.library = _Fragment(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        self.state.library = self.fragment(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
         return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
 
 
-def _part(function: Callable[..., Any], **options: Any) -> Any:
+class _TunedCompiler(_PartCompiler):
+    """Numba's compiler with a `_TunedFragment` for a library."""
+
+    fragment = _TunedFragment
+
+
+def _part(function: Callable[..., Any], compiler: type[_PartCompiler] = _PartCompiler, **options: Any) -> Any:
     flags: dict[str, Any] = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, **options}
-    compiled: Any = numba.njit(nogil=True, error_model="numpy", pipeline_class=_PartCompiler, **flags)(function)
+    compiled: Any = numba.njit(nogil=True, error_model="numpy", pipeline_class=compiler, **flags)(function)
     compiled.add_overload = lambda result: _keep(compiled, result)
     compiled._compile_for_args = lambda *_, **__: function
     return compiled

@@ -159,7 +159,8 @@ def test_an_edit_of_a_file_without_kernels(tmp_path, edited):
     """The way kernels are compiled, and constants in their code, for kernels of a coder."""
     for folder in ("ii_core", "codec"):
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
-    (tmp_path / "calls.py").write_text("from codec.coders.lf.motion import unpacked as doubled\n")
+    kernel = KERNEL.replace("2 * x", "unpacked(x)")
+    (tmp_path / "calls.py").write_text("from codec.coders.lf.motion import unpacked\n" + kernel)
     assert called_in_a_process(tmp_path, "calls")[-1] == 0
     assert called_in_a_process(tmp_path, "calls")[-1] == 1
     with (tmp_path / edited).open("a") as file:

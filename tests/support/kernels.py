@@ -10,7 +10,7 @@ import numpy as np
 
 
 def light_field():
-    """Kernels of `si-lf`: half of all compilation time, most of it one kernel that no second process can share."""
+    """Kernels of `si-lf`: half of all compilation time, half of that one kernel that no second process can share."""
     from codec import Plan, decode, encode, encode_take, open_take
     from ii_core import IIPicture, video_of
 

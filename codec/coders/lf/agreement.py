@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import inner_kernel, lean_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from .blocks import DIFFERENT, UNKNOWN
 from .warp import clamped
@@ -25,7 +25,7 @@ SPAN = 1 << LOG_SPAN  # samples of a row whose differences are computed together
 ROWS, SLOTS = 4, 32  # rows and disparities that are kept
 
 
-@inner_kernel
+@stage_kernel
 def between(plane, y, x, py, px):
     """A plane at (y, x), between samples bilinearly by sixteenths, times 256."""
     height, width = plane.shape
@@ -40,19 +40,19 @@ def between(plane, y, x, py, px):
     return upper * (16 - py) + lower * py
 
 
-@inner_kernel
+@stage_kernel
 def hashed(d):
     """Bits in which disparities nearby differ."""
     return (d * 40503) >> 8
 
 
-@inner_kernel
+@stage_kernel
 def _sees(at_x, at_y, width, height):
     """Whether a position in units of 2^-8 lies in a view, or within half a sample of it."""
     return -128 <= at_x <= 256 * width - 128 and -128 <= at_y <= 256 * height - 128
 
 
-@inner_kernel
+@stage_kernel
 def _least(values, seen, count):
     """The least sum of differences of one of ``seen`` values from the others, a mean of three; more for less seen."""
     if seen < 2:
@@ -66,7 +66,7 @@ def _least(values, seen, count):
     return (least // 3 if seen == 4 else (least >> 1 if seen == 3 else least)) + (count - seen) * 16
 
 
-@lean_kernel
+@part_kernel
 def _difference(views, sources, y, x, d, values):
     """Return the difference of the sources at a sample for a disparity, in eighths of a code."""
     height, width = views.shape[2:]
@@ -80,12 +80,12 @@ def _difference(views, sources, y, x, d, values):
     return _least(values, seen, count)
 
 
-@inner_kernel
+@stage_kernel
 def _truncated(a, b):
     return np.int32(min(np.int32(abs(np.int32(a - b))), np.int32(TRUNCATED)))
 
 
-@inner_kernel
+@stage_kernel
 def _take_span(plane, y, x0, dy, dx, row):
     """row[:] = a source's samples for `SPAN` samples from (y, x0) on, moved by (dy, dx).
 
@@ -110,7 +110,7 @@ def _take_span(plane, y, x0, dy, dx, row):
     return unseen
 
 
-@lean_kernel
+@part_kernel
 def _fill_span(views, sources, span, scratch, y, x0, d, into):
     """into[:SPAN] = differences of the samples from (y, x0) on."""
     width, values, unseen = views.shape[3], scratch[0], scratch[1]
@@ -143,7 +143,7 @@ def _fill_span(views, sources, span, scratch, y, x0, d, into):
                 into[j] = _least(values, seen, np.int64(MATCHED))
 
 
-@inner_kernel
+@stage_kernel
 def _span(s, y, across, d):
     """Row of ``s.kept`` that holds the differences of a span of a row, computed here if they are not kept."""
     spans = (s.counts.shape[1] + SPAN - 1) >> LOG_SPAN
@@ -155,7 +155,7 @@ def _span(s, y, across, d):
     return place
 
 
-@inner_kernel
+@stage_kernel
 def _beside(s, y, x, d):
     """`_difference`, kept from samples nearby."""
     height, width = s.counts.shape
@@ -164,7 +164,7 @@ def _beside(s, y, x, d):
     return np.int64(s.kept[_span(s, y, x >> LOG_SPAN, d), np.uint64(x & (SPAN - 1))])
 
 
-@inner_kernel
+@stage_kernel
 def disagreement(s, y, x, d, enough):
     """Return the difference of the sources around a sample for a disparity, in eighths of a code.
 
@@ -194,7 +194,7 @@ def disagreement(s, y, x, d, enough):
     return total // 6 + AGREED[np.uint64(agreeing)]
 
 
-@inner_kernel
+@stage_kernel
 def agrees(s, r, y, x, d):
     """Whether a source's own disparity says that it sees the same."""
     height, width = s.counts.shape

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.base.jit import inner_kernel, lean_kernel
+from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel, tuned_kernel
 
 LOW, RANGE, CACHE, WAITING, AT, DECODING, CODE = range(7)
 FULL = (1 << 40) - 1
@@ -119,7 +119,7 @@ def _shift(coder):
     state[LOW] = (low & 0xFFFFFFFF) << 8
 
 
-@inner_kernel
+@stage_kernel
 def _normalise(coder):
     state = coder.state
     while state[RANGE] < LEAST_RANGE:
@@ -134,7 +134,7 @@ def _normalise(coder):
             _shift(coder)
 
 
-@inner_kernel
+@stage_kernel
 def probability(contexts, context):
     """Of a one, in units of 2^-16."""
     p = (np.int64(contexts[context, 0]) + np.int64(contexts[context, 1])) >> 1
@@ -148,13 +148,13 @@ def bit_costs(contexts: NDArray[np.int32]) -> NDArray[np.float32]:
     return np.stack([COSTS[4096 - p], COSTS[p]], axis=1)
 
 
-@inner_kernel
+@stage_kernel
 def bit_cost(costs, context, bit):
     """Bits that a bit would take, of the table by `bit_costs`."""
     return costs[np.uint64(context), np.uint64(bit)]
 
 
-@inner_kernel
+@stage_kernel
 def _code_below(coder, split, bit):
     """Write or read a bit: one takes the part of the range below the split, zero the rest."""
     state = coder.state
@@ -169,13 +169,13 @@ def _code_below(coder, split, bit):
     return bit
 
 
-@inner_kernel
+@stage_kernel
 def _code_with(coder, p, bit):
     """Write or read a bit that is one with probability p."""
     return _code_below(coder, (coder.state[RANGE] >> 16) * p, bit)
 
 
-@inner_kernel
+@stage_kernel
 def _learn(contexts, context, bit):
     seen = contexts[context, 2]
     target = ONE if bit else 0
@@ -186,7 +186,7 @@ def _learn(contexts, context, bit):
         contexts[context, 2] = seen + 1
 
 
-@lean_kernel
+@tuned_kernel
 def code_bit(coder, context, bit):
     """Write or read a bit in a context, which learns it; return it."""
     bit = _code_with(coder, probability(coder.contexts, context), bit)
@@ -194,7 +194,7 @@ def code_bit(coder, context, bit):
     return bit
 
 
-@lean_kernel
+@tuned_kernel
 def code_mixed(coder, one, other, weights, bit):
     """Write or read a bit by two contexts: their log odds are added by weights, which learn as well (Mahoney 2005).
 
@@ -214,7 +214,7 @@ def code_mixed(coder, one, other, weights, bit):
     return bit
 
 
-@lean_kernel
+@tuned_kernel
 def code_raw(coder, bit):
     """Write or read a bit of even odds."""
     return _code_below(coder, coder.state[RANGE] >> 1, bit)
@@ -223,7 +223,7 @@ def code_raw(coder, bit):
 MOST_DIGITS = 24
 
 
-@lean_kernel
+@tuned_kernel
 def code_number(coder, first, count, order, value):
     """Write or read a number from 0 up: an Exp-Golomb code whose prefix has contexts first … first + count - 1."""
     total = value + (1 << order)
@@ -238,7 +238,7 @@ def code_number(coder, first, count, order, value):
     return found - (1 << order)
 
 
-@lean_kernel
+@part_kernel
 def number_cost(costs, first, count, order, value):
     """Bits that `code_number` would take."""
     total = value + (1 << order)

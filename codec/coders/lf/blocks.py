@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import array_kernel, inner_kernel, lean_kernel
+from ii_core.base.jit import array_kernel, part_kernel, stage_kernel, tuned_kernel
 
 from . import contexts as at
 from . import motion
@@ -130,7 +130,7 @@ def new_blocks(height: int, width: int) -> np.ndarray[Any, Any]:
     return np.zeros((FIELDS, height // 4, width // 4), np.int16)
 
 
-@lean_kernel
+@tuned_kernel
 def neighbours(blocks, field, value, by, bx):
     """Return the number of blocks above and to the left that have a value."""
     count = 0
@@ -141,7 +141,7 @@ def neighbours(blocks, field, value, by, bx):
     return count
 
 
-@lean_kernel
+@tuned_kernel
 def doubt_class(job, by, bx, log):
     """0–3 by how far the synthesis' sources differ in the block, in steps of the quantiser; 0 without synthesis."""
     if not job.synthesised:
@@ -157,7 +157,7 @@ def doubt_class(job, by, bx, log):
     return 0 if total < 2 * job.step else (1 if total < 5 * job.step else (2 if total < 12 * job.step else 3))
 
 
-@lean_kernel
+@tuned_kernel
 def split_context(job, by, bx, log):
     """By how many of the blocks above and left are smaller, and doubt."""
     blocks = job.blocks
@@ -169,14 +169,14 @@ def split_context(job, by, bx, log):
     return at.SPLIT + ((log - 3) * 3 + count) * 4 + doubt_class(job, by, bx, log)
 
 
-@lean_kernel
+@tuned_kernel
 def synthesis_context(job, by, bx, log):
     """By size, how many of the blocks above and left are synthesised, and doubt."""
     like = neighbours(job.blocks, np.int64(KIND), np.int64(SYNTHESIS), by, bx)
     return at.SYNTHESIS + ((log - 2) * 3 + like) * 4 + doubt_class(job, by, bx, log)
 
 
-@lean_kernel
+@tuned_kernel
 def residual_context(job, by, bx, log, kind):
     """By size, kind, how many of the blocks above and left have a residual, and doubt."""
     other = 0 if kind == SYNTHESIS else 1
@@ -186,7 +186,7 @@ def residual_context(job, by, bx, log, kind):
     return at.RESIDUAL + (((log - 2) * 2 + other) * 3 + like) * 4 + doubt_class(job, by, bx, log)
 
 
-@lean_kernel
+@tuned_kernel
 def coded_context(plane, log, kind, first, skipped):
     """By plane, size, kind, whether the first plane has a residual, and whether the transform is skipped."""
     if skipped:
@@ -194,13 +194,13 @@ def coded_context(plane, log, kind, first, skipped):
     return at.CODED + ((plane * 4 + log - 2) * 2 + (1 if kind == INTRA else 0)) * 2 + first
 
 
-@lean_kernel
+@tuned_kernel
 def skipped_context(job, by, bx, log):
     """By size, and how many of the blocks above and left have no transform."""
     return at.SKIPPED + (log - 2) * 3 + neighbours(job.blocks, np.int64(SKIPPED), np.int64(1), by, bx)
 
 
-@lean_kernel
+@tuned_kernel
 def guesses(job, by, bx, log):
     """Indices that the synthesis and the blocks left and above suggest; below the range where there is none."""
     none = job.low - 1
@@ -216,7 +216,7 @@ def guesses(job, by, bx, log):
     return made, left, above
 
 
-@lean_kernel
+@tuned_kernel
 def from_where(job, by, bx, log, index):
     """Return the source that predicts an index: 1 synthesis, 2 block to the left, 3 block above, 0 none."""
     made, left, above = guesses(job, by, bx, log)
@@ -228,7 +228,7 @@ def from_where(job, by, bx, log, index):
     return 3 if above > none and index == above else 0
 
 
-@lean_kernel
+@tuned_kernel
 def seen_mask(job, by, bx, log, index):
     """The references whose own disparity agrees at three of five places of the block, or is not known."""
     height, width = job.disparities.shape[1:]
@@ -254,7 +254,7 @@ def seen_mask(job, by, bx, log, index):
     return seen
 
 
-@lean_kernel
+@tuned_kernel
 def expected_mask(job, by, bx, where, seen):
     """The references of the block left or above, or those that see the block; and a context."""
     left = above = np.int64(0)
@@ -272,13 +272,13 @@ def expected_mask(job, by, bx, where, seen):
     return expected, at.SAME_MASK + 2 * where + (1 if left == above else 0) + (8 if expected == seen else 0)
 
 
-@lean_kernel
+@tuned_kernel
 def _made_context(made, left, none, log):
     """By size, and whether the block left has the same index, another, or none."""
     return at.MERGE + (log - 2) * 5 + (0 if left <= none else (1 if left == made else 2))
 
 
-@lean_kernel
+@tuned_kernel
 def likely_directions(blocks, by, bx):
     """Two intra modes, from the blocks left and above."""
     first = np.int64(blocks[DIRECTION, by, bx - 1]) if bx > 0 else SMOOTH
@@ -288,13 +288,13 @@ def likely_directions(blocks, by, bx):
     return first, second
 
 
-@lean_kernel
+@tuned_kernel
 def mixed_context(job, by, bx, log):
     """By size, and how many of the blocks above and left are mixed."""
     return at.MIXED + (log - 2) * 3 + neighbours(job.blocks, np.int64(KIND), np.int64(MIXED), by, bx)
 
 
-@lean_kernel
+@tuned_kernel
 def code_kind(coder, job, by, bx, log, kind, index, mask, direction):
     """Write or read how a block is predicted; return kind, index, mask and direction.
 
@@ -338,7 +338,7 @@ def code_kind(coder, job, by, bx, log, kind, index, mask, direction):
     return kind, index, mask, direction
 
 
-@lean_kernel
+@tuned_kernel
 def _code_direction(coder, direction):
     """34 directions: 30 of five bits, the last 4 of six."""
     value = direction - 2
@@ -352,7 +352,7 @@ def _code_direction(coder, direction):
     return min(found, 33) + 2
 
 
-@lean_kernel
+@tuned_kernel
 def _code_index(coder, job, by, bx, log, index):
     made, left, above = guesses(job, by, bx, log)
     none = job.low - 1
@@ -371,7 +371,7 @@ def _code_index(coder, job, by, bx, log, index):
     return min(max(base + size, job.low), job.high)
 
 
-@lean_kernel
+@tuned_kernel
 def _code_mask(coder, job, by, bx, where, seen, mask):
     expected, context = expected_mask(job, by, bx, where, seen)
     if code_bit(coder, context, 1 if mask == expected else 0):
@@ -387,7 +387,7 @@ def _code_mask(coder, job, by, bx, where, seen, mask):
     return found
 
 
-@lean_kernel
+@part_kernel
 def kind_cost(costs, job, by, bx, log, kind, index, mask, direction):
     """Bits that `code_kind` would take; those of the references left out if the mask is 0."""
     blocks, count = job.blocks, job.references.shape[0]
@@ -419,7 +419,7 @@ def kind_cost(costs, job, by, bx, log, kind, index, mask, direction):
     return bits
 
 
-@lean_kernel
+@part_kernel
 def _index_cost(costs, job, by, bx, log, index):
     made, left, above = guesses(job, by, bx, log)
     none = job.low - 1
@@ -444,7 +444,7 @@ def _index_cost(costs, job, by, bx, log, index):
     return bits
 
 
-@lean_kernel
+@part_kernel
 def mask_cost(costs, job, by, bx, where, seen, mask):
     """Bits that a set of references would take."""
     expected, context = expected_mask(job, by, bx, where, seen)
@@ -462,7 +462,7 @@ def mask_cost(costs, job, by, bx, where, seen, mask):
     return bits
 
 
-@lean_kernel
+@tuned_kernel
 def predict_explicit(job, work, y0, x0, n, index, mask):
     """work.predicted = the mean of the masked references at a disparity."""
     d = index * job.unit
@@ -503,7 +503,7 @@ def predict_explicit(job, work, y0, x0, n, index, mask):
                     predicted[p, y, x] = np.int32(predicted[p, y, x] + np.int32(1 << (shift - 1))) >> shift
 
 
-@lean_kernel
+@tuned_kernel
 def predict_synthesis(job, work, y0, x0, n):
     """work.predicted = the synthesised view."""
     for p in range(3):
@@ -512,14 +512,14 @@ def predict_synthesis(job, work, y0, x0, n):
                 work.predicted[p, y, x] = job.made[p, y0 + y, x0 + x]
 
 
-@lean_kernel
+@tuned_kernel
 def predict_direction(job, work, plane, y0, x0, n, direction):
     """work.predicted[plane] from the block's surroundings."""
     fill_border(job.views, job.at, plane, job.blocks, np.int64(DONE), y0, x0, n, work.border)
     predict_intra(work.border, direction, n, work.predicted, plane)
 
 
-@lean_kernel
+@tuned_kernel
 def store(job, work, plane, y0, x0, n, residual):
     """Decoded samples: the prediction, and work.block if there is a residual."""
     for y in range(n):
@@ -530,7 +530,7 @@ def store(job, work, plane, y0, x0, n, residual):
             job.views[job.at, plane, y0 + y, x0 + x] = value
 
 
-@lean_kernel
+@tuned_kernel
 def mark(blocks, by, bx, log, kind, index, mask, direction, coded):
     """Note a block as decoded."""
     size = 1 << (log - 2)
@@ -545,7 +545,7 @@ def mark(blocks, by, bx, log, kind, index, mask, direction, coded):
             blocks[DONE, y, x] = 1
 
 
-@lean_kernel
+@tuned_kernel
 def mark_block(job, by, bx, log, kind, index, mask, direction, coded):
     """Note a block as decoded, and its vector if there are earlier instants."""
     if job.past.shape[0]:
@@ -554,7 +554,7 @@ def mark_block(job, by, bx, log, kind, index, mask, direction, coded):
     mark(job.blocks, by, bx, log, kind, 0 if kind >= TIMED else index, mask, direction, coded)
 
 
-@lean_kernel
+@tuned_kernel
 def _load_levels(job, work, plane, y0, x0, n):
     """work.levels = the encoder's; return whether one is not zero."""
     found = 0
@@ -567,7 +567,7 @@ def _load_levels(job, work, plane, y0, x0, n):
     return found
 
 
-@lean_kernel
+@tuned_kernel
 def _note_levels(job, work, plane, y0, x0, n):
     """job.levels = those decoded, contexts of the planes that follow."""
     for y in range(n):
@@ -575,7 +575,7 @@ def _note_levels(job, work, plane, y0, x0, n):
             job.levels[plane, y0 + y, x0 + x] = work.levels[y, x]
 
 
-@lean_kernel
+@tuned_kernel
 def note_skipped(blocks, by, bx, log, skipped):
     """Note whether a block has no transform."""
     size = 1 << (log - 2)
@@ -584,14 +584,14 @@ def note_skipped(blocks, by, bx, log, skipped):
             blocks[SKIPPED, y, x] = skipped
 
 
-@lean_kernel
+@tuned_kernel
 def _clear(levels, n):
     for y in range(n):
         for x in range(n):
             levels[y, x] = 0
 
 
-@lean_kernel
+@tuned_kernel
 def code_block(coder, job, work, y0, x0, log):
     """Write a block that is marked, or read and decode one."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
@@ -625,7 +625,7 @@ def code_block(coder, job, work, y0, x0, log):
         note_skipped(blocks, by, bx, log, skipped)
 
 
-@inner_kernel
+@stage_kernel
 def _predict(job, work, y0, x0, n, kind, index, mask, direction):
     """work.predicted = the prediction of a block."""
     if kind == SYNTHESIS:
@@ -639,7 +639,7 @@ def _predict(job, work, y0, x0, n, kind, index, mask, direction):
             predict_direction(job, work, p, y0, x0, n, direction)
 
 
-@inner_kernel
+@stage_kernel
 def _code_plane(coder, job, work, y0, x0, log, p, kind, first, skipped):
     """Write or read the residual of a plane; return whether there are levels, and the factor of `cross`."""
     n, decoding = 1 << log, coder.state[DECODING]

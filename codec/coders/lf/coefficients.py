@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ii_core.base.jit import inner_kernel, lean_kernel
+from ii_core.base.jit import part_kernel, stage_kernel, tuned_kernel
 
 from .arithmetic import bit_cost, code_bit, code_mixed, code_number, code_raw, number_cost
 from .contexts import (
@@ -26,20 +26,20 @@ NEVER = 0.62  # of a step: less is never worth being the last coefficient
 HOPE = np.float32(2.5)  # bits that a lone last coefficient costs besides its own
 
 
-@inner_kernel
+@stage_kernel
 def _scanned(log, k):
     """Row and column of the k-th place in the order of the scan."""
     place = np.int64(SCANS[np.uint64(log), np.uint64(k)])
     return place >> 5, place & 31
 
 
-@inner_kernel
+@stage_kernel
 def _at(square, log, k):
     y, x = _scanned(log, k)
     return square[np.uint64(y), np.uint64(x)]
 
 
-@inner_kernel
+@stage_kernel
 def _neighbourhood(levels, y, x, n):
     """Class 0–7 by the sum of the magnitudes of the five places before, in the order of coding."""
     total = 0
@@ -57,13 +57,13 @@ def _neighbourhood(levels, y, x, n):
     return total if total < 5 else (5 if total < 7 else (6 if total < 11 else 7))
 
 
-@inner_kernel
+@stage_kernel
 def _place(y, x):
     s = y + x
     return 0 if s == 0 else (1 if s < 3 else (2 if s < 7 else 3))
 
 
-@lean_kernel
+@tuned_kernel
 def code_coefficients(coder, levels, plane, log, intra):
     """Write or read levels[:n, :n], of which one at least is not zero; a reader finds only zeros there before."""
     n = 1 << log
@@ -94,7 +94,7 @@ def code_coefficients(coder, levels, plane, log, intra):
         levels[y, x] = -found if code_raw(coder, 1 if value < 0 else 0) else found
 
 
-@inner_kernel
+@stage_kernel
 def _level_cost(costs, size, near, place, plane, log, last):
     bits = np.float32(0)
     if not last:
@@ -111,14 +111,14 @@ def _level_cost(costs, size, near, place, plane, log, last):
     return bits
 
 
-@inner_kernel
+@stage_kernel
 def _places_within(diagonal, n):
     """Number of places whose row and column add up to so much at most."""
     beyond = max(diagonal - n + 1, 0)
     return ((diagonal + 1) * (diagonal + 2) >> 1) - beyond * (beyond + 1)
 
 
-@lean_kernel
+@part_kernel
 def quantise(costs, coefficients, plane, log, step, weight, levels):
     """Fill levels[:n, :n]; return the bits, those of "coded or not" left out, and the squared error.
 
@@ -188,7 +188,7 @@ def quantise(costs, coefficients, plane, log, step, weight, levels):
     return bits, error
 
 
-@lean_kernel
+@tuned_kernel
 def dequantise(levels, log, step, coefficients):
     """Fill coefficients[:n, :n] where they are not zero; return the rows and columns that hold them.
 

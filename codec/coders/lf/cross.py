@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import lean_kernel
+from ii_core.base.jit import part_kernel, tuned_kernel
 
 from . import contexts as at
 from .arithmetic import bit_cost, code_bit
@@ -17,7 +17,7 @@ from .transform import inverse
 MOST_CROSS = 4  # quarters
 
 
-@lean_kernel
+@tuned_kernel
 def code_cross(coder, plane, log, cross):
     """Write or read the factor."""
     context = at.CROSS + (plane - 1) * 8
@@ -30,7 +30,7 @@ def code_cross(coder, plane, log, cross):
     return -size if negative else size
 
 
-@lean_kernel
+@part_kernel
 def cross_cost(costs, plane, log, cross):
     """Bits that `code_cross` would take."""
     context = at.CROSS + (plane - 1) * 8
@@ -42,7 +42,7 @@ def cross_cost(costs, plane, log, cross):
     return bits
 
 
-@lean_kernel
+@tuned_kernel
 def keep_first(work, rows, cols):
     """Remember work.coefficients[:rows, :cols] as the first plane's."""
     work.reach[0], work.reach[1] = rows, cols
@@ -51,7 +51,7 @@ def keep_first(work, rows, cols):
             work.first[y, x] = work.coefficients[y, x]
 
 
-@lean_kernel
+@part_kernel
 def best_cross(work):
     """The factor by which the first plane's coefficients come nearest to work.coefficients."""
     product = square = np.float32(0)
@@ -66,7 +66,7 @@ def best_cross(work):
     return min(max(factor, -MOST_CROSS), MOST_CROSS)
 
 
-@lean_kernel
+@part_kernel
 def subtract_cross(work, cross):
     """Take the prediction from work.coefficients."""
     for y in range(work.reach[0]):
@@ -74,7 +74,7 @@ def subtract_cross(work, cross):
             work.coefficients[y, x] -= (cross * work.first[y, x]) >> 2
 
 
-@lean_kernel
+@tuned_kernel
 def rebuild(work, levels, log, step, some, cross, skipped):
     """work.block = the residual, of levels if there are ``some``, and of the first plane.
 

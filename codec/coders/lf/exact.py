@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import array_kernel, lean_kernel
+from ii_core.base.jit import array_kernel, lean_kernel, part_kernel
 
 from . import contexts as at
 from .arithmetic import DECODING, code_bit, code_number, code_raw
@@ -74,7 +74,7 @@ def prepare(exact, views, view, axes, sixteen):
                 exact.guess[i, y, x] = min(max((total >> shift) + 8 * middle, 0), 8 * top)
 
 
-@lean_kernel
+@part_kernel
 def _features(missed, i, y, x, found):
     """Gather earlier errors; y and x count from the border of ``missed``. Return the sum of their magnitudes."""
     found[0], found[1] = missed[i, y, x - 1], missed[i, y - 1, x]
@@ -91,7 +91,7 @@ def _features(missed, i, y, x, found):
         found[8] = missed[0, y, x + 1]
 
 
-@lean_kernel
+@part_kernel
 def _code_magnitude(coder, first, size, scale):
     """A prefix of ones, each in its context, and ``scale`` bits of even odds; a long prefix ends in a number."""
     head = size >> scale

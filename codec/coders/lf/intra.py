@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import inner_kernel, lean_kernel
+from ii_core.base.jit import stage_kernel, tuned_kernel
 
 from .transform import LARGEST
 
@@ -15,7 +15,7 @@ BEYOND = np.array([[64 * (i + 1) // max(slope, 1) for i in range(LARGEST)] for s
 # Directions 0–16 go on from the row above by (m − 8) / 8 of a sample a row; 17–33 likewise from the column left.
 
 
-@lean_kernel
+@tuned_kernel
 def fill_border(views, at, plane, blocks, done, y0, x0, n, border):
     """border[0] = the corner and 2·n samples above, border[1] = the corner and 2·n to the left.
 
@@ -45,7 +45,7 @@ def fill_border(views, at, plane, blocks, done, y0, x0, n, border):
     border[0, 0] = border[1, 0] = corner
 
 
-@lean_kernel
+@tuned_kernel
 def predict_intra(border, mode, n, out, plane):
     """out[plane, :n, :n] = the prediction."""
     square = out[plane]
@@ -89,13 +89,13 @@ def predict_intra(border, mode, n, out, plane):
             _transpose(square, n)
 
 
-@inner_kernel
+@stage_kernel
 def _doubled_log(n):
     """Binary logarithm of 2·n: shifts take a tenth of the time of divisions by unknown numbers."""
     return 3 if n == 4 else (4 if n == 8 else (5 if n == 16 else 6))
 
 
-@inner_kernel
+@stage_kernel
 def _transpose(square, n):
     for y in range(1, n):
         for x in range(y):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import inner_kernel, lean_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from .blocks import DONE, INTRA, kind_cost
 from .intra import DIRECTIONS, MODES, fill_border, predict_intra
@@ -13,7 +13,7 @@ from .matching import HUGE
 FIRST_DIRECTION = MODES - DIRECTIONS
 
 
-@lean_kernel
+@part_kernel
 def _add_magnitudes(search, work, y0, x0, n, plane, modes, errors):
     """errors[mode] += sum of magnitudes of a plane's difference from the intra prediction."""
     first, last, step = modes
@@ -30,7 +30,7 @@ def _add_magnitudes(search, work, y0, x0, n, plane, modes, errors):
         errors[mode] += np.float32(total)  # exact: 1024 differences of decoded samples stay below 2^24
 
 
-@lean_kernel
+@part_kernel
 def rank_directions(costs, job, search, work, y0, x0, log, errors):
     """errors[:MODES] = sums of magnitudes and weighted bits; a hurried search leaves out unlikely directions."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
@@ -52,7 +52,7 @@ def rank_directions(costs, job, search, work, y0, x0, log, errors):
             errors[mode] += weight * kind_cost(costs, job, by, bx, log, INTRA, 0, 0, mode)
 
 
-@lean_kernel
+@part_kernel
 def _add_planes(job, search, work, y0, x0, n, modes, errors):
     """errors[mode] = sum of magnitudes of the difference from the intra prediction, for modes of a range."""
     first, last, step = modes
@@ -63,7 +63,7 @@ def _add_planes(job, search, work, y0, x0, n, modes, errors):
         _add_magnitudes(search, work, y0, x0, n, p, modes, errors)
 
 
-@inner_kernel
+@stage_kernel
 def least_error(errors):
     """The mode of the least error."""
     best = 0

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import inner_kernel, lean_kernel
+from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel
 
 from .blocks import EXPLICIT, MOST_REFERENCES, UNKNOWN, from_where, guesses, kind_cost, mask_cost, seen_mask
 from .transform import LARGEST
@@ -91,14 +91,14 @@ def new_match(indices: int, every: int, hurried: int = 0) -> Match:
     )
 
 
-@inner_kernel
+@stage_kernel
 def _between_rows(upper, lower, at, fy):
     """A sample between two rows, which is as far below the upper one as ``fy`` says."""
     one, other = np.float32(upper[np.uint64(at)]), np.float32(lower[np.uint64(at)])
     return (np.float32(1) - fy) * one + fy * other
 
 
-@lean_kernel
+@part_kernel
 def _missed_rows(plane, original, y0, x0, dy, dx, between, missed):
     """Fill missed with four rows of 32 samples: the plane moved, between samples bilinearly, less the original."""
     height, width = plane.shape
@@ -120,7 +120,7 @@ def _missed_rows(plane, original, y0, x0, dy, dx, between, missed):
             missed[np.uint64(LARGEST * i + x)] = moved - np.float32(own[np.uint64(x0 + x)])
 
 
-@inner_kernel
+@stage_kernel
 def _add_rows(one, other, columns, sums):
     """Fill sums with inner products of each column's four samples."""
     for x in range(columns):
@@ -132,7 +132,7 @@ def _add_rows(one, other, columns, sums):
         sums[x] = total
 
 
-@lean_kernel
+@part_kernel
 def _list_indices(job, match, y0, x0):
     """match.indices = those of the table: the whole range, or of a hurried search of a synthesised view a part of it.
 
@@ -186,7 +186,7 @@ def fill_products(job, original, y0, x0, match):
                     products[by, bx, at, k] = total
 
 
-@lean_kernel
+@part_kernel
 def _add_cells(match, by, bx, size, pairs):
     """match.total = products summed over a block."""
     for at in range(pairs):
@@ -200,7 +200,7 @@ def _add_cells(match, by, bx, size, pairs):
                     into[k] += cell[k]
 
 
-@lean_kernel
+@part_kernel
 def _set_errors(match, count):
     """match.errors[0] = of each index the error of the best set of references."""
     least, error = match.errors[0], match.errors[1]
@@ -224,7 +224,7 @@ def _set_errors(match, count):
             least[k] = min(least[k], share * error[k])
 
 
-@inner_kernel
+@stage_kernel
 def _add_index(job, tried, number, index):
     if index < job.low or index > job.high:
         return number
@@ -235,7 +235,7 @@ def _add_index(job, tried, number, index):
     return number + 1
 
 
-@lean_kernel
+@part_kernel
 def _likely_indices(job, match, weight, y0, x0, log):
     """Fill match.tried with indices worth comparing as decoded; return their number."""
     by, bx = y0 >> 2, x0 >> 2
@@ -262,7 +262,7 @@ def _likely_indices(job, match, weight, y0, x0, log):
     return number
 
 
-@inner_kernel
+@stage_kernel
 def _error_near(match, index):
     """The least error by the table beside an index; zero if the table has none there."""
     error = HUGE
@@ -272,7 +272,7 @@ def _error_near(match, index):
     return error if error < HUGE else np.float32(0)
 
 
-@lean_kernel
+@part_kernel
 def _compare(job, match, work, original, y0, x0, n, index, planes):
     """match.moved = the block's differences from each reference as decoded."""
     d = index * job.unit
@@ -292,7 +292,7 @@ def _compare(job, match, work, original, y0, x0, n, index, planes):
                     missed[np.uint64(at + x)] = np.float32(difference)
 
 
-@inner_kernel
+@stage_kernel
 def _dot(one, other, size):
     """Inner product; the order of the sums is fixed, for the choices of the search follow from them."""
     total = np.float32(0)
@@ -303,7 +303,7 @@ def _dot(one, other, size):
     return total
 
 
-@lean_kernel
+@part_kernel
 def _best_set(costs, job, match, work, original, weight, planes, y0, x0, log, index):
     """Squared error + weight · bits of an index by the best set of references, and that set."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
@@ -338,7 +338,7 @@ def _best_set(costs, job, match, work, original, weight, planes, y0, x0, log, in
     return best, best_mask
 
 
-@lean_kernel
+@part_kernel
 def best_explicit(costs, job, match, work, original, weight, planes, y0, x0, log):
     """Index and set of references of the least squared error + weight · bits, before any residual."""
     tried = match.tried

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import inner_kernel, lean_kernel
+from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel, tuned_kernel
 
 from . import contexts as at
 from .arithmetic import bit_cost, code_bit, code_number, number_cost
@@ -26,19 +26,19 @@ IN_TIME, PAST, DOWN, ACROSS, FIELDS = range(5)
 NOTHING = np.zeros((0, 1, 1, 1), np.int16)  # earlier instants of a picture alone
 
 
-@inner_kernel
+@stage_kernel
 def packed(past, down, across):
     """A vector as one number."""
     return (past << 24) + ((down + HALF) << 12) + across + HALF
 
 
-@inner_kernel
+@stage_kernel
 def unpacked(vector):
     """Instant, motion down, motion across."""
     return vector >> 24, ((vector >> 12) & 4095) - HALF, (vector & 4095) - HALF
 
 
-@inner_kernel
+@stage_kernel
 def noted(job, view, by, bx):
     """The vector that a view notes at a 4×4."""
     motions = job.motions
@@ -49,7 +49,7 @@ def noted(job, view, by, bx):
     )
 
 
-@lean_kernel
+@tuned_kernel
 def note(job, by, bx, log, in_time, vector):
     """Note the vector of a decoded block."""
     past, down, across = unpacked(vector)
@@ -62,7 +62,7 @@ def note(job, by, bx, log, in_time, vector):
             job.motions[job.at, ACROSS, y, x] = across
 
 
-@lean_kernel
+@tuned_kernel
 def inherited(job, by, bx, log):
     """Vector of the nearest view of the same instant at what the block shows; and whether it is predicted in time.
 
@@ -82,7 +82,7 @@ def inherited(job, by, bx, log):
     return noted(job, view, j, i), 1 + np.int64(job.motions[view, IN_TIME, j, i])
 
 
-@lean_kernel
+@tuned_kernel
 def guesses(job, by, bx, log):
     """Vectors inherited, of the block left and of the block above; `NONE` where these are not predicted in time."""
     left = above = np.int64(NONE)
@@ -93,7 +93,7 @@ def guesses(job, by, bx, log):
     return inherited(job, by, bx, log)[0], left, above
 
 
-@lean_kernel
+@tuned_kernel
 def time_context(job, by, bx, log):
     """By size, how many of the blocks above and left are predicted in time, and the inherited block."""
     motions, like = job.motions, 0
@@ -104,7 +104,7 @@ def time_context(job, by, bx, log):
     return at.IN_TIME + ((log - 2) * 3 + like) * 3 + inherited(job, by, bx, log)[1]
 
 
-@lean_kernel
+@tuned_kernel
 def code_vector(coder, job, by, bx, log, vector):
     """Write or read a vector."""
     first, left, above = guesses(job, by, bx, log)
@@ -127,13 +127,13 @@ def code_vector(coder, job, by, bx, log, vector):
     return packed(found, min(max(down, -MOST), MOST), min(max(across, -MOST), MOST))
 
 
-@inner_kernel
+@stage_kernel
 def _first_context(context, first, left):
     """Whether the block left has the inherited vector, another, or none."""
     return context + (0 if left == NONE else (1 if left == first else 2))
 
 
-@lean_kernel
+@tuned_kernel
 def _code_component(coder, first, value):
     size = code_number(coder, np.int64(first), np.int64(14), np.int64(1), abs(value))
     if size:
@@ -141,7 +141,7 @@ def _code_component(coder, first, value):
     return size
 
 
-@lean_kernel
+@part_kernel
 def vector_cost(costs, job, by, bx, log, vector):
     """Bits that `code_vector` would take."""
     first, left, above = guesses(job, by, bx, log)
@@ -167,13 +167,13 @@ def vector_cost(costs, job, by, bx, log, vector):
     return bits + _component_cost(costs, at.COMPONENT + 15, across - base_across)
 
 
-@lean_kernel
+@part_kernel
 def _component_cost(costs, first, value):
     bits = number_cost(costs, np.int64(first), np.int64(14), np.int64(1), abs(value))
     return bits + bit_cost(costs, first + 14, 1 if value < 0 else 0) if value else bits
 
 
-@lean_kernel
+@tuned_kernel
 def move(job, work, planes, y0, x0, n, vector):
     """work.predicted = the first planes of the same view at an earlier instant, moved by a vector."""
     past, down, across = unpacked(vector)
@@ -188,7 +188,7 @@ def move(job, work, planes, y0, x0, n, vector):
                 predicted[p, y, x] = np.int32(predicted[p, y, x] + np.int32(2048)) >> 12
 
 
-@lean_kernel
+@tuned_kernel
 def predict_in_time(job, work, y0, x0, n, vector, mixed):
     """work.predicted = the view at an earlier instant; ``mixed``: its mean with the synthesised view."""
     move(job, work, 3, y0, x0, n, vector)

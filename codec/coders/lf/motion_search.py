@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import lean_kernel
+from ii_core.base.jit import part_kernel
 
 from . import motion
 from .motion import MOST, NONE, STILL, packed, unpacked, vector_cost
@@ -13,7 +13,7 @@ WIDE, NEAR = 32, 8  # quarters of a sample: first step of the largest blocks, an
 ROUNDS = 4  # of a step
 
 
-@lean_kernel
+@part_kernel
 def _cost(costs, job, search, work, y0, x0, log, vector):
     """Squared error of the first plane + weight · bits of the vector."""
     n = 1 << log
@@ -26,7 +26,7 @@ def _cost(costs, job, search, work, y0, x0, log, vector):
     return total + search.weight * vector_cost(costs, job, y0 >> 2, x0 >> 2, log, vector)
 
 
-@lean_kernel
+@part_kernel
 def _descend(costs, job, search, work, y0, x0, log, vector, best, step):
     """Move to the best of eight neighbours, by steps that halve; return vector and cost."""
     while step:
@@ -47,7 +47,7 @@ def _descend(costs, job, search, work, y0, x0, log, vector, best, step):
     return vector, best
 
 
-@lean_kernel
+@part_kernel
 def best_vector(costs, job, search, work, y0, x0, log, enough):
     """The vector of the least cost; a guess that costs less than ``enough`` is not refined."""
     first, left, above = motion.guesses(job, y0 >> 2, x0 >> 2, log)

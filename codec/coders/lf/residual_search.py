@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import inner_kernel, lean_kernel
+from ii_core.base.jit import part_kernel, stage_kernel
 
 from .arithmetic import bit_cost
 from .blocks import LIMIT, coded_context, residual_context, skipped_context
@@ -49,14 +49,14 @@ def new_trial() -> Trial:
     )
 
 
-@inner_kernel
+@stage_kernel
 def _copy_block(block, to, n):
     for y in range(n):
         for x in range(n):
             to[y, x] = block[y, x]
 
 
-@lean_kernel
+@part_kernel
 def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped):
     """Quantise work.coefficients, which are samples if the transform is skipped."""
     if skipped:
@@ -64,7 +64,7 @@ def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped):
     return quantise(costs, work.coefficients, plane, log, step, weight, levels)
 
 
-@lean_kernel
+@part_kernel
 def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crossed, error, skipped):
     """Quantise work.block; return bits, whether there are levels, which array has them, and the factor of `cross`.
 
@@ -95,7 +95,7 @@ def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crosse
     return bits, some, cross
 
 
-@lean_kernel
+@part_kernel
 def try_residual(costs, job, search, work, trial, y0, x0, log, kind, so_far):
     """Code the difference to work.predicted; return bits, error and whether there is a residual.
 
@@ -133,7 +133,7 @@ def try_residual(costs, job, search, work, trial, y0, x0, log, kind, so_far):
     return bits, error, coded
 
 
-@lean_kernel
+@part_kernel
 def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit):
     """As `try_residual`, with a transform or without; give up without a residual beyond a cost."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
@@ -176,7 +176,7 @@ def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit)
     return empty, without, 0
 
 
-@inner_kernel
+@stage_kernel
 def _subtract_prediction(search, work, p, y0, x0, n):
     """work.block = the difference to work.predicted; return its squared error."""
     error = np.float32(0)
@@ -189,7 +189,7 @@ def _subtract_prediction(search, work, p, y0, x0, n):
     return error
 
 
-@inner_kernel
+@stage_kernel
 def _add_prediction(search, work, trial, p, y0, x0, n, error):
     """trial.trial_decoded = work.predicted and the decoded difference; return ``error`` and its squared error."""
     for y in range(n):
@@ -203,7 +203,7 @@ def _add_prediction(search, work, trial, p, y0, x0, n, error):
     return error
 
 
-@inner_kernel
+@stage_kernel
 def _leave(trial, work, p, n):
     """A plane without a residual."""
     for y in range(n):
@@ -212,7 +212,7 @@ def _leave(trial, work, p, n):
             trial.trial_levels[p, y, x] = 0
 
 
-@inner_kernel
+@stage_kernel
 def keep(trial, log):
     """Note the way tried as the best one of a block of this size."""
     n = 1 << log
@@ -225,7 +225,7 @@ def keep(trial, log):
                 trial.levels[log, p, y, x] = trial.trial_levels[p, y, x]
 
 
-@inner_kernel
+@stage_kernel
 def copy_trial(decoded, levels, cross, to_decoded, to_levels, to_cross, n):
     """Copy what a way makes of a block of n×n samples."""
     to_cross[0], to_cross[1] = cross[0], cross[1]

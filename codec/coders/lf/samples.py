@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ii_core.base.jit import inner_kernel, lean_kernel
+from ii_core.base.jit import part_kernel, stage_kernel, tuned_kernel
 
 from .arithmetic import bit_cost, code_bit, code_mixed, code_number, number_cost
 from .coefficients import MOST_LEVEL
@@ -30,7 +30,7 @@ _SAMPLES = np.arange(1 << 2 * LARGEST_SKIPPED)
 DENSITY = np.minimum(8 * _SAMPLES[:, None] // np.maximum(_SAMPLES, 4), 8).astype(np.uint8)
 
 
-@inner_kernel
+@stage_kernel
 def _around(levels, y, x, n):
     """Class 0–7 by the magnitudes left, above (twice each) and diagonally above."""
     total = 0
@@ -46,7 +46,7 @@ def _around(levels, y, x, n):
     return total if total < 5 else (5 if total < 7 else (6 if total < 10 else 7))
 
 
-@inner_kernel
+@stage_kernel
 def _beside(planes, plane, y, x, before, seen):
     """Class 0–8: by the levels of earlier planes at the sample; in the first, by the density of samples before."""
     if plane == 0:
@@ -56,14 +56,14 @@ def _beside(planes, plane, y, x, before, seen):
     return 3 * first + second
 
 
-@inner_kernel
+@stage_kernel
 def _sign_context(planes, plane, y, x):
     """By plane, and the sign of the first plane's level."""
     first = planes[0, y, x] if plane else 0
     return SAMPLE_SIGN + plane * 3 + (0 if first == 0 else (1 if first > 0 else 2))
 
 
-@lean_kernel
+@tuned_kernel
 def code_samples(coder, levels, planes, y0, x0, plane, log):
     """Write or read levels[:n, :n]; a reader finds only zeros there before.
 
@@ -92,12 +92,12 @@ def code_samples(coder, levels, planes, y0, x0, plane, log):
         levels[y, x] = -found if negative else found
 
 
-@inner_kernel
+@stage_kernel
 def _mixed_cost(costs, one, other, bit):
     return np.float32(0.5) * (bit_cost(costs, one, bit) + bit_cost(costs, other, bit))
 
 
-@inner_kernel
+@stage_kernel
 def _sample_cost(costs, size, around, beside, plane, log):
     """Bits of a sample, those of the sign left out."""
     by_size = plane * 2 + log - 2
@@ -113,7 +113,7 @@ def _sample_cost(costs, size, around, beside, plane, log):
     return bits
 
 
-@lean_kernel
+@part_kernel
 def quantise_samples(costs, block, planes, plane, log, step, weight, levels):
     """Fill levels[:n, :n]; return the bits, 0 if there are no levels, and the squared error.
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core.base.jit import array_kernel, inner_kernel, lean_kernel
+from ii_core.base.jit import array_kernel, part_kernel, stage_kernel
 
 from .arithmetic import bit_cost
 from .blocks import (
@@ -74,7 +74,7 @@ class Search(NamedTuple):
     surely: Any
 
 
-@lean_kernel
+@part_kernel
 def best_block(costs, job, search, match, work, trial, y0, x0, log):
     """Try the ways to code a block and note the best; return its cost and whether it has a residual."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
@@ -113,7 +113,7 @@ def best_block(costs, job, search, match, work, trial, y0, x0, log):
     return best, kind, index, mask, direction, coded
 
 
-@lean_kernel
+@part_kernel
 def best_in_time(costs, job, search, work, trial, y0, x0, log, good):
     """Try a block in time, alone and mixed with synthesis; return cost, kind, vector, and if it has a residual."""
     n = 1 << log
@@ -130,7 +130,7 @@ def best_in_time(costs, job, search, work, trial, y0, x0, log, good):
     return best, kind, vector, coded
 
 
-@lean_kernel
+@part_kernel
 def best_of_all(costs, job, search, match, work, trial, y0, x0, log):
     """As `best_block`, with the ways in time if there are earlier instants."""
     if job.past.shape[0] == 0:
@@ -165,7 +165,7 @@ def best_of_all(costs, job, search, match, work, trial, y0, x0, log):
     return best, kind, vector, 0, 0, coded
 
 
-@inner_kernel
+@stage_kernel
 def _much_smaller(blocks, by, bx, log):
     """Whether all blocks above and to the left have a quarter of the side at most."""
     if by == 0 or bx == 0:
@@ -178,7 +178,7 @@ def _much_smaller(blocks, by, bx, log):
     return True
 
 
-@lean_kernel
+@part_kernel
 def search_tree(costs, job, search, match, work, trial, y0, x0, log):
     """Find, mark and decode the blocks of a square; return the cost."""
     height, width = job.levels.shape[1:]

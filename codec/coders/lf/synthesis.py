@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import array_kernel, inner_kernel, lean_kernel
+from ii_core.base.jit import array_kernel, lean_kernel, part_kernel, stage_kernel
 
 from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, disagreement, hashed
 from .blocks import EXPLICIT, INDEX, KIND, UNKNOWN
@@ -112,7 +112,7 @@ def chosen(s: Synthesis) -> Synthesis:
     return s._replace(candidates=s.candidates[:0].copy(), kept=s.kept[:0].copy(), marks=s.marks[:0].copy())
 
 
-@inner_kernel
+@stage_kernel
 def _insert(s, y, x, d, apart):
     count = np.int64(s.counts[y, x])
     for i in range(count):
@@ -123,7 +123,7 @@ def _insert(s, y, x, d, apart):
         s.counts[y, x] = count + 1
 
 
-@lean_kernel
+@part_kernel
 def project(s, apart):
     """Move the sources' disparities to where they lead in the view; nearly equal ones count as one."""
     height, width = s.counts.shape
@@ -142,7 +142,7 @@ def project(s, apart):
                     _insert(s, to_y, to_x, d, apart)
 
 
-@lean_kernel
+@part_kernel
 def choose(s, apart):
     """s.disparity = of the candidates around each sample the one on which the sources agree best."""
     height, width = s.counts.shape
@@ -177,7 +177,7 @@ def choose(s, apart):
     _fill(s.disparity)
 
 
-@lean_kernel
+@part_kernel
 def _fill(disparity):
     """Give samples without disparity that of the one to the left, above, right or below."""
     height, width = disparity.shape
@@ -229,7 +229,7 @@ def blend(s, nearest, every):
             x += 1
 
 
-@inner_kernel
+@stage_kernel
 def _weigh_sources(s, nearest):
     """s.scratch[6:9] = weights of each source where it agrees, does not, and does not see the sample."""
     for r in range(s.sources.shape[0]):
@@ -238,7 +238,7 @@ def _weigh_sources(s, nearest):
             s.scratch[6 + kind, r] = weight if nearest else weight * 64 // far
 
 
-@inner_kernel
+@stage_kernel
 def _take(s, r, y, x, d, nearest, place):
     """s.scratch[1:6, r] = sample, weight and distance of a source along a disparity; return the weight.
 
@@ -262,7 +262,7 @@ def _take(s, r, y, x, d, nearest, place):
     return weight
 
 
-@inner_kernel
+@stage_kernel
 def _prefer_nearest(s, count, most):
     """Lower the weights of samples farther from the place than the nearest of a source that sees it."""
     closest = np.int64(64)
@@ -273,7 +273,7 @@ def _prefer_nearest(s, count, most):
         s.scratch[4, r] = s.scratch[4, r] * PHASE[max(s.scratch[5, r] - closest, 0)]
 
 
-@lean_kernel
+@part_kernel
 def _six_taps_run(plane, iy, ix, py, px, count, sums, out):
     """out[:count] = samples of a plane that follow each other, by six taps down, into ``sums``, then across.
 
@@ -304,7 +304,7 @@ def _six_taps_run(plane, iy, ix, py, px, count, sums, out):
         four[0], four[1], four[2], four[3] = (m + 2048) >> 12, (n + 2048) >> 12, (o + 2048) >> 12, (p + 2048) >> 12
 
 
-@inner_kernel
+@stage_kernel
 def _interpolate(s, y, x, length, d, count):
     """s.taken[:count, :, :length] = samples of the sources along a disparity."""
     for r in range(count):
@@ -314,20 +314,20 @@ def _interpolate(s, y, x, length, d, count):
             _six_taps_run(s.views[s.sources[r, 0], p], iy, ix, py, px, length, s.sums, s.taken[r, p])
 
 
-@inner_kernel
+@stage_kernel
 def _quotient(a, b):
     """a // b by a division of floating point, which is exact while a has at most 52 bits, and four times as fast."""
     return np.int64(np.floor(np.float64(a) / np.float64(b)))
 
 
-@inner_kernel
+@stage_kernel
 def _apart(s, a, b):
     """Difference of two sources' samples."""
     differs = abs(s.scratch[1, a] - s.scratch[1, b])
     return differs + abs(s.scratch[2, a] - s.scratch[2, b]) + abs(s.scratch[3, a] - s.scratch[3, b])
 
 
-@inner_kernel
+@stage_kernel
 def _weighted(s, y, x, count):
     """The mean by weights, which fall with the distance from the source in best agreement with the others.
 
@@ -365,7 +365,7 @@ def _weighted(s, y, x, count):
     return _quotient(spread, all_)
 
 
-@inner_kernel
+@stage_kernel
 def _mismatch(s, at, y, x, d):
     """Return the difference of the best two sources from the decoded view around a sample, in eighths of a code."""
     height, width = s.counts.shape
@@ -451,7 +451,7 @@ def refine(s, at, backward):
             s.disparities[at, y, x] = best
 
 
-@inner_kernel
+@stage_kernel
 def _roughness(d, one, two):
     return 9 * SMOOTH * ((1 if d != one else 0) + (1 if d != two else 0))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import inner_kernel, lean_kernel
+from ii_core.base.jit import part_kernel, stage_kernel, tuned_kernel
 
 LARGEST = 32
 _SIZES = 6  # by their binary logarithm
@@ -40,7 +40,7 @@ TRANSPOSED = np.ascontiguousarray(MATRICES.swapaxes(1, 2))
 SCANS = _scans()
 
 
-@inner_kernel
+@stage_kernel
 def _product(left, right, rows, terms, n, rounding, shift, out):
     """out[:rows, :n] = left[:rows, :terms] · right[:terms, :n] / 2^shift, rounded."""
     for i in range(rows):
@@ -63,7 +63,7 @@ def _product(left, right, rows, terms, n, rounding, shift, out):
                 into[j] = into[j] >> shift
 
 
-@lean_kernel
+@part_kernel
 def forward(block, log, half, out):
     """out[:n, :n] = the transform of block[:n, :n]; all (32, 32) of int32."""
     n = 1 << log
@@ -71,7 +71,7 @@ def forward(block, log, half, out):
     _product(half, TRANSPOSED[log], n, n, n, 2048, 12, out)
 
 
-@lean_kernel
+@tuned_kernel
 def inverse(coefficients, log, rows, cols, half, out):
     """out[:n, :n] = the inverse transform of coefficients that are zero but for the first rows and columns."""
     n = 1 << log

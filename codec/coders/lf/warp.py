@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ii_core.base.jit import inner_kernel, lean_kernel
+from ii_core.base.jit import stage_kernel, tuned_kernel
 
 from .transform import LARGEST
 
@@ -34,13 +34,13 @@ FILTERS = _filters()
 assert (FILTERS.sum(axis=1) == 64).all() and FILTERS[0].tolist() == [0, 0, 64, 0, 0, 0]
 
 
-@inner_kernel
+@stage_kernel
 def clamped(i, n):
     """The index of the sample, or of the border's."""
     return min(max(i, 0), n - 1)
 
 
-@inner_kernel
+@stage_kernel
 def filtered(t, at, a, b, c, d, e, f):
     """Sum of six samples from t[at] on, weighted."""
     far = np.int32(np.int32(a * t[np.uint64(at)]) + np.int32(f * t[np.uint64(at + 5)]))
@@ -49,7 +49,7 @@ def filtered(t, at, a, b, c, d, e, f):
     return np.int32(np.int32(far + near) + middle)
 
 
-@inner_kernel
+@stage_kernel
 def _filter_row(t, at, n, phase, row):
     """row[:n] = samples between those of t, from t[at + BEFORE] on, in units of 2^-6."""
     a, b, c = FILTERS[phase, 0], FILTERS[phase, 1], FILTERS[phase, 2]
@@ -63,7 +63,7 @@ def _filter_row(t, at, n, phase, row):
             row[j] = filtered(t, at + j, a, b, c, d, e, f)
 
 
-@inner_kernel
+@stage_kernel
 def _filtered_down(r, i, j, a, b, c, d, e, f):
     """Sum of six samples below each other from r[i, j] on, weighted."""
     far = np.int32(np.int32(a * r[i, j]) + np.int32(f * r[i + 5, j]))
@@ -71,7 +71,7 @@ def _filtered_down(r, i, j, a, b, c, d, e, f):
     return np.int32(np.int32(far + near) + np.int32(np.int32(c * r[i + 2, j]) + np.int32(d * r[i + 3, j])))
 
 
-@inner_kernel
+@stage_kernel
 def _add_four(out, at, one, two, three, four):
     """out[at … at + 3] += four numbers: computed before any is stored, they are vectorised."""
     one, two = np.int32(out[at] + one), np.int32(out[at + 1] + two)
@@ -79,7 +79,7 @@ def _add_four(out, at, one, two, three, four):
     out[at], out[at + 1], out[at + 2], out[at + 3] = one, two, three, four
 
 
-@lean_kernel
+@tuned_kernel
 def moved_block(views, view, plane, y0, x0, n, dy, dx, rows, out):
     """out[plane, :n, :n] += 64² times the block at (y0 + dy, x0 + dx) of a plane; ``rows`` is (38, 40) for use.
 
