@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from ..base.checks import checked, instance, number
 from ..camera.camera import IICamera
 from .picture import IIPicture
 
@@ -12,11 +13,14 @@ ASSUMED = "assumed"  # name of such a camera
 ASSUMED_ANGLE_DEG = 20.0
 
 
+@checked(picture=instance(IIPicture), angle_deg=number)
 def with_assumed_camera(picture: IIPicture, angle_deg: float = ASSUMED_ANGLE_DEG) -> IIPicture:
     """Return the picture with its camera, or with an assumed one of 1 mm pixels and this viewing angle.
 
     Raises
     ------
+    TypeError
+        If an argument has a wrong type.
     ValueError
         If the angle is not between 0 and 180°.
     """

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .cluster import Dask, cluster
-from .common import Force, Workers, app, check_only, check_outputs, image_file, picture_files
+from .common import Force, Workers, app, check_only, check_outputs, check_unused, image_file, picture_files
 from .option_groups import grouped
 from .progress import progress_bar, say_done
 
 if TYPE_CHECKING:
     from ..rendering.render import Stats
+    from ..scene.scene import Scene
 
 Exr = Path | None
 
@@ -30,6 +31,22 @@ class Motion:
     ] = ""
     clip: Annotated[str, typer.Option(help="Name of the animation in a glTF file.")] = ""
     fps: Annotated[float | None, typer.Option(help="Frames per second, in place of the file's.")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placing:
+    """Options of how a mesh file stands in the scene."""
+
+    rotate: Annotated[str, typer.Option(help="Rotation of a mesh file about x, then y, then z, degrees: x,y,z.")] = (
+        "0,0,0"
+    )
+    fit: Annotated[str, typer.Option(help="Names of a mesh file's parts that fill the picture, such as 'head*'.")] = (
+        "*"
+    )
+
+    def options(self) -> dict[str, Any]:
+        """Return what a scene or take is loaded with, by name."""
+        return {"rotate_deg": _floats("rotate", self.rotate, 3, 3), "fit": self.fit}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,6 +170,7 @@ def render(
     camera: Annotated[str, typer.Option(help="A camera's name, a .json file, or a folder of maps.")] = "setup1",
     scale: Annotated[int, typer.Option(help="Divides the number of lenses, at the same pixels per lens.")] = 1,
     motion: Motion,
+    placing: Placing,
     place: Place,
     sampling: Sampling,
     images: Images,
@@ -195,37 +213,41 @@ def render(
     if motion.frames:
         if set_name or images.projection or len(arrays) > 1:
             raise ValueError("--frames renders one scene through one pixel array, without --set and --projection")
-        _render_frames(
-            scene, motion, output, views, images, {**options, "dtype": f"uint{sampling.bits}"}, means, force
-        )
+        moving = {"clip": motion.clip or None, "fps": motion.fps, **placing.options()}
+        options |= {"dtype": f"uint{sampling.bits}"}
+        _render_frames(scene, moving, motion.frames, output, views, images, options, means, force)
     elif motion.clip or motion.fps is not None:
         raise ValueError("--clip and --fps are for moving scenes: --frames is needed")
     elif set_name:
         if images.files or images.projection:
             raise ValueError("a set includes all support images and projections: leave out their options")
         options |= {"bits": sampling.bits}
+        check_unused(context, "a set of scenes", "rotate", "fit")
         _render_set(set_name, output, views, options, means, force)
     else:
         dtype = "float32" if output.suffix == ".exr" else f"uint{sampling.bits}"
         _check_files(output, dtype, len(arrays), images, force)
         options |= {"dtype": dtype, "audit": sampling.audit}
-        _render_scene(scene, output, views, images, options, means, spread)
+        from ..files.load import load_scene
+
+        loaded = load_scene(scene, **placing.options())
+        _render_scene(loaded, output, views, images, options, means, spread)
 
 
 def _render_frames(
-    scene: str, motion: Motion, folder: Path, views: Views, images: Images, options: dict[str, Any], means: Means,
-    force: bool,
+    scene: str, moving: dict[str, Any], frames: str, folder: Path, views: Views, images: Images,
+    options: dict[str, Any], means: Means, force: bool,
 ) -> None:  # fmt: skip
     """Render frames of a moving scene."""
     from ..rendering.executors import identity
     from .take import render_frames, support_files
 
-    array, moving = views.arrays[0], {"clip": motion.clip or None, "fps": motion.fps}
+    array = views.arrays[0]
     with cluster(means.dask, identity) as executor:
         options = {**options, "pose": views.poses[0], "workers": means.workers, "executor": executor}
         kinds = _all_support(array) if images.support else []
         support = support_files(kinds, images.support, images.single)
-        render_frames(scene, moving, motion.frames, folder, array, support, force, options)
+        render_frames(scene, moving, frames, folder, array, support, force, options)
 
 
 def _check_files(output: Path, dtype: str, arrays: int, images: Images, force: bool) -> None:
@@ -241,13 +263,12 @@ def _check_files(output: Path, dtype: str, arrays: int, images: Images, force: b
 
 
 def _render_scene(
-    scene: str, output: Path, views: Views, images: Images, options: dict[str, Any], means: Means, spread: str | None
-) -> None:
+    scene: Scene, output: Path, views: Views, images: Images, options: dict[str, Any], means: Means,
+    spread: str | None,
+) -> None:  # fmt: skip
     """Render one scene through every pixel array, and its projection."""
-    from ..files.load import load_scene
     from ..rendering.executors import identity
 
-    loaded = load_scene(scene)
     with cluster(means.dask, identity) as executor:
         how = {"workers": means.workers, "executor": executor}
         for i, (array, pose) in enumerate(zip(views.arrays, views.poses, strict=True)):
@@ -257,7 +278,7 @@ def _render_scene(
                 files.setdefault(name, []).append(numbered(images.support))  # type: ignore[arg-type]
             more = {"pose": pose, "upright": array.lenses == (1, 1), "support": files, **options, **how}
             path = numbered(output)
-            shoot = partial(_shoot, scene=loaded, camera=array)
+            shoot = partial(_shoot, scene=scene, camera=array)
             if spread is None:
                 stats = shoot(path, **more)
             else:
@@ -266,7 +287,7 @@ def _render_scene(
                 stats = shoot_spread(shoot, path, array, i, spread, more)
             say_done(f"{path}: {_told(stats)}")
         if images.projection:
-            _save_projection(loaded, views.arrays[0], views.poses[0], images.projection, how)
+            _save_projection(scene, views.arrays[0], views.poses[0], images.projection, how)
 
 
 def _all_support(array: Any) -> list[str]:

@@ -6,8 +6,9 @@ import os
 import tomllib
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from ii_core.base.checks import place, shown, text
 from ii_core.base.files import check_file, one_line
 
 from ..scene.scene import Background, Body, Fog, Light, Material, Scene, Vector, unit_rows
@@ -31,7 +33,7 @@ from ..scene.textures import (
     metallic_roughness_map,
     normal_map,
 )
-from ..shapes.primitives import MOST_TRIANGLES, Mesh, rotation
+from ..shapes.primitives import MOST_TRIANGLES, Mesh, Point3, rotation
 from ..shapes.watertight import flaw
 from .beside import read_texture
 from .mesh_model import Model, Part
@@ -77,7 +79,9 @@ def scene_names() -> dict[str, str]:
     return found
 
 
-def load_scene(name: str | os.PathLike[str]) -> Scene:
+def load_scene(
+    name: str | os.PathLike[str], *, rotate_deg: Sequence[float] = (0.0, 0.0, 0.0), fit: str = "*"
+) -> Scene:
     """Load a scene by name, from a TOML file, or from a single mesh file.
 
     Parameters
@@ -86,6 +90,10 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
         One of `scene_names`, a file that ends in ``.toml``, or a mesh file (.glb, .gltf, .obj, .ply, .stl), which is
         scaled and placed to fill `WORKING_VOLUME`, with its own lights or, without any, two lights. Paths in a file
         are relative to its folder.
+    rotate_deg : (x, y, z)
+        Rotation of a mesh file in degrees, about x, then y, then z, before it is scaled.
+    fit : str
+        Pattern of names of a mesh file's parts, as in ``"head*"``: they fill the volume, other parts may leave it.
 
     Returns
     -------
@@ -94,9 +102,10 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
     Raises
     ------
     TypeError
-        If the name is neither text nor a path.
+        If the name is neither text nor a path, or another argument has a wrong type.
     ValueError
-        If the name is unknown, the file is wrong, or a mesh or texture is.
+        If the name is unknown, the file is wrong, or a mesh or texture is; if no part is of the names; or if a scene
+        that is no mesh file is to be rotated or fitted.
     OSError
         If a file is missing.
 
@@ -107,9 +116,10 @@ def load_scene(name: str | os.PathLike[str]) -> Scene:
         are not watertight.
     """
     path = scene_path(name)
-    files = MeshFiles()
+    files, fitted = MeshFiles(), fitting(path, rotate_deg, fit)
     if is_mesh(path):
-        scene = mesh_scene(path, files.model(path))
+        model = files.model(path)
+        scene = mesh_scene(path, model, working_place(path, model, fitted))
     else:
         scene = built(path, SceneLoader(path, files).scene, read_tables(path))
     warn_of(path, scene, files)
@@ -130,6 +140,22 @@ def scene_path(name: str | os.PathLike[str]) -> Path:
         path = Path(str(files("assets") / "scenes" / f"{name}.toml"))
     check_file(path)
     return path
+
+
+class Fitting(NamedTuple):
+    """How a mesh file is fitted into the working volume: its rotation, and a pattern of names of fitted parts."""
+
+    rotate_deg: Point3
+    fit: str
+
+
+def fitting(path: Path, rotate_deg: Sequence[float], fit: str) -> Fitting:
+    """Return the checked fitting of a mesh file; raise ValueError if another file is to be rotated or fitted."""
+    x, y, z = place("rotate_deg", rotate_deg, 3)
+    text("fit", fit)
+    if not is_mesh(path) and ((x, y, z) != (0.0, 0.0, 0.0) or fit != "*"):
+        raise ValueError(f"{path.name} places its objects itself: only a mesh file can be rotated and fitted")
+    return Fitting((x, y, z), fit)
 
 
 def is_mesh(path: Path) -> bool:
@@ -519,27 +545,40 @@ def _placed(light: Light, value: ObjectTable, strength: float) -> Light:
     return replace(light, vector=vector(turn @ light.vector + value.position_mm), direction=along, colour=colour)
 
 
-def mesh_scene(path: Path, model: Model, place: ObjectTable | None = None) -> Scene:
-    """A mesh file as a scene of its own, placed by `working_place` unless told."""
+def mesh_scene(path: Path, model: Model, value: ObjectTable) -> Scene:
+    """A mesh file as a scene of its own, at a place; errors name the file."""
     try:
-        value = working_place(path, model) if place is None else place
         return _alone(path, model, value)
     except ValueError as error:
         raise ValueError(f"{path.name}: {one_line(error)}") from None
 
 
-def working_place(path: Path, model: Model) -> ObjectTable:
-    """Return the transform that fits a model into the working volume."""
-    corners = np.concatenate([part.mesh.vertices for part in model.parts])
+def working_place(path: Path, model: Model, how: Fitting) -> ObjectTable:
+    """Return the transform that rotates a model and fits its parts of some names into the working volume.
+
+    Raises
+    ------
+    ValueError
+        If no part has such a name, or a corner is not finite; the message names the file.
+    """
+    fitted = [part.mesh.vertices for part in model.parts if fnmatchcase(part.name, how.fit)]
+    if not fitted:
+        known = _known(dict.fromkeys(part.name for part in model.parts[:MOST_NAMED] if part.name))
+        raise ValueError(f"{path.name}: fit is {shown(how.fit)}: no part has such a name, known are {known}")
+    corners = np.concatenate(fitted)
     low, high = corners.min(axis=0), corners.max(axis=0)
     if not max(np.abs(low).max(), np.abs(high).max()) <= np.finfo(np.float32).max:
-        raise ValueError(f"reaches from {low.tolist()} to {high.tolist()}: finite float32 numbers are needed")
+        raise ValueError(
+            f"{path.name}: reaches from {low.tolist()} to {high.tolist()}: finite float32 numbers are needed"
+        )
+    corners = corners @ rotation(how.rotate_deg).T
+    low, high = corners.min(axis=0), corners.max(axis=0)
     room = WORKING_VOLUME[1] - WORKING_VOLUME[0]
     scale = float(np.min(room / np.maximum(high - low, 1e-12 * room)))
     shift = (WORKING_VOLUME.sum(axis=0) - (low + high) * scale) / 2
     shift[2] = WORKING_VOLUME[0, 2] - low[2] * scale
     x, y, z = (float(s) for s in shift)
-    return ObjectTable(name=path.stem, position_mm=(x, y, z), scale=(scale, scale, scale))
+    return ObjectTable(name=path.stem, position_mm=(x, y, z), rotate_deg=how.rotate_deg, scale=(scale, scale, scale))
 
 
 def _alone(path: Path, model: Model, value: ObjectTable) -> Scene:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -19,7 +19,18 @@ from ii_core.base.checks import text, within
 from ..scene.keyframes import Track, looking_pose, turned_pose
 from ..scene.scene import Scene
 from ..shapes.primitives import rotation
-from .load import GLTF_TYPES, MeshFiles, SceneLoader, built, is_mesh, mesh_scene, scene_path, warn_of, working_place
+from .load import (
+    GLTF_TYPES,
+    MeshFiles,
+    SceneLoader,
+    built,
+    fitting,
+    is_mesh,
+    mesh_scene,
+    scene_path,
+    warn_of,
+    working_place,
+)
 from .toml_schema import ObjectTable, TrackTable, check_shape, checked_tables, raw_tables
 
 DEFAULT_FPS = 24.0
@@ -53,8 +64,12 @@ class Take:
     load_take
     """
 
-    def __init__(self, path: Path, *, clip: str | None = None, fps: float | None = None) -> None:
+    def __init__(
+        self, path: Path, *, clip: str | None = None, fps: float | None = None,
+        rotate_deg: Sequence[float] = (0.0, 0.0, 0.0), fit: str = "*",
+    ) -> None:  # fmt: skip
         self.name, self._path, self._clip = path.stem, path, clip
+        self._fitting = fitting(path, rotate_deg, fit)
         self._files = MeshFiles()
         self._motions: list[_Motion] = []
         self._latest: tuple[Any, Scene] | None = None
@@ -134,7 +149,7 @@ class Take:
             raise ValueError(f"{self._path.name}: {error}") from None
         self.fps = _rate(fps)
         self.frames = max(1, math.ceil(seconds * self.fps - 1e-6))
-        self._place = working_place(self._path, self._files.model(self._path, self._clip, 0.0))
+        self._place = working_place(self._path, self._files.model(self._path, self._clip, 0.0), self._fitting)
 
     def _checked_tracks(self, tracks: list[TrackTable]) -> list[_Motion]:
         motions: list[_Motion] = []
@@ -184,7 +199,10 @@ class Take:
         return built(self._path, self._loader.scene, checked_tables(key[0]), seconds)
 
 
-def load_take(name: str | os.PathLike[str], *, clip: str | None = None, fps: float | None = None) -> Take:
+def load_take(
+    name: str | os.PathLike[str], *, clip: str | None = None, fps: float | None = None,
+    rotate_deg: Sequence[float] = (0.0, 0.0, 0.0), fit: str = "*",
+) -> Take:  # fmt: skip
     """A scene that moves: by its name, from a scene file with ``[animation]``, or a glTF file with animations.
 
     Parameters
@@ -195,6 +213,8 @@ def load_take(name: str | os.PathLike[str], *, clip: str | None = None, fps: flo
         Of a glTF file alone: the name of its animation; the first if not given.
     fps : float, optional
         Frames a second in place of the file's, with the same keyframes; 24 of a glTF file.
+    rotate_deg, fit
+        As for `load_scene`, of the model at the clip's start.
 
     Returns
     -------
@@ -207,7 +227,7 @@ def load_take(name: str | os.PathLike[str], *, clip: str | None = None, fps: flo
     """
     if clip is not None:
         text("clip", clip)
-    return Take(scene_path(name), clip=clip, fps=fps)
+    return Take(scene_path(name), clip=clip, fps=fps, rotate_deg=rotate_deg, fit=fit)
 
 
 def _check_object(i: int, value: ObjectTable) -> None:

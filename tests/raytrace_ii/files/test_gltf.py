@@ -431,3 +431,27 @@ def test_a_file_alone_keeps_its_own_lights(tmp_path):
     (light,) = scene.lights  # a square of 2 becomes one of 20 mm at z = 20
     np.testing.assert_allclose(light.vector, [0, 10, 10])
     np.testing.assert_allclose(light.colour, 1)
+
+
+def test_a_file_alone_is_rotated_before_it_is_fitted(tmp_path):
+    trimesh.Trimesh(WEDGE, WEDGE_FACES, process=False).export(tmp_path / "wedge.ply")
+    (body,) = load_scene(tmp_path / "wedge.ply", rotate_deg=(0, 0, 90)).bodies
+    # x becomes y, y becomes −x, and the file's z lies along −z: 2×1×3 in 40×20×60, twenty times as large
+    corners = [[20, -10, 80], [20, 10, 80], [-20, -10, 80], [20, -10, 20]]
+    np.testing.assert_allclose(np.unique(body.vertices.round(3), axis=0), sorted(corners), atol=1e-4)
+
+
+def test_a_part_of_a_file_fills_the_working_volume(tmp_path, run, refused):
+    gltf = Gltf()
+    square = gltf.mesh(SQUARE, SQUARE_FACES)
+    gltf.node(mesh=square, name="ground", scale=[50, 50, 50])
+    gltf.node(mesh=square, name="head", translation=[7, 0, 0])
+    path = gltf.save(tmp_path / "m.glb")
+    ground, head = load_scene(path, fit="he*d").bodies
+    np.testing.assert_allclose([head.vertices.min(axis=0)[:2], head.vertices.max(axis=0)[:2]], [[-10, -10], [10, 10]])
+    assert np.ptp(ground.vertices[:, 0]) == pytest.approx(1000)
+    output = ("--scale", 64, "-o", tmp_path / "a.png")
+    refused(run("render", path, "--fit", "tail", *output), "no part has such a name, known are ground, head")
+    refused(run("render", path, "--rotate", "1,2", *output), "rotate is '1,2': three numbers x,y,z are needed")
+    refused(run("render", "apples", "--rotate", "0,90,0", *output), "only a mesh file can be rotated and fitted")
+    refused(run("render", "--set", "reference", "--fit", "head", *output[:2], "-o", tmp_path / "s"), "--fit")
