@@ -18,6 +18,7 @@ from . import synthesize, render, pictures, calibrating, coding, evaluate, bench
 from .common import app
 from .ending import ends_soon
 from .folders import no_empty_folders
+from .renamed import present
 from .words import SPELT, one_line
 
 __all__ = [
@@ -53,7 +54,7 @@ def main() -> None:
 def _run() -> None:
     try:
         with no_empty_folders():
-            code = app(standalone_mode=False)
+            code = app(args=present(sys.argv[1:]), standalone_mode=False)
         if code == INTERRUPTED:  # typer's return value after Ctrl-C
             print("interrupted", file=sys.stderr)
         sys.exit(code if isinstance(code, int) else 0)

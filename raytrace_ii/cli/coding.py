@@ -52,7 +52,7 @@ def encode(
     span: Annotated[int, typer.Option(help="II-video: instants of a group of pictures, 0 for all.")] = 8,
     group: Annotated[int, typer.Option(help="II-video: views of a group of pictures, 0 for all.")] = 0,
     strip: Annotated[int, typer.Option(help="II-video, interleaved: views of a strip.")] = 4,
-    rate: Annotated[str, typer.Option(help="II-video: meet --bpp over the take, or in each segment.")] = "take",
+    rate_over: Annotated[str, typer.Option(help="II-video: meet --bpp over the take, or in each segment.")] = "take",
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
@@ -71,9 +71,9 @@ def encode(
         if quality is not None:
             raise ValueError(f"quality is {quality:g}: II-video is coded by --bpp or --qp")
         plan = Plan(walk=walk, span=span, group=group, strip=strip)
-        encode_frames(picture, output, scheme or TAKE_SCHEME, plan, bpp=bpp, qp=qp, rate=rate)
+        encode_frames(picture, output, scheme or TAKE_SCHEME, plan, bpp=bpp, qp=qp, rate=rate_over)
         return
-    check_unused(context, f"{picture} is one picture, which", "walk", "span", "group", "strip", "rate")
+    check_unused(context, f"{picture} is one picture, which", "walk", "span", "group", "strip", "rate_over")
     if quality is not None and quality.is_integer():
         quality = int(quality)  # schemes of whole qualities
     original = IIPicture.load(picture)

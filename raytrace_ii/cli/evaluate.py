@@ -56,7 +56,9 @@ def measure(
         Path | None, typer.Option(help="Write charts of angles, depth, views and errors into this folder.")
     ] = None,
     depth: Annotated[Path | None, typer.Option(help="Measure Q_depth with this map of z in mm (.exr).")] = None,
-    focus: Annotated[bool, typer.Option("--focus", help="Measure Q_depth with depth from focus.")] = False,
+    depth_from_focus: Annotated[
+        bool, typer.Option("--depth-from-focus", help="Measure Q_depth with depth from focus.")
+    ] = False,
     method: Method = "dissertation",
     layers: Layers = None,
     ssim: Annotated[
@@ -81,13 +83,15 @@ def measure(
     if reference.is_dir():
         from .take import measure_frames
 
-        check_unused(context, f"{reference} is a take, which", "depth", "focus", "method", "layers", "ssim", "mask")
+        check_unused(
+            context, f"{reference} is a take, which", "depth", "depth_from_focus", "method", "layers", "ssim", "mask"
+        )
         measure_frames(reference, decoded, json, plots, force)
         return
-    if not (depth or focus or plots):
-        check_unused(context, "a measurement without --focus, --depth or --plots", "method", "layers")
+    if not (depth or depth_from_focus or plots):
+        check_unused(context, "a measurement without --depth-from-focus, --depth or --plots", "method", "layers")
     if depth:
-        check_unused(context, "--depth", "method", "focus")
+        check_unused(context, "--depth", "method", "depth_from_focus")
     if plots:
         load("matplotlib")  # before the work
         from metrics import PLOTS, plot_all
@@ -100,7 +104,7 @@ def measure(
         b,
         mask=None if mask is None else read_image(mask, size=a.size).min(axis=2) > 0,
         ssim=ssim,
-        over_depth=bool(depth or focus or plots),
+        over_depth=bool(depth or depth_from_focus or plots),
         depth=None if depth is None else read_depth(depth, size=a.size),
         layers_mm=_layers(layers, a),
         method=method,

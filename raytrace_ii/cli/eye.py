@@ -72,8 +72,8 @@ def eye(
     brightness: Annotated[float, typer.Option(help="Factor on all light.")] = 1.0,
     black: Annotated[float, typer.Option(help="Light of black as a share of white's.")] = 0.0,
     crosstalk: Annotated[float, typer.Option(help="Share of a pixel's light from its four neighbours.")] = 0.0,
-    lens_pitch: Annotated[float | None, typer.Option(help="Pitch of the display's lens array, mm.")] = None,
-    gap: Annotated[float | None, typer.Option(help="Gap from panel to lens plane, mm.")] = None,
+    lens_pitch_mm: Annotated[float | None, typer.Option(help="Pitch of the display's lens array.")] = None,
+    gap_mm: Annotated[float | None, typer.Option(help="Gap from panel to lens plane.")] = None,
     shift: Annotated[str, typer.Option(help="Shift of the lens array on the panel, mm: x,y.")] = "0,0",
     turn: Annotated[float, typer.Option(help="Rotation of the lens array on the panel, degrees.")] = 0.0,
     spread: Annotated[
@@ -98,7 +98,7 @@ def eye(
     shown = with_camera(IIPicture.load(picture), str(picture), angle)
     camera = camera_of(shown)
     display = DisplayModel(
-        camera=camera, lens_pitch_mm=lens_pitch, gap_mm=gap, shift_mm=(across, up), turn_deg=turn,  # type: ignore[arg-type]
+        camera=camera, lens_pitch_mm=lens_pitch_mm, gap_mm=gap_mm, shift_mm=(across, up), turn_deg=turn,  # type: ignore[arg-type]
         layout=layout, fill=fill, lobe=lobe, brightness=brightness, black=black, crosstalk=crosstalk,
     )  # fmt: skip
     place: tuple[float, ...] = _numbers("at", at, 3) if at else tuple(map(float, five_viewpoints(camera)["front"]))

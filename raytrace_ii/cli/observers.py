@@ -135,7 +135,9 @@ def _possible(reference: IIPicture) -> list[str]:
 def opinions(
     results: Annotated[list[Path], typer.Argument(help="Files of observers, or a folder of them.")],
     json: Annotated[Path | None, typer.Option(help="Write the numbers to this .json.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw scores over measures into this .png, .pdf or .svg.")] = None,
+    chart: Annotated[
+        Path | None, typer.Option(help="Draw scores over measures into this .png, .pdf or .svg.")
+    ] = None,
     confidence: Annotated[float, typer.Option(help="Level of the confidence intervals.")] = 0.95,
     force: Force = False,
 ) -> None:
@@ -145,9 +147,9 @@ def opinions(
     from metrics.observers import read_results, verdict
     from metrics.plots.opinion_chart import opinion_chart
 
-    check_outputs([path for path in (json, plot) if path], force)
-    if plot is not None:
-        check_suffix(plot)
+    check_outputs([path for path in (json, chart) if path], force)
+    if chart is not None:
+        check_suffix(chart)
     files = [file for path in results for file in (sorted(path.glob("*.jsonl")) if path.is_dir() else [path])]
     if not files:
         raise ValueError(f"{results[0]} holds no file of an observer: observer-001.jsonl is needed")
@@ -157,8 +159,8 @@ def opinions(
     _print(made)
     if json:
         write_json(json, made.numbers)
-    if plot:
-        opinion_chart(made, plot)
+    if chart:
+        opinion_chart(made, chart)
 
 
 def _print(made: Verdict) -> None:

@@ -28,7 +28,7 @@ from .video import coding, compared_takes, is_take_source
 if TYPE_CHECKING:
     from ii_core import IIPicture
 
-ACROSS = {"depth", "cone"}  # options of views over the viewing zone
+ACROSS = {"plane", "cone"}  # options of views over the viewing zone
 USED = {
     "quilt": {"for_", "tiles", "whole", *ACROSS},
     "lenticular": {"pitch", "slope", "centre", *ACROSS},
@@ -125,7 +125,7 @@ def display(
         str | None,
         typer.Option(help="Pixels of a tile, of the panel, of the eye's picture or of a frame; 800x400 by default."),
     ] = None,
-    depth: Annotated[
+    plane: Annotated[
         float | None, typer.Option(help="z in mm of the scene plane that appears in the plane of the display.")
     ] = None,
     cone: Annotated[
@@ -168,14 +168,14 @@ def display(
         output = plan.path(output)
     if kind == "parallax":
         check_outputs([output], force)
-        _film(with_camera(IIPicture.load(picture), str(picture), angle), output, pixels, depth, share, frames, fps)
+        _film(with_camera(IIPicture.load(picture), str(picture), angle), output, pixels, plane, share, frames, fps)
         return
     check_outputs(image_file(output, "uint8"), force)
     original = with_camera(IIPicture.load(picture), str(picture), angle)
-    options: dict[str, Any] = {"size": pixels, "depth_mm": depth, "cone": share}
+    options: dict[str, Any] = {"size": pixels, "depth_mm": plane, "cone": share}
     with spinner(f"{kind} of {picture.name}"):
         if plan is not None:
-            made = quilt(original, plan.tiles, **plan.options(original, depth))
+            made = quilt(original, plan.tiles, **plan.options(original, plane))
         elif kind == "lenticular":
             made = lenticular(original, pitch_px=pitch, slope=slope, centre_px=centre, **options)
         else:

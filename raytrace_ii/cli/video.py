@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 FILMS = (".mp4", ".mov", ".mkv", ".webm")
 TO = ("frames", "views", "quilt", "films", "parallax")
-PARALLAX = {"size", "depth", "cone"}
+PARALLAX = {"size", "plane", "cone"}
 QUILT = {"for_", "tiles", "whole", *PARALLAX}
 USED = {"quilt": QUILT, "parallax": PARALLAX}  # options that other forms do not use
 
@@ -37,9 +37,9 @@ def video(
     size: Annotated[
         str | None, typer.Option(help="Pixels of a tile or of a frame of parallax; 800x400 by default.")
     ] = None,
-    depth: Annotated[
+    plane: Annotated[
         float | None,
-        typer.Option(help="Quilt, parallax: z in mm of the plane in focus."),
+        typer.Option(help="Quilt, parallax: z in mm of the scene plane that appears in the plane of the display."),
     ] = None,
     cone: Annotated[
         float | None,
@@ -73,12 +73,12 @@ def video(
             report(done, total, "")
 
         if plan is not None:
-            options = plan.options(with_camera(shown.structure, str(source)), depth)
+            options = plan.options(with_camera(shown.structure, str(source)), plane)
             made = write_quilt_video(shown, output, plan.tiles, progress=told, **options)
         elif to == "parallax":
             share = 0.9 if cone is None else cone
             places = viewpoints_around(with_camera(shown.structure, str(source)), shown.frames, cone=share)
-            made = write_path_film(shown, output, places, size=pixels, depth_mm=depth, progress=told)
+            made = write_path_film(shown, output, places, size=pixels, depth_mm=plane, progress=told)
         else:
             writers: dict[str, Any] = {"frames": IIVideo.save, "views": write_view_folders, "films": write_view_films}
             with atomic_folder(output) as folder:

@@ -330,7 +330,7 @@ def test_wrong_input_is_named(run, refused, picture, tmp_path):
     refused(run("measure", bare, bare), "bare.png.json: no JSON, line 1, column 2")
     refused(run("study", picture, "--rates", 1, "--workers", 0, "-o", tmp_path / "s"), "workers is 0")
     said = "layers are 'x': dissertation, a number, NEAR:FAR:COUNT or px:LOW:HIGH:COUNT is needed\n"
-    refused(run("measure", picture, picture, "--focus", "--layers", "x"), said)
+    refused(run("measure", picture, picture, "--depth-from-focus", "--layers", "x"), said)
     refused(run("camera", "--design", "panel=x,pixels=9x9,pitch=1,distance=9"), "panel is 'x'")
 
 

@@ -28,7 +28,7 @@ def test_a_point_pupil_shows_the_view_image(run, path, tmp_path):
 
 
 def test_two_eyes_of_a_faulty_display(run, path, tmp_path):
-    faults = ["--layout", "rgb-stripe", "--fill", "0.6", "--turn", "0.5", "--shift", "0.01,0", "--gap", "6"]
+    faults = ["--layout", "rgb-stripe", "--fill", "0.6", "--turn", "0.5", "--shift", "0.01,0", "--gap-mm", "6"]
     options = [*faults, "--at", "0,0,-200", "--size", "64x32"]
     code, out, err = run("eye", path, "--both", *options, "-o", tmp_path / "e.png")
     assert code == 0, err
@@ -48,8 +48,8 @@ def test_two_eyes_of_a_faulty_display(run, path, tmp_path):
         (["--rays", "0"], "rays is 0"),
         (["--layout", "hex"], "rgb-stripe"),
         (["--fill", "0"], "fill is 0"),
-        (["--lens-pitch", "0"], "lens_pitch_mm"),
-        (["--gap", "nan"], "gap_mm"),
+        (["--lens-pitch-mm", "0"], "lens_pitch_mm"),
+        (["--gap-mm", "nan"], "gap_mm"),
         (["--apart", "0", "--both"], "apart_mm"),
         (["--size", "big"], "two whole numbers"),
     ],

@@ -138,7 +138,16 @@ def test_the_command_takes_layers_in_disparity(run, refused, tmp_path):
     picture, out = seen(CAMERA, texture(1), 600.0), tmp_path / "m.json"
     picture.save(tmp_path / "a.png")
     add_sensor_noise(picture, 3.0, seed=1).save(tmp_path / "b.png")
-    command = ("measure", tmp_path / "a.png", tmp_path / "b.png", "--focus", "--method", "robust", "--json", out)
+    command = (
+        "measure",
+        tmp_path / "a.png",
+        tmp_path / "b.png",
+        "--depth-from-focus",
+        "--method",
+        "robust",
+        "--json",
+        out,
+    )
     assert run(*command, "--layers", "px:-1.5:2:36")[0] == 0
     found = json.loads(out.read_text())["q_depth"]
     d = disparity_of_depth(CAMERA, found["depth_mm"])

@@ -178,10 +178,12 @@ def test_the_command_names_missing_measures_and_accepts_bare_pictures(run, refus
     options = ["--depth", tmp_path / "z.exr", "--layers", "5:45:3", "--json", tmp_path / "m.json", "--force"]
     code, out, _ = run("measure", tmp_path / "a.png", tmp_path / "b.png", *options)
     assert code == 0 and json.loads((tmp_path / "m.json").read_text())["q_depth"]["counts"] == [0, 168, 0]
-    both = ("measure", tmp_path / "a.png", tmp_path / "b.png", "--focus")
+    both = ("measure", tmp_path / "a.png", tmp_path / "b.png", "--depth-from-focus")
     refused(run(*both, "--layers", "5:4"), "layers are '5:4'")
     refused(run(*both, "--layers", "-3"), "-3 layers: at least 1")
-    refused(run("measure", tmp_path / "a.png", tmp_path / "b.png", "--focus", "--method", "guess"), "known are")
+    refused(
+        run("measure", tmp_path / "a.png", tmp_path / "b.png", "--depth-from-focus", "--method", "guess"), "known are"
+    )
 
     half = np.zeros((48, 56, 3), np.uint8)
     half[:24] = 255
