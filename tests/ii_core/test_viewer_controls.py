@@ -206,6 +206,18 @@ def test_on_a_phone_the_picture_comes_first(phone):
 
 
 @pytest.mark.slow
+def test_on_a_phone_controls_are_as_large_as_fingers_and_nothing_is_cut(phone):
+    """44 px is the usual size of a touch target; buttons had 25 and sliders 16."""
+    small = """[...document.querySelectorAll("aside button, aside input, aside select, #grip")].filter(e => {
+        const box = e.getBoundingClientRect(); return box.width > 0 && Math.min(box.width, box.height) < 44; })"""
+    cut = """[...document.querySelectorAll("aside *, .half")].filter(
+        e => e.clientWidth && e.scrollWidth > e.clientWidth)"""
+    assert phone.evaluate(f"{small}.map(e => e.outerHTML)") == []
+    assert phone.evaluate(f"{cut}.map(e => e.outerHTML)") == []
+    assert phone.locator("#canvas").get_attribute("aria-label")
+
+
+@pytest.mark.slow
 def test_tilting_turns_by_the_same_angle(phone):
     """Right edge and top edge away: the viewer then stands to the left of the display's axis, and below it."""
     tab = phone
