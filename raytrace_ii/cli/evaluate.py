@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -73,6 +74,7 @@ def measure(
 ) -> None:
     """Compare two II-pictures of the same structure, or two takes over time."""
     from ii_core import IIPicture
+    from ii_core.base.atomic import atomic_folder
     from ii_core.base.extras import load
     from ii_core.base.files import read_depth, read_image, write_json
     from metrics import report
@@ -109,11 +111,13 @@ def measure(
         layers_mm=_layers(layers, a),
         method=method,
     )
-    if plots:
-        with spinner(f"draw into {plots}"):
-            plot_all(a, b, made.depth, plots)
-    if json:
-        write_json(json, {"reference": str(reference), "decoded": str(decoded), **made.numbers})
+    with ExitStack() as outputs:  # numbers and charts appear together, or a stopped run leaves neither
+        if plots:
+            folder = outputs.enter_context(atomic_folder(plots))
+            with spinner(f"draw into {plots}"):
+                plot_all(a, b, made.depth, folder)
+        if json:
+            write_json(json, {"reference": str(reference), "decoded": str(decoded), **made.numbers})
     columns(made.rows)
 
 
