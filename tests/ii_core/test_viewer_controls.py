@@ -119,6 +119,7 @@ def disabled(tab):
     return set(tab.evaluate("[...document.querySelectorAll('[data-state]:disabled')].map(i => i.dataset.state)"))
 
 
+@pytest.mark.slow
 def test_sliders_without_effect_are_disabled(tab, opened, tmp_path):
     assert disabled(tab) == {"eyes", "gain"}
     tab.evaluate("ii.viewer.set({ mode: 'difference', stereo: 'anaglyph' })")
@@ -129,6 +130,7 @@ def test_sliders_without_effect_are_disabled(tab, opened, tmp_path):
     assert disabled(opened(tmp_path / "v.html")) == {"eyes", "f", "a"}
 
 
+@pytest.mark.slow
 def test_nothing_is_cut_on_a_small_screen(tab):
     """Earlier, the help stood at the end of a column of 880 px."""
     tab.set_viewport_size({"width": 1280, "height": 800})

@@ -384,6 +384,7 @@ def test_undecodable_files_are_refused(picture, coder, code, message):
         replace(coder, decoder=failing(code)).decode(coded)
 
 
+@pytest.mark.slow
 def test_children_of_a_command_end_with_it(tmp_path, picture):
     mark = tmp_path / "alive"
     child = f"import time,pathlib; time.sleep(4); pathlib.Path({str(mark)!r}).touch()"

@@ -19,6 +19,7 @@ from raytrace_ii.tracing.embree import CONFIGURATION, Library, Tree, library
 from raytrace_ii.tracing.intersect import Intersector, SingleRays
 from raytrace_ii.tracing.kernels.packets import place_hits
 from raytrace_ii.tracing.packing import packed as packed_scene
+from tests.support.slow import first_fast
 from tests.support.trace_scenes import body, hall, lamp, sphere, sun, wall
 
 SMALL = IICamera(pixels=(128, 64), lenses=(16, 8), pixel_pitch_mm=0.1, gap_mm=2.0)
@@ -313,7 +314,7 @@ def test_a_wrong_layout_is_noticed(monkeypatch):
     assert not embree._layouts_hold(good)
 
 
-@pytest.mark.parametrize("start", ["fork", "spawn"])
+@pytest.mark.parametrize("start", first_fast(["fork", "spawn"]))
 def test_processes_give_the_same_picture(start):
     """A forked process has Embree's memory without its threads: it opens a device of its own."""
     here = render(hall(), SMALL, workers=2)

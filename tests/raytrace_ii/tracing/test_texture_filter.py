@@ -14,6 +14,7 @@ from raytrace_ii.tracing.kernels.texels import mixed
 from raytrace_ii.tracing.kernels.textures import filter_taps, filtered
 from raytrace_ii.tracing.kernels.textures import footprint as face_footprint
 from raytrace_ii.tracing.texture_table import TextureTable, pyramid
+from tests.support.slow import first_fast
 from tests.support.trace_scenes import BLACK, WHITE, body, sphere, sun, wall
 
 BOARD = Image(np.broadcast_to((np.add.outer(np.arange(64), np.arange(64)) % 2)[..., None], (64, 64, 3)).astype("f4"))
@@ -121,7 +122,7 @@ def test_a_checker_finer_than_pixels_is_grey():
     np.testing.assert_allclose(filtered[filtered > 0], 0.5, atol=0.02)
 
 
-@pytest.mark.parametrize("kind", ["slanted", "mirrored", "sky", "normals", "blended"])
+@pytest.mark.parametrize("kind", first_fast(["slanted", "mirrored", "sky", "normals", "blended"], 2))
 def test_errors_against_many_samples_fall(kind):
     """Errors of one and of four samples fall by at least a third wherever an image is read."""
     size = (512, 1024) if kind == "sky" else (128, 256)
