@@ -57,7 +57,10 @@ def regular(
 @app.command("import")
 def import_(
     source: Annotated[
-        Path, typer.Argument(help="A folder of views, a quilt (name_qsCxRaA.png) or a lenslet picture.")
+        Path,
+        typer.Argument(
+            help="A folder of views, a quilt (name_qsCxRaA.png), a lenslet picture or a raw one (.lfp, .lfr, .raw)."
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="The II-picture: .png, .tif or .exr.")],
     ei_pixels: Annotated[
@@ -83,6 +86,12 @@ def import_(
         float | None,
         typer.Option(help="Distance of the plane of zero disparity from the cameras; infinity by default."),
     ] = None,
+    whites: Annotated[
+        Path | None,
+        typer.Option(
+            help="White picture of a raw one, or the camera's calibration data to choose from: a folder, .tar."
+        ),
+    ] = None,
     force: Force = False,
 ) -> None:
     """Import a light field of other programs as an II-picture.
@@ -95,8 +104,11 @@ def import_(
     from ii_core.base.files import check_type, image_types
     from ii_core.picture.picture import sidecar
 
-    image_types(output)
+    types = image_types(output)
     check_outputs([output, sidecar(output)], force)
+    if whites is not None or source.suffix.lower() in (".lfp", ".lfr", ".raw"):
+        _import_raw(source, whites, output, 8 if "uint8" in types else 16)
+        return
     views = None if ei_pixels is not None else find_views(source, grid=None if grid is None else pair("grid", grid))
     if baseline_mm is None and focal_mm is not None and views is not None and views.positions is not None:
         baseline_mm = views.positions.baseline_mm
@@ -120,6 +132,25 @@ def import_(
         say(order.describe())
     if made.camera is None:
         say("no camera is known: measures of views and of depth need one")
+
+
+def _import_raw(source: Path, whites: Path | None, output: Path, bits: int) -> None:
+    """Write the regular II-picture of a raw picture of a lenslet camera."""
+    from ii_core import resampled
+    from ii_core.base.files import check_type
+
+    from .calibrating import captured
+
+    check_type(output, f"uint{bits}")
+    with progress_bar(f"import {source.name}") as report:
+        shot = captured(source, white=whites, bits=bits, report=report)
+    with spinner(f"resample {source.name}"):
+        made, owned = resampled(shot.picture, deshift=shot.found.grid.lattice.hexagonal)
+        made.save(output)
+    (k, l), (u, v) = made.lenses, made.ei_pixels
+    say(shot.found.describe())
+    say(shot.told())
+    say_done(f"{output}: {k}×{l} lenses of {u}×{v} px, {owned.mean():.1%} of the pixels owned by their lens")
 
 
 def _rig(
