@@ -351,20 +351,32 @@ def calibrated_picture(
     ValueError
         If the frames are not of the calibration's size or have values that are not finite, or the picture is dark.
     """
+    return developed(
+        calibration, raw, white=white, dark=dark, mosaic=mosaic, curve=curve, full_scale=full_scale, bits=bits,
+        colour=colour, demosaic=demosaic,
+    )[0]  # fmt: skip
+
+
+def developed(
+    calibration: Calibration, raw: NDArray[Any], *, white: NDArray[Any] | None, dark: NDArray[Any] | None,
+    mosaic: str | None, curve: str, full_scale: float | None, bits: int, colour: RawColour | None, demosaic: str,
+) -> tuple[IIPicture, int]:  # fmt: skip
+    """Return the picture of `calibrated_picture`, and the number of defective pixels."""
     from .white import gain, repaired
 
     if bits not in (8, 16):
         raise ValueError(f"bits are {bits}: 8 or 16 are needed")
     raw, white, dark, mosaic = _upright(calibration, raw, white, dark, mosaic)
     owner = _owners(calibration)
-    values = _linear(raw, curve)
+    values, repairs = _linear(raw, curve), 0
     if dark is not None:
         values = values - _linear(dark, curve)
     if white is not None:
         smooth, bad = _white(calibration, white, dark, mosaic, curve)
         factors = gain(smooth)
         values = values * (factors if values.ndim == 2 else factors[..., None])
-        if bad.any():
+        repairs = int(bad.sum())
+        if repairs:
             values = repaired(values, bad, owner, 1 if mosaic is None else 2)
     if mosaic is not None:
         values = demosaiced(values if values.ndim == 2 else values[..., 0], mosaic, owner, method=demosaic)
@@ -384,7 +396,7 @@ def calibrated_picture(
             rows = np.clip(rows @ np.array(colour.matrix, np.float32).T, 0, 1)
         codes[top : top + BLOCK] = np.rint((2**bits - 1) * srgb(rows))
     camera = calibration.camera
-    return IIPicture(np.ascontiguousarray(codes), camera.lenses, camera.ei_pixels, camera)
+    return IIPicture(codes, camera.lenses, camera.ei_pixels, camera), repairs
 
 
 @checks.checked(

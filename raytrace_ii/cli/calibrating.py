@@ -95,11 +95,11 @@ def captured(
 ) -> Captured:  # fmt: skip
     """Read, calibrate and develop a raw picture; see the options of `calibrate`."""
     from ii_core import calibrate as find
-    from ii_core import calibrated_picture, defective_pixels
+    from ii_core.calibration.raw_camera import developed
     from ii_core.formats.lfp import read_raw
     from ii_core.formats.whites import read_white
 
-    report(0, 4, "read")
+    report(0, 3, "read")
     source = read_raw(raw, metadata)
     name, white_picture = (None, None) if white is None else read_white(white, source.setting)
     frames: dict[str, Any] = {
@@ -108,19 +108,16 @@ def captured(
     }
     mosaic = mosaic or source.mosaic
     curve = curve or ("srgb" if source.samples.dtype.name == "uint8" else "linear")
-    report(1, 4, "find lenses")
+    report(1, 3, "find lenses")
     found = find(
         source.samples, **frames, mosaic=mosaic, lattice=lattice or source.lattice,
         pixel_pitch_mm=pixel_pitch_mm or source.pixel_pitch_mm, gap_mm=gap_mm or source.gap_mm, name=raw.stem,
     )  # fmt: skip
-    report(2, 4, "find defects")
-    bad = 0
-    if frames["white"] is not None:
-        bad = int(defective_pixels(found, **frames, mosaic=mosaic, curve=curve).sum())
-    report(3, 4, "vignetting, mosaic, colours")
-    made = calibrated_picture(
+    report(2, 3, "vignetting, defects, mosaic, colours")
+    made, bad = developed(
         found, source.samples, **frames, mosaic=mosaic, curve=curve, bits=bits, colour=source.colour,
+        demosaic="directional",
         full_scale=full_scale if full_scale is not None else source.full_scale,
     )  # fmt: skip
-    report(4, 4, "")
+    report(3, 3, "")
     return Captured(found, made, curve, name, bad, source.colour is not None)

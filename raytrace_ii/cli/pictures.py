@@ -59,7 +59,7 @@ def import_(
     source: Annotated[
         Path,
         typer.Argument(
-            help="A folder of views, a quilt (name_qsCxRaA.png), a lenslet picture or a raw one (.lfp, .lfr, .raw)."
+            help="A folder of views, .mat, .h5, a quilt (name_qsCxRaA.png), a lenslet picture, .lfp, .lfr, .raw."
         ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="The II-picture: .png, .tif or .exr.")],
@@ -171,11 +171,14 @@ def _rig(
     return Rig(baseline_mm=baseline_mm, focal_mm=focal_mm, sensor_mm=sensor_mm, focus_mm=focus_mm)
 
 
+LAYOUTS = ("views", "hci", "quilt", "mosaic", "mat", "h5")
+
+
 @app.command()
 def export(
     picture: Annotated[Path, typer.Argument(help="An II-picture of regular structure, or a coded file.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder, or a file for a quilt or mosaic.")],
-    to: Annotated[str, typer.Option(help="views, hci, quilt or mosaic.")] = "views",
+    to: Annotated[str, typer.Option(help="views, hci, quilt, mosaic, mat or h5.")] = "views",
     depth: Annotated[Path | None, typer.Option(help="Map of z in mm (.exr), for the disparity map of hci.")] = None,
     row: Annotated[
         int | None, typer.Option(help="Row of views for a quilt, from 0; the middle one by default.")
@@ -187,11 +190,12 @@ def export(
     from ii_core import write_hci, write_quilt, write_views
     from ii_core.base.atomic import atomic_folder
     from ii_core.base.files import read_depth, write_image
+    from ii_core.formats.arrays import write_array
     from ii_core.formats.quilt import quilt_path
 
     load_plugins(plugin)
-    if to not in ("views", "hci", "quilt", "mosaic"):
-        raise ValueError(f"unknown layout {to!r}: known are views, hci, quilt, mosaic")
+    if to not in LAYOUTS:
+        raise ValueError(f"unknown layout {to!r}: known are {', '.join(LAYOUTS)}")
     if depth is not None and to != "hci":
         raise ValueError(f"depth is no option of layout {to}: use --to hci")
     original = load_any(picture)
@@ -205,6 +209,14 @@ def export(
                 write_hci(original, folder, depth=z)
         (k, l), (u, v) = original.lenses, original.ei_pixels
         say_done(f"{output}: {u * v} views of {k}×{l} px")
+        return
+    if to in ("mat", "h5"):
+        if output.suffix.lower() != f".{to}":
+            raise ValueError(f"{output} does not end in .{to}, which --to {to} writes")
+        check_outputs([output], force)
+        with spinner(f"export {picture.name}"):
+            write_array(original, output)
+        say_done(f"{output}: LF[v, u, y, x, c] and the camera")
         return
     target = quilt_path(output, original) if to == "quilt" else output
     check_outputs(image_file(target, original.pixels.dtype.name), force)
