@@ -17,6 +17,7 @@ from ii_core.base import checks
 from ii_core.base.files import one_line, read_text
 
 from ..measures.measure import measure_of
+from .source import Source, source_of
 
 FIELDS = {
     "name",
@@ -32,41 +33,49 @@ FIELDS = {
 }
 MAX_FRAMES = 10_000
 PICTURE = {"name", "use", "scene", "frames", "camera", "scale", "samples", "at_mm", "sha256"}
+PHOTOGRAPH = {"name", "use", "views", "view_pixels", "sha256", "source"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
-    """Reference picture or II-video: scene, camera and sampling, and the hash of its pixels.
+    """Reference picture or II-video, rendered or photographed, and the hash of its pixels.
 
     Parameters
     ----------
     name, use : str
         Name, and what the picture is for.
     scene : str
-        Scene of the package.
+        Scene of the package; empty for a photograph.
     frames : int, optional
         First frames of the scene's take that form a video; None for a still.
-    camera : str or mapping
-        Camera of the package, or its values.
+    camera : str or mapping, optional
+        Camera of the package, or its values; None for a photograph.
     scale, samples : int
     at_mm : (x, y, z)
         Place of the camera in the scene.
     sha256 : str, optional
         SHA-256 of the pixels, of a video those of all frames in order; None if not fixed yet.
+    views, view_pixels : (int, int), optional
+        Columns and rows of a photograph's views, and width and height of a view.
+    source : Source, optional
+        Where a photograph is had.
     """
 
     name: str
     use: str
-    scene: str
-    camera: Any
+    scene: str = ""
+    camera: Any = None
     frames: int | None = None
     scale: int = 1
     samples: int = 1
     at_mm: tuple[float, ...] = (0.0, 0.0, 0.0)
     sha256: str | None = None
+    views: tuple[int, int] | None = None
+    view_pixels: tuple[int, int] | None = None
+    source: Source | None = None
 
     def made_camera(self) -> IICamera:
-        """Return the camera."""
+        """Return the camera of a rendered picture."""
         if isinstance(self.camera, str):
             return preset(self.camera, scale=self.scale)
         return IICamera.from_json({"name": self.name, **self.camera})
@@ -177,6 +186,8 @@ def _profile(data: Mapping[str, Any], digest: str) -> Profile:
 
 
 def _reference(values: Mapping[str, Any]) -> Reference:
+    if "source" in values:
+        return _photograph(values)
     _check_keys("picture", values, PICTURE, optional={"frames", "scale", "samples", "at_mm", "sha256"})
     given = dict(values)
     if "frames" in given:
@@ -184,6 +195,12 @@ def _reference(values: Mapping[str, Any]) -> Reference:
     if "at_mm" in given:
         given["at_mm"] = checks.place("at_mm", given["at_mm"], 3)
     return Reference(**given)
+
+
+def _photograph(values: Mapping[str, Any]) -> Reference:
+    _check_keys("photograph", values, PHOTOGRAPH)
+    sizes: Any = {name: checks.whole_pair(name, values[name]) for name in ("views", "view_pixels")}
+    return Reference(**{**values, **sizes, "source": source_of(values["source"])})
 
 
 def _check_keys(what: str, data: Mapping[str, Any], known: set[str], optional: set[str] | None = None) -> None:

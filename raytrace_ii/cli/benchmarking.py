@@ -30,8 +30,12 @@ def benchmark(
         str, typer.Option(help="Files for external commands: ppm, pgx or ycbcr of 10 bit, or png.")
     ] = "ppm",
     pictures: Annotated[
-        Path | None, typer.Option(help="Folder of `raytrace-ii render --set benchmark`; rendered if none.")
+        Path | None,
+        typer.Option(help="Folder of photographs, or of `raytrace-ii render --set benchmark`; rendered if none."),
     ] = None,
+    list_: Annotated[
+        bool, typer.Option("--list", help="List the pictures of the profile, and where photographs are had.")
+    ] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The result, .json.")] = None,
     plugin: Plugins = None,
     force: Force = False,
@@ -46,13 +50,17 @@ def benchmark(
     from metrics.benchmark.run_log import RunLog
 
     from .benchmark_coders import coder_of
-    from .benchmark_pictures import rendered, stored
+    from .benchmark_pictures import listing, rendered, stored
 
     load_plugins(plugin)
     if profile is None:
         columns(profile_names())
         return
     defined = profile_of(profile)
+    if list_:
+        for line in listing(defined, pictures):
+            say(line)
+        return
     if output is None:
         raise ValueError("output is missing: -o result.json is needed")
     check_outputs([output], force)
