@@ -1,9 +1,9 @@
 """Quality of decoded II-pictures, rate–distortion studies, and their charts."""
 
+from ii_core.depth.focus import FocusDepth, depth_from_focus
+from ii_core.depth.layers import covering_layers, disparity_layers, linear_layers, logarithmic_layers
 from ii_core.display.view_sheets import plot_pair, plot_views
 
-from .depth.focus import FocusDepth, depth_from_focus
-from .depth.layers import covering_layers, disparity_layers, linear_layers, logarithmic_layers
 from .measures.angle import q_angle_ssim, q_angle_ycbcr
 from .measures.batch import measuring
 from .measures.builtin_measures import MEASURES
