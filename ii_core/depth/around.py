@@ -34,7 +34,7 @@ def views_around(picture: IIPicture, view: Pair) -> Views:
     pixels = np.empty((rows * cols, 3, height, width), np.uint16)
     for n, at in enumerate(order):
         pixels[n] = codes16(stack[at]).transpose(2, 0, 1)
-    steps = np.array(order, np.float32) - np.float32([view[1], view[0]])
+    steps = np.array(order, np.float32) - np.array([view[1], view[0]], np.float32)
     if picture.erect:
         steps = -steps
     return Views(pixels, steps, half_lines(steps))

@@ -171,11 +171,11 @@ def _sample(p, j, i, a0, a1, a2, a3, b0, b1, b2, b3):
 
 
 @lean_kernel
-def fit_planes(disparity, push, weight, view, radius, alike, near, floor, out, sure, first, last):
+def fit_planes(disparity, push, weight, view, radius, alike, near, prior, flat, out, sure, first, last):
     """Fit a plane to the disparities d + push/weight around each pixel, weighted; its value at the pixel is ``out``.
 
-    Neighbours up to ``radius`` pixels away weigh exp(−Σ_rgb |Δview|/alike − |Δd|/near). ``floor`` is the
-    weight that keeps the slopes of the plane at those of ``disparity``. ``sure`` is the sum of weights.
+    Neighbours up to ``radius`` pixels away weigh exp(−Σ_rgb |Δview|/alike − |Δd|/near). ``prior`` is the weight of
+    the old disparities, which keeps weak windows where they are. ``sure`` is the sum of weights.
     """
     height, width = disparity.shape
     for y in range(first, last):
@@ -216,7 +216,7 @@ def fit_planes(disparity, push, weight, view, radius, alike, near, floor, out, s
             # the normal equations, around the mean position
             mx, my = sx / s0, sy / s0
             cxx, cxy, cyy = sxx - sx * mx, sxy - sx * my, syy - sy * my
-            ridge = floor * s0 + 1e-12
+            ridge = flat * s0 + prior * radius * radius
             cxx += ridge
             cyy += ridge
             qx, qy = tx - t0 * mx, ty - t0 * my
@@ -224,4 +224,61 @@ def fit_planes(disparity, push, weight, view, radius, alike, near, floor, out, s
             px, py = 0.0, 0.0
             if det > 0.0:
                 px, py = (cyy * qx - cxy * qy) / det, (cxx * qy - cxy * qx) / det
-            out[y, x] = d + t0 / s0 - px * mx - py * my
+            out[y, x] = d + t0 / (s0 + prior) - px * mx - py * my
+
+
+@lean_kernel
+def move_to_view(disparity, down, across, filled, out):
+    """Move a disparity to the view a step away: the nearest in front, holes NaN or ``filled`` from behind."""
+    height, width = out.shape
+    out[:] = np.nan
+    for y in range(height):
+        for x in range(width):
+            d = disparity[y, x]
+            if np.isnan(d):
+                continue
+            # where neighbours of one surface move apart, pixels between them are covered, too
+            sy, sx = y - d * down, x - d * across
+            for j in range(math.floor(sy), math.floor(sy) + 2):
+                for i in range(math.floor(sx), math.floor(sx) + 2):
+                    near = abs(j - sy) <= 0.75 and abs(i - sx) <= 0.75
+                    if near and 0 <= j < height and 0 <= i < width and not out[j, i] >= d:
+                        out[j, i] = d
+    if not filled:
+        return
+    for y in range(height):
+        left, x = np.float32(np.nan), 0
+        while x < width:
+            if not np.isnan(out[y, x]):
+                left = out[y, x]
+                x += 1
+                continue
+            end = x
+            while end < width and np.isnan(out[y, end]):
+                end += 1
+            right = out[y, end] if end < width else np.float32(np.nan)
+            behind = right if np.isnan(left) or right < left else left
+            for i in range(x, end):
+                out[y, i] = behind
+            x = end
+
+
+@lean_kernel
+def rivals(cost, total, apart, ratio, margin, first, last):
+    """Compare the label of least ``total`` with others at least ``apart`` labels away.
+
+    ``ratio`` is its cost over the least cost of those, ``margin`` their least total above its own.
+    """
+    for y in range(first, last):
+        for x in range(cost.shape[1]):
+            best = 0
+            for d in range(cost.shape[2]):
+                if total[y, x, d] < total[y, x, best]:
+                    best = d
+            other, least = np.float32(np.inf), np.float32(np.inf)
+            for d in range(cost.shape[2]):
+                if abs(d - best) >= apart:
+                    other = min(other, cost[y, x, d])
+                    least = min(least, total[y, x, d])
+            ratio[y, x] = cost[y, x, best] / other if 0.0 < other < np.inf else np.float32(1.0)
+            margin[y, x] = least - total[y, x, best] if least < np.inf else np.float32(0.0)

@@ -14,7 +14,8 @@ import typer
 
 from ii_core.base.foreign import ForeignError
 
-from . import synthesize, render, pictures, calibrating, coding, evaluate, benchmarking, show, eye, observers, video
+from . import synthesize, render, pictures, calibrating, coding, evaluate, benchmarking, show, eye
+from . import depth, focus, observers, video
 from .common import app
 from .ending import ends_soon
 from .folders import no_empty_folders
@@ -26,8 +27,10 @@ __all__ = [
     "benchmarking",
     "calibrating",
     "coding",
+    "depth",
     "evaluate",
     "eye",
+    "focus",
     "main",
     "observers",
     "pictures",
