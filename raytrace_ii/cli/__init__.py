@@ -15,7 +15,7 @@ import typer
 from ii_core.base.foreign import ForeignError
 
 from . import synthesize, render, pictures, calibrating, coding, evaluate, benchmarking, show, eye
-from . import depth, focus, observers, video
+from . import depth, focus, measure_depth, observers, video
 from .common import app
 from .ending import ends_soon
 from .folders import no_empty_folders
@@ -32,6 +32,7 @@ __all__ = [
     "eye",
     "focus",
     "main",
+    "measure_depth",
     "observers",
     "pictures",
     "render",

@@ -1,12 +1,14 @@
 """Commands depth and focus."""
 
+import json
+
 import numpy as np
 import pytest
 
 from ii_core import IIPicture
 from ii_core.base.colour import linear
 from ii_core.base.files import read_depth, read_image
-from ii_core.formats.pfm import read_pfm
+from ii_core.formats.pfm import read_pfm, write_pfm
 from ii_core.picture.component import sub_images
 from tests.ii_core.test_depth import slanted
 
@@ -109,3 +111,18 @@ def test_focus_everywhere_a_stack_and_a_tilted_plane(run, field, tmp_path):
 def test_focus_refuses(run, field, tmp_path, options, said):
     code, _, err = run("focus", field[0], "-o", tmp_path / "f.png", *options)
     assert code == 2 and said in err and not list(tmp_path.iterdir())
+
+
+def test_errors_of_a_map(run, field, tmp_path):
+    path, truth = field
+    write_pfm(tmp_path / "t.pfm", truth.astype(np.float32))
+    write_pfm(tmp_path / "d.pfm", (truth + 0.05).astype(np.float32))
+    options = ["--border", "2", "--field", path, "--json", tmp_path / "e.json"]
+    code, out, err = run("measure-depth", tmp_path / "d.pfm", tmp_path / "t.pfm", *options)
+    assert code == 0, err
+    errors = json.loads((tmp_path / "e.json").read_text())
+    assert errors["badpix_003"] == 100 and errors["badpix_007"] == 0 and "badpix_007_outlines" in out
+    code, _, err = run("measure-depth", tmp_path / "d.pfm", tmp_path / "t.pfm", "--mm")
+    assert code == 2 and "--mm needs the camera of --field" in err
+    code, _, err = run("measure-depth", tmp_path / "d.pfm", tmp_path / "t.pfm", "--field", path, "--view", "7,1")
+    assert code == 2 and "view is '7,1': columns 0–4" in err
