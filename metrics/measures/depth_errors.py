@@ -15,8 +15,8 @@ from ii_core.base.colour import KB, KG, KR
 BORDER = 15  # px at each side that do not count
 THRESHOLDS = (0.01, 0.03, 0.07)  # px
 FINE = 0.15  # px by which thin things are too fat or too thin
-# Our regions where the benchmark has masks: jump in disparity, px; window, px; codes of luma; thin things, px; bend of
-# a surface, px per px².
+# Our regions where the benchmark has masks: jump in disparity, px; window, px; codes of luma; thin things, px; bend
+# of a surface, px per px².
 JUMP, AROUND, EVEN, THIN, BENT = 0.2, 5, 2.0, 7, 2e-4
 Mask = NDArray[np.bool_]
 SCHARR = np.array([[3.0, 10, 3], [0, 0, 0], [-3, -10, -3]]) / 64
