@@ -14,6 +14,7 @@ EXTRAS = {
     "bjontegaard": ("charts", "bjontegaard"),
     "imagecodecs": ("coders", "imagecodecs"),
     "distributed": ("dask", "dask"),
+    "imageio_ffmpeg": ("anchors", "imageio-ffmpeg"),
 }
 
 
