@@ -11,8 +11,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import assets
-from ii_core import IICamera, preset
+from ii_core import IICamera, IIPicture, preset
 from ii_core.base import checks
 from ii_core.base.files import one_line, read_text
 
@@ -33,7 +35,7 @@ FIELDS = {
 }
 MAX_FRAMES = 10_000
 PICTURE = {"name", "use", "scene", "frames", "camera", "scale", "samples", "at_mm", "sha256"}
-PHOTOGRAPH = {"name", "use", "views", "view_pixels", "sha256", "source"}
+PHOTOGRAPH = {"name", "use", "views", "view_pixels", "sha256", "source", "middle"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +59,8 @@ class Reference:
         SHA-256 of the pixels, of a video those of all frames in order; None if not fixed yet.
     views, view_pixels : (int, int), optional
         Columns and rows of a photograph's views, and width and height of a view.
+    middle : bool
+        Whether these are the middle views of the stored photograph, and the middle of each.
     source : Source, optional
         Where a photograph is had.
     """
@@ -72,6 +76,7 @@ class Reference:
     sha256: str | None = None
     views: tuple[int, int] | None = None
     view_pixels: tuple[int, int] | None = None
+    middle: bool = False
     source: Source | None = None
 
     def made_camera(self) -> IICamera:
@@ -79,6 +84,26 @@ class Reference:
         if isinstance(self.camera, str):
             return preset(self.camera, scale=self.scale)
         return IICamera.from_json({"name": self.name, **self.camera})
+
+    def part(self, picture: IIPicture) -> IIPicture:
+        """Return the part of a stored photograph that the definition takes.
+
+        Raises
+        ------
+        ValueError
+            If the photograph is smaller.
+        """
+        if not self.middle or self.views is None or self.view_pixels is None:
+            return picture
+        (columns, rows), (width, height) = self.views, self.view_pixels
+        field = picture.light_field
+        spans = []
+        for name, few, most in zip("TSVU", (height, width, rows, columns), field.shape, strict=False):
+            if few > most:
+                raise ValueError(f"{self.name} has {name} = {most}: at least {few} is needed")
+            spans.append(slice((most - few) // 2, (most - few) // 2 + few))
+        pixels = field[tuple(spans)].transpose(0, 2, 1, 3, 4).reshape(height * rows, width * columns, 3)
+        return IIPicture(np.ascontiguousarray(pixels), (width, height), (columns, rows))
 
     def matches(self, sha256: str) -> bool | None:
         """Return whether pixels of this hash are those of the definition; None if it does not fix them."""
@@ -198,7 +223,8 @@ def _reference(values: Mapping[str, Any]) -> Reference:
 
 
 def _photograph(values: Mapping[str, Any]) -> Reference:
-    _check_keys("photograph", values, PHOTOGRAPH)
+    _check_keys("photograph", values, PHOTOGRAPH, optional={"middle"})
+    checks.flag("middle", values.get("middle", False))
     sizes: Any = {name: checks.whole_pair(name, values[name]) for name in ("views", "view_pixels")}
     return Reference(**{**values, **sizes, "source": source_of(values["source"])})
 

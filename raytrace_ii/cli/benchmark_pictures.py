@@ -225,7 +225,7 @@ def _read(reference: Reference, place: Path) -> tuple[Path, Subject]:
 
     if reference.frames is None:
         path = place / f"{reference.name}.png"
-        return path, IIPicture.load(path)
+        return path, reference.part(IIPicture.load(path))
     path = place / reference.name
     video = open_video(path)
     if video.frames != reference.frames:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .cluster import Dask, check_cluster, cluster
 from .common import Force, app, check_outputs, columns
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, say_done
@@ -20,6 +21,9 @@ def benchmark(
     ] = None,
     scheme: Annotated[
         str | None, typer.Option(help="Scheme from `raytrace-ii schemes`, options after a colon.")
+    ] = None,
+    anchor: Annotated[
+        str | None, typer.Option(help="Coder of FFmpeg with best settings, such as vvenc; `--anchor list` lists all.")
     ] = None,
     external: Annotated[
         tuple[str, str],
@@ -37,6 +41,8 @@ def benchmark(
         bool, typer.Option("--list", help="List the pictures of the profile, and where photographs are had.")
     ] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The result, .json.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Points measured at a time, in threads; 1 by default.")] = None,
+    dask: Dask = None,
     plugin: Plugins = None,
     force: Force = False,
 ) -> None:
@@ -44,18 +50,24 @@ def benchmark(
 
     Every point is written when it is measured. The same command continues a run that failed or was stopped.
     """
+    from metrics.benchmark.anchors import ANCHORS
     from metrics.benchmark.profile import profile as profile_of
     from metrics.benchmark.profile import profile_names
     from metrics.benchmark.result import run, write_result
     from metrics.benchmark.run_log import RunLog
+    from metrics.rates.rd import identity
 
     from .benchmark_coders import coder_of
     from .benchmark_pictures import listing, rendered, stored
 
     load_plugins(plugin)
+    if anchor == "list":
+        columns({name: one.about for name, one in ANCHORS.items()})
+        return
     if profile is None:
         columns(profile_names())
         return
+    check_cluster(workers, dask, plugin)
     defined = profile_of(profile)
     if list_:
         for line in listing(defined, pictures):
@@ -64,12 +76,16 @@ def benchmark(
     if output is None:
         raise ValueError("output is missing: -o result.json is needed")
     check_outputs([output], force)
-    coder, tools = coder_of(defined, scheme, external, name, views)
+    coder, tools = coder_of(defined, scheme, anchor, external, name, views)
     made = rendered if pictures is None else stored(defined, pictures)
     log = RunLog(output.with_suffix(".points.jsonl"), defined, coder, tools.get("commands"), restart=force)
     try:
-        with progress_bar(f"{defined.name} {defined.version}, {coder}") as progress:
-            result = run(defined, coder, made, progress=progress, log=log, **tools)
+        with (
+            cluster(dask, identity) as executor,
+            progress_bar(f"{defined.name} {defined.version}, {coder}") as progress,
+        ):
+            means = {"workers": workers or 1} if executor is None else {"executor": executor}
+            result = run(defined, coder, made, progress=progress, log=log, means=means, **tools)
     except ValueError as error:
         kept = f"; finished points are in {log.path}, the same command continues" if log.path.exists() else ""
         raise ValueError(f"{error}{kept}") from error

@@ -50,7 +50,7 @@ def test_a_coder_is_run_and_ranked(run, tmp_path):
     code, out, _ = run("ranking", definition, *files, "-o", page)
     assert code == 0 and out.splitlines()[0].startswith("1  ") and page.exists() and page.with_suffix(".png").exists()
     assert {line.split()[0] for line in run("benchmark")[1].splitlines()} == {
-        "dissertation", "jpeg-pleno", "photographs", "small", "takes"
+        "dissertation", "jpeg-pleno", "photographs", "photographs-small", "small", "takes"
     }  # fmt: skip
 
 
@@ -58,8 +58,13 @@ def test_a_coder_is_run_and_ranked(run, tmp_path):
     ("arguments", "message"),
     [
         (("small",), "output is missing"),
-        (("small", "-o", "r.json"), "coder is missing: either --scheme or --external"),
+        (("small", "-o", "r.json"), "coder is missing: either --scheme, --anchor or --external"),
         (("small", "-o", "r.json", "--scheme", "h264"), "unknown scheme"),
+        (("small", "-o", "r.json", "--scheme", "jpeg", "--workers", "0"), "workers is 0"),
+        (
+            ("small", "-o", "r.json", "--scheme", "jpeg", "--workers", "2", "--dask", "x:1"),
+            "leave it out with --dask",
+        ),
         (("small", "-o", "r.json", "--external", "python3 {in} {out}", "python3 {in} {out}"), "--name gives"),
         (("small", "-o", "r.json", "--name", "x", "--external", "python3 {in}", "python3 {in} {out}"), "no {out}"),
         (("large", "-o", "r.json", "--scheme", "jpeg"), "unknown profile 'large'"),

@@ -424,8 +424,15 @@ def test_wrong_commands_are_refused_before_work(encoder, message):
 
 
 def test_profiles_of_the_package():
-    assert set(profile_names()) == {"dissertation", "jpeg-pleno", "photographs", "small", "takes"}
-    for photograph in profile("photographs").pictures:
+    assert set(profile_names()) == {
+        "dissertation",
+        "jpeg-pleno",
+        "photographs",
+        "photographs-small",
+        "small",
+        "takes",
+    }
+    for photograph in (*profile("photographs").pictures, *profile("photographs-small").pictures):
         assert photograph.source and len(photograph.source.commit) == 40 and len(photograph.sha256) == 64
     pleno, own = profile("jpeg-pleno"), profile("dissertation")
     assert pleno.rates_bpp == (0.001, 0.005, 0.02, 0.1, 0.75) and {"q_ctc_psnr", "q_ctc_ssim"} <= set(pleno.measures)
