@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -19,20 +20,32 @@ from .kernels.appearance import attenuate, look_closely, paint
 from .kernels.arrays import Generation, Onward, Passage, Rays, Recorded, ShadowRays, Stages
 from .kernels.attributes import footprints
 from .kernels.clear import pass_clear_face, pass_faces, start_inside, tell_inside
-from .kernels.lanes import work
+from .kernels.lanes import PACKET, work
 from .kernels.light import add_unblocked, keep_unblocked
 from .kernels.sampling import lobe_keys
-from .kernels.shade import record, shade
 from .kernels.sky import add_sky_image
 from .kernels.spawn import reflect
 from .kernels.spawn import spawn as spawn_rays
 from .kernels.start import start_rays, start_separable_rays
-from .kernels.tables import COUNTS, PASSED, REFLECTION, REFRACTION, SKY_IMAGE, SPAWNED, WEAK_SHADOW
+from .kernels.tables import (
+    COUNTS,
+    EMBREE_TICKS,
+    PASSED,
+    REFLECTION,
+    REFRACTION,
+    SHADOW,
+    SKY_IMAGE,
+    SPAWNED,
+    TICKS,
+    WEAK_SHADOW,
+)  # fmt: skip
+from .kernels.way import record, way_kernel
 from .packing import PackedScene, packed
 from .support_images import RECORDED
 
 KINDS = ("primary", "shadow", "reflection", "refraction")
 _NO_ROWS = np.empty(0, np.int32)
+_NO_HITS = Hits(_NO_ROWS, *(np.empty(0, np.float32) for _ in range(3)))  # the kernel finds them
 LOBE_RAYS = 16  # over the lobe of a rough mirror, for each pixel
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
@@ -213,6 +226,11 @@ class Tracer:
         self._whole = np.ones((capacity, 3), np.float32), np.arange(capacity, dtype=np.int32)
         self._shadow = _shadow_room(0, self.scene.nested)
         self._work = work()
+        self._tools = self.scene.intersector.tools(self._work.single[PACKET:])
+        self._follow = way_kernel(self.scene.intersector.width)
+        # hits and shadow rays that the kernel does not see to the end
+        self._finds = self._tools.nearest.packet != 0 and not self.scene.passes
+        self._later = self._tools.occluded.packet == 0 or self.scene.lets_through
         self._addresses: dict[Any, int] = {}  # of stages: the types of their arguments stay the same
 
     def begin(self) -> None:
@@ -300,21 +318,25 @@ class Tracer:
     ) -> Rays:
         """Trace and shade one generation; the next one comes back."""
         s, n = self.scene, len(rays.pixels)
-        hits = self._hits(rays)
+        hits = _NO_HITS if self._finds else self._hits(rays)
         spawn = spawn and (s.mirrors or s.transmits or s.blends)
         most = (lobe_rays if s.glossy else 1) + s.transmits + 2 * s.disperses + s.blends
         following = _room(most * n if spawn else 0, s.nested, s.glossy, any(self.footprint))
-        if len(self._shadow.reach) < n * len(s.lights):
+        if self._later and len(self._shadow.reach) < n * len(s.lights):
             self._shadow = _shadow_room(n * len(s.lights), s.nested)
         counts, lit = np.zeros(COUNTS, np.int64), np.zeros(len(s.lights), np.int64)
-        passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint, placed=s.passes)
+        passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint, placed=s.passes, later=self._later)
         images: list[Any] = [*(support or Support()).rows(), self.pose[:3, 3], self.pose[:3, 2]]
         generation = Generation(
-            hits, rays, s.surfaces, s.surroundings, passage, Recorded(*images), radiance, self._shadow, following,
-            counts, lit, self._work,
+            hits, self._tools, s.intersector.first_of_same, rays, s.surfaces, s.surroundings, passage,
+            Recorded(*images), radiance, self._shadow, following, counts, lit, self._work,
         )  # fmt: skip
-        shade(generation, self._stages(generation, support is not None, spawn))
-        self.count.rays.update({"reflection": int(counts[REFLECTION]), "refraction": int(counts[REFRACTION])})
+        start = time.thread_time()
+        self._follow(generation, self._stages(generation, support is not None, spawn))
+        share = int(counts[EMBREE_TICKS]) / max(int(counts[TICKS]), 1)
+        self.count.embree_seconds += share * (time.thread_time() - start)
+        kinds = {"shadow": SHADOW, "reflection": REFLECTION, "refraction": REFRACTION}
+        self.count.rays.update({kind: int(counts[column]) for kind, column in kinds.items()})
         self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[WEAK_SHADOW:PASSED]), strict=True)))
         if s.blends:
             self.count.rays["passed"] += int(counts[PASSED])
@@ -386,15 +408,15 @@ class Tracer:
             )  # fmt: skip
 
     def _light(self, shadow: ShadowRays, radiance: NDArray[np.float32]) -> None:
-        """Add the light of the shadow rays that nothing opaque stops, dimmed by what is clear."""
-        s = self.scene
-        self.count.rays["shadow"] += len(shadow.pixels)
-        found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, shadow.reach)
-        self.count.embree_seconds += seconds
-        if not s.lets_through:
-            add_unblocked(found, shadow.colours, shadow.pixels, radiance)
-            return
-        kept = keep_unblocked(found, *shadow)
+        """Add the light of shadow rays that nothing opaque stops, as told here or before, dimmed by what is clear."""
+        s, kept = self.scene, len(shadow.pixels)
+        if self._tools.occluded.packet == 0:
+            found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, shadow.reach)
+            self.count.embree_seconds += seconds
+            if not s.lets_through:
+                add_unblocked(found, shadow.colours, shadow.pixels, radiance)
+                return
+            kept = keep_unblocked(found, *shadow)
         for _ in range(MOST_CLEAR_FACES):
             shadow = _rows(shadow, slice(kept))
             hits, seconds = s.intersector.nearest_clear(shadow.origins, shadow.directions, shadow.reach)

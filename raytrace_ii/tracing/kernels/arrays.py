@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .lanes import Work
+from .packets import Tools
 
 Single = NDArray[np.float32]
 Double = NDArray[np.float64]
@@ -54,19 +55,19 @@ class ShadowRays(NamedTuple):
 class Surfaces(NamedTuple):
     """Faces, materials and textures of a scene, as `packing.PackedScene` describes them.
 
-    The ``flat_`` arrays are the same memory in one dimension.
+    ``rows`` is the table of faces in one dimension, of so many ``columns``, ``faces`` its columns from the normal on,
+    ``looks`` the first columns of ``materials`` in one dimension.
     """
 
+    rows: Single
+    columns: int
+    smooth: bool
     corners: Single
     faces: Single
-    normals: Single
     coordinates: Single
     object_of_face: Whole
     materials: Double
-    flat_corners: Single
-    flat_faces: Single
-    flat_normals: Single
-    flat_materials: Double
+    looks: Single
     textures: Double
     texels: tuple[Single, NDArray[np.uint8]]
     alphas: Single
@@ -105,7 +106,8 @@ class Passage(NamedTuple):
     """How one generation is shaded.
 
     ``least`` is the least weight of a spawned ray. Up to ``lobe_rays`` rays go over the lobe of a rough mirror, whose
-    places stand ``lobe_stride`` apart. A ray is ``first_width`` wide where it starts, if it has no width of its own,
+    places stand ``lobe_stride`` apart. Shadow rays are written for ``later`` if they may pass through clear bodies or
+    Embree cannot be called from the kernel. A ray is ``first_width`` wide where it starts, if it has no width of its own,
     and grows by ``spread`` a mm, from a negative width through 0: images are filtered over its width, not at all if
     both are 0. Hits that are not ``placed`` stand where Embree put them.
     """
@@ -116,6 +118,7 @@ class Passage(NamedTuple):
     first_width: float
     spread: float
     placed: bool
+    later: bool
 
 
 class Recorded(NamedTuple):
@@ -144,10 +147,14 @@ class Stages(NamedTuple):
 class Generation(NamedTuple):
     """One generation of rays with everything that its shading reads and fills.
 
-    Shadow rays take n rows for each light, of which ``lit`` are filled; ``counts`` are those of `tables`.
+    ``hits`` are of no rows if the kernel finds them, by ``tools``; of coincident faces the ``first_of_same`` counts,
+    of no rows if there are none. Shadow rays take n rows for each light, of which ``lit`` are filled; ``counts`` are
+    those of `tables`.
     """
 
     hits: Hits
+    tools: Tools
+    first_of_same: Whole
     rays: Rays
     surfaces: Surfaces
     surroundings: Surroundings

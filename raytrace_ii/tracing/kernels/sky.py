@@ -6,39 +6,42 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import late_kernel, part_kernel
+from ii_core.base.jit import late_kernel, part_kernel, stage_kernel
 
+from . import lanes as at
 from .addresses import value_at
 from .lanes import BLOCK
 from .tables import SKY_IMAGE, SKY_INTENSITY, SKY_TURN
 from .textures import filtered
 
+_ZERO, _ONE = np.float32(0), np.float32(1)
 
-@part_kernel
-def background_colour(background, dy):
-    """Colour of the sky for a unit direction with the upward component ``dy``."""
-    t = min(abs(dy) * background[9], 1.0)
-    pole = 3 if dy > 0.0 else 6
-    return (
-        background[0] + t * (background[pole] - background[0]),
-        background[1] + t * (background[pole + 1] - background[1]),
-        background[2] + t * (background[pole + 2] - background[2]),
-    )
+
+@stage_kernel
+def add_background(background, single):
+    """Add the colour of the sky to all lanes without a hit."""
+    for c in range(3):
+        horizon, zenith, nadir = np.float32(background[c]), np.float32(background[3 + c]), np.float32(background[6 + c])
+        for k in range(BLOCK):
+            dy = single[at.DY + k]
+            t = min(abs(dy) * np.float32(background[9]), _ONE)
+            light = horizon + t * ((zenith if dy > _ZERO else nadir) - horizon)
+            missed = single[at.HIT + k] == _ZERO
+            single[at.L0 + c * BLOCK + k] += single[at.W0 + c * BLOCK + k] * light if missed else _ZERO
 
 
 @late_kernel
 def add_sky_image(generation, first, lanes, _):
-    """Add the light of an equirectangular image around the scene, of all rays of a block that miss."""
+    """Add the light of an equirectangular image around the scene to all lanes without a hit."""
     g = value_at(generation)
-    rays, radiance = g.rays, g.radiance
-    for i in range(first, min(first + BLOCK, g.hits.faces.shape[0])):
-        if g.hits.faces[i] < 0:
-            dx, dy, dz = float(rays.directions[i, 0]), float(rays.directions[i, 1]), float(rays.directions[i, 2])
+    single = g.work.single
+    for k in range(lanes):
+        if single[at.HIT + k] == _ZERO:
+            dx, dy, dz = float(single[at.DX + k]), float(single[at.DY + k]), float(single[at.DZ + k])
             red, green, blue = _sky_image(g.surroundings.background, g.surfaces, dx, dy, dz, g.passage.spread)
-            pixel = rays.pixels[i]
-            radiance[pixel, 0] += float(rays.weights[i, 0]) * red
-            radiance[pixel, 1] += float(rays.weights[i, 1]) * green
-            radiance[pixel, 2] += float(rays.weights[i, 2]) * blue
+            single[at.L0 + k] += single[at.W0 + k] * red
+            single[at.L1 + k] += single[at.W1 + k] * green
+            single[at.L2 + k] += single[at.W2 + k] * blue
 
 
 @part_kernel
