@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import late_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import lane_stage, late_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
@@ -67,7 +67,7 @@ def attenuate(generation, first, lanes, _):
             single[at.W2 + k] *= through
 
 
-@stage_kernel
+@lane_stage
 def take_materials(surfaces, work):
     """Bring the materials of all lanes to them, without textures and whatever else is in ``EXTRAS``.
 
@@ -88,7 +88,7 @@ def take_materials(surfaces, work):
     return extras > _ZERO
 
 
-@stage_kernel
+@lane_stage
 def scatter(ambient, single):
     """Colours of scattered light, as seen: weight times texture and material; start with light given off."""
     for c in range(3):

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import exact_stage_kernel, late_kernel, stage_kernel
+from ii_core.base.jit import exact_lane_stage, inline_kernel, late_kernel
+from ii_core.base.jit import lane_stage as stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
@@ -14,7 +15,7 @@ from .lanes import BLOCK, take_rows
 from .packets import place_hit
 from .tables import ALL_COLUMNS, FLAT_COLUMNS, IMAGES
 from .textures import footprint
-from .vectors import three, three_doubles
+from .vectors import three, three_doubles, three_of_row
 
 _ZERO, _ONE, _THIRD, _WIDE = np.float32(0), np.float32(1), np.float32(1 / 3), np.int64(FLAT_COLUMNS)
 
@@ -24,10 +25,10 @@ def take_rays(first, lanes, rays, single):
     """Bring a packet of rays to lanes; lanes to spare have the last one."""
     for k in range(BLOCK):
         i = np.uint64(first + min(k, lanes - 1))
-        for c in range(3):
-            single[at.START + c * BLOCK + k] = rays.origins[i, c]
-            single[at.DX + c * BLOCK + k] = rays.directions[i, c]
-            single[at.W0 + c * BLOCK + k] = rays.weights[i, c]
+        o, d, w = at.START + k, at.DX + k, at.W0 + k
+        single[o], single[o + BLOCK], single[o + 2 * BLOCK] = three_of_row(rays.origins, i)
+        single[d], single[d + BLOCK], single[d + 2 * BLOCK] = three_of_row(rays.directions, i)
+        single[w], single[w + BLOCK], single[w + 2 * BLOCK] = three_of_row(rays.weights, i)
 
 
 @stage_kernel
@@ -64,7 +65,7 @@ def take_faces(surfaces, single, whole):
     return hits
 
 
-@exact_stage_kernel
+@exact_lane_stage
 def settle(single):
     """Put u, v and distance as `place_hit` gives them in place of Embree's."""
     for k in range(BLOCK):
@@ -146,19 +147,23 @@ def up_to_smooth(single):
         px, py, pz = three(single, at.PX, k)
         gx, gy, gz = three(single, at.GX, k)
         u, v = single[at.U + k], single[at.V + k]
-        x, y, z = _ZERO, _ZERO, _ZERO
-        for c in range(3):
-            share = _ONE - u - v if c == 0 else (u if c == 1 else v)
-            n, p = at.NORMAL + 3 * c * BLOCK + k, at.CORNER + 3 * c * BLOCK + k
-            nx, ny, nz = single[n], single[n + BLOCK], single[n + 2 * BLOCK]
-            side = -_ONE if nx * gx + ny * gy + nz * gz < _ZERO else _ONE  # of a face seen from behind
-            above = (px - single[p]) * nx + (py - single[p + BLOCK]) * ny + (pz - single[p + 2 * BLOCK]) * nz
-            up = share * side * min(side * above, _ZERO)
-            x, y, z = x - up * nx, y - up * ny, z - up * nz
-        smooth = single[at.SMOOTH + k] > _ZERO
+        x0, y0, z0 = _up(single, at.NORMAL + k, at.CORNER + k, _ONE - u - v, px, py, pz, gx, gy, gz)
+        x1, y1, z1 = _up(single, at.NORMAL + 3 * BLOCK + k, at.CORNER + 3 * BLOCK + k, u, px, py, pz, gx, gy, gz)
+        x2, y2, z2 = _up(single, at.NORMAL + 6 * BLOCK + k, at.CORNER + 6 * BLOCK + k, v, px, py, pz, gx, gy, gz)
+        x, y, z, smooth = x0 + x1 + x2, y0 + y1 + y2, z0 + z1 + z2, single[at.SMOOTH + k] > _ZERO
         single[at.AX + k], single[at.AY + k], single[at.AZ + k] = (
             x if smooth else _ZERO, y if smooth else _ZERO, z if smooth else _ZERO,
         )  # fmt: skip
+
+
+@inline_kernel
+def _up(single, n, p, share, px, py, pz, gx, gy, gz):
+    """A share of the way up onto the tangent plane of the corner ``p`` with the normal ``n``, if it lies above."""
+    nx, ny, nz = single[n], single[n + BLOCK], single[n + 2 * BLOCK]
+    side = -_ONE if nx * gx + ny * gy + nz * gz < _ZERO else _ONE  # of a face seen from behind
+    above = (px - single[p]) * nx + (py - single[p + BLOCK]) * ny + (pz - single[p + 2 * BLOCK]) * nz
+    up = -share * side * min(side * above, _ZERO)
+    return up * nx, up * ny, up * nz
 
 
 @late_kernel

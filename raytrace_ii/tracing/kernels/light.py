@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from ii_core.base.jit import lane_stage as stage_kernel
 from ii_core.base.jit import lean_kernel as kernel
-from ii_core.base.jit import stage_kernel
 
 from . import lanes as at
 from .lanes import BLOCK, slot

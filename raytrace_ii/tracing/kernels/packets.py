@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core.base.jit import exact_kernel as kernel
-from ii_core.base.jit import exact_stage_kernel as stage_kernel
-from ii_core.base.jit import inline_kernel, part_kernel
+from ii_core.base.jit import exact_lane_stage as stage_kernel
+from ii_core.base.jit import inline_kernel, lane_stage, part_kernel
 
 from . import lanes as at
 from .addresses import call
@@ -82,7 +82,7 @@ class Tools(NamedTuple):
 
 def _reduce(function: Any) -> Any:
     """A kernel's inner function whose minima may be taken in any order, and so in vectors: packets have no NaN."""
-    return part_kernel(function, fastmath={"nnan", "nsz"}, forceinline=True)
+    return lane_stage(function, fastmath={"nnan", "nsz"})
 
 
 @inline_kernel
@@ -283,10 +283,11 @@ def nearest_of_lanes(tools, first_of_same, ahead, lanes, work, width):
                 whole[at.FACE + first + lane] = -1
             continue
         _begin(packet, numbers, width)
-        for lane in range(width):
-            for c in range(3):
+        for c in range(3):
+            for lane in range(width):
                 packet[c * width + lane] = single[at.START + c * BLOCK + first + lane]
                 packet[(_DIRECTION + c) * width + lane] = single[at.DX + c * BLOCK + first + lane]
+        for lane in range(width):
             packet[_FAR * width + lane] = _NO_END
         for lane in range(width):
             numbers[_GEOMETRY * width + lane] = -1

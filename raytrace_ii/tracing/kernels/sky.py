@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import late_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import lane_stage, late_kernel, part_kernel
 
 from . import lanes as at
 from .addresses import value_at
@@ -17,7 +17,7 @@ from .textures import filtered
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
 
-@stage_kernel
+@lane_stage
 def add_background(background, single):
     """Add the colour of the sky to all lanes without a hit."""
     for c in range(3):

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ii_core.base.jit import late_kernel, stage_kernel
-from ii_core.base.jit import lean_kernel as kernel
+from ii_core.base.jit import lane_kernel as kernel
+from ii_core.base.jit import lane_stage as stage_kernel
+from ii_core.base.jit import late_kernel
 
 from . import lanes as at
 from .addresses import address_of, call, ticks, value_at
@@ -74,8 +75,9 @@ def way_kernel(width: int) -> Any:
                     add_background(g.surroundings.background, single)
             for k in range(lanes):
                 pixel = np.uint64(g.rays.pixels[first + k])
-                for c in range(3):
-                    g.radiance[pixel, c] += single[at.L0 + c * BLOCK + k]
+                g.radiance[pixel, 0] += single[at.L0 + k]
+                g.radiance[pixel, 1] += single[at.L1 + k]
+                g.radiance[pixel, 2] += single[at.L2 + k]
             if stages.record:
                 call(stages.record, here, first, lanes, 0)
             if stages.spawn and hits > 0:
