@@ -17,7 +17,7 @@ from ..scene.scene import Scene
 from .intersect import Hits
 from .kernels.addresses import addresses
 from .kernels.appearance import attenuate, look_closely, paint
-from .kernels.arrays import Generation, Onward, Passage, Rays, Recorded, ShadowRays, Stages
+from .kernels.arrays import Generation, Onward, Passage, Rays, Recorded, ShadowRays, Stages, Start
 from .kernels.attributes import footprints
 from .kernels.clear import pass_clear_face, pass_faces, start_inside, tell_inside
 from .kernels.lanes import PACKET, work
@@ -222,8 +222,11 @@ class Tracer:
         self.footprint = footprint if self.scene.images else (0.0, 0.0)
         self.begin()
         self._primary = _room(capacity, self.scene.nested, self.scene.glossy)
-        # weights and pixels of rays that carry all light, one a pixel: read only
-        self._whole = np.ones((capacity, 3), np.float32), np.arange(capacity, dtype=np.int32)
+        self._pixels = np.arange(capacity, dtype=np.int32)  # of rays one a pixel: read only
+        nothing = np.empty((0, 2))
+        self._no_start = Start(
+            nothing, nothing, np.zeros(2), _NO_ROWS, _NO_ROWS, self.pose[:3, :3], self.pose[:3, 3]
+        )  # fmt: skip
         self._shadow = _shadow_room(0, self.scene.nested)
         self._work = work()
         self._tools = self.scene.intersector.tools(self._work.single[PACKET:])
@@ -274,7 +277,7 @@ class Tracer:
             support.clear()
         if keys is not None:
             room.keys[:n] = keys[room.pixels[:n]]
-        self._trace(room, n, radiance, support)
+        self._trace(room, n, radiance, support, self._no_start)
 
     def run_separable(
         self,
@@ -284,23 +287,25 @@ class Tracer:
         rows: NDArray[np.int32],
         columns: NDArray[np.int32],
         keys: NDArray[np.uint64] | None = None,
-    ) -> bool:
-        """`run` for rays of `IICamera.separable_rays`; if some are unusable, nothing is done and False comes back.
+    ) -> None:
+        """`run` for rays of `IICamera.separable_rays`, all of them `usable`.
 
         ``rows`` and ``columns`` name the rays in the order in which they are traced.
         """
-        room, n = self._primary, len(rows)
-        usable = start_separable_rays(
-            *rays, rows, columns, self.pose[:3, :3], self.pose[:3, 3], room.origins, room.directions
-        )
-        if usable:
-            room.inside.fill(-1)
-            if keys is not None:
-                room.keys[:n] = keys
-            self._trace(room._replace(weights=self._whole[0], pixels=self._whole[1]), n, radiance, support)
-        return bool(usable)
+        start = Start(*rays, rows, columns, self.pose[:3, :3], self.pose[:3, 3])
+        room, n = self._primary._replace(pixels=self._pixels), len(rows)
+        room.inside.fill(-1)
+        if keys is not None:
+            room.keys[:n] = keys
+        if self.scene.transmits or not self._finds:  # they are wanted before the kernel runs
+            start_separable_rays(start, room.origins, room.directions)
+            room.weights.fill(1)
+            start = self._no_start
+        self._trace(room, n, radiance, support, start)
 
-    def _trace(self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None) -> None:
+    def _trace(
+        self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None, start: Start
+    ) -> None:
         """Trace the first n of the primary rays."""
         rays = _rows(primary, slice(n))
         self.count.rays["primary"] += n
@@ -309,13 +314,15 @@ class Tracer:
         for depth in range(self.max_depth + 1):
             lobe_rays = self.lobes[0] if depth == 0 else 1
             spawn = depth < self.max_depth
-            rays = self._generation(rays, radiance, support if depth == 0 else None, spawn, lobe_rays)
+            rays = self._generation(start, rays, radiance, support if depth == 0 else None, spawn, lobe_rays)
+            start = self._no_start
             if not len(rays.pixels):
                 break
 
     def _generation(
-        self, rays: Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool, lobe_rays: int
-    ) -> Rays:
+        self, start: Start, rays: Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool,
+        lobe_rays: int,
+    ) -> Rays:  # fmt: skip
         """Trace and shade one generation; the next one comes back."""
         s, n = self.scene, len(rays.pixels)
         hits = _NO_HITS if self._finds else self._hits(rays)
@@ -328,13 +335,13 @@ class Tracer:
         passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint, placed=s.passes, later=self._later)
         images: list[Any] = [*(support or Support()).rows(), self.pose[:3, 3], self.pose[:3, 2]]
         generation = Generation(
-            hits, self._tools, s.intersector.first_of_same, rays, s.surfaces, s.surroundings, passage,
+            hits, self._tools, s.intersector.first_of_same, start, rays, s.surfaces, s.surroundings, passage,
             Recorded(*images), radiance, self._shadow, following, counts, lit, self._work,
         )  # fmt: skip
-        start = time.thread_time()
+        started = time.thread_time()
         self._follow(generation, self._stages(generation, support is not None, spawn))
         share = int(counts[EMBREE_TICKS]) / max(int(counts[TICKS]), 1)
-        self.count.embree_seconds += share * (time.thread_time() - start)
+        self.count.embree_seconds += share * (time.thread_time() - started)
         kinds = {"shadow": SHADOW, "reflection": REFLECTION, "refraction": REFRACTION}
         self.count.rays.update({kind: int(counts[column]) for kind, column in kinds.items()})
         self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[WEAK_SHADOW:PASSED]), strict=True)))

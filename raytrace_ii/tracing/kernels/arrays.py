@@ -41,6 +41,21 @@ class Rays(NamedTuple):
     widths: Single
 
 
+class Start(NamedTuple):
+    """Camera rays of `IICamera.separable_rays`: ``rows`` and ``columns`` of the pixels in their order, and the pose.
+
+    Of no rows if the rays come from elsewhere.
+    """
+
+    x: Double
+    y: Double
+    z: Double
+    rows: Whole
+    columns: Whole
+    rotation: Double
+    shift: Double
+
+
 class ShadowRays(NamedTuple):
     """Rays to lights, with the light that they would let through; as many rows for each light as rays are shaded."""
 
@@ -148,13 +163,15 @@ class Generation(NamedTuple):
     """One generation of rays with everything that its shading reads and fills.
 
     ``hits`` are of no rows if the kernel finds them, by ``tools``; of coincident faces the ``first_of_same`` counts,
-    of no rows if there are none. Shadow rays take n rows for each light, of which ``lit`` are filled; ``counts`` are
+    of no rows if there are none. Origins, directions and weights of ``rays`` are of no rows if they ``start`` within
+    the kernel. Shadow rays take n rows for each light, of which ``lit`` are filled; ``counts`` are
     those of `tables`.
     """
 
     hits: Hits
     tools: Tools
     first_of_same: Whole
+    start: Start
     rays: Rays
     surfaces: Surfaces
     surroundings: Surroundings

@@ -61,7 +61,7 @@ def take_faces(surfaces, single, whole):
         if columns == ALL_COLUMNS:
             take_rows(surfaces.rows, columns, _WIDE, whole, np.int64(at.TABLE_ROW), single, np.int64(at.NORMAL))
         for k in range(BLOCK):
-            whole[at.BODY + k] = surfaces.object_of_face[np.uint64(whole[at.TABLE_ROW + k])]
+            whole[at.BODY + k] = np.int64(single[at.FACE_BODY + k])
     return hits
 
 

@@ -6,7 +6,12 @@ import math
 
 import numpy as np
 
+from ii_core.base.jit import inline_kernel, lane_stage
 from ii_core.base.jit import lean_kernel as kernel
+
+from . import lanes as at
+from .lanes import BLOCK
+from .vectors import put
 
 _LEAST, _MOST = 1e-150, 1e150  # between them squares and their sums neither vanish nor overflow
 
@@ -54,35 +59,49 @@ def start_rays(
 
 
 @kernel
-def start_separable_rays(x, y, z, rows, columns, rotation, shift, out_origins, out_directions):
-    """As `start_rays` for a block of pixels whose rays all carry all light, from `IICamera.separable_rays`.
-
-    ``rows`` and ``columns`` name the pixels in the order in which their rays are to stand.
-
-    Returns
-    -------
-    bool
-        Whether all rays are usable for sure: told of rows and columns, not of rays.
-    """
-    r00, r01, r02 = rotation[0, 0], rotation[0, 1], rotation[0, 2]
-    r10, r11, r12 = rotation[1, 0], rotation[1, 1], rotation[1, 2]
-    r20, r21, r22 = rotation[2, 0], rotation[2, 1], rotation[2, 2]
-    s0, s1, s2 = shift[0], shift[1], shift[2]
-    lz, dz = z[0], z[1]
-    sure = (_LEAST < abs(dz) < _MOST) & (abs(lz) < _MOST)
+def usable(x, y, z):
+    """Whether all rays of `IICamera.separable_rays` are usable for sure: told of rows and columns, not of rays."""
+    sure = (_LEAST < abs(z[1]) < _MOST) & (abs(z[0]) < _MOST)
     for rays in (x, y):
         for k in range(rays.shape[0]):
             sure &= (abs(rays[k, 0]) < _MOST) & (abs(rays[k, 1]) < _MOST)
-    for ray in range(rows.shape[0]):
-        i = np.uint64(ray)  # unsigned: numba need not look for negative indices
-        column, row = np.uint64(columns[i]), np.uint64(rows[i])
-        lx, dx = x[column, 0], x[column, 1]
-        ly, dy = y[row, 0], y[row, 1]
-        inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
-        out_origins[i, 0] = r00 * lx + r01 * ly + r02 * lz + s0
-        out_origins[i, 1] = r10 * lx + r11 * ly + r12 * lz + s1
-        out_origins[i, 2] = r20 * lx + r21 * ly + r22 * lz + s2
-        out_directions[i, 0] = (r00 * dx + r01 * dy + r02 * dz) * inverse
-        out_directions[i, 1] = (r10 * dx + r11 * dy + r12 * dz) * inverse
-        out_directions[i, 2] = (r20 * dx + r21 * dy + r22 * dz) * inverse
     return sure
+
+
+@inline_kernel
+def _separable_ray(start, column, row):
+    """Origin and direction of the ray of a pixel, from `IICamera.separable_rays`."""
+    r, s, lz, dz = start.rotation, start.shift, start.z[0], start.z[1]
+    lx, dx, ly, dy = start.x[column, 0], start.x[column, 1], start.y[row, 0], start.y[row, 1]
+    inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
+    return (
+        r[0, 0] * lx + r[0, 1] * ly + r[0, 2] * lz + s[0],
+        r[1, 0] * lx + r[1, 1] * ly + r[1, 2] * lz + s[1],
+        r[2, 0] * lx + r[2, 1] * ly + r[2, 2] * lz + s[2],
+        (r[0, 0] * dx + r[0, 1] * dy + r[0, 2] * dz) * inverse,
+        (r[1, 0] * dx + r[1, 1] * dy + r[1, 2] * dz) * inverse,
+        (r[2, 0] * dx + r[2, 1] * dy + r[2, 2] * dz) * inverse,
+    )
+
+
+@lane_stage
+def start_lanes(first, lanes, start, single):
+    """Start a packet of rays of `IICamera.separable_rays` that carry all light; lanes to spare have the last one."""
+    for k in range(BLOCK):
+        i = np.uint64(first + min(k, lanes - 1))
+        x, y, z, dx, dy, dz = _separable_ray(start, np.uint64(start.columns[i]), np.uint64(start.rows[i]))
+        o, d = at.START + k, at.DX + k
+        single[o], single[o + BLOCK], single[o + 2 * BLOCK] = x, y, z
+        single[d], single[d + BLOCK], single[d + 2 * BLOCK] = dx, dy, dz
+    for k in range(3 * BLOCK):
+        single[at.W0 + k] = np.float32(1)
+
+
+@kernel
+def start_separable_rays(start, out_origins, out_directions):
+    """As `start_lanes` for all rays, into arrays."""
+    for ray in range(start.rows.shape[0]):
+        i = np.uint64(ray)  # unsigned: numba need not look for negative indices
+        x, y, z, dx, dy, dz = _separable_ray(start, np.uint64(start.columns[i]), np.uint64(start.rows[i]))
+        put(out_origins, i, x, y, z)
+        put(out_directions, i, dx, dy, dz)

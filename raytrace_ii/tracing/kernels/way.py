@@ -29,6 +29,7 @@ from .lanes import BLOCK
 from .light import add_free, in_cone, keep_rays, lift_rays, reach_of, towards_light, weigh
 from .packets import nearest_of_lanes, occluded_of_lanes
 from .sky import add_background
+from .start import start_lanes
 from .tables import ALL_COLUMNS, EMBREE_TICKS, TICKS
 from .vectors import interpolate, put
 
@@ -55,7 +56,10 @@ def way_kernel(width: int) -> Any:
         for first in range(0, n, BLOCK):
             lanes, timed = min(BLOCK, n - first), first & _TIMED == 0
             start = ticks() if timed else 0
-            take_rays(first, lanes, g.rays, single)
+            if g.start.rows.shape[0] > 0:
+                start_lanes(first, lanes, g.start, single)
+            else:
+                take_rays(first, lanes, g.rays, single)
             if found:
                 take_hits(first, lanes, g.hits, single, whole)
             else:
