@@ -165,6 +165,11 @@ def lane_stage(function: Callable[..., Any], **options: Any) -> Any:
     return _part(function, _LanePartCompiler, **{"forceinline": True, "fastmath": {"contract"}, **options})
 
 
+def lane_part(function: Callable[..., Any]) -> Any:
+    """Compile a part of a `lane_kernel` that stays a function of its own, as that of `part_kernel` does."""
+    return _part(function, _LanePartCompiler, fastmath={"contract"})
+
+
 def exact_lane_stage(function: Callable[..., Any]) -> Any:
     """Compile a part as `lane_stage` does, which rounds after every operation as `exact_kernel` does."""
     return _part(function, _LanePartCompiler, forceinline=True)
@@ -264,7 +269,15 @@ def late_kernel(function: Callable[..., Any]) -> Any:
 
     Returns nothing, as C function. Its callers neither contain it nor optimise it a second time.
     """
-    compiled = lean_kernel(function, no_cpython_wrapper=True)
+    return _late(lean_kernel(function, no_cpython_wrapper=True))
+
+
+def late_lane_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a late kernel whose loops over lanes become vectors, as those of a `lane_kernel`."""
+    return _late(lean_kernel(function, no_cpython_wrapper=True, pipeline_class=_LaneCompiler))
+
+
+def _late(compiled: Any) -> Any:
     compiled.add_overload = lambda result: _keep(compiled, result)
     return compiled
 

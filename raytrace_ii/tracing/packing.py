@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -16,11 +17,12 @@ from ..scene.textures import Image
 from . import lift
 from .intersect import Intersector
 from .kernels import tables
-from .kernels.arrays import FaceTables, Surfaces, Surroundings
+from .kernels.arrays import FaceTables, Maps, Surfaces, Surroundings
 from .kernels.lanes import aligned
 from .kernels.tables import DIRECTIONAL, LEAST_WEIGHT, MATERIAL_COLUMNS, POINT, SPOT
 from .texture_table import TextureTable
 
+_MAPS = attrgetter("normal_map"), attrgetter("emission_map"), attrgetter("metallic_roughness_map")
 MOST_NESTED = 8  # bodies whose bounds meet in one place that a ray keeps count of
 
 _kept: WeakKeyDictionary[Scene, PackedScene] = WeakKeyDictionary()
@@ -107,14 +109,21 @@ class PackedScene:
         looks[:] = self.materials[:, : tables.LANED].reshape(-1)
         self.surfaces = Surfaces(
             rows.reshape(-1), rows.shape[1], len(normals) > 0, self.corners, self.faces, self.coordinates,
-            self.object_of_face, self.materials, looks, self.textures.table, self.textures.texels,
-            self.textures.alphas,
+            self.object_of_face, self.materials, looks, self._maps(bodies), self.textures.table,
+            self.textures.texels, self.textures.alphas,
         )  # fmt: skip
         self.face_tables = FaceTables(
             self.corners, self.faces, self.coordinates, self.object_of_face, self.materials, self.textures.table,
             self.textures.alphas,
         )  # fmt: skip
         self.surroundings = Surroundings(self.lights, self.background, self.fog, self.ambient)
+
+    def _maps(self, bodies: Sequence[Body]) -> Maps:
+        looks = [body.material for body in bodies]
+        return Maps(
+            any(isinstance(t, Image) for look in looks for t in look.textures),
+            *(any(map_of(look) is not None for look in looks) for map_of in _MAPS), self.blends,
+        )  # fmt: skip
 
 
 def _lets_through(body: Body) -> bool:

@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import lane_stage, late_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import inline_kernel, lane_stage, late_kernel, late_lane_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
 from .glossy import highlight
+from .images import read_images
 from .lanes import BLOCK, slot, take_rows
 from .media import clearness, enter, medium_of
 from .noise import fractal_lanes, vectors
@@ -27,8 +28,8 @@ from .tables import (
     NORMAL_SCALE,
     TEXTURE,
 )
-from .textures import filtered, noise_colour, pattern_colour, share_there
-from .vectors import edge, interpolate, three
+from .textures import noise_colour, pattern_colour, share_there
+from .vectors import edge, interpolate, three, three_doubles
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
@@ -114,64 +115,108 @@ def paint(generation, first, lanes, _):
         _colour_by_noise(noisy, g.surfaces, g.work)
 
 
-@late_kernel
+@late_lane_kernel
 def look_closely(generation, first, lanes, _):
     """Maps, textures, metal, and parts that are seen through."""
     g = value_at(generation)
-    materials, noisy = g.surfaces.materials, np.int64(0)  # no literal: another signature
-    filtering = g.passage.first_width != 0.0 or g.passage.spread != 0.0
+    s, single, double, whole, materials = g.surfaces, g.work.single, g.work.double, g.work.whole, g.surfaces.materials
     blending = g.following.pixels.shape[0] > 0  # the last generation takes what is blended as there
+    if g.passage.first_width == 0.0 and g.passage.spread == 0.0:
+        for k in range(4 * BLOCK):
+            single[at.AU + k] = _ZERO
+    if s.maps.any:
+        _place_on_images(single, double)
+    for k in range(3 * BLOCK):
+        single[at.B0 + k] = _ZERO
+    if s.maps.blend and blending:
+        for k in range(lanes):
+            if _is_special(k, single) and materials[whole[at.BODY + k], ALPHA_BLEND] > 0.0:
+                _blend(k, s, single, whole)
+    if s.maps.normal and _choose_images(NORMAL_MAP, lanes, s, g.work):
+        for k in range(lanes):
+            if whole[at.IMAGE + k] >= 0:
+                _map_normal(k, s, g.work)
+    if s.maps.emission and _choose_images(EMISSION_MAP, lanes, s, g.work):
+        for k in range(BLOCK):
+            mapped = whole[at.IMAGE + k] >= 0
+            single[at.E0 + k] *= single[at.Q0 + k] if mapped else _ONE
+            single[at.E1 + k] *= single[at.Q1 + k] if mapped else _ONE
+            single[at.E2 + k] *= single[at.Q2 + k] if mapped else _ONE
+    _take_textures(lanes, s, g.work)
+    mapped = s.maps.gloss and _choose_images(GLOSS_MAP, lanes, s, g.work)
     for k in range(lanes):
-        if g.work.single[at.HIT + k] * g.work.single[at.EXTRA + k] > _ZERO:
-            noisy += _take_images(k, g.surfaces, filtering, blending, g.work, noisy)
-    if noisy > 0:
-        _colour_by_noise(noisy, g.surfaces, g.work)
-    for k in range(lanes):
-        body = g.work.whole[at.BODY + k]
-        if g.work.single[at.HIT + k] * g.work.single[at.EXTRA + k] > _ZERO:
-            g.work.single[at.CLEAR + k] = clearness(materials, body)
-            if g.work.single[at.METAL + k] > 0.0 or materials[body, GLOSS_MAP] >= 0:
-                _gild(k, g.surfaces, g.work)
+        if _is_special(k, single):
+            body = whole[at.BODY + k]
+            single[at.CLEAR + k] = clearness(materials, body)
+            if single[at.METAL + k] > 0.0 or materials[body, GLOSS_MAP] >= 0:
+                _gild(k, mapped and whole[at.IMAGE + k] >= 0, s, g.work)
+
+
+@inline_kernel
+def _is_special(k, single):
+    return single[at.HIT + k] * single[at.EXTRA + k] > _ZERO
+
+
+@lane_stage
+def _place_on_images(single, double):
+    """(u, v) of all hits on the images of their bodies."""
+    for k in range(BLOCK):
+        u, v, c = np.float64(single[at.U + k]), np.float64(single[at.V + k]), at.COORDINATE + k
+        w = 1.0 - u - v
+        double[at.SU + k] = w * single[c] + u * single[c + 2 * BLOCK] + v * single[c + 4 * BLOCK]
+        double[at.SV + k] = w * single[c + BLOCK] + u * single[c + 3 * BLOCK] + v * single[c + 5 * BLOCK]
+
+
+@lane_stage
+def _choose_images(column, lanes, surfaces, work):
+    """Read one kind of map of all lanes; return whether there is any."""
+    whole, some = work.whole, False
+    for k in range(BLOCK):
+        row = -1
+        if k < lanes and _is_special(k, work.single):
+            row = int(surfaces.materials[np.uint64(whole[at.BODY + k]), column])
+        whole[at.IMAGE + k] = row
+        some |= row >= 0
+    if some:
+        read_images(surfaces.textures, surfaces.texels, work)
+    return some
 
 
 @stage_kernel
-def _take_images(k, surfaces, filtering, blending, work, noisy):
-    """Read the images of one lane's body.
+def _blend(k, surfaces, single, whole):
+    """Share a lane's weight out to a blended surface and to what is seen through it."""
+    there = share_there(
+        surfaces.coordinates, surfaces.textures, surfaces.alphas, surfaces.materials, whole[at.BODY + k],
+        whole[at.FACE + k], single[at.U + k], single[at.V + k],
+        single[at.AU + k], single[at.AV + k], single[at.BU + k], single[at.BV + k],
+    )  # fmt: skip
+    for c in range(3):
+        single[at.B0 + c * BLOCK + k] = (1.0 - there) * single[at.W0 + c * BLOCK + k]
+        single[at.W0 + c * BLOCK + k] *= there
 
-    Returns
-    -------
-    int
-        1 if the lane's colour is that of a noise yet to come, else 0.
-    """
-    single, whole, materials = work.single, work.whole, surfaces.materials
-    textures, texels, coordinates = surfaces.textures, surfaces.texels, surfaces.coordinates
-    f, body, u, v = whole[at.FACE + k], whole[at.BODY + k], single[at.U + k], single[at.V + k]
-    if not filtering:
-        single[at.AU + k], single[at.AV + k], single[at.BU + k], single[at.BV + k] = 0.0, 0.0, 0.0, 0.0
-    au, av, bu, bv = single[at.AU + k], single[at.AV + k], single[at.BU + k], single[at.BV + k]
-    single[at.B0 + k], single[at.B1 + k], single[at.B2 + k] = 0.0, 0.0, 0.0
-    if blending and materials[body, ALPHA_BLEND] > 0.0:  # seen through to the share that is not there
-        there = share_there(coordinates, textures, surfaces.alphas, materials, body, f, u, v, au, av, bu, bv)
-        for c in range(3):
-            single[at.B0 + c * BLOCK + k] = (1.0 - there) * single[at.W0 + c * BLOCK + k]
-            single[at.W0 + c * BLOCK + k] *= there
-    if materials[body, NORMAL_MAP] >= 0:
-        _map_normal(k, surfaces, work, au, av, bu, bv)
-    if materials[body, EMISSION_MAP] >= 0:
-        s0, s1, _ = interpolate(coordinates, f, u, v)
-        t0, t1, t2 = filtered(textures, int(materials[body, EMISSION_MAP]), texels, s0, s1, au, av, bu, bv)
-        single[at.E0 + k] *= t0
-        single[at.E1 + k] *= t1
-        single[at.E2 + k] *= t2
-    row = int(materials[body, TEXTURE])
-    if row < 0 or not (single[at.SCATTERED + k] > 0.0 or single[at.METAL + k] > 0.0):
-        return 0
-    if textures[row, 0] != IMAGE:
-        return _take_pattern(k, row, surfaces, work, noisy)
-    s0, s1, _ = interpolate(coordinates, f, u, v)
-    t0, t1, t2 = filtered(textures, row, texels, s0, s1, au, av, bu, bv)
-    single[at.T0 + k], single[at.T1 + k], single[at.T2 + k] = t0, t1, t2
-    return 0
+
+@lane_stage
+def _take_textures(lanes, surfaces, work):
+    """Colours of the textures of all lanes."""
+    single, whole, noisy, some = work.single, work.whole, np.int64(0), False  # no literal: another signature
+    for k in range(BLOCK):
+        whole[at.IMAGE + k] = -1
+        if k < lanes and _is_special(k, single) and (single[at.SCATTERED + k] > _ZERO or single[at.METAL + k] > _ZERO):
+            row = int(surfaces.materials[np.uint64(whole[at.BODY + k]), TEXTURE])
+            if row >= 0:
+                if surfaces.textures[np.uint64(row), 0] == IMAGE:
+                    whole[at.IMAGE + k], some = row, True
+                else:
+                    noisy += _take_pattern(k, row, surfaces, work, noisy)
+    if some:
+        read_images(surfaces.textures, surfaces.texels, work)
+        for k in range(BLOCK):
+            if whole[at.IMAGE + k] >= 0:
+                single[at.T0 + k], single[at.T1 + k], single[at.T2 + k] = (
+                    single[at.Q0 + k], single[at.Q1 + k], single[at.Q2 + k],
+                )  # fmt: skip
+    if noisy > 0:
+        _colour_by_noise(noisy, surfaces, work)
 
 
 @stage_kernel
@@ -193,21 +238,16 @@ def _take_pattern(k, row, surfaces, work, noisy):
 
 
 @part_kernel
-def _gild(k, surfaces, work):
-    """Shares of light of one lane's metal, and highlight and roughness by its map."""
-    single, f, body = work.single, work.whole[at.FACE + k], work.whole[at.BODY + k]
-    metallic, rough, row = single[at.METAL + k], single[at.ROUGH + k], int(surfaces.materials[body, GLOSS_MAP])
-    if row >= 0:
-        s0, s1, _ = interpolate(surfaces.coordinates, f, work.single[at.U + k], work.single[at.V + k])
-        _, by_rough, by_metal = filtered(
-            surfaces.textures, row, surfaces.texels, s0, s1,
-            single[at.AU + k], single[at.AV + k], single[at.BU + k], single[at.BV + k],
-        )  # fmt: skip
-        rough, metallic = rough * by_rough, metallic * by_metal
+def _gild(k, mapped, surfaces, work):
+    """Shares of light of one lane's metal, and highlight and roughness by its map, of which green and blue count."""
+    single, body = work.single, work.whole[at.BODY + k]
+    metallic, rough = float(single[at.METAL + k]), float(single[at.ROUGH + k])
+    if mapped:
+        rough, metallic = rough * single[at.Q1 + k], metallic * single[at.Q2 + k]
     for c in range(3):
         mirrored = metallic * surfaces.materials[body, c] * single[at.T0 + c * BLOCK + k]
         single[at.K0 + c * BLOCK + k] = (1.0 - metallic) * single[at.K0 + c * BLOCK + k] + mirrored
-    if single[at.GLOSS + k] > 0.0 and row >= 0:
+    if single[at.GLOSS + k] > 0.0 and mapped:
         k0, k1, k2 = three(single, at.K0, k)
         strength, single[at.EXPONENT + k] = highlight((k0 + k1 + k2) / 3.0, rough)
         single[at.GLOSS + k] *= strength
@@ -233,7 +273,7 @@ def _colour_by_noise(many, surfaces, work):
 
 
 @part_kernel
-def _map_normal(k, surfaces, work, au, av, bu, bv):
+def _map_normal(k, surfaces, work):
     """Tilt a shading normal by a normal map; leave it where that would turn it away from the viewer.
 
     Tangents are those of the face's own (u, v), made square to the shading normal; not MikkTSpace's, which are
@@ -241,11 +281,9 @@ def _map_normal(k, surfaces, work, au, av, bu, bv):
     """
     single, coordinates = work.single, surfaces.coordinates
     f, body = work.whole[at.FACE + k], work.whole[at.BODY + k]
-    nx, ny, nz = three(single, at.NX, k)
+    nx, ny, nz = three_doubles(single, at.NX, k)
     scale = surfaces.materials[body, NORMAL_SCALE]
-    s, t, _ = interpolate(coordinates, f, single[at.U + k], single[at.V + k])
-    row = int(surfaces.materials[body, NORMAL_MAP])
-    x, y, z = filtered(surfaces.textures, row, surfaces.texels, s, t, au, av, bu, bv)
+    x, y, z = three_doubles(single, at.Q0, k)
     x, y, z = scale * (2.0 * x - 1.0), scale * (2.0 * y - 1.0), 2.0 * z - 1.0
     u1, v1 = coordinates[f, 1, 0] - coordinates[f, 0, 0], coordinates[f, 1, 1] - coordinates[f, 0, 1]
     u2, v2 = coordinates[f, 2, 0] - coordinates[f, 0, 0], coordinates[f, 2, 1] - coordinates[f, 0, 1]

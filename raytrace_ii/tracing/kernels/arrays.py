@@ -67,6 +67,16 @@ class ShadowRays(NamedTuple):
     inside: Whole
 
 
+class Maps(NamedTuple):
+    """Whether bodies of a scene have any images, maps of a kind, or parts that are seen through."""
+
+    any: bool
+    normal: bool
+    emission: bool
+    gloss: bool
+    blend: bool
+
+
 class Surfaces(NamedTuple):
     """Faces, materials and textures of a scene, as `packing.PackedScene` describes them.
 
@@ -83,6 +93,7 @@ class Surfaces(NamedTuple):
     object_of_face: Whole
     materials: Double
     looks: Single
+    maps: Maps
     textures: Double
     texels: tuple[Single, NDArray[np.uint8]]
     alphas: Single

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import exact_lane_stage, inline_kernel, late_kernel
+from ii_core.base.jit import exact_lane_stage, inline_kernel, late_lane_kernel
 from ii_core.base.jit import lane_stage as stage_kernel
 
 from . import lanes as at
@@ -166,7 +166,7 @@ def _up(single, n, p, share, px, py, pz, gx, gy, gz):
     return up * nx, up * ny, up * nz
 
 
-@late_kernel
+@late_lane_kernel
 def footprints(generation, first, lanes, _):
     """How far a ray's width reaches over the (u, v) of the images of its body."""
     g = value_at(generation)

@@ -68,18 +68,33 @@ T0, T1, T2 = _offsets(3)  # colour of the texture
 LX, LY, LZ, COSINE, HALF, SHINE, CONE = _offsets(7)  # of the light at hand
 C0, C1, C2, WANTED = _offsets(4)  # what its shadow rays would let through, and 1 where there is one
 L0, L1, L2 = _offsets(3)  # light that a ray brings
+Q0, Q1, Q2 = _offsets(3)  # colours of images
+QUAD = next(_offset)  # the same, four numbers a lane
+_offsets(3)
+SHARES = next(_offset)  # of four texels
+_offsets(3)
 PACKET = next(_offset)  # Embree's rays, see packets.py
 _offsets(35)
 _SINGLES = next(_offset)
 
-# Quantities in float64: place, sum and strength of the octave of a noise.
+# Quantities in float64. Of a noise: place, sum and strength of the octave.
 _offset = count(0, BLOCK)
 SX, SY, SZ, TOTAL, STRENGTH = _offsets(5)
+# Of an image: place, way along the taps, how it goes on beyond its border, number of taps, finer level, part of the
+# coarser one; of both levels the first texel, size and share of the colour.
+SU, SV, WAY_U, WAY_V, ACROSS, DOWN, TAPS, NEAR, PART = _offsets(9)
+FIRST, WIDTHS, HEIGHTS, SHARE = _offsets(4)
+_offsets(4)
 _DOUBLES = next(_offset)
 
-# Whole numbers: face, −1 on a miss, its row in the table and its body; of noise its lane, octaves and seed.
+# Whole numbers: face, −1 on a miss, its row in the table and its body; of noise its lane, octaves and seed; of an image
+# its row in the table of textures, whether levels are of codes, four texels, and whether they are wanted.
 _offset = count(0, BLOCK)
-FACE, TABLE_ROW, BODY, NOISY, OCTAVES, SEED = _offsets(6)
+FACE, TABLE_ROW, BODY, NOISY, OCTAVES, SEED, IMAGE, CODES = _offsets(8)
+_offsets(1)
+TEXELS = next(_offset)
+_offsets(3)
+READ = next(_offset)
 _WHOLES = next(_offset)
 
 
@@ -152,6 +167,28 @@ def _transposed(builder: Any, rows: Any) -> Any:
     return rows
 
 
+def bits_of(number: Any) -> Any:
+    """The 32 bits of a float32."""
+    return np.float32(number).view(np.int32)
+
+
+def single_of(number: Any) -> Any:
+    """The float32 of 32 bits."""
+    return np.int32(number).view(np.float32)
+
+
+def _bits_of(typing: Any, number: Any) -> Any:
+    return types.int32(types.float32), lambda _c, builder, _s, values: builder.bitcast(values[0], ir.IntType(32))
+
+
+def _single_of(typing: Any, number: Any) -> Any:
+    return types.float32(types.int32), lambda _c, builder, _s, values: builder.bitcast(values[0], ir.FloatType())
+
+
+_bits_of_number: Any = intrinsic(_bits_of)
+_single_of_bits: Any = intrinsic(_single_of)
+overload(bits_of, inline="always")(lambda number: lambda number: _bits_of_number(number))
+overload(single_of, inline="always")(lambda number: lambda number: _single_of_bits(number))
 _take_rows_vectors: Any = intrinsic(_take_rows)
 
 
