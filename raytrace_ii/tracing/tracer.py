@@ -20,13 +20,13 @@ from .kernels.appearance import attenuate, look_closely, paint
 from .kernels.arrays import Generation, Onward, Passage, Rays, Recorded, ShadowRays, Stages, Start
 from .kernels.attributes import footprints
 from .kernels.clear import pass_clear_face, pass_faces, start_inside, tell_inside
-from .kernels.lanes import PACKET, work
+from .kernels.lanes import PACKET, aligned, work
 from .kernels.light import add_unblocked, keep_unblocked
 from .kernels.sampling import lobe_keys
 from .kernels.sky import add_sky_image
 from .kernels.spawn import reflect
 from .kernels.spawn import spawn as spawn_rays
-from .kernels.start import start_rays, start_separable_rays
+from .kernels.start import fill_start_tables, start_rays, start_separable_rays, usable
 from .kernels.tables import (
     COUNTS,
     EMBREE_TICKS,
@@ -36,6 +36,7 @@ from .kernels.tables import (
     SHADOW,
     SKY_IMAGE,
     SPAWNED,
+    START_COLUMNS,
     TICKS,
     WEAK_SHADOW,
 )  # fmt: skip
@@ -46,6 +47,7 @@ from .support_images import RECORDED
 KINDS = ("primary", "shadow", "reflection", "refraction")
 _NO_ROWS = np.empty(0, np.int32)
 _NO_HITS = Hits(_NO_ROWS, *(np.empty(0, np.float32) for _ in range(3)))  # the kernel finds them
+_NO_START = Start(*(np.empty(0, np.float32) for _ in range(2)), _NO_ROWS, _NO_ROWS, 0, 0)  # rays are in arrays
 LOBE_RAYS = 16  # over the lobe of a rough mirror, for each pixel
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
@@ -151,6 +153,18 @@ class Support:
         ]
 
 
+def start_tables(
+    rays: tuple[NDArray[np.float64], ...], pose: NDArray[np.float64]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+    """Return what columns and rows give to rays of `IICamera.separable_rays`; None if some may be unusable."""
+    x, y, z = rays
+    if not usable(x, y, z):
+        return None
+    columns, rows = (aligned(len(part) * START_COLUMNS).reshape(-1, START_COLUMNS) for part in (x, y))
+    fill_start_tables(x, y, z, pose[:3, :3], pose[:3, 3], columns, rows)
+    return columns.reshape(-1), rows.reshape(-1)
+
+
 def check_scene(scene: Any) -> None:
     """Raise TypeError unless it is a scene."""
     if not isinstance(scene, Scene):
@@ -223,10 +237,6 @@ class Tracer:
         self.begin()
         self._primary = _room(capacity, self.scene.nested, self.scene.glossy)
         self._pixels = np.arange(capacity, dtype=np.int32)  # of rays one a pixel: read only
-        nothing = np.empty((0, 2))
-        self._no_start = Start(
-            nothing, nothing, np.zeros(2), _NO_ROWS, _NO_ROWS, self.pose[:3, :3], self.pose[:3, 3]
-        )  # fmt: skip
         self._shadow = _shadow_room(0, self.scene.nested)
         self._work = work()
         self._tools = self.scene.intersector.tools(self._work.single[PACKET:])
@@ -277,30 +287,21 @@ class Tracer:
             support.clear()
         if keys is not None:
             room.keys[:n] = keys[room.pixels[:n]]
-        self._trace(room, n, radiance, support, self._no_start)
+        self._trace(room, n, radiance, support, _NO_START)
 
     def run_separable(
-        self,
-        rays: tuple[NDArray[np.float64], ...],
-        radiance: NDArray[np.float32],
-        support: Support | None,
-        rows: NDArray[np.int32],
-        columns: NDArray[np.int32],
+        self, start: Start, radiance: NDArray[np.float32], support: Support | None,
         keys: NDArray[np.uint64] | None = None,
-    ) -> None:
-        """`run` for rays of `IICamera.separable_rays`, all of them `usable`.
-
-        ``rows`` and ``columns`` name the rays in the order in which they are traced.
-        """
-        start = Start(*rays, rows, columns, self.pose[:3, :3], self.pose[:3, 3])
-        room, n = self._primary._replace(pixels=self._pixels), len(rows)
+    ) -> None:  # fmt: skip
+        """`run` for rays by columns and rows of pixels."""
+        room, n = self._primary._replace(pixels=self._pixels), len(start.rows)
         room.inside.fill(-1)
         if keys is not None:
             room.keys[:n] = keys
         if self.scene.transmits or not self._finds:  # they are wanted before the kernel runs
-            start_separable_rays(start, room.origins, room.directions)
+            start_separable_rays(start, self._work, room.origins, room.directions)
             room.weights.fill(1)
-            start = self._no_start
+            start = _NO_START
         self._trace(room, n, radiance, support, start)
 
     def _trace(
@@ -315,7 +316,7 @@ class Tracer:
             lobe_rays = self.lobes[0] if depth == 0 else 1
             spawn = depth < self.max_depth
             rays = self._generation(start, rays, radiance, support if depth == 0 else None, spawn, lobe_rays)
-            start = self._no_start
+            start = _NO_START
             if not len(rays.pixels):
                 break
 

@@ -42,18 +42,18 @@ class Rays(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Camera rays of `IICamera.separable_rays`: ``rows`` and ``columns`` of the pixels in their order, and the pose.
+    """Camera rays by columns and rows of pixels: the tables of `start.fill_start_tables`, in one dimension.
 
-    Of no rows if the rays come from elsewhere.
+    ``rows`` and ``columns`` are those of the pixels in the order of their rays, from ``top`` and ``left`` on; of no
+    rows if the rays come from elsewhere.
     """
 
-    x: Double
-    y: Double
-    z: Double
+    column_rays: Single
+    row_rays: Single
     rows: Whole
     columns: Whole
-    rotation: Double
-    shift: Double
+    top: int
+    left: int
 
 
 class ShadowRays(NamedTuple):

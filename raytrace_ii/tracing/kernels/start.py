@@ -6,14 +6,16 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, lane_stage
+from ii_core.base.jit import lane_kernel, lane_stage
 from ii_core.base.jit import lean_kernel as kernel
 
 from . import lanes as at
-from .lanes import BLOCK
+from .lanes import BLOCK, take_rows
+from .tables import START_COLUMNS
 from .vectors import put
 
-_LEAST, _MOST = 1e-150, 1e150  # between them squares and their sums neither vanish nor overflow
+_ONE = np.float32(1)
+_LEAST, _MOST = 1e-15, 1e15  # between them squares and their sums neither vanish nor overflow in float32
 
 
 @kernel
@@ -68,40 +70,49 @@ def usable(x, y, z):
     return sure
 
 
-@inline_kernel
-def _separable_ray(start, column, row):
-    """Origin and direction of the ray of a pixel, from `IICamera.separable_rays`."""
-    r, s, lz, dz = start.rotation, start.shift, start.z[0], start.z[1]
-    lx, dx, ly, dy = start.x[column, 0], start.x[column, 1], start.y[row, 0], start.y[row, 1]
-    inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
-    return (
-        r[0, 0] * lx + r[0, 1] * ly + r[0, 2] * lz + s[0],
-        r[1, 0] * lx + r[1, 1] * ly + r[1, 2] * lz + s[1],
-        r[2, 0] * lx + r[2, 1] * ly + r[2, 2] * lz + s[2],
-        (r[0, 0] * dx + r[0, 1] * dy + r[0, 2] * dz) * inverse,
-        (r[1, 0] * dx + r[1, 1] * dy + r[1, 2] * dz) * inverse,
-        (r[2, 0] * dx + r[2, 1] * dy + r[2, 2] * dz) * inverse,
-    )
+@kernel
+def fill_start_tables(x, y, z, rotation, shift, columns, rows):
+    """What columns and rows of `IICamera.separable_rays` give to the origins and directions of their rays.
+
+    A row of ``columns`` (w, 16) and one of ``rows`` (h, 16), float32, add up to a ray: origin, direction of any length.
+    """
+    for table, rays, axis in ((columns, x, 0), (rows, y, 1)):
+        for i in range(rays.shape[0]):
+            for c in range(3):
+                place, way = rotation[c, axis] * rays[i, 0], rotation[c, axis] * rays[i, 1]
+                if axis == 1:
+                    place, way = place + rotation[c, 2] * z[0] + shift[c], way + rotation[c, 2] * z[1]
+                table[i, c], table[i, 3 + c] = place, way
 
 
 @lane_stage
-def start_lanes(first, lanes, start, single):
-    """Start a packet of rays of `IICamera.separable_rays` that carry all light; lanes to spare have the last one."""
+def start_lanes(first, lanes, start, single, whole):
+    """Start a packet of rays that carry all light from a `Start`; lanes to spare have the last one."""
     for k in range(BLOCK):
         i = np.uint64(first + min(k, lanes - 1))
-        x, y, z, dx, dy, dz = _separable_ray(start, np.uint64(start.columns[i]), np.uint64(start.rows[i]))
-        o, d = at.START + k, at.DX + k
-        single[o], single[o + BLOCK], single[o + 2 * BLOCK] = x, y, z
-        single[d], single[d + BLOCK], single[d + 2 * BLOCK] = dx, dy, dz
+        whole[at.TABLE_ROW + k] = start.left + start.columns[i]
+        whole[at.FACE + k] = start.top + start.rows[i]
+    wide, none = np.int64(START_COLUMNS), np.int64(0)
+    take_rows(start.column_rays, wide, none, whole, np.int64(at.TABLE_ROW), single, np.int64(at.CORNER))
+    take_rows(start.row_rays, wide, none, whole, np.int64(at.FACE), single, np.int64(at.NORMAL))
     for k in range(3 * BLOCK):
-        single[at.W0 + k] = np.float32(1)
+        single[at.START + k] = single[at.CORNER + k] + single[at.NORMAL + k]
+        single[at.W0 + k] = _ONE
+    for k in range(BLOCK):
+        c, r = at.CORNER + 3 * BLOCK + k, at.NORMAL + 3 * BLOCK + k
+        x, y, z = single[c] + single[r], single[c + BLOCK] + single[r + BLOCK], single[c + 2 * BLOCK] + single[r + 2 * BLOCK]
+        inverse = _ONE / math.sqrt(x * x + y * y + z * z)
+        single[at.DX + k], single[at.DY + k], single[at.DZ + k] = x * inverse, y * inverse, z * inverse
 
 
-@kernel
-def start_separable_rays(start, out_origins, out_directions):
+@lane_kernel
+def start_separable_rays(start, work, out_origins, out_directions):
     """As `start_lanes` for all rays, into arrays."""
-    for ray in range(start.rows.shape[0]):
-        i = np.uint64(ray)  # unsigned: numba need not look for negative indices
-        x, y, z, dx, dy, dz = _separable_ray(start, np.uint64(start.columns[i]), np.uint64(start.rows[i]))
-        put(out_origins, i, x, y, z)
-        put(out_directions, i, dx, dy, dz)
+    n, single = start.rows.shape[0], work.single
+    for first in range(0, n, BLOCK):
+        lanes = min(BLOCK, n - first)
+        start_lanes(first, lanes, start, single, work.whole)
+        for k in range(lanes):
+            i = np.uint64(first + k)
+            put(out_origins, i, single[at.START + k], single[at.START + BLOCK + k], single[at.START + 2 * BLOCK + k])
+            put(out_directions, i, single[at.DX + k], single[at.DY + k], single[at.DZ + k])
