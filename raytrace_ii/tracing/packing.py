@@ -110,7 +110,7 @@ class PackedScene:
         self.surfaces = Surfaces(
             rows.reshape(-1), rows.shape[1], len(normals) > 0, self.corners, self.faces, self.coordinates,
             self.object_of_face, self.materials, looks, self._maps(bodies), self.textures.table,
-            self.textures.texels, self.textures.alphas,
+            self.textures.levels, self.textures.texels, self.textures.alphas,
         )  # fmt: skip
         self.face_tables = FaceTables(
             self.corners, self.faces, self.coordinates, self.object_of_face, self.materials, self.textures.table,

@@ -178,7 +178,7 @@ def _choose_images(column, lanes, surfaces, work):
         whole[at.IMAGE + k] = row
         some |= row >= 0
     if some:
-        read_images(surfaces.textures, surfaces.texels, work)
+        read_images(surfaces, work)
     return some
 
 
@@ -209,7 +209,7 @@ def _take_textures(lanes, surfaces, work):
                 else:
                     noisy += _take_pattern(k, row, surfaces, work, noisy)
     if some:
-        read_images(surfaces.textures, surfaces.texels, work)
+        read_images(surfaces, work)
         for k in range(BLOCK):
             if whole[at.IMAGE + k] >= 0:
                 single[at.T0 + k], single[at.T1 + k], single[at.T2 + k] = (

@@ -81,7 +81,7 @@ class Surfaces(NamedTuple):
     """Faces, materials and textures of a scene, as `packing.PackedScene` describes them.
 
     ``rows`` is the table of faces in one dimension, of so many ``columns``, ``faces`` its columns from the normal on,
-    ``looks`` the first columns of ``materials`` in one dimension.
+    ``looks`` the first columns of ``materials``, ``levels`` those of ``textures``, both in one dimension.
     """
 
     rows: Single
@@ -95,6 +95,7 @@ class Surfaces(NamedTuple):
     looks: Single
     maps: Maps
     textures: Double
+    levels: Single
     texels: tuple[Single, NDArray[np.uint8]]
     alphas: Single
 

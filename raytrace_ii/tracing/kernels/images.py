@@ -8,107 +8,118 @@ from ii_core.base.colour import LINEAR
 from ii_core.base.jit import lane_part, lane_stage
 
 from . import lanes as at
-from .lanes import BLOCK
-from .tables import LEVELS
+from .lanes import BLOCK, bits_of, single_of, take_rows
+from .tables import IMAGE_COLUMNS, LEVELS, REPEAT
 from .texels import add_mixed
 from .textures import filter_taps, folded, texels_about
 
 _LINEAR = LINEAR.astype(np.float32)
-_ZERO = np.float32(0)
+_ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
 _3, _4 = np.uint64(3), np.uint64(4)
 
 
 @lane_part
-def read_images(table, texels, work):
+def read_images(surfaces, work):
     """Colours of images over ellipses about (u, v) of two diameters: means of their pyramids (Williams 1983).
 
     Image rows of the table of textures, −1 for none, are in ``IMAGE``, places in ``SU`` and ``SV``, diameters in ``AU``
     … ``BV``; colours come to ``Q0`` … ``Q2``.
     """
-    single, whole = work.single, work.whole
+    single = work.single
     for k in range(4 * BLOCK):
         single[at.QUAD + k] = _ZERO
-    for tap in range(_choose_levels(table, work)):
-        for far in range(2):
-            _find_texels(np.float64(tap), far * 4 * BLOCK, work.single, work.double, work.whole)
+    for tap in range(_choose_levels(surfaces.levels, work)):
+        _find_places(np.float32(tap), single, work.double)
+        for level in (0, at.FAR_LEVEL - at.NEAR_LEVEL):
+            _find_texels(level, single)
             for k in range(BLOCK):
-                if whole[at.READ + k] != 0:
-                    _add_texels(k, whole[at.CODES + far * BLOCK + k] != 0, texels, single, whole)
+                if single[at.SHARE + k] * single[at.NEAR_LEVEL + level + k] > _ZERO:
+                    _add_texels(k, single[at.NEAR_LEVEL + level + 5 * BLOCK + k] > _ZERO, surfaces.texels, single)
     for k in range(BLOCK):
         q = at.QUAD + 4 * k
         single[at.Q0 + k], single[at.Q1 + k], single[at.Q2 + k] = single[q], single[q + 1], single[q + 2]
 
 
 @lane_stage
-def _choose_levels(table, work):
-    """Choose taps and two levels of each lane's image.
+def _choose_levels(levels, work):
+    """Choose taps and two levels of each lane's image; their parts of the colour stand before their sizes.
 
     Returns
     -------
     int
         The largest number of taps.
     """
-    single, double, whole = work.single, work.double, work.whole
+    single, whole, image = work.single, work.whole, at.NEAR_LEVEL
+    wide, none, rows = np.int64(IMAGE_COLUMNS), np.int64(0), np.int64(at.LEVEL_ROW)
     for k in range(BLOCK):
-        row = np.uint64(max(whole[at.IMAGE + k], 0))
-        double[at.WIDTHS + k], double[at.HEIGHTS + k] = table[row, 2], table[row, 3]
-        double[at.ACROSS + k], double[at.DOWN + k] = table[row, 6], table[row, 7]
-        double[at.PART + k] = table[row, LEVELS]
+        whole[at.LEVEL_ROW + k] = max(whole[at.IMAGE + k], 0)
+        single[at.SHARE + k] = _ONE if whole[at.IMAGE + k] >= 0 else _ZERO
+    take_rows(levels, wide, none, whole, rows, single, np.int64(at.NEAR_LEVEL))
     for k in range(BLOCK):
         taps, level, bu, bv = filter_taps(
-            double[at.WIDTHS + k], double[at.HEIGHTS + k], double[at.PART + k], np.float64(single[at.AU + k]),
-            np.float64(single[at.AV + k]), np.float64(single[at.BU + k]), np.float64(single[at.BV + k]),
+            single[image + 2 * BLOCK + k], single[image + 3 * BLOCK + k], single[image + LEVELS * BLOCK + k],
+            single[at.AU + k], single[at.AV + k], single[at.BU + k], single[at.BV + k],
         )  # fmt: skip
-        near = np.floor(level)
-        double[at.TAPS + k], double[at.WAY_U + k], double[at.WAY_V + k] = taps, bu, bv
-        double[at.NEAR + k], double[at.PART + k] = near, level - near
-    most = 0
+        single[at.TAPS + k], single[at.WAY_U + k], single[at.WAY_V + k] = taps * single[at.SHARE + k], bu, bv
+        single[at.REPEATS + k], single[at.REPEATS + BLOCK + k] = single[image + 6 * BLOCK + k], single[image + 7 * BLOCK + k]
+        single[at.LEVEL + k] = level
+    most = _ZERO
     for k in range(BLOCK):
-        double[at.TAPS + k] = double[at.TAPS + k] if whole[at.IMAGE + k] >= 0 else 0.0
-        most = max(most, int(double[at.TAPS + k]))
-        row = np.uint64(max(whole[at.IMAGE + k], 0) + int(double[at.NEAR + k]))
-        double[at.FIRST + k], whole[at.CODES + k] = table[row, 1], int(table[row, 5])
-        double[at.WIDTHS + k], double[at.HEIGHTS + k] = table[row, 2], table[row, 3]
-        row += np.uint64(double[at.PART + k] > 0.0)
-        double[at.FIRST + 4 * BLOCK + k], whole[at.CODES + BLOCK + k] = table[row, 1], int(table[row, 5])
-        double[at.WIDTHS + 4 * BLOCK + k], double[at.HEIGHTS + 4 * BLOCK + k] = table[row, 2], table[row, 3]
+        most = max(most, single[at.TAPS + k])
+        whole[at.LEVEL_ROW + k] += np.int64(single[at.LEVEL + k])
+    take_rows(levels, wide, none, whole, rows, single, np.int64(at.NEAR_LEVEL))
     for k in range(BLOCK):
-        share = 1.0 / max(double[at.TAPS + k], 1.0)
-        double[at.SHARE + k] = (1.0 - double[at.PART + k]) * share
-        double[at.SHARE + 4 * BLOCK + k] = double[at.PART + k] * share
-    return most
+        whole[at.LEVEL_ROW + k] += 1 if single[at.LEVEL + k] > np.floor(single[at.LEVEL + k]) else 0
+    take_rows(levels, wide, none, whole, rows, single, np.int64(at.FAR_LEVEL))
+    for k in range(BLOCK):
+        part = single[at.LEVEL + k] - np.floor(single[at.LEVEL + k])
+        single[at.NEAR_LEVEL + k], single[at.FAR_LEVEL + k] = _ONE - part, part
+    return int(most)
 
 
 @lane_stage
-def _find_texels(tap, level, single, double, whole):
-    """Find the four texels about one tap of each lane in one of its levels, and their shares of its colour."""
+def _find_places(tap, single, double):
+    """Find the place of one tap of each lane in its image, and its share of the colour."""
     for k in range(BLOCK):
-        taps, width, first = double[at.TAPS + k], double[at.WIDTHS + level + k], double[at.FIRST + level + k]
-        across, down, share = double[at.ACROSS + k], double[at.DOWN + k], double[at.SHARE + level + k]
-        s = (tap + 0.5) / max(taps, 1.0) - 0.5
-        x = folded(double[at.SU + k] + s * double[at.WAY_U + k], across)
-        y = 1.0 - folded(double[at.SV + k] + s * double[at.WAY_V + k], down)
-        i0, i1, j0, j1, fx, fy = texels_about(x, y, width, double[at.HEIGHTS + level + k], across, down)
-        share = share if tap < taps else 0.0
-        whole[at.TEXELS + k] = np.int64(first + j0 * width + i0)
-        whole[at.TEXELS + BLOCK + k] = np.int64(first + j0 * width + i1)
-        whole[at.TEXELS + 2 * BLOCK + k] = np.int64(first + j1 * width + i0)
-        whole[at.TEXELS + 3 * BLOCK + k] = np.int64(first + j1 * width + i1)
-        single[at.SHARES + k] = share * (1.0 - fx) * (1.0 - fy)
-        single[at.SHARES + BLOCK + k] = share * fx * (1.0 - fy)
-        single[at.SHARES + 2 * BLOCK + k] = share * (1.0 - fx) * fy
-        single[at.SHARES + 3 * BLOCK + k] = share * fx * fy
-        whole[at.READ + k] = 1 if share > 0.0 else 0
+        taps = single[at.TAPS + k]
+        share = _ONE / max(taps, _ONE)
+        s = np.float64((tap + _HALF) * share - _HALF)
+        single[at.X + k] = folded(double[at.SU + k] + s * single[at.WAY_U + k], single[at.REPEATS + k])
+        single[at.Y + k] = 1.0 - folded(double[at.SV + k] + s * single[at.WAY_V + k], single[at.REPEATS + BLOCK + k])
+        single[at.SHARE + k] = share if tap < taps else _ZERO
 
 
 @lane_stage
-def _add_texels(k, codes, texels, single, whole):
+def _find_texels(level, single):
+    """Find the four texels about the places in one level, and their shares of the colour."""
+    for k in range(BLOCK):
+        c = at.NEAR_LEVEL + level + k
+        width, first = single[c + 2 * BLOCK], bits_of(single[c + BLOCK])
+        i0, i1, j0, j1, fx, fy = texels_about(
+            single[at.X + k], single[at.Y + k], width, single[c + 3 * BLOCK],
+            single[at.REPEATS + k] == REPEAT, single[at.REPEATS + BLOCK + k] == REPEAT,
+        )  # fmt: skip
+        share = single[at.SHARE + k] * single[c]
+        above, below = first + np.int32(j0) * np.int32(width), first + np.int32(j1) * np.int32(width)
+        single[at.TEXELS + k], single[at.TEXELS + BLOCK + k] = (
+            single_of(np.int32(above + np.int32(i0))), single_of(np.int32(above + np.int32(i1))),
+        )  # fmt: skip
+        single[at.TEXELS + 2 * BLOCK + k], single[at.TEXELS + 3 * BLOCK + k] = (
+            single_of(np.int32(below + np.int32(i0))), single_of(np.int32(below + np.int32(i1))),
+        )  # fmt: skip
+        left, right, upper, lower = _ONE - fx, fx, share * (_ONE - fy), share * fy
+        single[at.SHARES + k], single[at.SHARES + BLOCK + k] = left * upper, right * upper
+        single[at.SHARES + 2 * BLOCK + k], single[at.SHARES + 3 * BLOCK + k] = left * lower, right * lower
+
+
+@lane_stage
+def _add_texels(k, codes, texels, single):
     """Add one lane's four texels."""
     s, t, q = at.SHARES + k, at.TEXELS + k, at.QUAD + 4 * k
     weights = single[s], single[s + BLOCK], single[s + 2 * BLOCK], single[s + 3 * BLOCK]
     a, b, c, d = (
-        np.uint64(whole[t]), np.uint64(whole[t + BLOCK]), np.uint64(whole[t + 2 * BLOCK]),
-        np.uint64(whole[t + 3 * BLOCK]),
+        np.uint64(bits_of(single[t])), np.uint64(bits_of(single[t + BLOCK])),
+        np.uint64(bits_of(single[t + 2 * BLOCK])), np.uint64(bits_of(single[t + 3 * BLOCK])),
     )  # fmt: skip
     if codes:
         for channel in range(3):

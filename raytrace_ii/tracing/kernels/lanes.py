@@ -71,8 +71,18 @@ L0, L1, L2 = _offsets(3)  # light that a ray brings
 Q0, Q1, Q2 = _offsets(3)  # colours of images
 QUAD = next(_offset)  # the same, four numbers a lane
 _offsets(3)
-SHARES = next(_offset)  # of four texels
+# Of the images: place of a tap and its share; number of taps, way along them, level, how the image goes on across and
+# down; four texels and their shares; rows of the table of levels, with their parts of the colour in place of a kind.
+X, Y, SHARE, TAPS, WAY_U, WAY_V, LEVEL, REPEATS = _offsets(8)
+_offsets(1)
+SHARES = next(_offset)
 _offsets(3)
+TEXELS = next(_offset)
+_offsets(3)
+NEAR_LEVEL = next(_offset)
+_offsets(15)
+FAR_LEVEL = next(_offset)
+_offsets(15)
 PACKET = next(_offset)  # Embree's rays, see packets.py
 _offsets(35)
 _SINGLES = next(_offset)
@@ -80,21 +90,13 @@ _SINGLES = next(_offset)
 # Quantities in float64. Of a noise: place, sum and strength of the octave.
 _offset = count(0, BLOCK)
 SX, SY, SZ, TOTAL, STRENGTH = _offsets(5)
-# Of an image: place, way along the taps, how it goes on beyond its border, number of taps, finer level, part of the
-# coarser one; of both levels the first texel, size and share of the colour.
-SU, SV, WAY_U, WAY_V, ACROSS, DOWN, TAPS, NEAR, PART = _offsets(9)
-FIRST, WIDTHS, HEIGHTS, SHARE = _offsets(4)
-_offsets(4)
+SU, SV = _offsets(2)  # place in an image
 _DOUBLES = next(_offset)
 
-# Whole numbers: face, −1 on a miss, its row in the table and its body; of noise its lane, octaves and seed; of an image
-# its row in the table of textures, whether levels are of codes, four texels, and whether they are wanted.
+# Whole numbers: face, −1 on a miss, its row in the table and its body; of noise its lane, octaves and seed; rows of an
+# image and of its level in the table of textures.
 _offset = count(0, BLOCK)
-FACE, TABLE_ROW, BODY, NOISY, OCTAVES, SEED, IMAGE, CODES = _offsets(8)
-_offsets(1)
-TEXELS = next(_offset)
-_offsets(3)
-READ = next(_offset)
+FACE, TABLE_ROW, BODY, NOISY, OCTAVES, SEED, IMAGE, LEVEL_ROW = _offsets(8)
 _WHOLES = next(_offset)
 
 

@@ -48,7 +48,7 @@ def add_sky_image(generation, first, lanes, _):
         double[at.SV + k] = min(max(v, half), 1.0 - half)
         across = spread / (2.0 * math.pi * max(math.sqrt(dx * dx + dz * dz), spread, 1e-9))
         single[at.AU + k], single[at.AV + k], single[at.BU + k], single[at.BV + k] = across, 0.0, 0.0, spread / math.pi
-    read_images(textures, g.surfaces.texels, g.work)
+    read_images(g.surfaces, g.work)
     for k in range(3 * BLOCK):
         missed = single[at.HIT + k % BLOCK] == _ZERO
         single[at.L0 + k] += single[at.W0 + k] * strength * single[at.Q0 + k] if missed else _ZERO

@@ -32,4 +32,4 @@ LIGHT_COLOUR, CONE_AXIS, CONE_SCALE, CONE_OFFSET = 4, 7, 10, 11
 # Of the background: colours of horizon, zenith and nadir, the gradient's steepness, then
 SKY_IMAGE, SKY_TURN, SKY_INTENSITY = 10, 11, 12
 # Of the table of textures, besides what each kind has: how many coarser levels of an image follow it.
-LEVELS = 8
+LEVELS, IMAGE_COLUMNS = 8, 16

@@ -12,9 +12,10 @@ from .lanes import bits_of, single_of
 from .tables import ALPHA_BLEND, CHECKER, CUTOFF, IMAGE, LEVELS, MIRROR, REPEAT, TEXTURE, VERTEX
 from .vectors import interpolate
 
-MOST_TAPS = 8.0  # along the longer axis of a filtered ellipse
-SHARPER = 0.5  # levels finer than the filter's width: bilinear reading of a level widens it again
-_ONE = np.float32(1)
+MOST_TAPS = np.float32(8)  # along the longer axis of a filtered ellipse
+SHARPER = np.float32(0.5)  # levels finer than the filter's width: bilinear reading of a level widens it again
+_ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
+_MANTISSA, _EXPONENT_0, _23, _127 = np.int32(0x7FFFFF), np.int32(0x3F800000), np.int32(23), np.int32(127)
 # of the logarithm: 2/ln 2 · 1/(2k + 1)
 _C0, _C1, _C2, _C3, _C4, _C5 = (np.float32(2 / math.log(2) / k) for k in (1, 3, 5, 7, 9, 11))
 
@@ -96,38 +97,38 @@ def filter_taps(width, height, levels, au, av, bu, bv):
     The level fits the shorter diameter, or the distance of the taps where there would be too many; an image has so
     many coarser ``levels``. Without a branch, for vectors.
     """
-    a, b = (au * width) ** 2 + (av * height) ** 2, (bu * width) ** 2 + (bv * height) ** 2
+    a, b = au * width * (au * width) + av * height * (av * height), bu * width * (bu * width) + bv * height * (bv * height)
     longer = a > b
     bu, bv = au if longer else bu, av if longer else bv
-    a, b = math.sqrt(min(a, b)), math.sqrt(max(a, b))
-    taps = min(max(np.ceil(b / max(a, 1.0)), 1.0), MOST_TAPS)
-    level = logarithm(max(a, max(b / taps, 1.0))) - SHARPER
-    return taps, min(max(level, 0.0), levels), bu, bv
+    a, b = math.sqrt(b if longer else a), math.sqrt(a if longer else b)
+    taps = min(max(np.ceil(b / max(a, _ONE)), _ONE), MOST_TAPS)
+    level = logarithm(max(a, max(b / taps, _ONE))) - SHARPER
+    return taps, min(max(level, _ZERO), levels), bu, bv
 
 
 @inline_kernel
 def logarithm(x):
-    """Logarithm to base 2 of a number from 1 on, to 3e-7: exponent, and a series in the mantissa, for vectors."""
-    number = bits_of(np.float32(x))
-    exponent, mantissa = number >> 23, single_of((number & 0x7FFFFF) | 0x3F800000)
+    """Logarithm to base 2 of a float32 from 1 on: exponent, and a series in the mantissa, for vectors."""
+    number = bits_of(x)
+    mantissa = single_of(np.int32((number & _MANTISSA) | _EXPONENT_0))
     t = (mantissa - _ONE) / (mantissa + _ONE)
     q = t * t
     series = _C0 + q * (_C1 + q * (_C2 + q * (_C3 + q * (_C4 + q * _C5))))
-    return np.float64(exponent - 127) + np.float64(t * series)
+    return np.float32(np.int32(number >> _23) - _127) + t * series
 
 
 @inline_kernel
-def texels_about(x, y, width, height, across, down):
+def texels_about(x, y, width, height, repeats_across, repeats_down):
     """The texels about a place folded into an image, from its upper left corner in widths and heights.
 
     Columns left and right, rows above and below, and how far it is to right and down; for vectors.
     """
-    x, y = x * width - 0.5, y * height - 0.5
+    x, y, last, lowest = x * width - _HALF, y * height - _HALF, width - _ONE, height - _ONE
     i, j = np.floor(x), np.floor(y)
-    i0 = (width - 1.0 if across == REPEAT else 0.0) if i < 0.0 else i
-    i1 = (0.0 if across == REPEAT else width - 1.0) if i + 1.0 >= width else i + 1.0
-    j0 = (height - 1.0 if down == REPEAT else 0.0) if j < 0.0 else j
-    j1 = (0.0 if down == REPEAT else height - 1.0) if j + 1.0 >= height else j + 1.0
+    i0 = (last if repeats_across else _ZERO) if i < _ZERO else i
+    i1 = (_ZERO if repeats_across else last) if i >= last else i + _ONE
+    j0 = (lowest if repeats_down else _ZERO) if j < _ZERO else j
+    j1 = (_ZERO if repeats_down else lowest) if j >= lowest else j + _ONE
     return i0, i1, j0, j1, x - i, y - j
 
 
@@ -154,8 +155,8 @@ def share_there(coordinates, textures, alphas, materials, body, f, u, v, au, av,
     if row >= 0 and textures[row, 0] == IMAGE and textures[row, 4] >= 0.0:
         x, y, _ = interpolate(coordinates, f, u, v)
         taps, level, bu, bv = filter_taps(
-            textures[row, 2], textures[row, 3], textures[row, LEVELS], np.float64(au), np.float64(av), np.float64(bu),
-            np.float64(bv),
+            np.float32(textures[row, 2]), np.float32(textures[row, 3]), np.float32(textures[row, LEVELS]),
+            np.float32(au), np.float32(av), np.float32(bu), np.float32(bv),
         )  # fmt: skip
         total = 0.0
         near = int(level)
@@ -175,7 +176,7 @@ def _alpha(textures, row, alphas, x, y):
     """Alpha of an image at (u, v), bilinear."""
     across, down, width = textures[row, 6], textures[row, 7], textures[row, 2]
     x, y = folded(x, across), 1.0 - folded(y, down)
-    i0, i1, j0, j1, fx, fy = texels_about(x, y, width, textures[row, 3], across, down)
+    i0, i1, j0, j1, fx, fy = texels_about(x, y, width, textures[row, 3], across == REPEAT, down == REPEAT)
     first = textures[row, 4]
     above, below = first + j0 * width, first + j1 * width
     upper = (1 - fx) * alphas[np.uint64(above + i0)] + fx * alphas[np.uint64(above + i1)]
