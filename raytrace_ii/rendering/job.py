@@ -284,12 +284,14 @@ class Job:
         Tables of the whole picture are computed once a thread: for every tile they would take 6 ns a pixel.
         """
         if not hasattr(self._local, "tables"):
-            camera = self.camera
-            some = camera.separable_rays(slice(0, 2), slice(0, 2)) if isinstance(camera, IICamera) else None
-            rays = camera.separable_rays() if some is not None else None  # else all would be computed to no end
+            rays, some = None, slice(0, 2)
+            if isinstance(self.camera, IICamera) and self.camera.separable_rays(some, some) is not None:
+                rays = self.camera.separable_rays()  # of a camera without, it would compute all to no end
             self._local.tables = None if rays is None else start_tables(rays, self.pose)
-        tables = self._local.tables
-        return None if tables is None else Start(*tables, order.rows, order.columns, rows.start, cols.start)
+        if self._local.tables is None:
+            return None
+        by_columns, by_rows = self._local.tables
+        return Start(by_columns, by_rows, order.rows, order.columns, rows.start, cols.start)
 
     def _keys(self, m: NDArray[Any], n: NDArray[Any], first: int, count: int) -> NDArray[np.uint64] | None:
         """Return the keys of ``count`` samples of each pixel; None unless the scene is glossy."""

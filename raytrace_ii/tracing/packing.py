@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Sequence
-from operator import attrgetter
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -22,7 +21,6 @@ from .kernels.lanes import aligned
 from .kernels.tables import DIRECTIONAL, LEAST_WEIGHT, MATERIAL_COLUMNS, POINT, SPOT
 from .texture_table import TextureTable
 
-_MAPS = attrgetter("normal_map"), attrgetter("emission_map"), attrgetter("metallic_roughness_map")
 MOST_NESTED = 8  # bodies whose bounds meet in one place that a ray keeps count of
 
 _kept: WeakKeyDictionary[Scene, PackedScene] = WeakKeyDictionary()
@@ -49,9 +47,9 @@ class PackedScene:
     """Packed scene: the arrays that the kernels read.
 
     ``corners`` is (F, 3, 3) float32 positions, ``faces`` (F, 5) unit normals, lifts and pulls, ``coordinates`` like
-    ``corners`` for textures, of no faces if there are none: a scene pays only for what it has. ``nested`` is how many transmissive bodies a ray may
-    be in at once by their ``clear_bounds`` (B, 2, 3); they and bodies with cut-outs follow the ``opaque_faces``.
-    ``least`` is the weight from which on a ray is worth shooting.
+    ``corners`` for textures, of no faces if there are none: a scene pays only for what it has. ``nested`` is how many
+    transmissive bodies a ray may be in at once by their ``clear_bounds`` (B, 2, 3); they and bodies with cut-outs
+    follow the ``opaque_faces``. ``least`` is the weight from which on a ray is worth shooting.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -105,11 +103,11 @@ class PackedScene:
         self.corners = self.intersector.corners
         rows = _face_rows(self.corners, self.object_of_face, normals, self.coordinates if self.images else None)
         self.faces = rows[:, tables.FACE : tables.BODY]
-        looks = aligned(len(bodies) * tables.LANED)
-        looks[:] = self.materials[:, : tables.LANED].reshape(-1)
+        laned = aligned(len(bodies) * tables.LANED)
+        laned[:] = self.materials[:, : tables.LANED].reshape(-1)
         self.surfaces = Surfaces(
             rows.reshape(-1), rows.shape[1], len(normals) > 0, self.corners, self.faces, self.coordinates,
-            self.object_of_face, self.materials, looks, self._maps(bodies), self.textures.table,
+            self.object_of_face, self.materials, laned, self._maps(bodies), self.textures.table,
             self.textures.levels, self.textures.texels, self.textures.alphas,
         )  # fmt: skip
         self.face_tables = FaceTables(
@@ -121,9 +119,12 @@ class PackedScene:
     def _maps(self, bodies: Sequence[Body]) -> Maps:
         looks = [body.material for body in bodies]
         return Maps(
-            any(isinstance(t, Image) for look in looks for t in look.textures),
-            *(any(map_of(look) is not None for look in looks) for map_of in _MAPS), self.blends,
-        )  # fmt: skip
+            any=any(isinstance(t, Image) for look in looks for t in look.textures),
+            normal=any(look.normal_map is not None for look in looks),
+            emission=any(look.emission_map is not None for look in looks),
+            gloss=any(look.metallic_roughness_map is not None for look in looks),
+            blend=self.blends,
+        )
 
 
 def _lets_through(body: Body) -> bool:

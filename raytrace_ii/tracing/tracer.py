@@ -47,7 +47,8 @@ from .support_images import RECORDED
 KINDS = ("primary", "shadow", "reflection", "refraction")
 _NO_ROWS = np.empty(0, np.int32)
 _NO_HITS = Hits(_NO_ROWS, *(np.empty(0, np.float32) for _ in range(3)))  # the kernel finds them
-_NO_START = Start(*(np.empty(0, np.float32) for _ in range(2)), _NO_ROWS, _NO_ROWS, 0, 0)  # rays are in arrays
+_NO_NUMBERS = np.empty(0, np.float32)
+_NO_START = Start(_NO_NUMBERS, _NO_NUMBERS, _NO_ROWS, _NO_ROWS, 0, 0)  # rays are in arrays
 LOBE_RAYS = 16  # over the lobe of a rough mirror, for each pixel
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 

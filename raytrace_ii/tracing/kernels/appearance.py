@@ -109,7 +109,8 @@ def paint(generation, first, lanes, _):
     for k in range(lanes):
         body = np.uint64(g.work.whole[at.BODY + k])
         g.work.single[at.CLEAR + k] = 0.0
-        if g.work.single[at.HIT + k] > _ZERO and materials[body, TEXTURE] >= 0 and g.work.single[at.SCATTERED + k] > 0.0:
+        seen = g.work.single[at.HIT + k] > _ZERO and g.work.single[at.SCATTERED + k] > _ZERO
+        if seen and materials[body, TEXTURE] >= 0:
             noisy += _take_pattern(k, int(materials[body, TEXTURE]), g.surfaces, g.work, noisy)
     if noisy > 0:
         _colour_by_noise(noisy, g.surfaces, g.work)
@@ -201,7 +202,8 @@ def _take_textures(lanes, surfaces, work):
     single, whole, noisy, some = work.single, work.whole, np.int64(0), False  # no literal: another signature
     for k in range(BLOCK):
         whole[at.IMAGE + k] = -1
-        if k < lanes and _is_special(k, single) and (single[at.SCATTERED + k] > _ZERO or single[at.METAL + k] > _ZERO):
+        coloured = single[at.SCATTERED + k] > _ZERO or single[at.METAL + k] > _ZERO
+        if k < lanes and coloured and _is_special(k, single):
             row = int(surfaces.materials[np.uint64(whole[at.BODY + k]), TEXTURE])
             if row >= 0:
                 if surfaces.textures[np.uint64(row), 0] == IMAGE:

@@ -133,10 +133,10 @@ class Passage(NamedTuple):
     """How one generation is shaded.
 
     ``least`` is the least weight of a spawned ray. Up to ``lobe_rays`` rays go over the lobe of a rough mirror, whose
-    places stand ``lobe_stride`` apart. Shadow rays are written for ``later`` if they may pass through clear bodies or
-    Embree cannot be called from the kernel. A ray is ``first_width`` wide where it starts, if it has no width of its own,
+    places stand ``lobe_stride`` apart. A ray is ``first_width`` wide where it starts, if it has no width of its own,
     and grows by ``spread`` a mm, from a negative width through 0: images are filtered over its width, not at all if
-    both are 0. Hits that are not ``placed`` stand where Embree put them.
+    both are 0. Hits that are not ``placed`` stand where Embree put them. Shadow rays are written for ``later`` if
+    they may pass through clear bodies, or if Embree cannot be called from the kernel.
     """
 
     least: float

@@ -22,8 +22,8 @@ _3, _4 = np.uint64(3), np.uint64(4)
 def read_images(surfaces, work):
     """Colours of images over ellipses about (u, v) of two diameters: means of their pyramids (Williams 1983).
 
-    Image rows of the table of textures, −1 for none, are in ``IMAGE``, places in ``SU`` and ``SV``, diameters in ``AU``
-    … ``BV``; colours come to ``Q0`` … ``Q2``.
+    Rows of the table of textures, −1 for none, are in ``IMAGE``, places in ``SU`` and ``SV``, diameters in ``AU`` to
+    ``BV``; colours come to ``Q0`` to ``Q2``.
     """
     single = work.single
     for k in range(4 * BLOCK):
@@ -61,7 +61,8 @@ def _choose_levels(levels, work):
             single[at.AU + k], single[at.AV + k], single[at.BU + k], single[at.BV + k],
         )  # fmt: skip
         single[at.TAPS + k], single[at.WAY_U + k], single[at.WAY_V + k] = taps * single[at.SHARE + k], bu, bv
-        single[at.REPEATS + k], single[at.REPEATS + BLOCK + k] = single[image + 6 * BLOCK + k], single[image + 7 * BLOCK + k]
+        single[at.REPEATS + k] = single[image + 6 * BLOCK + k]
+        single[at.REPEATS + BLOCK + k] = single[image + 7 * BLOCK + k]
         single[at.LEVEL + k] = level
     most = _ZERO
     for k in range(BLOCK):

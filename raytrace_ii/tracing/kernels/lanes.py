@@ -93,8 +93,8 @@ SX, SY, SZ, TOTAL, STRENGTH = _offsets(5)
 SU, SV = _offsets(2)  # place in an image
 _DOUBLES = next(_offset)
 
-# Whole numbers: face, −1 on a miss, its row in the table and its body; of noise its lane, octaves and seed; rows of an
-# image and of its level in the table of textures.
+# Whole numbers: face, −1 on a miss, its row in the table and its body; of noise its lane, octaves and seed; rows of
+# an image and of its level in the table of textures.
 _offset = count(0, BLOCK)
 FACE, TABLE_ROW, BODY, NOISY, OCTAVES, SEED, IMAGE, LEVEL_ROW = _offsets(8)
 _WHOLES = next(_offset)
@@ -138,7 +138,8 @@ def _take_rows(typing: Any, table: Any, columns: Any, first: Any, rows: Any, at:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         vector, word = ir.VectorType(ir.FloatType(), BLOCK), ir.IntType(64)
         source, numbers, target = (
-            context.make_array(kind)(context, builder, values[i]).data for i, kind in ((0, table), (3, rows), (5, out))
+            context.make_array(kind)(context, builder, values[i]).data
+            for i, kind in ((0, table), (3, rows), (5, out))
         )
         loaded = []
         for k in range(BLOCK):

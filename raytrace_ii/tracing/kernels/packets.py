@@ -302,7 +302,8 @@ def nearest_of_lanes(tools, first_of_same, ahead, lanes, work, width):
             whole[at.FACE + first + lane] = np.int64(numbers[_FACE * width + lane]) if hit else -1
         if first_of_same.shape[0] > 0:
             for k in range(first, first + width):
-                whole[at.FACE + k] = first_of_same[np.uint64(max(whole[at.FACE + k], 0))] if whole[at.FACE + k] >= 0 else -1
+                if whole[at.FACE + k] >= 0:
+                    whole[at.FACE + k] = first_of_same[np.uint64(whole[at.FACE + k])]
         ahead = packet[_FAR * width] if numbers[_GEOMETRY * width] >= 0 else ahead
     return ahead
 

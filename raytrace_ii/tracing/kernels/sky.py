@@ -22,11 +22,11 @@ _ZERO, _ONE = np.float32(0), np.float32(1)
 def add_background(background, single):
     """Add the colour of the sky to all lanes without a hit."""
     for c in range(3):
-        horizon, zenith, nadir = np.float32(background[c]), np.float32(background[3 + c]), np.float32(background[6 + c])
+        horizon, steep = np.float32(background[c]), np.float32(background[9])
+        zenith, nadir = np.float32(background[3 + c]), np.float32(background[6 + c])
         for k in range(BLOCK):
             dy = single[at.DY + k]
-            t = min(abs(dy) * np.float32(background[9]), _ONE)
-            light = horizon + t * ((zenith if dy > _ZERO else nadir) - horizon)
+            light = horizon + min(abs(dy) * steep, _ONE) * ((zenith if dy > _ZERO else nadir) - horizon)
             missed = single[at.HIT + k] == _ZERO
             single[at.L0 + c * BLOCK + k] += single[at.W0 + c * BLOCK + k] * light if missed else _ZERO
 
@@ -47,7 +47,8 @@ def add_sky_image(generation, first, lanes, _):
         v = 0.5 + math.asin(min(max(dy, -1.0), 1.0)) / math.pi
         double[at.SV + k] = min(max(v, half), 1.0 - half)
         across = spread / (2.0 * math.pi * max(math.sqrt(dx * dx + dz * dz), spread, 1e-9))
-        single[at.AU + k], single[at.AV + k], single[at.BU + k], single[at.BV + k] = across, 0.0, 0.0, spread / math.pi
+        single[at.AU + k], single[at.AV + k], single[at.BU + k] = across, 0.0, 0.0
+        single[at.BV + k] = spread / math.pi
     read_images(g.surfaces, g.work)
     for k in range(3 * BLOCK):
         missed = single[at.HIT + k % BLOCK] == _ZERO

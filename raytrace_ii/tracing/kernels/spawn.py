@@ -187,7 +187,8 @@ def _reflect_over_lobe(k, i, m0, m1, m2, rays, passage, following, work, counts)
         if along <= 0.0:  # out of the face that it would go into
             rx, ry, rz = rx - 2.0 * along * gx, ry - 2.0 * along * gy, rz - 2.0 * along * gz
         row = _send(
-            k, i, REFLECTION, ox, oy, oz, rx, ry, rz, share * m0, share * m1, share * m2, rays, following, work, counts,
+            k, i, REFLECTION, ox, oy, oz, rx, ry, rz, share * m0, share * m1, share * m2, rays, following, work,
+            counts,
         )  # fmt: skip
         following.keys[row] = mix_bits(key + np.uint64(j))
 

@@ -74,7 +74,8 @@ def usable(x, y, z):
 def fill_start_tables(x, y, z, rotation, shift, columns, rows):
     """What columns and rows of `IICamera.separable_rays` give to the origins and directions of their rays.
 
-    A row of ``columns`` (w, 16) and one of ``rows`` (h, 16), float32, add up to a ray: origin, direction of any length.
+    A row of ``columns`` (w, 16) and one of ``rows`` (h, 16), float32, add up to a ray: origin, and direction of any
+    length.
     """
     for table, rays, axis in ((columns, x, 0), (rows, y, 1)):
         for i in range(rays.shape[0]):
@@ -100,7 +101,8 @@ def start_lanes(first, lanes, start, single, whole):
         single[at.W0 + k] = _ONE
     for k in range(BLOCK):
         c, r = at.CORNER + 3 * BLOCK + k, at.NORMAL + 3 * BLOCK + k
-        x, y, z = single[c] + single[r], single[c + BLOCK] + single[r + BLOCK], single[c + 2 * BLOCK] + single[r + 2 * BLOCK]
+        x, y = single[c] + single[r], single[c + BLOCK] + single[r + BLOCK]
+        z = single[c + 2 * BLOCK] + single[r + 2 * BLOCK]
         inverse = _ONE / math.sqrt(x * x + y * y + z * z)
         single[at.DX + k], single[at.DY + k], single[at.DZ + k] = x * inverse, y * inverse, z * inverse
 

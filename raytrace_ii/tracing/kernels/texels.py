@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
@@ -25,12 +24,14 @@ def _add_mixed(typing: Any, pixels: Any, places: Any, weights: Any, out: Any, at
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         four, lane = ir.VectorType(ir.FloatType(), 4), ir.IntType(32)
-        data, target = (context.make_array(kind)(context, builder, values[i]).data for i, kind in ((0, pixels), (3, out)))
+        data = context.make_array(pixels)(context, builder, values[0]).data
+        target = context.make_array(out)(context, builder, values[3]).data
         place = builder.bitcast(builder.gep(target, [values[4]]), four.as_pointer())
         total = builder.load(place, align=4)
         for k in range(4):
             texel = builder.bitcast(builder.gep(data, [builder.extract_value(values[1], k)]), four.as_pointer())
-            weight = builder.insert_element(ir.Constant(four, ir.Undefined), builder.extract_value(values[2], k), lane(0))
+            weight = builder.extract_value(values[2], k)
+            weight = builder.insert_element(ir.Constant(four, ir.Undefined), weight, lane(0))
             weight = builder.shuffle_vector(weight, weight, ir.Constant(ir.VectorType(lane, 4), [0] * 4))
             product = builder.fmul(weight, builder.load(texel, align=4), flags=("contract",))
             total = builder.fadd(total, product, flags=("contract",))

@@ -97,12 +97,15 @@ def filter_taps(width, height, levels, au, av, bu, bv):
     The level fits the shorter diameter, or the distance of the taps where there would be too many; an image has so
     many coarser ``levels``. Without a branch, for vectors.
     """
-    a, b = au * width * (au * width) + av * height * (av * height), bu * width * (bu * width) + bv * height * (bv * height)
-    longer = a > b
+    au_wide, av_high, bu_wide, bv_high = au * width, av * height, bu * width, bv * height
+    first, second = au_wide * au_wide + av_high * av_high, bu_wide * bu_wide + bv_high * bv_high
+    longer = first > second
     bu, bv = au if longer else bu, av if longer else bv
-    a, b = math.sqrt(b if longer else a), math.sqrt(a if longer else b)
-    taps = min(max(np.ceil(b / max(a, _ONE)), _ONE), MOST_TAPS)
-    level = logarithm(max(a, max(b / taps, _ONE))) - SHARPER
+    a, b = math.sqrt(second if longer else first), math.sqrt(first if longer else second)
+    taps = min(max(np.ceil(b / (a if a > _ONE else _ONE)), _ONE), MOST_TAPS)
+    apart = b / taps
+    apart = a if a > apart else apart
+    level = logarithm(apart if apart > _ONE else _ONE) - SHARPER
     return taps, min(max(level, _ZERO), levels), bu, bv
 
 

@@ -1,4 +1,4 @@
-"""The way of a packet of rays: start, hit, attributes, appearance, lights, radiance; nothing leaves the first cache."""
+"""The way of a packet of rays: start, hit, attributes, appearance, lights, radiance, all in the first cache."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from .light import add_free, in_cone, keep_rays, lift_rays, reach_of, towards_li
 from .packets import nearest_of_lanes, occluded_of_lanes
 from .sky import add_background
 from .start import start_lanes
-from .tables import ALL_COLUMNS, EMBREE_TICKS, TICKS
+from .tables import EMBREE_TICKS, TICKS
 from .vectors import interpolate, put
 
 _ZERO, _TIMED = np.float32(0), np.int64(8 * BLOCK - 1)  # every eighth packet is timed
