@@ -38,6 +38,7 @@ from .kernels.tables import (
     SPAWNED,
     START_COLUMNS,
     TICKS,
+    UNTESTED,
     WEAK_SHADOW,
 )  # fmt: skip
 from .kernels.way import record, way_kernel
@@ -331,7 +332,7 @@ class Tracer:
         spawn = spawn and (s.mirrors or s.transmits or s.blends)
         most = (lobe_rays if s.glossy else 1) + s.transmits + 2 * s.disperses + s.blends
         following = _room(most * n if spawn else 0, s.nested, s.glossy, any(self.footprint))
-        if self._later and len(self._shadow.reach) < n * len(s.lights):
+        if len(self._shadow.reach) < n * len(s.lights):  # memory that nothing is written to is not used
             self._shadow = _shadow_room(n * len(s.lights), s.nested)
         counts, lit = np.zeros(COUNTS, np.int64), np.zeros(len(s.lights), np.int64)
         passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint, placed=s.passes, later=self._later)
@@ -351,7 +352,7 @@ class Tracer:
             self.count.rays["passed"] += int(counts[PASSED])
         for light in np.flatnonzero(lit):
             some = slice(light * n, light * n + lit[light])
-            self._light(_rows(self._shadow, some), radiance)
+            self._light(_rows(self._shadow, some), radiance, tested=not counts[UNTESTED])
         return _rows(following, slice(int(counts[SPAWNED])))
 
     def _stages(self, generation: Generation, recorded: bool, spawn: bool) -> Stages:
@@ -416,10 +417,10 @@ class Tracer:
                 s.corners, s.faces, s.object_of_face, s.opaque_faces,
             )  # fmt: skip
 
-    def _light(self, shadow: ShadowRays, radiance: NDArray[np.float32]) -> None:
+    def _light(self, shadow: ShadowRays, radiance: NDArray[np.float32], tested: bool) -> None:
         """Add the light of shadow rays that nothing opaque stops, as told here or before, dimmed by what is clear."""
         s, kept = self.scene, len(shadow.pixels)
-        if self._tools.occluded.packet == 0:
+        if not tested:
             found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, shadow.reach)
             self.count.embree_seconds += seconds
             if not s.lets_through:
