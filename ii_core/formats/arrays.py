@@ -76,7 +76,9 @@ def array_views(path: str | os.PathLike[str]) -> Views:
 
     known = WHOLE_ORDER if exact or flipped else frozenset(("transposed",))
     rig = None if stored.attributes is None else _rig(stored.attributes, stored.shape)
-    return Views(shape=stored.shape[:2], read=read, known=known, structure=stored.structure, rig=rig)
+    return Views(
+        shape=(stored.shape[0], stored.shape[1]), read=read, known=known, structure=stored.structure, rig=rig
+    )
 
 
 @checks.checked(path=checks.path)
