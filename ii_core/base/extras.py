@@ -15,6 +15,7 @@ EXTRAS = {
     "imagecodecs": ("coders", "imagecodecs"),
     "distributed": ("dask", "dask"),
     "h5py": ("arrays", "h5py"),
+    "imageio_ffmpeg": ("anchors", "imageio-ffmpeg"),
 }
 
 

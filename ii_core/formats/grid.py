@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +47,15 @@ class Views:
     structure: dict[str, Any] | None = None
     rig: Rig | None = None
     positions: Positions | None = None
+
+    def middle(self, shape: Pair) -> Views:
+        """Return the middle views, so many along the first and the second number; ValueError if there are fewer."""
+        if not all(1 <= few <= most for few, most in zip(shape, self.shape, strict=True)) or max(shape) < 2:
+            raise ValueError(
+                f"middle is {shape[0]}×{shape[1]} views: 2 to {self.shape[0]}×{self.shape[1]} are needed"
+            )
+        first = [(most - few) // 2 for few, most in zip(shape, self.shape, strict=True)]
+        return replace(self, shape=shape, read=lambda a, b: self.read(first[0] + a, first[1] + b), structure=None)
 
 
 def listed(files: list[Path], grid: Pair, known: frozenset[str]) -> Views:

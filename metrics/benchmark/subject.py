@@ -9,6 +9,7 @@ from statistics import fmean
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ii_core import IIPicture, IIVideo
 
@@ -20,10 +21,15 @@ Subject = IIPicture | IIVideo
 
 @dataclass(frozen=True)
 class Decoded:
-    """Decoded picture or video, and CPU seconds of the decoder."""
+    """Decoded picture or video, and CPU seconds of the decoder.
+
+    ``codes`` are the YCbCr codes of 10 bit that the coder returned, (N, M, 3), for measures of the common test
+    conditions; None if it returned RGB.
+    """
 
     picture: Subject
     seconds: float
+    codes: NDArray[Any] | None = None
 
 
 def identity(name: str, subject: Subject) -> dict[str, Any]:

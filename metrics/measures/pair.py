@@ -13,7 +13,7 @@ from ii_core import IICamera, IIPicture
 from ii_core.picture.picture import peak as peak_of
 
 if TYPE_CHECKING:
-    from ..depth.focus import FocusDepth
+    from ii_core.depth.focus import FocusDepth
 
 
 Compared = IIPicture | NDArray[Any]
@@ -67,6 +67,9 @@ class PicturePair:
         Pixels that count; all if not given.
     depth, layers_mm, method
         As for `q_depth`, which checks them.
+    codes : ndarray, (N, M, 3), optional
+        YCbCr codes of 10 bit of a decoder that returns them: measures of the common test conditions compare these
+        instead of the decoded picture's.
 
     Raises
     ------
@@ -82,6 +85,7 @@ class PicturePair:
     depth: ArrayLike | FocusDepth | None = None
     layers_mm: ArrayLike | None = None
     method: str = "dissertation"
+    codes: NDArray[Any] | None = None
 
     def __post_init__(self) -> None:
         for name in ("reference", "decoded"):
@@ -93,6 +97,8 @@ class PicturePair:
         self.reference.check_same_structure(self.decoded)
         if self.decoded.camera is not self.reference.camera:
             object.__setattr__(self, "decoded", self.reference.with_pixels(self.decoded.pixels))
+        if self.codes is not None and np.shape(self.codes) != self.reference.pixels.shape:
+            raise ValueError(f"codes are {np.shape(self.codes)}: {self.reference.pixels.shape} is needed")
         if self.mask is not None:
             object.__setattr__(self, "mask", _checked_mask(self.mask, self.reference))
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def coder_of(
-    profile: Profile, scheme: str | None, external: tuple[str, str], name: str | None, views: str
+    profile: Profile, scheme: str | None, anchor: str | None, external: tuple[str, str], name: str | None, views: str
 ) -> tuple[str, dict[str, Any]]:
     """Return the coder's name, and its functions for `metrics.benchmark.result.run`.
 
@@ -20,8 +20,10 @@ def coder_of(
     ValueError
         If there is none or more than one, the scheme is unknown, or it codes no takes and the profile has some.
     """
-    if (scheme is None) == (not any(external)):
-        raise ValueError("coder is missing: either --scheme or --external is needed")
+    if sum((scheme is not None, anchor is not None, any(external))) != 1:
+        raise ValueError("coder is missing: either --scheme, --anchor or --external is needed")
+    if anchor is not None:
+        return _anchor(profile, anchor, name)
     if scheme is not None:
         import codec
 
@@ -40,6 +42,20 @@ def coder_of(
         encoder=encoder, decoder=decoder, kind=views, seconds=profile.seconds, rate_tolerance=profile.rate_tolerance
     )
     return name, {"encode": tool.encode, "decode": tool.decode, "commands": [encoder, decoder]}
+
+
+def _anchor(profile: Profile, anchor: str, name: str | None) -> tuple[str, dict[str, Any]]:
+    """Return `coder_of` of an anchor; its command with a quantiser of q stands in the result."""
+    from metrics.benchmark.anchor_coder import AnchorCoder, versions
+    from metrics.benchmark.anchors import ANCHORS
+
+    if name is not None:
+        raise ValueError(f"name is {name!r}: only --external takes a name, an anchor has its own")
+    tool = AnchorCoder(anchor, profile.rate_tolerance)
+    if takes := [reference.name for reference in profile.pictures if reference.frames]:
+        raise ValueError(f"anchor {anchor} codes no takes: {takes[0]} of profile {profile.name} is one")
+    told = " ".join(f"{library} {version}" for library, version in versions().items())
+    return anchor, {"encode": tool.encode, "decode": tool.decode, "commands": [ANCHORS[anchor].encoder, told]}
 
 
 def encode_subject(subject: Subject, scheme: str, *, bpp: float) -> Any:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .cluster import Dask, cluster
+from .cluster import Dask, check_cluster, cluster
 from .coding import study_orders
 from .common import Force, Workers, app, check_outputs, check_unused, columns, load_any, tell_nominal
 from .plugins import Plugins, load_plugins
@@ -211,12 +211,7 @@ def study(
     if orders:
         coding = ("schemes", "anchor", "rates", "measures", "depth", "method", "layers", "workers", "dask")
         check_unused(context, "--orders", *coding)
-    if dask and workers is not None:
-        raise ValueError("--workers is for threads of this machine: leave it out with --dask")
-    if workers is not None and workers < 1:
-        raise ValueError(f"workers is {workers}: at least 1 is needed")
-    if dask and plugin:
-        raise ValueError("--plugin is for this machine alone: with --dask, install it as a package on all workers")
+    check_cluster(workers, dask, plugin)
     load_plugins(plugin)
     if not orders:
         for library in ("matplotlib", "bjontegaard"):  # before the work

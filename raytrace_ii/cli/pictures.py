@@ -69,6 +69,9 @@ def import_(
     grid: Annotated[
         str | None, typer.Option(help="Columns × rows of views, such as 9x9, if names do not contain them.")
     ] = None,
+    middle: Annotated[
+        str | None, typer.Option(help="Take only the middle views, of the first × the second number, such as 5x5.")
+    ] = None,
     transposed: Annotated[
         bool | None, typer.Option("--transposed/--not-transposed", help="The first number is horizontal.")
     ] = None,
@@ -111,6 +114,10 @@ def import_(
         _import_raw(source, whites, output, 8 if "uint8" in types else 16)
         return
     views = None if ei_pixels is not None else find_views(source, grid=None if grid is None else pair("grid", grid))
+    if middle is not None:
+        if views is None:
+            raise ValueError("middle is for folders of views: leave it out with --ei-pixels")
+        views = views.middle(pair("middle", middle))
     if baseline_mm is None and focal_mm is not None and views is not None and views.positions is not None:
         baseline_mm = views.positions.baseline_mm
     rig = _rig(camera, baseline_mm, focal_mm, sensor_mm, focus_mm)

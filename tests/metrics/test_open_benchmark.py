@@ -73,6 +73,7 @@ use = "a test"
 scene = "apples"
 camera = "setup1"
 """
+PHOTO = 'sha256 = "00"\nviews = [2, 2]\nview_pixels = [3, 3]\nsource = { path = "views" }'
 
 
 @pytest.fixture
@@ -423,7 +424,16 @@ def test_wrong_commands_are_refused_before_work(encoder, message):
 
 
 def test_profiles_of_the_package():
-    assert set(profile_names()) == {"dissertation", "jpeg-pleno", "small", "takes"}
+    assert set(profile_names()) == {
+        "dissertation",
+        "jpeg-pleno",
+        "photographs",
+        "photographs-small",
+        "small",
+        "takes",
+    }
+    for photograph in (*profile("photographs").pictures, *profile("photographs-small").pictures):
+        assert photograph.source and len(photograph.source.commit) == 40 and len(photograph.sha256) == 64
     pleno, own = profile("jpeg-pleno"), profile("dissertation")
     assert pleno.rates_bpp == (0.001, 0.005, 0.02, 0.1, 0.75) and {"q_ctc_psnr", "q_ctc_ssim"} <= set(pleno.measures)
     # Version 1 measured PSNR of full-range values and SSIM of BT.601 luma: other figures than the conditions have.
@@ -452,6 +462,9 @@ def test_profiles_of_the_package():
         (("version = 3", "version = 3\nprice = 1"), "profile has no price"),
         (('use = "a test"\n', ""), "picture: use missing"),
         (("rates_bpp = [", "rates_bpp = ["[:-1]), "mine.toml: "),
+        (('camera = "setup1"', 'source = { path = "views" }'), "photograph has no scene"),
+        (('scene = "apples"\ncamera = "setup1"', 'source = { path = "views" }'), "photograph: sha256, view_pixels"),
+        (('scene = "apples"\ncamera = "setup1"', PHOTO), "source: camera, commit, licence, repository missing"),
     ],
 )
 def test_wrong_profiles_are_one_clear_line(tmp_path, change, message):
@@ -460,7 +473,7 @@ def test_wrong_profiles_are_one_clear_line(tmp_path, change, message):
     with pytest.raises(ValueError, match=message) as error:
         profile(path)
     assert "\n" not in str(error.value)
-    with pytest.raises(ValueError, match="unknown profile 'mine': known are dissertation, jpeg-pleno, small"):
+    with pytest.raises(ValueError, match="unknown profile 'mine': known are dissertation, jpeg-pleno, photographs"):
         profile("mine")
 
 
