@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IICamera, IIPicture
+from ii_core.base import checks
 from ii_core.picture.picture import peak as peak_of
 
 if TYPE_CHECKING:
@@ -97,8 +98,10 @@ class PicturePair:
         self.reference.check_same_structure(self.decoded)
         if self.decoded.camera is not self.reference.camera:
             object.__setattr__(self, "decoded", self.reference.with_pixels(self.decoded.pixels))
-        if self.codes is not None and np.shape(self.codes) != self.reference.pixels.shape:
-            raise ValueError(f"codes are {np.shape(self.codes)}: {self.reference.pixels.shape} is needed")
+        if self.codes is not None:
+            checks.array("codes", self.codes)
+            if self.codes.shape != self.reference.pixels.shape:
+                raise ValueError(f"codes are {self.codes.shape}: {self.reference.pixels.shape} is needed")
         if self.mask is not None:
             object.__setattr__(self, "mask", _checked_mask(self.mask, self.reference))
 
