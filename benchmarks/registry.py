@@ -133,7 +133,7 @@ IMAGES = "docs/images"
 LAST = "018e29e"
 CLOSED: dict[str, tuple[str, ...]] = {
     "accuracy/eye_views": ("opinions_simulated.png",),
-    "coding/crossing": ("takes_crossing.png",),
+    "coding/crossing": (),
     "coding/light_field_bounds": ("lf_bounds.png",),
     "coding/light_field_threads": (),
     "coding/neighbours": (),

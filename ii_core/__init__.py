@@ -1,10 +1,11 @@
 """Cameras, pictures, component images and view images of integral imaging."""
 
-from .calibration import Calibration, NoLenses, calibrate, calibrated_picture, centres_picture
+from .calibration import Calibration, NoLenses, calibrate, calibrated_picture, centres_picture, defective_pixels
 from .camera.camera import Camera, IICamera
 from .camera.maps import MapCamera, read_maps, write_maps
 from .camera.pose import camera_pose
 from .camera.presets import camera_names, preset, preset_cameras
+from .depth.estimate import DepthEstimate, estimate_depth
 from .design.panel import PanelDesign, panel_display
 from .display.eye import Eye, EyeImage, eye_image
 from .display.model import DisplayModel
@@ -28,6 +29,7 @@ from .video.video import IIVideo, open_video, video_of, write_view_folders
 __all__ = [
     "Calibration",
     "Camera",
+    "DepthEstimate",
     "DisplayModel",
     "EmbeddedViewer",
     "Eye",
@@ -49,10 +51,12 @@ __all__ = [
     "component_images",
     "converging_distance",
     "crosstalk",
+    "defective_pixels",
     "depth_of_disparity",
     "disparity_of_depth",
     "elementary_images",
     "embed_viewer",
+    "estimate_depth",
     "eye_image",
     "find_views",
     "five_viewpoints",

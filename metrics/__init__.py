@@ -1,13 +1,14 @@
 """Quality of decoded II-pictures, rate–distortion studies, and their charts."""
 
+from ii_core.depth.focus import FocusDepth, depth_from_focus
+from ii_core.depth.layers import covering_layers, disparity_layers, linear_layers, logarithmic_layers
 from ii_core.display.view_sheets import plot_pair, plot_views
 
-from .depth.focus import FocusDepth, depth_from_focus
-from .depth.layers import covering_layers, disparity_layers, linear_layers, logarithmic_layers
 from .measures.angle import q_angle_ssim, q_angle_ycbcr
 from .measures.batch import measuring
 from .measures.builtin_measures import MEASURES
 from .measures.ctc import q_ctc_psnr, q_ctc_ssim
+from .measures.depth_errors import depth_errors, depth_regions
 from .measures.global_angle import angle_axes, mean_q_angle, q_angle, q_global
 from .measures.measure import Measure, Needs, known_measures, register_measure
 from .measures.over_time import TakeQuality, measure_take
@@ -60,9 +61,11 @@ __all__ = [
     "bd_rate",
     "covering_layers",
     "default_rates",
+    "depth_errors",
     "depth_from_focus",
     "depth_over_rate",
     "depth_rate_chart",
+    "depth_regions",
     "differences",
     "disparity_layers",
     "error_map",

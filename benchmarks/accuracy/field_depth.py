@@ -20,9 +20,9 @@ from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin, table
 from ii_core import IICamera, camera_pose, disparity_of_depth, preset
+from ii_core.depth.focus import METHODS
+from ii_core.depth.virtual_camera import virtual_camera_pixels
 from metrics import depth_from_focus
-from metrics.depth.focus import METHODS
-from metrics.depth.virtual_camera import virtual_camera_pixels
 from raytrace_ii import load_scene, render
 
 RECORDS = Records("field_depth", ("benchmarks.accuracy.field_depth",))

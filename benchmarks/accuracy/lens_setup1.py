@@ -11,10 +11,10 @@ import numpy as np
 from codec import decode, encode
 from ii_core import IICamera, IIPicture, add_sensor_noise, preset
 from ii_core.camera.optics import SphericalLenslet
+from ii_core.depth.virtual_camera import virtual_camera_pixels
 from ii_core.picture.disparity import disparity_of_depth
 from ii_core.waves.spread import spread_maps, spread_picture
 from metrics import depth_from_focus, q_global, q_view
-from metrics.depth.virtual_camera import virtual_camera_pixels
 from raytrace_ii import load_scene, render
 
 LENSES = ("rays", "ideal", "glass")

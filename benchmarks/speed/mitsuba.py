@@ -26,6 +26,7 @@ from benchmarks.records import Records
 from benchmarks.speed import pareto
 from ii_core import IICamera, preset
 from raytrace_ii import Background, Material, Scene, load_scene, render
+from raytrace_ii.tracing.kernels.tables import COORDINATES, NORMALS
 from raytrace_ii.tracing.packing import packed
 
 RECORDS = Records("mitsuba", ("benchmarks.speed.mitsuba",))
@@ -120,7 +121,8 @@ def _mesh(mitsuba: Any, scene: Scene) -> Any:
     arrays = packed(scene)
     corners = arrays.corners.reshape(-1, 3)
     flat = np.repeat(arrays.faces[:, :3], 3, axis=0)
-    smooth = arrays.normals.reshape(-1, 3) if len(arrays.normals) else np.zeros_like(flat)
+    table = arrays.surfaces.rows.reshape(-1, arrays.surfaces.columns)
+    smooth = table[:, NORMALS:COORDINATES].reshape(-1, 3) if arrays.surfaces.smooth else np.zeros_like(flat)
     normals = np.where(smooth.any(axis=1, keepdims=True), smooth, flat)  # those of flat bodies are 0
     mesh = mitsuba.Mesh("faces", len(corners), len(corners) // 3, has_vertex_normals=True)
     values = mitsuba.traverse(mesh)

@@ -19,8 +19,8 @@ from benchmarks.records import table as markdown
 from benchmarks.stability import curves, depth, geometry, light, picture, pictures
 from benchmarks.stability.excerpts import EXCERPTS, Excerpt
 from benchmarks.stability.geometry import Row
+from ii_core.depth.focus import METHODS
 from ii_core.display.figure import COLOURS, new_figure
-from metrics.depth.focus import METHODS
 
 ACCURACY = tuple(f"benchmarks.accuracy.{name}" for name in ("analytic", "map_precision", "depth_truth"))
 RECORDS = Records("stability", ("benchmarks.stability", *ACCURACY))

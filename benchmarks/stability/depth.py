@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from benchmarks.accuracy import depth_truth
 from benchmarks.stability.geometry import Row
 from ii_core import IIPicture, add_sensor_noise, preset
+from ii_core.depth.focus import METHODS
 from metrics import FocusDepth, depth_from_focus, linear_layers
-from metrics.depth.focus import METHODS
 from raytrace_ii import Body, Light, Material, Scene, render
 from raytrace_ii.scene.textures import Image, linear
 

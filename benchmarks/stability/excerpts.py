@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from benchmarks.stability.geometry import Row
-from metrics.depth.focus import METHODS
+from ii_core.depth.focus import METHODS
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from benchmarks.study.sheets import enlarged, sheet
 from codec import decode, encode
 from ii_core import add_sensor_noise, preset, read_maps, view_image, write_maps
 from ii_core.base.colour import srgb
-from metrics.depth.focus import METHODS
+from ii_core.depth.focus import METHODS
 from raytrace_ii import Body, Scene, load_scene, render, trace
 from raytrace_ii.shapes.primitives import rotation
 

@@ -14,6 +14,7 @@ from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, view_image
 from ii_core.base.files import write_image
 from ii_core.base.parallel import cores
+from ii_core.depth.layers import virtual_viewpoint
 from ii_core.picture.view import camera_of
 from metrics import (
     FocusDepth,
@@ -26,7 +27,6 @@ from metrics import (
     q_global,
     q_view,
 )
-from metrics.depth.layers import virtual_viewpoint
 from raytrace_ii import Shot
 
 from .coding import CODED, SCENES, curves, rated, setup3_scale, shot

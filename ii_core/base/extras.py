@@ -14,6 +14,7 @@ EXTRAS = {
     "bjontegaard": ("charts", "bjontegaard"),
     "imagecodecs": ("coders", "imagecodecs"),
     "distributed": ("dask", "dask"),
+    "h5py": ("arrays", "h5py"),
     "imageio_ffmpeg": ("anchors", "imageio-ffmpeg"),
 }
 

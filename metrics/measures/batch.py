@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IIPicture
 from ii_core.base import checks
+from ii_core.depth.focus import FocusDepth, depth_from_focus
 
-from ..depth.focus import FocusDepth, depth_from_focus
 from .measure import measure_of
 from .pair import PicturePair
 from .quality import DepthQuality

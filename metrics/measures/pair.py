@@ -13,7 +13,7 @@ from ii_core import IICamera, IIPicture
 from ii_core.picture.picture import peak as peak_of
 
 if TYPE_CHECKING:
-    from ..depth.focus import FocusDepth
+    from ii_core.depth.focus import FocusDepth
 
 
 Compared = IIPicture | NDArray[Any]

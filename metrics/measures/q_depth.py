@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IIPicture
 from ii_core.base import checks
+from ii_core.depth.focus import METHODS, FocusDepth, depth_from_focus
+from ii_core.depth.layers import check_layers, nearest_layer
+from ii_core.depth.virtual_camera import seen_pixels
 from ii_core.picture.view import camera_of
 
-from ..depth.focus import METHODS, FocusDepth, depth_from_focus
-from ..depth.layers import check_layers, nearest_layer
-from ..depth.virtual_camera import seen_pixels
 from .global_angle import psnr
 from .pair import Compared, PicturePair, Structure, picture_pair
 from .quality import DepthQuality

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core.base import checks
+from ii_core.depth.layers import logarithmic
 from ii_core.display.figure import COLOURS, new_figure, plain_text, save
 
-from ..depth.layers import logarithmic
 from ..measures.quality import AngleQuality, DepthQuality, told_outside
 from .rd_chart import edges
 

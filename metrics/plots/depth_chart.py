@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ii_core.base import checks
+from ii_core.depth.layers import logarithmic
 from ii_core.display.figure import COLOURS, LINES, MARKERS, check_suffix, new_figure, plain_text, save
 
-from ..depth.layers import logarithmic
 from ..measures.quality import told_outside
 from ..rates.points import is_study
 from .rd_chart import edges, set_rate_axis

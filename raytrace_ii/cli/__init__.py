@@ -14,7 +14,8 @@ import typer
 
 from ii_core.base.foreign import ForeignError
 
-from . import synthesize, render, pictures, calibrating, coding, evaluate, benchmarking, show, eye, observers, video
+from . import synthesize, render, pictures, calibrating, coding, evaluate, benchmarking, show, eye
+from . import depth, focus, measure_depth, observers, video
 from .common import app
 from .ending import ends_soon
 from .folders import no_empty_folders
@@ -26,9 +27,12 @@ __all__ = [
     "benchmarking",
     "calibrating",
     "coding",
+    "depth",
     "evaluate",
     "eye",
+    "focus",
     "main",
+    "measure_depth",
     "observers",
     "pictures",
     "render",

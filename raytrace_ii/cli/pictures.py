@@ -57,7 +57,10 @@ def regular(
 @app.command("import")
 def import_(
     source: Annotated[
-        Path, typer.Argument(help="A folder of views, a quilt (name_qsCxRaA.png) or a lenslet picture.")
+        Path,
+        typer.Argument(
+            help="A folder of views, .mat, .h5, a quilt (name_qsCxRaA.png), a lenslet picture, .lfp, .lfr, .raw."
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="The II-picture: .png, .tif or .exr.")],
     ei_pixels: Annotated[
@@ -86,6 +89,12 @@ def import_(
         float | None,
         typer.Option(help="Distance of the plane of zero disparity from the cameras; infinity by default."),
     ] = None,
+    whites: Annotated[
+        Path | None,
+        typer.Option(
+            help="White picture of a raw one, or the camera's calibration data to choose from: a folder, .tar."
+        ),
+    ] = None,
     force: Force = False,
 ) -> None:
     """Import a light field of other programs as an II-picture.
@@ -98,8 +107,11 @@ def import_(
     from ii_core.base.files import check_type, image_types
     from ii_core.picture.picture import sidecar
 
-    image_types(output)
+    types = image_types(output)
     check_outputs([output, sidecar(output)], force)
+    if whites is not None or source.suffix.lower() in (".lfp", ".lfr", ".raw"):
+        _import_raw(source, whites, output, 8 if "uint8" in types else 16)
+        return
     views = None if ei_pixels is not None else find_views(source, grid=None if grid is None else pair("grid", grid))
     if middle is not None:
         if views is None:
@@ -129,6 +141,25 @@ def import_(
         say("no camera is known: measures of views and of depth need one")
 
 
+def _import_raw(source: Path, whites: Path | None, output: Path, bits: int) -> None:
+    """Write the regular II-picture of a raw picture of a lenslet camera."""
+    from ii_core import resampled
+    from ii_core.base.files import check_type
+
+    from .calibrating import captured
+
+    check_type(output, f"uint{bits}")
+    with progress_bar(f"import {source.name}") as report:
+        shot = captured(source, white=whites, bits=bits, report=report)
+    with spinner(f"resample {source.name}"):
+        made, owned = resampled(shot.picture, deshift=shot.found.grid.lattice.hexagonal)
+        made.save(output)
+    (k, l), (u, v) = made.lenses, made.ei_pixels
+    say(shot.found.describe())
+    say(shot.told())
+    say_done(f"{output}: {k}×{l} lenses of {u}×{v} px, {owned.mean():.1%} of the pixels owned by their lens")
+
+
 def _rig(
     camera: str | None, baseline_mm: float | None, focal_mm: float | None, sensor_mm: float | None,
     focus_mm: float | None,
@@ -147,11 +178,14 @@ def _rig(
     return Rig(baseline_mm=baseline_mm, focal_mm=focal_mm, sensor_mm=sensor_mm, focus_mm=focus_mm)
 
 
+LAYOUTS = ("views", "hci", "quilt", "mosaic", "mat", "h5")
+
+
 @app.command()
 def export(
     picture: Annotated[Path, typer.Argument(help="An II-picture of regular structure, or a coded file.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder, or a file for a quilt or mosaic.")],
-    to: Annotated[str, typer.Option(help="views, hci, quilt or mosaic.")] = "views",
+    to: Annotated[str, typer.Option(help="views, hci, quilt, mosaic, mat or h5.")] = "views",
     depth: Annotated[Path | None, typer.Option(help="Map of z in mm (.exr), for the disparity map of hci.")] = None,
     row: Annotated[
         int | None, typer.Option(help="Row of views for a quilt, from 0; the middle one by default.")
@@ -163,11 +197,12 @@ def export(
     from ii_core import write_hci, write_quilt, write_views
     from ii_core.base.atomic import atomic_folder
     from ii_core.base.files import read_depth, write_image
+    from ii_core.formats.arrays import write_array
     from ii_core.formats.quilt import quilt_path
 
     load_plugins(plugin)
-    if to not in ("views", "hci", "quilt", "mosaic"):
-        raise ValueError(f"unknown layout {to!r}: known are views, hci, quilt, mosaic")
+    if to not in LAYOUTS:
+        raise ValueError(f"unknown layout {to!r}: known are {', '.join(LAYOUTS)}")
     if depth is not None and to != "hci":
         raise ValueError(f"depth is no option of layout {to}: use --to hci")
     original = load_any(picture)
@@ -181,6 +216,14 @@ def export(
                 write_hci(original, folder, depth=z)
         (k, l), (u, v) = original.lenses, original.ei_pixels
         say_done(f"{output}: {u * v} views of {k}×{l} px")
+        return
+    if to in ("mat", "h5"):
+        if output.suffix.lower() != f".{to}":
+            raise ValueError(f"{output} does not end in .{to}, which --to {to} writes")
+        check_outputs([output], force)
+        with spinner(f"export {picture.name}"):
+            write_array(original, output)
+        say_done(f"{output}: LF[v, u, y, x, c] and the camera")
         return
     target = quilt_path(output, original) if to == "quilt" else output
     check_outputs(image_file(target, original.pixels.dtype.name), force)

@@ -19,10 +19,10 @@ from ii_core import (
     view_image,
     write_hci,
 )
+from ii_core.depth.layers import disparity_layers
 from ii_core.formats.hci import view_disparity
 from ii_core.formats.rig import rig_of
 from metrics import q_depth, q_view
-from metrics.depth.layers import disparity_layers
 
 RIG = Rig(baseline_mm=20, focal_mm=50, sensor_mm=35, focus_mm=900)
 CAMERA = RIG.camera((5, 5), (64, 48))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture, orthoscopic, view_image
+from ii_core.depth.virtual_camera import virtual_camera_pixels
 from metrics import covering_layers, depth_from_focus, linear_layers, logarithmic_layers, q_depth, report
-from metrics.depth.virtual_camera import virtual_camera_pixels
 
 GAP = 1.5
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture, Rig, add_sensor_noise, depth_of_disparity, disparity_of_depth, preset
+from ii_core.depth.focus import METHODS
+from ii_core.depth.layers import check_layers, covering_layers, disparity_layers, field_layers, first_mm
+from ii_core.depth.views import near_and_far, view_steps, view_tables, views_side_by_side
 from metrics import depth_from_focus, q_depth
-from metrics.depth.focus import METHODS
-from metrics.depth.layers import check_layers, covering_layers, disparity_layers, field_layers, first_mm
-from metrics.depth.views import near_and_far, view_steps, view_tables, views_side_by_side
 from tests.ii_core.test_rig import CAMERA, RIG, seen
 
 K, L = CAMERA.lenses

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from ii_core import IICamera, IIPicture, orthoscopic, preset
+from ii_core.depth.focus import BASE, FILTER, REFERENCE
+from ii_core.depth.focus_kernels import Star, Tables, choose, focus_cost, half_cost, judge, pass_on, weigh
+from ii_core.depth.layers import nearest_layer
+from ii_core.depth.lens_tables import NOWHERE, pixel_tables, pixels_per_lens, star, whole_pixel_steps
+from ii_core.depth.virtual_camera import virtual_camera_pixels
 from metrics import depth_from_focus, linear_layers, logarithmic_layers, q_depth
-from metrics.depth.focus import BASE, FILTER, REFERENCE
-from metrics.depth.kernels import Star, Tables, choose, focus_cost, half_cost, judge, pass_on, weigh
-from metrics.depth.layers import nearest_layer
-from metrics.depth.lens_tables import NOWHERE, pixel_tables, pixels_per_lens, star, whole_pixel_steps
-from metrics.depth.virtual_camera import virtual_camera_pixels
 from raytrace_ii import Scene, render
 from raytrace_ii.scene.textures import Image
 from tests.support.trace_scenes import UNIFORM, WHITE, body, wall
@@ -335,6 +335,14 @@ def test_other_types_give_the_same_depth(dtype):
     # float32 cannot hold n/255: with costs as near as that the choice may fall the other way.
     assert (f.layer == g.layer).mean() > 0.98
     np.testing.assert_allclose(f.confidence, g.confidence, atol=1e-5)
+
+
+def test_the_robust_method_finds_the_same_in_sixteen_bits():
+    """Its prices of a change of depth are in codes of the picture's type: those of noise decide many pixels."""
+    eight = picture(lenses=(24, 16), seed=3)
+    sixteen = replace(eight, pixels=eight.pixels.astype(np.uint16) * 257)
+    layers = [depth_from_focus(p, layers_mm=LAYERS, method="robust").layer for p in (eight, sixteen)]
+    assert len(np.unique(layers[0])) > 3 and (layers[0] == layers[1]).mean() > 0.99
 
 
 def test_robust_cost_in_the_open():

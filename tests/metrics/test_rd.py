@@ -92,6 +92,13 @@ def test_a_quarter_of_overlap_is_enough():
             bd_rate(10**line, line, 10**line, line + less)
 
 
+def test_a_short_curve_within_a_long_one_is_whole_overlap():
+    """The share is of the shorter curve: a tenth of the long one here."""
+    short, long = np.linspace(4.5, 5.5, 4), np.linspace(0.0, 10.0, 5)
+    assert bd_rate(10**long, long, 2 * 10**short, short) == pytest.approx(100)
+    assert bd_psnr(10**long, long, 10**short, short + 1) == pytest.approx(1)
+
+
 @pytest.mark.parametrize(
     ("rates", "quality", "message"),
     [

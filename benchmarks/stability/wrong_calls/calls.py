@@ -25,6 +25,7 @@ from ii_core.camera.maps import read_maps, write_maps
 from ii_core.design import design, properties
 from ii_core.display.lenticular import lenticular
 from ii_core.formats.find import find_views
+from ii_core.formats.lytro import RawColour
 from ii_core.waves import spread, spread_files, wave
 from metrics import observers
 from metrics.observers import simulated
@@ -243,7 +244,9 @@ def of_pictures(made: Made) -> dict[str, Values]:
         "image_plane_mm": {"focal_mm": 2.0, "gap_mm": 1.0},
         "depth_range_mm": {"gap_mm": 1.0, "z_mm": 9.0},
         "calibrate": {**frames, "lattice": "rectangular", "pixel_pitch_mm": 0.01, "gap_mm": 0.2},
-        "calibrated_picture": {**frames, "calibration": calibration, "full_scale": 250.0},
+        "calibrated_picture": {**frames, "calibration": calibration, "full_scale": 250.0,
+            "colour": RawColour((1.2, 1.0, 1.5), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))},
+        "defective_pixels": {"white": raw, "dark": frames["dark"], "mosaic": "rggb", "calibration": calibration},
         "centres_picture": {"calibration": calibration, "picture": calibrated},
         "DisplayModel": {"lens_pitch_mm": 0.4, "gap_mm": 1.5},
         "Eye": {"position_mm": (0.0, 0.0, -300.0), "pupil_mm": 3.0, "focus_mm": 300.0},

@@ -14,12 +14,15 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ii_core.base.jit import exact_kernel as kernel
-from ii_core.base.jit import exact_stage_kernel as stage_kernel
-from ii_core.base.jit import inline_kernel, part_kernel
+from ii_core.base.jit import exact_lane_stage as stage_kernel
+from ii_core.base.jit import inline_kernel, lane_stage, part_kernel
 
+from . import lanes as at
 from .addresses import call
+from .lanes import BLOCK
 
 # Rows of a packet.
 _NEAR, _DIRECTION, _TIME, _FAR, _MASK, _FLAGS, _U, _V, _FACE, _GEOMETRY, _INSTANCE = (
@@ -62,9 +65,24 @@ class Calls(NamedTuple):
     narrow: np.float32
 
 
+NO_CALLS = Calls(0, 0, 0, 0, 0, 0, np.float32(0), np.float32(0))
+
+
+class Tools(NamedTuple):
+    """Embree's calls for a packet in lanes: nearest hit, whether anything stops a ray, and which lanes are traced.
+
+    The address of a function is 0 if Embree cannot be called so, or if nothing stops any ray.
+    """
+
+    nearest: Calls
+    occluded: Calls
+    active: NDArray[np.int32]
+    chosen: NDArray[np.int32]
+
+
 def _reduce(function: Any) -> Any:
     """A kernel's inner function whose minima may be taken in any order, and so in vectors: packets have no NaN."""
-    return part_kernel(function, fastmath={"nnan", "nsz"}, forceinline=True)
+    return lane_stage(function, fastmath={"nnan", "nsz"})
 
 
 @inline_kernel
@@ -214,10 +232,19 @@ def _choose(packet, active, chosen, calls, width):
 
 
 @stage_kernel
+def _trace(calls, active, chosen, packet, ahead, lanes, width):
+    """Trace the active lanes, so many, of a packet; one whose rays spread too far in groups of near lanes."""
+    if _together(packet, calls, ahead, width):
+        call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
+    else:
+        _trace_groups(calls, active, chosen, packet, lanes, width)
+
+
+@part_kernel
 def _trace_groups(calls, active, chosen, packet, lanes, width):
     """Trace a packet whose rays spread too far: groups of near lanes coherently, and the other lanes."""
     for lane in range(width):
-        chosen[lane] = lane < lanes
+        chosen[lane] = active[lane] != 0
     left, lone = lanes, 0
     while left >= width // 2 and lone < _MOST_LONE:
         count, first = _choose(packet, active, chosen, calls, width)
@@ -236,6 +263,81 @@ def _trace_groups(calls, active, chosen, packet, lanes, width):
         rest += chosen[lane] != 0
     if rest > 0:
         call(calls.packet, calls.active, calls.tree, calls.room, calls.incoherent)
+
+
+@stage_kernel
+def nearest_of_lanes(tools, first_of_same, ahead, lanes, work, width):
+    """Find the faces that the rays in the lanes hit.
+
+    Returns
+    -------
+    float
+        Distance of the last hit, as of `_together`.
+    """
+    single, whole, room = work.single, work.whole, at.PACKET
+    packet, numbers = single[room : room + PACKET_ROWS * width], work.bits[room : room + PACKET_ROWS * width]
+    for first in range(0, BLOCK, width):
+        some = min(lanes - first, width)
+        if some <= 0:
+            for lane in range(width):
+                whole[at.FACE + first + lane] = -1
+            continue
+        _begin(packet, numbers, width)
+        for c in range(3):
+            for lane in range(width):
+                packet[c * width + lane] = single[at.START + c * BLOCK + first + lane]
+                packet[(_DIRECTION + c) * width + lane] = single[at.DX + c * BLOCK + first + lane]
+        for lane in range(width):
+            packet[_FAR * width + lane] = _NO_END
+        for lane in range(width):
+            numbers[_GEOMETRY * width + lane] = -1
+            tools.active[lane] = -1 if lane < some else 0
+        _trace(tools.nearest, tools.active, tools.chosen, packet, ahead, some, width)
+        for lane in range(width):
+            single[at.U + first + lane] = packet[_U * width + lane]
+            single[at.V + first + lane] = packet[_V * width + lane]
+            single[at.DISTANCE + first + lane] = packet[_FAR * width + lane]
+        for lane in range(width):
+            hit = numbers[_GEOMETRY * width + lane] >= 0
+            whole[at.FACE + first + lane] = np.int64(numbers[_FACE * width + lane]) if hit else -1
+        if first_of_same.shape[0] > 0:
+            for k in range(first, first + width):
+                if whole[at.FACE + k] >= 0:
+                    whole[at.FACE + k] = first_of_same[np.uint64(whole[at.FACE + k])]
+        ahead = packet[_FAR * width] if numbers[_GEOMETRY * width] >= 0 else ahead
+    return ahead
+
+
+@stage_kernel
+def occluded_of_lanes(tools, reach, work, width):
+    """Take those shadow rays in the lanes out of ``WANTED`` that a face stops."""
+    single, room = work.single, at.PACKET
+    packet, numbers = single[room : room + PACKET_ROWS * width], work.bits[room : room + PACKET_ROWS * width]
+    for first in range(0, BLOCK, width):
+        some, one = 0, first  # lanes that are off have the last active one's ray: they spread a packet no farther
+        for k in range(first, first + width):
+            on = single[at.WANTED + k] > 0
+            some += on
+            one = k if on else one
+        if some == 0:
+            continue
+        _begin(packet, numbers, width)
+        for c in range(3):
+            o, d = at.OX + c * BLOCK, at.LX + c * BLOCK
+            a = at.AX + c * BLOCK
+            place, way = single[o + one] + single[a + one], single[d + one]
+            for lane in range(width):
+                on = single[at.WANTED + first + lane] > 0
+                packet[c * width + lane] = single[o + first + lane] + single[a + first + lane] if on else place
+                packet[(_DIRECTION + c) * width + lane] = single[d + first + lane] if on else way
+        for lane in range(width):
+            packet[_FAR * width + lane] = reach
+        for lane in range(width):
+            tools.active[lane] = -1 if single[at.WANTED + first + lane] > 0 else 0
+        _trace(tools.occluded, tools.active, tools.chosen, packet, np.float32(0), some, width)
+        for lane in range(width):
+            free = packet[_FAR * width + lane] >= 0
+            single[at.WANTED + first + lane] = single[at.WANTED + first + lane] if free else np.float32(0)
 
 
 @cache
@@ -261,10 +363,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 active[lane] = -1 if lane < lanes else 0
                 far = reach[i] if reach.shape[0] > 0 else _NO_END
                 _fill(packet, numbers, wide, lane, origins, directions, i, far)
-            if _together(packet, calls, ahead, wide):
-                call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
-            else:
-                _trace_groups(calls, active, chosen, packet, lanes, wide)
+            _trace(calls, active, chosen, packet, ahead, np.int64(lanes), wide)
             if placed:
                 _place(packet, numbers, wide, corners)
             ahead = packet[_FAR * width] if numbers[_GEOMETRY * width] >= 0 else ahead
@@ -281,10 +380,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 i = first + min(lane, lanes - 1)
                 active[lane] = -1 if lane < lanes else 0
                 _fill(packet, numbers, wide, lane, origins, directions, i, reach[i])
-            if _together(packet, calls, np.float32(0), wide):
-                call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
-            else:
-                _trace_groups(calls, active, chosen, packet, lanes, wide)
+            _trace(calls, active, chosen, packet, np.float32(0), np.int64(lanes), wide)
             for lane in range(lanes):
                 found[first + lane] = 0 if packet[_FAR * width + lane] < 0 else -1
 

@@ -14,6 +14,7 @@ from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, image_tex
 from raytrace_ii.shapes.primitives import rotation
 from raytrace_ii.tracing.kernels.noise import gradient_noise
 from raytrace_ii.tracing.kernels.srgb import encode_srgb, encode_steps
+from raytrace_ii.tracing.kernels.tables import FLAT_COLUMNS
 from raytrace_ii.tracing.packing import packed
 from raytrace_ii.tracing.texture_table import TextureTable
 from tests.support.trace_scenes import BLACK, WHITE, body, box, octaves, sphere, texture_at, wall
@@ -317,7 +318,7 @@ def test_stored_pixels_become_textures():
 
 def test_a_scene_pays_for_textures_only_if_it_has_some():
     plain, ball = Scene(bodies=[body(wall(5))]), sphere(1, 8)
-    assert packed(plain).coordinates.shape == (0, 3, 3) and packed(plain).normals.shape == (0, 3, 3)
+    assert packed(plain).coordinates.shape == (0, 3, 3) and packed(plain).surfaces.columns == FLAT_COLUMNS
     assert packed(plain).textures.table.shape[0] == 0 and [len(t) for t in packed(plain).textures.texels] == [0, 0]
     painted = Scene(bodies=[body(wall(5)), body(ball, coordinates=ball.vertices, texture=BOARD)])
     assert packed(painted).coordinates.shape == (2 + len(ball.faces), 3, 3)

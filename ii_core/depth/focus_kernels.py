@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ii_core.base.jit import exact_stage_kernel, inline_kernel, kernel
+from ..base.jit import exact_stage_kernel, inline_kernel, kernel
 
 # Least neighbours of a half: a single one often agrees by chance. More would also exclude lenses at the border.
 FEWEST = 2

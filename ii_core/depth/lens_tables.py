@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IICamera
-from ii_core.picture.view import view_positions
-
+from ..camera.camera import IICamera
+from ..picture.view import view_positions
 from .layers import Floats, virtual_viewpoint
 
 Table = tuple[NDArray[np.int32], Floats]

@@ -11,8 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IICamera, IIPicture, disparity_of_depth
-
+from ..camera.camera import IICamera
+from ..picture.disparity import disparity_of_depth
+from ..picture.picture import IIPicture
 from .layers import Floats
 from .lens_tables import Table
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ii_core import IICamera, IIPicture
-from ii_core.picture.view import camera_of, view_positions
-
+from ..camera.camera import IICamera
+from ..picture.picture import IIPicture
+from ..picture.view import camera_of, view_positions
 from .layers import virtual_viewpoint
 
 

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IIPicture, depth_of_disparity, disparity_of_depth
-from ii_core.base import checks
-from ii_core.base.parallel import over_rows
-from ii_core.picture.picture import peak
-from ii_core.picture.view import camera_of, view_image
-
-from . import kernels
+from ..base import checks
+from ..base.parallel import over_rows
+from ..picture.disparity import depth_of_disparity, disparity_of_depth
+from ..picture.picture import IIPicture, peak
+from ..picture.view import camera_of, view_image
+from . import focus_kernels as kernels
 from .layers import Floats, check_layers, virtual_viewpoint
 from .lens_tables import RINGS, pixel_tables, pixels_per_lens, star, whole_pixel_steps
 from .views import near_and_far, place_of, view_steps, view_tables, views_side_by_side

@@ -7,8 +7,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ii_core import IICamera, depth_of_disparity, disparity_of_depth
-from ii_core.base import checks
+from ..base import checks
+from ..camera.camera import IICamera
+from ..picture.disparity import depth_of_disparity, disparity_of_depth
 
 LAYERS = 250
 FIELD_SPAN, FARTHEST = 16.0, 100.0  # pixels; distances at which viewing zones meet

@@ -1,0 +1,1 @@
+"""Depth of a picture: from focus by layers, and disparity from all views."""

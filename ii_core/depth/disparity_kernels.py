@@ -1,0 +1,284 @@
+"""Kernels of disparity: costs along half-lines of views, Gauss–Newton steps over all views, windows of planes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.jit import array_kernel, lean_kernel, stage_kernel
+
+
+class Views(NamedTuple):
+    """Views around the one whose disparity is estimated."""
+
+    pixels: Any  # (n, 3, H, W) of uint16
+    steps: Any  # (n, 2) of float32: steps down and to the right from the reference; the first is the reference itself
+    lines: Any  # (n,) half-line of each view, −1 for none
+
+
+@stage_kernel
+def _cubic(f):
+    """Return the weights of four samples around a place f beyond the second (Catmull–Rom), float32."""
+    return (
+        np.float32(f * (-0.5 + f * (1.0 - 0.5 * f))),
+        np.float32(1.0 + f * f * (-2.5 + 1.5 * f)),
+        np.float32(f * (0.5 + f * (2.0 - 1.5 * f))),
+        np.float32(f * f * (-0.5 + 0.5 * f)),
+    )
+
+
+@array_kernel
+def line_costs(views, labels, limit, lines, out, first, last):
+    """out[y, x, d] = mean over the better half of the half-lines of views of the mean of min(Σ_rgb |Δ|, limit).
+
+    A point outside a view has no difference there. A label without any difference costs ``limit``.
+    """
+    width = out.shape[1]
+    total, count = np.empty((lines, width), np.float32), np.empty((lines, width), np.float32)
+    rows = np.empty((3, width), np.float32)
+    for y in range(first, last):
+        for d in range(labels.size):
+            total[:] = 0.0
+            count[:] = 0.0
+            for n in range(1, views.steps.shape[0]):
+                line = views.lines[n]
+                if line >= 0:
+                    sy, sx = -labels[d] * views.steps[n, 0], -labels[d] * views.steps[n, 1]
+                    _add_differences(views.pixels, n, y, sy, sx, limit, rows, total[line], count[line])
+            for x in range(width):
+                out[y, x, d] = _better_half(total, count, x, limit)
+
+
+@stage_kernel
+def _add_differences(pixels, n, y, sy, sx, limit, rows, total, count):
+    """Add min(Σ_rgb |Δ|, limit) between row ``y`` of the reference and the view ``n``, moved by (sy, sx), cubic."""
+    height, width = pixels.shape[2:]
+    top, left = math.floor(sy), math.floor(sx)
+    if y + top < 0 or y + top + (sy > top) >= height:
+        return
+    # pixels whose neighbours on both sides lie in the view
+    start, stop = max(0, -left), min(width, width - left - (sx > left))
+    if stop <= start:
+        return
+    a0, a1, a2, a3 = _cubic(np.float32(sy - top))
+    b0, b1, b2, b3 = _cubic(np.float32(sx - left))
+    y0, y1 = max(y + top - 1, 0), y + top
+    y2, y3 = min(y + top + 1, height - 1), min(y + top + 2, height - 1)
+    for c in range(3):
+        p = pixels[n, c]
+        for x in range(width):
+            rows[c, x] = (
+                a0 * np.float32(p[y0, x])
+                + a1 * np.float32(p[y1, x])
+                + a2 * np.float32(p[y2, x])
+                + a3 * np.float32(p[y3, x])
+            )
+    own = pixels[0]
+    inner, end = max(start, 1 - left), min(stop, width - 2 - left)
+    for x in range(inner, end):
+        i, e = x + left, np.float32(0.0)
+        for c in range(3):
+            r = rows[c]
+            e += abs(b0 * r[i - 1] + b1 * r[i] + b2 * r[i + 1] + b3 * r[i + 2] - np.float32(own[c, y, x]))
+        total[x] += min(e, limit)
+        count[x] += np.float32(1.0)
+    for x in range(start, stop):
+        if inner <= x < end:
+            continue
+        i, e = x + left, np.float32(0.0)
+        for c in range(3):
+            r = rows[c]
+            value = b0 * r[max(i - 1, 0)] + b1 * r[i] + b2 * r[min(i + 1, width - 1)] + b3 * r[min(i + 2, width - 1)]
+            e += abs(value - np.float32(own[c, y, x]))
+        total[x] += min(e, limit)
+        count[x] += np.float32(1.0)
+
+
+@stage_kernel
+def _better_half(total, count, x, limit):
+    """Return the mean of the lower half of the half-lines' means at pixel x; ``limit`` without one."""
+    seen = 0
+    for k in range(total.shape[0]):
+        if count[k, x] > 0.0:
+            value, j = total[k, x] / count[k, x], seen
+            while j > 0 and total[j - 1, x] > value:
+                total[j, x] = total[j - 1, x]
+                j -= 1
+            total[j, x] = value
+            seen += 1
+    half = (seen + 1) // 2
+    mean = np.float32(0.0)
+    for k in range(half):
+        mean += total[k, x]
+    return mean / half if half > 0 else limit
+
+
+@lean_kernel
+def add_evidence(views, disparity, limit, smooth, push, weight, first, last):
+    """Add up one Gauss–Newton step over all views: d + push/weight is the least-squares disparity of each pixel.
+
+    A view's weight is 1/(1 + r²/limit²)², r² the mean squared difference over 3×3 pixels, ``smooth`` (3, H, W) the
+    reference view filtered for gradients. Rows ``first`` to ``last`` of ``push`` and ``weight`` (H, W) are filled.
+    """
+    height, width = disparity.shape
+    for y in range(first, last):
+        for x in range(width):
+            push[y, x], weight[y, x] = 0.0, 0.0
+        if y < 1 or y > height - 2:
+            continue
+        for x in range(1, width - 1):
+            gx0 = np.float32(0.5) * (smooth[0, y, x + 1] - smooth[0, y, x - 1])
+            gx1 = np.float32(0.5) * (smooth[1, y, x + 1] - smooth[1, y, x - 1])
+            gx2 = np.float32(0.5) * (smooth[2, y, x + 1] - smooth[2, y, x - 1])
+            gy0 = np.float32(0.5) * (smooth[0, y + 1, x] - smooth[0, y - 1, x])
+            gy1 = np.float32(0.5) * (smooth[1, y + 1, x] - smooth[1, y - 1, x])
+            gy2 = np.float32(0.5) * (smooth[2, y + 1, x] - smooth[2, y - 1, x])
+            own = views.pixels[0]
+            o0, o1, o2 = np.float32(own[0, y, x]), np.float32(own[1, y, x]), np.float32(own[2, y, x])
+            up, total = np.float32(0.0), np.float32(0.0)
+            d = disparity[y, x]
+            for n in range(1, views.steps.shape[0]):
+                a, b = views.steps[n, 0], views.steps[n, 1]
+                sy, sx = y - d * a, x - d * b
+                if not (1 <= sy < height - 2 and 1 <= sx < width - 2):
+                    continue
+                j, i = int(sy), int(sx)
+                a0, a1, a2, a3 = _cubic(np.float32(sy - j))
+                b0, b1, b2, b3 = _cubic(np.float32(sx - i))
+                p = views.pixels[n]
+                e0 = _sample(p[0], j, i, a0, a1, a2, a3, b0, b1, b2, b3) - o0
+                e1 = _sample(p[1], j, i, a0, a1, a2, a3, b0, b1, b2, b3) - o1
+                e2 = _sample(p[2], j, i, a0, a1, a2, a3, b0, b1, b2, b3) - o2
+                s0, s1, s2 = a * gy0 + b * gx0, a * gy1 + b * gx1, a * gy2 + b * gx2
+                w = np.float32(1.0) / (np.float32(1.0) + (e0 * e0 + e1 * e1 + e2 * e2) / (limit * limit))
+                w *= w
+                up += w * (e0 * s0 + e1 * s1 + e2 * s2)
+                total += w * (s0 * s0 + s1 * s1 + s2 * s2)
+            push[y, x], weight[y, x] = up, total
+
+
+@stage_kernel
+def _sample(p, j, i, a0, a1, a2, a3, b0, b1, b2, b3):
+    """Return the cubic interpolation of an image around the pixel (j, i)."""
+    return (
+        a0 * (b0 * p[j - 1, i - 1] + b1 * p[j - 1, i] + b2 * p[j - 1, i + 1] + b3 * p[j - 1, i + 2])
+        + a1 * (b0 * p[j, i - 1] + b1 * p[j, i] + b2 * p[j, i + 1] + b3 * p[j, i + 2])
+        + a2 * (b0 * p[j + 1, i - 1] + b1 * p[j + 1, i] + b2 * p[j + 1, i + 1] + b3 * p[j + 1, i + 2])
+        + a3 * (b0 * p[j + 2, i - 1] + b1 * p[j + 2, i] + b2 * p[j + 2, i + 1] + b3 * p[j + 2, i + 2])
+    )
+
+
+@lean_kernel
+def fit_planes(disparity, push, weight, view, radius, alike, near, prior, flat, out, sure, first, last):
+    """Fit a plane to the disparities d + push/weight around each pixel, weighted; its value at the pixel is ``out``.
+
+    Neighbours up to ``radius`` pixels away weigh exp(−Σ_rgb |Δview|/alike − |Δd|/near). ``prior`` is the weight of
+    the old disparities, which keeps weak windows where they are. ``sure`` is the sum of weights.
+    """
+    height, width = disparity.shape
+    for y in range(first, last):
+        for x in range(width):
+            s0, sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            t0, tx, ty = 0.0, 0.0, 0.0
+            d = disparity[y, x]
+            for j in range(-radius, radius + 1):
+                if y + j < 0 or y + j >= height:
+                    continue
+                for i in range(-radius, radius + 1):
+                    if x + i < 0 or x + i >= width:
+                        continue
+                    v, u = y + j, x + i
+                    if weight[v, u] <= 0.0:
+                        continue
+                    far = (
+                        abs(view[0, v, u] - view[0, y, x])
+                        + abs(view[1, v, u] - view[1, y, x])
+                        + abs(view[2, v, u] - view[2, y, x])
+                    )
+                    w = math.exp(-far / alike - abs(disparity[v, u] - d) / near)
+                    q = w * (push[v, u] + weight[v, u] * (disparity[v, u] - d))
+                    w *= weight[v, u]
+                    s0 += w
+                    sx += w * i
+                    sy += w * j
+                    sxx += w * i * i
+                    sxy += w * i * j
+                    syy += w * j * j
+                    t0 += q
+                    tx += q * i
+                    ty += q * j
+            sure[y, x] = s0
+            if s0 <= 0.0:
+                out[y, x] = d
+                continue
+            # the normal equations, around the mean position
+            mx, my = sx / s0, sy / s0
+            cxx, cxy, cyy = sxx - sx * mx, sxy - sx * my, syy - sy * my
+            ridge = flat * s0 + prior * radius * radius
+            cxx += ridge
+            cyy += ridge
+            qx, qy = tx - t0 * mx, ty - t0 * my
+            det = cxx * cyy - cxy * cxy
+            px, py = 0.0, 0.0
+            if det > 0.0:
+                px, py = (cyy * qx - cxy * qy) / det, (cxx * qy - cxy * qx) / det
+            out[y, x] = d + t0 / (s0 + prior) - px * mx - py * my
+
+
+@lean_kernel
+def move_to_view(disparity, down, across, filled, out):
+    """Move a disparity to the view a step away: the nearest in front, holes NaN or ``filled`` from behind."""
+    height, width = out.shape
+    out[:] = np.nan
+    for y in range(height):
+        for x in range(width):
+            d = disparity[y, x]
+            if np.isnan(d):
+                continue
+            # where neighbours of one surface move apart, pixels between them are covered, too
+            sy, sx = y - d * down, x - d * across
+            for j in range(math.floor(sy), math.floor(sy) + 2):
+                for i in range(math.floor(sx), math.floor(sx) + 2):
+                    near = abs(j - sy) <= 0.75 and abs(i - sx) <= 0.75
+                    if near and 0 <= j < height and 0 <= i < width and not out[j, i] >= d:
+                        out[j, i] = d
+    if not filled:
+        return
+    for y in range(height):
+        left, x = np.float32(np.nan), 0
+        while x < width:
+            if not np.isnan(out[y, x]):
+                left = out[y, x]
+                x += 1
+                continue
+            end = x
+            while end < width and np.isnan(out[y, end]):
+                end += 1
+            right = out[y, end] if end < width else np.float32(np.nan)
+            behind = right if np.isnan(left) or right < left else left
+            for i in range(x, end):
+                out[y, i] = behind
+            x = end
+
+
+@lean_kernel
+def rivals(cost, total, apart, ratio, margin, first, last):
+    """Compare the label of least ``total`` with others at least ``apart`` labels away.
+
+    ``ratio`` is its cost over the least cost of those, ``margin`` their least total above its own.
+    """
+    for y in range(first, last):
+        for x in range(cost.shape[1]):
+            best = 0
+            for d in range(cost.shape[2]):
+                if total[y, x, d] < total[y, x, best]:
+                    best = d
+            other, least = np.float32(np.inf), np.float32(np.inf)
+            for d in range(cost.shape[2]):
+                if abs(d - best) >= apart:
+                    other = min(other, cost[y, x, d])
+                    least = min(least, total[y, x, d])
+            ratio[y, x] = cost[y, x, best] / other if 0.0 < other < np.inf else np.float32(1.0)
+            margin[y, x] = least - total[y, x, best] if least < np.inf else np.float32(0.0)

@@ -1,0 +1,309 @@
+"""Disparity and depth of one view of a light field, from all views."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from ..base import checks
+from ..base.parallel import over_rows
+from ..camera.camera import IICamera, Pair
+from ..picture.disparity import depth_of_disparity, disparity_of_depth
+from ..picture.picture import IIPicture
+from . import disparity_kernels as kernels
+from .around import CODES, DIRECTIONS, halved, views_around
+from .disparity_kernels import Views
+from .focus_kernels import choose, pass_on
+from .layers import FARTHEST, first_mm
+
+Map = NDArray[np.float32]
+Progress = Callable[[int, int, str], Any]
+
+# In 8-bit codes summed over R, G and B: the difference of another surface; prices of `pass_on`.
+OTHER_SURFACE, SLOPE, LEAP, ALIKE = 30.0, 30.0, 12.0, 25.0
+STEP = 0.48  # px that neighbouring labels are apart in the farthest view of a half-line
+MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of costs are then 4 times the field
+# The range of disparities: found in views of at most SEARCH_SIDE px, at MANY pixels whose costs within NOISE 8-bit
+# codes of the least span less than VALLEY px.
+SEARCH_SIDE, MANY, NOISE, VALLEY = 128, 16, 4.0, 2.0
+# Gauss–Newton: differences of occluded views, 8-bit codes; window of planes, px; likeness in codes and disparity;
+# weight of the old disparity, codes² a px²; weight of level planes over that of the data.
+STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT = 3, 6.0, 5, 15.0, 0.13, 1000.0, 1.0
+# Gradients are of a view blurred by BLUR px, with noise of NOISY 8-bit codes; without noise the blur is a bias:
+# antinous of the HCI fields has 28 % above 0.07 px with it and 21 % without, `apples` 61 % and 78 % (2026-11-25).
+BLUR, NOISY, CLEAN = 0.6, 0.9, 0.5
+# Confidence: labels so many px away are rivals; logistic regression on 950 000 pixels of four fields of 9×9 views,
+# `cuboid`, `twins`, `apples` with noise of one code and antinous, its constant lowered by 0.2 (2026-11-25).
+APART, JUDGE = 0.5, (-4.5, -0.29, -0.70, -1.31, 0.62)
+# Even blocks from which noise is estimated: side in px, and their share.
+BLOCK, EVEN = 8, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class DepthEstimate:
+    """Disparity of a view, estimated from all views.
+
+    Attributes
+    ----------
+    disparity : ndarray of float32, (L, K)
+        Pixels a step between views, positive before the lens plane; NaN where nothing tells depths apart.
+    confidence : ndarray of float32, (L, K)
+        Estimated probability that the disparity is within 0.07 px.
+    depth_mm : ndarray of float64, (L, K), or None
+        z in camera coordinates; None for a picture without camera.
+    view : (u, v)
+    """
+
+    disparity: Map
+    confidence: Map
+    depth_mm: NDArray[np.float64] | None
+    view: Pair
+
+
+@checks.checked(
+    picture=checks.instance(IIPicture),
+    view=checks.indices,
+    low=checks.number,
+    high=checks.number,
+    workers=checks.whole_from(1, 1024),
+    progress=checks.callable_,
+)
+def estimate_depth(
+    picture: IIPicture,
+    *,
+    view: Pair | None = None,
+    low: float | None = None,
+    high: float | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> DepthEstimate:
+    """Estimate the disparity of one view, and its depth if the picture has a camera.
+
+    1. Every label, a disparity, costs the mean difference along half-lines of views, the better half of eight.
+    2. Costs are passed on along rows and columns; the least one wins, a parabola places it between labels.
+    3. Gauss–Newton steps over all views; planes in bilateral windows average them.
+
+    Parameters
+    ----------
+    picture : IIPicture
+        Regular; two views or more.
+    view : (u, v), optional
+        The view, counted from the left and the top; the middle one by default.
+    low, high : float, optional
+        Range of disparities, px a step; found in smaller views by default.
+    workers : int, optional
+        Threads; as many as cores if not given. The result is the same for any number.
+    progress : callable, optional
+        Called with steps done, their number, and the next one's name.
+
+    Returns
+    -------
+    DepthEstimate
+
+    Raises
+    ------
+    ValueError
+        If there is one view only, if views are narrower than 8 px, or if a parameter is out of range.
+
+    References
+    ----------
+    Hirschmüller, Stereo processing by semiglobal matching, PAMI 2008, along four paths. Lucas and Kanade, An
+    iterative image registration technique, IJCAI 1981, over all views.
+    """
+    picture.check_regular()
+    (across, down), (u, v) = picture.lenses, picture.ei_pixels
+    if u * v < 2:
+        raise ValueError("the picture has one view: depth needs two or more")
+    if across < 8 or (down < 8 and v > 1):
+        raise ValueError(f"views are {across}×{down} px: at least 8×8 are needed")
+    at = (u // 2, v // 2) if view is None else view
+    if not (0 <= at[0] < u and 0 <= at[1] < v):
+        raise ValueError(f"view is {at[0]},{at[1]}: columns 0–{u - 1} and rows 0–{v - 1} are there")
+    if low is not None and high is not None and not low < high:
+        raise ValueError(f"low is {low:g}, high {high:g}: low < high is needed")
+    told = progress if progress is not None else lambda done, total, step: None
+    total = 4 + STEPS
+    told(0, total, "views")
+    views = views_around(picture, at)
+    told(1, total, "range of disparities")
+    if low is None or high is None:
+        found = search_range(views, picture.camera, workers)
+        low, high = found[0] if low is None else low, found[1] if high is None else high
+        high = high if high > low else low + 1.0
+    told(2, total, "costs")
+    start, *rivals = matched(views, labels_between(views, low, high), workers)
+    disparity, noise = start, noise_codes(views)
+    push, weight = np.zeros_like(disparity), np.zeros_like(disparity)
+    for step in range(STEPS):
+        told(3 + step, total, f"step {step + 1} over all views")
+        disparity, _ = refined(views, disparity, noise, push, weight, workers)
+    told(3 + STEPS, total, "confidence")
+    disparity[np.isnan(start)] = np.nan
+    confidence = judged(disparity, start, *rivals)
+    depth = None if picture.camera is None else depth_of_disparity(picture.camera, disparity)
+    told(total, total, "")
+    return DepthEstimate(disparity, confidence, depth, at)
+
+
+@checks.checked(picture=checks.instance(IIPicture), workers=checks.whole_from(1, 1024))
+def field_range(picture: IIPicture, *, workers: int | None = None) -> tuple[float, float]:
+    """Return the lowest and the highest disparity of a regular picture's middle view, px a step between views."""
+    picture.check_regular()
+    u, v = picture.ei_pixels
+    return search_range(views_around(picture, (u // 2, v // 2)), picture.camera, workers)
+
+
+def labels_between(views: Views, low: float, high: float) -> Map:
+    """Return disparities to try, in equal steps: `STEP` px in the farthest view of a half-line, or wider."""
+    reach = np.abs(views.steps[views.lines >= 0]).max()
+    most = max(FEWEST_LABELS, int(MOST_LABELS * len(views.steps)))
+    count = min(int(np.ceil((high - low) * reach / STEP)) + 1, most)
+    return np.linspace(low, high, max(count, 3), dtype=np.float32)
+
+
+def search_range(views: Views, camera: IICamera | None, workers: int | None) -> tuple[float, float]:
+    """Return the lowest and the highest disparity of views, by matching small ones over all possible labels."""
+    scale = 1
+    while max(views.pixels.shape[2:]) > SEARCH_SIDE:
+        views, scale = halved(views), 2 * scale
+    side = max(views.pixels.shape[2:])
+    low, high = possible(camera, side / 2 * scale)
+    reach = np.abs(views.steps[views.lines >= 0]).max()
+    labels = np.linspace(low / scale, high / scale, int((high - low) / scale * reach / STEP) + 3, dtype=np.float32)
+    cost = costs(views, labels, workers)
+    found = labelled(passed_on(views, cost, labels, workers), labels)
+    known = np.isfinite(found)
+    # a valley of the costs: where it is wide, noise decides
+    wide = (cost < cost.min(axis=2, keepdims=True) + NOISE * CODES).sum(axis=2) * (labels[1] - labels[0])
+    certain = known & (wide < VALLEY) & (np.abs(labels[cost.argmin(axis=2)] - found) < 0.2)
+    if certain.sum() < MANY:
+        certain = known
+    if not certain.any():
+        return max(low, -1.0), min(high, 1.0)
+    ends = np.quantile(found[certain], [0.002, 0.998]) * scale
+    margin = 0.3 + 0.05 * (ends[1] - ends[0])
+    return max(low, float(ends[0]) - margin), min(high, float(ends[1]) + margin)
+
+
+def possible(camera: IICamera | None, most: float) -> tuple[float, float]:
+    """Return the disparities of depths before the camera, at most ``most`` px in size."""
+    if camera is None or camera.front:
+        return -most, most
+    base = camera.origin_mm[2] + camera.gap_mm
+    if camera.viewer_mm is None:
+        return -most, 0.0
+    infinity = float(disparity_of_depth(camera, base + FARTHEST * camera.viewer_mm))
+    near = first_mm(camera)
+    with np.errstate(divide="ignore"):
+        nearest = float(disparity_of_depth(camera, near + 1e-3 * (base - near))) if near < base else most
+    return max(-most, infinity), min(most, nearest)
+
+
+def costs(views: Views, labels: Map, workers: int | None) -> Map:
+    """Return the costs of labels at every pixel of the reference, means over 3×3 pixels, (H, W, labels)."""
+    height, width = views.pixels.shape[2:]
+    out = np.empty((height, width, labels.size), np.float32)
+    limit = np.float32(OTHER_SURFACE * CODES)
+    run(workers, height, kernels.line_costs, views, labels, limit, len(DIRECTIONS), out)
+    ndimage.uniform_filter(out, (3, 3, 1), output=out)
+    return out
+
+
+def passed_on(views: Views, cost: Map, labels: Map, workers: int | None) -> Map:
+    """Return costs passed on along rows and columns, both ways."""
+    height, width = views.pixels.shape[2:]
+    view = views.pixels[0].transpose(1, 2, 0).astype(np.float64)
+    total = np.zeros_like(cost)
+    prices = labels.astype(np.float64), SLOPE * CODES, LEAP * CODES, ALIKE * CODES
+    for columns, back in product((False, True), repeat=2):
+        run(workers, width if columns else height, pass_on, cost, view, *prices, columns, back, total)
+    return total
+
+
+def labelled(total: Map, labels: Map) -> Map:
+    """Return the disparity of least cost, between labels by a parabola; NaN where all cost the same."""
+    layer, fit = np.empty(total.shape[:2], np.int64), np.empty(total.shape[:2])
+    choose(total, CODES / 100, layer, fit, 0, total.shape[0])
+    found = np.interp(layer + fit, np.arange(labels.size), labels)
+    return np.where(layer < 0, np.nan, found).astype(np.float32)
+
+
+def matched(views: Views, labels: Map, workers: int | None) -> tuple[Map, Map, Map]:
+    """Return the disparity by labels, the median over 3×3 pixels, and the `rivals` of its label."""
+    height = views.pixels.shape[2]
+    cost = costs(views, labels, workers)
+    total = passed_on(views, cost, labels, workers)
+    ratio, margin = np.empty(cost.shape[:2], np.float32), np.empty(cost.shape[:2], np.float32)
+    apart = max(1, round(APART / float(labels[1] - labels[0])))
+    run(workers, height, kernels.rivals, cost, total, apart, ratio, margin)
+    return np.asarray(ndimage.median_filter(labelled(total, labels), 3)), ratio, margin / CODES
+
+
+def judged(disparity: Map, start: Map, ratio: Map, margin: Map) -> Map:
+    """Return the estimated probability that disparities are within 0.07 px."""
+    known = np.nan_to_num(disparity)
+    spread = ndimage.maximum_filter(known, 7) - ndimage.minimum_filter(known, 7)
+    terms = (
+        np.log(spread + 0.02),  # outlines, and noise
+        np.log(np.abs(known - np.nan_to_num(start)) + 0.005),  # steps after matching
+        np.log(np.clip(ratio, 0.05, 2)),
+        np.log(np.maximum(margin, 0) + 2),
+    )
+    sum_ = JUDGE[0] + sum(weight * term for weight, term in zip(JUDGE[1:], terms, strict=True))
+    return np.where(np.isnan(disparity), 0, 1 / (1 + np.exp(-sum_))).astype(np.float32)
+
+
+def refined(
+    views: Views, disparity: Map, noise: float, push: Map, weight: Map, workers: int | None
+) -> tuple[Map, Map]:
+    """Return the disparity after a Gauss–Newton step over all views, and the weight of its windows."""
+    height = disparity.shape[0]
+    known = np.nan_to_num(disparity)
+    view = views.pixels[0].astype(np.float32)
+    blur = BLUR * min(max((noise - CLEAN) / (NOISY - CLEAN), 0.0), 1.0)
+    smooth = ndimage.gaussian_filter(view, (0, blur, blur)) if blur > 0 else view
+    run(workers, height, kernels.add_evidence, views, known, np.float32(OCCLUDED * CODES), smooth, push, weight)
+    out, sure = np.empty_like(known), np.empty_like(known)
+    likeness = np.float32(SAME_COLOUR * CODES), np.float32(SAME_SURFACE)
+    run(
+        workers,
+        height,
+        kernels.fit_planes,
+        known,
+        push,
+        weight,
+        view,
+        RADIUS,
+        *likeness,
+        PRIOR * CODES**2,
+        FLAT,
+        out,
+        sure,
+    )
+    out = known + np.clip(out - known, -0.15, 0.15)
+    return np.asarray(ndimage.median_filter(out, 3)), sure
+
+
+def noise_codes(views: Views) -> float:
+    """Return the standard deviation of noise in 8-bit codes, from the evenest blocks of the reference.
+
+    References
+    ----------
+    Immerkær, Fast noise variance estimation, CVIU 1996: the second difference both ways.
+    """
+    height, width = (side // BLOCK * BLOCK for side in views.pixels.shape[2:])
+    view = views.pixels[0].astype(np.float32) / CODES
+    fine = ndimage.convolve1d(ndimage.convolve1d(view, (1, -2, 1), axis=1), (1, -2, 1), axis=2) / 6
+    blocks = (fine[:, :height, :width] ** 2).mean(axis=0).reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK)
+    return float(np.sqrt(np.quantile(blocks.mean(axis=(1, 3)), EVEN)))
+
+
+def run(workers: int | None, rows: int, kernel: Callable[..., None], *arguments: Any) -> None:
+    """Call a kernel whose last two arguments are its first and last row."""
+    over_rows(lambda first, last: kernel(*arguments, first, last), rows, workers=workers)

@@ -1,1 +1,0 @@
-"""Depth from focus and quality over depth, Q_depth."""

@@ -1,0 +1,135 @@
+"""Disparity from all views: fields in closed form, forms of fields, files of the command depth."""
+
+import numpy as np
+import pytest
+
+from ii_core import IICamera, IIPicture, depth_of_disparity, estimate_depth
+from ii_core.depth.all_views import disparity_of_views
+from ii_core.depth.around import half_lines, views_around
+from ii_core.depth.estimate import field_range, labels_between
+from ii_core.depth.points import view_points
+
+RNG = np.random.default_rng(3)
+WAVES = RNG.uniform(-0.9, 0.9, (24, 2)), RNG.uniform(0, 6.3, (24, 3)), RNG.uniform(0.3, 1, 24)
+
+
+def texture(x, y):
+    """Light of a smooth random texture at places of the reference view, (…, 3)."""
+    waves, phases, sizes = WAVES
+    turns = x[..., None] * waves[:, 0] + y[..., None] * waves[:, 1]
+    light = sum(s * np.sin(turns[..., i, None] + p) for i, (p, s) in enumerate(zip(phases, sizes, strict=True)))
+    return np.clip(0.5 + light / 16, 0, 1)
+
+
+def slanted(views=(5, 5), size=(48, 40), at=0.7, slope=0.01, erect=False, dtype=np.uint8):
+    """Field of one textured plane of disparity ``at + slope·x`` in the middle view, and that disparity."""
+    (u, v), (k, l) = views, size
+    y, x = np.mgrid[:l, :k].astype(float)
+    out = np.empty((l, v, k, u, 3))
+    for j, i in np.ndindex(v, u):
+        down, right = (j - v // 2, i - u // 2) if not erect else (v // 2 - j, u // 2 - i)
+        # the plane's point at reference x stands at x − p·d(x) in a view
+        place = (x + right * at) / (1 - right * slope)
+        out[:, j, :, i] = texture(place, y + down * (at + slope * place))
+    pixels = out.reshape(l * v, k * u, 3)
+    if dtype != np.float32:
+        pixels = np.rint(pixels * np.iinfo(dtype).max)
+    return IIPicture(pixels.astype(dtype), size, views, erect=erect), at + slope * np.arange(k) + 0 * y
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        {},
+        {"at": -1.3, "slope": -0.01, "dtype": np.uint16},
+        {"views": (9, 1), "dtype": np.float32},
+        {"views": (1, 7), "size": (40, 48)},
+        {"views": (6, 4), "erect": True},
+        {"views": (2, 1), "at": 2.2},
+    ],
+    ids=["5x5", "far-16-bit", "horizontal-float", "vertical", "even-erect", "two"],
+)
+def test_disparity_of_a_slanted_plane(form):
+    """The texture is known between pixels: the truth has no interpolation in it."""
+    picture, truth = slanted(**form)
+    found = estimate_depth(picture, low=-4.0, high=4.0)
+    error = np.abs(found.disparity - truth)[6:-6, 6:-6]
+    assert np.median(error) < 0.02 and (error > 0.07).mean() < 0.12
+    assert found.view == (picture.ei_pixels[0] // 2, picture.ei_pixels[1] // 2) and found.depth_mm is None
+    assert found.disparity.shape == found.confidence.shape == truth.shape
+
+
+def test_range_is_found_and_confidence_is_honest():
+    picture, truth = slanted(views=(9, 9), size=(64, 48), at=-1.0)
+    low, high = field_range(picture)
+    assert low < truth.min() < truth.max() < high and high - low < 2.5
+    found = estimate_depth(picture)
+    sure = found.confidence >= 0.9
+    assert sure.mean() > 0.4 and (np.abs(found.disparity - truth)[sure] > 0.07).mean() <= 0.02
+
+
+def test_any_view_and_any_number_of_threads():
+    picture, truth = slanted(views=(5, 5), at=0.7, slope=0.0)
+    one = estimate_depth(picture, view=(0, 4), low=-2, high=2, workers=1)
+    many = estimate_depth(picture, view=(0, 4), low=-2, high=2, workers=5)
+    np.testing.assert_array_equal(one.disparity, many.disparity)
+    assert np.median(np.abs(one.disparity - truth)) < 0.03
+
+
+def test_an_even_picture_has_no_depth():
+    picture = IIPicture(np.full((60, 60, 3), 77, np.uint8), (20, 20), (3, 3))
+    found = estimate_depth(picture, low=-1, high=1)
+    assert np.isnan(found.disparity).all() and not found.confidence.any()
+
+
+def test_depth_is_that_of_the_camera():
+    camera = IICamera(pixels=(144, 120), lenses=(48, 40), pixel_pitch_mm=0.1, gap_mm=1.0, start_mm=30, viewer_mm=30)
+    picture, _ = slanted(views=(3, 3))
+    picture = IIPicture(picture.pixels, picture.lenses, picture.ei_pixels, camera)
+    found = estimate_depth(picture, low=-2, high=2)
+    np.testing.assert_allclose(found.depth_mm, depth_of_disparity(camera, found.disparity))
+    places, colours = view_points(picture, found.depth_mm, found.view)
+    assert len(places) == len(colours) == 48 * 40
+    np.testing.assert_allclose(places[:, 2].reshape(40, 48), found.depth_mm, atol=1e-9)
+
+
+def test_half_lines_take_near_and_far_views():
+    steps = np.array([(0, 0), *((0, i) for i in range(1, 10)), (1, 2), (3, 3)], np.float32)
+    np.testing.assert_array_equal(half_lines(steps), [-1, 1, 1, -1, 1, -1, -1, -1, -1, 1, -1, 5])
+    picture, _ = slanted()
+    labels = labels_between(views_around(picture, (2, 2)), -1.0, 1.0)
+    assert labels[0] == -1 and labels[-1] == 1 and np.ptp(np.diff(labels)) < 1e-6
+
+
+def test_views_moved_by_disparity_keep_the_nearest():
+    """A square of disparity 3 before a wall of 0: it moves, covers, and uncovers a hole that the wall fills."""
+    disparity = np.zeros((6, 20), np.float32)
+    disparity[2:4, 8:12] = 3.0
+    picture = IIPicture(np.zeros((18, 60, 3), np.uint8), (20, 6), (3, 3))
+    moved = disparity_of_views(picture, disparity, (1, 1))
+    wanted = np.zeros((6, 20), np.float32)
+    wanted[2:4, 5:9] = 3.0  # view to the right: x − 3
+    np.testing.assert_array_equal(moved[1, 2], wanted)
+    holes = disparity_of_views(picture, disparity, (1, 1), filled=False)[1, 2]
+    assert np.isnan(holes[2:4, 9:12]).all() and np.isnan(holes).sum() == 6
+    np.testing.assert_array_equal(moved[1, 1], disparity)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"view": (5, 0)}, "view is 5,0: columns 0–4 and rows 0–4"),
+        ({"low": 1.0, "high": 1.0}, "low < high"),
+        ({"workers": 0}, "workers is 0"),
+    ],
+)
+def test_refused(options, said):
+    with pytest.raises(ValueError, match=said):
+        estimate_depth(slanted()[0], **options)
+
+
+def test_refused_pictures():
+    with pytest.raises(ValueError, match="one view"):
+        estimate_depth(IIPicture(np.zeros((16, 16, 3), np.uint8), (16, 16), (1, 1)))
+    with pytest.raises(ValueError, match="views are 4×16 px: at least 8×8"):
+        estimate_depth(IIPicture(np.zeros((32, 8, 3), np.uint8), (4, 16), (2, 2)))
