@@ -26,6 +26,7 @@ ndimage = Lazy("scipy.ndimage")
 
 FLOOR = 0.1  # ε
 ODD = 0.4  # of the expected value
+MOST_DEFECTS = 1e-3  # of all pixels
 CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], bool)
 DIM = 0.3  # of the typical lens's light: lenses with less say nothing about their neighbours
 Image = NDArray[np.float32]
@@ -80,7 +81,8 @@ def defects(white: Image, smooth: Image) -> NDArray[np.bool_]:
     """Pixels, (N, M), whose value in the white image is far from those at the same place under other lenses.
 
     A defect differs from the light expected half a pixel around, since borders of micro-images are steep, by more
-    than `ODD` and by ten standard deviations of the noise, which grows with the root of the light.
+    than `ODD` and by ten standard deviations of the noise, which grows with the root of the light. Where that holds
+    for more pixels than sensors have defects, borders are steeper than lenses are regular: a whole pixel counts.
 
     Parameters
     ----------
@@ -88,12 +90,18 @@ def defects(white: Image, smooth: Image) -> NDArray[np.bool_]:
         White image, and the same without noise, see `averaged`.
     """
     least = np.float32(FLOOR * np.percentile(smooth, 99.5))
-    low = np.maximum((smooth + ndimage.minimum_filter(smooth, footprint=CROSS)) / 2, 0)
-    high = np.maximum((smooth + ndimage.maximum_filter(smooth, footprint=CROSS)) / 2, least)
-    sigma = 1.4826 * float(np.median(np.abs(white - smooth) / np.sqrt(np.maximum(smooth, least))))
-    noise = 10 * sigma * np.sqrt(high)
-    dark = white < np.minimum((1 - ODD) * low, low - noise)
-    return np.asarray(dark | (white > np.maximum((1 + ODD) * high, high + noise)))
+    low, high = (f(smooth, footprint=CROSS) for f in (ndimage.minimum_filter, ndimage.maximum_filter))
+    sigma = np.float32(1.4826 * np.median(np.abs(white - smooth) / np.sqrt(np.maximum(smooth, least))))
+    for reach in (np.float32(0.5), np.float32(1.0)):
+        below = np.maximum(smooth + reach * (low - smooth), 0)
+        above = np.maximum(smooth + reach * (high - smooth), least)
+        noise = 10 * sigma * np.sqrt(above)
+        bad = (white < np.minimum((1 - ODD) * below, below - noise)) | (
+            white > np.maximum((1 + ODD) * above, above + noise)
+        )
+        if bad.mean() < MOST_DEFECTS:
+            break
+    return np.asarray(bad)
 
 
 def repaired(frame: NDArray[Any], bad: NDArray[np.bool_], owner: NDArray[Any], step: int) -> NDArray[Any]:

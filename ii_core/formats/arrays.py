@@ -28,6 +28,7 @@ from ..base.atomic import atomic_path
 from ..base.extras import Lazy
 from ..base.files import MAX_TEXT, check_file, memory_bytes, one_line, parse_json
 from ..picture.picture import IIPicture
+from . import matlab5
 from .grid import WHOLE_ORDER, Views, camera_views
 from .rig import Rig
 
@@ -221,24 +222,17 @@ def _hdf5(path: Path) -> Stored:
 
 def _matlab(path: Path) -> Stored:
     try:
-        listed = matlab.whosmat(str(path))
-        arrays = {name: shape for name, shape, kind in listed if len(shape) in (4, 5) and kind not in ODD}
-        names = [NAME] if NAME in arrays else list(arrays)
-        if len(names) != 1:
-            raise ValueError(f"it holds {len(names)} arrays of four or five axes: one, named {NAME}, is needed")
-        _bounded(path, arrays[names[0]], len(arrays[names[0]]))
-        kept = [names[0], *(name for name, _, kind in listed if name == STRUCTURE and kind == "char")]
-        read = matlab.loadmat(str(path), variable_names=kept)
-        data = read[names[0]]
-        text = "".join(np.ravel(read[STRUCTURE])[:1].tolist()) if STRUCTURE in read else None
-    except MemoryError:
-        raise
-    except Exception as error:  # damaged files end in errors of many types
-        raise ValueError(f"{path} is no light field: {one_line(error) or type(error).__name__}") from None
+        listed = matlab5.arrays(path)
+        found = [array for array in listed if len(array.shape) in (4, 5) and array.kind != "char"]
+        found = [array for array in found if array.name == NAME] or found
+        if len(found) != 1:
+            raise ValueError(f"it holds {len(found)} arrays of four or five axes: one, named {NAME}, is needed")
+        _bounded(path, found[0].shape, len(found[0].shape))
+        data = found[0].read()
+        text = next((array.read() for array in listed if array.name == STRUCTURE and array.kind == "char"), None)
+    except (ValueError, IndexError, OverflowError) as error:
+        raise ValueError(f"{path} is no light field: {one_line(error)}") from None
     return Stored(data.shape, data.dtype, lambda a, b: np.asarray(data[a, b]), _structure(path, text))
-
-
-ODD = ("cell", "struct", "object", "char", "sparse", "function", "opaque", "unknown", "logical")
 
 
 def _structure(path: Path, text: Any) -> Any:

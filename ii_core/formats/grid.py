@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.files import read_image
 from ..camera.camera import Pair
 from ..picture.picture import IIPicture
 from .order import Read
 from .positions import Positions
+from .profiles import read_upright
 from .rig import Rig
 
 WHOLE_ORDER = frozenset(("transposed", "flip_down", "flip_across"))
@@ -89,7 +89,7 @@ def checked_reader(path_of: Callable[[int, int], Path], read: Callable[[Path], N
 
 
 def read_view(path: str | os.PathLike[str]) -> NDArray[Any]:
-    """Read a picture as (T, S, 3); grey is repeated, and an opaque alpha channel is dropped.
+    """Read a picture as (T, S, 3), upright and in sRGB, see `read_upright`; grey is repeated, opaque alpha dropped.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def read_view(path: str | os.PathLike[str]) -> NDArray[Any]:
     OSError
         If it cannot be read.
     """
-    pixels = read_image(path)
+    pixels = read_upright(path)
     channels = pixels.shape[2]
     if channels == 4:
         opaque = 1.0 if pixels.dtype.kind == "f" else np.iinfo(pixels.dtype).max

@@ -12,7 +12,7 @@ import typer
 
 from .cluster import Dask, check_cluster, cluster
 from .coding import study_orders
-from .common import Force, Workers, app, check_outputs, check_unused, columns, load_any
+from .common import Force, Workers, app, check_outputs, check_unused, columns, load_any, tell_nominal
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, spinner
 from .tables import print_table
@@ -100,6 +100,7 @@ def measure(
 
         check_outputs([*files, *(plots / name for name in PLOTS)], force, make_folder=True)
     a = IIPicture.load(reference)
+    tell_nominal(a, str(reference))
     b = _judged(decoded, a)
     made = report(
         a,

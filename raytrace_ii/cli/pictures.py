@@ -105,6 +105,7 @@ def import_(
     """
     from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset
     from ii_core.base.files import check_type, image_types
+    from ii_core.picture.assumed import ASSUMED_ANGLE_DEG, with_assumed_camera
     from ii_core.picture.picture import sidecar
 
     types = image_types(output)
@@ -132,13 +133,19 @@ def import_(
     if known is not None:
         made = IIPicture(made.pixels, known.lenses, known.ei_pixels, known, known.erect)
     check_type(output, made.pixels.dtype.name)
+    nominal = made.camera is None and (views is None or views.structure is None)
+    if nominal:
+        made = with_assumed_camera(made)
     made.save(output)
     (k, l), (u, v) = made.lenses, made.ei_pixels
     say_done(f"{output}: {k}×{l} lenses of {u}×{v} px, {made.pixels.dtype}")
     if order is not None:
         say(order.describe())
-    if made.camera is None:
-        say("no camera is known: measures of views and of depth need one")
+    if nominal:
+        say(
+            f"no camera is known: a nominal one of {ASSUMED_ANGLE_DEG:g}°, with pixels of 1 mm, is written; "
+            f"raytrace-ii camera {output} --set … replaces it"
+        )
 
 
 def _import_raw(source: Path, whites: Path | None, output: Path, bits: int) -> None:
@@ -176,6 +183,50 @@ def _rig(
         raise ValueError(f"{what}: an array of cameras needs baseline-mm, focal-mm and sensor-mm, or camera instead")
     assert baseline_mm is not None and focal_mm is not None and sensor_mm is not None
     return Rig(baseline_mm=baseline_mm, focal_mm=focal_mm, sensor_mm=sensor_mm, focus_mm=focus_mm)
+
+
+CAMERA_PARTS = {  # of `camera FIELD --set`: all of one line are needed, but focus
+    ("angle",): "viewing angle in degrees; pixels of 1 mm",
+    ("pixel", "gap"): "pixel pitch and gap in mm",
+    ("baseline", "focal", "sensor", "focus"): "of an array of cameras, in mm",
+}
+
+
+def set_camera(field: Path, text: str) -> None:
+    """Replace the camera in a regular II-picture's sidecar; parts are as in ``baseline=20,focal=50,sensor=35``."""
+    from dataclasses import replace
+
+    from ii_core import IICamera, IIPicture, Rig, with_assumed_camera
+    from ii_core.base.files import read_json, write_json
+    from ii_core.picture.picture import sidecar
+
+    parts: dict[str, float] = {}
+    for part in text.split(","):
+        name, _, number = part.strip().partition("=")
+        try:
+            parts[name] = float(number)
+        except ValueError:
+            raise ValueError(f"--set has {part.strip()!r}: a name and a number as in angle=30 are needed") from None
+    form = next((form for form in CAMERA_PARTS if {*form} - {"focus"} <= {*parts} <= {*form}), None)
+    if form is None:
+        known = "; ".join(f"{','.join(f'{name}=…' for name in form)}: {what}" for form, what in CAMERA_PARTS.items())
+        raise ValueError(f"--set is {text!r}: known are {known}")
+    picture = IIPicture.load(field)
+    picture.check_regular()
+    if form == ("angle",):
+        camera = with_assumed_camera(replace(picture, camera=None), parts["angle"]).camera
+    elif "gap" in form:
+        camera = IICamera(
+            name=field.stem, pixels=picture.size, lenses=picture.lenses, pixel_pitch_mm=parts["pixel"],
+            gap_mm=parts["gap"],
+        )  # fmt: skip
+    else:
+        rig = Rig(**{f"{name}_mm": value for name, value in parts.items()})
+        camera = rig.camera((picture.ei_pixels[0], picture.ei_pixels[1]), picture.lenses)
+    assert camera is not None
+    path = sidecar(field)
+    write_json(path, {**read_json(path), "camera": camera.to_json()})
+    say_done(f"{path}: camera {camera.name}, viewing angle {camera.view_angle_deg:.4g}°")
 
 
 LAYOUTS = ("views", "hci", "quilt", "mosaic", "mat", "h5")
