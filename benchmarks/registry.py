@@ -186,6 +186,7 @@ BENCHMARKS = {
         Benchmark("accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",),
             writes=(f"{IMAGES}/depth_truth.*",)),
         Benchmark("accuracy.field_depth", records=OWN, fills=("docs/metrics.md",)),
+        Benchmark("accuracy.estimated_depth", records=OWN, fills=("docs/depth.md",)),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
         Benchmark("speed.eye", records=OWN, fills=("docs/display.md",)),
         Benchmark("accuracy.map_precision", records=OWN, writes=(f"{IMAGES}/map_precision.*",)),
