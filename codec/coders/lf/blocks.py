@@ -59,7 +59,8 @@ class Job(NamedTuple):
         How far the sources of the synthesis differ, in eighths of an 8-bit code.
     synthesised : int
     crossed : int
-        Whether the second and third plane's residuals may be predicted from the first's.
+        Binary logarithm of the unit of factors that predict the second and third plane's residuals from the first's;
+        0 without them.
     skipping : int
         Whether small blocks may have no transform.
     step : int
@@ -71,6 +72,8 @@ class Job(NamedTuple):
         The same view at earlier instants of a take, the latest first; P is 0 for pictures alone.
     motions : ndarray of int16, (J, motion.FIELDS, H / 4, W / 4)
         Vectors of decoded views, if there are earlier instants.
+    finer : int
+        Whether large coefficients have contexts by their neighbourhood.
     """
 
     views: Any
@@ -91,6 +94,7 @@ class Job(NamedTuple):
     levels: Any
     past: Any = motion.NOTHING
     motions: Any = motion.NOTHING
+    finer: Any = 0
 
 
 class Work(NamedTuple):
@@ -616,7 +620,7 @@ def code_block(coder, job, work, y0, x0, log):
                 first = some
         if decoding:
             if some or cross:
-                rows, cols = rebuild(work, work.levels, log, job.step, some, cross, skipped)
+                rows, cols = rebuild(work, work.levels, log, job.step, some, cross, job.crossed, skipped)
                 if p == 0:
                     keep_first(work, rows, cols)
             store(job, work, p, y0, x0, n, some or cross)
@@ -656,7 +660,7 @@ def _code_plane(coder, job, work, y0, x0, log, p, kind, first, skipped):
         if decoding:
             _note_levels(job, work, p, y0, x0, n)
     elif some:
-        code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0)
+        code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0, job.finer)
     return some, cross
 
 

@@ -17,7 +17,7 @@ from ii_core import IIPicture
 from ... import clock
 from ...contract import Coder, Goal, Option, Options, Pixels
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
-from . import arithmetic, planes, ranges, search, stream, synthesis
+from . import arithmetic, loop_filter_search, planes, ranges, search, stream, synthesis
 from .blocks import Job, code_blend, new_work
 from .contexts import Contexts
 from .field import Field
@@ -43,6 +43,8 @@ WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 # Quantisers by which each level is finer than the next, for more is predicted from it, and the first is finer than
 # the last.
 FINER_A_LEVEL, FINER_FIRST = 1.5, 14.0
+SCALES = 35
+CROSS = stream.QUARTERS, stream.EIGHTHS
 MOST_VIEWS = 1 << 14
 VIEW_BYTES, EXACT_BYTES = 24, 96  # a sample's most
 # Settings that meet a size.
@@ -66,6 +68,11 @@ class LightField(Coder):
         "cross": Option(about="1 to predict colours of a residual from its first plane", default=1, low=0, high=1),
         "skip": Option(
             about="1 to code residuals of small blocks without a transform where it pays", default=1, low=0, high=1
+        ),
+        "tune": Option(
+            about="ctc for PSNR-YUV of JPEG Pleno's test conditions (6:1:1, BT.709), rgb for PSNR of RGB; grey is rgb",
+            default="ctc",
+            choices=("ctc", "rgb"),
         ),
         "lossless": Option(about="1 to code to the bit", default=0, low=0, high=1),
         "threads": Option(
@@ -162,7 +169,7 @@ def decoded_batches(
 ) -> Iterator[tuple[int, list[Node], int]]:
     """Decode one batch of views after another; yield the level, the views, and the bytes read so far."""
     contexts, work = contexts or Contexts(), new_work()
-    before = stream.head_bytes(len(levels))
+    before = stream.head_bytes(field.header, levels)
     with Workers(threads) as workers:
         for level, data in enumerate(levels):
             coder = arithmetic.reader(contexts.of(level), data)
@@ -232,18 +239,26 @@ class Source:
         self.count = self.pixels.size // 3
         self.height, self.width, self.grid = shape(picture)
         self.effort, self.threads = int(options["effort"]), int(options["threads"])
-        self.axes = planes.detail_axes(self.pixels, self.grid)
+        exact = bool(options["lossless"])
+        scales = None if exact or options["tune"] == "rgb" or _grey(self.pixels) else (SCALES, SCALES)
+        if scales:
+            self.axes, colours = planes.bt709_axes(scales), planes.bt709_colours(scales)
+        else:
+            self.axes = colours = planes.detail_axes(self.pixels, self.grid)
         low, high, down = ranges.estimated(self.view, self.grid)
         self.header = Header(
             log_stride=int(options["stride"]),
             sources=int(options["sources"]),
-            exact=bool(options["lossless"]),
+            exact=exact,
             down=down,
             low=low,
             high=high,
-            axes=self.axes,
-            crossed=bool(options["cross"]),
-            skipping=bool(options["skip"]) and not options["lossless"],
+            colours=colours,
+            scales=scales,
+            crossed=CROSS[bool(scales)] if options["cross"] else 0,
+            skipping=bool(options["skip"]) and not exact,
+            tuned=not exact,
+            filtered=not exact,
             steps=(),
         )
 
@@ -304,13 +319,18 @@ class Source:
                 coder = arithmetic.writer(contexts.of(number), room)
                 for nodes in field.batches(number):
                     found = partial(self._found, field, arithmetic.bit_costs(coder.contexts))
-                    jobs, made, blends = zip(*workers.map(found, nodes), strict=True)
+                    jobs, made, blends, filters = zip(*workers.map(found, nodes), strict=True)
                     for job, nearest in zip(jobs, blends, strict=True):
                         if job.synthesised:
                             code_blend(coder, nearest)
-                    for job in jobs:
+                    for job, filtering in zip(jobs, filters, strict=True):
                         coder = arithmetic.enlarged(coder, room)
-                        field.code(coder, job, work)
+                        same = 0
+                        if filtering:
+                            same = loop_filter_search.choose_filters(
+                                coder, field.filters, job.at, filtering, worth(job.step)
+                            )
+                        field.code(coder, job, work, same)
                     workers.map(field.refine, nodes, jobs, made)
                     field.finish(nodes)
                     del job, jobs, made  # before the next batch takes as much
@@ -318,19 +338,24 @@ class Source:
                 contexts.after(number)
         return levels
 
-    def _found(self, field: Field, costs: NDArray[np.float32], node: Node) -> tuple[Job, synthesis.Synthesis, int]:
-        """A view's blocks, found and decoded; its synthesis, and in which way that is blended."""
+    def _found(
+        self, field: Field, costs: NDArray[np.float32], node: Node
+    ) -> tuple[Job, synthesis.Synthesis, int, loop_filter_search.Found | None]:
+        """A view's blocks, found and decoded; its synthesis, in which way that is blended, and its best filters."""
         job, made = field.job(node)
         original = self.view(node.row, node.col)
         nearest = _nearer_blend(made, original, BLEND_ROWS[self.effort]) if job.synthesised else 0
         search.find_blocks(costs, job, self._search(job, original))
-        return job, made, nearest
+        filters = None
+        if field.header.filtered:
+            filters = loop_filter_search.search_filters(field.views, job.at, original, worth(job.step))
+        return job, made, nearest, filters
 
     def _search(self, job: Any, original: NDArray[np.int16]) -> Search:
         share = min(1.0, GOOD_SAMPLES / (self.height * self.width))
         return Search(
             original=original,
-            weight=np.float32(WEIGHT * (job.step / 16) ** 2),
+            weight=np.float32(worth(job.step)),
             least=3 if self.effort == 0 else 2,
             intra_tries=(1, 1, 3)[self.effort],
             good=np.float32(GOOD[self.effort] * share),
@@ -338,6 +363,16 @@ class Source:
             planes=1 if self.effort == 0 else 3,
             hurried=int(self.effort < 2),
         )
+
+
+def worth(step: int) -> float:
+    """Return the squared error that a bit is worth at a quantiser."""
+    return float(WEIGHT * (step / 16) ** 2)
+
+
+def _grey(pixels: NDArray[Any]) -> bool:
+    """Return whether red, green and blue are the same everywhere."""
+    return bool((pixels[..., :2] == pixels[..., 1:]).all())
 
 
 def _nearer_blend(made: synthesis.Synthesis, original: NDArray[np.int16], every: int) -> int:

@@ -64,7 +64,7 @@ class Segment:
         high = max(source.header.high for source in sources)
         header = replace(first.header, low=low, high=high)
         for source in sources:
-            source.header, source.axes = header, header.axes
+            source.header, source.axes = header, first.axes
         self.sources = sources
 
     def run_at(self, setting: float) -> Run:
