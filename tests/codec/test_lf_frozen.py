@@ -50,8 +50,8 @@ def test_the_lossy_stream_has_all_kinds_of_blocks(monkeypatch):
     """Each kind of prediction, and views with and without synthesis."""
     kinds, synthesised, code = set(), set(), Field.code
 
-    def noting(field, coder, job, work):
-        code(field, coder, job, work)
+    def noting(field, coder, job, work, *same):
+        code(field, coder, job, work, *same)
         kinds.update(np.unique(job.blocks[KIND]).tolist())
         synthesised.add(int(job.synthesised))
 
@@ -69,8 +69,8 @@ def test_the_third_stream_has_blocks_without_a_transform(monkeypatch):
     """Of both sizes, among others that have one."""
     found, code = set(), Field.code
 
-    def noting(field, coder, job, work):
-        code(field, coder, job, work)
+    def noting(field, coder, job, work, *same):
+        code(field, coder, job, work, *same)
         coded = job.blocks[CODED] == 1
         found.update(zip(job.blocks[LOG][coded].tolist(), job.blocks[SKIPPED][coded].tolist(), strict=True))
 

@@ -17,7 +17,7 @@ from ii_core import IIPicture
 from ... import clock
 from ...contract import Coder, Goal, Option, Options, Pixels
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
-from . import arithmetic, loop_filter_search, planes, ranges, search, stream, synthesis
+from . import arithmetic, loop_filter_search, planes, ranges, search, stream, synthesis, tuning
 from .blocks import Job, code_blend, new_work
 from .contexts import Contexts
 from .field import Field
@@ -43,7 +43,7 @@ WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 # Quantisers by which each level is finer than the next, for more is predicted from it, and the first is finer than
 # the last.
 FINER_A_LEVEL, FINER_FIRST = 1.5, 14.0
-SCALES = 35
+TRIAL_LEVELS = 2  # of views that show how errors share among planes
 CROSS = stream.QUARTERS, stream.EIGHTHS
 MOST_VIEWS = 1 << 14
 VIEW_BYTES, EXACT_BYTES = 24, 96  # a sample's most
@@ -61,7 +61,9 @@ class LightField(Coder):
     dtypes: ClassVar[tuple[str, ...]] = ("uint8", "uint16")
     qp_range: ClassVar[tuple[int, int] | None] = (FINEST, COARSEST)
     quality_range: ClassVar[tuple[float, float] | None] = (COARSEST_DB, FINEST_DB)
-    scale_about = "of qp the step doubles every 6, and is one 8-bit code at 8; quality is PSNR in dB"
+    scale_about = (
+        "of qp the step doubles every 6, and is one 8-bit code at 8; quality is PSNR in dB by the measure of tune"
+    )
     options: ClassVar[Mapping[str, Option]] = {
         "stride": Option(about="binary logarithm of the first views' distance on the grid", default=3, low=0, high=6),
         "sources": Option(about="views that a synthesis is made of, 0 for none", default=4, low=0, high=8),
@@ -240,7 +242,7 @@ class Source:
         self.height, self.width, self.grid = shape(picture)
         self.effort, self.threads = int(options["effort"]), int(options["threads"])
         exact = bool(options["lossless"])
-        scales = None if exact or options["tune"] == "rgb" or _grey(self.pixels) else (SCALES, SCALES)
+        scales = None if exact or options["tune"] == "rgb" or _grey(self.pixels) else (tuning.START, tuning.START)
         if scales:
             self.axes, colours = planes.bt709_axes(scales), planes.bt709_colours(scales)
         else:
@@ -270,13 +272,18 @@ class Source:
         return out
 
     def psnr(self, field: Field) -> float:
-        """PSNR in dB of what the decoder shows."""
+        """PSNR in dB of what the decoder shows, by the measure that is tuned for."""
         rows, cols = self.grid
-        error = 0.0
+        error, views = 0.0, []
         for number in range(len(field.views)):
             row, col = divmod(number, cols)
-            decoded = field.view_pixels(number).astype(np.float32)
-            error += float(np.square(decoded - self.pixels[row::rows, col::cols]).sum(dtype=np.float64))
+            original, decoded = self.pixels[row::rows, col::cols], field.view_pixels(number)
+            if self.header.scales:
+                views.append(tuning.psnr_yuv(original, decoded))
+            else:
+                error += float(np.square(decoded.astype(np.float32) - original).sum(dtype=np.float64))
+        if views:
+            return float(np.mean(views))
         top = np.iinfo(self.pixels.dtype).max
         return 10 * math.log10(top**2 * self.pixels.size / max(error, 1e-9))
 
@@ -288,9 +295,34 @@ class Source:
 
     def coded(self, setting: float) -> tuple[bytes, Field]:
         """The payload at a quantiser, and what the decoder will make of it."""
-        field = self.field(replace(self.header, steps=self.steps(setting)))
+        field = self.field(self.header_at(setting))
         levels = self.levels(field, Contexts())
         return stream.pack(field.header, levels, self.count), field
+
+    def header_at(self, setting: float) -> Header:
+        """Return the header at a quantiser. Planes of colours have the scales that a trial of the first views gives."""
+        header = replace(self.header, steps=self.steps(setting))
+        if header.scales is None:
+            return header
+        header = self._scaled(header, (tuning.START, tuning.START))
+        trial = self.field(header)
+        # All with the step of most views, by which errors are those of most views.
+        step = header.steps[max(i for i, level in enumerate(trial.levels) if level)]
+        trial.header = replace(header, steps=(step,) * len(header.steps))
+        trial.levels = trial.levels[:TRIAL_LEVELS]
+        effort, self.effort = self.effort, 0
+        self.levels(trial, Contexts())
+        self.effort = effort
+        errors = np.zeros(3)
+        for place in np.argwhere(trial.decoded).tolist():
+            decoded = trial.views[trial.number((place[0], place[1]))]
+            errors += np.square(decoded.astype(np.float32) - self.view(*place)).sum(axis=(1, 2), dtype=np.float64)
+        return self._scaled(header, tuning.better_scales(header.scales, errors))
+
+    def _scaled(self, header: Header, scales: tuple[int, int]) -> Header:
+        """Return the header with other scales of planes; the source's planes get them, too."""
+        self.axes = planes.bt709_axes(scales)
+        return replace(header, scales=scales, colours=planes.bt709_colours(scales))
 
     def steps(self, setting: float) -> tuple[int, ...]:
         """Return the quantiser's step of each level."""
