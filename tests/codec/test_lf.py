@@ -318,8 +318,8 @@ def test_too_many_views_are_refused_before_long_work():
 @pytest.mark.slow
 def test_large_views_are_searched_further():
     """At full size, 0.22 bits a sample are more than most blocks cost: nothing but synthesis was tried."""
-    assert threshold(128, 64) == threshold(16, 8) == pytest.approx(lf.GOOD[1])
-    assert threshold(512, 256) == pytest.approx(lf.GOOD[1] / 16)
+    assert threshold(128, 64) == threshold(16, 8) == pytest.approx(lf.GOOD[2])
+    assert threshold(512, 256) == pytest.approx(lf.GOOD[2] / 16)
     assert threshold(513, 256) < threshold(512, 256)
 
 

@@ -31,7 +31,7 @@ FRACTIONS = 16  # of a quantiser, between which a rate is searched
 OCTAVE = -6.0 * FRACTIONS  # quantisers that double a size, about
 START = 34 * FRACTIONS
 COARSEST_DB, FINEST_DB = 10.0, 60.0
-QUALITY_RUNS, NEAR_DB, DB_A_STEP = 6, 0.05, 0.8  # PSNR falls so much from one quantiser to the next, about
+QUALITY_RUNS, NEAR_DB, DB_A_STEP = 10, 0.05, 0.8  # PSNR falls so much from one quantiser to the next, about
 # Of the blocks that predict a view which is coded lossless; the better one is kept.
 EXACT_SETTINGS = 26 * FRACTIONS, 44 * FRACTIONS
 GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below which nothing else is tried
@@ -44,7 +44,7 @@ WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 # the last.
 FINER_A_LEVEL, FINER_FIRST = 1.5, 14.0
 TRIAL_LEVELS = 2  # of views that show how errors share among planes
-CROSS = stream.QUARTERS, stream.EIGHTHS
+CROSS = stream.QUARTERS, stream.EIGHTHS  # unit of factors between planes: of principal axes, and of BT.709
 MOST_VIEWS = 1 << 14
 VIEW_BYTES, EXACT_BYTES = 24, 96  # a sample's most
 # Settings that meet a size.
@@ -72,7 +72,7 @@ class LightField(Coder):
             about="1 to code residuals of small blocks without a transform where it pays", default=1, low=0, high=1
         ),
         "tune": Option(
-            about="ctc for PSNR-YUV of JPEG Pleno's test conditions (6:1:1, BT.709), rgb for PSNR of RGB; grey is rgb",
+            about="measure: PSNR-YUV of JPEG Pleno's test conditions (6:1:1, BT.709), or PSNR of RGB and of grey",
             default="ctc",
             choices=("ctc", "rgb"),
         ),
@@ -300,11 +300,12 @@ class Source:
         return stream.pack(field.header, levels, self.count), field
 
     def header_at(self, setting: float) -> Header:
-        """Return the header at a quantiser. Planes of colours have the scales that a trial of the first views gives."""
+        """Return the header at a quantiser, with the scales of Cb and Cr that a trial of the first views gives."""
         header = replace(self.header, steps=self.steps(setting))
         if header.scales is None:
             return header
-        header = self._scaled(header, (tuning.START, tuning.START))
+        scales = tuning.START, tuning.START
+        header = self._scaled(header, scales)
         trial = self.field(header)
         # All with the step of most views, by which errors are those of most views.
         step = header.steps[max(i for i, level in enumerate(trial.levels) if level)]
@@ -317,7 +318,7 @@ class Source:
         for place in np.argwhere(trial.decoded).tolist():
             decoded = trial.views[trial.number((place[0], place[1]))]
             errors += np.square(decoded.astype(np.float32) - self.view(*place)).sum(axis=(1, 2), dtype=np.float64)
-        return self._scaled(header, tuning.better_scales(header.scales, errors))
+        return self._scaled(header, tuning.better_scales(scales, errors))
 
     def _scaled(self, header: Header, scales: tuple[int, int]) -> Header:
         """Return the header with other scales of planes; the source's planes get them, too."""
@@ -385,15 +386,17 @@ class Source:
 
     def _search(self, job: Any, original: NDArray[np.int16]) -> Search:
         share = min(1.0, GOOD_SAMPLES / (self.height * self.width))
+        # The first view is one of many, and of photographs half of all bytes and more: it is always searched well.
+        effort = self.effort if len(job.references) or not self.effort else 2
         return Search(
             original=original,
             weight=np.float32(worth(job.step)),
-            least=3 if self.effort == 0 else 2,
-            intra_tries=(1, 1, 3)[self.effort],
-            good=np.float32(GOOD[self.effort] * share),
-            surely=np.float32(SURELY[self.effort]),
-            planes=1 if self.effort == 0 else 3,
-            hurried=int(self.effort < 2),
+            least=3 if effort == 0 else 2,
+            intra_tries=(1, 1, 3)[effort],
+            good=np.float32(GOOD[effort] * share),
+            surely=np.float32(SURELY[effort]),
+            planes=1 if effort == 0 else 3,
+            hurried=int(effort < 2),
         )
 
 

@@ -1,6 +1,7 @@
 """Prediction of the residual's second and third plane from its first: the colours of a block often lie on a line.
 
-The factor is in quarters or eighths, chosen for each block and plane, and multiplies the first plane's coefficients as decoded.
+The factor is in quarters or eighths, chosen for each block and plane. It multiplies the first plane's coefficients as
+decoded.
 """
 
 from __future__ import annotations

@@ -98,7 +98,7 @@ class Field:
         return job, made
 
     def code(self, coder: Arithmetic, job: Job, work: Work, same: int = 0) -> None:
-        """Write or read a view's blocks and filters, or its pixels if coding is lossless, which predict the next views.
+        """Write or read a view's blocks and filters, or its pixels if coding is lossless; they predict later views.
 
         Bit p of ``same`` says that the filter of plane p is the one coded last.
         """

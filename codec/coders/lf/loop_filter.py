@@ -89,12 +89,11 @@ def code_filter(coder, filters, view, same):
 @part_kernel
 def _code_taps(coder, taps, plane, count):
     """Write or read taps: the shift of all, and multiples of its power, as differences from the class before."""
-    shift = 0
-    most = 0
+    shift, ones = 0, np.int64(0)
     for k in range(count):
         for i in range(TAPS):
-            most |= np.int64(taps[k, i])
-    while shift < 3 and most and not (most >> shift) & 1:
+            ones |= np.int64(taps[k, i])
+    while shift < 3 and ones and not (ones >> shift) & 1:
         shift += 1
     shift = 2 * code_raw(coder, shift >> 1) + code_raw(coder, shift & 1)
     for k in range(count):

@@ -11,11 +11,23 @@ from ii_core.base.jit import lean_kernel
 
 from . import contexts as at
 from .arithmetic import Arithmetic, bit_costs
-from .loop_filter import BINS, BORDER, CLASSES, COUNTS, MOST_TAP, OWN, TAPS, Filters, _differences, memory, prepare_view
+from .loop_filter import (
+    BINS,
+    BORDER,
+    CLASSES,
+    COUNTS,
+    MOST_TAP,
+    OWN,
+    TAPS,
+    Filters,
+    _differences,
+    memory,
+    prepare_view,
+)
 
 UNIT = 256  # of taps
-COARSEST = 4  # precisions that are tried: multiples of 1, 2, 4 and 8
-HEAD = 4.0  # bits of a new filter beside its taps
+PRECISIONS = 4  # that are tried: multiples of 1, 2, 4 and 8
+HEAD, LEAST_BITS = 4.0, 1.4  # bits of a new filter beside its taps, and of a tap that is expected
 
 
 class Moments(NamedTuple):
@@ -78,37 +90,44 @@ def _add_moments(views, view, original, planes, activity, classes, bins, product
 
 def search_filters(views: NDArray[np.int16], view: int, original: NDArray[np.int16], weight: float) -> Found:
     """Return the best new filters of a decoded view; ``weight`` is the squared error that a bit is worth."""
-    moments = Moments(
-        np.zeros((3, CLASSES, TAPS, TAPS)), np.zeros((3, CLASSES, TAPS)), np.zeros(CLASSES)
-    )
+    moments = Moments(np.zeros((3, CLASSES, TAPS, TAPS)), np.zeros((3, CLASSES, TAPS)), np.zeros(CLASSES))
     _add_moments(views, view, original, *memory(*views.shape[2:]), *moments, np.zeros(TAPS))
     modes, taps, gains = [], np.zeros((3, CLASSES, TAPS), np.int64), []
     for p in range(3):
-        best: tuple[float, int, NDArray[np.int64]] = (0.0, 0, taps[p])
-        for mode in range(1, len(COUNTS)):
-            best = max(best, _best_of(moments, p, mode, weight), key=lambda found: found[0])
+        best: Best = (0.0, 0, taps[p])
+        # Eight classes gain most before their bits: where they gain nothing, other modes are not tried.
+        for mode in range(len(COUNTS) - 1, 0, -1):
+            best, hopeless = _better_of(moments, p, mode, weight, best)
+            if hopeless:
+                break
         gains.append(best[0])
         modes.append(best[1])
         taps[p, : len(best[2]), : best[2].shape[1]] = best[2]
     return Found(moments, modes, taps, gains)
 
 
-def _best_of(moments: Moments, p: int, mode: int, weight: float) -> tuple[float, int, NDArray[np.int64]]:
+Best = tuple[float, int, NDArray[np.int64]]  # gain less the bits' worth, mode, taps
+
+
+def _better_of(moments: Moments, p: int, mode: int, weight: float, best: Best) -> tuple[Best, bool]:
+    """Return the best filter so far or of a mode, and whether no filter of the mode or of fewer classes can gain."""
     products, missed = _merged(moments, p, mode)
     counts = moments.counts.reshape(COUNTS[mode], -1).sum(axis=1)
     ridge = np.eye(products.shape[1]) * (1 + counts[:, None, None])
     real = UNIT * np.linalg.solve(products + ridge, missed[..., None])[..., 0]
-    best: tuple[float, int, NDArray[np.int64]] = (-1.0, mode, real[:0].astype(np.int64))
-    if UNIT * _gain(products, missed, real) <= weight * HEAD:
-        return best
-    for shift in range(COARSEST):
+    most = _gain(products, missed, real)
+    if most - weight * (HEAD + LEAST_BITS * real.size) <= best[0]:
+        return best, most <= weight * (HEAD + LEAST_BITS * real.shape[1])
+    for shift in range(PRECISIONS):
         limit = MOST_TAP >> shift
         multiples = np.clip(np.rint(real / (1 << shift)), -limit, limit).astype(np.int64)
         size = np.abs(np.diff(multiples, axis=0, prepend=0))
-        bits = HEAD + float((2 * np.floor(np.log2(size + 2)) - 0.6 + (size > 0)).sum())
+        bits = HEAD + float((2 * np.floor(np.log2(size + 2)) - 2 + LEAST_BITS + (size > 0)).sum())
         taps = multiples << shift
-        best = max(best, (_gain(products, missed, taps) - weight * bits, mode, taps), key=lambda found: found[0])
-    return best
+        gain = _gain(products, missed, taps) - weight * bits
+        if gain > best[0]:
+            best = gain, mode, taps
+    return best, False
 
 
 def _merged(moments: Moments, p: int, mode: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -117,14 +136,16 @@ def _merged(moments: Moments, p: int, mode: int) -> tuple[NDArray[np.float64], N
     return products, moments.missed[p, :, :taps].reshape(count, -1, taps).sum(axis=1)
 
 
-def _gain(products: NDArray[np.float64], missed: NDArray[np.float64], taps: NDArray[np.floating | np.integer]) -> float:
+def _gain(
+    products: NDArray[np.float64], missed: NDArray[np.float64], taps: NDArray[np.floating | np.integer]
+) -> float:
     """Return the squared error that taps save, but for rounding."""
     real = taps / UNIT
     return float((2 * missed * real - real * np.einsum("kij,kj->ki", products, real)).sum())
 
 
 def choose_filters(coder: Arithmetic, filters: Filters, view: int, found: Found, weight: float) -> int:
-    """Set the filters of a view: none, those coded last, or new ones; return the planes of those coded last as bits."""
+    """Set the filters of a view: none, those coded last, or new ones; return as bits which are those coded last."""
     same = 0
     for p in range(3):
         off, on = weight * bit_costs(coder.contexts[[at.FILTERED + 3 * p + filters.before[p]]])[0]
@@ -134,7 +155,9 @@ def choose_filters(coder: Arithmetic, filters: Filters, view: int, found: Found,
         if latest >= 0:
             mode = int(filters.modes[latest, p])
             products, missed = _merged(found.moments, p, mode)
-            gains[2] = _gain(products, missed, filters.taps[latest, p, : COUNTS[mode], : missed.shape[1]]) - on - again
+            gains[2] = (
+                _gain(products, missed, filters.taps[latest, p, : COUNTS[mode], : missed.shape[1]]) - on - again
+            )
         way = int(np.argmax(gains))
         same |= (way == 2) << p
         filters.modes[view, p] = (0, found.modes[p], 1)[way]

@@ -68,8 +68,8 @@ def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped, fin
 def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crossed, error, skipped, finer):
     """Quantise work.block; return bits, whether there are levels, which array has them, and the factor of `cross`.
 
-    ``first`` says whether the first plane has a residual, ``error`` is the squared error without one, ``finer`` whether
-    contexts are those of version 7.
+    ``first`` says whether the first plane has a residual, ``error`` is the squared error without one, and ``finer``
+    says whether contexts are those of version 7.
     """
     context = coded_context(plane, log, kind, first, skipped)
     free, full = bit_cost(costs, context, np.int64(0)), bit_cost(costs, context, np.int64(1))
