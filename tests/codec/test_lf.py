@@ -80,8 +80,8 @@ def test_the_range_of_disparity_is_found(disparity, down):
     """If the texture moves by d a column, the next view shows at x - d what this one shows at x."""
     picture = shifted_plane(disparity)
     source = lf.Source(picture, checked_options(lf.LightField(), {}))
-    low, high, found = ranges.estimated(source.view, source.grid)
-    assert found == down
+    low, high, lattice = ranges.estimated(source.view, source.grid)
+    assert lattice == (0, 0, down * stream.UPRIGHT)
     assert low <= -256 * disparity[1] <= high
     # Zero is always within the range; beyond it and beyond the disparity there is at most the margin.
     assert low >= min(0, -256 * disparity[1]) - ranges.MARGIN

@@ -5,8 +5,8 @@ views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``
 views of *Apples* at quantiser 26; the first encoder that left out transforms wrote it. ``row.ii`` holds 1×10 views of
 *Apples* of 32×16 pixels at quantiser 36, by cdd3aba: its first view is matched to one that no other view is made of.
 ``tuned.ii`` and ``rotated.ii``, of version 7, hold 7×6 views of 58×38 pixels and 7×2 of them of the benchmark's 9×9
-views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. The decoder has integer arithmetic alone,
-so that a hash of the pixels is the expectation.
+views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. The decoder has integer arithmetic
+alone, so that a hash of the pixels is the expectation.
 """
 
 import hashlib

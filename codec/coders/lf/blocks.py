@@ -21,7 +21,7 @@ from .cross import code_cross, keep_first, rebuild
 from .intra import MODES, SMOOTH, fill_border, predict_intra
 from .samples import LARGEST_SKIPPED, code_samples
 from .transform import LARGEST
-from .warp import moved_block
+from .warp import LATTICE, lead, moved_block
 
 LOG_LARGEST, LOG_LEAST = 5, 2
 INTRA, EXPLICIT, SYNTHESIS, TIMED, MIXED = range(5)
@@ -46,7 +46,7 @@ class Job(NamedTuple):
     at : int
         Which of them this is.
     references : ndarray of int64, (R, 3)
-        Views to predict from: index, and how far each is, in columns and rows of the grid; R ≤ 4.
+        Views to predict from: index, and how far each is, in columns and rows of the grid, in 2^-10 of a view; R ≤ 4.
     unit : int
         Disparity of an index of 1, in 2^-8 samples between neighbouring views.
     low, high : int
@@ -246,12 +246,12 @@ def seen_mask(job, by, bx, log, index):
         for place in range(5):
             y = 4 * by + (2 * quarter if place == 4 else quarter + 2 * quarter * (place >> 1))
             x = 4 * bx + (2 * quarter if place == 4 else quarter + 2 * quarter * (place & 1))
-            i, j = x + ((d * across + 128) >> 8), y + ((d * down + 128) >> 8)
+            i, j = x + ((lead(d, across) + 128) >> 8), y + ((lead(d, down) + 128) >> 8)
             if i < 0 or j < 0 or i >= width or j >= height:
                 against += 1
             else:
                 other = np.int64(job.disparities[view, j, i])
-                if other != UNKNOWN and abs(other - d) * farthest > DIFFERENT:
+                if other != UNKNOWN and abs(other - d) * farthest > DIFFERENT << LATTICE:
                     against += 1
         if against < 3:
             seen |= 1 << r
@@ -487,8 +487,8 @@ def predict_explicit(job, work, y0, x0, n, index, mask):
                     y0,
                     x0,
                     n,
-                    d * job.references[r, 2],
-                    d * job.references[r, 1],
+                    lead(d, job.references[r, 2]),
+                    lead(d, job.references[r, 1]),
                     work.rows,
                     predicted,
                 )

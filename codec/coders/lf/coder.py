@@ -247,12 +247,12 @@ class Source:
             self.axes, colours = planes.bt709_axes(scales), planes.bt709_colours(scales)
         else:
             self.axes = colours = planes.detail_axes(self.pixels, self.grid)
-        low, high, down = ranges.estimated(self.view, self.grid)
+        low, high, lattice = ranges.estimated(self.view, self.grid, skewed=not exact)
         self.header = Header(
             log_stride=int(options["stride"]),
             sources=int(options["sources"]),
             exact=exact,
-            down=down,
+            lattice=lattice,
             low=low,
             high=high,
             colours=colours,

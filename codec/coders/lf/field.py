@@ -14,8 +14,9 @@ from .blocks import DONE, MOST_INDEX, MOST_REFERENCES, UNKNOWN, Job, Work, code_
 from .exact import code_exact, new_exact, prepare
 from .planes import gather, scatter
 from .pyramid import Node, Place, batches, pyramid
-from .stream import Header
+from .stream import UPRIGHT, Header
 from .synthesis import Synthesis, chosen, new_synthesis
+from .warp import LATTICE
 
 EIGHTH = 32  # of a sample, in units of disparity
 MOST_SEARCHED = 800  # disparities of one view
@@ -167,8 +168,10 @@ class Field:
             synthesis.refine(made, at, True)
 
     def _offsets(self, node: Node, places: tuple[Place, ...]) -> np.ndarray:
+        row, col, (across, down, apart) = node.row, node.col, self.header.lattice
         rows = [
-            (self.number(place), place[1] - node.col, self.header.down * (place[0] - node.row)) for place in places
+            (self.number((v, u)), UPRIGHT * (u - col) + across * (v - row), down * (u - col) + apart * (v - row))
+            for v, u in places
         ]
         return np.array(rows, np.int64).reshape(-1, 3)
 
@@ -177,7 +180,8 @@ class Field:
         if not len(references):
             return EIGHTH
         spread = self.header.high - self.header.low
-        return max(EIGHTH // int(np.abs(references[:, 1:]).max()), -(-spread // MOST_SEARCHED), 1)
+        farthest = (int(np.abs(references[:, 1:]).max()) + UPRIGHT // 2) >> LATTICE
+        return max(EIGHTH // max(farthest, 1), -(-spread // MOST_SEARCHED), 1)
 
 
 assert MOST_INDEX > MOST_SEARCHED and DONE

@@ -24,7 +24,7 @@ _VERSIONS = {
 _TOOLS = {version: tools for tools, version in _VERSIONS.items()}
 QUARTERS, EIGHTHS = 2, 3  # binary logarithms of the unit of factors between planes
 # Flags of version 7; the lowest two bits are 0, or the logarithm of the factors' unit.
-_SKIPS, _FILTERS, _DOWN, _BT709, _FLAGS = 4, 8, 16, 32, 64
+_SKIPS, _FILTERS, _DOWN, _BT709, _SKEWED, _FLAGS = 4, 8, 16, 32, 64, 128
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
 )
@@ -32,11 +32,14 @@ MOST_LOG_STRIDE = 6
 MOST_STEP = 1 << 18
 MOST_SOURCES = 8
 MOST_DISPARITY = 1 << 14
+UPRIGHT = 1 << 10
+MOST_LATTICE = 4 * UPRIGHT
 
 _HEAD = struct.Struct("<BBBBbhh9h")
 _LEVEL = struct.Struct("<II")
 _TUNED = struct.Struct("<BBBhh")
 _ROTATION = struct.Struct("<9h")
+_LATTICE = struct.Struct("<3h")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,8 +54,9 @@ class Header:
         How many views a synthesis is made of; 0 for none.
     exact : bool
         Whether coding is lossless.
-    down : int
-        1, or -1 where disparity has the other sign along columns than along rows.
+    lattice : (int, int, int)
+        How far a row of views leads across, a column down, and a row down, in 2^-10 of how far a column leads across:
+        (0, 0, ±`UPRIGHT`) on an upright grid, negative where disparity has the other sign along columns.
     low, high : int
         Range of disparity between neighbouring views, in 2^-8 samples.
     colours : ndarray of int32, (3, 3)
@@ -75,7 +79,7 @@ class Header:
     log_stride: int
     sources: int
     exact: bool
-    down: int
+    lattice: tuple[int, int, int]
     low: int
     high: int
     colours: NDArray[np.int32]
@@ -97,13 +101,19 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
     index = list(zip(header.steps, map(len, levels), strict=False))  # a view of a take needs no levels beyond its own
     if not header.tuned:
         version = _VERSIONS[bool(header.crossed), header.skipping]
-        common = header.log_stride, header.sources, header.exact, header.down, header.low, header.high
+        down = header.lattice[2] // UPRIGHT
+        common = header.log_stride, header.sources, header.exact, down, header.low, header.high
         return _HEAD.pack(version, *common, *colours) + b"".join(_LEVEL.pack(*level) for level in index)
     flags = header.crossed | _SKIPS * header.skipping | _FILTERS * header.filtered
-    flags |= _DOWN * (header.down < 0) | _BT709 * (header.scales is not None)
+    flags |= _DOWN * (header.lattice[2] < 0) | _BT709 * (header.scales is not None) | _SKEWED * _skewed(header)
     head = _TUNED.pack(TUNED, flags, header.log_stride | header.sources << 3, header.low, header.high)
     head += bytes(header.scales) if header.scales else _ROTATION.pack(*colours)
+    head += _LATTICE.pack(*header.lattice) if _skewed(header) else b""
     return head + b"".join(leb128(step) + leb128(length) for step, length in index)
+
+
+def _skewed(header: Header) -> bool:
+    return header.lattice not in ((0, 0, UPRIGHT), (0, 0, -UPRIGHT))
 
 
 def head_bytes(header: Header, levels: list[bytes]) -> int:
@@ -135,7 +145,8 @@ def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
     except (IndexError, ValueError, struct.error):
         raise ValueError(f"its light field has {len(payload)} bytes, too few for its header and index") from None
     header = Header(**values, steps=tuple(step for step, _ in index))
-    sound = header.log_stride <= MOST_LOG_STRIDE and header.sources <= MOST_SOURCES and abs(header.down) == 1
+    sound = header.log_stride <= MOST_LOG_STRIDE and header.sources <= MOST_SOURCES
+    sound = sound and max(map(abs, header.lattice)) <= MOST_LATTICE and header.lattice[2] != 0
     sound = sound and header.crossed in (0, QUARTERS, EIGHTHS) and header.exact in (0, 1)
     sound = sound and (header.scales is None or min(header.scales) > 0)
     if not sound or not -MOST_DISPARITY <= header.low <= header.high <= MOST_DISPARITY:
@@ -161,7 +172,7 @@ def _read_fixed(payload: bytes) -> _Read:
         "log_stride": log_stride,
         "sources": sources,
         "exact": exact,
-        "down": down,
+        "lattice": (0, 0, down * UPRIGHT),
         "low": low,
         "high": high,
         "colours": np.array(colours, np.int32).reshape(3, 3),
@@ -181,6 +192,10 @@ def _read_tuned(payload: bytes) -> _Read:
     else:
         colours = np.array(_ROTATION.unpack_from(payload, at), np.int32).reshape(3, 3)
         at += _ROTATION.size
+    lattice = 0, 0, -UPRIGHT if flags & _DOWN else UPRIGHT
+    if flags & _SKEWED:
+        lattice = _LATTICE.unpack_from(payload, at)
+        at += _LATTICE.size
     index = []
     for _ in range((counts & 7) + 2):
         step, at = read_leb128(payload, at)
@@ -190,7 +205,7 @@ def _read_tuned(payload: bytes) -> _Read:
         "log_stride": counts & 7,
         "sources": counts >> 3,
         "exact": False,
-        "down": -1 if flags & _DOWN else 1,
+        "lattice": lattice,
         "low": low,
         "high": high,
         "colours": colours,
