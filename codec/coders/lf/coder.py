@@ -57,7 +57,7 @@ class LightField(Coder):
     kind = "si"
     components_alone: ClassVar[bool] = True
     name = "si-lf"
-    about = "Sub-images as a light field: a pyramid of views, disparity, synthesis at the decoder"
+    about = "Sub-images as a light field, tuned for PSNR-YUV (6:1:1) or RGB: disparity, synthesis at the decoder"
     dtypes: ClassVar[tuple[str, ...]] = ("uint8", "uint16")
     qp_range: ClassVar[tuple[int, int] | None] = (FINEST, COARSEST)
     quality_range: ClassVar[tuple[float, float] | None] = (COARSEST_DB, FINEST_DB)
