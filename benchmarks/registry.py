@@ -218,6 +218,7 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/depth_cost.*", f"{IMAGES}/depth_pareto.*"),
         ),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
+        Benchmark("speed.commits", needs=HISTORY, records="commits.jsonl"),
         Benchmark("speed.mitsuba", needs="Mitsuba 3 and an LLVM library", records=OWN),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
         Benchmark("pages.hero", writes=(f"{IMAGES}/apples.webp",)),
