@@ -230,8 +230,7 @@ class Job:
         turn, shift = self.pose[:3, :3].T, self.pose[:3, 3]
         with np.errstate(over="ignore", invalid="ignore"):
             origins, directions = (L @ turn + shift).astype(np.float32), (D @ turn).astype(np.float32)
-        hits, _ = packed(self.scene).intersector.nearest(origins, directions)
-        return np.where(hits.faces >= 0, hits.distances.astype(np.float64), np.nan)
+        return packed(self.scene).intersector.distances(origins, directions).astype(np.float64)
 
     def _lobes(self) -> tuple[int, int]:
         """Return the rays of a sample over a rough mirror's lobe, and the samples that share the lobe's positions."""
