@@ -146,7 +146,7 @@ class Job:
             divisor = 1
         else:
             radiance, divisor = self._fixed(tracer, self.sampling, rows, cols, order, support), self.sampling
-            samples = np.full(len(radiance), divisor, np.int32)
+            samples = np.full(len(radiance) if "samples" in self.support else 0, divisor, np.int32)
             histogram = {divisor: len(radiance)}
         found = {} if support is None else vars(support)
         arrays = {"pixels": encoded(radiance, order.pixels, divisor, self.dtype).reshape(*shape, 3)}
@@ -262,7 +262,7 @@ class Job:
             return fixed_sum(
                 self.camera, samples, self.seed, m, n, TILE_RAYS, self._parts, self._shoot(tracer, support)
             )  # fmt: skip
-        radiance = np.zeros((len(order.pixels), 3), np.float32)
+        radiance = tracer.dark(len(order.pixels))
         start = self._start(rows, cols, order)
         if start is not None:
             tracer.run_separable(start, radiance, support, self._keys(m, n, 0, 1))
