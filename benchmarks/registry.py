@@ -219,6 +219,7 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/depth_cost.*", f"{IMAGES}/depth_pareto.*"),
         ),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
+        Benchmark("speed.commits", needs=HISTORY, records="commits.jsonl"),
         Benchmark("speed.mitsuba", needs="Mitsuba 3 and an LLVM library", records=OWN),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
         Benchmark("pages.notebooks", needs="the extra notebooks", writes=("examples/*.ipynb",)),
