@@ -42,7 +42,6 @@ BACK = {
     "depth-control": 70, "grin-hexagonal-depth-control": 70, "plenoptic1": 150, "plenoptic2": 150,
     "plenoptic1-double-gauss": 130, "plenoptic2-triplet": 150,
 }  # fmt: skip
-SMALL = ("plenoptic1-double-gauss", "plenoptic2-triplet")  # stored as JPEG, a third of the bytes without loss
 
 
 def main() -> None:
@@ -50,16 +49,19 @@ def main() -> None:
     scene = load_scene("apples")
     folder = DOCS / "images" / "cameras"
     folder.mkdir(parents=True, exist_ok=True)
-    for name in (name for names in KINDS.values() for name in names):
-        write_picture(folder / file_name(name), strip(scene, shown(name), name), lossless=True)
-        print(name, flush=True)
+    for kind, names in KINDS.items():
+        strips = [
+            np.pad(strip(scene, shown(name), name), ((0, GAP), (0, 0), (0, 0)), constant_values=255) for name in names
+        ]
+        write_picture(folder / file_name(kind), np.concatenate(strips)[:-GAP])
+        print(kind, flush=True)
     write_picture(DOCS / "images" / "scenes.webp", all_scenes())
     (DOCS / "cameras.md").write_text(page(), encoding="utf-8")
 
 
-def file_name(camera: str) -> str:
-    """Return the name of a camera's strip of pictures."""
-    return f"{camera}.{'jpg' if camera in SMALL else 'webp'}"
+def file_name(kind: str) -> str:
+    """Return the name of the sheet of a kind of cameras."""
+    return f"{kind.lower().replace(' ', '-')}.webp"
 
 
 def page() -> str:
@@ -68,6 +70,7 @@ def page() -> str:
     for kind, names in KINDS.items():
         text.append(f"\n## {kind}\n")
         text += [entry(name, preset_cameras(name), shown(name)) for name in names]
+        text.append(f"\n![from top to bottom: {', '.join(names)}](images/cameras/{file_name(kind)})\n")
     return "\n".join([*text, precision(), in_scene()])
 
 
@@ -91,8 +94,9 @@ KINDS = {
 INTRODUCTION = """# Cameras
 
 With this page you can choose a camera of the package and the format of its maps. A camera is a
-location and a direction for every pixel. Each strip shows (`python -m benchmarks run cameras`; an
-eighth of the lenses each way, of several arrays the first):
+location and a direction for every pixel. Under the cameras of a kind stand their strips, from top
+to bottom (`python -m benchmarks run cameras`; an eighth of the lenses each way, of several arrays
+the first):
 
 1. the locations L over the whole array, with x, y and z as red, green and blue;
 2. the directions D of a few lenses, in the same colours, black if blocked;
@@ -108,7 +112,7 @@ USUAL = ("pinhole", "8192×4096 px", "512×256 lenses", "rectangular", "16×16 p
 
 
 def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
-    """Return heading, text, properties and the strip of pictures."""
+    """Return heading, text and properties."""
     first = full[0]
     u, v = first.ei_pixels
     chain = " → ".join(e.kind for e in first.optics)
@@ -123,10 +127,9 @@ def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
     facts = [fact for fact in facts if fact not in USUAL]
     sheet = json.loads((CAMERAS / f"{name}.json").read_text(encoding="utf-8"))
     about = sheet["about"][:1].upper() + sheet["about"][1:]
-    picture = f"![{name}](images/cameras/{file_name(name)})"
     given = f" *{', '.join(facts)}.*" if facts else ""
     text = fill(f"{about}. {sheet['notes']}{given}", 100, break_on_hyphens=False)
-    return f"\n### {name}\n\n{text}\n\n{picture}\n"
+    return f"\n### {name}\n\n{text}\n"
 
 
 def all_scenes() -> NDArray[np.uint8]:
