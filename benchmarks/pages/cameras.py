@@ -148,13 +148,7 @@ def all_scenes() -> NDArray[np.uint8]:
 def precision() -> str:
     """Return the errors of cameras stored as pictures by format, from `benchmarks.accuracy.map_precision`."""
     rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
-    lines = [
-        "\n## Stored as pictures: which format is enough\n",
-        "Greatest errors of the maps of `setup1`, `setup3` and `spherical` at a quarter of the lenses each way,",
-        "and PSNR of *Apples* and *Cuboid* against pictures of float maps:\n",
-        "| format | bytes per ray | angle | location | PSNR |",
-        "|---|---|---|---|---|",
-    ]
+    lines = []
     for name in dict.fromkeys(row["format"] for row in rows):
         of = [row for row in rows if row["format"] == name]
         size = [row["bytes_per_pixel"] for row in of]
@@ -162,11 +156,9 @@ def precision() -> str:
         shown = "reference" if None in psnr else f"{min(psnr):.1f}–{max(psnr):.1f} dB"
         angle, place = (max(row[what] for row in of) for what in ("angle_max_urad", "place_max_um"))
         lines.append(
-            f"| {name} | {min(size):.2g}–{max(size):.2g} | {figure(angle)} µrad | {figure(place)} µm | {shown} |"
+            [name, f"{min(size):.2g}–{max(size):.2g}", f"{figure(angle)} µrad", f"{figure(place)} µm", shown]
         )
-    made = table(
-        "camera | format | bytes per ray | angle max · rms | location max · rms | PSNR apples · cuboid", lines
-    )
+    made = table("format | bytes per ray | angle | location | PSNR", lines)
     return "\n".join(
         [PRECISION, *made, "", origin(rows), "", VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""]
     )
@@ -175,9 +167,8 @@ def precision() -> str:
 PRECISION = """
 ## Stored as pictures: which format is enough
 
-Errors of maps stored as pictures, at a quarter of the lenses each way: angle between stored and
-true direction, distance between stored and true location, and PSNR of the picture against that of
-float maps.
+Greatest errors of the maps of `setup1`, `setup3` and `spherical` at a quarter of the lenses each
+way, and PSNR of *Apples* and *Cuboid* against pictures of float maps:
 """
 
 
@@ -185,19 +176,17 @@ def in_scene() -> str:
     """Return the comparison with a camera of glass in the scene, from `benchmarks.accuracy.camera_in_scene`."""
     (study,) = camera_in_scene.RECORDS.rows(scale=camera_in_scene.SCALE)
     lines = [
-        IN_SCENE,
-        "| *Apples* lit | aperture | triangles | as it is | Fresnel's losses added | no stray light |",
-        "|---|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {row['scene'].removeprefix('apples, lit ').replace('apples', 'as usual')} | "
-        f"{row['aperture_of_pitch']:.2f} | {row['triangles_of_the_camera']} | {row['psnr_db']:.1f} dB | "
-        f"{row['psnr_with_fresnel_db']:.1f} dB | {row['psnr_direct_light_db']:.1f} dB |"
+        [
+            row["scene"].removeprefix("apples, lit ").replace("apples", "as usual"),
+            f"{row['aperture_of_pitch']:.2f}",
+            str(row["triangles_of_the_camera"]),
+            *(f"{row[name]:.1f} dB" for name in ("psnr_db", "psnr_with_fresnel_db", "psnr_direct_light_db")),
+        ]
         for row in study["rows"]
         if (row["what"] == "picture" and row["samples"] > 1)
         or (row["what"] == "tessellation" and row["segments"] in SEGMENTS)
     ]
-    heads = "*Apples* | aperture | triangles of the camera | as it is | Fresnel's losses added | no stray light"
+    heads = "*Apples* lit | aperture | triangles | as it is | Fresnel's losses added | no stray light"
     shown = "![both pictures and their differences](images/camera_in_scene.jpg)"
     return "\n".join([IN_SCENE, *table(heads, lines), "", origin([study]), "", shown, ""])
 
