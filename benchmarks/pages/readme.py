@@ -109,9 +109,17 @@ def meetings() -> list[tuple[str, int, Pairs]]:
 
 def paired(rows: Mapping[tuple[str, str], Row], scheme: str) -> Pairs:
     """Return the rows of a scheme beside those of `si-lf`; none unless both are there for every scene."""
-    ours = {name: rows.get((name, BY_RGB)) or rows.get((name, OURS)) for name in (*SCENES, IMPORTED)}
-    names = [name for name, row in ours.items() if (name, scheme) in rows and row]
-    return {name: (rows[name, scheme], ours[name]) for name in names} if {*SCENES} <= {*names} else {}
+    found = {}
+    for name in (*SCENES, IMPORTED):
+        ours = rows.get((name, BY_RGB), rows.get((name, OURS)))
+        if ours is not None and (name, scheme) in rows and not _tuned_otherwise(ours):
+            found[name] = rows[name, scheme], ours
+    return found if {*SCENES} <= {*found} else {}
+
+
+def _tuned_otherwise(row: Row) -> bool:
+    """Return whether a curve of `si-lf` is tuned for another measure than PSNR of RGB, as since version 7."""
+    return row.get("scheme") == OURS and any("ctc" in point for point in row["points"])
 
 
 def split(values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
