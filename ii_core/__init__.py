@@ -6,6 +6,8 @@ from .camera.maps import MapCamera, read_maps, write_maps
 from .camera.pose import camera_pose
 from .camera.presets import camera_names, preset, preset_cameras
 from .depth.estimate import DepthEstimate, estimate_depth
+from .depth.refocus import focused
+from .depth.retarget import Retargeted, retarget
 from .design.panel import PanelDesign, panel_display
 from .display.eye import Eye, EyeImage, eye_image
 from .display.model import DisplayModel
@@ -40,6 +42,7 @@ __all__ = [
     "MapCamera",
     "NoLenses",
     "PanelDesign",
+    "Retargeted",
     "Rig",
     "ViewingZone",
     "add_sensor_noise",
@@ -60,6 +63,7 @@ __all__ = [
     "eye_image",
     "find_views",
     "five_viewpoints",
+    "focused",
     "from_smallest_rectangle",
     "load_mosaic",
     "open_video",
@@ -74,6 +78,7 @@ __all__ = [
     "read_maps",
     "refocus",
     "resampled",
+    "retarget",
     "smallest_rectangle",
     "stand_back",
     "sub_images",

@@ -18,14 +18,12 @@ def main() -> None:
 def tables() -> Tables:
     """Return one table for each profile of the package, with one caption, and that of the anchors."""
     lines: list[str] = []
-    for name, about in profile_names().items():
+    for name in profile_names():
         if all(reference.middle for reference in profile(name).pictures):
-            lines += [f"**{name}**: {about}", ""]
             continue
         lines += [*short_table(name, card_table(profile(name))[:-2]), ""]
-    anchors = ["| anchor | coder | samples | arguments of the encoder |", "|---|---|---|---|"]
-    for name, anchor in ANCHORS.items():
-        anchors.append(f"| `{name}` | {anchor.about} | `{anchor.pixels}` | `{anchor.encoder}` |")
+    anchors = ["| anchor | samples | arguments of the encoder |", "|---|---|---|"]
+    anchors += [f"| `{name}` | `{anchor.pixels}` | `{anchor.encoder}` |" for name, anchor in ANCHORS.items()]
     return {("docs/benchmark.md", "data-card"): [*lines, CAPTION], ("docs/benchmark.md", "anchors"): anchors}
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..base.jit import lean_kernel, stage_kernel
@@ -46,3 +48,128 @@ def add_view(image, own, down, across, weight, limit, disparity, total, mass, fi
             total[y, x, 1] += w * g
             total[y, x, 2] += w * b
             mass[y, x] += w
+
+
+SPAN = 0.75  # views beyond the outermost ones that a ray may lie outside
+# Disparities of one point in two views, and of neighbours on one surface, differ by less, px and share of themselves.
+AGREE, AGREE_SHARE, JUMP, JUMP_SHARE = 0.35, 0.05, 0.75, 0.1
+
+
+@stage_kernel
+def _near(depths, j, i, y, x):
+    """Return the disparity of view (j, i) at the pixel nearest to (y, x), at the border beyond it."""
+    rows, cols = depths.shape[2:]
+    return depths[j, i, min(max(int(y + 0.5), 0), rows - 1), min(max(int(x + 0.5), 0), cols - 1)]
+
+
+@lean_kernel
+def look_up(views, depths, places, low, high, order, total, mask, first, last):
+    """Add the light of rays at ``places`` (x, y, u, v) to ``total``; ``mask`` 2 is seen, 1 filled, 0 outside.
+
+    ``depths`` are shifts of a point in x and y from view to view; ``order`` is 1 if large shifts are near, else −1.
+    """
+    rows, cols, height, width = views.shape[:4]
+    for n in range(first, last):
+        for m in range(places.shape[1]):
+            x, y, u, v = places[n, m]
+            if not (-0.5 <= x <= width - 0.5 and -0.5 <= y <= height - 0.5):
+                continue
+            if not (-SPAN <= u <= cols - 1 + SPAN and -SPAN <= v <= rows - 1 + SPAN):
+                continue
+            left, top = min(max(math.floor(u), 0), max(cols - 2, 0)), min(max(math.floor(v), 0), max(rows - 2, 0))
+            right, below = min(left + 1, cols - 1), min(top + 1, rows - 1)
+            # Each view says where the ray ends; the end that most views see, weighted, counts: the nearest of equals.
+            at, most, behind, hidden = 0.0, -1.0, 0.0, True
+            for q in range(4):
+                j, i = (below if q & 2 else top), (right if q & 1 else left)
+                if (q & 1 and right == left) or (q & 2 and below == top):
+                    continue
+                d, clear = _end(depths, j, i, y, x, v - j, u - i, low, high, order)
+                if q == 0 or order * d < order * behind:
+                    behind = d
+                if not clear:
+                    continue
+                limit, support = AGREE + AGREE_SHARE * abs(d), 1e-6 * order * (d - low)
+                for p in range(4):
+                    dy, dx = v - (below if p & 2 else top), u - (right if p & 1 else left)
+                    if (p & 1 and right == left) or (p & 2 and below == top):
+                        continue
+                    there = _near(depths, below if p & 2 else top, right if p & 1 else left, y + d * dy, x + d * dx)
+                    if abs(there - d) <= limit:
+                        support += max(1.0 - abs(dy), 1e-3) * max(1.0 - abs(dx), 1e-3)
+                if support > most:
+                    at, most, hidden = d, support, False
+            if hidden:
+                at = behind
+            r, g, b, mass = 0.0, 0.0, 0.0, 0.0
+            for q in range(4):
+                j, i = (below if q & 2 else top), (right if q & 1 else left)
+                if (q & 1 and right == left) or (q & 2 and below == top):
+                    continue
+                w = max(1.0 - abs(v - j), 1e-3) * max(1.0 - abs(u - i), 1e-3)
+                shift, share = _place(depths, j, i, y, x, v - j, u - i, at, low, high)
+                w *= share
+                sy, sx = y + shift * (v - j), x + shift * (u - i)
+                sy, sx = min(max(sy, 0.0), height - 1.0), min(max(sx, 0.0), width - 1.0)
+                r += w * _pixel(views[j, i], 0, sy, sx)
+                g += w * _pixel(views[j, i], 1, sy, sx)
+                b += w * _pixel(views[j, i], 2, sy, sx)
+                mass += w
+            if mass > 0.0:
+                total[n, m, 0] += max(r / mass, 0.0)
+                total[n, m, 1] += max(g / mass, 0.0)
+                total[n, m, 2] += max(b / mass, 0.0)
+                mask[n, m] = max(mask[n, m], 1) if hidden else 2
+
+
+@stage_kernel
+def _place(depths, j, i, y, x, down, across, at, low, high):
+    """Return the shift nearest to ``at`` whose place in a view has the disparity ``at``, and a weight.
+
+    The surface seen through a hole, or the sky, is taken from where the view sees it next.
+    """
+    height, width = depths.shape[2:]
+    limit = AGREE + AGREE_SHARE * abs(at)
+    reach = max(abs(down), abs(across))
+    steps = math.ceil((high - low) * reach * 2.0) + 1
+    for k in range(steps + 1):
+        for side in range(2 if k > 0 else 1):
+            shift = at + (1 - 2 * side) * (k * 0.5 / reach if reach > 0.0 else 0.0)
+            sy, sx = y + shift * down, x + shift * across
+            if (
+                -0.5 <= sy <= height - 0.5
+                and -0.5 <= sx <= width - 0.5
+                and abs(_near(depths, j, i, sy, sx) - at) <= limit
+            ):
+                return shift, 1.0 if k == 0 else 1e-3 / k
+    return at, 1e-9
+
+
+@stage_kernel
+def _end(depths, j, i, y, x, down, across, low, high, order):
+    """Return the shift at which a ray meets a surface of view (j, i), and whether the view sees it there.
+
+    From near to far: before the surface the shift is nearer than that of the view where the ray passes, behind it
+    farther. Where the view's surface changes by a jump in between, the ray goes behind an edge.
+    """
+    span = high - low
+    steps = math.ceil(span * max(abs(down), abs(across)) * 2.0) + 1
+    near, far = (high, low) if order > 0 else (low, high)
+    was_d, was = near, _near(depths, j, i, y + near * down, x + near * across)
+    if order * was >= order * near:
+        return was, True
+    hidden, last = False, was
+    for k in range(1, steps + 1):
+        d = near + (far - near) * k / steps
+        here = _near(depths, j, i, y + d * down, x + d * across)
+        last = here
+        if order * d <= order * here and order * was_d > order * was:
+            if abs(here - was) <= JUMP + JUMP_SHARE * abs(here):
+                a, b = abs(was_d - was), abs(d - here)
+                return was + (here - was) * (a / (a + b) if a + b > 0.0 else 0.0), True
+            # the surface beyond the jump may itself be met between the two
+            if order * was < order * here and abs(d - here) <= abs(far - near) / steps:
+                return here, True
+            hidden = True
+        was_d, was = d, here
+    return last, not hidden

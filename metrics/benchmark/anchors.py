@@ -104,8 +104,8 @@ ANCHORS = {
     ),
     "x264": Anchor(
         about="H.264 by x264, preset placebo, 16 B pictures, 4:4:4",
-        encoder="-c:v libx264 -preset placebo -tune psnr -crf {q} -x264-params keyint=infinite:scenecut=0:ref=16:"
-        "bframes=16:b-adapt=2:b-pyramid=normal:rc-lookahead=250:threads=1",
+        encoder="-c:v libx264 -preset placebo -tune psnr -x264-params crf={q}:keyint=infinite:scenecut=0:ref=16:"
+        "bframes=16:b-adapt=2:b-pyramid=normal:rc-lookahead=250:threads=1 -bsf:v filter_units=remove_types=6",
         muxer="h264", pixels="yuv444p10le", finest=-12, coarsest=51, step=0.25,
     ),
     "libaom": Anchor(

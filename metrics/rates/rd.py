@@ -211,7 +211,8 @@ def rate_distortion(
         ``reached``: whether the scheme could meet the target.
     decode : callable
         ``decode(coded)`` gives the picture back, or an object with ``picture`` and ``seconds``, as
-        `codec.timed_decode` does, and perhaps ``codes``, which ``measure`` then gets as a keyword.
+        `codec.timed_decode` does, and perhaps ``codes``, which ``measure`` then gets as a keyword, and
+        ``more``, a mapping of further numbers to keep.
     progress : callable or bool, optional
         ``progress(done, total, text)`` after every point, in the calling thread; True prints a line.
     workers : int, optional
@@ -357,7 +358,7 @@ def _measure(
         decoded, seconds = getattr(answer, "picture", answer), getattr(answer, "seconds", spent)
         codes = getattr(answer, "codes", None)
         more = {} if measure is None else measure(decoded) if codes is None else measure(decoded, codes=codes)
-        quality = {"q_global": _quality(picture, decoded), **more}
+        quality = {"q_global": _quality(picture, decoded), **more, **getattr(answer, "more", {})}
     except Exception as error:
         error.add_note(f"while measuring {scheme} at {rate:g} bpp")
         raise

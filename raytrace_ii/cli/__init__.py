@@ -15,7 +15,7 @@ import typer
 from ii_core.base.foreign import ForeignError
 
 from . import synthesize, render, pictures, calibrating, coding, evaluate, benchmarking, show, eye
-from . import depth, focus, measure_depth, observers, video
+from . import depth, focus, measure_depth, observers, retarget, video
 from .common import app
 from .ending import ends_soon
 from .folders import no_empty_folders
@@ -36,6 +36,7 @@ __all__ = [
     "observers",
     "pictures",
     "render",
+    "retarget",
     "show",
     "synthesize",
     "video",

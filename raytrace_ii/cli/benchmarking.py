@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,10 @@ from .common import Force, app, check_outputs, columns
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, say_done
 from .words import say
+
+if TYPE_CHECKING:
+    from metrics.benchmark.profile import Reference
+    from metrics.benchmark.subject import Subject
 
 
 @app.command()
@@ -29,9 +33,13 @@ def benchmark(
         tuple[str, str],
         typer.Option(help="Commands of an encoder and a decoder: 'enc {in} {out} {bpp}' 'dec {in} {out}'."),
     ] = ("", ""),
-    name: Annotated[str | None, typer.Option(help="Name of the external commands in results.")] = None,
+    decoded: Annotated[
+        Path | None,
+        typer.Option(help="Folder of decoded views and sizes, PICTURE/TARGET, of a coder that ran elsewhere."),
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name of --external or --decoded in results.")] = None,
     views: Annotated[
-        str, typer.Option(help="Files for external commands: ppm, pgx or ycbcr of 10 bit, or png.")
+        str, typer.Option(help="Files of views for --external and --decoded: ppm, pgx or ycbcr of 10 bit, or png.")
     ] = "ppm",
     pictures: Annotated[
         Path | None,
@@ -76,8 +84,14 @@ def benchmark(
     if output is None:
         raise ValueError("output is missing: -o result.json is needed")
     check_outputs([output], force)
-    coder, tools = coder_of(defined, scheme, anchor, external, name, views)
+    coder, tools = coder_of(defined, scheme, anchor, external, decoded, name, views)
     made = rendered if pictures is None else stored(defined, pictures)
+    if (named := tools.pop("named", None)) is not None:
+        read = made
+
+        def made(reference: Reference) -> Subject:
+            return named(reference, read(reference))
+
     log = RunLog(output.with_suffix(".points.jsonl"), defined, coder, tools.get("commands"), restart=force)
     try:
         with (
@@ -102,18 +116,19 @@ def benchmark(
 def ranking(
     profile: Annotated[str, typer.Argument(help="The profile of all results.")],
     results: Annotated[list[Path], typer.Argument(help="Results of `raytrace-ii benchmark`.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="The page, .md; its chart is .png beside it.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The page, .md; beside it .csv, .tex and .svg.")],
     force: Force = False,
 ) -> None:
-    """Rank results of a benchmark on a page with a chart."""
+    """Rank results of a benchmark on a page to hand out, with all numbers, a LaTeX table and a chart."""
     from metrics.benchmark.profile import profile as profile_of
-    from metrics.benchmark.ranking import chart_path, ranked, write_page
+    from metrics.benchmark.ranking import ranked
+    from metrics.benchmark.ranking_page import page_paths, write_page
     from metrics.benchmark.result import read_result
 
     if output.suffix != ".md":
         raise ValueError(f"{output} is no Markdown page: .md is needed")
     defined = profile_of(profile)
-    check_outputs([output, chart_path(output)], force)
+    check_outputs(page_paths(output), force)
     read = [(str(path), read_result(path)) for path in results]
     write_page(output, defined, read)
     for place, row in enumerate(ranked(defined, [result for _, result in read]), 1):

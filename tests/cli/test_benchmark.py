@@ -10,6 +10,7 @@ import pytest
 import codec
 from ii_core import IIPicture, open_video
 from ii_core.base.files import write_image
+from ii_core.formats.pleno import write_pleno_views
 from metrics import measure_take
 from metrics.benchmark.profile import profile
 from metrics.benchmark.subject import identity
@@ -48,7 +49,7 @@ def test_a_coder_is_run_and_ranked(run, tmp_path):
         assert code == 0 and re.search(rf"{re.escape(scheme)} meets \d of 2 targets", out)
     page = tmp_path / "rank.md"
     code, out, _ = run("ranking", definition, *files, "-o", page)
-    assert code == 0 and out.splitlines()[0].startswith("1  ") and page.exists() and page.with_suffix(".png").exists()
+    assert code == 0 and out.splitlines()[0].startswith("1  ") and page.exists() and page.with_suffix(".svg").exists()
     assert {line.split()[0] for line in run("benchmark")[1].splitlines()} == {
         "dissertation", "jpeg-pleno", "photographs", "photographs-small", "small", "takes"
     }  # fmt: skip
@@ -58,7 +59,7 @@ def test_a_coder_is_run_and_ranked(run, tmp_path):
     ("arguments", "message"),
     [
         (("small",), "output is missing"),
-        (("small", "-o", "r.json"), "coder is missing: either --scheme, --anchor or --external"),
+        (("small", "-o", "r.json"), "coder is missing: either --scheme, --anchor, --external"),
         (("small", "-o", "r.json", "--scheme", "h264"), "unknown scheme"),
         (("small", "-o", "r.json", "--scheme", "jpeg", "--workers", "0"), "workers is 0"),
         (
@@ -145,6 +146,14 @@ def test_photographs_are_found_by_their_pixels(run, tmp_path):
     assert code == 0 and "ramp: there, pixels as defined" in out
     assert run(*taken, "-o", tmp_path / "r.json")[0] == 0
     assert json.loads((tmp_path / "r.json").read_text())["pictures"][0]["as_defined"] is True
+    for target in (4, 8):
+        write_pleno_views(picture, tmp_path / "coded" / "ramp" / str(target), "png")
+        (tmp_path / "coded" / "ramp" / str(target) / "bytes.txt").write_text("20")
+    foreign = ("benchmark", definition, "--pictures", tmp_path, "--decoded", tmp_path / "coded", "--views", "png")
+    assert "--name gives the name of the coder" in run(*foreign, "-o", tmp_path / "f.json")[2]
+    assert run(*foreign, "--name", "elsewhere", "-o", tmp_path / "f.json")[0] == 0
+    point = json.loads((tmp_path / "f.json").read_text())["pictures"][0]["points"][0]
+    assert (point["nbytes"], point["q_global"], point["reached"]) == (20, "inf", True)
     picture.with_pixels(ramp ^ 1).save(tmp_path / "ramp.png")
     code, _, error = run(*taken, "-o", tmp_path / "s.json")
     assert code == 2 and "ramp.png has other pixels than profile tiny fixes" in error

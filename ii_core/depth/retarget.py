@@ -1,0 +1,183 @@
+"""A light field through another II-camera: rays of the target looked up in the source by depth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base import checks
+from ..base.colour import srgb
+from ..base.parallel import over_rows
+from ..camera.camera import IICamera
+from ..picture.component import sub_images
+from ..picture.picture import DTYPES, IIPicture, peak
+from ..picture.view import camera_of
+from .gather_kernels import look_up
+from .refocus import _light
+
+Progress = Callable[[int, int, str], Any]
+SEEN, FILLED, OUTSIDE = 2, 1, 0  # codes of the mask
+BAND = 16  # rows of target pixels at a time
+AFFINE = 1e-6  # largest deviation of rays from an affine camera, in pitches and pixels
+
+
+@dataclass(frozen=True, eq=False)
+class Retargeted:
+    """A picture of another camera and where its pixels come from.
+
+    Attributes
+    ----------
+    picture : IIPicture
+    mask : ndarray of uint8, (N, M)
+        2 where a view of the source sees the point, 1 where none does and what lies behind fills the hole, 0 where
+        the ray lies outside the source: black.
+    """
+
+    picture: IIPicture
+    mask: NDArray[np.uint8]
+
+    @property
+    def shares(self) -> tuple[float, float, float]:
+        """Shares of pixels that are seen, filled and outside."""
+        return tuple(float((self.mask == code).mean()) for code in (SEEN, FILLED, OUTSIDE))  # type: ignore[return-value]
+
+
+@checks.checked(
+    picture=checks.instance(IIPicture),
+    camera=checks.instance(IICamera),
+    disparity=checks.array,
+    samples=checks.whole_from(1, 16),
+    workers=checks.whole_from(1, 1024),
+    progress=checks.callable_,
+)
+def retarget(
+    picture: IIPicture,
+    camera: IICamera,
+    disparity: NDArray[np.floating],
+    *,
+    samples: int = 1,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Retargeted:
+    """Return what another camera at the same place sees, from a picture and the disparity of all its views.
+
+    A target ray lies between four views of the source. In each, the ray's points lie on a line; the nearest one
+    that has the disparity of the view there is where the ray ends. Views that agree on the nearest point are mixed,
+    the nearer ones more. If the point is hidden from all four, what lies behind its neighbours is taken.
+
+    Parameters
+    ----------
+    picture : IIPicture
+        Source: regular, with a camera whose views are straight (no lens before the array, vertical parallax or one
+        row of views).
+    camera : IICamera
+        Target; any that has rays.
+    disparity : ndarray, (V, U, L, K)
+        Of all views of the source, pixels a step: `disparity_of_views`, or of a known depth. NaN counts as the
+        farthest.
+    samples : int
+        Rays a side of a target pixel.
+
+    Raises
+    ------
+    ValueError
+        If the source has no camera or none of straight views, or the disparity is of another shape.
+    """
+    source = camera_of(picture)
+    picture.check_regular()
+    (k, l), (u, v) = picture.lenses, picture.ei_pixels
+    if disparity.shape != (v, u, l, k):
+        raise ValueError(f"disparity is of shape {disparity.shape}: that of all views, {(v, u, l, k)}, is needed")
+    inverse = _places(source, picture.erect)
+    sign = -1.0 if picture.erect else 1.0
+    known = np.ascontiguousarray(disparity, np.float32)
+    finite = known[np.isfinite(known)]
+    if not finite.size:
+        raise ValueError("disparity is nowhere known")
+    low, high = float(finite.min()), float(finite.max())
+    known = np.where(np.isfinite(known), known, np.float32(low)) * np.float32(sign)
+    views = np.stack([[_light(view, 1.0) for view in row] for row in sub_images(picture)])
+    width, height = camera.pixels
+    light, mask = np.zeros((height, width, 3), np.float32), np.zeros((height, width), np.uint8)
+    ends = sorted((sign * low, sign * high))
+    order = 1 if sign > 0 else -1
+    offsets = (np.arange(samples) + 0.5) / samples
+
+    def fill(first: int, last: int) -> None:
+        total = np.zeros((last - first, width, 3), np.float32)
+        best = np.zeros((last - first, width), np.uint8)
+        places = np.empty((last - first, width, 4))
+        for sample in [(x, y) for y in offsets for x in offsets]:
+            start, way = camera.rays(rows=slice(first, last), sample=sample)
+            inverse(start, way, places)
+            look_up(views, known, places, ends[0], ends[1], order, total, best, 0, last - first)
+        light[first:last] = total / samples**2
+        mask[first:last] = best
+
+    for top in range(0, height, BAND * 8):
+        end = min(top + BAND * 8, height)
+
+        def band(first: int, last: int, top: int = top) -> None:
+            fill(top + first, top + last)
+
+        over_rows(band, end - top, workers=workers)
+        if progress is not None:
+            progress(end, height, "rows")
+    structure = camera.lenses, camera.ei_pixels
+    made = IIPicture(_codes(light, picture.pixels.dtype), *structure, camera, camera.erect)
+    return Retargeted(made, mask)
+
+
+def _codes(light: NDArray[np.float32], dtype: np.dtype[Any]) -> NDArray[Any]:
+    assert dtype.name in DTYPES
+    if dtype.kind == "f":
+        return light
+    return np.rint(srgb(np.clip(light, 0, 1)) * peak(dtype)).astype(dtype)
+
+
+def _places(camera: IICamera, erect: bool) -> Callable[[NDArray[Any], NDArray[Any], NDArray[Any]], None]:
+    """Return a function from rays to places (x, y, u, v) in the light field: fractional lenses and pixels under them.
+
+    Where a ray meets the lens plane, and its slope, are affine in lens and pixel for views that are straight: the
+    coefficients follow from three rays of the camera, and a fourth checks them.
+    """
+    if camera.front:
+        raise ValueError(f"{camera.front[0].kind} before the lens array bends rays: no source for retarget")
+    plane = camera.origin_mm[2] + camera.gap_mm
+    (k, l), (u, v) = camera.lenses, camera.ei_pixels
+    if not camera.lens_model.vertical_parallax and v > 1:
+        raise ValueError("the source has rows of pixels without vertical parallax: no source for retarget")
+
+    def coordinates(start: NDArray[Any], way: NDArray[Any], axis: int) -> NDArray[Any]:
+        slope = way[..., axis] / way[..., 2]
+        return np.stack([start[..., axis] + (plane - start[..., 2]) * slope, slope], axis=-1)
+
+    def ray(col: int, row: int, axis: int) -> NDArray[Any]:
+        start, way = camera.rays(rows=slice(row, row + 1))
+        return coordinates(start[0, col], way[0, col], axis)
+
+    matrices = []
+    for axis, (lenses, pixels) in enumerate(((k, u), (l, v))):
+
+        def at(i: int, axis: int = axis) -> NDArray[Any]:
+            return ray(i, 0, 0) if axis == 0 else ray(0, i, 1)
+
+        zero = at(0)
+        lens = (at((lenses - 1) * pixels) - zero) / (lenses - 1) if lenses > 1 else np.array([1.0, 0.0])
+        pixel = (at(pixels - 1) - zero) / (pixels - 1) if pixels > 1 else np.array([0.0, 1.0])
+        matrix = np.linalg.inv(np.stack([lens, pixel], axis=1))
+        far = matrix @ (at(lenses * pixels - 1) - zero) - [lenses - 1, pixels - 1]
+        if not (np.abs(far) < AFFINE * max(lenses, pixels)).all():
+            raise ValueError("rays of the source are not those of straight views: no source for retarget")
+        matrices.append((matrix, zero))
+
+    def places(start: NDArray[Any], way: NDArray[Any], out: NDArray[Any]) -> None:
+        for axis, (matrix, zero) in enumerate(matrices):
+            found = (coordinates(start, way, axis) - zero) @ matrix.T
+            out[..., axis], out[..., axis + 2] = found[..., 0], found[..., 1]
+
+    return places
