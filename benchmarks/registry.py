@@ -134,7 +134,7 @@ LAST = "018e29e"
 CLOSED: dict[str, tuple[str, ...]] = {
     "accuracy/eye_views": ("opinions_simulated.png",),
     "coding/crossing": (),
-    "coding/light_field_bounds": ("lf_bounds.png",),
+    "coding/light_field_bounds": (),
     "coding/light_field_threads": (),
     "coding/neighbours": (),
     "pages/concepts": tuple(
@@ -144,7 +144,7 @@ CLOSED: dict[str, tuple[str, ...]] = {
     "pages/focus_patterns": ("focus_patterns.png",),
     "pages/make_textures": (),
     "speed/before_after": (),
-    "speed/feature_ablation": ("feature_ablation.png",),
+    "speed/feature_ablation": (),
     "speed/take_cost": (),
     "speed/texture_filter": ("texture_filter.png",),
     "stability/install": (),

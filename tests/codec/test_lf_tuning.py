@@ -11,8 +11,7 @@ from codec.coders.lf import coder as lf
 from codec.contract import checked_options
 from ii_core import IIPicture, sub_images
 from metrics import q_ctc_psnr, q_global
-
-from .test_lf import shifted_plane
+from tests.codec.test_lf import shifted_plane
 
 
 @pytest.mark.parametrize("scales", [(64, 64), (35, 20), (12, 255), (1, 1)])
