@@ -366,7 +366,8 @@ def developed(
 
     if bits not in (8, 16):
         raise ValueError(f"bits are {bits}: 8 or 16 are needed")
-    raw, white, dark, mosaic = _upright(calibration, raw, white, dark, mosaic)
+    frames, mosaic = _upright(calibration, mosaic, raw=raw, white=white, dark=dark)
+    raw, white, dark = frames["raw"], frames["white"], frames["dark"]
     owner = _owners(calibration)
     values, repairs = _linear(raw, curve), 0
     if dark is not None:
@@ -423,32 +424,25 @@ def defective_pixels(
     ValueError
         If the frames are not of the calibration's size or have values that are not finite.
     """
-    white, _, dark, mosaic = _upright(calibration, white, white, dark, mosaic)
-    return _white(calibration, white, dark, mosaic, curve)[1]
+    frames, mosaic = _upright(calibration, mosaic, white=white, dark=dark)
+    return _white(calibration, frames["white"], frames["dark"], mosaic, curve)[1]
 
 
 def _upright(
-    calibration: Calibration,
-    raw: NDArray[Any],
-    white: NDArray[Any] | None,
-    dark: NDArray[Any] | None,
-    mosaic: str | None,
-) -> tuple[NDArray[Any], NDArray[Any] | None, NDArray[Any] | None, str | None]:
+    calibration: Calibration, mosaic: str | None, **frames: NDArray[Any] | None
+) -> tuple[dict[str, Any], str | None]:
     """Return checked frames, turned as the calibration is, and the mosaic that turns with them."""
-    frames = [f if f is None else np.rot90(f) if calibration.turned else f for f in (raw, white, dark)]
-    size = calibration.camera.pixels
-    for what, frame in zip(("white", "dark", "raw"), (frames[1], frames[2], frames[0]), strict=True):
-        if frame is not None and frame.shape[1::-1] != size:
-            raise ValueError(f"{what} is {frame.shape}: {size[1]}×{size[0]}, the calibration's size, is needed")
+    width, height = calibration.camera.pixels
+    turned = {what: f if f is None or not calibration.turned else np.rot90(f) for what, f in frames.items()}
+    for what, frame in turned.items():
+        if frame is not None and frame.shape[1::-1] != (width, height):
+            raise ValueError(f"{what} is {frame.shape}: {height}×{width}, the calibration's size, is needed")
         if frame is not None:
             _finite(what, frame)
     if calibration.turned and mosaic is not None:
         tile = np.rot90(np.array(list(mosaic)).reshape(2, 2))
-        if raw.shape[1] % 2:
-            tile = tile[::-1]
-        mosaic = "".join(tile.ravel())
-    assert frames[0] is not None
-    return frames[0], frames[1], frames[2], mosaic
+        mosaic = "".join((tile[::-1] if height % 2 else tile).ravel())
+    return turned, mosaic
 
 
 def _white(
