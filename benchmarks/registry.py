@@ -134,7 +134,7 @@ LAST = "018e29e"
 CLOSED: dict[str, tuple[str, ...]] = {
     "accuracy/eye_views": ("opinions_simulated.png",),
     "coding/crossing": (),
-    "coding/light_field_bounds": ("lf_bounds.png",),
+    "coding/light_field_bounds": (),
     "coding/light_field_threads": (),
     "coding/neighbours": (),
     "pages/concepts": tuple(
@@ -144,7 +144,7 @@ CLOSED: dict[str, tuple[str, ...]] = {
     "pages/focus_patterns": ("focus_patterns.png",),
     "pages/make_textures": (),
     "speed/before_after": (),
-    "speed/feature_ablation": ("feature_ablation.png",),
+    "speed/feature_ablation": (),
     "speed/take_cost": (),
     "speed/texture_filter": ("texture_filter.png",),
     "stability/install": (),
@@ -161,6 +161,7 @@ BENCHMARKS = {
         Benchmark("accuracy.sample_places", records=OWN, fills=("docs/speed_accuracy.md",)),
         Benchmark("accuracy.camera_in_scene", records=OWN, writes=(f"{IMAGES}/camera_in_scene.*",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",)),
+        Benchmark("accuracy.demosaicing", records=OWN, fills=("docs/calibration.md",)),
         Benchmark("accuracy.lens_rays", needs="--peer, an interpreter with optiland", records=OWN),
         Benchmark(
             "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)
@@ -186,6 +187,7 @@ BENCHMARKS = {
         Benchmark("accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",),
             writes=(f"{IMAGES}/depth_truth.*",)),
         Benchmark("accuracy.field_depth", records=OWN, fills=("docs/metrics.md",)),
+        Benchmark("accuracy.estimated_depth", records=OWN, fills=("docs/depth.md",)),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
         Benchmark("speed.eye", records=OWN, fills=("docs/display.md",)),
         Benchmark("accuracy.map_precision", records=OWN, writes=(f"{IMAGES}/map_precision.*",)),
@@ -218,6 +220,7 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/depth_cost.*", f"{IMAGES}/depth_pareto.*"),
         ),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
+        Benchmark("speed.commits", needs=HISTORY, records="commits.jsonl"),
         Benchmark("speed.mitsuba", needs="Mitsuba 3 and an LLVM library", records=OWN),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
         Benchmark("pages.notebooks", needs="the extra notebooks", writes=("examples/*.ipynb",)),

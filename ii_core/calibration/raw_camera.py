@@ -423,7 +423,7 @@ def defective_pixels(
     ValueError
         If the frames are not of the calibration's size or have values that are not finite.
     """
-    white, _, dark, mosaic = _upright(calibration, white, None, dark, mosaic)
+    white, _, dark, mosaic = _upright(calibration, white, white, dark, mosaic)
     return _white(calibration, white, dark, mosaic, curve)[1]
 
 
@@ -437,7 +437,7 @@ def _upright(
     """Return checked frames, turned as the calibration is, and the mosaic that turns with them."""
     frames = [f if f is None else np.rot90(f) if calibration.turned else f for f in (raw, white, dark)]
     size = calibration.camera.pixels
-    for what, frame in zip(("raw", "white", "dark"), frames, strict=True):
+    for what, frame in zip(("white", "dark", "raw"), (frames[1], frames[2], frames[0]), strict=True):
         if frame is not None and frame.shape[1::-1] != size:
             raise ValueError(f"{what} is {frame.shape}: {size[1]}×{size[0]}, the calibration's size, is needed")
         if frame is not None:

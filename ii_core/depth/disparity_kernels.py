@@ -9,6 +9,8 @@ import numpy as np
 
 from ..base.jit import array_kernel, lean_kernel, stage_kernel
 
+UNSEEN = 0.6  # of the cost of another surface
+
 
 class Views(NamedTuple):
     """Views around the one whose disparity is estimated."""
@@ -33,9 +35,13 @@ def _cubic(f):
 def line_costs(views, labels, limit, lines, out, first, last):
     """out[y, x, d] = mean over the better half of the half-lines of views of the mean of min(Σ_rgb |Δ|, limit).
 
-    A point outside a view has no difference there. A label without any difference costs ``limit``.
+    A point outside a view counts as `UNSEEN` of ``limit``: labels that few views see do not win by chance.
     """
     width = out.shape[1]
+    on = np.zeros(lines, np.float32)
+    for n in range(1, views.steps.shape[0]):
+        if views.lines[n] >= 0:
+            on[views.lines[n]] += np.float32(1.0)
     total, count = np.empty((lines, width), np.float32), np.empty((lines, width), np.float32)
     rows = np.empty((3, width), np.float32)
     for y in range(first, last):
@@ -48,7 +54,7 @@ def line_costs(views, labels, limit, lines, out, first, last):
                     sy, sx = -labels[d] * views.steps[n, 0], -labels[d] * views.steps[n, 1]
                     _add_differences(views.pixels, n, y, sy, sx, limit, rows, total[line], count[line])
             for x in range(width):
-                out[y, x, d] = _better_half(total, count, x, limit)
+                out[y, x, d] = _better_half(total, count, on, x, limit)
 
 
 @stage_kernel
@@ -97,12 +103,12 @@ def _add_differences(pixels, n, y, sy, sx, limit, rows, total, count):
 
 
 @stage_kernel
-def _better_half(total, count, x, limit):
+def _better_half(total, count, on, x, limit):
     """Return the mean of the lower half of the half-lines' means at pixel x; ``limit`` without one."""
     seen = 0
     for k in range(total.shape[0]):
         if count[k, x] > 0.0:
-            value, j = total[k, x] / count[k, x], seen
+            value, j = (total[k, x] + (on[k] - count[k, x]) * limit * np.float32(UNSEEN)) / on[k], seen
             while j > 0 and total[j - 1, x] > value:
                 total[j, x] = total[j - 1, x]
                 j -= 1

@@ -27,6 +27,7 @@ Progress = Callable[[int, int, str], Any]
 
 # In 8-bit codes summed over R, G and B: the difference of another surface; prices of `pass_on`.
 OTHER_SURFACE, SLOPE, LEAP, ALIKE = 30.0, 30.0, 12.0, 25.0
+FEW_RANGES = 3.0  # labels of all disparities over the most labels, up to which none are searched
 STEP = 0.48  # px that neighbouring labels are apart in the farthest view of a half-line
 MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of costs are then 4 times the field
 # The range of disparities: found in views of at most SEARCH_SIDE px, at MANY pixels whose costs within NOISE 8-bit
@@ -169,12 +170,13 @@ def labels_between(views: Views, low: float, high: float) -> Map:
 
 def search_range(views: Views, camera: IICamera | None, workers: int | None) -> tuple[float, float]:
     """Return the lowest and the highest disparity of views, by matching small ones over all possible labels."""
+    low, high = possible(camera, max(views.pixels.shape[2:]) / 2)
+    reach = np.abs(views.steps[views.lines >= 0]).max()
+    if (high - low) * reach / STEP < FEW_RANGES * MOST_LABELS * len(views.steps):
+        return low, high  # many small views: all disparities are tried
     scale = 1
     while max(views.pixels.shape[2:]) > SEARCH_SIDE:
         views, scale = halved(views), 2 * scale
-    side = max(views.pixels.shape[2:])
-    low, high = possible(camera, side / 2 * scale)
-    reach = np.abs(views.steps[views.lines >= 0]).max()
     labels = np.linspace(low / scale, high / scale, int((high - low) / scale * reach / STEP) + 3, dtype=np.float32)
     cost = costs(views, labels, workers)
     found = labelled(passed_on(views, cost, labels, workers), labels)
@@ -187,7 +189,7 @@ def search_range(views: Views, camera: IICamera | None, workers: int | None) -> 
     if not certain.any():
         return max(low, -1.0), min(high, 1.0)
     ends = np.quantile(found[certain], [0.002, 0.998]) * scale
-    margin = 0.3 + 0.05 * (ends[1] - ends[0])
+    margin = 0.3 + 0.1 * (ends[1] - ends[0])
     return max(low, float(ends[0]) - margin), min(high, float(ends[1]) + margin)
 
 

@@ -110,6 +110,8 @@ def about_picture(metadata: Mapping[str, Any]) -> AboutPicture:
     image = metadata["image"]
     details = image.get("rawDetails", image)
     bits = int(details["pixelPacking"]["bitsPerPixel"])
+    if not 1 <= bits <= 32:
+        raise ValueError(f"samples have {checks.shown(bits)} bits: 10, 12 or 16 are known")
     cells = _mosaic(details.get("mosaic") or image.get("mosaic"))
     levels = details.get("pixelFormat", {})
     devices = metadata.get("devices", {})

@@ -146,7 +146,7 @@ class Job:
             divisor = 1
         else:
             radiance, divisor = self._fixed(tracer, self.sampling, rows, cols, order, support), self.sampling
-            samples = np.full(len(radiance), divisor, np.int32)
+            samples = np.full(len(radiance) if "samples" in self.support else 0, divisor, np.int32)
             histogram = {divisor: len(radiance)}
         found = {} if support is None else vars(support)
         arrays = {"pixels": encoded(radiance, order.pixels, divisor, self.dtype).reshape(*shape, 3)}
@@ -230,8 +230,7 @@ class Job:
         turn, shift = self.pose[:3, :3].T, self.pose[:3, 3]
         with np.errstate(over="ignore", invalid="ignore"):
             origins, directions = (L @ turn + shift).astype(np.float32), (D @ turn).astype(np.float32)
-        hits, _ = packed(self.scene).intersector.nearest(origins, directions)
-        return np.where(hits.faces >= 0, hits.distances.astype(np.float64), np.nan)
+        return packed(self.scene).intersector.distances(origins, directions).astype(np.float64)
 
     def _lobes(self) -> tuple[int, int]:
         """Return the rays of a sample over a rough mirror's lobe, and the samples that share the lobe's positions."""
@@ -263,7 +262,7 @@ class Job:
             return fixed_sum(
                 self.camera, samples, self.seed, m, n, TILE_RAYS, self._parts, self._shoot(tracer, support)
             )  # fmt: skip
-        radiance = np.zeros((len(order.pixels), 3), np.float32)
+        radiance = tracer.dark(len(order.pixels))
         start = self._start(rows, cols, order)
         if start is not None:
             tracer.run_separable(start, radiance, support, self._keys(m, n, 0, 1))

@@ -19,6 +19,7 @@ import embreex.rtcore_scene  # loads the library and what it depends on
 import numpy as np
 from numpy.typing import NDArray
 
+from .kernels import packets
 from .kernels.lanes import aligned
 from .kernels.packets import PACKET_ROWS, Calls, packet_kernels
 
@@ -115,6 +116,7 @@ def _declared(functions: ctypes.CDLL) -> ctypes.CDLL:
         ("rtcReleaseGeometry", None, [pointer]),
         ("rtcCommitScene", None, [pointer]),
         ("rtcReleaseScene", None, [pointer]),
+        *((f"{kind}{width}", None, [pointer] * 4) for kind in ("rtcIntersect", "rtcOccluded") for width in _NATIVE),
     ):
         function = getattr(functions, name)
         function.restype, function.argtypes = result, arguments
@@ -182,6 +184,29 @@ class Tree:
         kernel = packet_kernels(self.library.width)[1]
         kernel(*self._room("rtcOccluded"), origins, directions, reach, out)
 
+    def few(self, function: str, origins: Floats, directions: Floats, reach: float) -> HitArrays:
+        """As `nearest`, or of ``rtcOccluded`` with distances below 0 where something is hit, without a kernel.
+
+        Neither the few rays that choose a packet's rays nor those of `_layouts_hold` are worth compiling one.
+        """
+        n, width, (active, _) = len(origins), self.library.width, lane_masks()
+        packet = aligned(packets.PACKET_ROWS * width).reshape(-1, width)
+        numbers, call = packet.view(np.int32), getattr(self.library.functions, f"{function}{width}")
+        faces, (u, v, distances) = np.empty(n, np.int32), np.empty((3, n), np.float32)
+        for first in range(0, n, width):
+            some = slice(first, min(first + width, n))
+            lanes = some.stop - first
+            packet[:] = 0
+            packet[:3, :lanes], packet[packets.DIRECTION :, :lanes][:3] = origins[some].T, directions[some].T
+            packet[packets.FAR] = reach
+            numbers[[packets.MASK, packets.GEOMETRY, packets.INSTANCE]] = -1
+            active[:width] = np.where(np.arange(width) < lanes, -1, 0)
+            call(active.ctypes.data, self._scene, packet.ctypes.data, self._arguments[1].ctypes.data)
+            faces[some] = np.where(numbers[packets.GEOMETRY] >= 0, numbers[packets.FACE], -1)[:lanes]
+            for out, row in ((u, packets.U), (v, packets.V), (distances, packets.FAR)):
+                out[some] = packet[row, :lanes]
+        return faces, u, v, distances
+
     def _room(self, function: str) -> tuple[Any, ...]:
         """Addresses, most spread and room for rays, which threads must not share: kept for each of them."""
         kept: dict[str, tuple[Any, ...]] = vars(self._rooms)
@@ -231,12 +256,10 @@ def _layouts_hold(library: Library) -> bool:
     x = np.linspace(1, 7, n, dtype=np.float32)
     beside = np.arange(n) % 2 == 1
     origins = np.column_stack([x + 100 * beside, np.full(n, 2), np.zeros(n)]).astype(np.float32)
-    directions, reach = np.tile(np.array([0, 0, 2], np.float32), (n, 1)), np.full(n, 3, np.float32)
+    directions = np.tile(np.array([0, 0, 2], np.float32), (n, 1))
     tree = Tree(library, square, robust=True)
-    faces, (u, v, distances) = np.empty(n, np.int32), np.empty((3, n), np.float32)
-    tree.nearest(origins, directions, reach, (faces, u, v, distances))
-    blocked = np.empty(n, np.int32)
-    tree.occluded(origins, directions, reach, blocked)
+    faces, u, v, distances = tree.few("rtcIntersect", origins, directions, 3)
+    blocked = np.where(tree.few("rtcOccluded", origins, directions, 3)[3] < 0, 0, -1)
     second = x > 6
     right_u, right_v = np.where(second, (8 - x) / 8, x / 8), np.where(second, 0.75, 0.25)
     return (

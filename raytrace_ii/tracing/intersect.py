@@ -55,6 +55,14 @@ class Intersector:
         """Nearest hit of every ray, and CPU seconds inside Embree; ``placed`` as in `embree.Tree`."""
         return _nearest(self._all, self._first, origins, directions, _NO_REACH, placed)
 
+    def distances(self, origins: Floats, directions: Floats) -> Floats:
+        """Distances of the nearest hits of a few rays, to Embree's precision; NaN on a miss."""
+        if isinstance(self._all, Tree):
+            faces, _, _, found = self._all.few("rtcIntersect", origins, directions, np.inf)
+        else:
+            faces, _, _, found = self.nearest(origins, directions)[0]
+        return np.where(faces >= 0, found, np.float32(np.nan))
+
     def tools(self, packet: Floats) -> Tools:
         """Return what a kernel calls Embree with itself, for packets in memory of one thread."""
         active, chosen = lane_masks()

@@ -36,7 +36,6 @@ from .kernels.tables import (
     SHADOW,
     SKY_IMAGE,
     SPAWNED,
-    START_COLUMNS,
     TICKS,
     UNTESTED,
     WEAK_SHADOW,
@@ -48,7 +47,7 @@ from .support_images import RECORDED
 KINDS = ("primary", "shadow", "reflection", "refraction")
 _NO_ROWS = np.empty(0, np.int32)
 _NO_HITS = Hits(_NO_ROWS, *(np.empty(0, np.float32) for _ in range(3)))  # the kernel finds them
-_NO_NUMBERS = np.empty(0, np.float32)
+_NO_NUMBERS = np.empty(0)
 _NO_START = Start(_NO_NUMBERS, _NO_NUMBERS, _NO_ROWS, _NO_ROWS, 0, 0)  # rays are in arrays
 LOBE_RAYS = 16  # over the lobe of a rough mirror, for each pixel
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
@@ -157,12 +156,12 @@ class Support:
 
 def start_tables(
     rays: tuple[NDArray[np.float64], ...], pose: NDArray[np.float64]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Return what columns and rows give to rays of `IICamera.separable_rays`; None if some may be unusable."""
     x, y, z = rays
     if not usable(x, y, z):
         return None
-    columns, rows = (aligned(len(part) * START_COLUMNS).reshape(-1, START_COLUMNS) for part in (x, y))
+    columns, rows = (aligned(16 * len(part)).view(np.float64).reshape(-1, 8) for part in (x, y))
     fill_start_tables(x, y, z, pose[:3, :3], pose[:3, 3], columns, rows)
     return columns.reshape(-1), rows.reshape(-1)
 
@@ -239,6 +238,7 @@ class Tracer:
         self.begin()
         self._primary = _room(capacity, self.scene.nested, self.scene.glossy)
         self._pixels = np.arange(capacity, dtype=np.int32)  # of rays one a pixel: read only
+        self._radiance = np.empty((capacity, 3), np.float32)
         self._shadow = _shadow_room(0, self.scene.nested)
         self._work = work()
         self._tools = self.scene.intersector.tools(self._work.single[PACKET:])
@@ -247,6 +247,11 @@ class Tracer:
         self._finds = self._tools.nearest.packet != 0 and not self.scene.passes
         self._later = self._tools.occluded.packet == 0 or self.scene.lets_through
         self._addresses: dict[Any, int] = {}  # of stages: the types of their arguments stay the same
+
+    def dark(self, n: int) -> NDArray[np.float32]:
+        """Radiance (n, 3) to add to, valid until the next call: new memory for each tile takes 2 ns a pixel."""
+        self._radiance[:n] = 0
+        return self._radiance[:n]
 
     def begin(self) -> None:
         """Count from 0."""

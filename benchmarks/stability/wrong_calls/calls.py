@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -44,10 +45,11 @@ MORE = (
 UNTRIED = {
     "chain", "placed", "scaled_chain", "surfaces_of", "unit_disk",
     "AccessCost", "AngleQuality", "Audit", "Calibration", "Camera", "Coder", "CodingResult", "DamagedTake",
-    "DecodedView", "DepthQuality", "EmbeddedViewer", "EyeImage", "FocusDepth", "Goal", "Grin", "Judged", "Lenticular",
+    "DecodedView", "DepthEstimate", "DepthQuality", "EmbeddedViewer", "EyeImage", "FocusDepth",
+    "Goal", "Grin", "Judged", "Lenticular",
     "MapCamera", "NoLenses", "Observer", "OpinionScores", "PairScale", "PanelDesign", "Paraxial", "Pinhole",
-    "Prediction", "Prescription", "Report", "Results", "Rig", "Run", "Shot", "SpreadMaps", "Stage", "Stats", "Take",
-    "TakeFloor", "TakeQuality", "Verdict", "ViewQuality", "ViewingZone",
+    "Prediction", "Prescription", "Report", "Results", "Retargeted", "Rig", "Run", "Shot",
+    "SpreadMaps", "Stage", "Stats", "Take", "TakeFloor", "TakeQuality", "Verdict", "ViewQuality", "ViewingZone",
 }  # fmt: skip
 CAMERA = IICamera(pixels=(48, 48), lenses=(12, 12), pixel_pitch_mm=0.1, gap_mm=1.5)
 PIXELS = np.random.default_rng(0).integers(0, 256, (48, 48, 3), np.uint8)
@@ -248,6 +250,11 @@ def of_pictures(made: Made) -> dict[str, Values]:
             "colour": RawColour((1.2, 1.0, 1.5), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))},
         "defective_pixels": {"white": raw, "dark": frames["dark"], "mosaic": "rggb", "calibration": calibration},
         "centres_picture": {"calibration": calibration, "picture": calibrated},
+        "estimate_depth": {"view": (1, 1), "low": -0.5, "high": 0.5},
+        "focused": {"disparity": 0.0, "weights": np.ones((4, 4)), "view": (1, 1), "limit": 0.5},
+        "plane_disparity": {"view": (1, 1)},
+        "pupil_weights": {"views": (4, 4)},
+        "retarget": {"disparity": np.zeros((4, 4, 12, 12), np.float32)},
         "DisplayModel": {"lens_pitch_mm": 0.4, "gap_mm": 1.5},
         "Eye": {"position_mm": (0.0, 0.0, -300.0), "pupil_mm": 3.0, "focus_mm": 300.0},
         "eye_image": {"size": (12, 12)},
@@ -318,6 +325,9 @@ def of_measures(made: Made) -> dict[str, Values]:
     return {
         "depth_from_focus": {"method": "robust", "base": [[0, 0]], "reference": [[0, 0]], "weights": [[1.0]]},
         "disparity_layers": {"low": LOW, "high": HIGH},
+        "depth_errors": {"disparity": DEPTH, "truth": DEPTH, "regions": {"all": DEPTH > 0},
+            "camera": replace(CAMERA, viewer_mm=300.0)},
+        "depth_regions": {"truth": DEPTH, "view": PIXELS},
         "logarithmic_layers": {"near_mm": 1.0, "far_mm": 2.0},
         "covering_layers": {"depth_mm": DEPTH},
         "measuring": {"names": ["q_global"]},

@@ -48,8 +48,8 @@ class Start(NamedTuple):
     rows if the rays come from elsewhere.
     """
 
-    column_rays: Single
-    row_rays: Single
+    column_rays: Double
+    row_rays: Double
     rows: Whole
     columns: Whole
     top: int

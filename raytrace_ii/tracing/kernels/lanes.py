@@ -91,6 +91,8 @@ _SINGLES = next(_offset)
 _offset = count(0, BLOCK)
 SX, SY, SZ, TOTAL, STRENGTH = _offsets(5)
 SU, SV = _offsets(2)  # place in an image
+RAY = next(_offset)  # origin and direction of a camera ray, of any length; two to spare
+_offsets(7)
 _DOUBLES = next(_offset)
 
 # Whole numbers: face, −1 on a miss, its row in the table and its body; of noise its lane, octaves and seed; rows of
@@ -154,14 +156,54 @@ def _take_rows(typing: Any, table: Any, columns: Any, first: Any, rows: Any, at:
     return types.void(table, types.intp, types.intp, rows, types.intp, out, types.intp), generate
 
 
+def add_rows(tables: Any, rows: Any, at: Any, out: Any, to: Any) -> None:
+    """Add 8 numbers of two tables of float64 for each lane k: rows ``rows[at[0] + k]`` and ``rows[at[1] + k]``.
+
+    Sum c of lane k comes to ``out[to + BLOCK·c + k]``, as by `take_rows`.
+    """
+    for k in range(BLOCK):
+        a, b = 8 * int(rows[at[0] + k]), 8 * int(rows[at[1] + k])
+        for c in range(8):
+            out[to + BLOCK * c + k] = tables[0][a + c] + tables[1][b + c]
+
+
+def _add_rows(typing: Any, tables: Any, rows: Any, at: Any, out: Any, to: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        vector, word = ir.VectorType(ir.DoubleType(), 8), ir.IntType(64)
+        sources = [
+            context.make_array(kind)(context, builder, builder.extract_value(values[0], i)).data
+            for i, kind in enumerate(tables)
+        ]
+        numbers, target = (
+            context.make_array(kind)(context, builder, values[i]).data for i, kind in ((1, rows), (3, out))
+        )
+        for first in (0, 8):
+            sums = []
+            for k in range(first, first + 8):
+                parts = []
+                for i, source in enumerate(sources):
+                    place = builder.add(builder.extract_value(values[2], i), word(k))
+                    row = builder.mul(builder.load(builder.gep(numbers, [place])), word(8))
+                    place = builder.bitcast(builder.gep(source, [row]), vector.as_pointer())
+                    parts.append(builder.load(place, align=8))
+                sums.append(builder.fadd(*parts))
+            for c, column in enumerate(_transposed(builder, sums)):
+                place = builder.gep(target, [builder.add(values[4], word(BLOCK * c + first))])
+                builder.store(column, builder.bitcast(place, vector.as_pointer()), align=8)
+        return context.get_dummy_value()
+
+    return types.void(tables, rows, types.UniTuple(types.intp, 2), out, types.intp), generate
+
+
 def _transposed(builder: Any, rows: Any) -> Any:
-    """16 vectors of 16 numbers, transposed by butterflies."""
-    kind = ir.VectorType(ir.IntType(32), BLOCK)
-    for step in (8, 4, 2, 1):
-        low = [k if not k & step else BLOCK + k - step for k in range(BLOCK)]
-        high = [k + step if not k & step else BLOCK + k for k in range(BLOCK)]
+    """As many vectors as each has numbers, a power of 2, transposed by butterflies."""
+    many = len(rows)
+    kind = ir.VectorType(ir.IntType(32), many)
+    for step in (1 << bit for bit in reversed(range(many.bit_length() - 1))):
+        low = [k if not k & step else many + k - step for k in range(many)]
+        high = [k + step if not k & step else many + k for k in range(many)]
         turned = list(rows)
-        for i in range(BLOCK):
+        for i in range(many):
             if not i & step:
                 a, b = rows[i], rows[i + step]
                 turned[i] = builder.shuffle_vector(a, b, ir.Constant(kind, low))
@@ -193,6 +235,15 @@ _single_of_bits: Any = intrinsic(_single_of)
 overload(bits_of, inline="always")(lambda number: lambda number: _bits_of_number(number))
 overload(single_of, inline="always")(lambda number: lambda number: _single_of_bits(number))
 _take_rows_vectors: Any = intrinsic(_take_rows)
+_add_rows_vectors: Any = intrinsic(_add_rows)
+
+
+@overload(add_rows, inline="always")
+def _compiled_sums(tables: Any, rows: Any, at: Any, out: Any, to: Any) -> Any:
+    def compiled(tables: Any, rows: Any, at: Any, out: Any, to: Any) -> Any:
+        return _add_rows_vectors(tables, rows, at, out, to)
+
+    return compiled
 
 
 @overload(take_rows, inline="always")

@@ -25,19 +25,7 @@ from .addresses import call
 from .lanes import BLOCK
 
 # Rows of a packet.
-_NEAR, _DIRECTION, _TIME, _FAR, _MASK, _FLAGS, _U, _V, _FACE, _GEOMETRY, _INSTANCE = (
-    3,
-    4,
-    7,
-    8,
-    9,
-    11,
-    15,
-    16,
-    17,
-    18,
-    19,
-)
+_NEAR, DIRECTION, _TIME, FAR, MASK, _FLAGS, U, V, FACE, GEOMETRY, INSTANCE = 3, 4, 7, 8, 9, 11, 15, 16, 17, 18, 19
 _CORNERS = 24  # the hit ends with `instPrimID`, row 20; behind it room for the nine coordinates of the faces hit
 PACKET_ROWS = _CORNERS + 9
 _NO_END = np.float32(1e37)
@@ -129,9 +117,9 @@ def _begin(packet, numbers, width):
     for lane in range(width):
         packet[_NEAR * width + lane] = np.float32(0)
         packet[_TIME * width + lane] = np.float32(0)
-        numbers[_MASK * width + lane] = -1
+        numbers[MASK * width + lane] = -1
         numbers[_FLAGS * width + lane] = 0
-        numbers[_INSTANCE * width + lane] = -1
+        numbers[INSTANCE * width + lane] = -1
 
 
 @inline_kernel
@@ -145,9 +133,9 @@ def _fill(packet, numbers, width, lane, o, d, ray, far):
     i = np.uint64(ray)
     for c in range(3):
         packet[_at(c, width, lane)] = o[i, c]
-        packet[_at(_DIRECTION + c, width, lane)] = d[i, c]
-    packet[_at(_FAR, width, lane)] = far
-    numbers[_at(_GEOMETRY, width, lane)] = -1
+        packet[_at(DIRECTION + c, width, lane)] = d[i, c]
+    packet[_at(FAR, width, lane)] = far
+    numbers[_at(GEOMETRY, width, lane)] = -1
 
 
 @_reduce
@@ -165,8 +153,8 @@ def _spread(packet, first, width):
 @stage_kernel
 def _together(packet, calls, ahead, width):
     """Whether rays are near enough to each other for coherent tracing, at their origins and ``ahead`` of them."""
-    x, y, z = packet[_DIRECTION * width], packet[(_DIRECTION + 1) * width], packet[(_DIRECTION + 2) * width]
-    apart, turned = _spread(packet, np.int64(0), width), _spread(packet, np.int64(_DIRECTION), width)
+    x, y, z = packet[DIRECTION * width], packet[(DIRECTION + 1) * width], packet[(DIRECTION + 2) * width]
+    apart, turned = _spread(packet, np.int64(0), width), _spread(packet, np.int64(DIRECTION), width)
     return (apart + turned * ahead <= calls.near) & (turned <= calls.narrow * (abs(x) + abs(y) + abs(z)))
 
 
@@ -174,31 +162,31 @@ def _together(packet, calls, ahead, width):
 def _place(packet, numbers, width, corners):
     """Put u, v and distance as `place_hit` gives them in place of Embree's: a loop without branches, for vectors."""
     for lane in range(width):
-        f = np.uint64(numbers[_at(_FACE, width, lane)] if numbers[_at(_GEOMETRY, width, lane)] >= 0 else 0)
+        f = np.uint64(numbers[_at(FACE, width, lane)] if numbers[_at(GEOMETRY, width, lane)] >= 0 else 0)
         for k in range(9):
             packet[_at(_CORNERS + k, width, lane)] = corners[f, k // 3, k % 3]
     for lane in range(width):
         u, v, t, sure = place_hit(
             packet[lane], packet[width + lane], packet[2 * width + lane],
-            packet[_DIRECTION * width + lane], packet[(_DIRECTION + 1) * width + lane],
-            packet[(_DIRECTION + 2) * width + lane],
+            packet[DIRECTION * width + lane], packet[(DIRECTION + 1) * width + lane],
+            packet[(DIRECTION + 2) * width + lane],
             packet[_CORNERS * width + lane], packet[(_CORNERS + 1) * width + lane],
             packet[(_CORNERS + 2) * width + lane], packet[(_CORNERS + 3) * width + lane],
             packet[(_CORNERS + 4) * width + lane], packet[(_CORNERS + 5) * width + lane],
             packet[(_CORNERS + 6) * width + lane], packet[(_CORNERS + 7) * width + lane],
             packet[(_CORNERS + 8) * width + lane],
         )  # fmt: skip
-        packet[_U * width + lane] = u if sure else packet[_U * width + lane]
-        packet[_V * width + lane] = v if sure else packet[_V * width + lane]
-        packet[_FAR * width + lane] = t if sure else packet[_FAR * width + lane]
+        packet[U * width + lane] = u if sure else packet[U * width + lane]
+        packet[V * width + lane] = v if sure else packet[V * width + lane]
+        packet[FAR * width + lane] = t if sure else packet[FAR * width + lane]
 
 
 @stage_kernel
 def _take(packet, numbers, width, lane, ray, primitives, u, v, distances):
     i = np.uint64(ray)
-    primitives[i] = numbers[_at(_FACE, width, lane)] if numbers[_at(_GEOMETRY, width, lane)] >= 0 else -1
+    primitives[i] = numbers[_at(FACE, width, lane)] if numbers[_at(GEOMETRY, width, lane)] >= 0 else -1
     u[i], v[i], distances[i] = (
-        packet[_at(_U, width, lane)], packet[_at(_V, width, lane)], packet[_at(_FAR, width, lane)],
+        packet[_at(U, width, lane)], packet[_at(V, width, lane)], packet[_at(FAR, width, lane)],
     )  # fmt: skip
 
 
@@ -286,25 +274,25 @@ def nearest_of_lanes(tools, first_of_same, ahead, lanes, work, width):
         for c in range(3):
             for lane in range(width):
                 packet[c * width + lane] = single[at.START + c * BLOCK + first + lane]
-                packet[(_DIRECTION + c) * width + lane] = single[at.DX + c * BLOCK + first + lane]
+                packet[(DIRECTION + c) * width + lane] = single[at.DX + c * BLOCK + first + lane]
         for lane in range(width):
-            packet[_FAR * width + lane] = _NO_END
+            packet[FAR * width + lane] = _NO_END
         for lane in range(width):
-            numbers[_GEOMETRY * width + lane] = -1
+            numbers[GEOMETRY * width + lane] = -1
             tools.active[lane] = -1 if lane < some else 0
         _trace(tools.nearest, tools.active, tools.chosen, packet, ahead, some, width)
         for lane in range(width):
-            single[at.U + first + lane] = packet[_U * width + lane]
-            single[at.V + first + lane] = packet[_V * width + lane]
-            single[at.DISTANCE + first + lane] = packet[_FAR * width + lane]
+            single[at.U + first + lane] = packet[U * width + lane]
+            single[at.V + first + lane] = packet[V * width + lane]
+            single[at.DISTANCE + first + lane] = packet[FAR * width + lane]
         for lane in range(width):
-            hit = numbers[_GEOMETRY * width + lane] >= 0
-            whole[at.FACE + first + lane] = np.int64(numbers[_FACE * width + lane]) if hit else -1
+            hit = numbers[GEOMETRY * width + lane] >= 0
+            whole[at.FACE + first + lane] = np.int64(numbers[FACE * width + lane]) if hit else -1
         if first_of_same.shape[0] > 0:
             for k in range(first, first + width):
                 if whole[at.FACE + k] >= 0:
                     whole[at.FACE + k] = first_of_same[np.uint64(whole[at.FACE + k])]
-        ahead = packet[_FAR * width] if numbers[_GEOMETRY * width] >= 0 else ahead
+        ahead = packet[FAR * width] if numbers[GEOMETRY * width] >= 0 else ahead
     return ahead
 
 
@@ -329,14 +317,14 @@ def occluded_of_lanes(tools, reach, work, width):
             for lane in range(width):
                 on = single[at.WANTED + first + lane] > 0
                 packet[c * width + lane] = single[o + first + lane] + single[a + first + lane] if on else place
-                packet[(_DIRECTION + c) * width + lane] = single[d + first + lane] if on else way
+                packet[(DIRECTION + c) * width + lane] = single[d + first + lane] if on else way
         for lane in range(width):
-            packet[_FAR * width + lane] = reach
+            packet[FAR * width + lane] = reach
         for lane in range(width):
             tools.active[lane] = -1 if single[at.WANTED + first + lane] > 0 else 0
         _trace(tools.occluded, tools.active, tools.chosen, packet, np.float32(0), some, width)
         for lane in range(width):
-            free = packet[_FAR * width + lane] >= 0
+            free = packet[FAR * width + lane] >= 0
             single[at.WANTED + first + lane] = single[at.WANTED + first + lane] if free else np.float32(0)
 
 
@@ -366,7 +354,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
             _trace(calls, active, chosen, packet, ahead, np.int64(lanes), wide)
             if placed:
                 _place(packet, numbers, wide, corners)
-            ahead = packet[_FAR * width] if numbers[_GEOMETRY * width] >= 0 else ahead
+            ahead = packet[FAR * width] if numbers[GEOMETRY * width] >= 0 else ahead
             for lane in range(lanes):
                 _take(packet, numbers, wide, lane, first + lane, primitives, u, v, distances)
 
@@ -382,6 +370,6 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 _fill(packet, numbers, wide, lane, origins, directions, i, reach[i])
             _trace(calls, active, chosen, packet, np.float32(0), np.int64(lanes), wide)
             for lane in range(lanes):
-                found[first + lane] = 0 if packet[_FAR * width + lane] < 0 else -1
+                found[first + lane] = 0 if packet[FAR * width + lane] < 0 else -1
 
     return nearest, occluded

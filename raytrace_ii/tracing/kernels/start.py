@@ -10,12 +10,11 @@ from ii_core.base.jit import lane_kernel, lane_stage
 from ii_core.base.jit import lean_kernel as kernel
 
 from . import lanes as at
-from .lanes import BLOCK, take_rows
-from .tables import START_COLUMNS
+from .lanes import BLOCK, add_rows
 from .vectors import put
 
 _ONE = np.float32(1)
-_LEAST, _MOST = 1e-15, 1e15  # between them squares and their sums neither vanish nor overflow in float32
+_LEAST, _MOST = 1e-150, 1e150  # between them squares and their sums neither vanish nor overflow
 
 
 @kernel
@@ -74,8 +73,7 @@ def usable(x, y, z):
 def fill_start_tables(x, y, z, rotation, shift, columns, rows):
     """What columns and rows of `IICamera.separable_rays` give to the origins and directions of their rays.
 
-    A row of ``columns`` (w, 16) and one of ``rows`` (h, 16), float32, add up to a ray: origin, and direction of any
-    length.
+    A row of ``columns`` (w, 8) and one of ``rows`` (h, 8) add up to a ray: origin, and direction of any length.
     """
     for table, rays, axis in ((columns, x, 0), (rows, y, 1)):
         for i in range(rays.shape[0]):
@@ -87,23 +85,21 @@ def fill_start_tables(x, y, z, rotation, shift, columns, rows):
 
 
 @lane_stage
-def start_lanes(first, lanes, start, single, whole):
+def start_lanes(first, lanes, start, work):
     """Start a packet of rays that carry all light from a `Start`; lanes to spare have the last one."""
+    single, double, whole, ray = work.single, work.double, work.whole, at.RAY
     for k in range(BLOCK):
         i = np.uint64(first + min(k, lanes - 1))
         whole[at.TABLE_ROW + k] = start.left + start.columns[i]
         whole[at.FACE + k] = start.top + start.rows[i]
-    wide, none = np.int64(START_COLUMNS), np.int64(0)
-    take_rows(start.column_rays, wide, none, whole, np.int64(at.TABLE_ROW), single, np.int64(at.CORNER))
-    take_rows(start.row_rays, wide, none, whole, np.int64(at.FACE), single, np.int64(at.NORMAL))
+    tables, rows = (start.column_rays, start.row_rays), (np.int64(at.TABLE_ROW), np.int64(at.FACE))
+    add_rows(tables, whole, rows, double, np.int64(at.RAY))
     for k in range(3 * BLOCK):
-        single[at.START + k] = single[at.CORNER + k] + single[at.NORMAL + k]
+        single[at.START + k] = double[at.RAY + k]
         single[at.W0 + k] = _ONE
     for k in range(BLOCK):
-        c, r = at.CORNER + 3 * BLOCK + k, at.NORMAL + 3 * BLOCK + k
-        x, y = single[c] + single[r], single[c + BLOCK] + single[r + BLOCK]
-        z = single[c + 2 * BLOCK] + single[r + 2 * BLOCK]
-        inverse = _ONE / math.sqrt(x * x + y * y + z * z)
+        x, y, z = double[ray + 3 * BLOCK + k], double[ray + 4 * BLOCK + k], double[ray + 5 * BLOCK + k]
+        inverse = 1.0 / math.sqrt(x * x + y * y + z * z)
         single[at.DX + k], single[at.DY + k], single[at.DZ + k] = x * inverse, y * inverse, z * inverse
 
 
@@ -113,7 +109,7 @@ def start_separable_rays(start, work, out_origins, out_directions):
     n, single = start.rows.shape[0], work.single
     for first in range(0, n, BLOCK):
         lanes = min(BLOCK, n - first)
-        start_lanes(first, lanes, start, single, work.whole)
+        start_lanes(first, lanes, start, work)
         for k in range(lanes):
             i = np.uint64(first + k)
             put(out_origins, i, single[at.START + k], single[at.START + BLOCK + k], single[at.START + 2 * BLOCK + k])

@@ -19,7 +19,6 @@ POINT, DIRECTIONAL, SPOT = 0, 1, 2  # kinds of light
 # Columns of the table of faces, float32: corners, unit normal, lift and pull, body; then, unless all are flat and
 # without images, normals of the corners and their (u, v).
 CORNERS, FACE, BODY, FLAT_COLUMNS, NORMALS, COORDINATES, ALL_COLUMNS = 0, 9, 14, 16, 16, 25, 32
-START_COLUMNS = 16  # of the tables of rays by columns and rows of pixels, see start.py
 # Columns of the table of materials, a row a body; colours have three. The first `LANED` are brought to lanes as they
 # stand, see lanes.py.
 COLOUR, MIRROR_SHARE, EMISSION, LOCAL, SPECULAR, SHININESS, LEAST_HALF = 0, 3, 6, 9, 10, 11, 12

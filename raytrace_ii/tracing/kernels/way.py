@@ -61,7 +61,7 @@ def way_kernel(width: int) -> Any:
             lanes, timed = min(BLOCK, n - first), first & _TIMED == 0
             start = ticks() if timed else 0
             if g.start.rows.shape[0] > 0:
-                start_lanes(first, lanes, g.start, single, whole)
+                start_lanes(first, lanes, g.start, g.work)
             else:
                 take_rays(first, lanes, g.rays, single)
             if found:

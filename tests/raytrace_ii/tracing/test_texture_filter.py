@@ -58,7 +58,7 @@ def test_four_texels_are_mixed_alike_in_vectors():
     texels = TextureTable([Image(rng.random((5, 4, 3), np.float32))]).texels[0]
     last = len(texels) - 2 * 3  # the row of the spare number follows
     weights = tuple(rng.random(4, np.float32))
-    together = numba.njit(lambda *arguments: add_mixed(*arguments))
+    together = numba.njit(lambda texels, places, weights, out, at: add_mixed(texels, places, weights, out, at))
     for places in ((0, 3, 12, 15), (last, last - 3, last, 0)):
         places = tuple(map(np.uint64, places))
         found, single = np.ones((2, 6), np.float32)
