@@ -8,7 +8,7 @@ from .profile import Profile, Reference
 
 CAPTION = "SHA-256 is that of the pixels (rows of R, G, B, one byte each, frame after frame); z is in mm."
 HEAD = ("picture", "what it is for", "scene", "camera", "lenses, pixels under each", "samples", "SHA-256")
-PHOTOGRAPHS = ("picture", "what it is for", "camera", "views, pixels of each", "repository", "licence", "SHA-256")
+PHOTOGRAPHS = ("picture", "camera", "views, pixels of each", "repository", "licence", "SHA-256")
 
 
 def card_table(profile: Profile, found: Mapping[str, str] | None = None) -> list[str]:
@@ -24,7 +24,8 @@ def card_table(profile: Profile, found: Mapping[str, str] | None = None) -> list
     lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     for reference in profile.pictures:
         sha256 = reference.sha256 if found is None else found.get(reference.name)
-        cells = (reference.name, reference.use, *_origin(reference), f"`{sha256[:12]}`" if sha256 else "not fixed")
+        about = () if reference.source else (reference.use,)
+        cells = (reference.name, *about, *_origin(reference), f"`{sha256[:12]}`" if sha256 else "not fixed")
         lines.append(f"| {' | '.join(cells)} |")
     return [*lines, "", CAPTION]
 

@@ -117,6 +117,7 @@ def ranking(
     profile: Annotated[str, typer.Argument(help="The profile of all results.")],
     results: Annotated[list[Path], typer.Argument(help="Results of `raytrace-ii benchmark`.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The page, .md; beside it .csv, .tex and .svg.")],
+    plugin: Plugins = None,
     force: Force = False,
 ) -> None:
     """Rank results of a benchmark on a page to hand out, with all numbers, a LaTeX table and a chart."""
@@ -125,6 +126,7 @@ def ranking(
     from metrics.benchmark.ranking_page import page_paths, write_page
     from metrics.benchmark.result import read_result
 
+    load_plugins(plugin)
     if output.suffix != ".md":
         raise ValueError(f"{output} is no Markdown page: .md is needed")
     defined = profile_of(profile)

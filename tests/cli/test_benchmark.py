@@ -144,6 +144,12 @@ def test_photographs_are_found_by_their_pixels(run, tmp_path):
     assert run("import", tmp_path / words[2], *words[3:])[0] == 0
     code, out, _ = run("benchmark", definition, "--list", "--pictures", tmp_path)
     assert code == 0 and "ramp: there, pixels as defined" in out
+    assert run("import", tmp_path / "views", "--grid", "3x2", "--middle", "2x1", "--no-flip-down", "--no-flip-across",
+               "-o", tmp_path / "m.png")[0] == 0  # fmt: skip
+    few = IIPicture.load(tmp_path / "m.png")
+    assert few.ei_pixels == (1, 2) and np.array_equal(few.pixels[:, :, 0], ramp[:, 1::3, 0])
+    assert "middle is 9×9 views" in run("import", tmp_path / "views", "--grid", "3x2", "--middle", "9x9",
+                                        "-o", tmp_path / "n.png")[2]  # fmt: skip
     assert run(*taken, "-o", tmp_path / "r.json")[0] == 0
     assert json.loads((tmp_path / "r.json").read_text())["pictures"][0]["as_defined"] is True
     for target in (4, 8):

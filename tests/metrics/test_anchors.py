@@ -2,6 +2,8 @@
 
 import itertools
 import pickle
+import runpy
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from metrics.benchmark.anchor_coder import AnchorCoder, largest, reduced, resize
 from metrics.benchmark.anchors import ANCHORS, hierarchy, level_of, serpentine
 from metrics.measures.batch import measuring
 from metrics.measures.ctc import codes
+from metrics.measures.pair import PicturePair
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 3), (9, 9), (7, 16)])
@@ -119,3 +122,16 @@ def test_codes_of_a_decoder_are_measured_without_a_detour(picture):
     assert q_ctc_psnr(picture, picture).step == 0
     with pytest.raises(ValueError, match="codes are"):
         measure(picture, codes=off[1:])
+
+
+def test_vmaf_of_the_example_falls_with_noise(picture, monkeypatch):
+    pytest.importorskip("imageio_ffmpeg")
+    monkeypatch.setattr("metrics.register_measure", lambda measure: measure)
+    vmaf = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "vmaf.py"))["vmaf"]
+    error = np.random.default_rng(0).standard_normal(picture.pixels.shape)
+    noisy = [
+        picture.with_pixels(np.clip(picture.pixels + deviation * error, 0, 255).astype(np.uint8))
+        for deviation in (4, 20)
+    ]
+    same, better, worse = (vmaf(PicturePair(picture, other)) for other in (picture, *noisy))
+    assert 95 < same <= 100 and same > better + 1 > worse + 10
