@@ -43,9 +43,9 @@ MORE = (
 UNTRIED = {
     "chain", "placed", "scaled_chain", "surfaces_of", "unit_disk",
     "AccessCost", "AngleQuality", "Audit", "Calibration", "Camera", "Coder", "CodingResult", "DamagedTake",
-    "DecodedView", "DepthQuality", "EmbeddedViewer", "EyeImage", "FocusDepth", "Goal", "Grin", "Judged", "Lenticular",
+    "DecodedView", "DepthEstimate", "DepthQuality", "EmbeddedViewer", "EyeImage", "FocusDepth", "Goal", "Grin", "Judged", "Lenticular",
     "MapCamera", "NoLenses", "Observer", "OpinionScores", "PairScale", "PanelDesign", "Paraxial", "Pinhole",
-    "Prediction", "Prescription", "Report", "Results", "Rig", "Run", "Shot", "SpreadMaps", "Stage", "Stats", "Take",
+    "Prediction", "Prescription", "Report", "Results", "Retargeted", "Rig", "Run", "Shot", "SpreadMaps", "Stage", "Stats", "Take",
     "TakeFloor", "TakeQuality", "Verdict", "ViewQuality", "ViewingZone",
 }  # fmt: skip
 CAMERA = IICamera(pixels=(48, 48), lenses=(12, 12), pixel_pitch_mm=0.1, gap_mm=1.5)
@@ -231,6 +231,10 @@ def of_pictures(made: Made) -> dict[str, Values]:
         "preset": {"name": "setup1", "scale": 8},
         "preset_cameras": {"name": "setup1", "scale": 8},
         "projection_camera": {"across": 10},
+        "estimate_depth": {"view": (0, 0), "low": -1.0, "high": 0.0},
+        "focused": {"disparity": 0.5, "weights": np.ones(PICTURE.ei_pixels[::-1]), "view": (0, 0), "bokeh": 1.0,
+            "limit": 0.1},
+        "retarget": {"disparity": np.full((*PICTURE.ei_pixels[::-1], *PICTURE.lenses[::-1]), -0.1)},
         "resampled": {"ei_pixels": (4, 4)},
         "camera_pose": {"at_mm": (0, 0, -9), "look_at_mm": (0, 0, 0)},
         "depth_of_disparity": {"disparity": 0.5},
@@ -315,6 +319,8 @@ def of_measures(made: Made) -> dict[str, Values]:
     return {
         "depth_from_focus": {"method": "robust", "base": [[0, 0]], "reference": [[0, 0]], "weights": [[1.0]]},
         "disparity_layers": {"low": LOW, "high": HIGH},
+        "depth_errors": {"disparity": DEPTH, "truth": DEPTH, "border": 1, "regions": {}, "camera": None},
+        "depth_regions": {"truth": DEPTH, "view": np.zeros((*DEPTH.shape, 3), np.uint8)},
         "logarithmic_layers": {"near_mm": 1.0, "far_mm": 2.0},
         "covering_layers": {"depth_mm": DEPTH},
         "measuring": {"names": ["q_global"]},
