@@ -96,7 +96,7 @@ def look_up(views, depths, places, low, high, order, total, mask, first, last):
                         continue
                     there = _near(depths, below if p & 2 else top, right if p & 1 else left, y + d * dy, x + d * dx)
                     if abs(there - d) <= limit:
-                        support += max(1.0 - abs(dy), 1e-3) * max(1.0 - abs(dx), 1e-3)
+                        support += max(1.0 - abs(dy), 1e-6) * max(1.0 - abs(dx), 1e-6)
                 if support > most:
                     at, most, hidden = d, support, False
             if hidden:
@@ -106,11 +106,13 @@ def look_up(views, depths, places, low, high, order, total, mask, first, last):
                 j, i = (below if q & 2 else top), (right if q & 1 else left)
                 if (q & 1 and right == left) or (q & 2 and below == top):
                     continue
-                w = max(1.0 - abs(v - j), 1e-3) * max(1.0 - abs(u - i), 1e-3)
+                w = max(1.0 - abs(v - j), 1e-6) * max(1.0 - abs(u - i), 1e-6)
                 shift, share = _place(depths, j, i, y, x, v - j, u - i, at, low, high)
                 w *= share
                 sy, sx = y + shift * (v - j), x + shift * (u - i)
                 sy, sx = min(max(sy, 0.0), height - 1.0), min(max(sx, 0.0), width - 1.0)
+                if share < 1.0:  # beside an edge: interpolation would mix both surfaces
+                    sy, sx = float(int(sy + 0.5)), float(int(sx + 0.5))
                 r += w * _pixel(views[j, i], 0, sy, sx)
                 g += w * _pixel(views[j, i], 1, sy, sx)
                 b += w * _pixel(views[j, i], 2, sy, sx)
@@ -149,6 +151,8 @@ def _place(depths, j, i, y, x, down, across, at, low, high):
 def _end(depths, j, i, y, x, down, across, low, high, order):
     """Return the shift at which a ray meets a surface of view (j, i), and whether the view sees it there.
 
+    If it does not, the shift is that of the farthest surface on the way.
+
     From near to far: before the surface the shift is nearer than that of the view where the ray passes, behind it
     farther. Where the view's surface changes by a jump in between, the ray goes behind an edge.
     """
@@ -158,18 +162,20 @@ def _end(depths, j, i, y, x, down, across, low, high, order):
     was_d, was = near, _near(depths, j, i, y + near * down, x + near * across)
     if order * was >= order * near:
         return was, True
-    hidden, last = False, was
+    hidden, deepest = False, was
     for k in range(1, steps + 1):
         d = near + (far - near) * k / steps
         here = _near(depths, j, i, y + d * down, x + d * across)
-        last = here
+        if order * here < order * deepest:
+            deepest = here
         if order * d <= order * here and order * was_d > order * was:
             if abs(here - was) <= JUMP + JUMP_SHARE * abs(here):
                 a, b = abs(was_d - was), abs(d - here)
                 return was + (here - was) * (a / (a + b) if a + b > 0.0 else 0.0), True
-            # the surface beyond the jump may itself be met between the two
-            if order * was < order * here and abs(d - here) <= abs(far - near) / steps:
+            # the nearer surface beyond the jump may itself be met between the two
+            met = _near(depths, j, i, y + here * down, x + here * across)
+            if order * was < order * here and abs(met - here) <= AGREE:
                 return here, True
             hidden = True
         was_d, was = d, here
-    return last, not hidden
+    return deepest, not hidden

@@ -23,9 +23,12 @@ SCHARR = np.array([[3.0, 10, 3], [0, 0, 0], [-3, -10, -3]]) / 64
 
 
 @checks.checked(
-    disparity=checks.numbers, truth=checks.numbers, border=checks.whole_from(0, 1 << 16), regions=checks.mapping,
+    disparity=checks.numbers,
+    truth=checks.numbers,
+    border=checks.whole_from(0, 1 << 16),
+    regions=checks.mapping,
     camera=checks.instance(IICamera),
-)  # fmt: skip
+)
 def depth_errors(
     disparity: ArrayLike,
     truth: ArrayLike,
@@ -110,6 +113,7 @@ def _normals(disparity: NDArray[np.float64], camera: IICamera) -> NDArray[np.flo
     assert camera.viewer_mm is not None
     rows, cols = disparity.shape
     z = depth_of_disparity(camera, disparity) - camera.origin_mm[2] - camera.gap_mm + camera.viewer_mm
+    z[~np.isfinite(z)] = np.nan
     width = camera.lenses[0] * camera.lens_pitch_mm[0] / camera.viewer_mm * z
     across, down = np.meshgrid(np.arange(cols) / (cols - 1) / 2, np.arange(rows) / (rows - 1) / 2)
     place = np.stack([across * width, down * width, z])
