@@ -225,7 +225,7 @@ BENCHMARKS = {
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
         Benchmark("pages.notebooks", needs="the extra notebooks", writes=("examples/*.ipynb",)),
         Benchmark("pages.hero", writes=(f"{IMAGES}/apples.webp",)),
-        Benchmark("pages.gallery", needs=f"{BROWSER} for --stills", writes=("docs/gallery/*",)),
+        Benchmark("pages.gallery", writes=("docs/gallery/*",)),
         Benchmark(
             "pages.readme",
             needs="out/demo and out/full of examples/demo.py; records of the coders, ratios, Mitsuba and POV-Ray",

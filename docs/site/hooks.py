@@ -1,6 +1,6 @@
 """What the site does to the pages of docs/, so that the same pages read well in the repository.
 
-The site has a plain copy of every file outside docs/ that a page links to. A still of the gallery leads to its viewer
+The site has a plain copy of every file outside docs/ that a page links to. A scene of the gallery leads to its viewer
 page, if `make gallery` has made it. A public name that the reference lacks is a warning.
 """
 
@@ -18,7 +18,7 @@ from mkdocs.utils import is_markdown_file
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 OUTWARD = re.compile(r"\]\((?P<path>(?:\.\./)+[^)#\s]+)(?P<anchor>#[^)\s]*)?")
-STILL = re.compile(r"!\[\w+\]\((?P<name>\w+)\.jpg\)")
+SCENE = re.compile(r"^- (?P<name>\w+)$", re.MULTILINE)
 log = logging.getLogger("mkdocs.hooks.docs")
 
 
@@ -41,14 +41,14 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         return f"]({'../' * page.file.src_uri.count('/')}{uri}"
 
     if page.file.src_uri == "gallery/README.md":
-        markdown = STILL.sub(linked_still, markdown)
+        markdown = SCENE.sub(linked_scene, markdown)
     return OUTWARD.sub(inside, markdown)
 
 
-def linked_still(match: re.Match[str]) -> str:
-    """Return a still of the gallery as a link to its viewer page, or alone if there is no such page."""
+def linked_scene(match: re.Match[str]) -> str:
+    """Return an item of the gallery as a link to its viewer page, or as it is if there is no such page."""
     page = f"{match['name']}.html"
-    return f"[{match[0]}]({page})" if (DOCS / "gallery" / page).is_file() else match[0]
+    return f"- [{match['name']}]({page})" if (DOCS / "gallery" / page).is_file() else match[0]
 
 
 def on_page_content(html: str, page: Any, config: Any, files: Files) -> None:
