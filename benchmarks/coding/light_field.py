@@ -163,10 +163,12 @@ def tables() -> Tables:
         cells += [difference(curves.get((name, other)), by_rgb) for other in OTHERS]
         times = [f"{np.median([point[key] for point in ours]):.1f}" for key in ("encode_us", "decode_us")]
         against.append([name, *cells, *times])
-        without = [_without(ours, by_rgb, curves.get((name, tool))) for tool in TOOLS]
+        measure = "ctc" if "ctc" in ours[0] else "psnr"  # records of versions without `tune` have PSNR of RGB alone
+        without = [difference(ours, curves.get((name, tool)), measure) for tool in TOOLS]
         rates = [exact.get((name, scheme)) for scheme in LOSSLESS]
         without += ["–" if rate is None else f"{rate:.2f}" for rate in rates]
-        tools.append([name, *without])
+        if set(without) != {"–"}:
+            tools.append([name, *without])
     heads = [*TOOLS.values(), *(f"`{scheme}`, bpp" for scheme in LOSSLESS)]
     made = {
         "lf-against": table(
@@ -210,11 +212,6 @@ def ours_by_rgb(curves: Mapping[tuple[str, str], Any], name: str) -> Any:
     """Return our curve that is tuned for RGB: of versions that had no other tuning, the only one; else None."""
     tuned, only = curves.get((name, BY_RGB)), curves.get((name, OURS))
     return tuned or (None if only and "ctc" in only[0] else only)
-
-
-def _without(ours: Any, by_rgb: Any, tool: Any) -> str:
-    """Return the rate of a tool by the measure that it is tuned for."""
-    return difference(ours, tool, "ctc") if tool and "ctc" in tool[0] else difference(by_rgb, tool)
 
 
 def least_rate(curves: Mapping[str, Any], names: Sequence[str]) -> str:
