@@ -22,7 +22,7 @@ RECORDS = Records("commits", ("benchmarks.speed.commits", "benchmarks.speed.befo
 SCENES = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
 COMMITS = ("cf408e1", "23f840d", before.COMMIT)  # before lanes; of the targets of lanes; before packets
 BANDS = (7,)  # in the middle of the picture
-REPEATS = 7
+REPEATS = 5
 
 
 def main() -> None:
