@@ -133,8 +133,8 @@ IMAGES = "docs/images"
 LAST = "018e29e"
 CLOSED: dict[str, tuple[str, ...]] = {
     "accuracy/eye_views": ("opinions_simulated.png",),
-    "coding/crossing": ("takes_crossing.png",),
-    "coding/light_field_bounds": ("lf_bounds.png",),
+    "coding/crossing": (),
+    "coding/light_field_bounds": (),
     "coding/light_field_threads": (),
     "coding/neighbours": (),
     "pages/concepts": tuple(
@@ -144,7 +144,7 @@ CLOSED: dict[str, tuple[str, ...]] = {
     "pages/focus_patterns": ("focus_patterns.png",),
     "pages/make_textures": (),
     "speed/before_after": (),
-    "speed/feature_ablation": ("feature_ablation.png",),
+    "speed/feature_ablation": (),
     "speed/take_cost": (),
     "speed/texture_filter": ("texture_filter.png",),
     "stability/install": (),
@@ -161,6 +161,7 @@ BENCHMARKS = {
         Benchmark("accuracy.sample_places", records=OWN, fills=("docs/speed_accuracy.md",)),
         Benchmark("accuracy.camera_in_scene", records=OWN, writes=(f"{IMAGES}/camera_in_scene.*",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",)),
+        Benchmark("accuracy.demosaicing", records=OWN, fills=("docs/calibration.md",)),
         Benchmark("accuracy.lens_rays", needs="--peer, an interpreter with optiland", records=OWN),
         Benchmark(
             "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)
@@ -219,8 +220,10 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/depth_cost.*", f"{IMAGES}/depth_pareto.*"),
         ),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
+        Benchmark("speed.commits", needs=HISTORY, records="commits.jsonl"),
         Benchmark("speed.mitsuba", needs="Mitsuba 3 and an LLVM library", records=OWN),
         Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
+        Benchmark("pages.notebooks", needs="the extra notebooks", writes=("examples/*.ipynb",)),
         Benchmark("pages.hero", writes=(f"{IMAGES}/apples.webp",)),
         Benchmark("pages.gallery", needs=f"{BROWSER} for --stills", writes=("docs/gallery/*",)),
         Benchmark(

@@ -17,7 +17,7 @@ from .contract import Coder, Goal, Option, general_scheme, options, parse_scheme
 from .inspect.extract import extract
 from .inspect.order_analysis import analyse_orders
 from .inspect.progressive import DecodedView, Stage, decode_levels, decode_view
-from .inspect.random_access import decode_component, decode_frame
+from .inspect.random_access import access_cost, decode_component, decode_frame
 from .search import Axis, CodingResult, Run, meet_size
 from .takes.api import EncodedTake, encode_take, open_take
 from .takes.coding import codes_takes
@@ -53,6 +53,7 @@ __all__ = [
     "Run",
     "Stage",
     "TakeFloor",
+    "access_cost",
     "analyse_orders",
     "codes_takes",
     "component_cost",

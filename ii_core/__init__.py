@@ -1,6 +1,6 @@
 """Cameras, pictures, component images and view images of integral imaging."""
 
-from .calibration import Calibration, NoLenses, calibrate, calibrated_picture, centres_picture
+from .calibration import Calibration, NoLenses, calibrate, calibrated_picture, centres_picture, defective_pixels
 from .camera.camera import Camera, IICamera
 from .camera.maps import MapCamera, read_maps, write_maps
 from .camera.pose import camera_pose
@@ -54,6 +54,7 @@ __all__ = [
     "component_images",
     "converging_distance",
     "crosstalk",
+    "defective_pixels",
     "depth_of_disparity",
     "disparity_of_depth",
     "elementary_images",

@@ -16,7 +16,17 @@ from functools import partial
 from typing import Any
 
 from benchmarks.arguments import command_line
-from benchmarks.coding.light_field import FIELDS, IMPORTED, OURS, SCENES, difference, pictured, rate_change
+from benchmarks.coding.light_field import (
+    BY_RGB,
+    FIELDS,
+    IMPORTED,
+    OURS,
+    SCENES,
+    difference,
+    ours_by_rgb,
+    pictured,
+    rate_change,
+)
 from benchmarks.coding.light_field import RECORDS as OTHERS
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
@@ -97,7 +107,7 @@ def transforms(original: IIPicture, setting: str) -> dict[str, tuple[int, int]]:
 def tables() -> Tables:
     """Return the table of docs/lf.md."""
     rows = {(row["picture"], row["setting"]): row for row in RECORDS.rows()}
-    compared = [row for row in OTHERS.rows() if row["scheme"] in (OURS, PEER)]
+    compared = [row for row in OTHERS.rows() if row["scheme"] in (OURS, BY_RGB, PEER)]
     others = {(row["picture"], row["scheme"]): row["points"] for row in compared}
     names = [name for name in (*SCENES, *FIELDS, IMPORTED) if any((name, setting) in rows for setting in SETTINGS)]
     if not names:
@@ -107,7 +117,7 @@ def tables() -> Tables:
         curves = {setting: rows[name, setting]["points"] for setting in SETTINGS if (name, setting) in rows}
         setting = best(curves)
         anchor = curves[setting]
-        cells = [difference(anchor, others.get((name, scheme))) for scheme in (OURS, PEER)]
+        cells = [difference(anchor, curve) for curve in (ours_by_rgb(others, name), others.get((name, PEER)))]
         ends = [[point[key] for point in anchor] for key in ("encode_us", "decode_us")]
         cells += [f"{min(times):.1f}–{max(times):.1f}" for times in ends]
         lines.append(f"| {name} | {SETTINGS[setting]} | {' | '.join(cells)} |")

@@ -1,12 +1,16 @@
-"""`si-lf` against the other schemes: rate at equal PSNR, gain of each tool, CPU time.
+"""`si-lf` against the other schemes: rate at equal quality, gain of each tool, CPU time.
 
     python -m benchmarks run light_field [--pictures car,car-9x9] [--schemes si-lf] [--flower FOLDER]
+        [--photographs stegosaurus.png bottle.png …]
 
 Pictures are four scenes through `setup1` at scale 8, and two light fields of 9×9 views of 120×56 pixels with
 disparity of both signs, rendered with four samples per pixel: the camera's gap is 32/3 of that of `setup1`, and each
 view is cropped one column or row further on than its neighbour. ``--flower`` adds the middle 96×64 pixels of 10×10
-views of a light field camera from a folder (alone: ``--pictures flower``). Every scheme is run at five quantisers,
-and lossless. Numbers go to ``benchmarks/results/light_field.jsonl``, tables to ``docs/lf.md``.
+views of a light field camera from a folder (alone: ``--pictures flower``), ``--photographs`` the middle 128×96 pixels
+of the middle 9×9 views of imported pictures, such as those of the benchmark ``photographs``. Every scheme is run at
+five quantisers, and lossless. Quality is PSNR-YUV of JPEG Pleno's test conditions, for which `si-lf` is tuned, and
+PSNR of RGB, for which its second curve is. Numbers go to ``benchmarks/results/light_field.jsonl``, tables to
+``docs/lf.md``.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import chain
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,7 +32,7 @@ from benchmarks.records import Records, origin, table
 from codec import encode, timed_decode
 from ii_core import IIPicture, preset
 from ii_core.formats.find import find_views, picture_of
-from metrics import bd_rate, q_global
+from metrics import bd_rate, q_ctc_psnr, q_global
 from metrics.rates.rd import UndefinedDifference
 from raytrace_ii import load_scene, render
 
@@ -35,7 +40,9 @@ RECORDS = Records("light_field", ("benchmarks.coding.light_field",))
 SCENES = ("apples", "twins", "car", "cuboid")
 FIELDS = ("car-9x9", "apples-9x9")
 IMPORTED = "flower"
-OURS = "si-lf"
+OURS, BY_RGB = "si-lf", "si-lf:tune=rgb"
+PHOTOGRAPHS = ("flowers", "stegosaurus", "bottle", "toys")
+CUT, MIDDLE = (128, 96), 9  # pixels and views of a photograph
 TOOLS = {
     "si-lf:sources=0": "synthesis off",
     "si-lf:cross=0": "colours not predicted",
@@ -54,12 +61,19 @@ VIEWS, GAP = 9, 6  # views per side; factor on disparity, by a larger gap
 
 def main() -> None:
     """Measure, print, record and fill the page."""
-    parser = command_line(__doc__, pictures=SCENES + FIELDS, schemes=(*OTHERS, OURS, *TOOLS, *LOSSLESS))
+    parser = command_line(__doc__, pictures=SCENES + FIELDS, schemes=(*OTHERS, OURS, BY_RGB, *TOOLS, *LOSSLESS))
     parser.add_argument("--flower", help="folder of the views of a light field camera")
+    parser.add_argument("--photographs", nargs="+", default=[], help="imported pictures, named by their files")
     asked = parser.parse_args()
-    names = dict.fromkeys([*asked.pictures, *([IMPORTED] if asked.flower else [])])
+    photographs = {Path(file).stem: file for file in asked.photographs}
+    names = dict.fromkeys([*asked.pictures, *([IMPORTED] if asked.flower else []), *photographs])
     keys = [{"picture": name, "scheme": scheme} for scheme in asked.schemes for name in names]
-    RECORDS.run(keys, lambda picture, scheme: measured(pictured(picture, asked.flower), scheme), asked.again)
+
+    def measure(picture: str, scheme: str) -> dict[str, Any]:
+        cut = picture in photographs
+        return measured(middle(photographs[picture]) if cut else pictured(picture, asked.flower), scheme)
+
+    RECORDS.run(keys, measure, asked.again)
     publish(tables())
 
 
@@ -93,6 +107,19 @@ def pictured(name: str, flower: str | None = None) -> IIPicture:
     return IIPicture(cut.reshape(rows * VIEWS, cols * VIEWS, 3), (cols, rows), (VIEWS, VIEWS))
 
 
+@cache
+def middle(file: str) -> IIPicture:
+    """Return the middle of a photograph: `CUT` pixels of at most `MIDDLE` × `MIDDLE` views."""
+    whole = IIPicture.load(file)
+    (width, height), (cols, rows) = whole.lenses, whole.ei_pixels
+    pixels = whole.pixels.reshape(height, rows, width, cols, 3)
+    for axis, count in enumerate((CUT[1], MIDDLE, CUT[0], MIDDLE)):
+        first = max(0, pixels.shape[axis] - count) // 2
+        pixels = pixels.take(range(first, min(first + count, pixels.shape[axis])), axis)
+    height, rows, width, cols, _ = pixels.shape
+    return IIPicture(pixels.reshape(height * rows, width * cols, 3), (width, height), (cols, rows))
+
+
 def measured(original: IIPicture, scheme: str) -> dict[str, Any]:
     """Return a curve, or the rate of a lossless scheme."""
     if scheme not in LOSSLESS:
@@ -108,17 +135,17 @@ def measured(original: IIPicture, scheme: str) -> dict[str, Any]:
 
 
 def curve(original: IIPicture, scheme: str) -> dict[str, Any]:
-    """Return rate, PSNR and CPU microseconds per pixel at each quantiser."""
+    """Return rate, both qualities and CPU microseconds per pixel at each quantiser."""
     width, height = original.size
     points = []
     compiled(scheme, qp=QUANTISERS[OURS][0])
     for qp in QUANTISERS[scheme if scheme in QUANTISERS else scheme.partition(":")[0]]:
         coded = encode(original, scheme, qp=qp)
         decoding = timed_decode(coded)
-        psnr = q_global(original, decoding.picture)
+        quality = {"psnr": q_global(original, decoding.picture), "ctc": q_ctc_psnr(original, decoding.picture).mean}
         seconds = {"encode_us": coded.encode_seconds or 0, "decode_us": decoding.seconds}
         times = {name: 1e6 * value / (width * height) for name, value in seconds.items()}
-        points.append({"qp": qp, "bpp": coded.bpp, "psnr": psnr, **times})
+        points.append({"qp": qp, "bpp": coded.bpp, **quality, **times})
     return {"points": points}
 
 
@@ -127,20 +154,31 @@ def tables() -> Tables:
     rows = RECORDS.rows()
     curves = {(row["picture"], row["scheme"]): row["points"] for row in rows if "points" in row}
     exact = {(row["picture"], row["scheme"]): row["bpp"] for row in rows if "bpp" in row}
-    names = [name for name in (*SCENES, *FIELDS, IMPORTED) if (name, OURS) in curves]
+    names = [name for name in (*SCENES, *FIELDS, IMPORTED, *PHOTOGRAPHS) if (name, OURS) in curves]
     against, tools = [], []
     for name in names:
         ours = curves[name, OURS]
-        cells = [difference(curves.get((name, other)), ours) for other in OTHERS]
+        by_rgb = ours_by_rgb(curves, name)
+        cells = [difference(curves.get((name, other)), ours, "ctc") for other in OTHERS]
+        cells += [difference(curves.get((name, other)), by_rgb) for other in OTHERS]
         times = [f"{np.median([point[key] for point in ours]):.1f}" for key in ("encode_us", "decode_us")]
         against.append([name, *cells, *times])
-        without = [difference(ours, curves.get((name, tool))) for tool in TOOLS]
+        without = [_without(ours, by_rgb, curves.get((name, tool))) for tool in TOOLS]
         rates = [exact.get((name, scheme)) for scheme in LOSSLESS]
         without += ["–" if rate is None else f"{rate:.2f}" for rate in rates]
         tools.append([name, *without])
     heads = [*TOOLS.values(), *(f"`{scheme}`, bpp" for scheme in LOSSLESS)]
     made = {
-        "lf-against": table(" | ".join(["picture", *map(_code, OTHERS), "encode µs | decode µs"]), against),
+        "lf-against": table(
+            " | ".join(
+                [
+                    "picture",
+                    *(f"{way}: `{other}`" for way in ("CTC", "RGB") for other in OTHERS),
+                    "encode µs | decode µs",
+                ]
+            ),
+            against,
+        ),
         "lf-tools": table(" | ".join(["picture", *heads]), tools),
     }
     own = {("docs/lf.md", mark): [*lines, "", origin(rows)] for mark, lines in made.items()}
@@ -168,8 +206,15 @@ def targets(records: Mapping[int, Sequence[Mapping[str, Any]]]) -> list[str]:
     return [*table(heads, lines), "", origin(chain(*records.values()))] if lines else ["Not measured yet."]
 
 
-def _code(scheme: str) -> str:
-    return f"`{scheme}`"
+def ours_by_rgb(curves: Mapping[tuple[str, str], Any], name: str) -> Any:
+    """Return our curve that is tuned for RGB: of versions that had no other tuning, the only one; else None."""
+    tuned, only = curves.get((name, BY_RGB)), curves.get((name, OURS))
+    return tuned or (None if only and "ctc" in only[0] else only)
+
+
+def _without(ours: Any, by_rgb: Any, tool: Any) -> str:
+    """Return the rate of a tool by the measure that it is tuned for."""
+    return difference(ours, tool, "ctc") if tool and "ctc" in tool[0] else difference(by_rgb, tool)
 
 
 def least_rate(curves: Mapping[str, Any], names: Sequence[str]) -> str:
@@ -189,16 +234,20 @@ def _is_ours(scheme: str) -> bool:
     return scheme.partition(":")[0] == OURS
 
 
-def difference(anchor: Any, tested: Any) -> str:
+def difference(anchor: Any, tested: Any, quality: str = "psnr") -> str:
     """Return the Bjøntegaard rate of ``tested`` as text."""
-    rate = None if anchor is None or tested is None else rate_change(anchor, tested)
+    rate = None if anchor is None or tested is None else rate_change(anchor, tested, quality)
     return "–" if rate is None else _percent(rate)
 
 
-def rate_change(anchor: Any, tested: Any) -> float | None:
-    """Return the Bjøntegaard rate of ``tested`` in per cent; None if the curves hardly overlap."""
+def rate_change(anchor: Any, tested: Any, quality: str = "psnr") -> float | None:
+    """Return the Bjøntegaard rate of ``tested`` in per cent; None if the curves hardly overlap, or are of old records
+    without this quality.
+    """
+    if any(quality not in point for points in (anchor, tested) for point in points):
+        return None
     try:
-        return bd_rate(*((_column(points, key)) for points in (anchor, tested) for key in ("bpp", "psnr")))
+        return bd_rate(*((_column(points, key)) for points in (anchor, tested) for key in ("bpp", quality)))
     except UndefinedDifference:
         return None
 

@@ -42,7 +42,6 @@ BACK = {
     "depth-control": 70, "grin-hexagonal-depth-control": 70, "plenoptic1": 150, "plenoptic2": 150,
     "plenoptic1-double-gauss": 130, "plenoptic2-triplet": 150,
 }  # fmt: skip
-SMALL = ("plenoptic1-double-gauss", "plenoptic2-triplet")  # stored as JPEG, a third of the bytes without loss
 
 
 def main() -> None:
@@ -50,16 +49,19 @@ def main() -> None:
     scene = load_scene("apples")
     folder = DOCS / "images" / "cameras"
     folder.mkdir(parents=True, exist_ok=True)
-    for name in (name for names in KINDS.values() for name in names):
-        write_picture(folder / file_name(name), strip(scene, shown(name), name), lossless=True)
-        print(name, flush=True)
+    for kind, names in KINDS.items():
+        strips = [
+            np.pad(strip(scene, shown(name), name), ((0, GAP), (0, 0), (0, 0)), constant_values=255) for name in names
+        ]
+        write_picture(folder / file_name(kind), np.concatenate(strips)[:-GAP])
+        print(kind, flush=True)
     write_picture(DOCS / "images" / "scenes.webp", all_scenes())
     (DOCS / "cameras.md").write_text(page(), encoding="utf-8")
 
 
-def file_name(camera: str) -> str:
-    """Return the name of a camera's strip of pictures."""
-    return f"{camera}.{'jpg' if camera in SMALL else 'webp'}"
+def file_name(kind: str) -> str:
+    """Return the name of the sheet of a kind of cameras."""
+    return f"{kind.lower().replace(' ', '-')}.webp"
 
 
 def page() -> str:
@@ -68,6 +70,7 @@ def page() -> str:
     for kind, names in KINDS.items():
         text.append(f"\n## {kind}\n")
         text += [entry(name, preset_cameras(name), shown(name)) for name in names]
+        text.append(f"\n![from top to bottom: {', '.join(names)}](images/cameras/{file_name(kind)})\n")
     return "\n".join([*text, precision(), in_scene()])
 
 
@@ -91,8 +94,9 @@ KINDS = {
 INTRODUCTION = """# Cameras
 
 With this page you can choose a camera of the package and the format of its maps. A camera is a
-location and a direction for every pixel. Each strip shows (`python -m benchmarks run cameras`; an
-eighth of the lenses each way, of several arrays the first):
+location and a direction for every pixel. Under the cameras of a kind stand their strips, from top
+to bottom (`python -m benchmarks run cameras`; an eighth of the lenses each way, of several arrays
+the first):
 
 1. the locations L over the whole array, with x, y and z as red, green and blue;
 2. the directions D of a few lenses, in the same colours, black if blocked;
@@ -108,7 +112,7 @@ USUAL = ("pinhole", "8192×4096 px", "512×256 lenses", "rectangular", "16×16 p
 
 
 def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
-    """Return heading, text, properties and the strip of pictures."""
+    """Return heading, text and properties."""
     first = full[0]
     u, v = first.ei_pixels
     chain = " → ".join(e.kind for e in first.optics)
@@ -123,10 +127,9 @@ def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
     facts = [fact for fact in facts if fact not in USUAL]
     sheet = json.loads((CAMERAS / f"{name}.json").read_text(encoding="utf-8"))
     about = sheet["about"][:1].upper() + sheet["about"][1:]
-    picture = f"![{name}](images/cameras/{file_name(name)})"
     given = f" *{', '.join(facts)}.*" if facts else ""
     text = fill(f"{about}. {sheet['notes']}{given}", 100, break_on_hyphens=False)
-    return f"\n### {name}\n\n{text}\n\n{picture}\n"
+    return f"\n### {name}\n\n{text}\n"
 
 
 def all_scenes() -> NDArray[np.uint8]:
@@ -145,13 +148,7 @@ def all_scenes() -> NDArray[np.uint8]:
 def precision() -> str:
     """Return the errors of cameras stored as pictures by format, from `benchmarks.accuracy.map_precision`."""
     rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
-    lines = [
-        "\n## Stored as pictures: which format is enough\n",
-        "Greatest errors of the maps of `setup1`, `setup3` and `spherical` at a quarter of the lenses each way,",
-        "and PSNR of *Apples* and *Cuboid* against pictures of float maps:\n",
-        "| format | bytes per ray | angle | location | PSNR |",
-        "|---|---|---|---|---|",
-    ]
+    lines = []
     for name in dict.fromkeys(row["format"] for row in rows):
         of = [row for row in rows if row["format"] == name]
         size = [row["bytes_per_pixel"] for row in of]
@@ -159,11 +156,9 @@ def precision() -> str:
         shown = "reference" if None in psnr else f"{min(psnr):.1f}–{max(psnr):.1f} dB"
         angle, place = (max(row[what] for row in of) for what in ("angle_max_urad", "place_max_um"))
         lines.append(
-            f"| {name} | {min(size):.2g}–{max(size):.2g} | {figure(angle)} µrad | {figure(place)} µm | {shown} |"
+            [name, f"{min(size):.2g}–{max(size):.2g}", f"{figure(angle)} µrad", f"{figure(place)} µm", shown]
         )
-    made = table(
-        "camera | format | bytes per ray | angle max · rms | location max · rms | PSNR apples · cuboid", lines
-    )
+    made = table("format | bytes per ray | angle | location | PSNR", lines)
     return "\n".join(
         [PRECISION, *made, "", origin(rows), "", VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""]
     )
@@ -172,9 +167,8 @@ def precision() -> str:
 PRECISION = """
 ## Stored as pictures: which format is enough
 
-Errors of maps stored as pictures, at a quarter of the lenses each way: angle between stored and
-true direction, distance between stored and true location, and PSNR of the picture against that of
-float maps.
+Greatest errors of the maps of `setup1`, `setup3` and `spherical` at a quarter of the lenses each
+way, and PSNR of *Apples* and *Cuboid* against pictures of float maps:
 """
 
 
@@ -182,19 +176,17 @@ def in_scene() -> str:
     """Return the comparison with a camera of glass in the scene, from `benchmarks.accuracy.camera_in_scene`."""
     (study,) = camera_in_scene.RECORDS.rows(scale=camera_in_scene.SCALE)
     lines = [
-        IN_SCENE,
-        "| *Apples* lit | aperture | triangles | as it is | Fresnel's losses added | no stray light |",
-        "|---|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {row['scene'].removeprefix('apples, lit ').replace('apples', 'as usual')} | "
-        f"{row['aperture_of_pitch']:.2f} | {row['triangles_of_the_camera']} | {row['psnr_db']:.1f} dB | "
-        f"{row['psnr_with_fresnel_db']:.1f} dB | {row['psnr_direct_light_db']:.1f} dB |"
+        [
+            row["scene"].removeprefix("apples, lit ").replace("apples", "as usual"),
+            f"{row['aperture_of_pitch']:.2f}",
+            str(row["triangles_of_the_camera"]),
+            *(f"{row[name]:.1f} dB" for name in ("psnr_db", "psnr_with_fresnel_db", "psnr_direct_light_db")),
+        ]
         for row in study["rows"]
         if (row["what"] == "picture" and row["samples"] > 1)
         or (row["what"] == "tessellation" and row["segments"] in SEGMENTS)
     ]
-    heads = "*Apples* | aperture | triangles of the camera | as it is | Fresnel's losses added | no stray light"
+    heads = "*Apples* lit | aperture | triangles | as it is | Fresnel's losses added | no stray light"
     shown = "![both pictures and their differences](images/camera_in_scene.jpg)"
     return "\n".join([IN_SCENE, *table(heads, lines), "", origin([study]), "", shown, ""])
 

@@ -1,10 +1,11 @@
-"""Data card of the benchmark's pictures, from the profiles alone, for ``docs/benchmark.md``."""
+"""Data card of the benchmark's pictures and table of its anchors, for ``docs/benchmark.md``."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from benchmarks.pages.tables import Tables, publish
+from metrics.benchmark.anchors import ANCHORS
 from metrics.benchmark.card import CAPTION, card_table
 from metrics.benchmark.profile import profile, profile_names
 
@@ -15,11 +16,15 @@ def main() -> None:
 
 
 def tables() -> Tables:
-    """Return one table for each profile of the package, with one caption."""
+    """Return one table for each profile of the package, with one caption, and that of the anchors."""
     lines: list[str] = []
     for name in profile_names():
+        if all(reference.middle for reference in profile(name).pictures):
+            continue
         lines += [*short_table(name, card_table(profile(name))[:-2]), ""]
-    return {("docs/benchmark.md", "data-card"): [*lines, CAPTION]}
+    anchors = ["| anchor | samples | arguments of the encoder |", "|---|---|---|"]
+    anchors += [f"| `{name}` | `{anchor.pixels}` | `{anchor.encoder}` |" for name, anchor in ANCHORS.items()]
+    return {("docs/benchmark.md", "data-card"): [*lines, CAPTION], ("docs/benchmark.md", "anchors"): anchors}
 
 
 def short_table(name: str, lines: Sequence[str]) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any
 
 from benchmarks.accuracy import povray
 from benchmarks.coding import coders, jplm, light_field
-from benchmarks.coding.light_field import IMPORTED, OURS, SCENES, rate_change
+from benchmarks.coding.light_field import BY_RGB, IMPORTED, OURS, SCENES, rate_change
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, commit_of, origin, with_commits
@@ -109,8 +109,9 @@ def meetings() -> list[tuple[str, int, Pairs]]:
 
 def paired(rows: Mapping[tuple[str, str], Row], scheme: str) -> Pairs:
     """Return the rows of a scheme beside those of `si-lf`; none unless both are there for every scene."""
-    names = [name for name in (*SCENES, IMPORTED) if {(name, scheme), (name, OURS)} <= rows.keys()]
-    return {name: (rows[name, scheme], rows[name, OURS]) for name in names} if {*SCENES} <= {*names} else {}
+    ours = {name: rows.get((name, BY_RGB)) or rows.get((name, OURS)) for name in (*SCENES, IMPORTED)}
+    names = [name for name, row in ours.items() if (name, scheme) in rows and row]
+    return {name: (rows[name, scheme], ours[name]) for name in names} if {*SCENES} <= {*names} else {}
 
 
 def split(values: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:

@@ -4,12 +4,14 @@
 
 The scenes are reduced to what both do alike: one grey, the first light, shadows, no textures, no highlights. The rays
 are those of a band of full ``setup1``. Mitsuba gets them ready-made, view by view, its fastest order, and stores
-linear light. `render` makes them itself and stores 8-bit sRGB. The pictures are compared in linear light. Needs
+linear light, once by default and once with robust intersections, as ours are. `render` makes them itself and stores
+8-bit sRGB. The pictures are compared in linear light. Needs
 Mitsuba, for instance ``pip install --target FOLDER mitsuba drjit``, and an LLVM library.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -26,6 +28,7 @@ from benchmarks.records import Records
 from benchmarks.speed import pareto
 from ii_core import IICamera, preset
 from raytrace_ii import Background, Material, Scene, load_scene, render
+from raytrace_ii.tracing.kernels.tables import COORDINATES, NORMALS
 from raytrace_ii.tracing.packing import packed
 
 RECORDS = Records("mitsuba", ("benchmarks.speed.mitsuba",))
@@ -65,27 +68,41 @@ def plain(scene: Scene) -> Scene:
 
 
 def compare(mitsuba: Any, scene: Scene, camera: IICamera) -> dict[str, Any]:
-    """Return median CPU nanoseconds per pixel of both, the median of their ratios, and the share of equal pixels."""
-    theirs, pixels = prepared(mitsuba, scene, camera), camera.pixels[0] * camera.pixels[1]
-    linear = render(scene, camera, dtype="float32", support=(), workers=1).picture.pixels[..., 0]
-    agree = float((np.abs(theirs() - linear) <= SAME).mean())
-    times = []
+    """Return median CPU nanoseconds per pixel of ours, of Mitsuba and of Mitsuba with robust intersections as ours.
+
+    With medians of the ratios, the share of equal pixels, and how busy the machine was with other programs.
+    """
+    pixels, linear = camera.pixels[0] * camera.pixels[1], render(
+        scene, camera, dtype="float32", support=(), workers=1
+    ).picture.pixels[..., 0]  # fmt: skip
+    ways: dict[str, Callable[[], object]] = {
+        "ours": lambda: render(scene, camera, support=(), workers=1),
+        "mitsuba": prepared(mitsuba, scene, camera), "robust": prepared(mitsuba, scene, camera, robust=True),
+    }  # fmt: skip
+    agree = float((np.abs(np.asarray(ways["mitsuba"]()) - linear) <= SAME).mean())
+    ways["robust"]()
+    times: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(REPEATS):
-        ours = render(scene, camera, support=(), workers=1).stats.cpu_seconds
-        start = time.process_time()
-        theirs()
-        times.append((ours / pixels * 1e9, (time.process_time() - start) / pixels * 1e9))
+        for name, shoot in ways.items():
+            start = time.process_time()
+            shoot()
+            times[name].append((time.process_time() - start) / pixels * 1e9)
     return {
-        "ours_ns": median(a for a, _ in times), "mitsuba_ns": median(b for _, b in times),
-        "ratio": median(b / a for a, b in times), "agree": agree,
+        **{f"{name}_ns": median(found) for name, found in times.items()},
+        "ratio": median(b / a for a, b in zip(times["ours"], times["mitsuba"], strict=True)),
+        "robust_ratio": median(b / a for a, b in zip(times["ours"], times["robust"], strict=True)),
+        "agree": agree, "load": os.getloadavg()[0],
     }  # fmt: skip
 
 
-def prepared(mitsuba: Any, scene: Scene, camera: IICamera) -> Callable[[], NDArray[np.float32]]:
+def prepared(
+    mitsuba: Any, scene: Scene, camera: IICamera, *, robust: bool = False
+) -> Callable[[], NDArray[np.float32]]:
     """Return the function that renders the scene by Mitsuba, with faces, rays and code at hand, as (N, M)."""
     dr = import_module("drjit")
     dr.set_thread_count(1)
-    world, light = mitsuba.load_dict({"type": "scene", "faces": _mesh(mitsuba, scene)}), scene.lights[0]
+    about = {"type": "scene", "embree_use_robust_intersections": robust, "faces": _mesh(mitsuba, scene)}
+    world, light = mitsuba.load_dict(about), scene.lights[0]
     (columns, rows), (width, height) = (
         camera.pixels,
         (camera.pixels[0] // camera.lenses[0], camera.pixels[1] // camera.lenses[1]),
@@ -120,7 +137,8 @@ def _mesh(mitsuba: Any, scene: Scene) -> Any:
     arrays = packed(scene)
     corners = arrays.corners.reshape(-1, 3)
     flat = np.repeat(arrays.faces[:, :3], 3, axis=0)
-    smooth = arrays.normals.reshape(-1, 3) if len(arrays.normals) else np.zeros_like(flat)
+    table = arrays.surfaces.rows.reshape(-1, arrays.surfaces.columns)
+    smooth = table[:, NORMALS:COORDINATES].reshape(-1, 3) if arrays.surfaces.smooth else np.zeros_like(flat)
     normals = np.where(smooth.any(axis=1, keepdims=True), smooth, flat)  # those of flat bodies are 0
     mesh = mitsuba.Mesh("faces", len(corners), len(corners) // 3, has_vertex_normals=True)
     values = mitsuba.traverse(mesh)

@@ -5,17 +5,15 @@ from __future__ import annotations
 import gzip
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from statistics import fmean
 from typing import Any
 
-from benchmarks.coding import coders
 from benchmarks.coding.rd import climbing
 from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, filled
-from benchmarks.records import ROOT, origin, table
+from benchmarks.records import ROOT, table
 from ii_core.base.files import atomic_path
 from ii_core.base.json_lines import lines_of, read_records
-from metrics import bd_psnr, bd_rate
+from metrics import bd_rate
 from metrics.rates.rd import UndefinedDifference
 
 from . import beside, theirs
@@ -28,7 +26,6 @@ from .theirs import said
 
 PAGE, IMAGES = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study"
 KEPT = ROOT / "benchmarks/results/study.jsonl.gz"  # compressed to a sixth of its size
-CODERS_SCALE = 4
 PHOTOGRAPHS = {"component-images": ".jpg", "other-cameras": ".jpg", "artefacts-": ".webp", "equal-": ".webp"}
 TIMED_RATES = (0.015, 0.15, 0.63, 1.5)  # bpp
 OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
@@ -59,7 +56,6 @@ def tables(kept: Path = KEPT) -> Tables:
         **shown_tables(results, best),
         "gain-by-size": sizes(everything),
         "view-by-size": views_by_size(everything),
-        "gains-coders": coder_gains(coders.RECORDS.rows(scale=CODERS_SCALE)),
     }
     return {("docs/study.md", mark): lines for mark, lines in made.items()}
 
@@ -280,23 +276,6 @@ def gains_modern(results: Results) -> list[str]:
     return table(" | ".join(["scheme", *made]), lines)
 
 
-def coder_gains(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the mean gain over JPEG 2000 of all schemes of `coders` at their default options, best first."""
-    scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    curves = {(row["scene"], row["scheme"]): pairs(row["points"]) for row in rows}
-    found = {
-        scheme: [bd_gain(curves.get((scene, REFERENCE), []), curves.get((scene, scheme), [])) for scene in scenes]
-        for scheme in dict.fromkeys(row["scheme"] for row in rows if ":" not in row["scheme"])
-        if scheme != REFERENCE
-    }
-    ranked = sorted(
-        found.items(), key=lambda item: -fmean([value for value in item[1] if value is not None] or [-99])
-    )
-    lines = ["| dB | " + " | ".join(scenes) + " |", "|---" * (len(scenes) + 1) + "|"]
-    lines += [f"| `{name}` | " + " | ".join(shown(value, "+.1f") for value in row) + " |" for name, row in ranked]
-    return [*lines, "", origin(rows)]
-
-
 def pairs(points: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
     """Return (rate, PSNR) of a rising curve, from either form of points."""
     same = [{"bpp": p["bpp"], "psnr": p["psnr"] if "psnr" in p else float(p["q_global"])} for p in points]
@@ -309,14 +288,6 @@ def rate_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float
         return shown(bd_rate(*zip(*anchor, strict=True), *zip(*curve, strict=True)), "+.0f")
     except (UndefinedDifference, TypeError):
         return "–"
-
-
-def bd_gain(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float, float]]) -> float | None:
-    """Return the Bjøntegaard gain in dB, or None if it is undefined."""
-    try:
-        return bd_psnr(*zip(*anchor, strict=True), *zip(*curve, strict=True))
-    except (UndefinedDifference, TypeError):
-        return None
 
 
 def record_table(best: Mapping[str, Mapping[str, Any]]) -> list[str]:

@@ -6,7 +6,9 @@ import numpy as np
 
 from ..api import Encoded, blank_picture
 from ..checks import check_type, whole_pair
+from ..clock import cpu_seconds
 from ..coders import groups
+from ..coders.lf.coder import LightField
 from ..coders.pseudo_video import PseudoVideo
 from ..contract import Coder, Pixels, find
 from ..frames import Layout, layout
@@ -68,6 +70,38 @@ def decode_frame(coded: Encoded, index: int) -> Pixels:
     if isinstance(index, bool) or not 0 <= index < grid.frames:
         raise ValueError(f"the frame of index {index} does not exist: there are {grid.frames}, from 0")
     return _decoded(coder, coded, int(coder.frame_order(grid.rows, grid.cols, coded.options)[index]))
+
+
+def access_cost(coded: Encoded, place: tuple[int, int]) -> tuple[int, float] | None:
+    """Return the bytes that decoding of one component image reads, and its CPU seconds.
+
+    Of a pseudo video sequence the bytes are those of the group of pictures; of `si-lf` those of the levels above the
+    view, and of its own. None for schemes that decode none alone, or whose bytes are not counted.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `decode_component`.
+    """
+    check_type("coded", coded, Encoded, "a coded picture")
+    col, row = whole_pair("place", place)
+    coder = find(coded.scheme)
+    if isinstance(coder, PseudoVideo):
+        grid = layout(coded.structure["lenses"], coded.structure["ei_pixels"], coder.kind)
+        order = coder.frame_order(grid.rows, grid.cols, coded.options)
+        stream = sequence(coded)
+        started = cpu_seconds()
+        decode_component(coded, place)  # raises ValueError if there is none
+        seconds = cpu_seconds() - started
+        start, stop = stream.group(int(np.flatnonzero(order == row * grid.cols + col)[0]))
+        nbytes = len(stream.first) + sum(len(packet.data) for packet in stream.packets[start:stop])
+        return nbytes, seconds
+    if isinstance(coder, LightField):
+        started = cpu_seconds()
+        blank = blank_picture(coded.structure, coded.dtype)
+        _, nbytes, _ = coder.decode_view(coded.payload, blank, coded.options, (row, col))
+        return nbytes, cpu_seconds() - started
+    return None
 
 
 def sequence(coded: Encoded) -> groups.Sequence:

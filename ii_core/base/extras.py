@@ -14,6 +14,8 @@ EXTRAS = {
     "bjontegaard": ("charts", "bjontegaard"),
     "imagecodecs": ("coders", "imagecodecs"),
     "distributed": ("dask", "dask"),
+    "h5py": ("arrays", "h5py"),
+    "imageio_ffmpeg": ("anchors", "imageio-ffmpeg"),
 }
 
 

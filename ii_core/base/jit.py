@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding as llvm
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
@@ -109,6 +110,15 @@ def exact_kernel(function: Callable[..., Any]) -> Any:
     return kernel(function, _nrt=False, error_model="numpy")
 
 
+def lane_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a lean kernel whose short loops over lanes become vectors.
+
+    LLVM's usual passes unroll a loop of 16 rounds before they look for vectors, and then find few. Here no loop is
+    unrolled: loops within loops over lanes are to be written out.
+    """
+    return lean_kernel(function, pipeline_class=_LaneCompiler)
+
+
 def inline_kernel(function: Callable[..., Any]) -> Any:
     """Compile a helper of a kernel, inlined as source into its callers."""
     return numba.njit(nogil=True, inline="always")(function)
@@ -150,6 +160,21 @@ def exact_stage_kernel(function: Callable[..., Any]) -> Any:
     return _part(function, forceinline=True)
 
 
+def lane_stage(function: Callable[..., Any], **options: Any) -> Any:
+    """Compile a part of a `lane_kernel`, inlined as that of `stage_kernel` is, whose loops are left as they are."""
+    return _part(function, _LanePartCompiler, **{"forceinline": True, "fastmath": {"contract"}, **options})
+
+
+def lane_part(function: Callable[..., Any]) -> Any:
+    """Compile a part of a `lane_kernel` that stays a function of its own, as that of `part_kernel` does."""
+    return _part(function, _LanePartCompiler, fastmath={"contract"})
+
+
+def exact_lane_stage(function: Callable[..., Any]) -> Any:
+    """Compile a part as `lane_stage` does, which rounds after every operation as `exact_kernel` does."""
+    return _part(function, _LanePartCompiler, forceinline=True)
+
+
 class _Fragment(JITCodeLibrary):
     """Code of a part: LLVM optimises and translates it within its callers, not for itself as well."""
 
@@ -182,14 +207,47 @@ class _NoEnvironments:
         pass
 
 
+class _LaneFragment(_Fragment):
+    """Code of a part whose loops are left to its callers."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+
+class _Lanes(JITCodeLibrary):
+    """Code whose loops are not unrolled."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        options = llvm.create_pipeline_tuning_options(3)
+        options.loop_vectorization, options.slp_vectorization, options.loop_unrolling = True, False, False
+        builder = llvm.create_pass_builder(self._codegen._tm, options)
+        builder.getModulePassManager().run(self._final_module, builder)
+
+
 class _PartCompiler(CompilerBase):
     """Numba's compiler with a `_Fragment` for a library."""
 
-    fragment = _Fragment
+    fragment: type[JITCodeLibrary] = _Fragment
 
     def define_pipelines(self) -> list[Any]:
         self.state.library = self.fragment(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        self.state.library.enable_object_caching()
         return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
+
+
+class _LaneCompiler(_PartCompiler):
+    """Numba's compiler with a library of `_Lanes`."""
+
+    fragment = _Lanes
+
+
+class _LanePartCompiler(_PartCompiler):
+    """Numba's compiler with a `_LaneFragment` for a library."""
+
+    fragment = _LaneFragment
 
 
 class _TunedCompiler(_PartCompiler):
@@ -211,7 +269,15 @@ def late_kernel(function: Callable[..., Any]) -> Any:
 
     Returns nothing, as C function. Its callers neither contain it nor optimise it a second time.
     """
-    compiled = lean_kernel(function, no_cpython_wrapper=True)
+    return _late(lean_kernel(function, no_cpython_wrapper=True))
+
+
+def late_lane_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a late kernel whose loops over lanes become vectors, as those of a `lane_kernel`."""
+    return _late(lean_kernel(function, no_cpython_wrapper=True, pipeline_class=_LaneCompiler))
+
+
+def _late(compiled: Any) -> Any:
     compiled.add_overload = lambda result: _keep(compiled, result)
     return compiled
 

@@ -14,9 +14,10 @@ from ..base.checks import length
 from ..base.colour import linear, srgb
 from ..camera.camera import IICamera
 from ..camera.lattice import DRIFT_TERMS, LATTICES, Drift
+from ..formats.lytro import RawColour
 from ..picture.picture import IIPicture
 from ..picture.regular import owners
-from .demosaic import MOSAICS, demosaiced, evened
+from .demosaic import METHODS, MOSAICS, demosaiced, evened
 from .refusal import NoLenses
 
 if TYPE_CHECKING:  # scipy takes a third of a second
@@ -26,6 +27,7 @@ if TYPE_CHECKING:  # scipy takes a third of a second
 PIXEL_MM = 0.0061  # where nothing is known: that of the presets, and their viewing angle
 HALF_ANGLE_TAN = math.tan(math.radians(29.9 / 2))
 CURVES = ("linear", "srgb")
+BLOCK = 256  # rows in one call of numpy
 MOST_LEAN = 20.0  # degrees that rows of a hexagonal lattice may rise before columns are taken for rows
 
 
@@ -303,7 +305,7 @@ def _drift_mm(drift: Drift, pixel_mm: float) -> tuple[tuple[float, ...], tuple[f
 @checks.checked(
     calibration=checks.instance(Calibration), raw=checks.array, white=checks.array, dark=checks.array,
     mosaic=checks.one_of(*MOSAICS), curve=checks.one_of(*CURVES), full_scale=checks.number_from(1e-9, 1e9),
-    bits=checks.whole,
+    bits=checks.whole, colour=checks.instance(RawColour), demosaic=checks.one_of(*METHODS),
 )  # fmt: skip
 def calibrated_picture(
     calibration: Calibration,
@@ -315,8 +317,12 @@ def calibrated_picture(
     curve: str = "linear",
     full_scale: float | None = None,
     bits: int = 8,
+    colour: RawColour | None = None,
+    demosaic: str = "directional",
 ) -> IIPicture:
-    """The II-picture of a raw one: dark frame off, vignetting divided out, colours, sRGB, camera.
+    """The II-picture of a raw one: dark frame off, dead pixels, vignetting, colours, sRGB, camera.
+
+    Dead pixels are those of `defective_pixels`, replaced by the mean of their neighbours under the same lens.
 
     Parameters
     ----------
@@ -330,6 +336,10 @@ def calibrated_picture(
         scale, of others what a thousandth of the pixels exceed.
     bits : {8, 16}
         Of the picture. Most coders take 8.
+    colour : RawColour, optional
+        Gains of white balance, and the matrix to sRGB, of the camera's metadata. Values above the scale are white.
+    demosaic : {"directional", "bilinear"}
+        See `demosaiced`.
 
     Returns
     -------
@@ -341,43 +351,120 @@ def calibrated_picture(
     ValueError
         If the frames are not of the calibration's size or have values that are not finite, or the picture is dark.
     """
-    from .white import gain
+    return developed(
+        calibration, raw, white=white, dark=dark, mosaic=mosaic, curve=curve, full_scale=full_scale, bits=bits,
+        colour=colour, demosaic=demosaic,
+    )[0]  # fmt: skip
+
+
+def developed(
+    calibration: Calibration, raw: NDArray[Any], *, white: NDArray[Any] | None, dark: NDArray[Any] | None,
+    mosaic: str | None, curve: str, full_scale: float | None, bits: int, colour: RawColour | None, demosaic: str,
+) -> tuple[IIPicture, int]:  # fmt: skip
+    """Return the picture of `calibrated_picture`, and the number of defective pixels."""
+    from .white import gain, repaired
 
     if bits not in (8, 16):
         raise ValueError(f"bits are {bits}: 8 or 16 are needed")
-    frames = [f if f is None else np.rot90(f) if calibration.turned else f for f in (raw, white, dark)]
-    size = calibration.camera.pixels
-    for what, frame in zip(("raw", "white", "dark"), frames, strict=True):
-        if frame is not None and frame.shape[1::-1] != size:
-            raise ValueError(f"{what} is {frame.shape}: {size[1]}×{size[0]}, the calibration's size, is needed")
-        if frame is not None:
-            _finite(what, frame)
-    if calibration.turned and mosaic is not None:  # the tile turns with the picture
-        tile = np.rot90(np.array(list(mosaic)).reshape(2, 2))
-        if raw.shape[1] % 2:
-            tile = tile[::-1]
-        mosaic = "".join(tile.ravel())
-    values, white_values, dark_values = (None if f is None else _linear(f, curve) for f in frames)
-    assert values is not None
-    if dark_values is not None:
-        values = values - dark_values
-    if white_values is not None:
-        if dark_values is not None:
-            white_values = white_values - dark_values
-        factors = gain(_grey(white_values, mosaic), calibration.grid.lattice)
+    raw, white, dark, mosaic = _upright(calibration, raw, white, dark, mosaic)
+    owner = _owners(calibration)
+    values, repairs = _linear(raw, curve), 0
+    if dark is not None:
+        values = values - _linear(dark, curve)
+    if white is not None:
+        smooth, bad = _white(calibration, white, dark, mosaic, curve)
+        factors = gain(smooth)
         values = values * (factors if values.ndim == 2 else factors[..., None])
+        repairs = int(bad.sum())
+        if repairs:
+            values = repaired(values, bad, owner, 1 if mosaic is None else 2)
     if mosaic is not None:
-        values = demosaiced(values if values.ndim == 2 else values[..., 0], mosaic, _owners(calibration))
+        values = demosaiced(values if values.ndim == 2 else values[..., 0], mosaic, owner, method=demosaic)
     if values.ndim == 2 or values.shape[2] == 1:
         values = np.repeat(values.reshape(*values.shape[:2], 1), 3, axis=2)
+    if colour is not None:  # a saturated pixel stays white: the smallest gain is 1
+        values = values * np.array(colour.gains, np.float32) / np.float32(min(colour.gains))
     if full_scale is None:
         full_scale = 1.0 if curve == "srgb" else float(np.percentile(values, 99.9))
     if not full_scale > 0:
         raise ValueError("the picture is dark: no pixel is brighter than the dark frame")
     dtype = np.uint8 if bits == 8 else np.uint16
-    codes = np.rint((2**bits - 1) * srgb(np.clip(values[..., :3] / full_scale, 0, 1))).astype(dtype)
+    codes = np.empty((*values.shape[:2], 3), dtype)
+    for top in range(0, len(codes), BLOCK):
+        rows = np.clip(values[top : top + BLOCK, :, :3] / np.float32(full_scale), 0, 1)
+        if colour is not None:
+            rows = np.clip(rows @ np.array(colour.matrix, np.float32).T, 0, 1)
+        codes[top : top + BLOCK] = np.rint((2**bits - 1) * srgb(rows))
     camera = calibration.camera
-    return IIPicture(np.ascontiguousarray(codes), camera.lenses, camera.ei_pixels, camera)
+    return IIPicture(codes, camera.lenses, camera.ei_pixels, camera), repairs
+
+
+@checks.checked(
+    calibration=checks.instance(Calibration), white=checks.array, dark=checks.array, mosaic=checks.one_of(*MOSAICS),
+    curve=checks.one_of(*CURVES),
+)  # fmt: skip
+def defective_pixels(
+    calibration: Calibration,
+    white: NDArray[Any],
+    *,
+    dark: NDArray[Any] | None = None,
+    mosaic: str | None = None,
+    curve: str = "linear",
+) -> NDArray[np.bool_]:
+    """Dead and hot pixels, by the white image: far from the values at the same place under the lenses around.
+
+    Returns
+    -------
+    ndarray of bool, (N, M)
+        In the frame of the calibration's picture.
+
+    Raises
+    ------
+    ValueError
+        If the frames are not of the calibration's size or have values that are not finite.
+    """
+    white, _, dark, mosaic = _upright(calibration, white, white, dark, mosaic)
+    return _white(calibration, white, dark, mosaic, curve)[1]
+
+
+def _upright(
+    calibration: Calibration,
+    raw: NDArray[Any],
+    white: NDArray[Any] | None,
+    dark: NDArray[Any] | None,
+    mosaic: str | None,
+) -> tuple[NDArray[Any], NDArray[Any] | None, NDArray[Any] | None, str | None]:
+    """Return checked frames, turned as the calibration is, and the mosaic that turns with them."""
+    frames = [f if f is None else np.rot90(f) if calibration.turned else f for f in (raw, white, dark)]
+    size = calibration.camera.pixels
+    for what, frame in zip(("white", "dark", "raw"), (frames[1], frames[2], frames[0]), strict=True):
+        if frame is not None and frame.shape[1::-1] != size:
+            raise ValueError(f"{what} is {frame.shape}: {size[1]}×{size[0]}, the calibration's size, is needed")
+        if frame is not None:
+            _finite(what, frame)
+    if calibration.turned and mosaic is not None:
+        tile = np.rot90(np.array(list(mosaic)).reshape(2, 2))
+        if raw.shape[1] % 2:
+            tile = tile[::-1]
+        mosaic = "".join(tile.ravel())
+    assert frames[0] is not None
+    return frames[0], frames[1], frames[2], mosaic
+
+
+def _white(
+    calibration: Calibration, white: NDArray[Any], dark: NDArray[Any] | None, mosaic: str | None, curve: str
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Return the white image without noise and defects, and where it had defects."""
+    from .white import averaged, defects, repaired
+
+    values = _linear(white, curve) - (0 if dark is None else _linear(dark, curve))
+    grey, lattice = _grey(values, mosaic), calibration.grid.lattice
+    smooth = averaged(grey, lattice)
+    bad = defects(grey, smooth)
+    if bad.any():  # again without them: a defect spoils the mean of its likes
+        smooth = averaged(repaired(grey, bad, _owners(calibration), 1), lattice)
+        bad = defects(grey, smooth)
+    return smooth, bad
 
 
 def _owners(calibration: Calibration) -> NDArray[np.int32]:

@@ -120,7 +120,11 @@ def retarget(
 
     for top in range(0, height, BAND * 8):
         end = min(top + BAND * 8, height)
-        over_rows(lambda a, b, top=top: fill(top + a, top + b), end - top, workers=workers)
+
+        def band(first: int, last: int, top: int = top) -> None:
+            fill(top + first, top + last)
+
+        over_rows(band, end - top, workers=workers)
         if progress is not None:
             progress(end, height, "rows")
     structure = camera.lenses, camera.ei_pixels

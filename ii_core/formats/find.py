@@ -14,6 +14,7 @@ from ..base import checks
 from ..camera.camera import Pair
 from ..picture.picture import IIPicture
 from ..picture.view import turned_pixels
+from .arrays import ARRAYS, array_views
 from .grid import Views
 from .order import Arrangement, estimate
 from .quilt import quilt_views
@@ -22,12 +23,12 @@ from .views import folder_views
 
 @checks.checked(source=checks.path, grid=checks.whole_pair)
 def find_views(source: str | os.PathLike[str], *, grid: Pair | None = None) -> Views:
-    """Return the views of a folder or of a quilt.
+    """Return the views of a folder, of an array in a file, or of a quilt.
 
     Parameters
     ----------
     source : path
-        A folder, or a picture file with ``_qsCxRaA`` in its name.
+        A folder, a file of `ARRAYS`, or a picture file with ``_qsCxRaA`` in its name.
     grid : (columns, rows), optional
         Grid of views with only one number in their names, or of the tiles of a quilt without it in its name.
 
@@ -41,6 +42,10 @@ def find_views(source: str | os.PathLike[str], *, grid: Pair | None = None) -> V
     path = Path(source)
     if path.is_dir():
         return folder_views(path, grid)
+    if path.suffix.lower() in ARRAYS:
+        if grid is not None:
+            raise ValueError(f"{path} says its grid of views: leave out the grid")
+        return array_views(path)
     return quilt_views(path, grid)
 
 

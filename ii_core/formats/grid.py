@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.files import read_image
 from ..camera.camera import Pair
 from ..picture.picture import IIPicture
 from .order import Read
 from .positions import Positions
+from .profiles import read_upright
 from .rig import Rig
 
 WHOLE_ORDER = frozenset(("transposed", "flip_down", "flip_across"))
@@ -47,6 +47,15 @@ class Views:
     structure: dict[str, Any] | None = None
     rig: Rig | None = None
     positions: Positions | None = None
+
+    def middle(self, shape: Pair) -> Views:
+        """Return the middle views, so many along the first and the second number; ValueError if there are fewer."""
+        if not all(1 <= few <= most for few, most in zip(shape, self.shape, strict=True)) or max(shape) < 2:
+            raise ValueError(
+                f"middle is {shape[0]}×{shape[1]} views: 2 to {self.shape[0]}×{self.shape[1]} are needed"
+            )
+        first = [(most - few) // 2 for few, most in zip(shape, self.shape, strict=True)]
+        return replace(self, shape=shape, read=lambda a, b: self.read(first[0] + a, first[1] + b), structure=None)
 
 
 def listed(files: list[Path], grid: Pair, known: frozenset[str]) -> Views:
@@ -80,7 +89,7 @@ def checked_reader(path_of: Callable[[int, int], Path], read: Callable[[Path], N
 
 
 def read_view(path: str | os.PathLike[str]) -> NDArray[Any]:
-    """Read a picture as (T, S, 3); grey is repeated, and an opaque alpha channel is dropped.
+    """Read a picture as (T, S, 3), upright and in sRGB, see `read_upright`; grey is repeated, opaque alpha dropped.
 
     Raises
     ------
@@ -89,7 +98,7 @@ def read_view(path: str | os.PathLike[str]) -> NDArray[Any]:
     OSError
         If it cannot be read.
     """
-    pixels = read_image(path)
+    pixels = read_upright(path)
     channels = pixels.shape[2]
     if channels == 4:
         opaque = 1.0 if pixels.dtype.kind == "f" else np.iinfo(pixels.dtype).max

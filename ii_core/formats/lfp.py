@@ -25,7 +25,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,40 +35,14 @@ from numpy.typing import NDArray
 from ..base import checks
 from ..base.files import check_file, memory_bytes, one_line, read_image, read_json
 from ..camera.camera import Pair
+from .lytro import PRIVATE, RawPicture, about_picture
 
 MAGIC = b"\x89LF"
 MARK = b"\r\n\x1a\n"
 HEADER, NAME = 16, 80
 MOST_JSON = 16 << 20  # bytes
 CONTAINERS, PACKED = (".lfp", ".lfr"), (".raw",)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RawPicture:
-    """A raw picture and what its metadata tell.
-
-    Attributes
-    ----------
-    samples : ndarray, (N, M) or (N, M, 1 or 3)
-        Of a container float32, linear, the value of no light taken off; of image files as they are stored.
-    mosaic : str or None
-        Colours of the first 2×2 pixels, such as "bggr".
-    full_scale : float or None
-        Sample value at the end of the scale, if the metadata say it.
-    pixel_pitch_mm, lens_pitch_mm, gap_mm : float or None
-    turn_rad : float or None
-        Of the lens grid, as the maker measured it.
-    lattice : str or None
-    """
-
-    samples: NDArray[Any]
-    mosaic: str | None = None
-    full_scale: float | None = None
-    pixel_pitch_mm: float | None = None
-    lens_pitch_mm: float | None = None
-    gap_mm: float | None = None
-    turn_rad: float | None = None
-    lattice: str | None = None
+TOLD = (".json", ".txt")  # metadata of packed samples
 
 
 @checks.checked(path=checks.path, metadata=checks.path)
@@ -78,7 +52,8 @@ def read_raw(path: str | os.PathLike[str], metadata: str | os.PathLike[str] | No
     Parameters
     ----------
     metadata : path, optional
-        JSON of packed samples; the samples' name with ``.json`` in place of its suffix, or behind it, if not given.
+        JSON of packed samples; if not given, the samples' name with ``.json`` or ``.txt`` in place of its suffix or
+        behind it, or with ``_metadata.json``.
 
     Raises
     ------
@@ -92,11 +67,7 @@ def read_raw(path: str | os.PathLike[str], metadata: str | os.PathLike[str] | No
     if metadata is None and suffix in CONTAINERS:
         return read_lfp(path)
     if metadata is None and suffix in PACKED:
-        beside = (path.with_suffix(".json"), Path(f"{path}.json"))
-        found = next((file for file in beside if file.exists()), None)
-        if found is None:
-            raise ValueError(f"{path} holds packed samples: {beside[0].name}, its metadata, is needed beside it")
-        metadata = found
+        metadata = metadata_beside(path)
     if metadata is not None:
         return read_packed(path, metadata)
     samples = read_image(path)
@@ -119,10 +90,13 @@ def read_lfp(path: str | os.PathLike[str]) -> RawPicture:
     check_file(path)
     data = Path(path).read_bytes()
     try:
-        table, sections = _sections(data)
+        table, sections = read_sections(data)
         frame = _frame(table)
-        metadata = _object(_section(sections, frame["metadataRef"], "metadata"))
-        return _picture(_section(sections, frame["imageRef"], "picture"), metadata)
+        metadata = dict(_object(_section(sections, frame["metadataRef"], "metadata")))
+        private = frame.get("privateMetadataRef")
+        if private in sections:
+            metadata[PRIVATE] = _object(sections[private])
+        return raw_picture(_section(sections, frame["imageRef"], "picture"), metadata)
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
         text = f"{error.args[0]} missing" if isinstance(error, KeyError) and error.args else error
         raise ValueError(f"{os.fspath(path)} is no raw picture of a Lytro camera: {one_line(text)}") from None
@@ -133,11 +107,38 @@ def read_packed(path: str | os.PathLike[str], metadata: str | os.PathLike[str]) 
     """Packed samples in a file of their own, with the metadata's JSON beside; errors as of `read_lfp`."""
     check_file(path)
     try:
-        return _picture(Path(path).read_bytes(), read_json(metadata))
+        return raw_picture(Path(path).read_bytes(), read_json(metadata))
     except ValueError as error:  # numbers in the metadata that are text, echoed by Python in full
         raise ValueError(one_line(error)) from None
     except (TypeError, KeyError, IndexError, AttributeError, OverflowError) as error:
         raise ValueError(f"{os.fspath(metadata)} does not describe a raw picture: {one_line(repr(error))}") from None
+
+
+def metadata_beside(path: Path) -> Path:
+    """Return the metadata of packed samples, whose name may be in capitals; ValueError if there are none."""
+    wanted = {f"{stem}{end}".lower() for stem in (path.stem, path.name) for end in TOLD}
+    wanted.add(f"{path.stem}_metadata.json".lower())
+    found = (
+        sorted(file for file in path.parent.iterdir() if file.name.lower() in wanted) if path.parent.is_dir() else []
+    )
+    if not found:
+        raise ValueError(f"{path} holds packed samples: {path.stem}.json or .txt, its metadata, is needed beside it")
+    return found[0]
+
+
+def raw_picture(packed: bytes, metadata: Mapping[str, Any]) -> RawPicture:
+    """Return the raw picture of packed samples and their metadata.
+
+    Raises
+    ------
+    ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError
+        If the metadata do not describe the samples.
+    """
+    about = about_picture(metadata)
+    samples = unpacked(packed, about.size, about.bits).astype(np.float32)
+    for phase, black in enumerate(about.black):
+        samples[phase // 2 :: 2, phase % 2 :: 2] -= np.float32(black)
+    return replace(about.picture, samples=samples)
 
 
 def unpacked(data: bytes, size: Pair, bits: int) -> NDArray[np.uint16]:
@@ -168,8 +169,8 @@ def unpacked(data: bytes, size: Pair, bits: int) -> NDArray[np.uint16]:
     return np.asarray(samples.ravel()[:count].reshape(height, width), np.uint16)
 
 
-def _sections(data: bytes) -> tuple[Mapping[str, Any], dict[str, bytes]]:
-    """The table of contents, and all data by name."""
+def read_sections(data: bytes) -> tuple[Mapping[str, Any], dict[str, bytes]]:
+    """The table of contents of a container, and all its data by name; ValueError if it is damaged."""
     if data[:3] != MAGIC or data[3:8] != b"P" + MARK:
         raise ValueError("it does not begin as a container does")
     table: Mapping[str, Any] | None = None
@@ -218,51 +219,3 @@ def _frame(table: Mapping[str, Any]) -> Mapping[str, Any]:
     """The first frame of the table of a first or of a second generation camera."""
     frames = table["frames"] if "frames" in table else table["picture"]["frameArray"]
     return frames[0]["frame"]
-
-
-def _picture(packed: bytes, metadata: Mapping[str, Any]) -> RawPicture:
-    image = metadata["image"]
-    details = image.get("rawDetails", image)
-    bits = int(details["pixelPacking"]["bitsPerPixel"])
-    samples = unpacked(packed, (int(image["width"]), int(image["height"])), bits)
-    levels = details.get("pixelFormat", {})
-    devices = metadata.get("devices", {})
-    sensor, mla = devices.get("sensor", {}), devices.get("mla", {})
-    tiling = str(mla.get("tiling", ""))
-    black = _mean(levels.get("black"), 0.0)
-    return RawPicture(
-        samples=samples.astype(np.float32) - np.float32(black),
-        mosaic=_mosaic(details.get("mosaic") or image.get("mosaic")),
-        full_scale=_mean(levels.get("white"), float((1 << bits) - 1)) - black,
-        pixel_pitch_mm=_millimetres(sensor.get("pixelPitch")),
-        lens_pitch_mm=_millimetres(mla.get("lensPitch")),
-        gap_mm=_millimetres(mla.get("sensorOffset", {}).get("z")),
-        turn_rad=float(mla["rotation"]) if "rotation" in mla else None,
-        lattice="hexagonal" if tiling.startswith("hex") else "rectangular" if tiling else None,
-    )
-
-
-def _mosaic(mosaic: Any) -> str | None:
-    """Colours of the first tile: ``tile`` gives rows, such as "r,gr:gb,b", ``upperLeftPixel`` where it begins."""
-    if not mosaic:
-        return None
-    rows = [[cell.strip() for cell in row.split(",")] for row in str(mosaic["tile"]).split(":")]
-    if [len(row) for row in rows] != [2, 2]:
-        raise ValueError(f"its mosaic is {checks.shown(mosaic['tile'])}: 2×2 pixels are known")
-    tile = np.array(rows)
-    first = np.argwhere(tile == mosaic.get("upperLeftPixel", tile[0, 0]))
-    if not len(first):
-        raise ValueError(f"its mosaic {checks.shown(mosaic['tile'])} has no {checks.shown(mosaic['upperLeftPixel'])}")
-    tile = np.roll(tile, tuple(-first[0]), axis=(0, 1))
-    return "".join(cell[0] for cell in tile.ravel())
-
-
-def _mean(levels: Any, usual: float) -> float:
-    values = list(levels.values()) if isinstance(levels, Mapping) else [levels] if levels is not None else []
-    return float(np.mean([float(v) for v in values])) if values else usual
-
-
-def _millimetres(metres: Any) -> float | None:
-    """A length of the metadata; None if there is none that makes sense."""
-    value = float(metres) * 1000 if isinstance(metres, int | float) else 0.0
-    return value if 0 < value < np.inf else None

@@ -1,4 +1,4 @@
-"""Assumed camera of a picture without one."""
+"""Assumed camera of a picture without one, marked by its name: lengths in mm are nominal."""
 
 from __future__ import annotations
 
@@ -9,8 +9,13 @@ from ..base.checks import checked, instance, number
 from ..camera.camera import IICamera
 from .picture import IIPicture
 
-ASSUMED = "assumed"  # name of such a camera
+ASSUMED = "nominal"  # name of such a camera, also in files
 ASSUMED_ANGLE_DEG = 20.0
+
+
+def is_nominal(picture: IIPicture) -> bool:
+    """Return whether a picture's camera was assumed."""
+    return picture.camera is not None and picture.camera.name == ASSUMED
 
 
 @checked(picture=instance(IIPicture), angle_deg=number)

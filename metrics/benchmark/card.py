@@ -8,6 +8,7 @@ from .profile import Profile, Reference
 
 CAPTION = "SHA-256 is that of the pixels (rows of R, G, B, one byte each, frame after frame); z is in mm."
 HEAD = ("picture", "what it is for", "scene", "camera", "lenses, pixels under each", "samples", "SHA-256")
+PHOTOGRAPHS = ("picture", "what it is for", "camera", "views, pixels of each", "repository", "licence", "SHA-256")
 
 
 def card_table(profile: Profile, found: Mapping[str, str] | None = None) -> list[str]:
@@ -19,15 +20,11 @@ def card_table(profile: Profile, found: Mapping[str, str] | None = None) -> list
     found : mapping of str to str, optional
         Hashes of rendered pixels by name, which the table shows instead of those of the definition.
     """
-    lines = [f"| {' | '.join(HEAD)} |", "|" + "---|" * len(HEAD)]
+    head = PHOTOGRAPHS if any(reference.source for reference in profile.pictures) else HEAD
+    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     for reference in profile.pictures:
-        camera = reference.made_camera()
-        (k, l), (u, v) = camera.lenses, camera.ei_pixels
         sha256 = reference.sha256 if found is None else found.get(reference.name)
-        cells = (
-            reference.name, reference.use, _scene(reference), _camera(reference), f"{k}×{l}, {u}×{v}",
-            str(reference.samples), "not fixed" if sha256 is None else f"`{sha256[:12]}`",
-        )  # fmt: skip
+        cells = (reference.name, reference.use, *_origin(reference), f"`{sha256[:12]}`" if sha256 else "not fixed")
         lines.append(f"| {' | '.join(cells)} |")
     return [*lines, "", CAPTION]
 
@@ -50,6 +47,21 @@ def data_card(profile: Profile, found: Mapping[str, str]) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def _origin(reference: Reference) -> tuple[str, ...]:
+    """Return scene, camera, structure and samples of a rendered picture; camera, views, place, licence of another."""
+    if (source := reference.source) is not None and reference.views and reference.view_pixels:
+        views, size = (f"{across}×{down}" for across, down in (reference.views, reference.view_pixels))
+        link = f"{source.repository}/tree/{source.commit}/{_escaped(source.path)}"
+        return source.camera, f"{views}, {size}", f"[{source.repository.split('/', 3)[-1]}]({link})", source.licence
+    camera = reference.made_camera()
+    (k, l), (u, v) = camera.lenses, camera.ei_pixels
+    return _scene(reference), _camera(reference), f"{k}×{l}, {u}×{v}", str(reference.samples)
+
+
+def _escaped(path: str) -> str:
+    return path.replace("(", "%28").replace(")", "%29")
 
 
 def _scene(reference: Reference) -> str:

@@ -11,12 +11,15 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import assets
-from ii_core import IICamera, preset
+from ii_core import IICamera, IIPicture, preset
 from ii_core.base import checks
 from ii_core.base.files import one_line, read_text
 
 from ..measures.measure import measure_of
+from .source import Source, source_of
 
 FIELDS = {
     "name",
@@ -32,44 +35,75 @@ FIELDS = {
 }
 MAX_FRAMES = 10_000
 PICTURE = {"name", "use", "scene", "frames", "camera", "scale", "samples", "at_mm", "sha256"}
+PHOTOGRAPH = {"name", "use", "views", "view_pixels", "sha256", "source", "middle"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
-    """Reference picture or II-video: scene, camera and sampling, and the hash of its pixels.
+    """Reference picture or II-video, rendered or photographed, and the hash of its pixels.
 
     Parameters
     ----------
     name, use : str
         Name, and what the picture is for.
     scene : str
-        Scene of the package.
+        Scene of the package; empty for a photograph.
     frames : int, optional
         First frames of the scene's take that form a video; None for a still.
-    camera : str or mapping
-        Camera of the package, or its values.
+    camera : str or mapping, optional
+        Camera of the package, or its values; None for a photograph.
     scale, samples : int
     at_mm : (x, y, z)
         Place of the camera in the scene.
     sha256 : str, optional
         SHA-256 of the pixels, of a video those of all frames in order; None if not fixed yet.
+    views, view_pixels : (int, int), optional
+        Columns and rows of a photograph's views, and width and height of a view.
+    middle : bool
+        Whether these are the middle views of the stored photograph, and the middle of each.
+    source : Source, optional
+        Where a photograph is had.
     """
 
     name: str
     use: str
-    scene: str
-    camera: Any
+    scene: str = ""
+    camera: Any = None
     frames: int | None = None
     scale: int = 1
     samples: int = 1
     at_mm: tuple[float, ...] = (0.0, 0.0, 0.0)
     sha256: str | None = None
+    views: tuple[int, int] | None = None
+    view_pixels: tuple[int, int] | None = None
+    middle: bool = False
+    source: Source | None = None
 
     def made_camera(self) -> IICamera:
-        """Return the camera."""
+        """Return the camera of a rendered picture."""
         if isinstance(self.camera, str):
             return preset(self.camera, scale=self.scale)
         return IICamera.from_json({"name": self.name, **self.camera})
+
+    def part(self, picture: IIPicture) -> IIPicture:
+        """Return the part of a stored photograph that the definition takes.
+
+        Raises
+        ------
+        ValueError
+            If the photograph is smaller.
+        """
+        if not self.middle or self.views is None or self.view_pixels is None:
+            return picture
+        (columns, rows), (width, height) = self.views, self.view_pixels
+        field = picture.light_field
+        spans = []
+        for name, few, most in zip("TSVU", (height, width, rows, columns), field.shape, strict=False):
+            if few > most:
+                raise ValueError(f"{self.name} has {name} = {most}: at least {few} is needed")
+            spans.append(slice((most - few) // 2, (most - few) // 2 + few))
+        pixels = field[tuple(spans)].transpose(0, 2, 1, 3, 4).reshape(height * rows, width * columns, 3)
+        return IIPicture(np.ascontiguousarray(pixels), (width, height), (columns, rows))
 
     def matches(self, sha256: str) -> bool | None:
         """Return whether pixels of this hash are those of the definition; None if it does not fix them."""
@@ -177,6 +211,8 @@ def _profile(data: Mapping[str, Any], digest: str) -> Profile:
 
 
 def _reference(values: Mapping[str, Any]) -> Reference:
+    if "source" in values:
+        return _photograph(values)
     _check_keys("picture", values, PICTURE, optional={"frames", "scale", "samples", "at_mm", "sha256"})
     given = dict(values)
     if "frames" in given:
@@ -184,6 +220,13 @@ def _reference(values: Mapping[str, Any]) -> Reference:
     if "at_mm" in given:
         given["at_mm"] = checks.place("at_mm", given["at_mm"], 3)
     return Reference(**given)
+
+
+def _photograph(values: Mapping[str, Any]) -> Reference:
+    _check_keys("photograph", values, PHOTOGRAPH, optional={"middle"})
+    checks.flag("middle", values.get("middle", False))
+    sizes: Any = {name: checks.whole_pair(name, values[name]) for name in ("views", "view_pixels")}
+    return Reference(**{**values, **sizes, "source": source_of(values["source"])})
 
 
 def _check_keys(what: str, data: Mapping[str, Any], known: set[str], optional: set[str] | None = None) -> None:

@@ -33,6 +33,7 @@ def run(
     commands: Sequence[str] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
     log: RunLog | None = None,
+    means: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Run a coder on the pictures of a profile.
 
@@ -51,6 +52,8 @@ def run(
         ``progress(done, total, text)`` after every point.
     log : RunLog, optional
         Finished points, which are not measured again; every new point is added.
+    means : mapping, optional
+        ``workers`` or ``executor`` of `metrics.rate_distortion`; one worker if not given.
 
     Returns
     -------
@@ -72,7 +75,19 @@ def run(
             if progress is not None:
                 progress(done + found, total, f"{name}: {text}")
 
-        rows.append(_row(profile, coder, reference, made, log, encode=encode, decode=decode, progress=report))
+        rows.append(
+            _row(
+                profile,
+                coder,
+                reference,
+                made,
+                log,
+                encode=encode,
+                decode=decode,
+                progress=report,
+                **(means or {"workers": 1}),
+            )
+        )
     return {
         "profile": {"name": profile.name, "version": profile.version, "sha256": profile.digest},
         "coder": coder,
@@ -105,7 +120,7 @@ def _row(
 
         try:
             points = rate_distortion(
-                subject, [coder], profile.rates_bpp, workers=1, keep=keep,
+                subject, [coder], profile.rates_bpp, keep=keep,
                 known={(coder, rate): point for rate, point in known.items()},
                 measure=measuring_subject(subject, profile.measures), **tools,
             )  # fmt: skip

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from statistics import fmean
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ii_core import IIPicture, IIVideo
 
@@ -20,10 +21,16 @@ Subject = IIPicture | IIVideo
 
 @dataclass(frozen=True)
 class Decoded:
-    """Decoded picture or video, and CPU seconds of the decoder."""
+    """Decoded picture or video, and CPU seconds of the decoder.
+
+    ``codes`` are the YCbCr codes of 10 bit that the coder returned, (N, M, 3), for measures of the common test
+    conditions; None if it returned RGB. ``more`` are further numbers of the point.
+    """
 
     picture: Subject
     seconds: float
+    codes: NDArray[Any] | None = None
+    more: Mapping[str, float] = field(default_factory=dict)
 
 
 def identity(name: str, subject: Subject) -> dict[str, Any]:

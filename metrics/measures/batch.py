@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ii_core import IIPicture
 from ii_core.base import checks
@@ -39,8 +39,9 @@ def measuring(
     Returns
     -------
     callable
-        ``measure(decoded)`` returns a dict of values by name. Measures over depth add ``q_depth``, the value of every
-        layer, ``depth_mm``, the layers, and ``depth_outside``, the share of view pixels outside all layers.
+        ``measure(decoded, codes=None)``, with ``codes`` of `PicturePair`, returns a dict of values by name. Measures
+        over depth add ``q_depth``, the value of every layer, ``depth_mm``, the layers, and ``depth_outside``, the
+        share of view pixels outside all layers.
 
     Raises
     ------
@@ -69,8 +70,8 @@ class _Measuring:
     pair: PicturePair
     names: tuple[str, ...]
 
-    def __call__(self, decoded: IIPicture) -> dict[str, Any]:
-        compared = replace(self.pair, decoded=decoded)
+    def __call__(self, decoded: IIPicture, codes: NDArray[Any] | None = None) -> dict[str, Any]:
+        compared = replace(self.pair, decoded=decoded, codes=codes)
         results: dict[Any, Any] = {}
         kept: dict[str, Any] = {}
         for measure in map(measure_of, self.names):

@@ -56,6 +56,27 @@ _db(
     "PSNR-YUV of the CTC",
     "mean of the views' PSNR-YUV by JPEG Pleno's CTC",
 )
+_db(
+    "q_ctc_min",
+    ALL_ANGLES,
+    ctc_psnr,
+    _worst,
+    "PSNR-YUV of the CTC, worst view",
+    "PSNR-YUV of the worst view by JPEG Pleno's CTC",
+)
+register_measure(
+    Measure(
+        name="q_ctc_step",
+        needs=ALL_ANGLES,
+        compute=ctc_psnr,
+        value=lambda quality: quality.step,
+        label="change of PSNR-YUV from view to view",
+        text="root mean square change of the views' PSNR-YUV along the serpentine path",
+        unit="dB",
+        digits=2,
+        higher_is_better=False,
+    )
+)
 _share(
     "q_ctc_ssim",
     ALL_ANGLES,

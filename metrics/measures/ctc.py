@@ -6,6 +6,8 @@ Y has codes 64–940, Cb and Cr 64–960, as BT.709-6 quantises them; the peak i
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -79,21 +81,35 @@ def ctc_psnr(pair: PicturePair) -> AngleQuality:
     """Return `q_ctc_psnr` of a pair."""
 
     def measure(a: Floats, b: Floats) -> float:
-        if np.array_equal(a, b):
-            return float("inf")
-        return weighted_psnr(np.square((codes(b) - codes(a)) / PEAK).mean(axis=(0, 1)))
+        return weighted_psnr(np.square((b - a) / PEAK).mean(axis=(0, 1)))
 
-    return each_view(pair, measure)
+    return _each_view(pair, measure, float("inf"))
 
 
 def ctc_ssim(pair: PicturePair) -> AngleQuality:
     """Return `q_ctc_ssim` of a pair."""
 
     def measure(a: Floats, b: Floats) -> float:
-        luminance, contrast = ssim_maps(codes(a)[..., 0] / PEAK, codes(b)[..., 0] / PEAK, peak=1.0, border="nearest")
+        luminance, contrast = ssim_maps(a[..., 0] / PEAK, b[..., 0] / PEAK, peak=1.0, border="nearest")
         return float((luminance * contrast).mean())
 
-    return each_view(pair, measure)
+    return _each_view(pair, measure, 1.0)
+
+
+def _each_view(pair: PicturePair, measure: Callable[[Floats, Floats], float], same: float) -> AngleQuality:
+    """Return a measure of the codes of each pair of sub-images; ``same`` is that of equal ones."""
+    own = None if pair.codes is None else pair.reference.with_pixels(pair.codes.astype(np.uint16)).light_field
+    places = iter(np.ndindex(*pair.reference.ei_pixels[::-1]))  # the order of `each_view`
+
+    def coded(a: Floats, b: Floats) -> float:
+        v, u = next(places)
+        if own is None and np.array_equal(a, b):
+            return same
+        found = codes(b) if own is None else own[:, :, v, u].astype(np.float64)
+        wanted = codes(a)
+        return same if np.array_equal(wanted, found) and own is not None else measure(wanted, found)
+
+    return each_view(pair, coded)
 
 
 def codes(rgb: Floats) -> Floats:

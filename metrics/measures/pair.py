@@ -67,6 +67,9 @@ class PicturePair:
         Pixels that count; all if not given.
     depth, layers_mm, method
         As for `q_depth`, which checks them.
+    codes : ndarray, (N, M, 3), optional
+        YCbCr codes of 10 bit of a decoder that returns them: measures of the common test conditions compare these
+        instead of the decoded picture's.
 
     Raises
     ------
@@ -82,6 +85,7 @@ class PicturePair:
     depth: ArrayLike | FocusDepth | None = None
     layers_mm: ArrayLike | None = None
     method: str = "dissertation"
+    codes: NDArray[Any] | None = None
 
     def __post_init__(self) -> None:
         for name in ("reference", "decoded"):
@@ -93,6 +97,8 @@ class PicturePair:
         self.reference.check_same_structure(self.decoded)
         if self.decoded.camera is not self.reference.camera:
             object.__setattr__(self, "decoded", self.reference.with_pixels(self.decoded.pixels))
+        if self.codes is not None:
+            _check_codes(self.codes, self.reference)
         if self.mask is not None:
             object.__setattr__(self, "mask", _checked_mask(self.mask, self.reference))
 
@@ -119,6 +125,14 @@ class PicturePair:
                 bad = np.flatnonzero(~np.isfinite(row).all(axis=1) & counts)
                 if bad.size:
                     raise ValueError(f"{name} pixel ({bad[0]}, {n}) is {row[bad[0]]}: finite values are needed")
+
+
+def _check_codes(codes: Any, picture: IIPicture) -> None:
+    wanted = picture.pixels.shape
+    if not isinstance(codes, np.ndarray) or codes.dtype.kind not in "uif":
+        raise TypeError(f"codes is a {type(codes).__name__}: an array of numbers of shape {wanted} is needed")
+    if codes.shape != wanted:
+        raise ValueError(f"codes are {codes.shape}: {wanted} is needed")
 
 
 def _checked_mask(mask: Any, picture: IIPicture) -> NDArray[np.bool_]:

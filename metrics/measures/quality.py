@@ -53,6 +53,17 @@ class AngleQuality:
         return int(u), int(v)
 
     @property
+    def step(self) -> float:
+        """Root mean square change from one sub-image to the next along the serpentine path; NaN for a single one."""
+        path = self.values.copy()
+        path[1::2] = path[1::2, ::-1]
+        before, after = path.ravel()[:-1], path.ravel()[1:]
+        changes = np.subtract(
+            after, before, where=before != after, out=np.zeros(before.shape)
+        )  # +inf twice is no change
+        return float(np.sqrt(np.mean(np.square(changes)))) if changes.size else math.nan
+
+    @property
     def _known(self) -> NDArray[np.float64]:
         return self.values[~np.isnan(self.values)]
 

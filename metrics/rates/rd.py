@@ -191,7 +191,7 @@ def rate_distortion(
     progress: Callable[[int, int, str], None] | bool | None = None,
     workers: int | None = None,
     executor: Any = None,
-    measure: Callable[[Any], Mapping[str, Any]] | None = None,
+    measure: Callable[..., Mapping[str, Any]] | None = None,
     known: Mapping[tuple[str, float], dict[str, Any]] | None = None,
     keep: Callable[[dict[str, Any]], None] | None = None,
 ) -> list[dict[str, Any]]:
@@ -211,7 +211,8 @@ def rate_distortion(
         ``reached``: whether the scheme could meet the target.
     decode : callable
         ``decode(coded)`` gives the picture back, or an object with ``picture`` and ``seconds``, as
-        `codec.timed_decode` does.
+        `codec.timed_decode` does, and perhaps ``codes``, which ``measure`` then gets as a keyword, and
+        ``more``, a mapping of further numbers to keep.
     progress : callable or bool, optional
         ``progress(done, total, text)`` after every point, in the calling thread; True prints a line.
     workers : int, optional
@@ -335,7 +336,7 @@ class _Point:
     picture: IIPicture | IIVideo
     encode: Callable[..., Any]
     decode: Callable[[Any], Any]
-    measure: Callable[[Any], Mapping[str, Any]] | None
+    measure: Callable[..., Mapping[str, Any]] | None
 
     def __call__(self, scheme: str, rate: float) -> dict[str, Any]:
         return _measure(self.picture, scheme, rate, self.encode, self.decode, self.measure)
@@ -347,7 +348,7 @@ def _measure(
     rate: float,
     encode: Callable[..., Any],
     decode: Callable[[Any], Any],
-    measure: Callable[[Any], Mapping[str, Any]] | None,
+    measure: Callable[..., Mapping[str, Any]] | None,
 ) -> dict[str, Any]:
     try:
         coded = encode(picture, scheme, bpp=rate)
@@ -355,7 +356,9 @@ def _measure(
         answer = decode(coded)
         spent = time.thread_time() - start
         decoded, seconds = getattr(answer, "picture", answer), getattr(answer, "seconds", spent)
-        quality = {"q_global": _quality(picture, decoded), **(measure(decoded) if measure else {})}
+        codes = getattr(answer, "codes", None)
+        more = {} if measure is None else measure(decoded) if codes is None else measure(decoded, codes=codes)
+        quality = {"q_global": _quality(picture, decoded), **more, **getattr(answer, "more", {})}
     except Exception as error:
         error.add_note(f"while measuring {scheme} at {rate:g} bpp")
         raise

@@ -24,7 +24,11 @@ FORM = "ii-benchmark-pictures"
 
 
 def rendered(reference: Reference) -> Subject:
-    """Render a reference picture or video."""
+    """Render a reference picture or video; a photograph raises ValueError."""
+    if reference.source is not None:
+        raise ValueError(
+            f"{reference.name} is a photograph: --pictures names its folder, --list says where it is had"
+        )
     from ii_core import video_of
     from raytrace_ii import load_scene, load_take, render
 
@@ -41,29 +45,73 @@ def rendered(reference: Reference) -> Subject:
 
 
 def stored(profile: Profile, folder: Path) -> Callable[[Reference], Subject]:
-    """Return a reader of rendered pictures and videos of a profile.
+    """Return a reader of photographs, and of rendered pictures and videos, of a profile.
 
     Raises
     ------
     ValueError
         If a picture of the profile is missing, before any work; the reader also if its pixels are not those of the
-        manifest.
+        manifest, or of the definition for a photograph.
     """
     from metrics.benchmark.subject import identity
 
     place = folder / profile.name
     known = _pixels(_manifest(place, profile))
     for reference in profile.pictures:
-        if reference.name not in known:
+        if reference.source is not None:
+            if (wrong := _wrong_photograph(reference, profile, folder)) is not None:
+                raise ValueError(f"{wrong}: `raytrace-ii benchmark {profile.name} --list` says where it is had")
+            known[reference.name] = str(reference.sha256)
+        elif reference.name not in known:
             raise ValueError(f"{place} has no picture {reference.name}: `raytrace-ii render --set` renders it")
 
     def read(reference: Reference) -> Subject:
-        path, subject = _read(reference, place)
+        path, subject = _read(
+            reference, place if reference.source is None else photograph(reference, profile, folder)
+        )
         if identity("", subject)["sha256"] != known[reference.name]:
             raise ValueError(f"{path} has other pixels than its manifest says: `raytrace-ii render --set` repairs it")
         return subject
 
     return read
+
+
+def photograph(reference: Reference, profile: Profile, folder: Path) -> Path:
+    """Return the folder of a photograph: that of the profile's name inside ``folder``, or ``folder`` itself."""
+    inside = folder / profile.name
+    return inside if (inside / f"{reference.name}.png").is_file() else folder
+
+
+def _wrong_photograph(reference: Reference, profile: Profile, folder: Path) -> str | None:
+    """Return what is wrong with a photograph in a folder; None if it has the pixels of the definition."""
+    from metrics.benchmark.subject import identity
+
+    place = photograph(reference, profile, folder)
+    if not (place / f"{reference.name}.png").is_file():
+        return f"{folder} has no picture {reference.name}"
+    path, subject = _read(reference, place)
+    if reference.matches(identity("", subject)["sha256"]):
+        return None
+    return f"{path} has other pixels than profile {profile.name} fixes"
+
+
+def listing(profile: Profile, folder: Path | None) -> list[str]:
+    """Return a line per picture of a profile; of a photograph also where it is had and the command that makes it."""
+    lines = []
+    for reference in profile.pictures:
+        if (source := reference.source) is None:
+            lines.append(f"{reference.name}: rendered from scene {reference.scene}")
+            continue
+        wrong = "not looked for, --pictures names a folder" if folder is None else None
+        wrong = wrong or (folder and _wrong_photograph(reference, profile, folder)) or "there, pixels as defined"
+        (columns, rows), (width, height) = reference.views or (0, 0), reference.view_pixels or (0, 0)
+        lines += [
+            f"{reference.name}: {wrong}",
+            f"  {source.camera}, {columns}×{rows} views of {width}×{height} px",
+            f"  {source.repository} at {source.commit}: {source.path}; licence: {source.licence}",
+            f"  {source.command(reference.name, str(folder or 'DIR'))}",
+        ]
+    return lines
 
 
 def render_profiles(named: str, folder: Path, force: bool, workers: int | None) -> None:
@@ -72,6 +120,12 @@ def render_profiles(named: str, folder: Path, force: bool, workers: int | None) 
 
     for name in [named] if named else profile_names():
         defined = profile(name)
+        if any(reference.source is not None for reference in defined.pictures):
+            if named:
+                raise ValueError(
+                    f"{name} has photographs: `raytrace-ii benchmark {name} --list` says where they are had"
+                )
+            continue
         manifest = _render(defined, folder / defined.name, force, workers)
         found = _pixels(manifest)
         wrong = [
@@ -171,7 +225,7 @@ def _read(reference: Reference, place: Path) -> tuple[Path, Subject]:
 
     if reference.frames is None:
         path = place / f"{reference.name}.png"
-        return path, IIPicture.load(path)
+        return path, reference.part(IIPicture.load(path))
     path = place / reference.name
     video = open_video(path)
     if video.frames != reference.frames:

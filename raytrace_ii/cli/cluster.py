@@ -51,3 +51,13 @@ def _check_address(address: str) -> None:
     get_address_host_port(address)
     if scheme == "tls" and Security().get_connection_args("client").get("ssl_context") is None:
         raise ValueError("no TLS certificates are configured for dask")
+
+
+def check_cluster(workers: int | None, dask: str | None, plugin: Any) -> None:
+    """Raise ValueError for options of threads and of a cluster that exclude each other."""
+    if dask and workers is not None:
+        raise ValueError("--workers is for threads of this machine: leave it out with --dask")
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers is {workers}: at least 1 is needed")
+    if dask and plugin:
+        raise ValueError("--plugin is for this machine alone: with --dask, install it as a package on all workers")

@@ -71,8 +71,13 @@ def with_camera(picture: IIPicture, name: str, angle_deg: float | None = None) -
     ValueError
         If an angle is given for a picture with a camera.
     """
-    from ii_core.picture.assumed import ASSUMED_ANGLE_DEG, with_assumed_camera
+    from dataclasses import replace
 
+    from ii_core.picture.assumed import ASSUMED_ANGLE_DEG, is_nominal, with_assumed_camera
+
+    if is_nominal(picture) and angle_deg is not None:
+        picture = replace(picture, camera=None)
+    tell_nominal(picture, name)
     if picture.camera is not None:
         if angle_deg is not None:
             raise ValueError(f"{name} has a camera with a viewing angle: leave out --angle")
@@ -82,6 +87,14 @@ def with_camera(picture: IIPicture, name: str, angle_deg: float | None = None) -
     if angle_deg is None:
         print(f"note: {one_line(name)} has no camera: a viewing angle of {angle:g}° is assumed", file=sys.stderr)
     return seen
+
+
+def tell_nominal(picture: IIPicture, name: str) -> None:
+    """Tell on the error stream that lengths are nominal, if the picture's camera was assumed."""
+    from ii_core.picture.assumed import is_nominal
+
+    if is_nominal(picture):
+        print(f"note: {one_line(name)} has a nominal camera: lengths in mm are nominal", file=sys.stderr)
 
 
 def image_file(path: Path | None, dtype: str) -> list[Path]:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .cluster import Dask, cluster
+from .cluster import Dask, check_cluster, cluster
 from .coding import study_orders
-from .common import Force, Workers, app, check_outputs, check_unused, columns, load_any
+from .common import Force, Workers, app, check_outputs, check_unused, columns, load_any, tell_nominal
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, spinner
 from .tables import print_table
@@ -73,6 +74,7 @@ def measure(
 ) -> None:
     """Compare two II-pictures of the same structure, or two takes over time."""
     from ii_core import IIPicture
+    from ii_core.base.atomic import atomic_folder
     from ii_core.base.extras import load
     from ii_core.base.files import read_depth, read_image, write_json
     from metrics import report
@@ -98,6 +100,7 @@ def measure(
 
         check_outputs([*files, *(plots / name for name in PLOTS)], force, make_folder=True)
     a = IIPicture.load(reference)
+    tell_nominal(a, str(reference))
     b = _judged(decoded, a)
     made = report(
         a,
@@ -109,11 +112,13 @@ def measure(
         layers_mm=_layers(layers, a),
         method=method,
     )
-    if plots:
-        with spinner(f"draw into {plots}"):
-            plot_all(a, b, made.depth, plots)
-    if json:
-        write_json(json, {"reference": str(reference), "decoded": str(decoded), **made.numbers})
+    with ExitStack() as outputs:  # numbers and charts appear together, or a stopped run leaves neither
+        if plots:
+            folder = outputs.enter_context(atomic_folder(plots))
+            with spinner(f"draw into {plots}"):
+                plot_all(a, b, made.depth, folder)
+        if json:
+            write_json(json, {"reference": str(reference), "decoded": str(decoded), **made.numbers})
     columns(made.rows)
 
 
@@ -206,12 +211,7 @@ def study(
     if orders:
         coding = ("schemes", "anchor", "rates", "measures", "depth", "method", "layers", "workers", "dask")
         check_unused(context, "--orders", *coding)
-    if dask and workers is not None:
-        raise ValueError("--workers is for threads of this machine: leave it out with --dask")
-    if workers is not None and workers < 1:
-        raise ValueError(f"workers is {workers}: at least 1 is needed")
-    if dask and plugin:
-        raise ValueError("--plugin is for this machine alone: with --dask, install it as a package on all workers")
+    check_cluster(workers, dask, plugin)
     load_plugins(plugin)
     if not orders:
         for library in ("matplotlib", "bjontegaard"):  # before the work

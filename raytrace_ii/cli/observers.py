@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -142,6 +143,7 @@ def opinions(
     force: Force = False,
 ) -> None:
     """Analyse results of a test with observers: scores with intervals, and their prediction by measures."""
+    from ii_core.base.atomic import atomic_path
     from ii_core.base.files import write_json
     from ii_core.display.figure import check_suffix
     from metrics.observers import read_results, verdict
@@ -157,10 +159,11 @@ def opinions(
     for note in made.notes:
         say(f"note: {note}")
     _print(made)
-    if json:
-        write_json(json, made.numbers)
-    if chart:
-        opinion_chart(made, chart)
+    with ExitStack() as outputs:  # numbers and chart appear together, or a stopped run leaves neither
+        if chart:
+            opinion_chart(made, outputs.enter_context(atomic_path(chart)))
+        if json:
+            write_json(json, made.numbers)
 
 
 def _print(made: Verdict) -> None:

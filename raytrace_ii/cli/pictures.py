@@ -57,7 +57,10 @@ def regular(
 @app.command("import")
 def import_(
     source: Annotated[
-        Path, typer.Argument(help="A folder of views, a quilt (name_qsCxRaA.png) or a lenslet picture.")
+        Path,
+        typer.Argument(
+            help="A folder of views, .mat, .h5, a quilt (name_qsCxRaA.png), a lenslet picture, .lfp, .lfr, .raw."
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="The II-picture: .png, .tif or .exr.")],
     ei_pixels: Annotated[
@@ -65,6 +68,9 @@ def import_(
     ] = None,
     grid: Annotated[
         str | None, typer.Option(help="Columns × rows of views, such as 9x9, if names do not contain them.")
+    ] = None,
+    middle: Annotated[
+        str | None, typer.Option(help="Take only the middle views, of the first × the second number, such as 5x5.")
     ] = None,
     transposed: Annotated[
         bool | None, typer.Option("--transposed/--not-transposed", help="The first number is horizontal.")
@@ -83,6 +89,12 @@ def import_(
         float | None,
         typer.Option(help="Distance of the plane of zero disparity from the cameras; infinity by default."),
     ] = None,
+    whites: Annotated[
+        Path | None,
+        typer.Option(
+            help="White picture of a raw one, or the camera's calibration data to choose from: a folder, .tar."
+        ),
+    ] = None,
     force: Force = False,
 ) -> None:
     """Import a light field of other programs as an II-picture.
@@ -93,11 +105,19 @@ def import_(
     """
     from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset
     from ii_core.base.files import check_type, image_types
+    from ii_core.picture.assumed import ASSUMED_ANGLE_DEG, with_assumed_camera
     from ii_core.picture.picture import sidecar
 
-    image_types(output)
+    types = image_types(output)
     check_outputs([output, sidecar(output)], force)
+    if whites is not None or source.suffix.lower() in (".lfp", ".lfr", ".raw"):
+        _import_raw(source, whites, output, 8 if "uint8" in types else 16)
+        return
     views = None if ei_pixels is not None else find_views(source, grid=None if grid is None else pair("grid", grid))
+    if middle is not None:
+        if views is None:
+            raise ValueError("middle is for folders of views: leave it out with --ei-pixels")
+        views = views.middle(pair("middle", middle))
     if baseline_mm is None and focal_mm is not None and views is not None and views.positions is not None:
         baseline_mm = views.positions.baseline_mm
     rig = _rig(camera, baseline_mm, focal_mm, sensor_mm, focus_mm)
@@ -113,13 +133,38 @@ def import_(
     if known is not None:
         made = IIPicture(made.pixels, known.lenses, known.ei_pixels, known, known.erect)
     check_type(output, made.pixels.dtype.name)
+    nominal = made.camera is None and (views is None or views.structure is None)
+    if nominal:
+        made = with_assumed_camera(made)
     made.save(output)
     (k, l), (u, v) = made.lenses, made.ei_pixels
     say_done(f"{output}: {k}×{l} lenses of {u}×{v} px, {made.pixels.dtype}")
     if order is not None:
         say(order.describe())
-    if made.camera is None:
-        say("no camera is known: measures of views and of depth need one")
+    if nominal:
+        say(
+            f"no camera is known: a nominal one of {ASSUMED_ANGLE_DEG:g}°, with pixels of 1 mm, is written; "
+            f"raytrace-ii camera {output} --set … replaces it"
+        )
+
+
+def _import_raw(source: Path, whites: Path | None, output: Path, bits: int) -> None:
+    """Write the regular II-picture of a raw picture of a lenslet camera."""
+    from ii_core import resampled
+    from ii_core.base.files import check_type
+
+    from .calibrating import captured
+
+    check_type(output, f"uint{bits}")
+    with progress_bar(f"import {source.name}") as report:
+        shot = captured(source, white=whites, bits=bits, report=report)
+    with spinner(f"resample {source.name}"):
+        made, owned = resampled(shot.picture, deshift=shot.found.grid.lattice.hexagonal)
+        made.save(output)
+    (k, l), (u, v) = made.lenses, made.ei_pixels
+    say(shot.found.describe())
+    say(shot.told())
+    say_done(f"{output}: {k}×{l} lenses of {u}×{v} px, {owned.mean():.1%} of the pixels owned by their lens")
 
 
 def _rig(
@@ -140,11 +185,58 @@ def _rig(
     return Rig(baseline_mm=baseline_mm, focal_mm=focal_mm, sensor_mm=sensor_mm, focus_mm=focus_mm)
 
 
+CAMERA_PARTS = {  # of `camera FIELD --set`: all of one line are needed, but focus
+    ("angle",): "viewing angle in degrees; pixels of 1 mm",
+    ("pixel", "gap"): "pixel pitch and gap in mm",
+    ("baseline", "focal", "sensor", "focus"): "of an array of cameras, in mm",
+}
+
+
+def set_camera(field: Path, text: str) -> None:
+    """Replace the camera in a regular II-picture's sidecar; parts are as in ``baseline=20,focal=50,sensor=35``."""
+    from dataclasses import replace
+
+    from ii_core import IICamera, IIPicture, Rig, with_assumed_camera
+    from ii_core.base.files import read_json, write_json
+    from ii_core.picture.picture import sidecar
+
+    parts: dict[str, float] = {}
+    for part in text.split(","):
+        name, _, number = part.strip().partition("=")
+        try:
+            parts[name] = float(number)
+        except ValueError:
+            raise ValueError(f"--set has {part.strip()!r}: a name and a number as in angle=30 are needed") from None
+    form = next((form for form in CAMERA_PARTS if {*form} - {"focus"} <= {*parts} <= {*form}), None)
+    if form is None:
+        known = "; ".join(f"{','.join(f'{name}=…' for name in form)}: {what}" for form, what in CAMERA_PARTS.items())
+        raise ValueError(f"--set is {text!r}: known are {known}")
+    picture = IIPicture.load(field)
+    picture.check_regular()
+    if form == ("angle",):
+        camera = with_assumed_camera(replace(picture, camera=None), parts["angle"]).camera
+    elif "gap" in form:
+        camera = IICamera(
+            name=field.stem, pixels=picture.size, lenses=picture.lenses, pixel_pitch_mm=parts["pixel"],
+            gap_mm=parts["gap"],
+        )  # fmt: skip
+    else:
+        rig = Rig(**{f"{name}_mm": value for name, value in parts.items()})
+        camera = rig.camera((picture.ei_pixels[0], picture.ei_pixels[1]), picture.lenses)
+    assert camera is not None
+    path = sidecar(field)
+    write_json(path, {**read_json(path), "camera": camera.to_json()})
+    say_done(f"{path}: camera {camera.name}, viewing angle {camera.view_angle_deg:.4g}°")
+
+
+LAYOUTS = ("views", "hci", "quilt", "mosaic", "mat", "h5")
+
+
 @app.command()
 def export(
     picture: Annotated[Path, typer.Argument(help="An II-picture of regular structure, or a coded file.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A folder, or a file for a quilt or mosaic.")],
-    to: Annotated[str, typer.Option(help="views, hci, quilt or mosaic.")] = "views",
+    to: Annotated[str, typer.Option(help="views, hci, quilt, mosaic, mat or h5.")] = "views",
     depth: Annotated[Path | None, typer.Option(help="Map of z in mm (.exr), for the disparity map of hci.")] = None,
     row: Annotated[
         int | None, typer.Option(help="Row of views for a quilt, from 0; the middle one by default.")
@@ -156,11 +248,12 @@ def export(
     from ii_core import write_hci, write_quilt, write_views
     from ii_core.base.atomic import atomic_folder
     from ii_core.base.files import read_depth, write_image
+    from ii_core.formats.arrays import write_array
     from ii_core.formats.quilt import quilt_path
 
     load_plugins(plugin)
-    if to not in ("views", "hci", "quilt", "mosaic"):
-        raise ValueError(f"unknown layout {to!r}: known are views, hci, quilt, mosaic")
+    if to not in LAYOUTS:
+        raise ValueError(f"unknown layout {to!r}: known are {', '.join(LAYOUTS)}")
     if depth is not None and to != "hci":
         raise ValueError(f"depth is no option of layout {to}: use --to hci")
     original = load_any(picture)
@@ -174,6 +267,14 @@ def export(
                 write_hci(original, folder, depth=z)
         (k, l), (u, v) = original.lenses, original.ei_pixels
         say_done(f"{output}: {u * v} views of {k}×{l} px")
+        return
+    if to in ("mat", "h5"):
+        if output.suffix.lower() != f".{to}":
+            raise ValueError(f"{output} does not end in .{to}, which --to {to} writes")
+        check_outputs([output], force)
+        with spinner(f"export {picture.name}"):
+            write_array(original, output)
+        say_done(f"{output}: LF[v, u, y, x, c] and the camera")
         return
     target = quilt_path(output, original) if to == "quilt" else output
     check_outputs(image_file(target, original.pixels.dtype.name), force)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 ACROSS = {"plane", "cone"}  # options of views over the viewing zone
 USED = {
     "quilt": {"for_", "tiles", "whole", *ACROSS},
-    "lenticular": {"pitch", "slope", "centre", *ACROSS},
+    "lenticular": {"pitch", "slope", "centre", "calibration", "whole", *ACROSS},
     "simulation": {"at", "fill"},
     "parallax": {"frames", "fps", *ACROSS},
 }
@@ -140,6 +140,9 @@ def display(
     centre: Annotated[
         float, typer.Option(help="Lenticular: column of a border between lenses, in the top row.")
     ] = 0.0,
+    calibration: Annotated[
+        Path | None, typer.Option(help="Lenticular: visual.json of a Looking Glass, for its panel's own picture.")
+    ] = None,
     at: Annotated[str | None, typer.Option(help="Simulation: position of the eye, mm: x,y,z.")] = None,
     fill: Annotated[float, typer.Option(help="Simulation: diameter of a lens over the pitch.")] = 1.0,
     frames: Annotated[int, typer.Option(help="Parallax: views around the viewing zone, at most 3000.")] = 60,
@@ -162,6 +165,12 @@ def display(
     if kind not in USED:
         raise ValueError(f"unknown kind {kind!r}: known are {', '.join(USED)}")
     check_unused(context, f"--as {kind}", *set().union(*USED.values()) - USED[kind])
+    if calibration is not None:
+        check_unused(context, "--calibration", "size", "pitch", "slope", "centre")
+        _native(picture, output, calibration, plane, cone, whole, angle, force)
+        return
+    if kind == "lenticular":
+        check_unused(context, "--as lenticular without --calibration", "whole")
     plan = QuiltPlan(for_, tiles, size, cone, whole) if kind == "quilt" else None
     pixels, share = pair("size", SIZE if size is None else size), 0.9 if cone is None else cone
     if plan is not None:
@@ -182,6 +191,23 @@ def display(
             made = display_simulation(original, _eye(original, at), size=pixels, fill=fill)
         write_image(output, made)
     say_done(f"{output}: {made.shape[1]}×{made.shape[0]} px")
+
+
+def _native(
+    picture: Path, output: Path, calibration: Path, plane: float | None, cone: float | None, whole: bool,
+    angle: float | None, force: bool,
+) -> None:  # fmt: skip
+    """Write the picture of a Looking Glass's own panel."""
+    from ii_core import IIPicture
+    from ii_core.base.files import write_image
+    from ii_core.display.looking_glass import native_picture, read_looking_glass
+
+    check_outputs(image_file(output, "uint8"), force)
+    display = read_looking_glass(calibration)
+    original = with_camera(IIPicture.load(picture), str(picture), angle)
+    with spinner(f"panel picture of {picture.name}"):
+        write_image(output, native_picture(original, display, depth_mm=plane, cone=cone, whole=whole))
+    say_done(f"{output}: {display.size[0]}×{display.size[1]} px, for the display of {calibration.name} alone")
 
 
 def _film(

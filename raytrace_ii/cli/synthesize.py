@@ -53,6 +53,14 @@ def camera(
     solve: Annotated[
         str | None, typer.Option(help="Solve for the missing lengths: pitch=0.39,gap=0.73,pixel=0.0061")
     ] = None,
+    set_: Annotated[
+        str | None,
+        typer.Option(
+            "--set",
+            help="Replace the camera of an II-picture, given instead of a name: angle=30; pixel=0.01,gap=3; "
+            "or baseline=20,focal=50,sensor=35,focus=900.",
+        ),
+    ] = None,
     force: Force = False,
 ) -> None:
     """Store a camera as L and D maps, print its properties, design one for a panel, or solve for missing lengths."""
@@ -60,6 +68,12 @@ def camera(
     from ii_core.camera.maps import check_format, map_files
 
     check_format(format)
+    if set_ is not None:
+        from .pictures import set_camera
+
+        check_only(context, "--set replaces the camera of a picture", {"name", "set_"})
+        set_camera(Path(name), set_)
+        return
     if solve is not None:
         check_only(context, "--solve is all of its command", {"solve"})
         _print_solution(solve)

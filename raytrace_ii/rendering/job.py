@@ -15,11 +15,12 @@ from ii_core import Camera, IICamera, MapCamera
 from ii_core.base.colour import srgb
 
 from ..scene.scene import Scene
+from ..tracing.kernels.arrays import Start
 from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb, encode_steps
 from ..tracing.packing import packed, share
 from ..tracing.sampling import Adaptive, Sampling, Shoot, adaptive_mean, fixed_sum
-from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer
+from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer, start_tables
 from .audit import FULL_DEPTH, FULL_SAMPLES, Audit, chosen, compared
 from .nearness import parts_of_pixel, pixels_are_nearer, steps_at_content
 from .tiles import Order, Tile, ray_order, tiles
@@ -145,7 +146,7 @@ class Job:
             divisor = 1
         else:
             radiance, divisor = self._fixed(tracer, self.sampling, rows, cols, order, support), self.sampling
-            samples = np.full(len(radiance), divisor, np.int32)
+            samples = np.full(len(radiance) if "samples" in self.support else 0, divisor, np.int32)
             histogram = {divisor: len(radiance)}
         found = {} if support is None else vars(support)
         arrays = {"pixels": encoded(radiance, order.pixels, divisor, self.dtype).reshape(*shape, 3)}
@@ -229,8 +230,7 @@ class Job:
         turn, shift = self.pose[:3, :3].T, self.pose[:3, 3]
         with np.errstate(over="ignore", invalid="ignore"):
             origins, directions = (L @ turn + shift).astype(np.float32), (D @ turn).astype(np.float32)
-        hits, _ = packed(self.scene).intersector.nearest(origins, directions)
-        return np.where(hits.faces >= 0, hits.distances.astype(np.float64), np.nan)
+        return packed(self.scene).intersector.distances(origins, directions).astype(np.float64)
 
     def _lobes(self) -> tuple[int, int]:
         """Return the rays of a sample over a rough mirror's lobe, and the samples that share the lobe's positions."""
@@ -258,17 +258,14 @@ class Job:
     ) -> NDArray[np.float32]:
         """Return the summed radiance of a tile with a fixed number of samples, in the order of the rays."""
         m, n = cols.start + order.columns, rows.start + order.rows
-        if isinstance(self.camera, IICamera):
-            if samples > 1:
-                return fixed_sum(
-                    self.camera, samples, self.seed, m, n, TILE_RAYS, self._parts, self._shoot(tracer, support)
-                )  # fmt: skip
-            rays = self.camera.separable_rays(rows, cols)
-        else:
-            rays = None
-        radiance = np.zeros((len(order.pixels), 3), np.float32)
-        keys = self._keys(m, n, 0, 1)
-        if rays is not None and tracer.run_separable(rays, radiance, support, order.rows, order.columns, keys):
+        if samples > 1 and isinstance(self.camera, IICamera):
+            return fixed_sum(
+                self.camera, samples, self.seed, m, n, TILE_RAYS, self._parts, self._shoot(tracer, support)
+            )  # fmt: skip
+        radiance = tracer.dark(len(order.pixels))
+        start = self._start(rows, cols, order)
+        if start is not None:
+            tracer.run_separable(start, radiance, support, self._keys(m, n, 0, 1))
             return radiance
         for sample in range(samples):
             self._check_stopped()
@@ -276,10 +273,24 @@ class Job:
                 L, D, shares = self.camera.stored_rays(sample, rows, cols)
             else:
                 L, D, shares = self.camera.weighted_rays(rows, cols)
-            if sample > 0:
-                keys = self._keys(m, n, sample, 1)
+            keys = self._keys(m, n, sample, 1)
             tracer.run(L, D, radiance, support if sample == 0 else None, shares, keys, order.pixels)
         return radiance
+
+    def _start(self, rows: slice, cols: slice, order: Order) -> Start | None:
+        """Return the rays of a tile by columns and rows; None if the camera's do not follow from them.
+
+        Tables of the whole picture are computed once a thread: for every tile they would take 6 ns a pixel.
+        """
+        if not hasattr(self._local, "tables"):
+            rays, some = None, slice(0, 2)
+            if isinstance(self.camera, IICamera) and self.camera.separable_rays(some, some) is not None:
+                rays = self.camera.separable_rays()  # of a camera without, it would compute all to no end
+            self._local.tables = None if rays is None else start_tables(rays, self.pose)
+        if self._local.tables is None:
+            return None
+        by_columns, by_rows = self._local.tables
+        return Start(by_columns, by_rows, order.rows, order.columns, rows.start, cols.start)
 
     def _keys(self, m: NDArray[Any], n: NDArray[Any], first: int, count: int) -> NDArray[np.uint64] | None:
         """Return the keys of ``count`` samples of each pixel; None unless the scene is glossy."""

@@ -19,6 +19,8 @@ import embreex.rtcore_scene  # loads the library and what it depends on
 import numpy as np
 from numpy.typing import NDArray
 
+from .kernels import packets
+from .kernels.lanes import aligned
 from .kernels.packets import PACKET_ROWS, Calls, packet_kernels
 
 CONFIGURATION = "RAYTRACE_II_EMBREE"  # environment variable: Embree's device configuration, or "embreex"
@@ -30,7 +32,6 @@ _VERSION, _NATIVE = 0, {16: 34, 8: 33, 4: 32}  # RTCDeviceProperty
 _ROBUST, _TRIANGLE, _INDEX, _VERTEX, _UINT3, _FLOAT3 = 1 << 2, 0, 0, 1, 0x5003, 0x9003
 _COHERENT = 1 << 16  # RTC_RAY_QUERY_FLAG_COHERENT
 _SPARE = 4  # float32 behind a shared buffer's last row: Embree reads 16 bytes at a time
-_CACHE_LINE = 64
 # Largest spread of a coherent packet: wider ones lose to groups of near rays, or to Embree's traversal for rays
 # without order (all scenes, scales 1–32 of setup1, 2026-11-22). Sum of the sides of the box around the origins, with
 # its growth on the way to the last hit, in median edges of the faces; the same of the directions as a share.
@@ -115,6 +116,7 @@ def _declared(functions: ctypes.CDLL) -> ctypes.CDLL:
         ("rtcReleaseGeometry", None, [pointer]),
         ("rtcCommitScene", None, [pointer]),
         ("rtcReleaseScene", None, [pointer]),
+        *((f"{kind}{width}", None, [pointer] * 4) for kind in ("rtcIntersect", "rtcOccluded") for width in _NATIVE),
     ):
         function = getattr(functions, name)
         function.restype, function.argtypes = result, arguments
@@ -157,7 +159,7 @@ class Tree:
         f.rtcCommitScene(self._scene)
         if error := f.rtcGetDeviceError(library.device):
             raise MemoryError(f"Embree cannot build the tree of {len(corners)} faces: error {error}")
-        self._arguments = _lines(2, np.uint32)
+        self._arguments = aligned(32).view(np.uint32).reshape(2, 16)
         self._arguments[:, 1] = 0xFFFFFFFF  # every feature
         self._arguments[0, 0] = _COHERENT
         self._rooms = threading.local()
@@ -182,6 +184,29 @@ class Tree:
         kernel = packet_kernels(self.library.width)[1]
         kernel(*self._room("rtcOccluded"), origins, directions, reach, out)
 
+    def few(self, function: str, origins: Floats, directions: Floats, reach: float) -> HitArrays:
+        """As `nearest`, or of ``rtcOccluded`` with distances below 0 where something is hit, without a kernel.
+
+        Neither the few rays that choose a packet's rays nor those of `_layouts_hold` are worth compiling one.
+        """
+        n, width, (active, _) = len(origins), self.library.width, lane_masks()
+        packet = aligned(packets.PACKET_ROWS * width).reshape(-1, width)
+        numbers, call = packet.view(np.int32), getattr(self.library.functions, f"{function}{width}")
+        faces, (u, v, distances) = np.empty(n, np.int32), np.empty((3, n), np.float32)
+        for first in range(0, n, width):
+            some = slice(first, min(first + width, n))
+            lanes = some.stop - first
+            packet[:] = 0
+            packet[:3, :lanes], packet[packets.DIRECTION :, :lanes][:3] = origins[some].T, directions[some].T
+            packet[packets.FAR] = reach
+            numbers[[packets.MASK, packets.GEOMETRY, packets.INSTANCE]] = -1
+            active[:width] = np.where(np.arange(width) < lanes, -1, 0)
+            call(active.ctypes.data, self._scene, packet.ctypes.data, self._arguments[1].ctypes.data)
+            faces[some] = np.where(numbers[packets.GEOMETRY] >= 0, numbers[packets.FACE], -1)[:lanes]
+            for out, row in ((u, packets.U), (v, packets.V), (distances, packets.FAR)):
+                out[some] = packet[row, :lanes]
+        return faces, u, v, distances
+
     def _room(self, function: str) -> tuple[Any, ...]:
         """Addresses, most spread and room for rays, which threads must not share: kept for each of them."""
         kept: dict[str, tuple[Any, ...]] = vars(self._rooms)
@@ -190,16 +215,18 @@ class Tree:
         return kept[function]
 
     def _new_room(self, function: str) -> tuple[Any, ...]:
-        width = self.library.width
-        active, chosen = _lines(2, np.int32)
-        packet = _lines(PACKET_ROWS * width // 16 + 1, np.float32).reshape(-1)
-        address = ctypes.cast(getattr(self.library.functions, f"{function}{width}"), ctypes.c_void_p).value or 0
-        calls = Calls(
-            address, self._scene, self._arguments[0].ctypes.data, self._arguments[1].ctypes.data,
-            active.ctypes.data, packet.ctypes.data, np.float32(NEAR[function] * self._edge),
-            np.float32(NARROW[function]),
+        active, chosen = lane_masks()
+        packet = aligned(PACKET_ROWS * self.library.width)
+        return self.calls(function, active, packet), active, chosen, packet, packet.view(np.int32)
+
+    def calls(self, function: str, active: NDArray[np.int32], packet: Floats) -> Calls:
+        """What a function is called with for packets in memory of the caller, which threads must not share."""
+        entry = getattr(self.library.functions, f"{function}{self.library.width}")
+        return Calls(
+            ctypes.cast(entry, ctypes.c_void_p).value or 0, self._scene, self._arguments[0].ctypes.data,
+            self._arguments[1].ctypes.data, active.ctypes.data, packet.ctypes.data,
+            np.float32(NEAR[function] * self._edge), np.float32(NARROW[function]),
         )  # fmt: skip
-        return calls, active, chosen, packet, packet.view(np.int32)
 
 
 def with_spare(corners: Floats) -> Floats:
@@ -214,11 +241,9 @@ def with_spare(corners: Floats) -> Floats:
     return room[: corners.size].reshape(corners.shape)
 
 
-def _lines(count: int, dtype: Any) -> NDArray[Any]:
-    """Cache lines of zeros, 16 numbers a row: Embree needs packets aligned."""
-    raw = np.zeros((count + 1) * _CACHE_LINE, np.uint8)
-    start = -raw.ctypes.data % _CACHE_LINE
-    return raw[start : start + count * _CACHE_LINE].view(dtype).reshape(count, 16)
+def lane_masks() -> NDArray[np.int32]:
+    """Two rows of 16 zeros, aligned as Embree needs them: which lanes are traced, and which are left."""
+    return aligned(32).view(np.int32).reshape(2, 16)
 
 
 def _layouts_hold(library: Library) -> bool:
@@ -231,12 +256,10 @@ def _layouts_hold(library: Library) -> bool:
     x = np.linspace(1, 7, n, dtype=np.float32)
     beside = np.arange(n) % 2 == 1
     origins = np.column_stack([x + 100 * beside, np.full(n, 2), np.zeros(n)]).astype(np.float32)
-    directions, reach = np.tile(np.array([0, 0, 2], np.float32), (n, 1)), np.full(n, 3, np.float32)
+    directions = np.tile(np.array([0, 0, 2], np.float32), (n, 1))
     tree = Tree(library, square, robust=True)
-    faces, (u, v, distances) = np.empty(n, np.int32), np.empty((3, n), np.float32)
-    tree.nearest(origins, directions, reach, (faces, u, v, distances))
-    blocked = np.empty(n, np.int32)
-    tree.occluded(origins, directions, reach, blocked)
+    faces, u, v, distances = tree.few("rtcIntersect", origins, directions, 3)
+    blocked = np.where(tree.few("rtcOccluded", origins, directions, 3)[3] < 0, 0, -1)
     second = x > 6
     right_u, right_v = np.where(second, (8 - x) / 8, x / 8), np.where(second, 0.75, 0.25)
     return (

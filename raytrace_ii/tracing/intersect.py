@@ -14,13 +14,14 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from .embree import Tree, library, with_spare
+from .embree import Tree, lane_masks, library, with_spare
 from .kernels.arrays import Hits
-from .kernels.packets import place_hits
+from .kernels.lanes import BLOCK
+from .kernels.packets import NO_CALLS, Tools, place_hits
 from .same_faces import first_of_same
 
 Floats = NDArray[np.float32]
-_NO_REACH = np.empty(0, np.float32)
+_NO_REACH, _NO_FACES = np.empty(0, np.float32), np.empty(0, np.int32)
 
 
 class Intersector:
@@ -53,6 +54,33 @@ class Intersector:
     def nearest(self, origins: Floats, directions: Floats, placed: bool = True) -> tuple[Hits, float]:
         """Nearest hit of every ray, and CPU seconds inside Embree; ``placed`` as in `embree.Tree`."""
         return _nearest(self._all, self._first, origins, directions, _NO_REACH, placed)
+
+    def distances(self, origins: Floats, directions: Floats) -> Floats:
+        """Distances of the nearest hits of a few rays, to Embree's precision; NaN on a miss."""
+        if isinstance(self._all, Tree):
+            faces, _, _, found = self._all.few("rtcIntersect", origins, directions, np.inf)
+        else:
+            faces, _, _, found = self.nearest(origins, directions)[0]
+        return np.where(faces >= 0, found, np.float32(np.nan))
+
+    def tools(self, packet: Floats) -> Tools:
+        """Return what a kernel calls Embree with itself, for packets in memory of one thread."""
+        active, chosen = lane_masks()
+        nearest, stop = (
+            tree.calls(function, active, packet) if isinstance(tree, Tree) else NO_CALLS
+            for tree, function in ((self._all, "rtcIntersect"), (self._opaque, "rtcOccluded"))
+        )
+        return Tools(nearest, stop, active, chosen)
+
+    @property
+    def width(self) -> int:
+        """Rays of a packet."""
+        return self._all.library.width if isinstance(self._all, Tree) else BLOCK
+
+    @property
+    def first_of_same(self) -> NDArray[np.int32]:
+        """Return for each face the first of those in the same place; of no rows if no two are."""
+        return _NO_FACES if self._first is None else self._first
 
     def nearest_clear(self, origins: Floats, directions: Floats, reach: Floats = _NO_REACH) -> tuple[Hits, float]:
         """Nearest hit within ``reach`` with a face that lets light through; faces count from their first."""

@@ -14,17 +14,15 @@ LIFT_STEPS, MOST_LIFT = 8 * float(np.finfo(np.float32).smallest_subnormal), 1e-3
 SOME_FACES = 1 << 16
 
 
-def face_table(corners: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Unit normal (0 for a face without area), lift in mm and pull of every face.
+def fill_face_table(corners: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    """Write unit normal (0 for a face without area), lift in mm and pull of every face as rows of ``out``.
 
     The pull takes a hit about as far towards the middle of its face as the lift takes it off the face, as a share
     of the way.
     """
-    out = np.empty((len(corners), 5), np.float32)
     for first in range(0, len(corners), SOME_FACES):  # in float64 all at once would take ten times the table
         some = slice(first, first + SOME_FACES)
         out[some] = _face_rows(corners[some].astype(np.float64))
-    return out
 
 
 def _face_rows(p: NDArray[np.float64]) -> NDArray[np.float64]:

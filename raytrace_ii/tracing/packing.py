@@ -16,7 +16,8 @@ from ..scene.textures import Image
 from . import lift
 from .intersect import Intersector
 from .kernels import tables
-from .kernels.arrays import FaceTables, Surfaces, Surroundings
+from .kernels.arrays import FaceTables, Maps, Surfaces, Surroundings
+from .kernels.lanes import aligned
 from .kernels.tables import DIRECTIONAL, LEAST_WEIGHT, MATERIAL_COLUMNS, POINT, SPOT
 from .texture_table import TextureTable
 
@@ -45,11 +46,10 @@ def share(scene: Scene, other: Scene) -> None:
 class PackedScene:
     """Packed scene: the arrays that the kernels read.
 
-    ``corners`` is (F, 3, 3) float32 positions, ``faces`` (F, 5) unit normals, lifts and pulls. ``normals`` is like
-    ``corners`` for shading, of length 1 or 0, of no faces if every body is flat; ``coordinates`` for textures, of no
-    faces if there are none: a scene pays only for what it has. ``nested`` is how many transmissive bodies a ray may
-    be in at once by their ``clear_bounds`` (B, 2, 3); they and bodies with cut-outs follow the ``opaque_faces``.
-    ``least`` is the weight from which on a ray is worth shooting.
+    ``corners`` is (F, 3, 3) float32 positions, ``faces`` (F, 5) unit normals, lifts and pulls, ``coordinates`` like
+    ``corners`` for textures, of no faces if there are none: a scene pays only for what it has. ``nested`` is how many
+    transmissive bodies a ray may be in at once by their ``clear_bounds`` (B, 2, 3); they and bodies with cut-outs
+    follow the ``opaque_faces``. ``least`` is the weight from which on a ray is worth shooting.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -65,8 +65,7 @@ class PackedScene:
         self.nested = min(int(meeting.sum(axis=1).max(initial=0)), MOST_NESTED)
         vertices = [b.vertices for b in bodies[:first_clear]] + _overlapping(bodies[first_clear:], meeting)
         self.corners = _per_corner(vertices, bodies)
-        self.faces = lift.face_table(self.corners)
-        self.normals = _per_corner([None if b.normals is None else unit_rows(b.normals) for b in bodies], bodies)
+        normals = _per_corner([None if b.normals is None else unit_rows(b.normals) for b in bodies], bodies)
         self.coordinates = _per_corner(
             [b.texture_coordinates if b.material.textures else None for b in bodies], bodies
         )
@@ -102,16 +101,30 @@ class PackedScene:
         self.passes = self.nested > 1 or any(body.material.alpha_cutoff > 0 for body in bodies)
         self.intersector = Intersector(self.corners, self.opaque_faces)
         self.corners = self.intersector.corners
+        rows = _face_rows(self.corners, self.object_of_face, normals, self.coordinates if self.images else None)
+        self.faces = rows[:, tables.FACE : tables.BODY]
+        laned = aligned(len(bodies) * tables.LANED)
+        laned[:] = self.materials[:, : tables.LANED].reshape(-1)
         self.surfaces = Surfaces(
-            self.corners, self.faces, self.normals, self.coordinates, self.object_of_face, self.materials,
-            self.corners.reshape(-1), self.faces.reshape(-1), self.normals.reshape(-1),
-            self.materials.reshape(-1), self.textures.table, self.textures.texels, self.textures.alphas,
+            rows.reshape(-1), rows.shape[1], len(normals) > 0, self.corners, self.faces, self.coordinates,
+            self.object_of_face, self.materials, laned, self._maps(bodies), self.textures.table,
+            self.textures.levels, self.textures.texels, self.textures.alphas,
         )  # fmt: skip
         self.face_tables = FaceTables(
             self.corners, self.faces, self.coordinates, self.object_of_face, self.materials, self.textures.table,
             self.textures.alphas,
         )  # fmt: skip
         self.surroundings = Surroundings(self.lights, self.background, self.fog, self.ambient)
+
+    def _maps(self, bodies: Sequence[Body]) -> Maps:
+        looks = [body.material for body in bodies]
+        return Maps(
+            any=any(isinstance(t, Image) for look in looks for t in look.textures),
+            normal=any(look.normal_map is not None for look in looks),
+            emission=any(look.emission_map is not None for look in looks),
+            gloss=any(look.metallic_roughness_map is not None for look in looks),
+            blend=self.blends,
+        )
 
 
 def _lets_through(body: Body) -> bool:
@@ -216,6 +229,24 @@ def _per_corner(values: Sequence[NDArray[Any] | None], bodies: Sequence[Body]) -
             np.take(np.asarray(value, np.float32), np.asarray(body.faces), axis=0, out=out[first:last], mode="clip")
         first = last
     return out
+
+
+def _face_rows(
+    corners: NDArray[np.float32], bodies: NDArray[np.int32], normals: NDArray[np.float32],
+    coordinates: NDArray[np.float32] | None,
+) -> NDArray[np.float32]:  # fmt: skip
+    """Return the table of faces, see `kernels.tables`: rows of one cache line or two."""
+    wide = len(normals) > 0 or coordinates is not None
+    columns = tables.ALL_COLUMNS if wide else tables.FLAT_COLUMNS
+    rows = aligned(len(corners) * columns).reshape(-1, columns)
+    rows[:, : tables.FACE] = corners.reshape(-1, 9)
+    lift.fill_face_table(corners, rows[:, tables.FACE : tables.BODY])
+    rows[:, tables.BODY] = bodies
+    if len(normals):
+        rows[:, tables.NORMALS : tables.COORDINATES] = normals.reshape(-1, 9)
+    if coordinates is not None and len(coordinates):
+        rows[:, tables.COORDINATES : tables.COORDINATES + 6] = coordinates[:, :, :2].reshape(-1, 6)
+    return rows
 
 
 def _light_row(light: Light) -> list[float]:

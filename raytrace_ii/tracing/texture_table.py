@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.textures import Checker, Image, Stripes, Texture, VertexColours
-from .kernels.tables import CHECKER, CLAMP, IMAGE, MIRROR, NOISE, REPEAT, STRIPES, VERTEX
+from .kernels.lanes import aligned
+from .kernels.tables import CHECKER, CLAMP, IMAGE, IMAGE_COLUMNS, MIRROR, NOISE, REPEAT, STRIPES, VERTEX
 
 COLUMNS = 12  # kind, then what the kind needs
 WRAPS = {"repeat": REPEAT, "mirror": MIRROR, "clamp": CLAMP}
@@ -17,6 +18,8 @@ WRAPS = {"repeat": REPEAT, "mirror": MIRROR, "clamp": CLAMP}
 
 class TextureTable:
     """Textures as a table (n, COLUMNS), and what their images hold.
+
+    ``levels`` is the table in float32 in one dimension, in rows of a cache line, with first texels as int32.
 
     ``texels`` are linear colours, three numbers a texel, of some images, and sRGB codes, four a texel, of the others,
     of which one texel never lies in two cache lines; ``alphas`` those of images that have any. The rows of an image's
@@ -53,6 +56,10 @@ class TextureTable:
         self.table = np.zeros((len(rows), COLUMNS))
         for row, values in zip(self.table, rows, strict=True):
             row[: len(values)] = values
+        self.levels = aligned(len(rows) * IMAGE_COLUMNS)
+        levels = self.levels.reshape(-1, IMAGE_COLUMNS)
+        levels[:, :COLUMNS] = self.table
+        levels[:, 1].view(np.int32)[:] = np.where(self.table[:, 0] == IMAGE, self.table[:, 1], 0)
         if len(self._pixels) > 1:
             self._pixels.append(np.zeros((1, 3), np.float32))  # `texels.mixed` reads beyond the last texel
         self.texels = np.concatenate(self._pixels).reshape(-1), np.concatenate(self._codes).reshape(-1)

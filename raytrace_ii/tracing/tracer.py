@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -16,23 +17,38 @@ from ..scene.scene import Scene
 from .intersect import Hits
 from .kernels.addresses import addresses
 from .kernels.appearance import attenuate, look_closely, paint
-from .kernels.arrays import Generation, Onward, Passage, Rays, Recorded, ShadowRays, Stages
+from .kernels.arrays import Generation, Onward, Passage, Rays, Recorded, ShadowRays, Stages, Start
 from .kernels.attributes import footprints
 from .kernels.clear import pass_clear_face, pass_faces, start_inside, tell_inside
-from .kernels.lanes import work
+from .kernels.lanes import PACKET, aligned, work
 from .kernels.light import add_unblocked, keep_unblocked
 from .kernels.sampling import lobe_keys
-from .kernels.shade import record, shade
 from .kernels.sky import add_sky_image
 from .kernels.spawn import reflect
 from .kernels.spawn import spawn as spawn_rays
-from .kernels.start import start_rays, start_separable_rays
-from .kernels.tables import COUNTS, PASSED, REFLECTION, REFRACTION, SKY_IMAGE, SPAWNED, WEAK_SHADOW
+from .kernels.start import fill_start_tables, start_rays, start_separable_rays, usable
+from .kernels.tables import (
+    COUNTS,
+    EMBREE_TICKS,
+    PASSED,
+    REFLECTION,
+    REFRACTION,
+    SHADOW,
+    SKY_IMAGE,
+    SPAWNED,
+    TICKS,
+    UNTESTED,
+    WEAK_SHADOW,
+)  # fmt: skip
+from .kernels.way import record, way_kernel
 from .packing import PackedScene, packed
 from .support_images import RECORDED
 
 KINDS = ("primary", "shadow", "reflection", "refraction")
 _NO_ROWS = np.empty(0, np.int32)
+_NO_HITS = Hits(_NO_ROWS, *(np.empty(0, np.float32) for _ in range(3)))  # the kernel finds them
+_NO_NUMBERS = np.empty(0)
+_NO_START = Start(_NO_NUMBERS, _NO_NUMBERS, _NO_ROWS, _NO_ROWS, 0, 0)  # rays are in arrays
 LOBE_RAYS = 16  # over the lobe of a rough mirror, for each pixel
 MOST_CLEAR_FACES = 64  # a shadow ray through more faces than this is taken as dark
 
@@ -138,6 +154,18 @@ class Support:
         ]
 
 
+def start_tables(
+    rays: tuple[NDArray[np.float64], ...], pose: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Return what columns and rows give to rays of `IICamera.separable_rays`; None if some may be unusable."""
+    x, y, z = rays
+    if not usable(x, y, z):
+        return None
+    columns, rows = (aligned(16 * len(part)).view(np.float64).reshape(-1, 8) for part in (x, y))
+    fill_start_tables(x, y, z, pose[:3, :3], pose[:3, 3], columns, rows)
+    return columns.reshape(-1), rows.reshape(-1)
+
+
 def check_scene(scene: Any) -> None:
     """Raise TypeError unless it is a scene."""
     if not isinstance(scene, Scene):
@@ -209,11 +237,21 @@ class Tracer:
         self.footprint = footprint if self.scene.images else (0.0, 0.0)
         self.begin()
         self._primary = _room(capacity, self.scene.nested, self.scene.glossy)
-        # weights and pixels of rays that carry all light, one a pixel: read only
-        self._whole = np.ones((capacity, 3), np.float32), np.arange(capacity, dtype=np.int32)
+        self._pixels = np.arange(capacity, dtype=np.int32)  # of rays one a pixel: read only
+        self._radiance = np.empty((capacity, 3), np.float32)
         self._shadow = _shadow_room(0, self.scene.nested)
         self._work = work()
+        self._tools = self.scene.intersector.tools(self._work.single[PACKET:])
+        self._follow = way_kernel(self.scene.intersector.width)
+        # hits and shadow rays that the kernel does not see to the end
+        self._finds = self._tools.nearest.packet != 0 and not self.scene.passes
+        self._later = self._tools.occluded.packet == 0 or self.scene.lets_through
         self._addresses: dict[Any, int] = {}  # of stages: the types of their arguments stay the same
+
+    def dark(self, n: int) -> NDArray[np.float32]:
+        """Radiance (n, 3) to add to, valid until the next call: new memory for each tile takes 2 ns a pixel."""
+        self._radiance[:n] = 0
+        return self._radiance[:n]
 
     def begin(self) -> None:
         """Count from 0."""
@@ -256,33 +294,26 @@ class Tracer:
             support.clear()
         if keys is not None:
             room.keys[:n] = keys[room.pixels[:n]]
-        self._trace(room, n, radiance, support)
+        self._trace(room, n, radiance, support, _NO_START)
 
     def run_separable(
-        self,
-        rays: tuple[NDArray[np.float64], ...],
-        radiance: NDArray[np.float32],
-        support: Support | None,
-        rows: NDArray[np.int32],
-        columns: NDArray[np.int32],
+        self, start: Start, radiance: NDArray[np.float32], support: Support | None,
         keys: NDArray[np.uint64] | None = None,
-    ) -> bool:
-        """`run` for rays of `IICamera.separable_rays`; if some are unusable, nothing is done and False comes back.
+    ) -> None:  # fmt: skip
+        """`run` for rays by columns and rows of pixels."""
+        room, n = self._primary._replace(pixels=self._pixels), len(start.rows)
+        room.inside.fill(-1)
+        if keys is not None:
+            room.keys[:n] = keys
+        if self.scene.transmits or not self._finds:  # they are wanted before the kernel runs
+            start_separable_rays(start, self._work, room.origins, room.directions)
+            room.weights.fill(1)
+            start = _NO_START
+        self._trace(room, n, radiance, support, start)
 
-        ``rows`` and ``columns`` name the rays in the order in which they are traced.
-        """
-        room, n = self._primary, len(rows)
-        usable = start_separable_rays(
-            *rays, rows, columns, self.pose[:3, :3], self.pose[:3, 3], room.origins, room.directions
-        )
-        if usable:
-            room.inside.fill(-1)
-            if keys is not None:
-                room.keys[:n] = keys
-            self._trace(room._replace(weights=self._whole[0], pixels=self._whole[1]), n, radiance, support)
-        return bool(usable)
-
-    def _trace(self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None) -> None:
+    def _trace(
+        self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None, start: Start
+    ) -> None:
         """Trace the first n of the primary rays."""
         rays = _rows(primary, slice(n))
         self.count.rays["primary"] += n
@@ -291,36 +322,42 @@ class Tracer:
         for depth in range(self.max_depth + 1):
             lobe_rays = self.lobes[0] if depth == 0 else 1
             spawn = depth < self.max_depth
-            rays = self._generation(rays, radiance, support if depth == 0 else None, spawn, lobe_rays)
+            rays = self._generation(start, rays, radiance, support if depth == 0 else None, spawn, lobe_rays)
+            start = _NO_START
             if not len(rays.pixels):
                 break
 
     def _generation(
-        self, rays: Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool, lobe_rays: int
-    ) -> Rays:
+        self, start: Start, rays: Rays, radiance: NDArray[np.float32], support: Support | None, spawn: bool,
+        lobe_rays: int,
+    ) -> Rays:  # fmt: skip
         """Trace and shade one generation; the next one comes back."""
         s, n = self.scene, len(rays.pixels)
-        hits = self._hits(rays)
+        hits = _NO_HITS if self._finds else self._hits(rays)
         spawn = spawn and (s.mirrors or s.transmits or s.blends)
         most = (lobe_rays if s.glossy else 1) + s.transmits + 2 * s.disperses + s.blends
         following = _room(most * n if spawn else 0, s.nested, s.glossy, any(self.footprint))
-        if len(self._shadow.reach) < n * len(s.lights):
+        if len(self._shadow.reach) < n * len(s.lights):  # memory that nothing is written to is not used
             self._shadow = _shadow_room(n * len(s.lights), s.nested)
         counts, lit = np.zeros(COUNTS, np.int64), np.zeros(len(s.lights), np.int64)
-        passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint, placed=s.passes)
+        passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint, placed=s.passes, later=self._later)
         images: list[Any] = [*(support or Support()).rows(), self.pose[:3, 3], self.pose[:3, 2]]
         generation = Generation(
-            hits, rays, s.surfaces, s.surroundings, passage, Recorded(*images), radiance, self._shadow, following,
-            counts, lit, self._work,
+            hits, self._tools, s.intersector.first_of_same, start, rays, s.surfaces, s.surroundings, passage,
+            Recorded(*images), radiance, self._shadow, following, counts, lit, self._work,
         )  # fmt: skip
-        shade(generation, self._stages(generation, support is not None, spawn))
-        self.count.rays.update({"reflection": int(counts[REFLECTION]), "refraction": int(counts[REFRACTION])})
+        started = time.thread_time()
+        self._follow(generation, self._stages(generation, support is not None, spawn))
+        share = int(counts[EMBREE_TICKS]) / max(int(counts[TICKS]), 1)
+        self.count.embree_seconds += share * (time.thread_time() - started)
+        kinds = {"shadow": SHADOW, "reflection": REFLECTION, "refraction": REFRACTION}
+        self.count.rays.update({kind: int(counts[column]) for kind, column in kinds.items()})
         self.count.skipped.update(dict(zip(KINDS[1:], map(int, counts[WEAK_SHADOW:PASSED]), strict=True)))
         if s.blends:
             self.count.rays["passed"] += int(counts[PASSED])
         for light in np.flatnonzero(lit):
             some = slice(light * n, light * n + lit[light])
-            self._light(_rows(self._shadow, some), radiance)
+            self._light(_rows(self._shadow, some), radiance, tested=not counts[UNTESTED])
         return _rows(following, slice(int(counts[SPAWNED])))
 
     def _stages(self, generation: Generation, recorded: bool, spawn: bool) -> Stages:
@@ -385,16 +422,16 @@ class Tracer:
                 s.corners, s.faces, s.object_of_face, s.opaque_faces,
             )  # fmt: skip
 
-    def _light(self, shadow: ShadowRays, radiance: NDArray[np.float32]) -> None:
-        """Add the light of the shadow rays that nothing opaque stops, dimmed by what is clear."""
-        s = self.scene
-        self.count.rays["shadow"] += len(shadow.pixels)
-        found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, shadow.reach)
-        self.count.embree_seconds += seconds
-        if not s.lets_through:
-            add_unblocked(found, shadow.colours, shadow.pixels, radiance)
-            return
-        kept = keep_unblocked(found, *shadow)
+    def _light(self, shadow: ShadowRays, radiance: NDArray[np.float32], tested: bool) -> None:
+        """Add the light of shadow rays that nothing opaque stops, as told here or before, dimmed by what is clear."""
+        s, kept = self.scene, len(shadow.pixels)
+        if not tested:
+            found, seconds = s.intersector.blocked(shadow.origins, shadow.directions, shadow.reach)
+            self.count.embree_seconds += seconds
+            if not s.lets_through:
+                add_unblocked(found, shadow.colours, shadow.pixels, radiance)
+                return
+            kept = keep_unblocked(found, *shadow)
         for _ in range(MOST_CLEAR_FACES):
             shadow = _rows(shadow, slice(kept))
             hits, seconds = s.intersector.nearest_clear(shadow.origins, shadow.directions, shadow.reach)

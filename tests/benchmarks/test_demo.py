@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from benchmarks.coding import disparity
-from examples import demo, jplm_encoder, vvenc
+from examples import demo, jplm_encoder
 from ii_core import IIPicture, preset
 from ii_core.base.files import read_image
-from ii_core.formats.pgx import Component, read_pgx, write_pgx
 
 ROOT = Path(__file__).parents[2]
 
@@ -81,31 +80,3 @@ def test_the_example_meets_a_target(tmp_path, monkeypatch, limit):
     monkeypatch.setattr(sys, "argv", words)
     jplm_encoder.main()
     assert 0.98 * min(limit, 800) < file.stat().st_size <= limit
-
-
-def test_chroma_of_vvc_comes_back():
-    x, y = np.arange(64), np.arange(32)[:, None]
-    plane = 512 + 200 * np.cos(2 * np.pi * x / 16) * np.cos(2 * np.pi * y / 16)  # far below the limit of 4:2:0
-    off = np.abs(vvenc.resized(vvenc.reduced(plane), (64, 32)) - plane)
-    assert off[8:-8, 8:-8].max() < 1  # borders have no neighbours
-    serpentine = ["000_000", "001_000", "002_000", "002_001", "001_001", "000_001"]
-    assert vvenc.names(2, 3) == [f"{place}.pgx" for place in serpentine]
-
-
-def test_views_pass_through_vvc(tmp_path):
-    pytest.importorskip("imageio_ffmpeg")
-    views, back = tmp_path / "views", tmp_path / "back"
-    back.mkdir()
-    rng = np.random.default_rng(0)
-    smooth = np.add.outer(np.arange(66), np.arange(71)) * 4
-    for name in vvenc.names(2, 2):
-        for i in range(3):
-            (views / str(i)).mkdir(parents=True, exist_ok=True)
-            codes = np.roll(smooth + rng.integers(0, 100), 1) % 1024 if i == 0 else smooth + 20 * i
-            write_pgx(views / str(i) / name, Component(codes.clip(0, 1023).astype(np.int32), 10, False))
-    vvenc.encode(views, tmp_path / "file", 3000, 2, 2, 71, 66, "faster")
-    vvenc.decode(tmp_path / "file", back)
-    assert (tmp_path / "file").stat().st_size <= 3000
-    for path in views.rglob("*.pgx"):
-        error = read_pgx(path).codes - read_pgx(back / path.relative_to(views)).codes
-        assert np.sqrt((error**2).mean()) < 30, path

@@ -27,6 +27,7 @@ def test_crossing_is_interpolated():
     assert waves.crossing(points[1:], "rays_db") == "always above"
 
 
+@pytest.mark.slow
 def test_round_kernels_agree_where_the_field_gives_way_to_airys_pattern():
     """The closed form that stands in for the field of wide lenses is the field's where both are there: 70 dB."""
     pitch, gap, pixel = 0.2, 0.374, 0.0125

@@ -2,12 +2,15 @@
 
 import json
 import re
+import shlex
 
 import numpy as np
 import pytest
 
 import codec
 from ii_core import IIPicture, open_video
+from ii_core.base.files import write_image
+from ii_core.formats.pleno import write_pleno_views
 from metrics import measure_take
 from metrics.benchmark.profile import profile
 from metrics.benchmark.subject import identity
@@ -46,9 +49,9 @@ def test_a_coder_is_run_and_ranked(run, tmp_path):
         assert code == 0 and re.search(rf"{re.escape(scheme)} meets \d of 2 targets", out)
     page = tmp_path / "rank.md"
     code, out, _ = run("ranking", definition, *files, "-o", page)
-    assert code == 0 and out.splitlines()[0].startswith("1  ") and page.exists() and page.with_suffix(".png").exists()
+    assert code == 0 and out.splitlines()[0].startswith("1  ") and page.exists() and page.with_suffix(".svg").exists()
     assert {line.split()[0] for line in run("benchmark")[1].splitlines()} == {
-        "dissertation", "jpeg-pleno", "small", "takes"
+        "dissertation", "jpeg-pleno", "photographs", "photographs-small", "small", "takes"
     }  # fmt: skip
 
 
@@ -56,8 +59,13 @@ def test_a_coder_is_run_and_ranked(run, tmp_path):
     ("arguments", "message"),
     [
         (("small",), "output is missing"),
-        (("small", "-o", "r.json"), "coder is missing: either --scheme or --external"),
+        (("small", "-o", "r.json"), "coder is missing: either --scheme, --anchor, --external"),
         (("small", "-o", "r.json", "--scheme", "h264"), "unknown scheme"),
+        (("small", "-o", "r.json", "--scheme", "jpeg", "--workers", "0"), "workers is 0"),
+        (
+            ("small", "-o", "r.json", "--scheme", "jpeg", "--workers", "2", "--dask", "x:1"),
+            "leave it out with --dask",
+        ),
         (("small", "-o", "r.json", "--external", "python3 {in} {out}", "python3 {in} {out}"), "--name gives"),
         (("small", "-o", "r.json", "--name", "x", "--external", "python3 {in}", "python3 {in} {out}"), "no {out}"),
         (("large", "-o", "r.json", "--scheme", "jpeg"), "unknown profile 'large'"),
@@ -95,6 +103,64 @@ def test_the_set_is_rendered_checked_and_used(run, tmp_path):
     assert code == 2 and "apples.png has other pixels than its manifest says" in error
     assert run("render", "--set", f"benchmark:{made}", "-o", data)[0] == 0  # made again, as it was
     assert picture_json("", IIPicture.load(data / "tiny" / "apples.png"))["sha256"] == found
+
+
+PHOTOGRAPH = (
+    TINY.partition("[[picture]]")[0]
+    + """
+[[picture]]
+name = "ramp"
+use = "a test"
+views = [3, 2]
+view_pixels = [8, 4]
+sha256 = "{sha256}"
+[picture.source]
+camera = "made up"
+repository = "https://example.org/ramp"
+commit = "0123456789012345678901234567890123456789"
+path = "views"
+licence = "CC0"
+options = "--grid 3x2 --no-flip-down --no-flip-across"
+"""
+)
+
+
+def test_photographs_are_found_by_their_pixels(run, tmp_path):
+    ramp = np.add.outer(np.arange(8) * 3, np.arange(24) * 9).astype(np.uint8)[..., None].repeat(3, axis=2)
+    picture = IIPicture(ramp, (8, 4), (3, 2))
+    definition = tmp_path / "ramp.toml"
+    definition.write_text(PHOTOGRAPH.format(sha256=picture_json("", picture)["sha256"]))
+    taken = ("benchmark", definition, "--scheme", "jpeg2000", "--pictures", tmp_path)
+    code, _, error = run(*taken, "-o", tmp_path / "r.json")
+    assert code == 2 and f"{tmp_path} has no picture ramp" in error and "--list" in error
+    code, out, _ = run("benchmark", definition, "--list", "--pictures", tmp_path)
+    assert code == 0 and "has no picture ramp" in out and "https://example.org/ramp at 0123456789" in out
+    assert "licence: CC0" in out and "made up, 3×2 views of 8×4 px" in out
+    # The command that the list gives makes the picture, from views in the order of their numbers.
+    (tmp_path / "views").mkdir()
+    for i, (row, column) in enumerate(np.ndindex(2, 3)):
+        write_image(tmp_path / "views" / f"{i}.png", ramp[row::2, column::3])
+    words = shlex.split(next(line for line in out.splitlines() if "raytrace-ii import" in line))
+    assert run("import", tmp_path / words[2], *words[3:])[0] == 0
+    code, out, _ = run("benchmark", definition, "--list", "--pictures", tmp_path)
+    assert code == 0 and "ramp: there, pixels as defined" in out
+    assert run(*taken, "-o", tmp_path / "r.json")[0] == 0
+    assert json.loads((tmp_path / "r.json").read_text())["pictures"][0]["as_defined"] is True
+    for target in (4, 8):
+        write_pleno_views(picture, tmp_path / "coded" / "ramp" / str(target), "png")
+        (tmp_path / "coded" / "ramp" / str(target) / "bytes.txt").write_text("20")
+    foreign = ("benchmark", definition, "--pictures", tmp_path, "--decoded", tmp_path / "coded", "--views", "png")
+    assert "--name gives the name of the coder" in run(*foreign, "-o", tmp_path / "f.json")[2]
+    assert run(*foreign, "--name", "elsewhere", "-o", tmp_path / "f.json")[0] == 0
+    point = json.loads((tmp_path / "f.json").read_text())["pictures"][0]["points"][0]
+    assert (point["nbytes"], point["q_global"], point["reached"]) == (20, "inf", True)
+    picture.with_pixels(ramp ^ 1).save(tmp_path / "ramp.png")
+    code, _, error = run(*taken, "-o", tmp_path / "s.json")
+    assert code == 2 and "ramp.png has other pixels than profile tiny fixes" in error
+    for command in (("benchmark", definition, "--scheme", "jpeg2000", "-o", tmp_path / "t.json"),
+                    ("render", "--set", f"benchmark:{definition}", "-o", tmp_path / "set")):  # fmt: skip
+        code, _, error = run(*command)
+        assert code == 2 and "photograph" in error and len(error.splitlines()) == 1
 
 
 def test_a_set_keeps_foreign_files_and_refuses_options(run, refused, tmp_path):

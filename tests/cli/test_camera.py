@@ -105,7 +105,7 @@ def test_a_hexagonal_picture_is_made_regular_and_coded(run, refused, tmp_path):
         assert made.regular and made.lenses == (64, 37) and made.ei_pixels == ei
         owned = read_image(tmp_path / f"{method}_mask.png")[..., 0]
         assert owned.shape == made.pixels.shape[:2] and 0.6 < (owned == 255).mean() < 1
-        assert run("encode", out, "--qp", 30, "-o", tmp_path / f"{method}.ii")[0] == 0
+        assert run("encode", out, "--scheme", "si-h264", "--qp", 30, "-o", tmp_path / f"{method}.ii")[0] == 0
     refused(run("regular", tmp_path / "h.png", "--method", "x", "-o", tmp_path / "x.png"), "unknown method 'x'")
 
 

@@ -179,6 +179,18 @@ def stopped(*arguments, **options):
     raise KeyboardInterrupt
 
 
+def test_a_measurement_stopped_between_its_outputs_leaves_none(run, picture, tmp_path, monkeypatch):
+    """Numbers without charts were left: the same command was refused."""
+    command = ("measure", picture, picture, "--layers", "3", "--json", tmp_path / "m.json", "--plots", tmp_path / "p")
+    for place in "metrics.plot_all", "ii_core.base.files.write_json":
+        with monkeypatch.context() as patch:
+            patch.setattr(place, stopped)
+            assert run(*command)[0] == 130
+        assert not (tmp_path / "m.json").exists() and not (tmp_path / "p").exists()
+    assert run(*command)[0] == 0
+    assert (tmp_path / "m.json").exists() and len(list((tmp_path / "p").iterdir())) >= 4
+
+
 def test_points_of_another_picture_or_measure_are_not_taken(tmp_path):
     a = IIPicture(np.zeros((8, 8, 3), np.uint8), (4, 4), (2, 2))
     point = dict.fromkeys(FIELDS, 1.0) | {"scheme": "x", "options": {}, "reached": True, "q_global": math.inf}

@@ -427,6 +427,7 @@ def test_only_this_machines_own_names_are_served(served):
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_addresses_of_no_scheduler_are_one_line_to_the_end_of_the_process(picture, refused):
     """Only a separate process shows the nine lines that a client printed at its end."""
     addresses = "tls://", "tls://127.0.0.1:9", "nothing://x"

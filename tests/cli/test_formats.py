@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ii_core import IIPicture, preset, sub_images
-from ii_core.base.files import read_image
+from ii_core import IIPicture, Rig, preset, sub_images
+from ii_core.base.files import read_image, write_image
 from ii_core.formats.pfm import read_pfm
 
 
@@ -93,7 +93,7 @@ def test_imported_views_get_a_camera(run, refused, shot, tmp_path):
     rig = ("--baseline-mm", 5, "--focal-mm", 50)
     refused(run("import", views, "-o", out, *rig), "sensor-mm is missing")
     refused(run("import", views, "-o", out, *rig, "--sensor-mm", 35, "--camera", "setup1"), "camera is given, too")
-    assert "no camera is known" in run("import", views, "-o", out)[1]
+    assert "a nominal one of 20°" in run("import", views, "-o", out)[1]
     code, said, _ = run("import", views, "-o", out, *rig, "--sensor-mm", 35, "--focus-mm", 800, "--force")
     assert code == 0 and "no camera" not in said
     camera = IIPicture.load(out).camera
@@ -109,3 +109,32 @@ def test_imported_views_get_a_camera(run, refused, shot, tmp_path):
     assert run("import", views, "-o", out, "--camera", tmp_path / "c.json", "--force")[0] == 0
     assert IIPicture.load(out).camera.lens_pitch_mm == preset("setup1", scale=16).lens_pitch_mm
     refused(run("import", views, "-o", out, "--camera", "setup3", "--force"), "64×64 lenses of 64×64 px need")
+
+
+def test_a_field_without_camera_gets_a_nominal_one_that_set_replaces(run, tmp_path):
+    """Views, measures and displays work, and say that lengths are nominal, until lengths are given."""
+    (tmp_path / "v").mkdir()
+    rng = np.random.default_rng(0)
+    for row, col in np.ndindex(3, 3):
+        write_image(tmp_path / f"v/view_{row}_{col}.png", rng.integers(0, 256, (12, 14, 3), np.uint8))
+    field, note = tmp_path / "p.png", "has a nominal camera: lengths in mm are nominal"
+    assert run("import", tmp_path / "v", "-o", field)[0] == 0
+    assert IIPicture.load(field).camera.name == "nominal"
+    measured = run("measure", field, field)
+    assert measured[0] == 0 and note in measured[2] and "Q_view" in measured[1]
+    quilt = ("display", field, "--as", "quilt", "--size", "16x16", "-o", tmp_path / "q.png", "--force")
+    assert note in run(*quilt)[2]
+    assert run(*quilt, "--angle", 40)[0] == 0
+    for text, angle in (("angle=30", 30.0), ("pixel=0.01,gap=0.06", 28.07), ("baseline=2,focal=5,sensor=3", None)):
+        assert run("camera", field, "--set", text)[0] == 0
+        camera = IIPicture.load(field).camera
+        assert angle is None or camera.view_angle_deg == pytest.approx(angle, abs=0.01)
+    assert camera == Rig(baseline_mm=2, focal_mm=5, sensor_mm=3).camera((3, 3), (14, 12))
+    assert note not in run(*quilt)[2]
+    for text, said in (
+        ("angle", "a name and a number"),
+        ("gap=1", "known are angle"),
+        ("angle=999", "between 0 and 180"),
+    ):
+        code, _, error = run("camera", field, "--set", text)
+        assert code == 2 and said in error

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import codec
 from codec import Coder, CodingResult, Encoded, Run, contract, decode, decode_component, decode_frame, encode, schemes
 from codec.coders.decoding import decoded_frames
 from codec.coders.pseudo_video import PseudoVideo
@@ -332,3 +333,17 @@ def test_a_coder_of_another_package_decodes_components_alone(monkeypatch):
     stream = encode(picture(), "test-raw")
     assert np.array_equal(decode_component(stream, (1, 2)), sub_images(picture())[2, 1])
     assert np.array_equal(decode_frame(stream, 9), sub_images(picture())[2, 1])
+
+
+def test_cost_of_a_view_counts_its_group():
+    field = IIPicture(np.random.default_rng(0).integers(0, 256, (96, 128, 3), np.uint8), (32, 24), (4, 4))
+    whole = encode(field, "si-h264", qp=30)
+    nbytes, seconds = codec.access_cost(whole, (1, 2))
+    assert whole.nbytes - 70 < nbytes <= whole.nbytes and seconds >= 0  # one group: all but the header of the file
+    alone = [codec.access_cost(encode(field, "si-h264:gop=1", qp=30), (u, v))[0] for v in range(4) for u in range(4)]
+    stream = encode(field, "si-h264:gop=1", qp=30)
+    assert max(alone) < stream.nbytes / 8 and stream.nbytes - 200 < sum(alone) <= stream.nbytes
+    assert codec.access_cost(encode(field, "jpeg2000", bpp=2.0), (0, 0)) is None
+    levels = encode(field, "si-lf", bpp=1.0)
+    costs = [codec.access_cost(levels, (u, v))[0] for v in range(4) for u in range(4)]
+    assert min(costs) < max(costs) <= levels.nbytes

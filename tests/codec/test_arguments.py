@@ -5,6 +5,7 @@ import pytest
 
 from codec import (
     Encoded,
+    access_cost,
     analyse_orders,
     decode,
     decode_component,
@@ -28,6 +29,7 @@ CALLS = {
     "decode": (decode, {"coded": CODED, "max_pixels": 100}),
     "timed_decode": (timed_decode, {"coded": CODED, "max_pixels": 100}),
     "decode_frame": (decode_frame, {"coded": CODED, "index": 0}),
+    "access_cost": (access_cost, {"coded": CODED, "place": (0, 0)}),
     "decode_component": (decode_component, {"coded": CODED, "place": (0, 0)}),
     "extract": (extract, {"coded": CODED}),
     "options": (options, {"scheme": "jpeg"}),

@@ -1,10 +1,12 @@
-"""Frozen streams of `si-lf`, versions 3 and 5: the same bytes decode to the same pixels on every machine.
+"""Frozen streams of `si-lf`, versions 3, 5 and 7: the same bytes decode to the same pixels on every machine.
 
 In ``tests/golden/lf``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
 views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
 views of *Apples* at quantiser 26; the first encoder that left out transforms wrote it. ``row.ii`` holds 1×10 views of
 *Apples* of 32×16 pixels at quantiser 36, by cdd3aba: its first view is matched to one that no other view is made of.
-The decoder has integer arithmetic alone, so that a hash of the pixels is the expectation.
+``tuned.ii`` and ``rotated.ii``, of version 7, hold 7×6 views of 58×38 pixels and 7×2 of them of the benchmark's 9×9
+views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. The decoder has integer arithmetic
+alone, so that a hash of the pixels is the expectation.
 """
 
 import hashlib
@@ -25,11 +27,20 @@ FOLDER = Path(__file__).parents[1] / "golden" / "lf"
 PIXELS = {
     "lossy": "defb0393182954c2a0827acfe2c0d408fd37d1c8abcac248e83ca5d02bb8f7ee",
     "skipped": "4bb0232b9f5557feb2f5d26ac1904b48c687300269542c6db1bf73b3e635b603",
+    "tuned": "d9d30a671b25efd3a58ad8856f476928dc720daa03306e3642c3d62d8d79c0de",
+    "rotated": "1c1d667939667f5b19d172dd13ee2637d5e29ae8e9c7d0f11a44a72bcd47be85",
     "row": "8779e10e45bc0ef8e8a3921c5f3ed192d0b0dad3092e0d9619ae1a54c87281c0",
     "exact": "be2c46c242ca2aae010544f6e178dd5dfa93b5aec5566384427e4a469a1b2cfd",
 }
 
-VERSIONS = {"lossy": stream.VERSION, "exact": stream.VERSION, "skipped": stream.SKIPPING, "row": stream.SKIPPING}
+VERSIONS = {
+    "lossy": stream.VERSION,
+    "exact": stream.VERSION,
+    "skipped": stream.SKIPPING,
+    "row": stream.SKIPPING,
+    "tuned": stream.TUNED,
+    "rotated": stream.TUNED,
+}
 
 
 def digest(pixels):
@@ -50,8 +61,8 @@ def test_the_lossy_stream_has_all_kinds_of_blocks(monkeypatch):
     """Each kind of prediction, and views with and without synthesis."""
     kinds, synthesised, code = set(), set(), Field.code
 
-    def noting(field, coder, job, work):
-        code(field, coder, job, work)
+    def noting(field, coder, job, work, *same):
+        code(field, coder, job, work, *same)
         kinds.update(np.unique(job.blocks[KIND]).tolist())
         synthesised.add(int(job.synthesised))
 
@@ -62,21 +73,38 @@ def test_the_lossy_stream_has_all_kinds_of_blocks(monkeypatch):
 
 
 def test_versions_are_the_numbers_in_the_streams():
-    assert (stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED) == (2, 3, 5, 6)
+    numbers = stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED, stream.TUNED
+    assert numbers == (2, 3, 5, 6, 7)
 
 
 def test_the_third_stream_has_blocks_without_a_transform(monkeypatch):
     """Of both sizes, among others that have one."""
     found, code = set(), Field.code
 
-    def noting(field, coder, job, work):
-        code(field, coder, job, work)
+    def noting(field, coder, job, work, *same):
+        code(field, coder, job, work, *same)
         coded = job.blocks[CODED] == 1
         found.update(zip(job.blocks[LOG][coded].tolist(), job.blocks[SKIPPED][coded].tolist(), strict=True))
 
     monkeypatch.setattr(Field, "code", noting)
     decode(Encoded.load(FOLDER / "skipped.ii"))
     assert {(2, 0), (2, 1), (3, 0), (3, 1)} <= found
+
+
+def test_the_tuned_stream_has_filters_of_several_kinds(monkeypatch):
+    """New ones of one class and of four, those coded last, and none; planes are those of BT.709."""
+    found, code = [], Field.code
+
+    def noting(field, coder, job, work, *same):
+        latest = field.filters.latest.copy()
+        code(field, coder, job, work, *same)
+        again = (field.filters.modes[job.at] > 0) & (field.filters.latest == latest)
+        found.extend(zip(field.filters.modes[job.at].tolist(), again.tolist(), strict=True))
+        assert field.header.scales == (34, 28)
+
+    monkeypatch.setattr(Field, "code", noting)
+    decode(Encoded.load(FOLDER / "tuned.ii"))
+    assert {(0, False), (1, False), (2, False), (2, True)} <= set(found)
 
 
 def test_the_lossy_stream_has_factors_between_planes():

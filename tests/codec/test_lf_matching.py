@@ -6,6 +6,7 @@ import pytest
 from codec.coders.lf import arithmetic, contexts
 from codec.coders.lf.blocks import UNKNOWN, Job, new_blocks
 from codec.coders.lf.matching import CELLS, fill_products, new_match
+from codec.coders.lf.stream import UPRIGHT
 
 REFERENCES = np.array([[0, -1, 0], [1, 2, 0], [2, 0, 1]], np.int64)
 UNIT, LOW, HIGH = 96, -9, 9
@@ -34,7 +35,7 @@ def example(disparity=None):
         views=views,
         disparities=np.full((4, 36, 52), UNKNOWN, np.int16),
         at=3,
-        references=REFERENCES,
+        references=REFERENCES * (1, UPRIGHT, UPRIGHT),
         unit=UNIT,
         low=LOW,
         high=HIGH,

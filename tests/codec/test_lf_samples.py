@@ -29,8 +29,8 @@ def decoded_blocks(coded, monkeypatch):
     """Blocks of all views, from the decoder."""
     found, code = [], Field.code
 
-    def noting(field, coder, job, work):
-        code(field, coder, job, work)
+    def noting(field, coder, job, work, *same):
+        code(field, coder, job, work, *same)
         found.append(job.blocks.copy())
 
     monkeypatch.setattr(Field, "code", noting)
@@ -40,8 +40,9 @@ def decoded_blocks(coded, monkeypatch):
 
 def test_isolated_samples_are_coded_without_a_transform(monkeypatch):
     picture = specks()
-    skipping, transformed = (encode(picture, scheme, qp=34) for scheme in ("si-lf", "si-lf:skip=0"))
-    assert skipping.payload[0] == stream.SKIPPING and transformed.payload[0] == stream.VERSION
+    skipping, transformed = (encode(picture, f"si-lf:tune=rgb,skip={skip}", qp=34) for skip in (1, 0))
+    found = [stream.unpack(coded.payload, picture.pixels.size // 3)[0].skipping for coded in (skipping, transformed)]
+    assert found == [True, False]
     assert skipping.nbytes < 0.9 * transformed.nbytes
     # The same quantiser: the error is no larger.
     assert q_global(picture, decode(skipping)) > q_global(picture, decode(transformed)) - 0.1
@@ -59,7 +60,7 @@ def test_decoding_repeats_the_encoder_to_the_bit(dtype, options):
     picture = specks(dtype, grid=(3, 4), lenses=(19, 10))
     source = lf.Source(picture, checked_options(lf.LightField(), options))
     payload, field = source.coded(30 * lf.FRACTIONS)
-    assert payload[0] == (stream.SKIPPING_UNCROSSED if options else stream.SKIPPING)
+    assert payload[0] == stream.TUNED
     shown = np.empty_like(picture.pixels)
     field.show(shown)
     coded = encode(picture, "si-lf:cross=0" if options else "si-lf", qp=30)

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from codec import decode, encode, schemes
 from codec.contract import find, parse_scheme
 from codec.search import Axis, Run, Trial, bracket, meet_rate, meet_size, size_miss, trials
-
-from .test_contract import psnr, quick, textured
+from tests.codec.test_contract import psnr, quick, textured
 
 
 class Fake:

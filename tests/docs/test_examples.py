@@ -30,8 +30,8 @@ def registries(monkeypatch):
 
 
 def run_cell(code, names):
-    """Run a cell as a notebook does: the value of a last expression is shown."""
-    tree = ast.parse(code)
+    """Run a cell as a notebook does, of a smaller picture: the value of a last expression is shown."""
+    tree = ast.parse(code.replace("scale = 8", "scale = 32"))
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
     exec(compile(tree, "cell", "exec"), names)
     return None if last is None else eval(compile(ast.Expression(last.value), "cell", "eval"), names)
@@ -43,9 +43,10 @@ def test_a_notebook_runs(path, tmp_path, monkeypatch, registries):
     names, shown = {"__name__": "notebook"}, []
     for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
         if cell["cell_type"] == "code":
-            assert cell["outputs"] == [] and cell["execution_count"] is None
             shown.append(run_cell("".join(cell["source"]), names))
-    assert len(shown) >= 5
+            stored = [output for output in cell["outputs"] if output["output_type"] == "execute_result"]
+            assert len(stored) == (shown[-1] is not None), "python -m benchmarks run notebooks"
+    assert len(shown) >= 5 and path.stat().st_size < 120_000
     for value in shown:
         assert len(repr(value)) < 800
         if hasattr(value, "_repr_html_"):

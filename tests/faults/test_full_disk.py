@@ -39,6 +39,7 @@ from metrics.plots.opinion_chart import opinion_chart
 from raytrace_ii import load_scene, render_to
 from raytrace_ii.rendering import render_sets
 from tests.support.full_disk import full_disk
+from tests.support.slow import first_fast
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="RLIMIT_FSIZE is of POSIX")
 
@@ -177,7 +178,7 @@ KEPT = {
 }
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", first_fast(NAMES, 12))
 def test_a_full_disk_is_reported_and_no_broken_file_is_left(writers, name, tmp_path):
     """At four limits, the last one byte less than the largest file."""
 

@@ -102,6 +102,7 @@ def test_a_file_cut_short_is_made_again(called, package, end, cut):
     assert called(package, "old.kernels") == (42, 1)
 
 
+@pytest.mark.slow
 def test_a_renamed_folder(package):
     """The cache names missing modules, but the time stamp of the source file, which numba checks, is unchanged."""
     (package / "old").rename(package / "new")

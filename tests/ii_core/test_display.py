@@ -193,7 +193,10 @@ def test_animation_holds_its_frames(tmp_path, apples, name):
         (["--as", "quilt", "-o", "a.png", "--tiles", "0x2"], "tiles"),
         (["--as", "quilt", "-o", "a.png", "--for", "visor"], "unknown device 'visor': known are go, portrait, 16"),
         (["--as", "quilt", "-o", "a.png", "--for", "go", "--tiles", "8x6"], "those of the display go"),
-        (["--as", "lenticular", "-o", "a.png", "--whole"], "--as lenticular does not use --whole"),
+        (
+            ["--as", "lenticular", "-o", "a.png", "--whole"],
+            "--as lenticular without --calibration does not use --whole",
+        ),
         (["--as", "simulation", "-o", "a.png", "--at", "0,0,5"], "before the lens plane"),
         (["--as", "simulation", "-o", "a.png", "--fill", "2"], "fill is 2"),
     ],

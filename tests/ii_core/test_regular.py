@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from ii_core import IICamera, IIPicture, component_images, preset, view_image
 from ii_core.picture.regular import from_smallest_rectangle, owners, resampled, smallest_rectangle
+from tests.support.slow import first_fast
 
 REGULAR = ("rectangular", (5.0, 5.0), (0.0, 0.0))
 KINDS = [
@@ -332,7 +333,7 @@ def test_nan_stays_in_its_own_pixel():
     assert bad[0, 0] and not bad[3:].any() and not bad[:, 3:].any()
 
 
-@pytest.mark.parametrize("name", ["hdtv", "plenoptic"])
+@pytest.mark.parametrize("name", first_fast(["plenoptic", "hdtv"]))
 def test_presets_reach_a_view_image(name):
     camera = preset(name)
     flat = np.full((camera.pixels[1], camera.pixels[0], 3), 77, np.uint8)

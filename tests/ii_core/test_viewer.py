@@ -245,6 +245,7 @@ def test_comparison_shows_the_difference(opened, compared, shot, brighter):
     assert tab.locator("table sub").count() == len(names)
 
 
+@pytest.mark.slow
 def test_stereo_pairs_and_keys(opened, still):
     tab = opened(still, "#stereo=cross-eyed&eyes=1&f=0")
     tab.locator("#main").focus()
@@ -384,6 +385,7 @@ def test_served(run, monkeypatch, shot, tmp_path):
     assert code == 0 and "shows the page" in out
 
 
+@pytest.mark.slow
 def test_the_page_may_run_its_own_scripts_alone(opened, shot, tmp_path):
     """A content security policy: other scripts, and requests to other hosts, are refused."""
     write_viewer(tmp_path / "v.html", shot.picture, title="<script>alert(1)</script>")

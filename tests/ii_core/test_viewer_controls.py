@@ -119,6 +119,7 @@ def disabled(tab):
     return set(tab.evaluate("[...document.querySelectorAll('[data-state]:disabled')].map(i => i.dataset.state)"))
 
 
+@pytest.mark.slow
 def test_sliders_without_effect_are_disabled(tab, opened, tmp_path):
     assert disabled(tab) == {"eyes", "gain"}
     tab.evaluate("ii.viewer.set({ mode: 'difference', stereo: 'anaglyph' })")
@@ -129,6 +130,7 @@ def test_sliders_without_effect_are_disabled(tab, opened, tmp_path):
     assert disabled(opened(tmp_path / "v.html")) == {"eyes", "f", "a"}
 
 
+@pytest.mark.slow
 def test_nothing_is_cut_on_a_small_screen(tab):
     """Earlier, the help stood at the end of a column of 880 px."""
     tab.set_viewport_size({"width": 1280, "height": 800})
@@ -203,6 +205,18 @@ def test_on_a_phone_the_picture_comes_first(phone):
     tab.locator("#reset").click()
     assert state(tab) == opened
     assert tab.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+
+
+@pytest.mark.slow
+def test_on_a_phone_controls_are_as_large_as_fingers_and_nothing_is_cut(phone):
+    """44 px is the usual size of a touch target; buttons had 25 and sliders 16."""
+    small = """[...document.querySelectorAll("aside button, aside input, aside select, #grip")].filter(e => {
+        const box = e.getBoundingClientRect(); return box.width > 0 && Math.min(box.width, box.height) < 44; })"""
+    cut = """[...document.querySelectorAll("aside *, .half")].filter(
+        e => e.clientWidth && e.scrollWidth > e.clientWidth)"""
+    assert phone.evaluate(f"{small}.map(e => e.outerHTML)") == []
+    assert phone.evaluate(f"{cut}.map(e => e.outerHTML)") == []
+    assert phone.locator("#canvas").get_attribute("aria-label")
 
 
 @pytest.mark.slow

@@ -84,6 +84,7 @@ PLAYING = """state => { ii.viewer.set(state); const s = ii.viewer.snapshot();
     return [ii.viewer.take.shown, s.width, s.height, Array.from(s.data), ii.viewer.viewpoint()] }"""
 
 
+@pytest.mark.slow
 def test_the_space_bar_plays_with_parallax_and_comparison(tab, take, other):
     tab.locator("#main").focus()
     tab.keyboard.press(" ")
@@ -187,6 +188,7 @@ def test_a_card_without_room_for_all_frames(opened, take, tmp_path, monkeypatch)
         tab.goto("about:blank")  # before the server ends
 
 
+@pytest.mark.slow
 def test_the_command_serves_a_take_in_parts(run, monkeypatch, opened, take, tmp_path):
     take.save(tmp_path / "frames")
     encode_take(take, "si-h264", qp=30, plan=Plan(walk="time-first"), path=tmp_path / "take.ii")

@@ -337,6 +337,14 @@ def test_other_types_give_the_same_depth(dtype):
     np.testing.assert_allclose(f.confidence, g.confidence, atol=1e-5)
 
 
+def test_the_robust_method_finds_the_same_in_sixteen_bits():
+    """Its prices of a change of depth are in codes of the picture's type: those of noise decide many pixels."""
+    eight = picture(lenses=(24, 16), seed=3)
+    sixteen = replace(eight, pixels=eight.pixels.astype(np.uint16) * 257)
+    layers = [depth_from_focus(p, layers_mm=LAYERS, method="robust").layer for p in (eight, sixteen)]
+    assert len(np.unique(layers[0])) > 3 and (layers[0] == layers[1]).mean() > 0.99
+
+
 def test_robust_cost_in_the_open():
     a = picture((9, 9), (5, 5))
     shift = pixels_per_lens(a.camera, LAYERS) * 5

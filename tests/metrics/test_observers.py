@@ -487,7 +487,7 @@ def test_the_commands_from_pictures_to_a_table(run, coded, tmp_path):
     (tmp_path / "r").mkdir()
     write_simulated(tmp_path / "r", plan, [5.0, 4.5, 3.6, 2.8, 2.0, 1.4], 16, seed=1)
     (tmp_path / "r" / "observer-017.jsonl").touch()
-    code, out, err = run("opinions", tmp_path / "r", "--json", tmp_path / "o.json", "--plot", tmp_path / "o.png")
+    code, out, err = run("opinions", tmp_path / "r", "--json", tmp_path / "o.json", "--chart", tmp_path / "o.png")
     assert code == 0, err
     assert "MOS of SIMULATED observers, 16 observers" in out and "observer-017.jsonl is empty" in out
     assert out.count("±") == 6 and "q_view, all" in out and read_image(tmp_path / "o.png").shape[1] > 500

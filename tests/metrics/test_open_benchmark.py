@@ -1,5 +1,6 @@
 """Open benchmark: definitions, external commands, views as files, results and their ranking."""
 
+import csv
 import json
 import shlex
 import sys
@@ -8,18 +9,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
+from examples import recompute
 from ii_core import IIPicture, video_of
 from ii_core.formats.pgx import Component, read_pgx, write_pgx
 from ii_core.formats.pleno import COMPONENTS, read_pleno_views, read_ppm, write_pleno_views, write_ppm
 from metrics import rate_distortion
+from metrics.benchmark.correlation import rank_correlations
+from metrics.benchmark.delivered import Delivered
 from metrics.benchmark.external import External, Refused
 from metrics.benchmark.profile import profile, profile_names
-from metrics.benchmark.ranking import chart_path, ranked, write_page
+from metrics.benchmark.ranking import ranked
+from metrics.benchmark.ranking_page import write_page
 from metrics.benchmark.result import read_result, run, write_result
 from metrics.benchmark.run_log import RunLog
 from metrics.benchmark.subject import measuring_subject
 from metrics.measures.batch import measuring
+from metrics.measures.measure import measure_of
 from metrics.reports.study import picture_json, provenance
 
 PYTHON = f"{shlex.quote(sys.executable)} -I -S"  # without packages: starts in 20 ms
@@ -73,6 +80,7 @@ use = "a test"
 scene = "apples"
 camera = "setup1"
 """
+PHOTO = 'sha256 = "00"\nviews = [2, 2]\nview_pixels = [3, 3]\nsource = { path = "views" }'
 
 
 @pytest.fixture
@@ -384,6 +392,7 @@ def test_undecodable_files_are_refused(picture, coder, code, message):
         replace(coder, decoder=failing(code)).decode(coded)
 
 
+@pytest.mark.slow
 def test_children_of_a_command_end_with_it(tmp_path, picture):
     mark = tmp_path / "alive"
     child = f"import time,pathlib; time.sleep(4); pathlib.Path({str(mark)!r}).touch()"
@@ -422,7 +431,16 @@ def test_wrong_commands_are_refused_before_work(encoder, message):
 
 
 def test_profiles_of_the_package():
-    assert set(profile_names()) == {"dissertation", "jpeg-pleno", "small", "takes"}
+    assert set(profile_names()) == {
+        "dissertation",
+        "jpeg-pleno",
+        "photographs",
+        "photographs-small",
+        "small",
+        "takes",
+    }
+    for photograph in (*profile("photographs").pictures, *profile("photographs-small").pictures):
+        assert photograph.source and len(photograph.source.commit) == 40 and len(photograph.sha256) == 64
     pleno, own = profile("jpeg-pleno"), profile("dissertation")
     assert pleno.rates_bpp == (0.001, 0.005, 0.02, 0.1, 0.75) and {"q_ctc_psnr", "q_ctc_ssim"} <= set(pleno.measures)
     # Version 1 measured PSNR of full-range values and SSIM of BT.601 luma: other figures than the conditions have.
@@ -451,6 +469,9 @@ def test_profiles_of_the_package():
         (("version = 3", "version = 3\nprice = 1"), "profile has no price"),
         (('use = "a test"\n', ""), "picture: use missing"),
         (("rates_bpp = [", "rates_bpp = ["[:-1]), "mine.toml: "),
+        (('camera = "setup1"', 'source = { path = "views" }'), "photograph has no scene"),
+        (('scene = "apples"\ncamera = "setup1"', 'source = { path = "views" }'), "photograph: sha256, view_pixels"),
+        (('scene = "apples"\ncamera = "setup1"', PHOTO), "source: camera, commit, licence, repository missing"),
     ],
 )
 def test_wrong_profiles_are_one_clear_line(tmp_path, change, message):
@@ -459,7 +480,7 @@ def test_wrong_profiles_are_one_clear_line(tmp_path, change, message):
     with pytest.raises(ValueError, match=message) as error:
         profile(path)
     assert "\n" not in str(error.value)
-    with pytest.raises(ValueError, match="unknown profile 'mine': known are dissertation, jpeg-pleno, small"):
+    with pytest.raises(ValueError, match="unknown profile 'mine': known are dissertation, jpeg-pleno, photographs"):
         profile("mine")
 
 
@@ -610,11 +631,76 @@ def test_ranking_by_targets_met_then_quality(tmp_path, definition, picture, code
     difference = {row["coder"]: row["bd_rate"] for row in rows}
     assert difference["deflate"] == pytest.approx(0, abs=1e-9)
     assert difference["half|rate"] == pytest.approx(-50, abs=1e-6)  # half the rate at every quality
-    page, chart = write_page(tmp_path / "rank.md", definition, named)
+    page, numbers, table, chart = write_page(tmp_path / "rank.md", definition, named)
     text = page.read_text()
-    assert chart == chart_path(page) and chart.read_bytes()[:4] == b"\x89PNG" and "rank.png" in text
+    assert chart.read_text().startswith("<?xml") and "rank.svg" in text
     assert text.index("| better |") < text.index("| deflate |") < text.index("half\\|rate")
-    assert sorted(path.name for path in tmp_path.glob("rank*")) == ["rank.md", "rank.png"]
+    assert sorted(path.name for path in tmp_path.glob("rank*")) == ["rank.csv", "rank.md", "rank.svg", "rank.tex"]
+    # Every table names the views' size, depth and noise, and the definition.
+    told = "3×3 views of 6×5 pixels: ramp. Depth: 8 bit. Noise: none, rendered pictures."
+    assert text.count(told) == 3 and text.count(f"SHA-256 {definition.digest[:12]}") == 3
+    assert "-50.0 %; -50.0 % ramp" in text
+    rows = list(csv.DictReader(numbers.open()))
+    assert len(rows) == 16 and float(rows[0]["q_global"]) == named[1][1]["pictures"][0]["points"][0]["q_global"]
+    assert r"half|rate & 4 of 4" in table.read_text() and r"-50.0 \%" in table.read_text()
+    assert table.read_text().count("\\\\") == 5
+
+
+def test_an_independent_script_agrees(definition, picture, coder):
+    """Formulas written anew on scipy, without this package: 0.1 % is allowed, rounding alone is found."""
+    names = ["q_global", "q_ctc_psnr", "q_ctc_min", "q_ctc_step", "q_ctc_ssim"]
+    rng = np.random.default_rng(5)
+    large = IIPicture(rng.integers(0, 256, (60, 48, 3)).astype(np.uint8), (16, 20), (3, 3))
+    worse = large.with_pixels((large.pixels // 8 * 8 + rng.integers(0, 6, large.pixels.shape)).astype(np.uint8))
+    pair = {name: measure_of(name) for name in names}
+    found = measuring(large, names)(worse)
+    again = recompute.measures(large.pixels, worse.pixels, 3, 3)
+    assert set(pair) == set(again)
+    for name, value in again.items():
+        assert found[name] == pytest.approx(value, rel=1e-6), name
+    base = with_points(result_of(definition, picture, "deflate", coder), "deflate")
+    bent = with_points(base, "half", rate=0.5)
+    for i, point in enumerate(bent["pictures"][0]["points"]):
+        point["q_global"] += 0.3 * i
+    row = next(row for row in ranked(definition, [base, bent]) if row["coder"] == "half")
+    assert row["differences"]["q_global"]["ramp"] == pytest.approx(
+        recompute.rates(base, bent, "q_global")["ramp"], rel=1e-3
+    )
+
+
+def test_views_of_a_coder_that_ran_elsewhere_are_measured(tmp_path, definition, picture):
+    for target in definition.rates_bpp:
+        place = tmp_path / "ramp" / f"{target:g}"
+        write_pleno_views(picture.with_pixels(picture.pixels ^ 1), place, "png")
+        (place / "bytes.txt").write_text(f"{int(target * 18 * 15 / 8)}\n")
+    coder = Delivered(tmp_path)
+    made = lambda reference: coder.named(reference, picture)  # noqa: E731
+    result = run(definition, "elsewhere", made, encode=coder.encode, decode=coder.decode)
+    points = result["pictures"][0]["points"]
+    assert all(point["reached"] for point in points) and points[0]["nbytes"] == int(2 * 18 * 15 / 8)
+    assert [point["q_global"] for point in points] == pytest.approx([20 * np.log10(255)] * 4)
+    (tmp_path / "ramp" / "2" / "bytes.txt").write_text("many")
+    with pytest.raises(ValueError, match=r"bytes\.txt is 'many': the number of bytes"):
+        run(definition, "elsewhere", made, encode=coder.encode, decode=coder.decode)
+    (tmp_path / "ramp" / "6" / "001_001.png").unlink()
+    (tmp_path / "ramp" / "2" / "bytes.txt").write_text("9")
+    with pytest.raises(ValueError, match=r"view 001_001.png is missing"):
+        run(definition, "elsewhere", made, encode=coder.encode, decode=coder.decode)
+    with pytest.raises(ValueError, match="is no folder"):
+        Delivered(tmp_path / "none")
+
+
+def test_measures_that_order_coders_alike_correlate(definition, picture, coder):
+    base = result_of(definition, picture, "deflate", coder)
+    results = [with_points(base, str(gain), gain=gain) for gain in (0.0, 1.0, 2.0, 3.0)]
+    both = replace(definition, measures=("q_global", "q_ssim", "q_ctc_step"))
+    for result, ssim, step in zip(results, (0.9, 0.8, 0.8, 0.95), (3, 2, 1, 0), strict=True):
+        for row in result["pictures"]:
+            row["points"] = [{**point, "q_ssim": ssim, "q_ctc_step": step} for point in row["points"]]
+    found = rank_correlations(both, results)
+    assert found["q_global", "q_global"] == pytest.approx(1) == found["q_global", "q_ctc_step"]  # lower is better
+    assert found["q_global", "q_ssim"] == pytest.approx(stats.spearmanr([0, 1, 2, 3], [0.9, 0.8, 0.8, 0.95])[0])
+    assert rank_correlations(both, results[:2]) == {}
 
 
 def test_results_that_cannot_be_compared_are_refused(tmp_path, definition, picture, coder):

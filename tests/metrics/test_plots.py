@@ -12,7 +12,7 @@ from ii_core.base.files import read_image, write_image
 from ii_core.display.figure import save
 from ii_core.display.view_sheets import _pair_figure, _views_figure, plot_pair, plot_views
 from metrics import PLOTS, angle_axes, depth_rate_chart, plot_all, plot_angle, q_angle, q_depth, rd_chart, time_chart
-from metrics.benchmark import ranking
+from metrics.benchmark import ranking_page
 from metrics.measures.over_time import TakeQuality
 from metrics.observers.subjective import predicted_scores
 from metrics.observers.verdict import Judged, Verdict
@@ -205,7 +205,7 @@ def _take():
 def _ranking():
     point = [{"bpp": bpp, "q_global": 30.0} for bpp in (0.1, 0.2)]
     rows = [{"coder": name, "result": {"pictures": [{"name": NAME, "points": point}]}} for name in NAMES]
-    return ranking._chart(SimpleNamespace(pictures=[NAME], rank_by="q_global"), rows)
+    return ranking_page._chart(SimpleNamespace(pictures=[NAME], rank_by="q_global"), rows)
 
 
 CHARTS = {

@@ -92,6 +92,13 @@ def test_a_quarter_of_overlap_is_enough():
             bd_rate(10**line, line, 10**line, line + less)
 
 
+def test_a_short_curve_within_a_long_one_is_whole_overlap():
+    """The share is of the shorter curve: a tenth of the long one here."""
+    short, long = np.linspace(4.5, 5.5, 4), np.linspace(0.0, 10.0, 5)
+    assert bd_rate(10**long, long, 2 * 10**short, short) == pytest.approx(100)
+    assert bd_psnr(10**long, long, 10**short, short + 1) == pytest.approx(1)
+
+
 @pytest.mark.parametrize(
     ("rates", "quality", "message"),
     [
@@ -200,10 +207,15 @@ def test_options_of_a_name_keep_its_preset():
 
 
 def test_versions_are_those_of_all_that_results_depend_on():
-    """On b1dc540 an upgrade of embreex or imagecodecs repeated no step; glymur is not used."""
+    """On b1dc540 an upgrade of embreex or imagecodecs repeated no step; glymur is not used.
+
+    Results of anchors alone depend on their extra; they hold its versions beside the command.
+    """
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    optional = [line for extra in set(extras) - {"all", "dev", "docs"} for line in extras[extra]]
+    optional = [
+        line for extra in set(extras) - {"all", "anchors", "dev", "docs", "notebooks"} for line in extras[extra]
+    ]
     needed = {re.match(r"[\w-]+", line)[0] for line in [*project["dependencies"], *optional]}
     assert set(LIBRARIES) == needed - {"matplotlib", "pydantic", "typer", "rich", "dask"}
     assert set(LIBRARIES) <= set(library_versions()) and "python" in provenance()["versions"]

@@ -1,6 +1,7 @@
 """Small scenes and rays for the tests of the tracer."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -8,9 +9,10 @@ from raytrace_ii import Background, Body, Light, Material, Scene
 from raytrace_ii.scene.textures import Checker, Image, Noise
 from raytrace_ii.shapes.primitives import Box, Mesh, Plane, Sphere, rotation
 from raytrace_ii.tracing.kernels import lanes
+from raytrace_ii.tracing.kernels.images import read_images
 from raytrace_ii.tracing.kernels.lanes import BLOCK, work
 from raytrace_ii.tracing.kernels.noise import fractal_lanes
-from raytrace_ii.tracing.kernels.textures import filtered, noise_colour, pattern_colour
+from raytrace_ii.tracing.kernels.textures import noise_colour, pattern_colour
 from raytrace_ii.tracing.texture_table import TextureTable
 
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
@@ -111,20 +113,35 @@ def hall(max_depth=5):
 def texture_at(texture, points):
     """Linear colours, (n, 3), of a texture at (n, 3) texture coordinates."""
     packed = TextureTable([texture])
-    table, texels, points = packed.table, packed.texels, np.asarray(points, float)
+    table, points = packed.table, np.asarray(points, float)
     if isinstance(texture, Image):
-        texels = (texels[0].astype(float), texels[1])  # in Python float32 would stay float32
-        return np.array([filtered(table, 0, texels, x, y, 0.0, 0.0, 0.0, 0.0) for x, y, _ in points])
+        return np.concatenate([filtered(packed, 0, some[:, 0], some[:, 1]) for some in blocks(points)])
     if isinstance(texture, Noise):
         sums = octaves(points / texture.size, texture.octaves, texture.seed)
         return np.array([noise_colour(table, 0, total) for total in sums])
     return np.array([pattern_colour(table, 0, *p) for p in points])
 
 
+def blocks(points):
+    return np.split(points, range(BLOCK, len(points), BLOCK))
+
+
+def filtered(packed, row, u, v, au=0.0, av=0.0, bu=0.0, bv=0.0):
+    """Linear colours, (n, 3), of an image of a texture table at up to 16 places, over ellipses of two diameters."""
+    rooms, n = work(), len(np.atleast_1d(u))
+    rooms.whole[lanes.IMAGE : lanes.IMAGE + BLOCK] = -1
+    rooms.whole[lanes.IMAGE : lanes.IMAGE + n] = row
+    rooms.double[lanes.SU : lanes.SU + n], rooms.double[lanes.SV : lanes.SV + n] = u, v
+    for first, value in ((lanes.AU, au), (lanes.AV, av), (lanes.BU, bu), (lanes.BV, bv)):
+        rooms.single[first : first + n] = value
+    read_images(SimpleNamespace(levels=packed.levels, texels=packed.texels), rooms)
+    return np.stack([rooms.single[first : first + n] for first in (lanes.Q0, lanes.Q1, lanes.Q2)], axis=1)
+
+
 def octaves(points, many, seed):
     """Sums of octaves of gradient noise at (n, 3) places, (n,)."""
     found = []
-    for some in np.split(points, range(BLOCK, len(points), BLOCK)):
+    for some in blocks(points):
         rooms = work()
         for first, values in ((lanes.SX, some[:, 0]), (lanes.SY, some[:, 1]), (lanes.SZ, some[:, 2])):
             rooms.double[first : first + len(some)] = values

@@ -33,6 +33,7 @@ from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, origin
 from benchmarks.workers import cases
 
+from . import captured as captured  # registers its readers
 from . import measurements as measurements  # registers its readers
 from . import takes as takes  # registers its readers
 from .readers import READERS, Read

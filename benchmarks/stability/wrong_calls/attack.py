@@ -41,7 +41,7 @@ SAID = {
     "views": "views|viewpoints", "cone": "cone|zone", "directions": "directions?|ray",
     "ei_pixels": "ei_pixels|elementary image|lenses of", "qp": "qp|scheme", "bpp": "bpp|scheme",
     "quality": "quality|scheme", "picture": "picture|name|file", "optics": "optics|element|optical",
-    "study": "study|points",
+    "study": "study|points", "regions": "regions?",
 }  # fmt: skip
 # Valid values that take too long: threads, and samples of 10⁹.
 LONG = {"workers", "samples", "across", "runs", "count", "views", "max_depth"}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -25,6 +26,7 @@ from ii_core.camera.maps import read_maps, write_maps
 from ii_core.design import design, properties
 from ii_core.display.lenticular import lenticular
 from ii_core.formats.find import find_views
+from ii_core.formats.lytro import RawColour
 from ii_core.waves import spread, spread_files, wave
 from metrics import observers
 from metrics.observers import simulated
@@ -43,10 +45,11 @@ MORE = (
 UNTRIED = {
     "chain", "placed", "scaled_chain", "surfaces_of", "unit_disk",
     "AccessCost", "AngleQuality", "Audit", "Calibration", "Camera", "Coder", "CodingResult", "DamagedTake",
-    "DecodedView", "DepthEstimate", "DepthQuality", "EmbeddedViewer", "EyeImage", "FocusDepth", "Goal", "Grin", "Judged", "Lenticular",
+    "DecodedView", "DepthEstimate", "DepthQuality", "EmbeddedViewer", "EyeImage", "FocusDepth",
+    "Goal", "Grin", "Judged", "Lenticular",
     "MapCamera", "NoLenses", "Observer", "OpinionScores", "PairScale", "PanelDesign", "Paraxial", "Pinhole",
-    "Prediction", "Prescription", "Report", "Results", "Retargeted", "Rig", "Run", "Shot", "SpreadMaps", "Stage", "Stats", "Take",
-    "TakeFloor", "TakeQuality", "Verdict", "ViewQuality", "ViewingZone",
+    "Prediction", "Prescription", "Report", "Results", "Retargeted", "Rig", "Run", "Shot",
+    "SpreadMaps", "Stage", "Stats", "Take", "TakeFloor", "TakeQuality", "Verdict", "ViewQuality", "ViewingZone",
 }  # fmt: skip
 CAMERA = IICamera(pixels=(48, 48), lenses=(12, 12), pixel_pitch_mm=0.1, gap_mm=1.5)
 PIXELS = np.random.default_rng(0).integers(0, 256, (48, 48, 3), np.uint8)
@@ -231,10 +234,6 @@ def of_pictures(made: Made) -> dict[str, Values]:
         "preset": {"name": "setup1", "scale": 8},
         "preset_cameras": {"name": "setup1", "scale": 8},
         "projection_camera": {"across": 10},
-        "estimate_depth": {"view": (0, 0), "low": -1.0, "high": 0.0},
-        "focused": {"disparity": 0.5, "weights": np.ones(PICTURE.ei_pixels[::-1]), "view": (0, 0), "bokeh": 1.0,
-            "limit": 0.1},
-        "retarget": {"disparity": np.full((*PICTURE.ei_pixels[::-1], *PICTURE.lenses[::-1]), -0.1)},
         "resampled": {"ei_pixels": (4, 4)},
         "camera_pose": {"at_mm": (0, 0, -9), "look_at_mm": (0, 0, 0)},
         "depth_of_disparity": {"disparity": 0.5},
@@ -247,8 +246,15 @@ def of_pictures(made: Made) -> dict[str, Values]:
         "image_plane_mm": {"focal_mm": 2.0, "gap_mm": 1.0},
         "depth_range_mm": {"gap_mm": 1.0, "z_mm": 9.0},
         "calibrate": {**frames, "lattice": "rectangular", "pixel_pitch_mm": 0.01, "gap_mm": 0.2},
-        "calibrated_picture": {**frames, "calibration": calibration, "full_scale": 250.0},
+        "calibrated_picture": {**frames, "calibration": calibration, "full_scale": 250.0,
+            "colour": RawColour((1.2, 1.0, 1.5), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))},
+        "defective_pixels": {"white": raw, "dark": frames["dark"], "mosaic": "rggb", "calibration": calibration},
         "centres_picture": {"calibration": calibration, "picture": calibrated},
+        "estimate_depth": {"view": (1, 1), "low": -0.5, "high": 0.5},
+        "focused": {"disparity": 0.0, "weights": np.ones((4, 4)), "view": (1, 1), "limit": 0.5},
+        "plane_disparity": {"view": (1, 1)},
+        "pupil_weights": {"views": (4, 4)},
+        "retarget": {"disparity": np.zeros((4, 4, 12, 12), np.float32)},
         "DisplayModel": {"lens_pitch_mm": 0.4, "gap_mm": 1.5},
         "Eye": {"position_mm": (0.0, 0.0, -300.0), "pupil_mm": 3.0, "focus_mm": 300.0},
         "eye_image": {"size": (12, 12)},
@@ -319,8 +325,9 @@ def of_measures(made: Made) -> dict[str, Values]:
     return {
         "depth_from_focus": {"method": "robust", "base": [[0, 0]], "reference": [[0, 0]], "weights": [[1.0]]},
         "disparity_layers": {"low": LOW, "high": HIGH},
-        "depth_errors": {"disparity": DEPTH, "truth": DEPTH, "border": 1, "regions": {}, "camera": None},
-        "depth_regions": {"truth": DEPTH, "view": np.zeros((*DEPTH.shape, 3), np.uint8)},
+        "depth_errors": {"disparity": DEPTH, "truth": DEPTH, "regions": {"all": DEPTH > 0},
+            "camera": replace(CAMERA, viewer_mm=300.0)},
+        "depth_regions": {"truth": DEPTH, "view": PIXELS},
         "logarithmic_layers": {"near_mm": 1.0, "far_mm": 2.0},
         "covering_layers": {"depth_mm": DEPTH},
         "measuring": {"names": ["q_global"]},

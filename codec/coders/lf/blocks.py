@@ -21,7 +21,7 @@ from .cross import code_cross, keep_first, rebuild
 from .intra import MODES, SMOOTH, fill_border, predict_intra
 from .samples import LARGEST_SKIPPED, code_samples
 from .transform import LARGEST
-from .warp import moved_block
+from .warp import LATTICE, lead, moved_block
 
 LOG_LARGEST, LOG_LEAST = 5, 2
 INTRA, EXPLICIT, SYNTHESIS, TIMED, MIXED = range(5)
@@ -46,7 +46,7 @@ class Job(NamedTuple):
     at : int
         Which of them this is.
     references : ndarray of int64, (R, 3)
-        Views to predict from: index, and how far each is, in columns and rows of the grid; R ≤ 4.
+        Views to predict from: index, and how far each is, in columns and rows of the grid, in 2^-10 of a view; R ≤ 4.
     unit : int
         Disparity of an index of 1, in 2^-8 samples between neighbouring views.
     low, high : int
@@ -59,7 +59,8 @@ class Job(NamedTuple):
         How far the sources of the synthesis differ, in eighths of an 8-bit code.
     synthesised : int
     crossed : int
-        Whether the second and third plane's residuals may be predicted from the first's.
+        Binary logarithm of the unit of factors that predict the second and third plane's residuals from the first's;
+        0 without them.
     skipping : int
         Whether small blocks may have no transform.
     step : int
@@ -71,6 +72,8 @@ class Job(NamedTuple):
         The same view at earlier instants of a take, the latest first; P is 0 for pictures alone.
     motions : ndarray of int16, (J, motion.FIELDS, H / 4, W / 4)
         Vectors of decoded views, if there are earlier instants.
+    finer : int
+        Whether large coefficients have contexts by their neighbourhood.
     """
 
     views: Any
@@ -91,6 +94,7 @@ class Job(NamedTuple):
     levels: Any
     past: Any = motion.NOTHING
     motions: Any = motion.NOTHING
+    finer: Any = 0
 
 
 class Work(NamedTuple):
@@ -242,12 +246,12 @@ def seen_mask(job, by, bx, log, index):
         for place in range(5):
             y = 4 * by + (2 * quarter if place == 4 else quarter + 2 * quarter * (place >> 1))
             x = 4 * bx + (2 * quarter if place == 4 else quarter + 2 * quarter * (place & 1))
-            i, j = x + ((d * across + 128) >> 8), y + ((d * down + 128) >> 8)
+            i, j = x + ((lead(d, across) + 128) >> 8), y + ((lead(d, down) + 128) >> 8)
             if i < 0 or j < 0 or i >= width or j >= height:
                 against += 1
             else:
                 other = np.int64(job.disparities[view, j, i])
-                if other != UNKNOWN and abs(other - d) * farthest > DIFFERENT:
+                if other != UNKNOWN and abs(other - d) * farthest > DIFFERENT << LATTICE:
                     against += 1
         if against < 3:
             seen |= 1 << r
@@ -483,8 +487,8 @@ def predict_explicit(job, work, y0, x0, n, index, mask):
                     y0,
                     x0,
                     n,
-                    d * job.references[r, 2],
-                    d * job.references[r, 1],
+                    lead(d, job.references[r, 2]),
+                    lead(d, job.references[r, 1]),
                     work.rows,
                     predicted,
                 )
@@ -616,7 +620,7 @@ def code_block(coder, job, work, y0, x0, log):
                 first = some
         if decoding:
             if some or cross:
-                rows, cols = rebuild(work, work.levels, log, job.step, some, cross, skipped)
+                rows, cols = rebuild(work, work.levels, log, job.step, some, cross, job.crossed, skipped)
                 if p == 0:
                     keep_first(work, rows, cols)
             store(job, work, p, y0, x0, n, some or cross)
@@ -656,7 +660,7 @@ def _code_plane(coder, job, work, y0, x0, log, p, kind, first, skipped):
         if decoding:
             _note_levels(job, work, p, y0, x0, n)
     elif some:
-        code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0)
+        code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0, job.finer)
     return some, cross
 
 

@@ -17,7 +17,7 @@ from ii_core import IIPicture
 from ... import clock
 from ...contract import Coder, Goal, Option, Options, Pixels
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
-from . import arithmetic, planes, ranges, search, stream, synthesis
+from . import arithmetic, loop_filter_search, planes, ranges, search, stream, synthesis, tuning
 from .blocks import Job, code_blend, new_work
 from .contexts import Contexts
 from .field import Field
@@ -31,7 +31,7 @@ FRACTIONS = 16  # of a quantiser, between which a rate is searched
 OCTAVE = -6.0 * FRACTIONS  # quantisers that double a size, about
 START = 34 * FRACTIONS
 COARSEST_DB, FINEST_DB = 10.0, 60.0
-QUALITY_RUNS, NEAR_DB, DB_A_STEP = 6, 0.05, 0.8  # PSNR falls so much from one quantiser to the next, about
+QUALITY_RUNS, NEAR_DB, DB_A_STEP = 10, 0.05, 0.8  # PSNR falls so much from one quantiser to the next, about
 # Of the blocks that predict a view which is coded lossless; the better one is kept.
 EXACT_SETTINGS = 26 * FRACTIONS, 44 * FRACTIONS
 GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below which nothing else is tried
@@ -43,6 +43,8 @@ WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 # Quantisers by which each level is finer than the next, for more is predicted from it, and the first is finer than
 # the last.
 FINER_A_LEVEL, FINER_FIRST = 1.5, 14.0
+TRIAL_LEVELS = 2  # of views that show how errors share among planes
+CROSS = stream.QUARTERS, stream.EIGHTHS  # unit of factors between planes: of principal axes, and of BT.709
 MOST_VIEWS = 1 << 14
 VIEW_BYTES, EXACT_BYTES = 24, 96  # a sample's most
 # Settings that meet a size.
@@ -55,17 +57,24 @@ class LightField(Coder):
     kind = "si"
     components_alone: ClassVar[bool] = True
     name = "si-lf"
-    about = "Sub-images as a light field: a pyramid of views, disparity, synthesis at the decoder"
+    about = "Sub-images as a light field, tuned for PSNR-YUV (6:1:1) or RGB: disparity, synthesis at the decoder"
     dtypes: ClassVar[tuple[str, ...]] = ("uint8", "uint16")
     qp_range: ClassVar[tuple[int, int] | None] = (FINEST, COARSEST)
     quality_range: ClassVar[tuple[float, float] | None] = (COARSEST_DB, FINEST_DB)
-    scale_about = "of qp the step doubles every 6, and is one 8-bit code at 8; quality is PSNR in dB"
+    scale_about = (
+        "of qp the step doubles every 6, and is one 8-bit code at 8; quality is PSNR in dB by the measure of tune"
+    )
     options: ClassVar[Mapping[str, Option]] = {
         "stride": Option(about="binary logarithm of the first views' distance on the grid", default=3, low=0, high=6),
         "sources": Option(about="views that a synthesis is made of, 0 for none", default=4, low=0, high=8),
         "cross": Option(about="1 to predict colours of a residual from its first plane", default=1, low=0, high=1),
         "skip": Option(
             about="1 to code residuals of small blocks without a transform where it pays", default=1, low=0, high=1
+        ),
+        "tune": Option(
+            about="measure: PSNR-YUV of JPEG Pleno's test conditions (6:1:1, BT.709), or PSNR of RGB and of grey",
+            default="ctc",
+            choices=("ctc", "rgb"),
         ),
         "lossless": Option(about="1 to code to the bit", default=0, low=0, high=1),
         "threads": Option(
@@ -162,7 +171,7 @@ def decoded_batches(
 ) -> Iterator[tuple[int, list[Node], int]]:
     """Decode one batch of views after another; yield the level, the views, and the bytes read so far."""
     contexts, work = contexts or Contexts(), new_work()
-    before = stream.head_bytes(len(levels))
+    before = stream.head_bytes(field.header, levels)
     with Workers(threads) as workers:
         for level, data in enumerate(levels):
             coder = arithmetic.reader(contexts.of(level), data)
@@ -232,18 +241,26 @@ class Source:
         self.count = self.pixels.size // 3
         self.height, self.width, self.grid = shape(picture)
         self.effort, self.threads = int(options["effort"]), int(options["threads"])
-        self.axes = planes.detail_axes(self.pixels, self.grid)
-        low, high, down = ranges.estimated(self.view, self.grid)
+        exact = bool(options["lossless"])
+        scales = None if exact or options["tune"] == "rgb" or _grey(self.pixels) else (tuning.START, tuning.START)
+        if scales:
+            self.axes, colours = planes.bt709_axes(scales), planes.bt709_colours(scales)
+        else:
+            self.axes = colours = planes.detail_axes(self.pixels, self.grid)
+        low, high, lattice = ranges.estimated(self.view, self.grid, skewed=not exact)
         self.header = Header(
             log_stride=int(options["stride"]),
             sources=int(options["sources"]),
-            exact=bool(options["lossless"]),
-            down=down,
+            exact=exact,
+            lattice=lattice,
             low=low,
             high=high,
-            axes=self.axes,
-            crossed=bool(options["cross"]),
-            skipping=bool(options["skip"]) and not options["lossless"],
+            colours=colours,
+            scales=scales,
+            crossed=CROSS[bool(scales)] if options["cross"] else 0,
+            skipping=bool(options["skip"]) and not exact,
+            tuned=not exact,
+            filtered=not exact,
             steps=(),
         )
 
@@ -255,13 +272,18 @@ class Source:
         return out
 
     def psnr(self, field: Field) -> float:
-        """PSNR in dB of what the decoder shows."""
+        """PSNR in dB of what the decoder shows, by the measure that is tuned for."""
         rows, cols = self.grid
-        error = 0.0
+        error, views = 0.0, []
         for number in range(len(field.views)):
             row, col = divmod(number, cols)
-            decoded = field.view_pixels(number).astype(np.float32)
-            error += float(np.square(decoded - self.pixels[row::rows, col::cols]).sum(dtype=np.float64))
+            original, decoded = self.pixels[row::rows, col::cols], field.view_pixels(number)
+            if self.header.scales:
+                views.append(tuning.psnr_yuv(original, decoded))
+            else:
+                error += float(np.square(decoded.astype(np.float32) - original).sum(dtype=np.float64))
+        if views:
+            return float(np.mean(views))
         top = np.iinfo(self.pixels.dtype).max
         return 10 * math.log10(top**2 * self.pixels.size / max(error, 1e-9))
 
@@ -273,9 +295,35 @@ class Source:
 
     def coded(self, setting: float) -> tuple[bytes, Field]:
         """The payload at a quantiser, and what the decoder will make of it."""
-        field = self.field(replace(self.header, steps=self.steps(setting)))
+        field = self.field(self.header_at(setting))
         levels = self.levels(field, Contexts())
         return stream.pack(field.header, levels, self.count), field
+
+    def header_at(self, setting: float) -> Header:
+        """Return the header at a quantiser, with the scales of Cb and Cr that a trial of the first views gives."""
+        header = replace(self.header, steps=self.steps(setting))
+        if header.scales is None:
+            return header
+        scales = tuning.START, tuning.START
+        header = self._scaled(header, scales)
+        trial = self.field(header)
+        # All with the step of most views, by which errors are those of most views.
+        step = header.steps[max(i for i, level in enumerate(trial.levels) if level)]
+        trial.header = replace(header, steps=(step,) * len(header.steps))
+        trial.levels = trial.levels[:TRIAL_LEVELS]
+        effort, self.effort = self.effort, 0
+        self.levels(trial, Contexts())
+        self.effort = effort
+        errors = np.zeros(3)
+        for place in np.argwhere(trial.decoded).tolist():
+            decoded = trial.views[trial.number((place[0], place[1]))]
+            errors += np.square(decoded.astype(np.float32) - self.view(*place)).sum(axis=(1, 2), dtype=np.float64)
+        return self._scaled(header, tuning.better_scales(scales, errors))
+
+    def _scaled(self, header: Header, scales: tuple[int, int]) -> Header:
+        """Return the header with other scales of planes; the source's planes get them, too."""
+        self.axes = planes.bt709_axes(scales)
+        return replace(header, scales=scales, colours=planes.bt709_colours(scales))
 
     def steps(self, setting: float) -> tuple[int, ...]:
         """Return the quantiser's step of each level."""
@@ -304,13 +352,18 @@ class Source:
                 coder = arithmetic.writer(contexts.of(number), room)
                 for nodes in field.batches(number):
                     found = partial(self._found, field, arithmetic.bit_costs(coder.contexts))
-                    jobs, made, blends = zip(*workers.map(found, nodes), strict=True)
+                    jobs, made, blends, filters = zip(*workers.map(found, nodes), strict=True)
                     for job, nearest in zip(jobs, blends, strict=True):
                         if job.synthesised:
                             code_blend(coder, nearest)
-                    for job in jobs:
+                    for job, filtering in zip(jobs, filters, strict=True):
                         coder = arithmetic.enlarged(coder, room)
-                        field.code(coder, job, work)
+                        same = 0
+                        if filtering:
+                            same = loop_filter_search.choose_filters(
+                                coder, field.filters, job.at, filtering, worth(job.step)
+                            )
+                        field.code(coder, job, work, same)
                     workers.map(field.refine, nodes, jobs, made)
                     field.finish(nodes)
                     del job, jobs, made  # before the next batch takes as much
@@ -318,26 +371,43 @@ class Source:
                 contexts.after(number)
         return levels
 
-    def _found(self, field: Field, costs: NDArray[np.float32], node: Node) -> tuple[Job, synthesis.Synthesis, int]:
-        """A view's blocks, found and decoded; its synthesis, and in which way that is blended."""
+    def _found(
+        self, field: Field, costs: NDArray[np.float32], node: Node
+    ) -> tuple[Job, synthesis.Synthesis, int, loop_filter_search.Found | None]:
+        """A view's blocks, found and decoded; its synthesis, in which way that is blended, and its best filters."""
         job, made = field.job(node)
         original = self.view(node.row, node.col)
         nearest = _nearer_blend(made, original, BLEND_ROWS[self.effort]) if job.synthesised else 0
         search.find_blocks(costs, job, self._search(job, original))
-        return job, made, nearest
+        filters = None
+        if field.header.filtered:
+            filters = loop_filter_search.search_filters(field.views, job.at, original, worth(job.step))
+        return job, made, nearest, filters
 
     def _search(self, job: Any, original: NDArray[np.int16]) -> Search:
         share = min(1.0, GOOD_SAMPLES / (self.height * self.width))
+        # The first view is one of many, and of photographs half of all bytes and more: it is always searched well.
+        effort = self.effort if len(job.references) or not self.effort else 2
         return Search(
             original=original,
-            weight=np.float32(WEIGHT * (job.step / 16) ** 2),
-            least=3 if self.effort == 0 else 2,
-            intra_tries=(1, 1, 3)[self.effort],
-            good=np.float32(GOOD[self.effort] * share),
-            surely=np.float32(SURELY[self.effort]),
-            planes=1 if self.effort == 0 else 3,
-            hurried=int(self.effort < 2),
+            weight=np.float32(worth(job.step)),
+            least=3 if effort == 0 else 2,
+            intra_tries=(1, 1, 3)[effort],
+            good=np.float32(GOOD[effort] * share),
+            surely=np.float32(SURELY[effort]),
+            planes=1 if effort == 0 else 3,
+            hurried=int(effort < 2),
         )
+
+
+def worth(step: int) -> float:
+    """Return the squared error that a bit is worth at a quantiser."""
+    return float(WEIGHT * (step / 16) ** 2)
+
+
+def _grey(pixels: NDArray[Any]) -> bool:
+    """Return whether red, green and blue are the same everywhere."""
+    return bool((pixels[..., :2] == pixels[..., 1:]).all())
 
 
 def _nearer_blend(made: synthesis.Synthesis, original: NDArray[np.int16], every: int) -> int:

@@ -15,6 +15,7 @@ from .contexts import (
     ABOVE_TWO,
     LAST,
     REST,
+    REST_NEAR,
     SIGNIFICANT,
     SIGNIFICANT_THERE,
     WEIGHTS,
@@ -41,7 +42,7 @@ def _at(square, log, k):
 
 @stage_kernel
 def _neighbourhood(levels, y, x, n):
-    """Class 0–7 by the sum of the magnitudes of the five places before, in the order of coding."""
+    """Class 0–9 by the sum of the magnitudes of the five places before, in the order of coding."""
     total = 0
     row, below = levels[np.uint64(y)], levels[np.uint64(min(y + 1, n - 1))]
     if x + 1 < n:
@@ -54,7 +55,14 @@ def _neighbourhood(levels, y, x, n):
         total += abs(below[np.uint64(x)])
         if y + 2 < n:
             total += abs(levels[np.uint64(y + 2), np.uint64(x)])
-    return total if total < 5 else (5 if total < 7 else (6 if total < 11 else 7))
+    if total < 11:
+        return total if total < 5 else (5 if total < 7 else 6)
+    return 7 if total < 18 else (8 if total < 30 else 9)
+
+
+@stage_kernel
+def _rest_context(plane, around, finer):
+    return REST_NEAR + (plane * 6 + max(around - 4, 0)) * 16 if finer else REST + plane * 16
 
 
 @stage_kernel
@@ -64,7 +72,7 @@ def _place(y, x):
 
 
 @tuned_kernel
-def code_coefficients(coder, levels, plane, log, intra):
+def code_coefficients(coder, levels, plane, log, intra, finer):
     """Write or read levels[:n, :n], of which one at least is not zero; a reader finds only zeros there before."""
     n = 1 << log
     last = n * n - 1
@@ -75,8 +83,8 @@ def code_coefficients(coder, levels, plane, log, intra):
         y, x = _scanned(log, k)
         value = np.int64(levels[y, x])
         size = abs(value)
-        near = _neighbourhood(levels, y, x, n)
-        place = _place(y, x)
+        around = _neighbourhood(levels, y, x, n)
+        near, place = min(around, 7), _place(y, x)
         context = SIGNIFICANT + ((plane * 4 + log - 2) * 4 + place) * 8 + near
         there = ((y << 2 >> log) * 4 + (x << 2 >> log)) * 2 + intra
         other = SIGNIFICANT_THERE + (plane * 4 + log - 2) * 32 + there
@@ -88,15 +96,14 @@ def code_coefficients(coder, levels, plane, log, intra):
         if code_mixed(coder, ABOVE_ONE + context, other, WEIGHTS + 12 + plane, 1 if size > 1 else 0):
             found = 2
             if code_bit(coder, ABOVE_TWO + context, 1 if size > 2 else 0):
-                found = 3 + min(
-                    code_number(coder, REST + plane * 16, np.int64(16), np.int64(0), size - 3), MOST_LEVEL
-                )
+                rest = _rest_context(plane, around, finer)
+                found = 3 + min(code_number(coder, rest, np.int64(16), np.int64(0), size - 3), MOST_LEVEL)
         levels[y, x] = -found if code_raw(coder, 1 if value < 0 else 0) else found
 
 
 @stage_kernel
-def _level_cost(costs, size, near, place, plane, log, last):
-    bits = np.float32(0)
+def _level_cost(costs, size, around, place, plane, log, last, finer):
+    bits, near = np.float32(0), min(around, 7)
     if not last:
         bits += bit_cost(costs, SIGNIFICANT + ((plane * 4 + log - 2) * 4 + place) * 8 + near, 1 if size else 0)
         if size == 0:
@@ -107,7 +114,7 @@ def _level_cost(costs, size, near, place, plane, log, last):
     if size > 1:
         bits += bit_cost(costs, ABOVE_TWO + context, 1 if size > 2 else 0)
         if size > 2:
-            bits += number_cost(costs, REST + plane * 16, np.int64(16), np.int64(0), size - 3)
+            bits += number_cost(costs, _rest_context(plane, around, finer), np.int64(16), np.int64(0), size - 3)
     return bits
 
 
@@ -119,7 +126,7 @@ def _places_within(diagonal, n):
 
 
 @part_kernel
-def quantise(costs, coefficients, plane, log, step, weight, levels):
+def quantise(costs, coefficients, plane, log, step, weight, levels, finer):
     """Fill levels[:n, :n]; return the bits, those of "coded or not" left out, and the squared error.
 
     Parameters
@@ -149,7 +156,7 @@ def quantise(costs, coefficients, plane, log, step, weight, levels):
             continue
         y, x = _scanned(log, k)
         level: Any = min(np.int64(size / step + np.float32(0.5)), MOST_LEVEL)
-        cost = _level_cost(costs, level, 0, _place(y, x), plane, log, True)
+        cost = _level_cost(costs, level, 0, _place(y, x), plane, log, True, finer)
         missed = size - np.float32(level) * step
         gain = size * size - missed * missed
         if level > 1 or gain >= weight * (cost + HOPE):
@@ -165,11 +172,11 @@ def quantise(costs, coefficients, plane, log, step, weight, levels):
         level = min(np.int64(size / step + np.float32(0.5)), MOST_LEVEL)
         near, where = _neighbourhood(levels, y, x, n), _place(y, x)
         best: Any = 0
-        cost = _level_cost(costs, 0, near, where, plane, log, False)
+        cost = _level_cost(costs, 0, near, where, plane, log, False, finer)
         least = size * size + weight * cost
         kept, missed2 = cost, size * size
         for tried in range(max(1, level - 1), level + 1):
-            cost = _level_cost(costs, tried, near, where, plane, log, False)
+            cost = _level_cost(costs, tried, near, where, plane, log, False, finer)
             missed = size - np.float32(tried) * step
             total = missed * missed + weight * cost
             if total < least:

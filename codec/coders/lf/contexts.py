@@ -47,7 +47,13 @@ SAMPLE_ABOVE_TWO = SAMPLE_ABOVE_ONE_BESIDE + 27  # plane 3 × around 8
 SAMPLE_REST = SAMPLE_ABOVE_TWO + 24  # plane 3 × 16 digits
 SAMPLE_SIGN = SAMPLE_REST + 48  # plane 3 × sign of the first plane 3
 SAMPLE_WEIGHTS = SAMPLE_SIGN + 9  # plane 3 × block size 2, of above one plane 3
-COUNT = SAMPLE_WEIGHTS + 9
+# Of version 7.
+REST_NEAR = SAMPLE_WEIGHTS + 9  # plane 3 × larger neighbourhoods 6 × 16 digits
+FILTERED = REST_NEAR + 288  # plane 3 × the view before: none, off, on 3
+FILTER_SAME = FILTERED + 9  # plane 3
+FILTER_CLASSES = FILTER_SAME + 3  # plane 3 × (more than one, eight)
+TAP = FILTER_CLASSES + 6  # first plane or another 2 × group of taps 4 × 12 digits
+COUNT = TAP + 96
 
 # Probabilities to begin with: log(p / (1 - p)) from -6.2 up in steps of 0.2, by its digit; * where none is known. The
 # mean over eight coded pictures: three scenes and a flower of a real light field camera, at two quantisers each.
@@ -145,7 +151,9 @@ def starting_contexts() -> NDArray[np.int32]:
     )
     weights = np.full((EXACT - WEIGHTS, 3), 1 << 15)
     unknown = np.tile([1 << 15, 1 << 15, 0], (COUNT - EXACT, 1))
-    return np.concatenate([found, weights, unknown]).astype(np.int32)
+    contexts = np.concatenate([found, weights, unknown]).astype(np.int32)
+    contexts[REST_NEAR:FILTERED] = np.repeat(contexts[REST:BLEND].reshape(3, 1, 16, 3), 6, axis=1).reshape(-1, 3)
+    return contexts
 
 
 class Contexts:

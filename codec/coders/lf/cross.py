@@ -1,6 +1,7 @@
 """Prediction of the residual's second and third plane from its first: the colours of a block often lie on a line.
 
-The factor is in quarters, chosen for each block and plane, and multiplies the first plane's coefficients as decoded.
+The factor is in quarters or eighths, chosen for each block and plane. It multiplies the first plane's coefficients as
+decoded.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from .arithmetic import bit_cost, code_bit
 from .coefficients import dequantise
 from .transform import inverse
 
-MOST_CROSS = 4  # quarters
+MOST_CROSS = 4  # units
 
 
 @tuned_kernel
@@ -52,8 +53,8 @@ def keep_first(work, rows, cols):
 
 
 @part_kernel
-def best_cross(work):
-    """The factor by which the first plane's coefficients come nearest to work.coefficients."""
+def best_cross(work, shift):
+    """The factor, in 2^-shift, by which the first plane's coefficients come nearest to work.coefficients."""
     product = square = np.float32(0)
     for y in range(work.reach[0]):
         for x in range(work.reach[1]):
@@ -62,21 +63,21 @@ def best_cross(work):
             square += first * first
     if square == 0:
         return np.int64(0)
-    factor = np.int64(np.floor(np.float32(4) * product / square + np.float32(0.5)))
+    factor = np.int64(np.floor(np.float32(1 << shift) * product / square + np.float32(0.5)))
     return min(max(factor, -MOST_CROSS), MOST_CROSS)
 
 
 @part_kernel
-def subtract_cross(work, cross):
+def subtract_cross(work, cross, shift):
     """Take the prediction from work.coefficients."""
     for y in range(work.reach[0]):
         for x in range(work.reach[1]):
-            work.coefficients[y, x] -= (cross * work.first[y, x]) >> 2
+            work.coefficients[y, x] -= (cross * work.first[y, x]) >> shift
 
 
 @tuned_kernel
-def rebuild(work, levels, log, step, some, cross, skipped):
-    """work.block = the residual, of levels if there are ``some``, and of the first plane.
+def rebuild(work, levels, log, step, some, cross, shift, skipped):
+    """work.block = the residual, of levels if there are ``some``, and of the first plane by a factor in 2^-shift.
 
     Return the rows and columns of work.coefficients that hold it.
     """
@@ -89,7 +90,7 @@ def rebuild(work, levels, log, step, some, cross, skipped):
             for x in range(wide):
                 value = work.coefficients[y, x] if y < rows and x < cols else 0
                 if y < work.reach[0] and x < work.reach[1]:
-                    value += (cross * work.first[y, x]) >> 2
+                    value += (cross * work.first[y, x]) >> shift
                 work.coefficients[y, x] = value
         rows, cols = high, wide
     if skipped:

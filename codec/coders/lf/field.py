@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import motion, synthesis
+from . import loop_filter, motion, synthesis
 from .arithmetic import Arithmetic
 from .blocks import DONE, MOST_INDEX, MOST_REFERENCES, UNKNOWN, Job, Work, code_view, new_blocks
 from .exact import code_exact, new_exact, prepare
 from .planes import gather, scatter
 from .pyramid import Node, Place, batches, pyramid
-from .stream import Header
+from .stream import UPRIGHT, Header
 from .synthesis import Synthesis, chosen, new_synthesis
+from .warp import LATTICE
 
 EIGHTH = 32  # of a sample, in units of disparity
 MOST_SEARCHED = 800  # disparities of one view
@@ -50,6 +51,7 @@ class Field:
         # Pixels by view, if coding is lossless.
         self.pixels = np.zeros((len(self.views) if header.exact else 0, height, width, 3), dtype)
         self._exact = new_exact(height, width, dtype)
+        self.filters = loop_filter.new_filters(len(self.views) if header.filtered else 0)
         self.decoded = np.zeros(grid, bool)
         self.past = tuple(past)
         self.motions = motion.NOTHING
@@ -85,7 +87,8 @@ class Field:
             disparity=made.disparity,
             doubt=made.doubt,
             synthesised=int(known),
-            crossed=int(self.header.crossed),
+            crossed=self.header.crossed,
+            finer=int(self.header.tuned),
             skipping=int(self.header.skipping),
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),
@@ -95,24 +98,29 @@ class Field:
         )
         return job, made
 
-    def code(self, coder: Arithmetic, job: Job, work: Work) -> None:
-        """Write or read a view's blocks, and its pixels if coding is lossless, which then predict the next views."""
+    def code(self, coder: Arithmetic, job: Job, work: Work, same: int = 0) -> None:
+        """Write or read a view's blocks and filters, or its pixels if coding is lossless; they predict later views.
+
+        Bit p of ``same`` says that the filter of plane p is the one coded last.
+        """
         code_view(coder, job, work)
+        if self.header.filtered:
+            loop_filter.code_filter(coder, self.filters, job.at, same)
         if self.header.exact:
             exact = self._exact
-            axes, sixteen = self.header.axes, exact.pixels.itemsize == 2
+            rotation, sixteen = self.header.colours, exact.pixels.itemsize == 2
             exact.pixels[:] = self.pixels[job.at]
-            prepare(exact, self.views, job.at, axes, sixteen)
+            prepare(exact, self.views, job.at, rotation, sixteen)
             code_exact(coder, exact)
             self.pixels[job.at] = exact.pixels
-            gather(exact.pixels, (1, 1), 0, 0, axes, sixteen, self.views[job.at])
+            gather(exact.pixels, (1, 1), 0, 0, rotation, sixteen, self.views[job.at])
 
     def view_pixels(self, number: int) -> NDArray[Any]:
         """A decoded view, (H, W, 3)."""
         if self.header.exact:
             return self.pixels[number]
         pixels = np.empty(self._exact.pixels.shape, self._exact.pixels.dtype)
-        scatter(self.views, number, (1, 1), 0, 0, self.header.axes, pixels.itemsize == 2, pixels)
+        scatter(self.views, number, (1, 1), 0, 0, self.header.colours, pixels.itemsize == 2, pixels)
         return pixels
 
     def show(self, pixels: NDArray[Any]) -> None:
@@ -123,7 +131,9 @@ class Field:
             pixels[row::rows, col::cols] = self.view_pixels(number)
 
     def refine(self, node: Node, job: Job, made: Synthesis) -> None:
-        """Note the disparity of a decoded view, for those that follow."""
+        """Filter a decoded view, and note its disparity, for those that follow."""
+        if self.header.filtered and self.filters.modes[job.at].any():
+            loop_filter.filter_view(self.views, job.at, self.filters, *loop_filter.memory(*self.shape))
         if (node.row, node.col) not in self.used or not (len(made.sources) or self.past):
             return
         synthesis.start(made, job.at, job.blocks, job.unit, job.synthesised)
@@ -158,8 +168,10 @@ class Field:
             synthesis.refine(made, at, True)
 
     def _offsets(self, node: Node, places: tuple[Place, ...]) -> np.ndarray:
+        row, col, (across, down, apart) = node.row, node.col, self.header.lattice
         rows = [
-            (self.number(place), place[1] - node.col, self.header.down * (place[0] - node.row)) for place in places
+            (self.number((v, u)), UPRIGHT * (u - col) + across * (v - row), down * (u - col) + apart * (v - row))
+            for v, u in places
         ]
         return np.array(rows, np.int64).reshape(-1, 3)
 
@@ -168,7 +180,8 @@ class Field:
         if not len(references):
             return EIGHTH
         spread = self.header.high - self.header.low
-        return max(EIGHTH // int(np.abs(references[:, 1:]).max()), -(-spread // MOST_SEARCHED), 1)
+        farthest = (int(np.abs(references[:, 1:]).max()) + UPRIGHT // 2) >> LATTICE
+        return max(EIGHTH // max(farthest, 1), -(-spread // MOST_SEARCHED), 1)
 
 
 assert MOST_INDEX > MOST_SEARCHED and DONE

@@ -14,7 +14,7 @@ from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel
 
 from .blocks import EXPLICIT, MOST_REFERENCES, UNKNOWN, from_where, guesses, kind_cost, mask_cost, seen_mask
 from .transform import LARGEST
-from .warp import clamped, moved_block
+from .warp import clamped, lead, moved_block
 
 PAIRS = MOST_REFERENCES * (MOST_REFERENCES + 1) // 2  # the lower triangle by rows
 DIAGONAL = 0, 2, 5, 9
@@ -173,7 +173,7 @@ def fill_products(job, original, y0, x0, match):
         for by in range(rows):
             at = 0
             for r in range(count):
-                dx, dy = d * job.references[r, 1], d * job.references[r, 2]
+                dx, dy = lead(d, job.references[r, 1]), lead(d, job.references[r, 2])
                 own, plane = match.missed[r], job.views[job.references[r, 0], 0]
                 _missed_rows(plane, original[0], y0 + 4 * by, x0, dy, dx, match.between, own)
                 for s in range(r + 1):
@@ -282,7 +282,7 @@ def _compare(job, match, work, original, y0, x0, n, index, planes):
             for y in range(n):
                 for x in range(n):
                     into[y, x] = 0
-            dy, dx = d * job.references[r, 2], d * job.references[r, 1]
+            dy, dx = lead(d, job.references[r, 2]), lead(d, job.references[r, 1])
             moved_block(job.views, job.references[r, 0], p, y0, x0, n, dy, dx, work.rows, work.predicted)
             missed = match.moved[r]
             for y in range(n):

@@ -13,7 +13,7 @@ from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel, tuned_kerne
 
 from . import contexts as at
 from .arithmetic import bit_cost, code_bit, code_number, number_cost
-from .warp import clamped, moved_block
+from .warp import clamped, lead, moved_block
 
 MOST_PAST = 4  # earlier instants
 QUARTER = 64  # of a sample, in 2^-8
@@ -75,8 +75,8 @@ def inherited(job, by, bx, log):
     y, x = 4 * by + half, 4 * bx + half
     if job.synthesised:
         d = np.int64(job.disparity[y, x])
-        x += (d * job.references[0, 1] + 128) >> 8
-        y += (d * job.references[0, 2] + 128) >> 8
+        x += (lead(d, job.references[0, 1]) + 128) >> 8
+        y += (lead(d, job.references[0, 2]) + 128) >> 8
     j, i = clamped(y >> 2, height), clamped(x >> 2, width)
     view = job.references[0, 0]
     return noted(job, view, j, i), 1 + np.int64(job.motions[view, IN_TIME, j, i])

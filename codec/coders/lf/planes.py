@@ -1,4 +1,4 @@
-"""Planes of the principal colours of views, in integer eighths of an 8-bit code."""
+"""Planes of the colours of views, in integer eighths of an 8-bit code: principal axes, or Y, Cb and Cr of BT.709."""
 
 from __future__ import annotations
 
@@ -7,15 +7,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ii_core.base.colour import CB, CR, KB, KG, KR, YCBCR
 from ii_core.base.jit import lean_kernel
 
 from ..volume import principal_axes
 from .warp import clamped
 
 MOST_COMPARED = 1 << 22  # pixels of which the principal axes are found
+ONE = 1 << 14  # unit of matrices
+SCALE = 64  # unit of the scales of Cb and Cr
+# RGB of a unit of the planes √3·Y, √3·Cb and √3·Cr, the latter two in 2^-20: grey has the same length in both spaces.
+_COLOURS = np.rint(
+    np.array([[1 / SCALE] * 3, [0, -KB * CB / KG, CB], [CR, -KR * CR / KG, 0]]) * (ONE * SCALE / 3**0.5)
+).astype(np.int32)
 
 
-def detail_axes(pixels: NDArray[Any], grid: tuple[int, int]) -> NDArray[np.int16]:
+def bt709_axes(scales: tuple[int, int]) -> NDArray[np.int32]:
+    """Return √3·Y and the scaled √3·Cb and √3·Cr of RGB by rows, in units of 2^-14."""
+    factors = np.array([SCALE, *scales])[:, None] / SCALE
+    return np.rint(YCBCR * factors * (3**0.5 * ONE)).astype(np.int32)
+
+
+def bt709_colours(scales: tuple[int, int]) -> NDArray[np.int32]:
+    """Return RGB of each plane of `bt709_axes` by rows, in units of 2^-14, by integer division."""
+    divisors = np.array([1, *np.maximum(scales, 1)], np.int32)[:, None]
+    return (_COLOURS + divisors // 2) // divisors
+
+
+def detail_axes(pixels: NDArray[Any], grid: tuple[int, int]) -> NDArray[np.int32]:
     """Return the rotation to the principal axes of differences between neighbouring samples of a view.
 
     What prediction misses is detail, and its colours are not spread as those of areas are: of areas alone they are
@@ -29,14 +48,14 @@ def detail_axes(pixels: NDArray[Any], grid: tuple[int, int]) -> NDArray[np.int16
 
     Returns
     -------
-    ndarray of int16, (3, 3)
+    ndarray of int32, (3, 3)
         Axes by rows, by falling variance, in units of 2^-14.
     """
     rows, cols = grid
     views = pixels.reshape(pixels.shape[0] // rows, rows, pixels.shape[1] // cols, cols, 3)
     some = views[:, :: max(1, pixels.size // 3 // MOST_COMPARED)].astype(np.int32)
     detail = np.concatenate([np.diff(some, axis=axis).reshape(-1, 3) for axis in (0, 2)])
-    return principal_axes(detail if len(detail) else pixels)
+    return principal_axes(detail if len(detail) else pixels).astype(np.int32)
 
 
 @lean_kernel
@@ -48,8 +67,8 @@ def gather(pixels, grid, row, col, axes, sixteen, out):
     pixels : ndarray of uint8 or uint16, (N, M, 3)
     grid : (int, int)
         Rows and columns of views, which are interleaved.
-    axes : ndarray of int16, (3, 3)
-        Colours by rows, in units of 2^-14.
+    axes : ndarray of int32, (3, 3)
+        Planes of RGB by rows, in units of 2^-14.
     sixteen : bool
         Whether pixels have 16 bits.
     """
@@ -66,8 +85,8 @@ def gather(pixels, grid, row, col, axes, sixteen, out):
 
 
 @lean_kernel
-def scatter(views, at, grid, row, col, axes, sixteen, pixels):
-    """The inverse of `gather`, rounded and clipped; the axes are a rotation."""
+def scatter(views, at, grid, row, col, colours, sixteen, pixels):
+    """The inverse of `gather`, rounded and clipped; ``colours`` are RGB of each plane by rows, in units of 2^-14."""
     height, width = pixels.shape[0] // grid[0], pixels.shape[1] // grid[1]
     middle, shift, top = (1 << 15, 9, 65535) if sixteen else (1 << 7, 17, 255)
     for y in range(height):
@@ -76,5 +95,5 @@ def scatter(views, at, grid, row, col, axes, sixteen, pixels):
             for c in range(3):
                 total = np.int64(1 << (shift - 1))
                 for p in range(3):
-                    total += np.int64(axes[p, c]) * np.int64(views[at, p, y, x])
+                    total += np.int64(colours[p, c]) * np.int64(views[at, p, y, x])
                 pixels[i, j, c] = min(max((total >> shift) + middle, 0), top)

@@ -1,4 +1,4 @@
-"""The encoder's estimate of the disparity between neighbouring views: its range, and its sign along columns."""
+"""The encoder's estimate of the disparity between neighbouring views: its range, and where it leads on the grid."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .blocks import Job
 from .matching import DIAGONAL, fill_products, new_match
+from .stream import UPRIGHT
 from .transform import LARGEST
 
 REACH = 32  # samples between neighbouring views
@@ -18,10 +19,17 @@ DISTINCT = 0.5  # the error at the best disparity is at most this part of the me
 # and disparities of up to 1.5 times that error lie within so many units, by size: those of flat sky do not.
 ALIKE, NARROW = 1.5, {LARGE: 8 * 256 // UNIT, SMALL: 2 * 256 // UNIT}
 MARGIN = 128  # half a sample
+# Lattices are compared if disparities reach so far: 1.5 samples. Another one is taken if it fits so much better.
+FAR, WORTH_SKEWING = 384, 0.9
+STEPS = (64, 64, 64, 32, 32, 16, 16, 8, 8, 4)
 
 
-def estimated(view: Callable[[int, int], NDArray[np.int16]], grid: tuple[int, int]) -> tuple[int, int, int]:
-    """Least and greatest disparity, and 1, or -1 where columns have the other sign; all as in the header.
+Views = Callable[[int, int], NDArray[np.int16]]
+Lattice = tuple[int, int, int]
+
+
+def estimated(view: Views, grid: tuple[int, int], *, skewed: bool = True) -> tuple[int, int, Lattice]:
+    """Least and greatest disparity, and the lattice of the views; all as in the header.
 
     Parameters
     ----------
@@ -29,37 +37,97 @@ def estimated(view: Callable[[int, int], NDArray[np.int16]], grid: tuple[int, in
         Planes (3, H, W) of the view at (row, column).
     grid : (int, int)
         Rows and columns of views.
+    skewed : bool
+        Whether the lattice may be other than upright.
     """
     middle = grid[0] // 2, grid[1] // 2
     signs = (1, -1) if grid[0] > 1 and grid[1] > 1 else (1,)
-    found = [_errors(view, grid, middle, down) for down in signs]
-    errors, down = min(zip(found, signs, strict=True), key=lambda one: float(_cells(one[0], LARGE).min(axis=0).sum()))
+    upright: list[Lattice] = [(0, 0, sign * UPRIGHT) for sign in signs]
+    found = [_errors(view, grid, middle, lattice) for lattice in upright]
+    errors, lattice = min(zip(found, upright, strict=True), key=lambda one: _misfit(one[0]))
+    low, high = _range(view, grid, middle, errors, lattice)
+    if skewed and max(-low, high) - MARGIN >= FAR:
+        other = _best_lattice(view, grid, middle, lattice, (low, high))
+        if other != lattice:
+            lattice = other
+            low, high = _range(view, grid, middle, _errors(view, grid, middle, lattice), lattice)
+    return low, high, lattice
+
+
+def _range(
+    view: Views, grid: tuple[int, int], middle: tuple[int, int], errors: NDArray[np.float32], lattice: Lattice
+) -> tuple[int, int]:
+    """Return least and greatest disparity from those of the middle view and of four others."""
     # Views near the corners see what the one in the middle does not.
     rows, cols = ({count // 6, count - 1 - count // 6} for count in grid)
     others = sorted({(row, col) for row in rows for col in cols} - {middle})
     best = [_distinct(errors, LARGE), _distinct(errors, SMALL)]
-    best += [_distinct(_errors(view, grid, place, down), SMALL) for place in others]
+    best += [_distinct(_errors(view, grid, place, lattice), SMALL) for place in others]
     distinct = np.concatenate(best) - len(errors) // 2
     if not len(distinct):
-        return -UNIT, UNIT, down
+        return -UNIT, UNIT
     # Things near the plane of the display may be smaller than a cell: zero is always within the range.
-    return min(int(distinct.min()), 0) * UNIT - MARGIN, max(int(distinct.max()), 0) * UNIT + MARGIN, down
+    return min(int(distinct.min()), 0) * UNIT - MARGIN, max(int(distinct.max()), 0) * UNIT + MARGIN
+
+
+def _best_lattice(
+    view: Views, grid: tuple[int, int], middle: tuple[int, int], upright: Lattice, within: tuple[int, int]
+) -> Lattice:
+    """Return the lattice by which the middle view fits its neighbours best; the upright one unless it fits worse."""
+    limits = within[0] // UNIT, -(-within[1] // UNIT)
+
+    def misfit(lattice: Lattice) -> float:
+        return _misfit(_errors(view, grid, middle, lattice, limits))
+
+    best, least = upright, misfit(upright)
+    bound = least * WORTH_SKEWING
+    for step in STEPS:
+        for place in range(3):
+            for sign in (1, -1):
+                values = list(best)
+                values[place] += sign * step
+                tried = values[0], values[1], values[2]
+                error = misfit(tried)
+                if error < least:
+                    best, least = tried, error
+                    break
+    return best if least < bound else upright
+
+
+def _misfit(errors: NDArray[np.float32]) -> float:
+    """Return the sum of the least errors of large cells."""
+    return float(_cells(errors, LARGE).min(axis=0).sum())
 
 
 def _errors(
-    view: Callable[[int, int], NDArray[np.int16]], grid: tuple[int, int], place: tuple[int, int], down: int
+    view: Views,
+    grid: tuple[int, int],
+    place: tuple[int, int],
+    lattice: Lattice,
+    limits: tuple[int, int] | None = None,
 ) -> NDArray[np.float32]:
-    """Squared error (disparities, H / 4, W / 4) of a view against its neighbours; the middle disparity is zero."""
+    """Squared error (disparities, H / 4, W / 4) of a view against its neighbours.
+
+    Disparities are those within limits, or as far as `REACH` on either side of zero.
+    """
     row, col = place
     near = [(row, col - 1), (row, col + 1), (row - 1, col), (row + 1, col)]
     near = [(r, c) for r, c in near if 0 <= r < grid[0] and 0 <= c < grid[1]]
     if not near:
         return np.zeros((1, 1, 1), np.float32)
-    references = np.array([(i, c - col, down * (r - row)) for i, (r, c) in enumerate(near)], np.int64)
+    across, down, apart = lattice
+    references = np.array(
+        [
+            (i, UPRIGHT * (c - col) + across * (r - row), down * (c - col) + apart * (r - row))
+            for i, (r, c) in enumerate(near)
+        ],
+        np.int64,
+    )
     original, views = view(row, col), np.stack([view(r, c) for r, c in near])
     reach = min(REACH, max(original.shape[1:]) // 2) * 256 // UNIT
+    low, high = limits or (-reach, reach)
     height, width = original.shape[1:]
-    errors = np.zeros((2 * reach + 1, height // 4, width // 4), np.float32)
+    errors = np.zeros((high - low + 1, height // 4, width // 4), np.float32)
     blank = np.zeros((1, 1, 1), np.int16)
     job = Job(
         views=views,
@@ -67,8 +135,8 @@ def _errors(
         at=0,
         references=references,
         unit=UNIT,
-        low=-reach,
-        high=reach,
+        low=low,
+        high=high,
         made=blank,
         disparity=blank[0],
         doubt=blank[0],
@@ -79,7 +147,7 @@ def _errors(
         blocks=blank,
         levels=blank,
     )
-    match = new_match(2 * reach + 1, 1)
+    match = new_match(high - low + 1, 1)
     for y0 in range(0, height, LARGEST):
         for x0 in range(0, width, LARGEST):
             fill_products(job, original, y0, x0, match)

@@ -57,18 +57,19 @@ def _copy_block(block, to, n):
 
 
 @part_kernel
-def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped):
+def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped, finer):
     """Quantise work.coefficients, which are samples if the transform is skipped."""
     if skipped:
         return quantise_samples(costs, work.coefficients, trial.trial_levels, plane, log, step, weight, levels)
-    return quantise(costs, work.coefficients, plane, log, step, weight, levels)
+    return quantise(costs, work.coefficients, plane, log, step, weight, levels, finer)
 
 
 @part_kernel
-def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crossed, error, skipped):
+def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crossed, error, skipped, finer):
     """Quantise work.block; return bits, whether there are levels, which array has them, and the factor of `cross`.
 
-    ``first`` says whether the first plane has a residual, ``error`` is the squared error without one.
+    ``first`` says whether the first plane has a residual, ``error`` is the squared error without one, and ``finer``
+    says whether contexts are those of version 7.
     """
     context = coded_context(plane, log, kind, first, skipped)
     free, full = bit_cost(costs, context, np.int64(0)), bit_cost(costs, context, np.int64(1))
@@ -81,14 +82,14 @@ def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crosse
         _copy_block(work.block, work.coefficients, 1 << log)
     else:
         forward(work.block, log, work.half, work.coefficients)
-    more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.levels, skipped)
+    more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.levels, skipped, finer)
     best = error + weight * bits
     if more > 0 and missed + weight * (more + full + none) < best:
         best, bits, some = missed + weight * (more + full + none), more + full + none, 1
-    factor = best_cross(work) if predictable else np.int64(0)
+    factor = best_cross(work, crossed) if predictable else np.int64(0)
     if factor:
-        subtract_cross(work, factor)
-        more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.spare, skipped)
+        subtract_cross(work, factor, crossed)
+        more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.spare, skipped, finer)
         more += (full if more > 0 else free) + cross_cost(costs, plane, log, factor)
         if missed + weight * more < best:
             bits, some, cross = more, 1, factor
@@ -144,14 +145,14 @@ def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit)
         least = _subtract_prediction(search, work, p, y0, x0, n)
         without += least
         more, some, cross = _try_plane(
-            costs, work, trial, p, log, step, search.weight, kind, first, job.crossed, least, skipped
+            costs, work, trial, p, log, step, search.weight, kind, first, job.crossed, least, skipped, job.finer
         )
         bits += more
         if p:
             trial.trial_cross[p - 1] = cross
         if some:
             levels = work.spare if cross else work.levels
-            rows, cols = rebuild(work, levels, log, job.step, 1, cross, skipped)
+            rows, cols = rebuild(work, levels, log, job.step, 1, cross, job.crossed, skipped)
             if p == 0:
                 keep_first(work, rows, cols)
                 first = 1

@@ -64,7 +64,7 @@ class Segment:
         high = max(source.header.high for source in sources)
         header = replace(first.header, low=low, high=high)
         for source in sources:
-            source.header, source.axes = header, header.axes
+            source.header = header
         self.sources = sources
 
     def run_at(self, setting: float) -> Run:
@@ -72,13 +72,14 @@ class Segment:
         started = clock.cpu_seconds()
         first, *later = self.sources
         contexts = Contexts()
-        field = first.field(replace(first.header, steps=first.steps(setting)))
+        field = first.field(first.header_at(setting))
         picture = stream.pack(field.header, first.levels(field, contexts), first.count)
         steps = field.header.steps if first.header.exact else first.steps(setting + COARSER * FRACTIONS)
         header = replace(field.header, steps=steps)
         head = bytes([VERSION, PAST, len(steps)]) + b"".join(map(_STEP.pack, steps))
         parts, past = [head, leb128(len(picture)), picture], [field]
         for source in later:
+            source.axes = first.axes
             field = source.field(header, past)
             levels = source.levels(field, contexts)
             parts += [*(leb128(len(level)) for level in levels), *levels]

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-# By factors between planes, and residuals without a transform. Version 4 is that of segments of takes.
-VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED = 3, 2, 5, 6
+from ...bitstream.compact import leb128, read_leb128
+from .planes import bt709_colours
+
+# Versions 2, 3, 5 and 6 say by their number which tools they have: by factors between planes, and residuals without a
+# transform. Version 4 is that of segments of takes. Version 7 has flags; lossless coding still writes 2 and 3.
+VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED, TUNED = 3, 2, 5, 6, 7
 _VERSIONS = {
     (False, False): UNCROSSED,
     (True, False): VERSION,
@@ -17,6 +22,9 @@ _VERSIONS = {
     (False, True): SKIPPING_UNCROSSED,
 }
 _TOOLS = {version: tools for tools, version in _VERSIONS.items()}
+QUARTERS, EIGHTHS = 2, 3  # binary logarithms of the unit of factors between planes
+# Flags of version 7; the lowest two bits are 0, or the logarithm of the factors' unit.
+_SKIPS, _FILTERS, _DOWN, _BT709, _SKEWED, _FLAGS = 4, 8, 16, 32, 64, 128
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
 )
@@ -24,9 +32,14 @@ MOST_LOG_STRIDE = 6
 MOST_STEP = 1 << 18
 MOST_SOURCES = 8
 MOST_DISPARITY = 1 << 14
+UPRIGHT = 1 << 10
+MOST_LATTICE = 4 * UPRIGHT
 
 _HEAD = struct.Struct("<BBBBbhh9h")
 _LEVEL = struct.Struct("<II")
+_TUNED = struct.Struct("<BBBhh")
+_ROTATION = struct.Struct("<9h")
+_LATTICE = struct.Struct("<3h")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,16 +54,24 @@ class Header:
         How many views a synthesis is made of; 0 for none.
     exact : bool
         Whether coding is lossless.
-    down : int
-        1, or -1 where disparity has the other sign along columns than along rows.
+    lattice : (int, int, int)
+        How far a row of views leads across, a column down, and a row down, in 2^-10 of how far a column leads across:
+        (0, 0, ±`UPRIGHT`) on an upright grid, negative where disparity has the other sign along columns.
     low, high : int
         Range of disparity between neighbouring views, in 2^-8 samples.
-    axes : ndarray of int16, (3, 3)
-        Colours, in units of 2^-14.
-    crossed : bool
-        Whether the residuals of the second and third plane may be predicted from the first's.
+    colours : ndarray of int32, (3, 3)
+        RGB of each plane by rows, in units of 2^-14. In lossless coding they are a rotation.
+    scales : (int, int) or None
+        Of the planes of Cb and Cr in 2^-6, if planes are those of BT.709; None if ``colours`` are a rotation.
+    crossed : int
+        Binary logarithm of the unit of factors that predict residuals of the second and third plane from the first's;
+        0 without them.
     skipping : bool
         Whether small blocks may have a residual without a transform.
+    tuned : bool
+        Version 7: large coefficients have contexts by their neighbourhood, and views may be filtered.
+    filtered : bool
+        Whether views may be filtered in the loop.
     steps : tuple of int
         The quantiser's step of each level, in 2^-7 of an 8-bit code.
     """
@@ -58,34 +79,46 @@ class Header:
     log_stride: int
     sources: int
     exact: bool
-    down: int
+    lattice: tuple[int, int, int]
     low: int
     high: int
-    axes: NDArray[np.int16]
-    crossed: bool
+    colours: NDArray[np.int32]
+    scales: tuple[int, int] | None = None
+    crossed: int
     skipping: bool
+    tuned: bool = False
+    filtered: bool = False
     steps: tuple[int, ...]
 
 
 def pack(header: Header, levels: list[bytes], pixels: int) -> bytes:
     """The payload of a picture of so many pixels."""
-    head = _HEAD.pack(
-        _VERSIONS[header.crossed, header.skipping],
-        header.log_stride,
-        header.sources,
-        header.exact,
-        header.down,
-        header.low,
-        header.high,
-        *header.axes.ravel().tolist(),
-    )
-    index = b"".join(_LEVEL.pack(step, len(level)) for step, level in zip(header.steps, levels, strict=True))
-    return (head + index + b"".join(levels)).ljust(least_bytes(pixels), b"\0")
+    return (_head(header, levels) + b"".join(levels)).ljust(least_bytes(pixels), b"\0")
 
 
-def head_bytes(levels: int) -> int:
+def _head(header: Header, levels: list[bytes]) -> bytes:
+    colours = header.colours.ravel().tolist()
+    index = list(zip(header.steps, map(len, levels), strict=False))  # a view of a take needs no levels beyond its own
+    if not header.tuned:
+        version = _VERSIONS[bool(header.crossed), header.skipping]
+        down = header.lattice[2] // UPRIGHT
+        common = header.log_stride, header.sources, header.exact, down, header.low, header.high
+        return _HEAD.pack(version, *common, *colours) + b"".join(_LEVEL.pack(*level) for level in index)
+    flags = header.crossed | _SKIPS * header.skipping | _FILTERS * header.filtered
+    flags |= _DOWN * (header.lattice[2] < 0) | _BT709 * (header.scales is not None) | _SKEWED * _skewed(header)
+    head = _TUNED.pack(TUNED, flags, header.log_stride | header.sources << 3, header.low, header.high)
+    head += bytes(header.scales) if header.scales else _ROTATION.pack(*colours)
+    head += _LATTICE.pack(*header.lattice) if _skewed(header) else b""
+    return head + b"".join(leb128(step) + leb128(length) for step, length in index)
+
+
+def _skewed(header: Header) -> bool:
+    return header.lattice not in ((0, 0, UPRIGHT), (0, 0, -UPRIGHT))
+
+
+def head_bytes(header: Header, levels: list[bytes]) -> int:
     """Length of header and index."""
-    return _HEAD.size + levels * _LEVEL.size
+    return len(_head(header, levels))
 
 
 def least_bytes(pixels: int) -> int:
@@ -101,21 +134,23 @@ def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
     ValueError
         If the payload is none of a picture of so many pixels.
     """
-    if len(payload) < max(_HEAD.size, least_bytes(pixels)):
+    if len(payload) < max(1, least_bytes(pixels)):
         raise ValueError(f"its light field has {len(payload)} bytes, too few for {pixels} pixels")
-    version, log_stride, sources, exact, down, low, high, *axes = _HEAD.unpack_from(payload)
-    if version not in _TOOLS:
-        known = ", ".join(map(str, sorted(_TOOLS)))
+    version = payload[0]
+    if version not in _TOOLS and version != TUNED:
+        known = ", ".join(map(str, sorted((*_TOOLS, TUNED))))
         raise ValueError(f"its light field is of version {version}: this decoder reads versions {known}")
-    crossed, skipping = _TOOLS[version]
-    sound = log_stride <= MOST_LOG_STRIDE and sources <= MOST_SOURCES and exact <= 1 and abs(down) == 1
-    if not sound or not -MOST_DISPARITY <= low <= high <= MOST_DISPARITY:
+    try:
+        values, index, start = (_read_tuned if version == TUNED else _read_fixed)(payload)
+    except (IndexError, ValueError, struct.error):
+        raise ValueError(f"its light field has {len(payload)} bytes, too few for its header and index") from None
+    header = Header(**values, steps=tuple(step for step, _ in index))
+    sound = header.log_stride <= MOST_LOG_STRIDE and header.sources <= MOST_SOURCES
+    sound = sound and max(map(abs, header.lattice)) <= MOST_LATTICE and header.lattice[2] != 0
+    sound = sound and header.crossed in (0, QUARTERS, EIGHTHS) and header.exact in (0, 1)
+    sound = sound and (header.scales is None or min(header.scales) > 0)
+    if not sound or not -MOST_DISPARITY <= header.low <= header.high <= MOST_DISPARITY:
         raise ValueError("its header holds values that no encoder writes")
-    count = log_stride + 2
-    start = head_bytes(count)
-    if len(payload) < start:
-        raise ValueError(f"its light field has {len(payload)} bytes: header and index alone have {start}")
-    index = [_LEVEL.unpack_from(payload, _HEAD.size + i * _LEVEL.size) for i in range(count)]
     levels = []
     for step, length in index:
         if not 0 < step <= MOST_STEP:
@@ -124,16 +159,60 @@ def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
         start += length
     if len(payload) != max(start, least_bytes(pixels)) or payload[start:].strip(b"\0"):
         raise ValueError(f"its light field has {len(payload)} bytes, where its index says {start}")
-    header = Header(
-        log_stride=log_stride,
-        sources=sources,
-        exact=bool(exact),
-        down=down,
-        low=low,
-        high=high,
-        axes=np.array(axes, np.int16).reshape(3, 3),
-        crossed=crossed,
-        skipping=skipping,
-        steps=tuple(step for step, _ in index),
-    )
     return header, levels
+
+
+_Read = tuple[dict[str, Any], list[tuple[int, int]], int]  # values of the header, index, where the levels begin
+
+
+def _read_fixed(payload: bytes) -> _Read:
+    version, log_stride, sources, exact, down, low, high, *colours = _HEAD.unpack_from(payload)
+    crossed, skipping = _TOOLS[version]
+    values = {
+        "log_stride": log_stride,
+        "sources": sources,
+        "exact": exact,
+        "lattice": (0, 0, down * UPRIGHT),
+        "low": low,
+        "high": high,
+        "colours": np.array(colours, np.int32).reshape(3, 3),
+        "crossed": QUARTERS if crossed else 0,
+        "skipping": skipping,
+    }
+    index = [_LEVEL.unpack_from(payload, _HEAD.size + i * _LEVEL.size) for i in range(log_stride + 2)]
+    return values, index, _HEAD.size + len(index) * _LEVEL.size
+
+
+def _read_tuned(payload: bytes) -> _Read:
+    _, flags, counts, low, high = _TUNED.unpack_from(payload)
+    at, scales = _TUNED.size, None
+    if flags & _BT709:
+        scales = payload[at], payload[at + 1]
+        colours, at = bt709_colours(scales), at + 2
+    else:
+        colours = np.array(_ROTATION.unpack_from(payload, at), np.int32).reshape(3, 3)
+        at += _ROTATION.size
+    lattice = 0, 0, -UPRIGHT if flags & _DOWN else UPRIGHT
+    if flags & _SKEWED:
+        lattice = _LATTICE.unpack_from(payload, at)
+        at += _LATTICE.size
+    index = []
+    for _ in range((counts & 7) + 2):
+        step, at = read_leb128(payload, at)
+        length, at = read_leb128(payload, at)
+        index.append((step, length))
+    values = {
+        "log_stride": counts & 7,
+        "sources": counts >> 3,
+        "exact": False,
+        "lattice": lattice,
+        "low": low,
+        "high": high,
+        "colours": colours,
+        "scales": scales,
+        "crossed": flags & (3 | -_FLAGS),  # with flags that no encoder sets
+        "skipping": bool(flags & _SKIPS),
+        "tuned": True,
+        "filtered": bool(flags & _FILTERS),
+    }
+    return values, index, at

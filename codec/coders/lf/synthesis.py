@@ -17,7 +17,7 @@ from ii_core.base.jit import array_kernel, lean_kernel, part_kernel, stage_kerne
 
 from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, disagreement, hashed
 from .blocks import EXPLICIT, INDEX, KIND, UNKNOWN
-from .warp import BEFORE, FILTERS, TAPS, clamped, filtered
+from .warp import BEFORE, FILTERS, LATTICE, TAPS, clamped, filtered, lead
 
 CANDIDATES = 8
 MOST_SOURCES = 8
@@ -45,7 +45,7 @@ class Synthesis(NamedTuple):
     disparities : ndarray of int16, (J, H, W)
         `UNKNOWN` where nothing is known.
     sources : ndarray of int64, (S, 3)
-        Views to take from, the nearest first: index, how far in columns and in rows.
+        Views to take from, the nearest first: index, how far in columns and in rows, in 2^-10 of a view.
     candidates : ndarray of int16, (CANDIDATES, H, W)
     counts : ndarray of uint8, (H, W)
     made : ndarray of int16, (3, H, W)
@@ -137,7 +137,7 @@ def project(s, apart):
                 d = np.int64(s.disparities[view, y, x])
                 if d == UNKNOWN:
                     continue
-                to_x, to_y = x + ((128 - d * across) >> 8), y + ((128 - d * down) >> 8)
+                to_x, to_y = x + ((128 - lead(d, across)) >> 8), y + ((128 - lead(d, down)) >> 8)
                 if 0 <= to_x < width and 0 <= to_y < height:
                     _insert(s, to_y, to_x, d, apart)
 
@@ -233,7 +233,8 @@ def blend(s, nearest, every):
 def _weigh_sources(s, nearest):
     """s.scratch[6:9] = weights of each source where it agrees, does not, and does not see the sample."""
     for r in range(s.sources.shape[0]):
-        far = 8 + s.sources[r, 1] * s.sources[r, 1] + s.sources[r, 2] * s.sources[r, 2]
+        squared = s.sources[r, 1] * s.sources[r, 1] + s.sources[r, 2] * s.sources[r, 2]
+        far = 8 + (squared >> 2 * LATTICE)
         for kind, weight in enumerate((64, 8, 1)):
             s.scratch[6 + kind, r] = weight if nearest else weight * 64 // far
 
@@ -245,7 +246,7 @@ def _take(s, r, y, x, d, nearest, place):
     ``place`` is that of the sample in the run that `_interpolate` has made.
     """
     height, width = s.counts.shape
-    at_x, at_y = 256 * x + d * s.sources[r, 1], 256 * y + d * s.sources[r, 2]
+    at_x, at_y = 256 * x + lead(d, s.sources[r, 1]), 256 * y + lead(d, s.sources[r, 2])
     inside = -128 <= at_x <= 256 * width - 128 and -128 <= at_y <= 256 * height - 128
     weight = s.scratch[(6 if agrees(s, r, y, x, d) else 7) if inside else 8, r]
     if nearest:
@@ -308,7 +309,7 @@ def _six_taps_run(plane, iy, ix, py, px, count, sums, out):
 def _interpolate(s, y, x, length, d, count):
     """s.taken[:count, :, :length] = samples of the sources along a disparity."""
     for r in range(count):
-        dx, dy = d * s.sources[r, 1], d * s.sources[r, 2]
+        dx, dy = lead(d, s.sources[r, 1]), lead(d, s.sources[r, 2])
         ix, iy, px, py = x + (dx >> 8), y + (dy >> 8), (dx >> 4) & 15, (dy >> 4) & 15
         for p in range(3):
             _six_taps_run(s.views[s.sources[r, 0], p], iy, ix, py, px, length, s.sums, s.taken[r, p])
@@ -375,7 +376,7 @@ def _mismatch(s, at, y, x, d):
     within = 0 < x < width - 1 and 0 < y < height - 1
     for r in range(count):
         total = np.int64(0)
-        dx, dy = d * s.sources[r, 1], d * s.sources[r, 2]
+        dx, dy = lead(d, s.sources[r, 1]), lead(d, s.sources[r, 2])
         ix, iy, px, py = dx >> 8, dy >> 8, (dx >> 4) & 15, (dy >> 4) & 15
         own, other = s.views[at, 0], s.views[s.sources[r, 0], 0]
         if x + ix < -1 or y + iy < -1 or x + ix > width or y + iy > height:

@@ -34,6 +34,15 @@ FILTERS = _filters()
 assert (FILTERS.sum(axis=1) == 64).all() and FILTERS[0].tolist() == [0, 0, 64, 0, 0, 0]
 
 
+LATTICE = 10  # binary logarithm of the unit of views' positions on the grid
+
+
+@stage_kernel
+def lead(d, along):
+    """How far a disparity leads to a view so far along rows or columns of the grid, in 2^-8 samples."""
+    return (d * along) >> LATTICE
+
+
 @stage_kernel
 def clamped(i, n):
     """The index of the sample, or of the border's."""

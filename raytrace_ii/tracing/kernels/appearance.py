@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import late_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import inline_kernel, lane_stage, late_kernel, late_lane_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
 from .glossy import highlight
-from .lanes import BLOCK, slot
+from .images import read_images
+from .lanes import BLOCK, slot, take_rows
 from .media import clearness, enter, medium_of
 from .noise import fractal_lanes, vectors
 from .tables import (
@@ -22,16 +23,15 @@ from .tables import (
     GLOSS_MAP,
     IMAGE,
     LANED,
-    MATERIAL_COLUMNS,
     NOISE,
     NORMAL_MAP,
     NORMAL_SCALE,
     TEXTURE,
 )
-from .textures import filtered, noise_colour, pattern_colour, share_there
-from .vectors import edge, interpolate, three
+from .textures import noise_colour, pattern_colour, share_there
+from .vectors import edge, interpolate, three, three_doubles
 
-_COLUMNS, _EXTRAS = np.uint64(MATERIAL_COLUMNS), np.uint64(EXTRAS)
+_ZERO, _ONE = np.float32(0), np.float32(1)
 
 
 @late_kernel
@@ -42,32 +42,34 @@ def attenuate(generation, first, lanes, _):
     """
     g = value_at(generation)
     rays, fog, work, materials = g.rays, g.surroundings.fog, g.work, g.surfaces.materials
-    double, whole = work.double, work.whole
+    single, whole = work.single, work.whole
     for k in range(lanes):
-        i, body, t = whole[at.ROW + k], whole[at.BODY + k], np.float64(work.single[at.DISTANCE + k])
+        i, body, t = first + k, whole[at.BODY + k], np.float64(single[at.DISTANCE + k])
+        if fog.shape[0] > 0:
+            single[at.F0 + k], single[at.F1 + k], single[at.F2 + k] = 0.0, 0.0, 0.0
+        if single[at.HIT + k] == _ZERO:
+            continue
         medium = -1
         if rays.inside.shape[1] > 0:
-            if materials[body, EXTRAS] > 0.0 and double[at.ENTERING + k] < 0.0 and clearness(materials, body) > 0.0:
+            if materials[body, EXTRAS] > 0.0 and single[at.ENTERING + k] < 0.0 and clearness(materials, body) > 0.0:
                 enter(rays.inside, i, body)
             medium = medium_of(rays.inside, i, materials, -1)
-        if fog.shape[0] > 0:
-            double[at.F0 + k], double[at.F1 + k], double[at.F2 + k] = 0.0, 0.0, 0.0
         if medium >= 0:
-            double[at.W0 + k] *= math.exp(-materials[medium, ABSORPTION] * t)
-            double[at.W1 + k] *= math.exp(-materials[medium, ABSORPTION + 1] * t)
-            double[at.W2 + k] *= math.exp(-materials[medium, ABSORPTION + 2] * t)
+            single[at.W0 + k] *= math.exp(-materials[medium, ABSORPTION] * t)
+            single[at.W1 + k] *= math.exp(-materials[medium, ABSORPTION + 1] * t)
+            single[at.W2 + k] *= math.exp(-materials[medium, ABSORPTION + 2] * t)
         elif fog.shape[0] > 0:
             through = math.exp(-fog[3] * t)
-            double[at.F0 + k] = double[at.W0 + k] * (1.0 - through) * fog[0]
-            double[at.F1 + k] = double[at.W1 + k] * (1.0 - through) * fog[1]
-            double[at.F2 + k] = double[at.W2 + k] * (1.0 - through) * fog[2]
-            double[at.W0 + k] *= through
-            double[at.W1 + k] *= through
-            double[at.W2 + k] *= through
+            single[at.F0 + k] = single[at.W0 + k] * (1.0 - through) * fog[0]
+            single[at.F1 + k] = single[at.W1 + k] * (1.0 - through) * fog[1]
+            single[at.F2 + k] = single[at.W2 + k] * (1.0 - through) * fog[2]
+            single[at.W0 + k] *= through
+            single[at.W1 + k] *= through
+            single[at.W2 + k] *= through
 
 
-@stage_kernel
-def take_materials(lanes, surfaces, work):
+@lane_stage
+def take_materials(surfaces, work):
     """Bring the materials of all lanes to them, without textures and whatever else is in ``EXTRAS``.
 
     Returns
@@ -75,37 +77,28 @@ def take_materials(lanes, surfaces, work):
     bool
         Whether a lane has any of it.
     """
-    double, whole, materials = work.double, work.whole, surfaces.flat_materials
-    same, extras = True, False
-    for k in range(lanes):
-        same &= whole[at.BODY + k] == whole[at.BODY]
-    for k in range(1 if same else lanes):
-        row = np.uint64(whole[at.BODY + k]) * _COLUMNS
-        extras |= materials[row + _EXTRAS] > 0.0
-        for c in range(LANED):
-            double[at.R0 + c * BLOCK + k] = materials[row + np.uint64(c)]
-    if same:
-        for c in range(LANED):
-            for k in range(1, BLOCK):
-                double[at.R0 + c * BLOCK + k] = double[at.R0 + c * BLOCK]
-    for k in range(3 * BLOCK):
-        double[at.T0 + k] = 1.0
-    return extras
-
-
-@stage_kernel
-def scatter(ambient, double):
-    """Colours of scattered light, as seen: weight times texture and material; and light given off."""
-    a0, a1, a2 = ambient[0], ambient[1], ambient[2]
+    single = work.single
+    take_rows(
+        surfaces.looks, np.int64(LANED), np.int64(0), work.whole, np.int64(at.BODY), single, np.int64(at.R0)
+    )  # fmt: skip
+    extras = _ZERO
     for k in range(BLOCK):
-        local, w0, w1, w2 = double[at.SCATTERED + k], double[at.W0 + k], double[at.W1 + k], double[at.W2 + k]
-        r = w0 * (local * double[at.R0 + k] * double[at.T0 + k])
-        g = w1 * (local * double[at.R1 + k] * double[at.T1 + k])
-        b = w2 * (local * double[at.R2 + k] * double[at.T2 + k])
-        double[at.R0 + k], double[at.R1 + k], double[at.R2 + k] = r, g, b
-        double[at.E0 + k] = w0 * double[at.E0 + k] + r * a0
-        double[at.E1 + k] = w1 * double[at.E1 + k] + g * a1
-        double[at.E2 + k] = w2 * double[at.E2 + k] + b * a2
+        extras += single[at.EXTRA + k] * single[at.HIT + k]
+    for k in range(3 * BLOCK):
+        single[at.T0 + k] = _ONE
+    return extras > _ZERO
+
+
+@lane_stage
+def scatter(ambient, single):
+    """Colours of scattered light, as seen: weight times texture and material; start with light given off."""
+    for c in range(3):
+        a = np.float32(ambient[c])
+        for k in range(c * BLOCK, (c + 1) * BLOCK):
+            w, local, hit = single[at.W0 + k], single[at.SCATTERED + k - c * BLOCK], single[at.HIT + k - c * BLOCK]
+            scattered = w * (local * single[at.R0 + k] * single[at.T0 + k])
+            single[at.R0 + k] = scattered
+            single[at.L0 + k] = w * single[at.E0 + k] + scattered * a if hit > _ZERO else _ZERO
 
 
 @late_kernel
@@ -115,71 +108,117 @@ def paint(generation, first, lanes, _):
     materials, noisy = g.surfaces.materials, np.int64(0)  # no literal: another signature
     for k in range(lanes):
         body = np.uint64(g.work.whole[at.BODY + k])
-        g.work.double[at.CLEAR + k] = 0.0
-        if materials[body, TEXTURE] >= 0 and g.work.double[at.SCATTERED + k] > 0.0:
+        g.work.single[at.CLEAR + k] = 0.0
+        seen = g.work.single[at.HIT + k] > _ZERO and g.work.single[at.SCATTERED + k] > _ZERO
+        if seen and materials[body, TEXTURE] >= 0:
             noisy += _take_pattern(k, int(materials[body, TEXTURE]), g.surfaces, g.work, noisy)
     if noisy > 0:
         _colour_by_noise(noisy, g.surfaces, g.work)
 
 
-@late_kernel
+@late_lane_kernel
 def look_closely(generation, first, lanes, _):
     """Maps, textures, metal, and parts that are seen through."""
     g = value_at(generation)
-    materials, noisy = g.surfaces.materials, np.int64(0)  # no literal: another signature
-    filtering = g.passage.first_width != 0.0 or g.passage.spread != 0.0
+    s, single, double, whole, materials = g.surfaces, g.work.single, g.work.double, g.work.whole, g.surfaces.materials
     blending = g.following.pixels.shape[0] > 0  # the last generation takes what is blended as there
+    if g.passage.first_width == 0.0 and g.passage.spread == 0.0:
+        for k in range(4 * BLOCK):
+            single[at.AU + k] = _ZERO
+    if s.maps.any:
+        _place_on_images(single, double)
+    for k in range(3 * BLOCK):
+        single[at.B0 + k] = _ZERO
+    if s.maps.blend and blending:
+        for k in range(lanes):
+            if _is_special(k, single) and materials[whole[at.BODY + k], ALPHA_BLEND] > 0.0:
+                _blend(k, s, single, whole)
+    if s.maps.normal and _choose_images(NORMAL_MAP, lanes, s, g.work):
+        for k in range(lanes):
+            if whole[at.IMAGE + k] >= 0:
+                _map_normal(k, s, g.work)
+    if s.maps.emission and _choose_images(EMISSION_MAP, lanes, s, g.work):
+        for k in range(BLOCK):
+            mapped = whole[at.IMAGE + k] >= 0
+            single[at.E0 + k] *= single[at.Q0 + k] if mapped else _ONE
+            single[at.E1 + k] *= single[at.Q1 + k] if mapped else _ONE
+            single[at.E2 + k] *= single[at.Q2 + k] if mapped else _ONE
+    _take_textures(lanes, s, g.work)
+    mapped = s.maps.gloss and _choose_images(GLOSS_MAP, lanes, s, g.work)
     for k in range(lanes):
-        if materials[g.work.whole[at.BODY + k], EXTRAS] > 0.0:
-            noisy += _take_images(k, g.surfaces, filtering, blending, g.work, noisy)
-    if noisy > 0:
-        _colour_by_noise(noisy, g.surfaces, g.work)
-    for k in range(lanes):
-        body = g.work.whole[at.BODY + k]
-        if materials[body, EXTRAS] > 0.0:
-            g.work.double[at.CLEAR + k] = clearness(materials, body)
-            if g.work.double[at.METAL + k] > 0.0 or materials[body, GLOSS_MAP] >= 0:
-                _gild(k, g.surfaces, g.work)
+        if _is_special(k, single):
+            body = whole[at.BODY + k]
+            single[at.CLEAR + k] = clearness(materials, body)
+            if single[at.METAL + k] > 0.0 or materials[body, GLOSS_MAP] >= 0:
+                _gild(k, mapped and whole[at.IMAGE + k] >= 0, s, g.work)
+
+
+@inline_kernel
+def _is_special(k, single):
+    return single[at.HIT + k] * single[at.EXTRA + k] > _ZERO
+
+
+@lane_stage
+def _place_on_images(single, double):
+    """(u, v) of all hits on the images of their bodies."""
+    for k in range(BLOCK):
+        u, v, c = np.float64(single[at.U + k]), np.float64(single[at.V + k]), at.COORDINATE + k
+        w = 1.0 - u - v
+        double[at.SU + k] = w * single[c] + u * single[c + 2 * BLOCK] + v * single[c + 4 * BLOCK]
+        double[at.SV + k] = w * single[c + BLOCK] + u * single[c + 3 * BLOCK] + v * single[c + 5 * BLOCK]
+
+
+@lane_stage
+def _choose_images(column, lanes, surfaces, work):
+    """Read one kind of map of all lanes; return whether there is any."""
+    whole, some = work.whole, False
+    for k in range(BLOCK):
+        row = -1
+        if k < lanes and _is_special(k, work.single):
+            row = int(surfaces.materials[np.uint64(whole[at.BODY + k]), column])
+        whole[at.IMAGE + k] = row
+        some |= row >= 0
+    if some:
+        read_images(surfaces, work)
+    return some
 
 
 @stage_kernel
-def _take_images(k, surfaces, filtering, blending, work, noisy):
-    """Read the images of one lane's body.
+def _blend(k, surfaces, single, whole):
+    """Share a lane's weight out to a blended surface and to what is seen through it."""
+    there = share_there(
+        surfaces.coordinates, surfaces.textures, surfaces.alphas, surfaces.materials, whole[at.BODY + k],
+        whole[at.FACE + k], single[at.U + k], single[at.V + k],
+        single[at.AU + k], single[at.AV + k], single[at.BU + k], single[at.BV + k],
+    )  # fmt: skip
+    for c in range(3):
+        single[at.B0 + c * BLOCK + k] = (1.0 - there) * single[at.W0 + c * BLOCK + k]
+        single[at.W0 + c * BLOCK + k] *= there
 
-    Returns
-    -------
-    int
-        1 if the lane's colour is that of a noise yet to come, else 0.
-    """
-    single, double, whole, materials = work.single, work.double, work.whole, surfaces.materials
-    textures, texels, coordinates = surfaces.textures, surfaces.texels, surfaces.coordinates
-    f, body, u, v = whole[at.FACE + k], whole[at.BODY + k], single[at.U + k], single[at.V + k]
-    if not filtering:
-        double[at.AU + k], double[at.AV + k], double[at.BU + k], double[at.BV + k] = 0.0, 0.0, 0.0, 0.0
-    au, av, bu, bv = double[at.AU + k], double[at.AV + k], double[at.BU + k], double[at.BV + k]
-    double[at.B0 + k], double[at.B1 + k], double[at.B2 + k] = 0.0, 0.0, 0.0
-    if blending and materials[body, ALPHA_BLEND] > 0.0:  # seen through to the share that is not there
-        there = share_there(coordinates, textures, surfaces.alphas, materials, body, f, u, v, au, av, bu, bv)
-        for c in range(3):
-            double[at.B0 + c * BLOCK + k] = (1.0 - there) * double[at.W0 + c * BLOCK + k]
-            double[at.W0 + c * BLOCK + k] *= there
-    if materials[body, NORMAL_MAP] >= 0:
-        _map_normal(k, surfaces, work, au, av, bu, bv)
-    if materials[body, EMISSION_MAP] >= 0:
-        s0, s1, _ = interpolate(coordinates, f, u, v)
-        t0, t1, t2 = filtered(textures, int(materials[body, EMISSION_MAP]), texels, s0, s1, au, av, bu, bv)
-        double[at.E0 + k] *= t0
-        double[at.E1 + k] *= t1
-        double[at.E2 + k] *= t2
-    row = int(materials[body, TEXTURE])
-    if row < 0 or not (double[at.SCATTERED + k] > 0.0 or double[at.METAL + k] > 0.0):
-        return 0
-    if textures[row, 0] != IMAGE:
-        return _take_pattern(k, row, surfaces, work, noisy)
-    s0, s1, _ = interpolate(coordinates, f, u, v)
-    t0, t1, t2 = filtered(textures, row, texels, s0, s1, au, av, bu, bv)
-    double[at.T0 + k], double[at.T1 + k], double[at.T2 + k] = t0, t1, t2
-    return 0
+
+@lane_stage
+def _take_textures(lanes, surfaces, work):
+    """Colours of the textures of all lanes."""
+    single, whole, noisy, some = work.single, work.whole, np.int64(0), False  # no literal: another signature
+    for k in range(BLOCK):
+        whole[at.IMAGE + k] = -1
+        coloured = single[at.SCATTERED + k] > _ZERO or single[at.METAL + k] > _ZERO
+        if k < lanes and coloured and _is_special(k, single):
+            row = int(surfaces.materials[np.uint64(whole[at.BODY + k]), TEXTURE])
+            if row >= 0:
+                if surfaces.textures[np.uint64(row), 0] == IMAGE:
+                    whole[at.IMAGE + k], some = row, True
+                else:
+                    noisy += _take_pattern(k, row, surfaces, work, noisy)
+    if some:
+        read_images(surfaces, work)
+        for k in range(BLOCK):
+            if whole[at.IMAGE + k] >= 0:
+                single[at.T0 + k], single[at.T1 + k], single[at.T2 + k] = (
+                    single[at.Q0 + k], single[at.Q1 + k], single[at.Q2 + k],
+                )  # fmt: skip
+    if noisy > 0:
+        _colour_by_noise(noisy, surfaces, work)
 
 
 @stage_kernel
@@ -189,7 +228,7 @@ def _take_pattern(k, row, surfaces, work, noisy):
     x, y, z = interpolate(surfaces.coordinates, np.uint64(whole[at.FACE + k]), single[at.U + k], single[at.V + k])
     if table[row, 0] != NOISE:
         t0, t1, t2 = pattern_colour(table, row, x, y, z)
-        double[at.T0 + k], double[at.T1 + k], double[at.T2 + k] = t0, t1, t2
+        single[at.T0 + k], single[at.T1 + k], single[at.T2 + k] = t0, t1, t2
         return 0
     whole[slot(at.NOISY, noisy)] = k
     packed = int(table[row, 10])
@@ -201,66 +240,59 @@ def _take_pattern(k, row, surfaces, work, noisy):
 
 
 @part_kernel
-def _gild(k, surfaces, work):
-    """Shares of light of one lane's metal, and highlight and roughness by its map."""
-    double, f, body = work.double, work.whole[at.FACE + k], work.whole[at.BODY + k]
-    metallic, rough, row = double[at.METAL + k], double[at.ROUGH + k], int(surfaces.materials[body, GLOSS_MAP])
-    if row >= 0:
-        s0, s1, _ = interpolate(surfaces.coordinates, f, work.single[at.U + k], work.single[at.V + k])
-        _, by_rough, by_metal = filtered(
-            surfaces.textures, row, surfaces.texels, s0, s1,
-            double[at.AU + k], double[at.AV + k], double[at.BU + k], double[at.BV + k],
-        )  # fmt: skip
-        rough, metallic = rough * by_rough, metallic * by_metal
+def _gild(k, mapped, surfaces, work):
+    """Shares of light of one lane's metal, and highlight and roughness by its map, of which green and blue count."""
+    single, body = work.single, work.whole[at.BODY + k]
+    metallic, rough = float(single[at.METAL + k]), float(single[at.ROUGH + k])
+    if mapped:
+        rough, metallic = rough * single[at.Q1 + k], metallic * single[at.Q2 + k]
     for c in range(3):
-        mirrored = metallic * surfaces.materials[body, c] * double[at.T0 + c * BLOCK + k]
-        double[at.K0 + c * BLOCK + k] = (1.0 - metallic) * double[at.K0 + c * BLOCK + k] + mirrored
-    if double[at.GLOSS + k] > 0.0 and row >= 0:
-        k0, k1, k2 = three(double, at.K0, k)
-        strength, double[at.EXPONENT + k] = highlight((k0 + k1 + k2) / 3.0, rough)
-        double[at.GLOSS + k] *= strength
-        double[at.HALF_FROM + k] = 0.0
-    double[at.SCATTERED + k] *= 1.0 - metallic
-    double[at.CLEAR + k] *= 1.0 - metallic
-    double[at.METAL + k], double[at.ROUGH + k] = metallic, rough
+        mirrored = metallic * surfaces.materials[body, c] * single[at.T0 + c * BLOCK + k]
+        single[at.K0 + c * BLOCK + k] = (1.0 - metallic) * single[at.K0 + c * BLOCK + k] + mirrored
+    if single[at.GLOSS + k] > 0.0 and mapped:
+        k0, k1, k2 = three(single, at.K0, k)
+        strength, single[at.EXPONENT + k] = highlight((k0 + k1 + k2) / 3.0, rough)
+        single[at.GLOSS + k] *= strength
+        single[at.HALF_FROM + k] = 0.0
+    single[at.SCATTERED + k] *= 1.0 - metallic
+    single[at.CLEAR + k] *= 1.0 - metallic
+    single[at.METAL + k], single[at.ROUGH + k] = metallic, rough
 
 
 @stage_kernel
 def _colour_by_noise(many, surfaces, work):
     """Colours of the lanes whose texture is noise."""
-    double, whole = work.double, work.whole
+    single, double, whole = work.single, work.double, work.whole
     for k in range(many, vectors(many)):  # lanes to spare: far places would overflow
         whole[at.OCTAVES + k], double[at.SX + k], double[at.SY + k], double[at.SZ + k] = 0, 0.0, 0.0, 0.0
     fractal_lanes(many, whole, double)
     for j in range(many):
         k = whole[at.NOISY + j]
         row = int(surfaces.materials[np.uint64(whole[slot(at.BODY, k)]), TEXTURE])
-        double[slot(at.T0, k)], double[slot(at.T1, k)], double[slot(at.T2, k)] = noise_colour(
+        single[slot(at.T0, k)], single[slot(at.T1, k)], single[slot(at.T2, k)] = noise_colour(
             surfaces.textures, row, double[at.TOTAL + j]
         )
 
 
 @part_kernel
-def _map_normal(k, surfaces, work, au, av, bu, bv):
+def _map_normal(k, surfaces, work):
     """Tilt a shading normal by a normal map; leave it where that would turn it away from the viewer.
 
     Tangents are those of the face's own (u, v), made square to the shading normal; not MikkTSpace's, which are
     averaged over a mesh's corners.
     """
-    single, double, coordinates = work.single, work.double, surfaces.coordinates
+    single, coordinates = work.single, surfaces.coordinates
     f, body = work.whole[at.FACE + k], work.whole[at.BODY + k]
-    nx, ny, nz = three(double, at.NX, k)
+    nx, ny, nz = three_doubles(single, at.NX, k)
     scale = surfaces.materials[body, NORMAL_SCALE]
-    s, t, _ = interpolate(coordinates, f, single[at.U + k], single[at.V + k])
-    row = int(surfaces.materials[body, NORMAL_MAP])
-    x, y, z = filtered(surfaces.textures, row, surfaces.texels, s, t, au, av, bu, bv)
+    x, y, z = three_doubles(single, at.Q0, k)
     x, y, z = scale * (2.0 * x - 1.0), scale * (2.0 * y - 1.0), 2.0 * z - 1.0
     u1, v1 = coordinates[f, 1, 0] - coordinates[f, 0, 0], coordinates[f, 1, 1] - coordinates[f, 0, 1]
     u2, v2 = coordinates[f, 2, 0] - coordinates[f, 0, 0], coordinates[f, 2, 1] - coordinates[f, 0, 1]
     turn = float(u1) * v2 - float(u2) * v1
     if turn == 0.0 or x * x + y * y < 1e-12:
         return
-    side = double[at.ENTERING + k] * (1.0 if turn > 0.0 else -1.0)
+    side = single[at.ENTERING + k] * (1.0 if turn > 0.0 else -1.0)
     ax, ay, az = edge(surfaces.corners, f, 1)
     bx, by, bz = edge(surfaces.corners, f, 2)
     # where u grows, and where v grows, up to a positive factor and the side
@@ -273,7 +305,7 @@ def _map_normal(k, surfaces, work, au, av, bu, bv):
     length = math.sqrt(mx * mx + my * my + mz * mz)
     if length == 0.0 or mx * single[at.DX + k] + my * single[at.DY + k] + mz * single[at.DZ + k] >= 0.0:
         return
-    double[at.NX + k], double[at.NY + k], double[at.NZ + k] = mx / length, my / length, mz / length
+    single[at.NX + k], single[at.NY + k], single[at.NZ + k] = mx / length, my / length, mz / length
 
 
 @part_kernel

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .lanes import Work
+from .packets import Tools
 
 Single = NDArray[np.float32]
 Double = NDArray[np.float64]
@@ -40,6 +41,21 @@ class Rays(NamedTuple):
     widths: Single
 
 
+class Start(NamedTuple):
+    """Camera rays by columns and rows of pixels: the tables of `start.fill_start_tables`, in one dimension.
+
+    ``rows`` and ``columns`` are those of the pixels in the order of their rays, from ``top`` and ``left`` on; of no
+    rows if the rays come from elsewhere.
+    """
+
+    column_rays: Double
+    row_rays: Double
+    rows: Whole
+    columns: Whole
+    top: int
+    left: int
+
+
 class ShadowRays(NamedTuple):
     """Rays to lights, with the light that they would let through; as many rows for each light as rays are shaded."""
 
@@ -51,23 +67,35 @@ class ShadowRays(NamedTuple):
     inside: Whole
 
 
+class Maps(NamedTuple):
+    """Whether bodies of a scene have any images, maps of a kind, or parts that are seen through."""
+
+    any: bool
+    normal: bool
+    emission: bool
+    gloss: bool
+    blend: bool
+
+
 class Surfaces(NamedTuple):
     """Faces, materials and textures of a scene, as `packing.PackedScene` describes them.
 
-    The ``flat_`` arrays are the same memory in one dimension.
+    ``rows`` is the table of faces in one dimension, of so many ``columns``, ``faces`` its columns from the normal on,
+    ``looks`` the first columns of ``materials``, ``levels`` those of ``textures``, both in one dimension.
     """
 
+    rows: Single
+    columns: int
+    smooth: bool
     corners: Single
     faces: Single
-    normals: Single
     coordinates: Single
     object_of_face: Whole
     materials: Double
-    flat_corners: Single
-    flat_faces: Single
-    flat_normals: Single
-    flat_materials: Double
+    looks: Single
+    maps: Maps
     textures: Double
+    levels: Single
     texels: tuple[Single, NDArray[np.uint8]]
     alphas: Single
 
@@ -107,7 +135,8 @@ class Passage(NamedTuple):
     ``least`` is the least weight of a spawned ray. Up to ``lobe_rays`` rays go over the lobe of a rough mirror, whose
     places stand ``lobe_stride`` apart. A ray is ``first_width`` wide where it starts, if it has no width of its own,
     and grows by ``spread`` a mm, from a negative width through 0: images are filtered over its width, not at all if
-    both are 0. Hits that are not ``placed`` stand where Embree put them.
+    both are 0. Hits that are not ``placed`` stand where Embree put them. Shadow rays are written for ``later`` if
+    they may pass through clear bodies, or if Embree cannot be called from the kernel.
     """
 
     least: float
@@ -116,6 +145,7 @@ class Passage(NamedTuple):
     first_width: float
     spread: float
     placed: bool
+    later: bool
 
 
 class Recorded(NamedTuple):
@@ -144,10 +174,16 @@ class Stages(NamedTuple):
 class Generation(NamedTuple):
     """One generation of rays with everything that its shading reads and fills.
 
-    Shadow rays take n rows for each light, of which ``lit`` are filled; ``counts`` are those of `tables`.
+    ``hits`` are of no rows if the kernel finds them, by ``tools``; of coincident faces the ``first_of_same`` counts,
+    of no rows if there are none. Origins, directions and weights of ``rays`` are of no rows if they ``start`` within
+    the kernel. Shadow rays take n rows for each light, of which ``lit`` are filled; ``counts`` are
+    those of `tables`.
     """
 
     hits: Hits
+    tools: Tools
+    first_of_same: Whole
+    start: Start
     rays: Rays
     surfaces: Surfaces
     surroundings: Surroundings

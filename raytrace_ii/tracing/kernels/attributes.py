@@ -1,4 +1,4 @@
-"""Attributes of hits, computed for all lanes of a block: position, flat and smooth normal, footprint."""
+"""Attributes of hits, computed for all lanes of a packet: position, flat and smooth normal, footprint."""
 
 from __future__ import annotations
 
@@ -6,60 +6,66 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import exact_stage_kernel, late_kernel, stage_kernel
+from ii_core.base.jit import exact_lane_stage, inline_kernel, late_lane_kernel
+from ii_core.base.jit import lane_stage as stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
-from .lanes import BLOCK, slot
+from .lanes import BLOCK, take_rows
 from .packets import place_hit
-from .tables import IMAGES
+from .tables import ALL_COLUMNS, FLAT_COLUMNS, IMAGES
 from .textures import footprint
-from .vectors import three, three_doubles
+from .vectors import three, three_doubles, three_of_row
 
-_5, _9 = np.uint64(5), np.uint64(9)
+_ZERO, _ONE, _THIRD, _WIDE = np.float32(0), np.float32(1), np.float32(1 / 3), np.int64(FLAT_COLUMNS)
 
 
 @stage_kernel
-def gather(first, hits, rays, surfaces, work):
-    """Bring the hits of a block of rays to lanes.
+def take_rays(first, lanes, rays, single):
+    """Bring a packet of rays to lanes; lanes to spare have the last one."""
+    for k in range(BLOCK):
+        i = np.uint64(first + min(k, lanes - 1))
+        o, d, w = at.START + k, at.DX + k, at.W0 + k
+        single[o], single[o + BLOCK], single[o + 2 * BLOCK] = three_of_row(rays.origins, i)
+        single[d], single[d + BLOCK], single[d + 2 * BLOCK] = three_of_row(rays.directions, i)
+        single[w], single[w + BLOCK], single[w + 2 * BLOCK] = three_of_row(rays.weights, i)
+
+
+@stage_kernel
+def take_hits(first, lanes, hits, single, whole):
+    """Bring the hits of a packet, found before, to lanes."""
+    for k in range(BLOCK):
+        i = np.uint64(first + min(k, lanes - 1))
+        whole[at.FACE + k] = np.int64(hits.faces[i]) if k < lanes else -1
+        single[at.U + k], single[at.V + k], single[at.DISTANCE + k] = hits.u[i], hits.v[i], hits.distances[i]
+
+
+@stage_kernel
+def take_faces(surfaces, single, whole):
+    """Bring what is known of the faces hit to lanes; of a miss, of the first face.
 
     Returns
     -------
-    lanes : int
-        How many of the rays hit something.
+    int
+        How many rays hit something.
     """
-    single, whole = work.single, work.whole
-    corners, faces, normals = surfaces.flat_corners, surfaces.flat_faces, surfaces.flat_normals
-    last = min(first + BLOCK, hits.faces.shape[0])
-    smooth = normals.shape[0] > 0
-    lanes = 0
-    for k in range(last - first):
-        i = np.uint64(first + k)
-        face = hits.faces[i]
-        whole[at.LANE + k] = lanes if face >= 0 else -1
-        if face < 0:
-            continue
-        f = np.uint64(face)  # unsigned indices into one dimension: numba need not look for negative ones
-        whole[slot(at.ROW, lanes)], whole[slot(at.FACE, lanes)] = first + k, face
-        whole[slot(at.BODY, lanes)] = surfaces.object_of_face[f]
-        single[slot(at.U, lanes)], single[slot(at.V, lanes)] = hits.u[i], hits.v[i]
-        single[slot(at.DISTANCE, lanes)] = hits.distances[i]
-        for c in range(3):
-            single[slot(at.START + c * BLOCK, lanes)] = rays.origins[i, c]
-            single[slot(at.DX + c * BLOCK, lanes)] = rays.directions[i, c]
-            single[slot(at.WEIGHT + c * BLOCK, lanes)] = rays.weights[i, c]
-        for c in range(5):
-            single[slot(at.FACE_NORMAL + c * BLOCK, lanes)] = faces[f * _5 + np.uint64(c)]
-        for c in range(9):
-            single[slot(at.CORNER + c * BLOCK, lanes)] = corners[f * _9 + np.uint64(c)]
-        if smooth:
-            for c in range(9):
-                single[slot(at.NORMAL + c * BLOCK, lanes)] = normals[f * _9 + np.uint64(c)]
-        lanes += 1
-    return lanes
+    hits = 0
+    for k in range(BLOCK):
+        hit = whole[at.FACE + k] >= 0
+        whole[at.TABLE_ROW + k] = whole[at.FACE + k] if hit else 0
+        single[at.HIT + k] = _ONE if hit else _ZERO
+        hits += hit
+    if hits > 0:
+        columns = np.int64(surfaces.columns)
+        take_rows(surfaces.rows, columns, np.int64(0), whole, np.int64(at.TABLE_ROW), single, np.int64(at.CORNER))
+        if columns == ALL_COLUMNS:
+            take_rows(surfaces.rows, columns, _WIDE, whole, np.int64(at.TABLE_ROW), single, np.int64(at.NORMAL))
+        for k in range(BLOCK):
+            whole[at.BODY + k] = np.int64(single[at.FACE_BODY + k])
+    return hits
 
 
-@exact_stage_kernel
+@exact_lane_stage
 def settle(single):
     """Put u, v and distance as `place_hit` gives them in place of Embree's."""
     for k in range(BLOCK):
@@ -76,114 +82,107 @@ def settle(single):
 
 
 @stage_kernel
-def place(single, double):
-    """Hit points, normals on the ray's side, places to start from, and weights."""
+def place(single):
+    """Hit points, normals on the ray's side, and places to start from."""
     for k in range(BLOCK):
-        u, v, pull = np.float64(single[at.U + k]), np.float64(single[at.V + k]), np.float64(single[at.PULL + k])
-        u, v = u + pull * (1.0 / 3.0 - u), v + pull * (1.0 / 3.0 - v)
-        w = 1.0 - u - v
+        u, v, pull = single[at.U + k], single[at.V + k], single[at.PULL + k]
+        u, v = u + pull * (_THIRD - u), v + pull * (_THIRD - v)
+        w = _ONE - u - v
         c = at.CORNER + k
         px = w * single[c] + u * single[c + 3 * BLOCK] + v * single[c + 6 * BLOCK]
         py = w * single[c + BLOCK] + u * single[c + 4 * BLOCK] + v * single[c + 7 * BLOCK]
         pz = w * single[c + 2 * BLOCK] + u * single[c + 5 * BLOCK] + v * single[c + 8 * BLOCK]
-        g = at.FACE_NORMAL + k
-        gx, gy, gz = np.float64(single[g]), np.float64(single[g + BLOCK]), np.float64(single[g + 2 * BLOCK])
-        lift = np.float64(single[at.LIFT + k])
-        entering = gx * single[at.DX + k] + gy * single[at.DY + k] + gz * single[at.DZ + k] < 0.0
-        side = 1.0 if entering else -1.0
+        gx, gy, gz = three(single, at.FACE_NORMAL, k)
+        lift = single[at.LIFT + k]
+        entering = gx * single[at.DX + k] + gy * single[at.DY + k] + gz * single[at.DZ + k] < _ZERO
+        side = _ONE if entering else -_ONE
         gx, gy, gz = side * gx, side * gy, side * gz
-        double[at.PX + k], double[at.PY + k], double[at.PZ + k] = px, py, pz
-        double[at.GX + k], double[at.GY + k], double[at.GZ + k] = gx, gy, gz
-        double[at.OX + k], double[at.OY + k], double[at.OZ + k] = px + lift * gx, py + lift * gy, pz + lift * gz
-        double[at.ENTERING + k] = side
-        double[at.W0 + k] = single[at.WEIGHT + k]
-        double[at.W1 + k] = single[at.WEIGHT + BLOCK + k]
-        double[at.W2 + k] = single[at.WEIGHT + 2 * BLOCK + k]
+        single[at.PX + k], single[at.PY + k], single[at.PZ + k] = px, py, pz
+        single[at.GX + k], single[at.GY + k], single[at.GZ + k] = gx, gy, gz
+        single[at.OX + k], single[at.OY + k], single[at.OZ + k] = px + lift * gx, py + lift * gy, pz + lift * gz
+        single[at.ENTERING + k] = side
 
 
 @stage_kernel
-def flat_normals(double):
+def flat_normals(single):
     """Shade by the normals of the faces."""
+    for k in range(3 * BLOCK):
+        single[at.NX + k] = single[at.GX + k]
+        single[at.AX + k] = _ZERO
     for k in range(BLOCK):
-        double[at.NX + k], double[at.NY + k], double[at.NZ + k] = (
-            double[at.GX + k],
-            double[at.GY + k],
-            double[at.GZ + k],
-        )
-        double[at.SMOOTH + k] = 0.0
-        double[at.AX + k], double[at.AY + k], double[at.AZ + k] = 0.0, 0.0, 0.0
+        single[at.SMOOTH + k] = _ZERO
 
 
 @stage_kernel
-def smooth_normals(single, double):
+def smooth_normals(single):
     """Interpolated vertex normals on the ray's side, or the face's own where there is none or it faces away."""
     for k in range(BLOCK):
-        u, v = np.float64(single[at.U + k]), np.float64(single[at.V + k])
-        w = 1.0 - u - v
+        u, v = single[at.U + k], single[at.V + k]
+        w = _ONE - u - v
         n = at.NORMAL + k
         x = w * single[n] + u * single[n + 3 * BLOCK] + v * single[n + 6 * BLOCK]
         y = w * single[n + BLOCK] + u * single[n + 4 * BLOCK] + v * single[n + 7 * BLOCK]
         z = w * single[n + 2 * BLOCK] + u * single[n + 5 * BLOCK] + v * single[n + 8 * BLOCK]
-        gx, gy, gz = three(double, at.GX, k)
-        length = math.sqrt(x * x + y * y + z * z)
-        inverse = 1.0 / (length if length > 0.0 else 1.0)
-        inverse = -inverse if x * gx + y * gy + z * gz < 0.0 else inverse
+        gx, gy, gz = three(single, at.GX, k)
+        square = x * x + y * y + z * z
+        inverse = _ONE / math.sqrt(square if square > _ZERO else _ONE)
+        inverse = -inverse if x * gx + y * gy + z * gz < _ZERO else inverse
         x, y, z = x * inverse, y * inverse, z * inverse
-        away = (length == 0.0) | (x * single[at.DX + k] + y * single[at.DY + k] + z * single[at.DZ + k] >= 0.0)
-        double[at.NX + k] = gx if away else x
-        double[at.NY + k] = gy if away else y
-        double[at.NZ + k] = gz if away else z
-        smooth = (single[n] != 0.0) | (single[n + BLOCK] != 0.0) | (single[n + 2 * BLOCK] != 0.0)
-        double[at.SMOOTH + k] = 1.0 if smooth else 0.0
+        away = (square == _ZERO) | (x * single[at.DX + k] + y * single[at.DY + k] + z * single[at.DZ + k] >= _ZERO)
+        single[at.NX + k] = gx if away else x
+        single[at.NY + k] = gy if away else y
+        single[at.NZ + k] = gz if away else z
+        smooth = (single[n] != _ZERO) | (single[n + BLOCK] != _ZERO) | (single[n + 2 * BLOCK] != _ZERO)
+        single[at.SMOOTH + k] = _ONE if smooth else _ZERO
 
 
 @stage_kernel
-def up_to_smooth(single, double):
+def up_to_smooth(single):
     """The way from a place in a face up to the smooth surface that the face stands for (Hanika 2021).
 
     The mean of the ways onto the tangent planes of the corners, where these lie above. A shadow ray from the face
     itself is stopped by the neighbouring faces wherever light grazes: a dark band with teeth.
     """
     for k in range(BLOCK):
-        px, py, pz = three(double, at.PX, k)
-        gx, gy, gz = three(double, at.GX, k)
-        u, v = np.float64(single[at.U + k]), np.float64(single[at.V + k])
-        x, y, z = 0.0, 0.0, 0.0
-        for c in range(3):
-            share = 1.0 - u - v if c == 0 else (u if c == 1 else v)
-            n, p = at.NORMAL + 3 * c * BLOCK + k, at.CORNER + 3 * c * BLOCK + k
-            nx, ny, nz = np.float64(single[n]), np.float64(single[n + BLOCK]), np.float64(single[n + 2 * BLOCK])
-            side = -1.0 if nx * gx + ny * gy + nz * gz < 0.0 else 1.0  # of a face seen from behind
-            above = (px - single[p]) * nx + (py - single[p + BLOCK]) * ny + (pz - single[p + 2 * BLOCK]) * nz
-            up = share * side * min(side * above, 0.0)
-            x, y, z = x - up * nx, y - up * ny, z - up * nz
-        smooth = double[at.SMOOTH + k] > 0.0
-        double[at.AX + k], double[at.AY + k], double[at.AZ + k] = (
-            x if smooth else 0.0, y if smooth else 0.0, z if smooth else 0.0,
+        px, py, pz = three(single, at.PX, k)
+        gx, gy, gz = three(single, at.GX, k)
+        u, v = single[at.U + k], single[at.V + k]
+        x0, y0, z0 = _up(single, at.NORMAL + k, at.CORNER + k, _ONE - u - v, px, py, pz, gx, gy, gz)
+        x1, y1, z1 = _up(single, at.NORMAL + 3 * BLOCK + k, at.CORNER + 3 * BLOCK + k, u, px, py, pz, gx, gy, gz)
+        x2, y2, z2 = _up(single, at.NORMAL + 6 * BLOCK + k, at.CORNER + 6 * BLOCK + k, v, px, py, pz, gx, gy, gz)
+        x, y, z, smooth = x0 + x1 + x2, y0 + y1 + y2, z0 + z1 + z2, single[at.SMOOTH + k] > _ZERO
+        single[at.AX + k], single[at.AY + k], single[at.AZ + k] = (
+            x if smooth else _ZERO, y if smooth else _ZERO, z if smooth else _ZERO,
         )  # fmt: skip
 
 
-@late_kernel
+@inline_kernel
+def _up(single, n, p, share, px, py, pz, gx, gy, gz):
+    """A share of the way up onto the tangent plane of the corner ``p`` with the normal ``n``, if it lies above."""
+    nx, ny, nz = single[n], single[n + BLOCK], single[n + 2 * BLOCK]
+    side = -_ONE if nx * gx + ny * gy + nz * gz < _ZERO else _ONE  # of a face seen from behind
+    above = (px - single[p]) * nx + (py - single[p + BLOCK]) * ny + (pz - single[p + 2 * BLOCK]) * nz
+    up = -share * side * min(side * above, _ZERO)
+    return up * nx, up * ny, up * nz
+
+
+@late_lane_kernel
 def footprints(generation, first, lanes, _):
     """How far a ray's width reaches over the (u, v) of the images of its body."""
     g = value_at(generation)
     rays, surfaces, passage = g.rays, g.surfaces, g.passage
-    single, double, whole = g.work.single, g.work.double, g.work.whole
+    single, whole = g.work.single, g.work.whole
     own = rays.widths.shape[0] > 0
     any_image = False
     for k in range(lanes):
-        f = whole[at.FACE + k]
-        start = np.float64(rays.widths[whole[at.ROW + k]]) if own else passage.first_width
-        double[at.WIDTH + k] = abs(start + passage.spread * np.float64(single[at.DISTANCE + k]))
-        if surfaces.materials[whole[at.BODY + k], IMAGES] > 0.0:
-            any_image = True
-            for c in range(6):
-                single[at.COORDINATE + c * BLOCK + k] = surfaces.coordinates[f, c // 2, c % 2]
+        start = np.float64(rays.widths[first + k]) if own else passage.first_width
+        single[at.WIDTH + k] = abs(start + passage.spread * np.float64(single[at.DISTANCE + k]))
+        any_image |= surfaces.materials[whole[at.BODY + k], IMAGES] > 0.0
     if not any_image:
         return
     for k in range(BLOCK):
         c, t = at.CORNER + k, at.COORDINATE + k
-        x, y, z = np.float64(single[c]), np.float64(single[c + BLOCK]), np.float64(single[c + 2 * BLOCK])
+        x, y, z = three_doubles(single, at.CORNER, k)
         u, v = single[t], single[t + BLOCK]
         dx, dy, dz = three_doubles(single, at.DX, k)
         gx, gy, gz = three_doubles(single, at.FACE_NORMAL, k)
@@ -192,6 +191,6 @@ def footprints(generation, first, lanes, _):
             single[c + 6 * BLOCK] - x, single[c + 7 * BLOCK] - y, single[c + 8 * BLOCK] - z,
             single[t + 2 * BLOCK] - u, single[t + 3 * BLOCK] - v,
             single[t + 4 * BLOCK] - u, single[t + 5 * BLOCK] - v,
-            double[at.WIDTH + k], dx, dy, dz, gx, gy, gz,
+            np.float64(single[at.WIDTH + k]), dx, dy, dz, gx, gy, gz,
         )  # fmt: skip
-        double[at.AU + k], double[at.AV + k], double[at.BU + k], double[at.BV + k] = au, av, bu, bv
+        single[at.AU + k], single[at.AV + k], single[at.BU + k], single[at.BV + k] = au, av, bu, bv

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from ii_core.base.jit import lane_stage as stage_kernel
 from ii_core.base.jit import lean_kernel as kernel
-from ii_core.base.jit import stage_kernel
 
 from . import lanes as at
 from .lanes import BLOCK, slot
@@ -19,103 +19,147 @@ from .tables import (
     FAR,
     LEAST_WEIGHT,
     LIGHT_COLOUR,
+    SHADOW,
     SPOT,
     WEAK_SHADOW,
 )  # fmt: skip
 from .vectors import three
 
-_TO_LAMP, _ONE = np.float32(0.9999), np.uint64(1)  # how far a shadow ray reaches towards a lamp, in its own lengths
+_TO_LAMP = np.float32(0.9999)  # how far a shadow ray reaches towards a lamp, in its own lengths
+_ZERO, _ONE, _LEAST = np.float32(0), np.float32(1), np.float32(LEAST_WEIGHT)
 
 
 @stage_kernel
-def towards_light(lights, light, single, double):
+def towards_light(lights, light, single):
     """Directions to one light, cosines to it, 0 where it is behind the surface, and of the half-way vectors."""
     far = lights[light, 0] == DIRECTIONAL
-    sx, sy, sz = lights[light, 1], lights[light, 2], lights[light, 3]
+    sx, sy, sz = np.float32(lights[light, 1]), np.float32(lights[light, 2]), np.float32(lights[light, 3])
     if far:
         for k in range(BLOCK):
-            double[at.LX + k], double[at.LY + k], double[at.LZ + k], double[at.HALF + k] = -sx, -sy, -sz, 1.0
+            single[at.LX + k], single[at.LY + k], single[at.LZ + k], single[at.CONE + k] = -sx, -sy, -sz, _ONE
     else:
         for k in range(BLOCK):
-            lx, ly, lz = sx - double[at.OX + k], sy - double[at.OY + k], sz - double[at.OZ + k]
-            double[at.LX + k], double[at.LY + k], double[at.LZ + k] = lx, ly, lz
-            double[at.HALF + k] = 1.0 / math.sqrt(lx * lx + ly * ly + lz * lz)
+            lx, ly, lz = sx - single[at.OX + k], sy - single[at.OY + k], sz - single[at.OZ + k]
+            single[at.LX + k], single[at.LY + k], single[at.LZ + k] = lx, ly, lz
+            single[at.CONE + k] = _ONE / math.sqrt(lx * lx + ly * ly + lz * lz)
     for k in range(BLOCK):
-        lx, ly, lz, norm = double[at.LX + k], double[at.LY + k], double[at.LZ + k], double[at.HALF + k]
-        nx, ny, nz = three(double, at.NX, k)
+        lx, ly, lz, norm = single[at.LX + k], single[at.LY + k], single[at.LZ + k], single[at.CONE + k]
+        nx, ny, nz = three(single, at.NX, k)
         cosine = (nx * lx + ny * ly + nz * lz) * norm
-        above = double[at.GX + k] * lx + double[at.GY + k] * ly + double[at.GZ + k] * lz > 0.0
+        above = single[at.GX + k] * lx + single[at.GY + k] * ly + single[at.GZ + k] * lz > _ZERO
         lit = (
-            (cosine > 0.0)
-            & (above | (double[at.SMOOTH + k] > 0.0))
-            & ((double[at.SCATTERED + k] > 0.0) | (double[at.GLOSS + k] > 0.0))
+            (cosine > _ZERO)
+            & (above | (single[at.SMOOTH + k] > _ZERO))
+            & ((single[at.SCATTERED + k] > _ZERO) | (single[at.GLOSS + k] > _ZERO))
+            & (single[at.HIT + k] > _ZERO)
         )
-        double[at.COSINE + k] = cosine if lit else 0.0
+        single[at.COSINE + k] = cosine if lit else _ZERO
         hx, hy, hz = lx * norm - single[at.DX + k], ly * norm - single[at.DY + k], lz * norm - single[at.DZ + k]
-        half, square = nx * hx + ny * hy + nz * hz, hx * hx + hy * hy + hz * hz
+        half, square, least = nx * hx + ny * hy + nz * hz, hx * hx + hy * hy + hz * hz, single[at.HALF_FROM + k]
         # too weak to see, as nearly everywhere: told without a power
-        seen = (half > 0.0) & (half * half > double[at.HALF_FROM + k] ** 2 * square) & (double[at.GLOSS + k] > 0.0)
-        double[at.HALF + k] = half / math.sqrt(square if square > 0.0 else 1.0) if seen else 0.0
-        double[at.CONE + k] = norm
+        seen = lit & (half > _ZERO) & (half * half > least * least * square) & (single[at.GLOSS + k] > _ZERO)
+        single[at.HALF + k] = half / math.sqrt(square if square > _ZERO else _ONE) if seen else _ZERO
 
 
 @stage_kernel
-def in_cone(lights, light, double):
+def in_cone(lights, light, single):
     """Share of a spot light in each direction: 1 in its inner cone, 0 outside the outer one; of other lights 1."""
-    spot = lights[light, 0] == SPOT
+    if lights[light, 0] != SPOT:
+        for k in range(BLOCK):
+            single[at.CONE + k] = _ONE
+        return
     ax, ay, az = lights[light, CONE_AXIS], lights[light, CONE_AXIS + 1], lights[light, CONE_AXIS + 2]
     for k in range(BLOCK):
-        cosine = -(double[at.LX + k] * ax + double[at.LY + k] * ay + double[at.LZ + k] * az) * double[at.CONE + k]
+        cosine = -(single[at.LX + k] * ax + single[at.LY + k] * ay + single[at.LZ + k] * az) * single[at.CONE + k]
         share = min(max(cosine * lights[light, CONE_SCALE] + lights[light, CONE_OFFSET], 0.0), 1.0)
-        double[at.CONE + k] = share * share if spot else 1.0
+        single[at.CONE + k] = share * share
 
 
 @stage_kernel
-def cast(lanes, lights, light, rays, shadows, first, work, counts):
-    """Write the shadow rays of a block to one light, from row ``first`` on; none too weak to be seen.
+def weigh(lights, light, single, counts):
+    """Light that the shadow rays to one light would let through, none too weak to be seen.
+
+    Returns
+    -------
+    int
+        How many shadow rays there are.
+    """
+    shining = 0
+    for k in range(BLOCK):
+        single[at.SHINE + k] = _ZERO
+        shining += single[at.HALF + k] > _ZERO
+    if shining > 0:
+        for k in range(BLOCK):
+            if single[at.HALF + k] > _ZERO:
+                single[at.SHINE + k] = single[at.GLOSS + k] * single[at.HALF + k] ** single[at.EXPONENT + k]
+    l0, l1, l2 = (
+        np.float32(lights[light, LIGHT_COLOUR]), np.float32(lights[light, LIGHT_COLOUR + 1]),
+        np.float32(lights[light, LIGHT_COLOUR + 2]),
+    )  # fmt: skip
+    wanted, weak = 0, 0
+    for k in range(BLOCK):
+        cosine, shine, cone = single[at.COSINE + k], single[at.SHINE + k], single[at.CONE + k]
+        c0 = (single[at.R0 + k] * cosine + single[at.W0 + k] * shine) * cone * l0
+        c1 = (single[at.R1 + k] * cosine + single[at.W1 + k] * shine) * cone * l1
+        c2 = (single[at.R2 + k] * cosine + single[at.W2 + k] * shine) * cone * l2
+        single[at.C0 + k], single[at.C1 + k], single[at.C2 + k] = c0, c1, c2
+        faces, seen = cosine > _ZERO, max(c0, max(c1, c2)) >= _LEAST
+        single[at.WANTED + k] = _ONE if faces & seen else _ZERO
+        wanted += faces & seen
+        weak += faces & (not seen)
+    counts[SHADOW] += wanted
+    counts[WEAK_SHADOW] += weak
+    return wanted
+
+
+@stage_kernel
+def reach_of(lights, light):
+    """How far shadow rays to a light reach, in their own lengths."""
+    return FAR if lights[light, 0] == DIRECTIONAL else _TO_LAMP
+
+
+@stage_kernel
+def lift_rays(lights, light, single):
+    """Start shadow rays on the smooth surface: at (OX …) + (AX …), to a lamp by so much less."""
+    share = _ZERO if lights[light, 0] == DIRECTIONAL else _ONE
+    for k in range(3 * BLOCK):
+        single[at.LX + k] -= share * single[at.AX + k]
+
+
+@stage_kernel
+def keep_rays(lanes, first, lights, light, rays, shadows, row, single):
+    """Write the shadow rays of a packet from row ``row`` on, for those that follow them through clear bodies.
 
     Returns
     -------
     int
         How many there are.
     """
-    double, whole = work.double, work.whole
-    far = lights[light, 0] == DIRECTIONAL
+    start, reach = row, reach_of(lights, light)
     for k in range(lanes):
-        if double[at.HALF + k] > 0.0 and double[at.COSINE + k] > 0.0:
-            double[at.SHINE + k] = double[at.GLOSS + k] * double[at.HALF + k] ** double[at.EXPONENT + k]
-        else:
-            double[at.SHINE + k] = 0.0
-    l0, l1, l2 = lights[light, LIGHT_COLOUR], lights[light, LIGHT_COLOUR + 1], lights[light, LIGHT_COLOUR + 2]
-    for k in range(BLOCK):
-        cosine, shine, cone = double[at.COSINE + k], double[at.SHINE + k], double[at.CONE + k]
-        c0 = (double[at.R0 + k] * cosine + double[at.W0 + k] * shine) * cone * l0
-        c1 = (double[at.R1 + k] * cosine + double[at.W1 + k] * shine) * cone * l1
-        c2 = (double[at.R2 + k] * cosine + double[at.W2 + k] * shine) * cone * l2
-        double[at.C0 + k], double[at.C1 + k], double[at.C2 + k] = c0, c1, c2
-        double[at.STRONGEST + k] = max(c0, max(c1, c2))
-    if not far:
-        for k in range(3 * BLOCK):
-            double[at.LX + k] -= double[at.AX + k]
-    reach = FAR if far else _TO_LAMP
-    row = np.uint64(first)
-    for k in range(lanes):
-        if double[at.COSINE + k] == 0.0:
+        if single[at.WANTED + k] == _ZERO:
             continue
-        if double[at.STRONGEST + k] < LEAST_WEIGHT:
-            counts[WEAK_SHADOW] += 1
-            continue
-        i = np.uint64(whole[at.ROW + k])
+        i, to = np.uint64(first + k), np.uint64(row)
         for c in range(3):
-            shadows.origins[row, c] = double[slot(at.OX + c * BLOCK, k)] + double[slot(at.AX + c * BLOCK, k)]
-            shadows.directions[row, c] = double[slot(at.LX + c * BLOCK, k)]
-            shadows.colours[row, c] = double[slot(at.C0 + c * BLOCK, k)]
-        shadows.reach[row] = reach
-        shadows.pixels[row] = rays.pixels[i]
+            shadows.origins[to, c] = single[slot(at.OX + c * BLOCK, k)] + single[slot(at.AX + c * BLOCK, k)]
+            shadows.directions[to, c] = single[slot(at.LX + c * BLOCK, k)]
+            shadows.colours[to, c] = single[slot(at.C0 + c * BLOCK, k)]
+        shadows.reach[to] = reach
+        shadows.pixels[to] = rays.pixels[i]
         for j in range(rays.inside.shape[1]):
-            shadows.inside[row, j] = rays.inside[i, j]
-        row += _ONE
-    return np.int64(row) - first
+            shadows.inside[to, j] = rays.inside[i, j]
+        row += 1
+    return row - start
+
+
+@stage_kernel
+def add_free(single):
+    """Add the light of one light that arrives."""
+    for k in range(BLOCK):
+        free = single[at.WANTED + k] > _ZERO
+        single[at.L0 + k] += single[at.C0 + k] if free else _ZERO
+        single[at.L1 + k] += single[at.C1 + k] if free else _ZERO
+        single[at.L2 + k] += single[at.C2 + k] if free else _ZERO
 
 
 @kernel

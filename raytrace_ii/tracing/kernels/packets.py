@@ -14,27 +14,18 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ii_core.base.jit import exact_kernel as kernel
-from ii_core.base.jit import exact_stage_kernel as stage_kernel
-from ii_core.base.jit import inline_kernel, part_kernel
+from ii_core.base.jit import exact_lane_stage as stage_kernel
+from ii_core.base.jit import inline_kernel, lane_stage, part_kernel
 
+from . import lanes as at
 from .addresses import call
+from .lanes import BLOCK
 
 # Rows of a packet.
-_NEAR, _DIRECTION, _TIME, _FAR, _MASK, _FLAGS, _U, _V, _FACE, _GEOMETRY, _INSTANCE = (
-    3,
-    4,
-    7,
-    8,
-    9,
-    11,
-    15,
-    16,
-    17,
-    18,
-    19,
-)
+_NEAR, DIRECTION, _TIME, FAR, MASK, _FLAGS, U, V, FACE, GEOMETRY, INSTANCE = 3, 4, 7, 8, 9, 11, 15, 16, 17, 18, 19
 _CORNERS = 24  # the hit ends with `instPrimID`, row 20; behind it room for the nine coordinates of the faces hit
 PACKET_ROWS = _CORNERS + 9
 _NO_END = np.float32(1e37)
@@ -62,9 +53,24 @@ class Calls(NamedTuple):
     narrow: np.float32
 
 
+NO_CALLS = Calls(0, 0, 0, 0, 0, 0, np.float32(0), np.float32(0))
+
+
+class Tools(NamedTuple):
+    """Embree's calls for a packet in lanes: nearest hit, whether anything stops a ray, and which lanes are traced.
+
+    The address of a function is 0 if Embree cannot be called so, or if nothing stops any ray.
+    """
+
+    nearest: Calls
+    occluded: Calls
+    active: NDArray[np.int32]
+    chosen: NDArray[np.int32]
+
+
 def _reduce(function: Any) -> Any:
     """A kernel's inner function whose minima may be taken in any order, and so in vectors: packets have no NaN."""
-    return part_kernel(function, fastmath={"nnan", "nsz"}, forceinline=True)
+    return lane_stage(function, fastmath={"nnan", "nsz"})
 
 
 @inline_kernel
@@ -111,9 +117,9 @@ def _begin(packet, numbers, width):
     for lane in range(width):
         packet[_NEAR * width + lane] = np.float32(0)
         packet[_TIME * width + lane] = np.float32(0)
-        numbers[_MASK * width + lane] = -1
+        numbers[MASK * width + lane] = -1
         numbers[_FLAGS * width + lane] = 0
-        numbers[_INSTANCE * width + lane] = -1
+        numbers[INSTANCE * width + lane] = -1
 
 
 @inline_kernel
@@ -127,9 +133,9 @@ def _fill(packet, numbers, width, lane, o, d, ray, far):
     i = np.uint64(ray)
     for c in range(3):
         packet[_at(c, width, lane)] = o[i, c]
-        packet[_at(_DIRECTION + c, width, lane)] = d[i, c]
-    packet[_at(_FAR, width, lane)] = far
-    numbers[_at(_GEOMETRY, width, lane)] = -1
+        packet[_at(DIRECTION + c, width, lane)] = d[i, c]
+    packet[_at(FAR, width, lane)] = far
+    numbers[_at(GEOMETRY, width, lane)] = -1
 
 
 @_reduce
@@ -147,8 +153,8 @@ def _spread(packet, first, width):
 @stage_kernel
 def _together(packet, calls, ahead, width):
     """Whether rays are near enough to each other for coherent tracing, at their origins and ``ahead`` of them."""
-    x, y, z = packet[_DIRECTION * width], packet[(_DIRECTION + 1) * width], packet[(_DIRECTION + 2) * width]
-    apart, turned = _spread(packet, np.int64(0), width), _spread(packet, np.int64(_DIRECTION), width)
+    x, y, z = packet[DIRECTION * width], packet[(DIRECTION + 1) * width], packet[(DIRECTION + 2) * width]
+    apart, turned = _spread(packet, np.int64(0), width), _spread(packet, np.int64(DIRECTION), width)
     return (apart + turned * ahead <= calls.near) & (turned <= calls.narrow * (abs(x) + abs(y) + abs(z)))
 
 
@@ -156,31 +162,31 @@ def _together(packet, calls, ahead, width):
 def _place(packet, numbers, width, corners):
     """Put u, v and distance as `place_hit` gives them in place of Embree's: a loop without branches, for vectors."""
     for lane in range(width):
-        f = np.uint64(numbers[_at(_FACE, width, lane)] if numbers[_at(_GEOMETRY, width, lane)] >= 0 else 0)
+        f = np.uint64(numbers[_at(FACE, width, lane)] if numbers[_at(GEOMETRY, width, lane)] >= 0 else 0)
         for k in range(9):
             packet[_at(_CORNERS + k, width, lane)] = corners[f, k // 3, k % 3]
     for lane in range(width):
         u, v, t, sure = place_hit(
             packet[lane], packet[width + lane], packet[2 * width + lane],
-            packet[_DIRECTION * width + lane], packet[(_DIRECTION + 1) * width + lane],
-            packet[(_DIRECTION + 2) * width + lane],
+            packet[DIRECTION * width + lane], packet[(DIRECTION + 1) * width + lane],
+            packet[(DIRECTION + 2) * width + lane],
             packet[_CORNERS * width + lane], packet[(_CORNERS + 1) * width + lane],
             packet[(_CORNERS + 2) * width + lane], packet[(_CORNERS + 3) * width + lane],
             packet[(_CORNERS + 4) * width + lane], packet[(_CORNERS + 5) * width + lane],
             packet[(_CORNERS + 6) * width + lane], packet[(_CORNERS + 7) * width + lane],
             packet[(_CORNERS + 8) * width + lane],
         )  # fmt: skip
-        packet[_U * width + lane] = u if sure else packet[_U * width + lane]
-        packet[_V * width + lane] = v if sure else packet[_V * width + lane]
-        packet[_FAR * width + lane] = t if sure else packet[_FAR * width + lane]
+        packet[U * width + lane] = u if sure else packet[U * width + lane]
+        packet[V * width + lane] = v if sure else packet[V * width + lane]
+        packet[FAR * width + lane] = t if sure else packet[FAR * width + lane]
 
 
 @stage_kernel
 def _take(packet, numbers, width, lane, ray, primitives, u, v, distances):
     i = np.uint64(ray)
-    primitives[i] = numbers[_at(_FACE, width, lane)] if numbers[_at(_GEOMETRY, width, lane)] >= 0 else -1
+    primitives[i] = numbers[_at(FACE, width, lane)] if numbers[_at(GEOMETRY, width, lane)] >= 0 else -1
     u[i], v[i], distances[i] = (
-        packet[_at(_U, width, lane)], packet[_at(_V, width, lane)], packet[_at(_FAR, width, lane)],
+        packet[_at(U, width, lane)], packet[_at(V, width, lane)], packet[_at(FAR, width, lane)],
     )  # fmt: skip
 
 
@@ -214,10 +220,19 @@ def _choose(packet, active, chosen, calls, width):
 
 
 @stage_kernel
+def _trace(calls, active, chosen, packet, ahead, lanes, width):
+    """Trace the active lanes, so many, of a packet; one whose rays spread too far in groups of near lanes."""
+    if _together(packet, calls, ahead, width):
+        call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
+    else:
+        _trace_groups(calls, active, chosen, packet, lanes, width)
+
+
+@part_kernel
 def _trace_groups(calls, active, chosen, packet, lanes, width):
     """Trace a packet whose rays spread too far: groups of near lanes coherently, and the other lanes."""
     for lane in range(width):
-        chosen[lane] = lane < lanes
+        chosen[lane] = active[lane] != 0
     left, lone = lanes, 0
     while left >= width // 2 and lone < _MOST_LONE:
         count, first = _choose(packet, active, chosen, calls, width)
@@ -236,6 +251,81 @@ def _trace_groups(calls, active, chosen, packet, lanes, width):
         rest += chosen[lane] != 0
     if rest > 0:
         call(calls.packet, calls.active, calls.tree, calls.room, calls.incoherent)
+
+
+@stage_kernel
+def nearest_of_lanes(tools, first_of_same, ahead, lanes, work, width):
+    """Find the faces that the rays in the lanes hit.
+
+    Returns
+    -------
+    float
+        Distance of the last hit, as of `_together`.
+    """
+    single, whole, room = work.single, work.whole, at.PACKET
+    packet, numbers = single[room : room + PACKET_ROWS * width], work.bits[room : room + PACKET_ROWS * width]
+    for first in range(0, BLOCK, width):
+        some = min(lanes - first, width)
+        if some <= 0:
+            for lane in range(width):
+                whole[at.FACE + first + lane] = -1
+            continue
+        _begin(packet, numbers, width)
+        for c in range(3):
+            for lane in range(width):
+                packet[c * width + lane] = single[at.START + c * BLOCK + first + lane]
+                packet[(DIRECTION + c) * width + lane] = single[at.DX + c * BLOCK + first + lane]
+        for lane in range(width):
+            packet[FAR * width + lane] = _NO_END
+        for lane in range(width):
+            numbers[GEOMETRY * width + lane] = -1
+            tools.active[lane] = -1 if lane < some else 0
+        _trace(tools.nearest, tools.active, tools.chosen, packet, ahead, some, width)
+        for lane in range(width):
+            single[at.U + first + lane] = packet[U * width + lane]
+            single[at.V + first + lane] = packet[V * width + lane]
+            single[at.DISTANCE + first + lane] = packet[FAR * width + lane]
+        for lane in range(width):
+            hit = numbers[GEOMETRY * width + lane] >= 0
+            whole[at.FACE + first + lane] = np.int64(numbers[FACE * width + lane]) if hit else -1
+        if first_of_same.shape[0] > 0:
+            for k in range(first, first + width):
+                if whole[at.FACE + k] >= 0:
+                    whole[at.FACE + k] = first_of_same[np.uint64(whole[at.FACE + k])]
+        ahead = packet[FAR * width] if numbers[GEOMETRY * width] >= 0 else ahead
+    return ahead
+
+
+@stage_kernel
+def occluded_of_lanes(tools, reach, work, width):
+    """Take those shadow rays in the lanes out of ``WANTED`` that a face stops."""
+    single, room = work.single, at.PACKET
+    packet, numbers = single[room : room + PACKET_ROWS * width], work.bits[room : room + PACKET_ROWS * width]
+    for first in range(0, BLOCK, width):
+        some, one = 0, first  # lanes that are off have the last active one's ray: they spread a packet no farther
+        for k in range(first, first + width):
+            on = single[at.WANTED + k] > 0
+            some += on
+            one = k if on else one
+        if some == 0:
+            continue
+        _begin(packet, numbers, width)
+        for c in range(3):
+            o, d = at.OX + c * BLOCK, at.LX + c * BLOCK
+            a = at.AX + c * BLOCK
+            place, way = single[o + one] + single[a + one], single[d + one]
+            for lane in range(width):
+                on = single[at.WANTED + first + lane] > 0
+                packet[c * width + lane] = single[o + first + lane] + single[a + first + lane] if on else place
+                packet[(DIRECTION + c) * width + lane] = single[d + first + lane] if on else way
+        for lane in range(width):
+            packet[FAR * width + lane] = reach
+        for lane in range(width):
+            tools.active[lane] = -1 if single[at.WANTED + first + lane] > 0 else 0
+        _trace(tools.occluded, tools.active, tools.chosen, packet, np.float32(0), some, width)
+        for lane in range(width):
+            free = packet[FAR * width + lane] >= 0
+            single[at.WANTED + first + lane] = single[at.WANTED + first + lane] if free else np.float32(0)
 
 
 @cache
@@ -261,13 +351,10 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 active[lane] = -1 if lane < lanes else 0
                 far = reach[i] if reach.shape[0] > 0 else _NO_END
                 _fill(packet, numbers, wide, lane, origins, directions, i, far)
-            if _together(packet, calls, ahead, wide):
-                call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
-            else:
-                _trace_groups(calls, active, chosen, packet, lanes, wide)
+            _trace(calls, active, chosen, packet, ahead, np.int64(lanes), wide)
             if placed:
                 _place(packet, numbers, wide, corners)
-            ahead = packet[_FAR * width] if numbers[_GEOMETRY * width] >= 0 else ahead
+            ahead = packet[FAR * width] if numbers[GEOMETRY * width] >= 0 else ahead
             for lane in range(lanes):
                 _take(packet, numbers, wide, lane, first + lane, primitives, u, v, distances)
 
@@ -281,11 +368,8 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
                 i = first + min(lane, lanes - 1)
                 active[lane] = -1 if lane < lanes else 0
                 _fill(packet, numbers, wide, lane, origins, directions, i, reach[i])
-            if _together(packet, calls, np.float32(0), wide):
-                call(calls.packet, calls.active, calls.tree, calls.room, calls.coherent)
-            else:
-                _trace_groups(calls, active, chosen, packet, lanes, wide)
+            _trace(calls, active, chosen, packet, np.float32(0), np.int64(lanes), wide)
             for lane in range(lanes):
-                found[first + lane] = 0 if packet[_FAR * width + lane] < 0 else -1
+                found[first + lane] = 0 if packet[FAR * width + lane] < 0 else -1
 
     return nearest, occluded

@@ -27,15 +27,19 @@ from .tables import (
 )  # fmt: skip
 from .vectors import behind, put, three, three_doubles
 
+_ZERO = np.float32(0)
+
 
 @late_kernel
 def reflect(generation, first, lanes, _):
     """Write the rays over smooth mirrors, for scenes without rough ones and without anything seen through."""
     g = value_at(generation)
     for k in range(lanes):
-        m0, m1, m2 = _mirrored(k, g.work.double)
+        if g.work.single[at.HIT + k] == _ZERO:
+            continue
+        m0, m1, m2 = _mirrored(k, g.work.single)
         if max(m0, m1, m2) >= g.passage.least:
-            _reflect(k, m0, m1, m2, g.rays, g.following, g.work, g.counts)
+            _reflect(k, first + k, m0, m1, m2, g.rays, g.following, g.work, g.counts)
         else:
             g.counts[WEAK_REFLECTION] += max(m0, m1, m2) > 0.0
 
@@ -49,33 +53,37 @@ def spawn(generation, first, lanes, _):
     g = value_at(generation)
     rays, passage, following, work, counts = g.rays, g.passage, g.following, g.work, g.counts
     for k in range(lanes):
-        body = work.whole[at.BODY + k]
-        m0, m1, m2 = _mirrored(k, work.double)
+        if work.single[at.HIT + k] == _ZERO:
+            continue
+        i, body = first + k, work.whole[at.BODY + k]
+        m0, m1, m2 = _mirrored(k, work.single)
         if g.surfaces.materials[body, EXTRAS] > 0.0:
             if g.surfaces.materials[body, ALPHA_BLEND] > 0.0:
-                _pass_through(k, rays, g.surfaces, passage, following, work, counts)
-            if work.double[at.CLEAR + k] > 0.0:
-                m0, m1, m2 = _refract(k, m0, m1, m2, rays, g.surfaces.materials, passage, following, work, counts)
+                _pass_through(k, i, rays, g.surfaces, passage, following, work, counts)
+            if work.single[at.CLEAR + k] > 0.0:
+                m0, m1, m2 = _refract(
+                    k, i, m0, m1, m2, rays, g.surfaces.materials, passage, following, work, counts
+                )  # fmt: skip
         if max(m0, m1, m2) < passage.least:
             counts[WEAK_REFLECTION] += max(m0, m1, m2) > 0.0
-        elif work.double[at.ROUGH + k] > 0.0:
-            _reflect_over_lobe(k, m0, m1, m2, rays, passage, following, work, counts)
+        elif work.single[at.ROUGH + k] > 0.0:
+            _reflect_over_lobe(k, i, m0, m1, m2, rays, passage, following, work, counts)
         else:
-            _reflect(k, m0, m1, m2, rays, following, work, counts)
+            _reflect(k, i, m0, m1, m2, rays, following, work, counts)
 
 
 @inline_kernel
-def _mirrored(k, double):
+def _mirrored(k, single):
     """Weights of the light that one lane mirrors."""
     return (
-        double[at.W0 + k] * double[at.K0 + k],
-        double[at.W1 + k] * double[at.K1 + k],
-        double[at.W2 + k] * double[at.K2 + k],
+        single[at.W0 + k] * single[at.K0 + k],
+        single[at.W1 + k] * single[at.K1 + k],
+        single[at.W2 + k] * single[at.K2 + k],
     )
 
 
 @stage_kernel
-def _send(k, kind, ox, oy, oz, dx, dy, dz, w0, w1, w2, rays, following, work, counts):
+def _send(k, i, kind, ox, oy, oz, dx, dy, dz, w0, w1, w2, rays, following, work, counts):
     """Write a ray that a lane sends on, with the pixel, bodies around it and place in lobes of the ray before.
 
     Returns
@@ -83,12 +91,12 @@ def _send(k, kind, ox, oy, oz, dx, dy, dz, w0, w1, w2, rays, following, work, co
     int
         Its row.
     """
-    i, row = work.whole[at.ROW + k], counts[SPAWNED]
+    row = counts[SPAWNED]
     put(following.origins, row, ox, oy, oz)
     put(following.directions, row, dx, dy, dz)
     put(following.weights, row, w0, w1, w2)
     if following.widths.shape[0] > 0:
-        following.widths[row] = work.double[at.WIDTH + k]
+        following.widths[row] = work.single[at.WIDTH + k]
     following.pixels[row] = rays.pixels[i]
     for j in range(rays.inside.shape[1]):
         following.inside[row, j] = rays.inside[i, j]
@@ -100,22 +108,22 @@ def _send(k, kind, ox, oy, oz, dx, dy, dz, w0, w1, w2, rays, following, work, co
 
 
 @part_kernel
-def _pass_through(k, rays, surfaces, passage, following, work, counts):
+def _pass_through(k, i, rays, surfaces, passage, following, work, counts):
     """The ray that sees through a blended surface."""
-    single, double = work.single, work.double
-    b0, b1, b2 = three(double, at.B0, k)
+    single = work.single
+    b0, b1, b2 = three(single, at.B0, k)
     if max(b0, b1, b2) < passage.least:
         return
     x, y, z = behind(
         surfaces.corners, surfaces.faces, work.whole[at.FACE + k], single[at.U + k], single[at.V + k],
-        double[at.ENTERING + k] > 0.0,
+        single[at.ENTERING + k] > 0.0,
     )  # fmt: skip
     dx, dy, dz = three_doubles(single, at.DX, k)
-    _send(k, PASSED, x, y, z, dx, dy, dz, b0, b1, b2, rays, following, work, counts)
+    _send(k, i, PASSED, x, y, z, dx, dy, dz, b0, b1, b2, rays, following, work, counts)
 
 
 @stage_kernel
-def _refract(k, m0, m1, m2, rays, materials, passage, following, work, counts):
+def _refract(k, i, m0, m1, m2, rays, materials, passage, following, work, counts):
     """The rays through a face of glass, one a channel where it disperses, by Fresnel's formulas.
 
     Returns
@@ -123,19 +131,19 @@ def _refract(k, m0, m1, m2, rays, materials, passage, following, work, counts):
     m0, m1, m2 : float
         Weights of the mirrored light, with what the face reflects.
     """
-    double, whole = work.double, work.whole
-    i, body, entering = whole[at.ROW + k], whole[at.BODY + k], double[at.ENTERING + k] > 0.0
-    (nx, ny, nz), metallic = three(double, at.NX, k), double[at.METAL + k]
+    single, whole = work.single, work.whole
+    body, entering = whole[at.BODY + k], single[at.ENTERING + k] > 0.0
+    (nx, ny, nz), metallic = three_doubles(single, at.NX, k), single[at.METAL + k]
     before, after = media_at(rays.inside, i, materials, body, entering)
     ex, ey, ez = three_doubles(work.single, at.DX, k)
-    gx, gy, gz = three(double, at.GX, k)
+    gx, gy, gz = three_doubles(single, at.GX, k)
     lift = np.float64(work.single[at.LIFT + k])
     cosine = -(ex * nx + ey * ny + ez * nz)
     splits = disperses(materials, before) or disperses(materials, after)
     for c in range(3 if splits else 1):
-        t0 = double[at.W0 + k] * materials[body, TRANSMISSION]
-        t1 = double[at.W1 + k] * materials[body, TRANSMISSION + 1]
-        t2 = double[at.W2 + k] * materials[body, TRANSMISSION + 2]
+        t0 = single[at.W0 + k] * materials[body, TRANSMISSION]
+        t1 = single[at.W1 + k] * materials[body, TRANSMISSION + 1]
+        t2 = single[at.W2 + k] * materials[body, TRANSMISSION + 2]
         if metallic > 0.0:
             t0, t1, t2 = (1.0 - metallic) * t0, (1.0 - metallic) * t1, (1.0 - metallic) * t2
         if splits:  # one channel alone
@@ -151,22 +159,22 @@ def _refract(k, m0, m1, m2, rays, materials, passage, following, work, counts):
         tx, ty, tz = ratio * ex + along * nx, ratio * ey + along * ny, ratio * ez + along * nz
         if tx * gx + ty * gy + tz * gz < 0.0:  # a bent normal must not send it back out
             x, y, z = (
-                double[at.PX + k] - lift * gx, double[at.PY + k] - lift * gy, double[at.PZ + k] - lift * gz,
+                single[at.PX + k] - lift * gx, single[at.PY + k] - lift * gy, single[at.PZ + k] - lift * gz,
             )  # fmt: skip
-            row = _send(k, REFRACTION, x, y, z, tx, ty, tz, t0, t1, t2, rays, following, work, counts)
+            row = _send(k, i, REFRACTION, x, y, z, tx, ty, tz, t0, t1, t2, rays, following, work, counts)
             cross(following.inside, row, body, entering)
     return m0, m1, m2
 
 
 @part_kernel
-def _reflect_over_lobe(k, m0, m1, m2, rays, passage, following, work, counts):
+def _reflect_over_lobe(k, i, m0, m1, m2, rays, passage, following, work, counts):
     """The rays over the lobe of a rough mirror."""
-    single, double = work.single, work.double
-    rough, key = double[at.ROUGH + k], rays.keys[work.whole[at.ROW + k]]
+    single = work.single
+    rough, key = np.float64(single[at.ROUGH + k]), rays.keys[i]
     dx, dy, dz = three_doubles(single, at.DX, k)
-    nx, ny, nz = three(double, at.NX, k)
-    gx, gy, gz = three(double, at.GX, k)
-    ox, oy, oz = three(double, at.OX, k)
+    nx, ny, nz = three_doubles(single, at.NX, k)
+    gx, gy, gz = three_doubles(single, at.GX, k)
+    ox, oy, oz = three_doubles(single, at.OX, k)
     many = min(max(math.ceil(passage.lobe_rays * max(m0, m1, m2)), 1), passage.lobe_rays)
     for j in range(many):
         across, around = _in_lobe(key, j * passage.lobe_stride)
@@ -179,25 +187,26 @@ def _reflect_over_lobe(k, m0, m1, m2, rays, passage, following, work, counts):
         if along <= 0.0:  # out of the face that it would go into
             rx, ry, rz = rx - 2.0 * along * gx, ry - 2.0 * along * gy, rz - 2.0 * along * gz
         row = _send(
-            k, REFLECTION, ox, oy, oz, rx, ry, rz, share * m0, share * m1, share * m2, rays, following, work, counts,
+            k, i, REFLECTION, ox, oy, oz, rx, ry, rz, share * m0, share * m1, share * m2, rays, following, work,
+            counts,
         )  # fmt: skip
         following.keys[row] = mix_bits(key + np.uint64(j))
 
 
 @stage_kernel
-def _reflect(k, m0, m1, m2, rays, following, work, counts):
+def _reflect(k, i, m0, m1, m2, rays, following, work, counts):
     """The ray over a smooth mirror."""
-    double = work.double
+    single = work.single
     dx, dy, dz = three_doubles(work.single, at.DX, k)
-    nx, ny, nz = three(double, at.NX, k)
-    gx, gy, gz = three(double, at.GX, k)
-    ox, oy, oz = three(double, at.OX, k)
+    nx, ny, nz = three_doubles(single, at.NX, k)
+    gx, gy, gz = three_doubles(single, at.GX, k)
+    ox, oy, oz = three_doubles(single, at.OX, k)
     twice = 2.0 * (dx * nx + dy * ny + dz * nz)
     rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
     if rx * gx + ry * gy + rz * gz <= 0.0:  # nor may a bent normal send a reflection into the face
         twice = 2.0 * (dx * gx + dy * gy + dz * gz)
         rx, ry, rz = dx - twice * gx, dy - twice * gy, dz - twice * gz
-    _send(k, REFLECTION, ox, oy, oz, rx, ry, rz, m0, m1, m2, rays, following, work, counts)
+    _send(k, i, REFLECTION, ox, oy, oz, rx, ry, rz, m0, m1, m2, rays, following, work, counts)
 
 
 @inline_kernel

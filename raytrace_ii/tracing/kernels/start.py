@@ -6,8 +6,14 @@ import math
 
 import numpy as np
 
+from ii_core.base.jit import lane_kernel, lane_stage
 from ii_core.base.jit import lean_kernel as kernel
 
+from . import lanes as at
+from .lanes import BLOCK, add_rows
+from .vectors import put
+
+_ONE = np.float32(1)
 _LEAST, _MOST = 1e-150, 1e150  # between them squares and their sums neither vanish nor overflow
 
 
@@ -54,35 +60,57 @@ def start_rays(
 
 
 @kernel
-def start_separable_rays(x, y, z, rows, columns, rotation, shift, out_origins, out_directions):
-    """As `start_rays` for a block of pixels whose rays all carry all light, from `IICamera.separable_rays`.
-
-    ``rows`` and ``columns`` name the pixels in the order in which their rays are to stand.
-
-    Returns
-    -------
-    bool
-        Whether all rays are usable for sure: told of rows and columns, not of rays.
-    """
-    r00, r01, r02 = rotation[0, 0], rotation[0, 1], rotation[0, 2]
-    r10, r11, r12 = rotation[1, 0], rotation[1, 1], rotation[1, 2]
-    r20, r21, r22 = rotation[2, 0], rotation[2, 1], rotation[2, 2]
-    s0, s1, s2 = shift[0], shift[1], shift[2]
-    lz, dz = z[0], z[1]
-    sure = (_LEAST < abs(dz) < _MOST) & (abs(lz) < _MOST)
+def usable(x, y, z):
+    """Whether all rays of `IICamera.separable_rays` are usable for sure: told of rows and columns, not of rays."""
+    sure = (_LEAST < abs(z[1]) < _MOST) & (abs(z[0]) < _MOST)
     for rays in (x, y):
         for k in range(rays.shape[0]):
             sure &= (abs(rays[k, 0]) < _MOST) & (abs(rays[k, 1]) < _MOST)
-    for ray in range(rows.shape[0]):
-        i = np.uint64(ray)  # unsigned: numba need not look for negative indices
-        column, row = np.uint64(columns[i]), np.uint64(rows[i])
-        lx, dx = x[column, 0], x[column, 1]
-        ly, dy = y[row, 0], y[row, 1]
-        inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
-        out_origins[i, 0] = r00 * lx + r01 * ly + r02 * lz + s0
-        out_origins[i, 1] = r10 * lx + r11 * ly + r12 * lz + s1
-        out_origins[i, 2] = r20 * lx + r21 * ly + r22 * lz + s2
-        out_directions[i, 0] = (r00 * dx + r01 * dy + r02 * dz) * inverse
-        out_directions[i, 1] = (r10 * dx + r11 * dy + r12 * dz) * inverse
-        out_directions[i, 2] = (r20 * dx + r21 * dy + r22 * dz) * inverse
     return sure
+
+
+@kernel
+def fill_start_tables(x, y, z, rotation, shift, columns, rows):
+    """What columns and rows of `IICamera.separable_rays` give to the origins and directions of their rays.
+
+    A row of ``columns`` (w, 8) and one of ``rows`` (h, 8) add up to a ray: origin, and direction of any length.
+    """
+    for table, rays, axis in ((columns, x, 0), (rows, y, 1)):
+        for i in range(rays.shape[0]):
+            for c in range(3):
+                place, way = rotation[c, axis] * rays[i, 0], rotation[c, axis] * rays[i, 1]
+                if axis == 1:
+                    place, way = place + rotation[c, 2] * z[0] + shift[c], way + rotation[c, 2] * z[1]
+                table[i, c], table[i, 3 + c] = place, way
+
+
+@lane_stage
+def start_lanes(first, lanes, start, work):
+    """Start a packet of rays that carry all light from a `Start`; lanes to spare have the last one."""
+    single, double, whole, ray = work.single, work.double, work.whole, at.RAY
+    for k in range(BLOCK):
+        i = np.uint64(first + min(k, lanes - 1))
+        whole[at.TABLE_ROW + k] = start.left + start.columns[i]
+        whole[at.FACE + k] = start.top + start.rows[i]
+    tables, rows = (start.column_rays, start.row_rays), (np.int64(at.TABLE_ROW), np.int64(at.FACE))
+    add_rows(tables, whole, rows, double, np.int64(at.RAY))
+    for k in range(3 * BLOCK):
+        single[at.START + k] = double[at.RAY + k]
+        single[at.W0 + k] = _ONE
+    for k in range(BLOCK):
+        x, y, z = double[ray + 3 * BLOCK + k], double[ray + 4 * BLOCK + k], double[ray + 5 * BLOCK + k]
+        inverse = 1.0 / math.sqrt(x * x + y * y + z * z)
+        single[at.DX + k], single[at.DY + k], single[at.DZ + k] = x * inverse, y * inverse, z * inverse
+
+
+@lane_kernel
+def start_separable_rays(start, work, out_origins, out_directions):
+    """As `start_lanes` for all rays, into arrays."""
+    n, single = start.rows.shape[0], work.single
+    for first in range(0, n, BLOCK):
+        lanes = min(BLOCK, n - first)
+        start_lanes(first, lanes, start, work)
+        for k in range(lanes):
+            i = np.uint64(first + k)
+            put(out_origins, i, single[at.START + k], single[at.START + BLOCK + k], single[at.START + 2 * BLOCK + k])
+            put(out_directions, i, single[at.DX + k], single[at.DY + k], single[at.DZ + k])

@@ -4,57 +4,49 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 
-_CHANNELS = tuple(map(np.uint64, range(3)))
 
+def add_mixed(pixels: Any, places: Any, weights: Any, out: Any, at: Any) -> None:
+    """Add the weighted sum of four texels of float32 to ``out[at:at + 3]``; ``out[at + 3]`` is changed, too.
 
-def mixed(pixels: Any, places: Any, weights: Any) -> Any:
-    """Sums of red, green and blue of four texels of float32.
-
-    ``places`` are of the first channels; a number that follows the last texel is read and not used.
+    ``places`` are of the first channels; a number that follows the last texel is read.
     """
-    a, b, c, d = places
-    w00, w10, w01, w11 = weights
-    red, green, blue = (
-        w00 * pixels[a + k] + w10 * pixels[b + k] + w01 * pixels[c + k] + w11 * pixels[d + k] for k in _CHANNELS
-    )
-    return red, green, blue
+    for place, weight in zip(places, weights, strict=True):
+        for c in range(4):
+            out[at + c] += weight * pixels[int(place) + c]
 
 
-def _mixed(typing: Any, pixels: Any, places: Any, weights: Any) -> Any:
-    """One load, one conversion and one product a texel: LLVM makes none of them from single channels."""
+def _add_mixed(typing: Any, pixels: Any, places: Any, weights: Any, out: Any, at: Any) -> Any:
+    """One load and one product a texel: LLVM makes none of them from single channels."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        four = ir.VectorType(ir.FloatType(), 4)
-        lane = ir.IntType(32)
+        four, lane = ir.VectorType(ir.FloatType(), 4), ir.IntType(32)
         data = context.make_array(pixels)(context, builder, values[0]).data
-        total = None
+        target = context.make_array(out)(context, builder, values[3]).data
+        place = builder.bitcast(builder.gep(target, [values[4]]), four.as_pointer())
+        total = builder.load(place, align=4)
         for k in range(4):
             texel = builder.bitcast(builder.gep(data, [builder.extract_value(values[1], k)]), four.as_pointer())
-            colours = builder.fpext(builder.load(texel, align=4), ir.VectorType(ir.DoubleType(), 4))
-            weight = builder.insert_element(
-                ir.Constant(colours.type, ir.Undefined), builder.extract_value(values[2], k), lane(0)
-            )
+            weight = builder.extract_value(values[2], k)
+            weight = builder.insert_element(ir.Constant(four, ir.Undefined), weight, lane(0))
             weight = builder.shuffle_vector(weight, weight, ir.Constant(ir.VectorType(lane, 4), [0] * 4))
-            product = builder.fmul(weight, colours, flags=("contract",))
-            total = product if total is None else builder.fadd(total, product, flags=("contract",))
-        return context.make_tuple(
-            builder, signature.return_type, [builder.extract_element(total, lane(k)) for k in range(3)]
-        )
+            product = builder.fmul(weight, builder.load(texel, align=4), flags=("contract",))
+            total = builder.fadd(total, product, flags=("contract",))
+        builder.store(total, place, align=4)
+        return context.get_dummy_value()
 
-    return types.UniTuple(types.float64, 3)(pixels, places, weights), generate
-
-
-_mixed_vectors: Any = intrinsic(_mixed)
+    return types.void(pixels, places, weights, out, types.intp), generate
 
 
-@overload(mixed, inline="always")
-def _compiled(pixels: Any, places: Any, weights: Any) -> Any:
-    def compiled(pixels: Any, places: Any, weights: Any) -> Any:
-        return _mixed_vectors(pixels, places, weights)
+_add_mixed_vectors: Any = intrinsic(_add_mixed)
+
+
+@overload(add_mixed, inline="always")
+def _compiled(pixels: Any, places: Any, weights: Any, out: Any, at: Any) -> Any:
+    def compiled(pixels: Any, places: Any, weights: Any, out: Any, at: Any) -> Any:
+        return _add_mixed_vectors(pixels, places, weights, out, at)
 
     return compiled

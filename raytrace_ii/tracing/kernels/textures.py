@@ -1,4 +1,4 @@
-"""Textures: patterns, and images read at a point or filtered over a footprint."""
+"""Textures: patterns, places in images, and their alpha; colours of images are read in `images`."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import math
 
 import numpy as np
 
-from ii_core.base.colour import LINEAR
 from ii_core.base.jit import inline_kernel, part_kernel, stage_kernel
 
+from .lanes import bits_of, single_of
 from .tables import ALPHA_BLEND, CHECKER, CUTOFF, IMAGE, LEVELS, MIRROR, REPEAT, TEXTURE, VERTEX
-from .texels import mixed
 from .vectors import interpolate
 
-MOST_TAPS = 8  # along the longer axis of a filtered ellipse
-SHARPER = 0.5  # levels finer than the filter's width: bilinear reading of a level widens it again
-_LINEAR = LINEAR.astype(np.float64)  # float32's values: a bilinear reading converts twelve of them else
-_1, _2, _3, _4 = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
+MOST_TAPS = np.float32(8)  # along the longer axis of a filtered ellipse
+SHARPER = np.float32(0.5)  # levels finer than the filter's width: bilinear reading of a level widens it again
+_ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
+_MANTISSA, _EXPONENT_0, _23, _127 = np.int32(0x7FFFFF), np.int32(0x3F800000), np.int32(23), np.int32(127)
+# of the logarithm: 2/ln 2 · 1/(2k + 1)
+_C0, _C1, _C2, _C3, _C4, _C5 = (np.float32(2 / math.log(2) / k) for k in (1, 3, 5, 7, 9, 11))
 
 
 @part_kernel
@@ -60,25 +61,6 @@ def _between(table, row, t):
 
 
 @stage_kernel
-def _image(level, wraps, texels, x, y):
-    """Colour of an image's level at a place folded into the image, bilinear."""
-    a, b, c, d, fx, fy = _texels_at(level, wraps, x, y)
-    w00, w10, w01, w11 = (1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy
-    pixels, codes = texels
-    if level[3]:
-        a, b, c, d = a * _4, b * _4, c * _4, d * _4
-        k, m, n, o = codes[a], codes[b], codes[c], codes[d]
-        red = w00 * _LINEAR[k] + w10 * _LINEAR[m] + w01 * _LINEAR[n] + w11 * _LINEAR[o]
-        k, m, n, o = codes[a + _1], codes[b + _1], codes[c + _1], codes[d + _1]
-        green = w00 * _LINEAR[k] + w10 * _LINEAR[m] + w01 * _LINEAR[n] + w11 * _LINEAR[o]
-        k, m, n, o = codes[a + _2], codes[b + _2], codes[c + _2], codes[d + _2]
-        blue = w00 * _LINEAR[k] + w10 * _LINEAR[m] + w01 * _LINEAR[n] + w11 * _LINEAR[o]
-    else:
-        red, green, blue = mixed(pixels, (a * _3, b * _3, c * _3, d * _3), (w00, w10, w01, w11))
-    return red, green, blue
-
-
-@stage_kernel
 def footprint(ax, ay, az, bx, by, bz, u1, v1, u2, v2, width, dx, dy, dz, gx, gy, gz):
     """How far a ray's cross-section of some width reaches over (u, v): across the plane of incidence, and in it.
 
@@ -108,94 +90,56 @@ def footprint(ax, ay, az, bx, by, bz, u1, v1, u2, v2, width, dx, dy, dz, gx, gy,
     return i * u1 + j * u2, i * v1 + j * v2, k * u1 + l * u2, k * v1 + l * v2
 
 
-@part_kernel
-def filter_taps(table, row, au, av, bu, bv):
+@inline_kernel
+def filter_taps(width, height, levels, au, av, bu, bv):
     """Number of taps, level of each, and the way over (u, v) that they lie along: the longer of two diameters.
 
-    The level fits the shorter diameter, or the distance of the taps where there would be too many.
+    The level fits the shorter diameter, or the distance of the taps where there would be too many; an image has so
+    many coarser ``levels``. Without a branch, for vectors.
     """
-    width, height = table[row, 2], table[row, 3]
-    a, b = (au * width) ** 2 + (av * height) ** 2, (bu * width) ** 2 + (bv * height) ** 2
-    if max(a, b) <= 1.0:
-        return 1, 0.0, bu, bv
-    a, b = math.sqrt(a), math.sqrt(b)
-    if a > b:
-        a, b, bu, bv = b, a, au, av
-    taps = int(min(max(math.ceil(b / max(a, 1.0)), 1.0), MOST_TAPS))
-    level = math.log2(max(a, b / taps, 1.0)) - SHARPER
-    return taps, min(max(level, 0.0), table[row, LEVELS]), bu, bv
+    au_wide, av_high, bu_wide, bv_high = au * width, av * height, bu * width, bv * height
+    first, second = au_wide * au_wide + av_high * av_high, bu_wide * bu_wide + bv_high * bv_high
+    longer = first > second
+    bu, bv = au if longer else bu, av if longer else bv
+    a, b = math.sqrt(second if longer else first), math.sqrt(first if longer else second)
+    taps = min(max(np.ceil(b / (a if a > _ONE else _ONE)), _ONE), MOST_TAPS)
+    apart = b / taps
+    apart = a if a > apart else apart
+    level = logarithm(apart if apart > _ONE else _ONE) - SHARPER
+    return taps, min(max(level, _ZERO), levels), bu, bv
 
 
 @inline_kernel
-def _levels(table, row, level):
-    """The levels above and below, and how far it is to the second; the first twice where it is none."""
-    near = int(level)
-    part = level - near
-    return _level(table, row + near), _level(table, row + near + (1 if part > 0.0 else 0)), part
+def logarithm(x):
+    """Logarithm to base 2 of a float32 from 1 on: exponent, and a series in the mantissa, for vectors."""
+    number = bits_of(x)
+    mantissa = single_of(np.int32((number & _MANTISSA) | _EXPONENT_0))
+    t = (mantissa - _ONE) / (mantissa + _ONE)
+    q = t * t
+    series = _C0 + q * (_C1 + q * (_C2 + q * (_C3 + q * (_C4 + q * _C5))))
+    return np.float32(np.int32(number >> _23) - _127) + t * series
 
 
 @inline_kernel
-def _level(table, row):
-    """A level's first texel, width, height, and whether it is of codes."""
-    return int(table[row, 1]), int(table[row, 2]), int(table[row, 3]), table[row, 5] != 0.0
+def texels_about(x, y, width, height, repeats_across, repeats_down):
+    """The texels about a place folded into an image, from its upper left corner in widths and heights.
 
-
-@inline_kernel
-def _wraps(table, row):
-    """How an image and its levels go on across and down."""
-    return int(table[row, 6]), int(table[row, 7])
-
-
-@part_kernel
-def filtered(table, row, texels, u, v, au, av, bu, bv):
-    """Colour of an image over an ellipse about (u, v) of two diameters: means of its pyramid (Williams 1983)."""
-    taps, level, bu, bv = filter_taps(table, row, au, av, bu, bv)
-    near, far, part = _levels(table, row, level)
-    wraps = _wraps(table, row)
-    red, green, blue = 0.0, 0.0, 0.0
-    for tap in range(taps):
-        s = (tap + 0.5) / taps - 0.5
-        x, y = _folded(u + s * bu, wraps[0]), 1.0 - _folded(v + s * bv, wraps[1])
-        r, g, b = _image(near, wraps, texels, x, y)
-        if part > 0.0:
-            r1, g1, b1 = _image(far, wraps, texels, x, y)
-            r, g, b = r + part * (r1 - r), g + part * (g1 - g), b + part * (b1 - b)
-        red, green, blue = red + r, green + g, blue + b
-    return red / taps, green / taps, blue / taps
-
-
-@stage_kernel
-def _texels_at(level, wraps, x, y):
-    """The four texels about a place folded into the image, from its upper left corner in widths and heights.
-
-    Left and right above, left and right below, and how far it is to right and down.
+    Columns left and right, rows above and below, and how far it is to right and down; for vectors.
     """
-    first, width, height, _ = level
-    across, down = wraps
-    x, y = x * width - 0.5, y * height - 0.5
+    x, y, last, lowest = x * width - _HALF, y * height - _HALF, width - _ONE, height - _ONE
     i, j = np.floor(x), np.floor(y)
-    i0, i1 = _wrap(int(i), width, across)
-    j0, j1 = _wrap(int(j), height, down)
-    a, b = first + j0 * width, first + j1 * width
-    return np.uint64(a + i0), np.uint64(a + i1), np.uint64(b + i0), np.uint64(b + i1), x - i, y - j
+    i0 = (last if repeats_across else _ZERO) if i < _ZERO else i
+    i1 = (_ZERO if repeats_across else last) if i >= last else i + _ONE
+    j0 = (lowest if repeats_down else _ZERO) if j < _ZERO else j
+    j1 = (_ZERO if repeats_down else lowest) if j >= lowest else j + _ONE
+    return i0, i1, j0, j1, x - i, y - j
 
 
 @inline_kernel
-def _wrap(i, n, wrap):
-    """Texel i and the next one, for i from −1 on; without a division."""
-    if wrap == REPEAT:
-        return i if i >= 0 else n - 1, i + 1 if 0 < i + 1 < n else 0
-    return max(i, 0), min(i + 1, n - 1)
-
-
-@inline_kernel
-def _folded(t, wrap):
-    """A texture coordinate taken into the image, [0, 1]."""
-    if wrap == REPEAT:
-        return t - np.floor(t)
-    if wrap == MIRROR:
-        return abs(t - 2.0 * np.floor(0.5 * t + 0.5))  # from the nearest even number
-    return min(max(t, 0.0), 1.0)
+def folded(t, wrap):
+    """A texture coordinate taken into the image, [0, 1]; for vectors."""
+    mirrored = abs(t - 2.0 * np.floor(0.5 * t + 0.5))  # from the nearest even number
+    return t - np.floor(t) if wrap == REPEAT else (mirrored if wrap == MIRROR else min(max(t, 0.0), 1.0))
 
 
 @stage_kernel
@@ -213,11 +157,14 @@ def share_there(coordinates, textures, alphas, materials, body, f, u, v, au, av,
     share, row = materials[body, ALPHA_BLEND], int(materials[body, TEXTURE])
     if row >= 0 and textures[row, 0] == IMAGE and textures[row, 4] >= 0.0:
         x, y, _ = interpolate(coordinates, f, u, v)
-        taps, level, bu, bv = filter_taps(textures, row, au, av, bu, bv)
+        taps, level, bu, bv = filter_taps(
+            np.float32(textures[row, 2]), np.float32(textures[row, 3]), np.float32(textures[row, LEVELS]),
+            np.float32(au), np.float32(av), np.float32(bu), np.float32(bv),
+        )  # fmt: skip
         total = 0.0
         near = int(level)
         part = level - near
-        for tap in range(taps):
+        for tap in range(int(taps)):
             s = (tap + 0.5) / taps - 0.5
             here = _alpha(textures, row + near, alphas, x + s * bu, y + s * bv)
             if part > 0.0:
@@ -230,10 +177,11 @@ def share_there(coordinates, textures, alphas, materials, body, f, u, v, au, av,
 @part_kernel
 def _alpha(textures, row, alphas, x, y):
     """Alpha of an image at (u, v), bilinear."""
-    wraps = _wraps(textures, row)
-    x, y = _folded(x, wraps[0]), 1.0 - _folded(y, wraps[1])
-    a, b, c, d, fx, fy = _texels_at(_level(textures, row), wraps, x, y)
-    first = np.uint64(int(textures[row, 4]) - int(textures[row, 1]))  # wraps round as an index does
-    upper = (1 - fx) * alphas[first + a] + fx * alphas[first + b]
-    lower = (1 - fx) * alphas[first + c] + fx * alphas[first + d]
+    across, down, width = textures[row, 6], textures[row, 7], textures[row, 2]
+    x, y = folded(x, across), 1.0 - folded(y, down)
+    i0, i1, j0, j1, fx, fy = texels_about(x, y, width, textures[row, 3], across == REPEAT, down == REPEAT)
+    first = textures[row, 4]
+    above, below = first + j0 * width, first + j1 * width
+    upper = (1 - fx) * alphas[np.uint64(above + i0)] + fx * alphas[np.uint64(above + i1)]
+    lower = (1 - fx) * alphas[np.uint64(below + i0)] + fx * alphas[np.uint64(below + i1)]
     return (1 - fy) * upper + fy * lower

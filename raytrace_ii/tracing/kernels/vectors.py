@@ -65,6 +65,11 @@ def three(values, first, k):
 
 
 @inline_kernel
+def three_of_row(rows, i):
+    return rows[i, 0], rows[i, 1], rows[i, 2]
+
+
+@inline_kernel
 def three_doubles(values, first, k):
     """As `three`, of float32 to float64."""
     return (

@@ -157,7 +157,7 @@ def test_a_worker_with_other_code_is_refused_by_name(cluster, run, refused, tmp_
     other = tmp_path / "other"
     for package in ("raytrace_ii", "ii_core", "assets"):
         shutil.copytree(ROOT / package, other / package, ignore=shutil.ignore_patterns("__pycache__"))
-    kernel = other / "raytrace_ii" / "tracing" / "kernels" / "shade.py"
+    kernel = other / "raytrace_ii" / "tracing" / "kernels" / "way.py"
     kernel.write_text(kernel.read_text() + "\n# brighter\n")
     cluster.add()
     command = ("render", "objects", "--scale", 128, "--dask", cluster.address, "-o")

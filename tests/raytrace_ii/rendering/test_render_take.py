@@ -75,6 +75,7 @@ def test_a_damaged_frame_is_made_again(take, tmp_path):
     assert (tmp_path / "out" / "frame_0001.png").read_bytes() == whole
 
 
+@pytest.mark.slow
 def test_a_killed_take_goes_on(tmp_path):
     """SIGKILL leaves whole frames, of which at most the last is made again."""
     take_of(tmp_path, BALLS + MOVES.replace("frames = 11", "frames = 400"))

@@ -19,6 +19,7 @@ from raytrace_ii.tracing.embree import CONFIGURATION, Library, Tree, library
 from raytrace_ii.tracing.intersect import Intersector, SingleRays
 from raytrace_ii.tracing.kernels.packets import place_hits
 from raytrace_ii.tracing.packing import packed as packed_scene
+from tests.support.slow import first_fast
 from tests.support.trace_scenes import body, hall, lamp, sphere, sun, wall
 
 SMALL = IICamera(pixels=(128, 64), lenses=(16, 8), pixel_pitch_mm=0.1, gap_mm=2.0)
@@ -264,14 +265,14 @@ def test_narrower_cpus_and_embreex_give_the_same_pictures(configuration, says, u
             np.testing.assert_array_equal(other[name], expected, err_msg=name)
             continue
         # Single pixels differ by a float32 rounding, presumably where a ray meets the edge of two faces: either
-        # may be found. Up to 2 of 1395 pixels were seen to differ, by 1 code of 16 bits.
+        # may be found. Up to 2 of 1395 pixels were seen to differ, by 1 code of 16 bits; of depths 5.
         differs = (other[name] != expected) & ~(np.isnan(other[name]) & np.isnan(expected))
         if (says, name) == ("packets of 4", "odd lenses, 3 samples"):
             # One sample's primary hit is the same and its radiance 1e-4 off: a later ray meets the other face.
             assert np.argwhere(differs.any(axis=-1)).tolist() in ([], [[0, 23]])
             assert np.abs(other[name].astype(float) - expected).max() <= 2
             continue
-        assert differs.sum() <= 4, name
+        assert differs.sum() <= 6, name
         step = 2.0**-22 * expected[differs] if "depth" in name else 1
         assert (np.abs(other[name][differs].astype(float) - expected[differs]) <= step).all(), name
 
@@ -306,14 +307,15 @@ def test_a_wrong_layout_is_noticed(monkeypatch):
     assert isinstance(good, Library) and embree._layouts_hold(good)
 
     class Shifted(Tree):
-        def nearest(self, origins, directions, reach, out):
-            super().nearest(origins, directions, reach, (out[0], out[2], out[1], out[3]))  # u and v exchanged
+        def few(self, *arguments):
+            faces, u, v, distances = super().few(*arguments)
+            return faces, v, u, distances
 
     monkeypatch.setattr(embree, "Tree", Shifted)
     assert not embree._layouts_hold(good)
 
 
-@pytest.mark.parametrize("start", ["fork", "spawn"])
+@pytest.mark.parametrize("start", first_fast(["fork", "spawn"]))
 def test_processes_give_the_same_picture(start):
     """A forked process has Embree's memory without its threads: it opens a device of its own."""
     here = render(hall(), SMALL, workers=2)

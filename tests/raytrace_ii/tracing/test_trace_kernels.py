@@ -11,34 +11,19 @@ from raytrace_ii import trace
 from raytrace_ii.rendering.job import Job
 from raytrace_ii.scene.textures import Image
 from raytrace_ii.tracing import tracer
-from raytrace_ii.tracing.kernels import appearance, attributes, shade, sky, spawn
+from raytrace_ii.tracing.embree import lane_masks
+from raytrace_ii.tracing.intersect import Intersector
+from raytrace_ii.tracing.kernels import appearance, attributes, sky, spawn, way
+from raytrace_ii.tracing.kernels.arrays import Start
 from raytrace_ii.tracing.kernels.fresnel import fresnel
+from raytrace_ii.tracing.kernels.lanes import work
 from raytrace_ii.tracing.kernels.light import keep_unblocked
+from raytrace_ii.tracing.kernels.packets import NO_CALLS, Tools
 from raytrace_ii.tracing.kernels.start import start_rays, start_separable_rays
 from tests.support.pictures import scene
 from tests.support.trace_scenes import WHITE, body, hall, sphere, wall
 
-NAMES = (
-    "start_rays",
-    "shade",
-    "add_unblocked",
-    "pass_faces",
-    "pass_clear_face",
-    "start_inside",
-    "tell_inside",
-)
-PARTS = (
-    "gather",
-    "place",
-    "smooth_normals",
-    "up_to_smooth",
-    "take_materials",
-    "scatter",
-    "towards_light",
-    "in_cone",
-    "cast",
-    "add_light",
-)
+NAMES = ("start_rays", "add_unblocked", "pass_faces", "pass_clear_face", "start_inside", "tell_inside")
 
 
 def crowded():
@@ -95,14 +80,17 @@ def agree(scene, monkeypatch):
     camera = preset("setup1", scale=64)
     m, n = np.random.default_rng(0).integers(0, camera.pixels, (600, 2)).T
     compiled = trace(scene, *camera.rays_at(m, n))
-    for module, names in ((tracer, NAMES), (shade, PARTS)):
-        for name in names:
-            monkeypatch.setattr(module, name, getattr(module, name).py_func)
-    # stages are called by address, which Python cannot: the function stands for its address, a tuple for its place
+    for name in NAMES:
+        monkeypatch.setattr(tracer, name, getattr(tracer, name).py_func)
+    # Python can call neither Embree nor a stage by address: Embree's hits come in arrays, the function stands for its
+    # address and a tuple for its place
+    monkeypatch.setattr(Intersector, "tools", lambda *_: Tools(NO_CALLS, NO_CALLS, *lane_masks()))
+    monkeypatch.setattr(tracer, "way_kernel", lambda width: way.way_kernel(width).py_func)
     monkeypatch.setattr(tracer, "addresses", lambda stages, _: {stage: stage.py_func for stage in stages})
-    monkeypatch.setattr(shade, "call", lambda stage, *arguments: stage(*arguments))
-    monkeypatch.setattr(shade, "address_of", lambda generation: generation)
-    for module in (appearance, attributes, shade, sky, spawn):
+    monkeypatch.setattr(way, "call", lambda stage, *arguments: stage(*arguments))
+    monkeypatch.setattr(way, "address_of", lambda generation: generation)
+    monkeypatch.setattr(way, "ticks", lambda: 0)
+    for module in (appearance, attributes, sky, spawn, way):
         monkeypatch.setattr(module, "value_at", lambda generation: generation)
     plain = trace(scene, *camera.rays_at(m, n))
     np.testing.assert_array_equal(compiled.object_id, plain.object_id)
@@ -150,33 +138,33 @@ def test_rays_without_light_are_left_out():
 
 def test_rays_by_row_and_column_are_those_one_by_one():
     rng = np.random.default_rng(0)
-    x, y, z = rng.normal(size=(5, 2)), rng.normal(size=(3, 2)), np.array([1.0, 4.0])
+    x, y, z = rng.normal(size=(5, 2)), rng.normal(size=(7, 2)), np.array([1.0, 4.0])
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    grid = np.empty((2, 3, 5, 3))
+    grid = np.empty((2, 7, 5, 3))
     for k in range(2):
         grid[k, ..., 0], grid[k, ..., 1], grid[k, ..., 2] = x[:, k], y[:, k, None], z[k]
-    expected = [np.empty((15, 3), np.float32) for _ in range(3)]
-    pixels, inside = np.empty(15, np.int32), np.empty((15, 0), np.int32)
-    order = rng.permutation(15).astype(np.int32)
-    start_rays(*grid.reshape(2, 15, 3), np.empty(0), order, turn, np.arange(3.0), *expected, pixels, inside)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, np.arange(3.0)
+    expected = [np.empty((35, 3), np.float32) for _ in range(3)]
+    pixels, inside = np.empty(35, np.int32), np.empty((35, 0), np.int32)
+    order = rng.permutation(35).astype(np.int32)
+    start_rays(*grid.reshape(2, 35, 3), np.empty(0), order, turn, np.arange(3.0), *expected, pixels, inside)
+    start = Start(*tracer.start_tables((x, y, z), pose), order // 5 - 1, order % 5 - 2, 1, 2)
     for function in (start_separable_rays, start_separable_rays.py_func):
-        found = [np.empty((15, 3), np.float32) for _ in range(2)]
-        assert function(x, y, z, order // 5, order % 5, turn, np.arange(3.0), *found)
+        found = [np.empty((35, 3), np.float32) for _ in range(2)]
+        function(start, work(), *found)
         np.testing.assert_array_equal(found, expected[:2])
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e200])
 def test_rows_and_columns_of_unusable_rays_are_reported(wrong):
-    room = [np.empty((15, 3), np.float32) for _ in range(2)]
-    sizes, order = (10, 6, 2), (np.zeros(15, np.int32),) * 2
+    sizes = (10, 6, 2)
     for where in range(18):
         flat = np.ones(18)
         flat[where] = wrong
         x, y, z = np.split(flat, np.cumsum(sizes)[:-1])
-        rays = x.reshape(5, 2), y.reshape(3, 2), z
-        assert not start_separable_rays(*rays, *order, np.eye(3), np.zeros(3), *room)
-    nowhere = np.zeros((5, 2)), np.zeros((3, 2)), np.zeros(2)
-    assert not start_separable_rays(*nowhere, *order, np.eye(3), np.zeros(3), *room), "no direction"
+        assert tracer.start_tables((x.reshape(5, 2), y.reshape(3, 2), z), np.eye(4)) is None
+    assert tracer.start_tables((np.zeros((5, 2)), np.zeros((3, 2)), np.zeros(2)), np.eye(4)) is None, "no direction"
 
 
 def test_shadow_rays_that_arrive_are_packed_to_the_front():

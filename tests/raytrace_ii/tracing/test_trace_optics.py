@@ -12,7 +12,6 @@ from raytrace_ii import Background, Material, Scene, trace
 from raytrace_ii.scene.textures import Checker
 from raytrace_ii.shapes.primitives import Mesh
 from raytrace_ii.tracing.kernels.fresnel import fresnel
-from raytrace_ii.tracing.kernels.sky import background_colour
 from raytrace_ii.tracing.kernels.srgb import encode_srgb
 from raytrace_ii.tracing.kernels.tables import LEAST_WEIGHT
 from raytrace_ii.tracing.lift import LIFT
@@ -509,11 +508,6 @@ def test_sky_runs_with_the_sine_from_horizon_to_zenith_and_nadir(spread_deg):
 
 def test_kernels_of_light_equal_their_python_source():
     generator = np.random.default_rng(0)
-    background = np.array([*generator.random(9), 1.7])
-    for dy in (-1.0, -0.3, 0.0, 0.2, 0.9):
-        assert background_colour(background, dy) == pytest.approx(
-            background_colour.py_func(background, dy), abs=1e-15
-        )
     radiance = generator.uniform(-0.2, 1.3, (200, 3)).astype(np.float32)
     curve, order = np.linspace(0, 255, 4097) ** 1.1 / 255**0.1, generator.permutation(200)
     a, b = np.empty((200, 3), np.uint8), np.empty((200, 3), np.uint8)

@@ -1,0 +1,166 @@
+"""Encoder's choice of loop filters: least squares by plane and class, and whether their bits pay."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ii_core.base.jit import lean_kernel
+
+from . import contexts as at
+from .arithmetic import Arithmetic, bit_costs
+from .loop_filter import (
+    BINS,
+    BORDER,
+    CLASSES,
+    COUNTS,
+    MOST_TAP,
+    OWN,
+    TAPS,
+    Filters,
+    _differences,
+    memory,
+    prepare_view,
+)
+
+UNIT = 256  # of taps
+PRECISIONS = 4  # that are tried: multiples of 1, 2, 4 and 8
+HEAD, LEAST_BITS = 4.0, 1.4  # bits of a new filter beside its taps, and of a tap that is expected
+
+
+class Moments(NamedTuple):
+    """Sums over a decoded view, by plane and class.
+
+    Parameters
+    ----------
+    products : ndarray of float64, (3, CLASSES, TAPS, TAPS)
+        Of differences.
+    missed : ndarray of float64, (3, CLASSES, TAPS)
+        Of differences and the original less the decoded sample.
+    counts : ndarray of float64, (CLASSES,)
+    """
+
+    products: NDArray[np.float64]
+    missed: NDArray[np.float64]
+    counts: NDArray[np.float64]
+
+
+class Found(NamedTuple):
+    """Best new filters of a view.
+
+    Parameters
+    ----------
+    moments : Moments
+    modes : list of int
+    taps : ndarray of int64, (3, CLASSES, TAPS)
+    gains : list of float
+        Squared error that they save, less the worth of their bits.
+    """
+
+    moments: Moments
+    modes: list[int]
+    taps: NDArray[np.int64]
+    gains: list[float]
+
+
+@lean_kernel
+def _add_moments(views, view, original, planes, activity, classes, bins, products, missed, counts, row):
+    height, width = classes.shape
+    prepare_view(views, view, planes, activity, classes, bins)
+    found = bins[BINS:]
+    for p in range(3):
+        taps = TAPS if p else OWN
+        for y in range(height):
+            for x in range(width):
+                k = np.int64(classes[y, x])
+                _differences(planes, p, y + BORDER, x + BORDER, found)
+                for i in range(taps):
+                    row[i] = found[i]
+                error = np.float64(original[p, y, x] - views[view, p, y, x])
+                if p == 0:
+                    counts[k] += 1
+                for i in range(taps):
+                    value, into = row[i], products[p, k, i]
+                    missed[p, k, i] += value * error
+                    for j in range(taps):
+                        into[j] += value * row[j]
+
+
+def search_filters(views: NDArray[np.int16], view: int, original: NDArray[np.int16], weight: float) -> Found:
+    """Return the best new filters of a decoded view; ``weight`` is the squared error that a bit is worth."""
+    moments = Moments(np.zeros((3, CLASSES, TAPS, TAPS)), np.zeros((3, CLASSES, TAPS)), np.zeros(CLASSES))
+    _add_moments(views, view, original, *memory(*views.shape[2:]), *moments, np.zeros(TAPS))
+    modes, taps, gains = [], np.zeros((3, CLASSES, TAPS), np.int64), []
+    for p in range(3):
+        best: Best = (0.0, 0, taps[p])
+        # Eight classes gain most before their bits: where they gain nothing, other modes are not tried.
+        for mode in range(len(COUNTS) - 1, 0, -1):
+            best, hopeless = _better_of(moments, p, mode, weight, best)
+            if hopeless:
+                break
+        gains.append(best[0])
+        modes.append(best[1])
+        taps[p, : len(best[2]), : best[2].shape[1]] = best[2]
+    return Found(moments, modes, taps, gains)
+
+
+Best = tuple[float, int, NDArray[np.int64]]  # gain less the bits' worth, mode, taps
+
+
+def _better_of(moments: Moments, p: int, mode: int, weight: float, best: Best) -> tuple[Best, bool]:
+    """Return the best filter so far or of a mode, and whether no filter of the mode or of fewer classes can gain."""
+    products, missed = _merged(moments, p, mode)
+    counts = moments.counts.reshape(COUNTS[mode], -1).sum(axis=1)
+    ridge = np.eye(products.shape[1]) * (1 + counts[:, None, None])
+    real = UNIT * np.linalg.solve(products + ridge, missed[..., None])[..., 0]
+    most = _gain(products, missed, real)
+    if most - weight * (HEAD + LEAST_BITS * real.size) <= best[0]:
+        return best, most <= weight * (HEAD + LEAST_BITS * real.shape[1])
+    for shift in range(PRECISIONS):
+        limit = MOST_TAP >> shift
+        multiples = np.clip(np.rint(real / (1 << shift)), -limit, limit).astype(np.int64)
+        size = np.abs(np.diff(multiples, axis=0, prepend=0))
+        bits = HEAD + float((2 * np.floor(np.log2(size + 2)) - 2 + LEAST_BITS + (size > 0)).sum())
+        taps = multiples << shift
+        gain = _gain(products, missed, taps) - weight * bits
+        if gain > best[0]:
+            best = gain, mode, taps
+    return best, False
+
+
+def _merged(moments: Moments, p: int, mode: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    taps, count = TAPS if p else OWN, COUNTS[mode]
+    products = moments.products[p, :, :taps, :taps].reshape(count, -1, taps, taps).sum(axis=1)
+    return products, moments.missed[p, :, :taps].reshape(count, -1, taps).sum(axis=1)
+
+
+def _gain(
+    products: NDArray[np.float64], missed: NDArray[np.float64], taps: NDArray[np.floating | np.integer]
+) -> float:
+    """Return the squared error that taps save, but for rounding."""
+    real = taps / UNIT
+    return float((2 * missed * real - real * np.einsum("kij,kj->ki", products, real)).sum())
+
+
+def choose_filters(coder: Arithmetic, filters: Filters, view: int, found: Found, weight: float) -> int:
+    """Set the filters of a view: none, those coded last, or new ones; return as bits which are those coded last."""
+    same = 0
+    for p in range(3):
+        off, on = weight * bit_costs(coder.contexts[[at.FILTERED + 3 * p + filters.before[p]]])[0]
+        new, again = weight * bit_costs(coder.contexts[[at.FILTER_SAME + p]])[0]
+        latest = int(filters.latest[p])
+        gains = [-off, found.gains[p] - on - (new if latest >= 0 else 0) if found.modes[p] else -np.inf, -np.inf]
+        if latest >= 0:
+            mode = int(filters.modes[latest, p])
+            products, missed = _merged(found.moments, p, mode)
+            gains[2] = (
+                _gain(products, missed, filters.taps[latest, p, : COUNTS[mode], : missed.shape[1]]) - on - again
+            )
+        way = int(np.argmax(gains))
+        same |= (way == 2) << p
+        filters.modes[view, p] = (0, found.modes[p], 1)[way]
+        if way == 1:
+            filters.taps[view, p] = found.taps[p]
+    return same

@@ -1,1 +1,0 @@
-"""Tests, in the folders of the packages that they test."""

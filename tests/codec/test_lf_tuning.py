@@ -1,0 +1,298 @@
+"""What `si-lf` is tuned for: planes of BT.709, their scales, the header of version 7, the loop filter."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from codec import decode, encode
+from codec.coders.lf import arithmetic, contexts, loop_filter, loop_filter_search, planes, ranges, stream, tuning
+from codec.coders.lf import coder as lf
+from codec.contract import checked_options
+from ii_core import IIPicture, sub_images
+from metrics import q_ctc_psnr, q_global
+from tests.codec.test_lf import shifted_plane
+
+
+@pytest.mark.parametrize("scales", [(64, 64), (35, 20), (12, 255), (1, 1)])
+def test_colours_invert_the_axes(scales):
+    axes, colours = planes.bt709_axes(scales) / (1 << 14), planes.bt709_colours(scales) / (1 << 14)
+    # Rows of the axes of small scales are rounded to 2^-14 and have magnitudes of about the scale over 64.
+    np.testing.assert_allclose(axes @ colours.T, np.eye(3), atol=2e-2 / min(scales))
+
+
+def test_grey_has_the_same_length_by_both_tunings():
+    grey = np.ones(3)
+    assert planes.bt709_axes((35, 35)) @ grey / (1 << 14) == pytest.approx([3**0.5, 0, 0], abs=1e-4)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_the_measure_is_that_of_the_test_conditions(dtype):
+    rng = np.random.default_rng(1)
+    top = np.iinfo(dtype).max
+    original = shifted_plane((1, 1), grid=(2, 3), height=8, width=12)
+    original = original.with_pixels(original.pixels.astype(dtype) * (top // 255))
+    noise = np.rint(rng.normal(0, top / 60, original.pixels.shape))
+    decoded = original.with_pixels(np.clip(original.pixels + noise, 0, top).astype(dtype))
+    pairs = zip(sub_images(original).reshape(-1, 8, 12, 3), sub_images(decoded).reshape(-1, 8, 12, 3), strict=True)
+    ours = [tuning.psnr_yuv(a, b) for a, b in pairs]
+    np.testing.assert_allclose(ours, q_ctc_psnr(original, decoded).values.ravel(), rtol=1e-9)
+
+
+def test_planes_are_scaled_so_that_errors_count_as_the_measure_counts_them(monkeypatch):
+    """Of Y with four times the error, Cb's squared error changes the mean of logarithms by 4/6 of what Y's does."""
+    monkeypatch.setattr(tuning, "FACTOR", 1.0)
+    scales = 40, 40  # squares of errors in planes: 3 of Y, 3 · (40/64)² of Cb and Cr
+    errors = np.array([3 * 4e6, 3 * (40 / 64) ** 2 * 1e6, 3 * (40 / 64) ** 2 * 2e6])
+    found = np.array(tuning.better_scales(scales, errors))
+    np.testing.assert_allclose((found / 64) ** 2, [4 / 6 / 1, 4 / 6 / 2], rtol=0.03)
+    assert tuning.better_scales(scales, np.array([1e6, 0, 1e12])) == (tuning.MOST, tuning.LEAST)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_grey_pictures_are_tuned_by_rgb(dtype):
+    picture = shifted_plane((1, 1), grid=(3, 2), height=11, width=17)
+    grey = picture.with_pixels(np.repeat(picture.pixels[..., 1:2].astype(dtype), 3, axis=2))
+    by_default, by_rgb = (encode(grey, scheme, qp=30) for scheme in ("si-lf", "si-lf:tune=rgb"))
+    assert by_default.payload == by_rgb.payload
+    assert stream.unpack(by_default.payload, grey.pixels.size // 3)[0].scales is None
+
+
+def test_each_tuning_is_better_by_its_own_measure():
+    """Unrelated views with much colour, at sizes that differ by less than the measures do."""
+    rng = np.random.default_rng(3)
+    noise = rng.normal(0, 25, (24, 3, 32, 3, 3))
+    for axis in (0, 2):
+        noise = (noise + np.roll(noise, 1, axis)) / 2**0.5
+    picture = IIPicture(np.clip(128 + noise, 0, 255).astype(np.uint8).reshape(72, 96, 3), (32, 24), (3, 3))
+    ctc = encode(picture, "si-lf", qp=34)
+    rgb = encode(picture, "si-lf:tune=rgb", bpp=ctc.bpp)
+    assert q_ctc_psnr(picture, decode(ctc)).mean > q_ctc_psnr(picture, decode(rgb)).mean + 1
+    assert q_global(picture, decode(ctc)) < q_global(picture, decode(rgb)) - 1
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.tuples(st.integers(0, 6), st.integers(0, 8), st.sampled_from([0, 2, 3])),
+    st.sampled_from([(0, 0, 1024), (0, 0, -1024)]) | st.tuples(*2 * [st.integers(-4096, 4096)], st.integers(1, 4096)),
+    st.tuples(st.booleans(), st.booleans()),
+    st.none() | st.tuples(st.integers(1, 255), st.integers(1, 255)),
+    st.integers(0, 2**32 - 1),
+)
+def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, seed):
+    rng = np.random.default_rng(seed)
+    log_stride, sources, crossed = numbers
+    low, high = sorted(rng.integers(-(1 << 14), (1 << 14) + 1, 2).tolist())
+    header = stream.Header(
+        log_stride=log_stride,
+        sources=sources,
+        exact=False,
+        lattice=lattice,
+        low=low,
+        high=high,
+        colours=planes.bt709_colours(scales)
+        if scales
+        else rng.integers(-(1 << 15), 1 << 15, (3, 3)).astype(np.int32),
+        scales=scales,
+        crossed=crossed,
+        skipping=tools[0],
+        tuned=True,
+        filtered=tools[1],
+        steps=tuple(rng.integers(1, (1 << 18) + 1, log_stride + 2).tolist()),
+    )
+    levels = [rng.bytes(int(rng.integers(0, 300))) for _ in header.steps]
+    payload = stream.pack(header, levels, 1000)
+    found, parts = stream.unpack(payload, 1000)
+    assert parts == levels and stream.head_bytes(found, parts) == len(payload) - sum(map(len, levels))
+    for name in header.__dataclass_fields__:
+        np.testing.assert_array_equal(getattr(found, name), getattr(header, name))
+
+
+@pytest.mark.parametrize(("at", "value"), [(1, 32 | 128), (1, 32 | 1), (2, 7), (2, 3 | 9 << 3), (7, 0), (8, 0)])
+def test_headers_that_no_encoder_writes_are_refused(at, value):
+    picture = shifted_plane((1, 1), grid=(2, 2))
+    payload = bytearray(encode(picture, "si-lf:fast", qp=40).payload)
+    payload[at] = value
+    with pytest.raises(ValueError, match=r"values that no encoder writes|its light field has"):
+        stream.unpack(bytes(payload), picture.pixels.size // 3)
+
+
+def test_a_header_that_ends_early_is_refused():
+    payload = encode(shifted_plane((1, 1), grid=(2, 2)), "si-lf:fast", qp=40).payload
+    for length in range(1, 20):
+        with pytest.raises(ValueError, match="its light field has"):
+            stream.unpack(payload[:length], length)
+
+
+def turned_plane(turn, grid=(5, 5), height=40, width=48, step=5.0):
+    """A plane seen from a grid of cameras, turned against their pixels by ``turn`` rad, and 1.1 times as high."""
+    rng = np.random.default_rng(4)
+    waves = rng.normal(0, 1, (40, 2)) * 0.35
+    phases, colours = rng.uniform(0, 6, 40), rng.normal(0, 12, (40, 3))
+    field = np.empty((height, grid[0], width, grid[1], 3))
+    for v in range(grid[0]):
+        for u in range(grid[1]):
+            x = np.arange(width) + step * (u * np.cos(turn) - 1.1 * v * np.sin(turn))
+            y = np.arange(height) + step * (u * np.sin(turn) + 1.1 * v * np.cos(turn))
+            angles = waves[:, 0] * x[:, None] + waves[:, 1] * y[:, None, None] + phases
+            field[:, v, :, u] = 128 + np.sin(angles) @ colours
+    pixels = np.clip(field, 0, 255).astype(np.uint8).reshape(height * grid[0], width * grid[1], 3)
+    return IIPicture(pixels, (width, height), grid[::-1])
+
+
+def test_views_of_a_turned_grid_are_predicted(monkeypatch):
+    """The lattice is found, and saves a third of the bytes."""
+    picture = turned_plane(0.06)
+    source = lf.Source(picture, checked_options(lf.LightField(), {}))
+    # How far a column leads across is the unit.
+    np.testing.assert_allclose(np.array(source.header.lattice) / 1024, [-0.066, 0.06, 1.1], atol=0.012)
+    turned = encode(picture, "si-lf", qp=26)
+    shown = np.empty_like(picture.pixels)
+    payload, field = source.coded(26 * lf.FRACTIONS)
+    field.show(shown)
+    assert payload == turned.payload
+    np.testing.assert_array_equal(decode(turned).pixels, shown)
+    monkeypatch.setattr(ranges, "FAR", 1 << 20)
+    assert turned.nbytes < 0.7 * encode(picture, "si-lf", qp=26).nbytes
+
+
+def filtered_by_definition(view, modes, taps):
+    """The filter by its definition in docs/lf.md, with arrays shifted as a whole."""
+    planes_, (height, width) = view.astype(np.int64), view.shape[1:]
+
+    def moved(plane, down, across):
+        rows = np.clip(np.arange(height) + down, 0, height - 1)
+        return plane[rows][:, np.clip(np.arange(width) + across, 0, width - 1)]
+
+    pairs = [(0, 1), (1, 0), (1, 1), (1, -1), (0, 2), (2, 0)]
+
+    def even(plane):
+        return [moved(plane, *by) + moved(plane, -by[0], -by[1]) - 2 * plane for by in pairs]
+
+    curved = sum(abs(difference) for difference in even(planes_[0])[:2])
+    across = sum(moved(curved, 0, i) for i in range(-2, 3))
+    bins = np.minimum(sum(moved(across, i, 0) for i in range(-2, 3)) // 8, 4095)
+    below = np.searchsorted(np.sort(bins, axis=None), bins)  # samples of lower bins
+    classes = np.minimum(8 * below // bins.size, 7)
+    out = view.copy()
+    for p, mode in enumerate(modes):
+        if mode:
+            odd = [moved(planes_[p], *by) - moved(planes_[p], -by[0], -by[1]) for by in pairs[:2]]
+            found = even(planes_[p]) + odd + (even(planes_[0]) if p else [])
+            weights = taps[p].astype(np.int64)[classes * (0, 1, 4, 8)[mode] // 8]
+            total = sum(weights[..., i] * difference for i, difference in enumerate(found))
+            out[p] = np.clip(planes_[p] + ((total + 128) >> 8), -8191, 8191)
+    return out
+
+
+@pytest.mark.parametrize("modes", [(1, 2, 3), (3, 1, 2), (2, 3, 0), (0, 0, 1), (3, 3, 3)])
+@pytest.mark.parametrize("shape", [(4, 4), (8, 20)])
+def test_a_view_is_filtered_as_defined(modes, shape):
+    rng = np.random.default_rng(sum(modes))
+    smooth = np.add.outer(np.arange(shape[0]) ** 2, 9 * np.arange(shape[1]))
+    views = (smooth + rng.integers(-800, 800, (2, 3, *shape))).astype(np.int16)
+    views[1, :, 0] = rng.choice([-8191, 8191], shape[1])
+    filters = loop_filter.new_filters(2)
+    filters.modes[1] = modes
+    filters.taps[1] = rng.integers(-127, 128, filters.taps[1].shape)
+    expected = filtered_by_definition(views[1], modes, filters.taps[1])
+    other = views[0].copy()
+    loop_filter.filter_view(views, 1, filters, *loop_filter.memory(*shape))
+    np.testing.assert_array_equal(views[1], expected)
+    np.testing.assert_array_equal(views[0], other)
+
+
+def test_filters_are_read_as_they_were_written():
+    """Several views: not filtered, with new filters in each precision, and with those before."""
+    rng = np.random.default_rng(9)
+    written, read = loop_filter.new_filters(12), loop_filter.new_filters(12)
+    coder = arithmetic.writer(contexts.starting_contexts(), 1 << 16)
+    for view in range(12):
+        same = int(rng.integers(8)) if view else 0
+        for p in range(3):
+            mode = written.modes[view, p] = rng.integers(4)
+            taps, shift = loop_filter.TAPS if p else loop_filter.OWN, int(rng.integers(4))
+            values = rng.integers(-(127 >> shift), (127 >> shift) + 1, (loop_filter.COUNTS[mode], taps)) << shift
+            written.taps[view, p, : len(values), :taps] = values
+        loop_filter.code_filter(coder, written, view, same)
+    reader = arithmetic.reader(contexts.starting_contexts(), arithmetic.finish(coder))
+    for view in range(12):
+        loop_filter.code_filter(reader, read, view, 0)
+    for one, other in zip(written, read, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_least_squares_undo_a_blur_and_the_gain_is_the_error_that_they_save():
+    rng = np.random.default_rng(2)
+    original = rng.normal(0, 300, (3, 40, 48)).astype(np.int16)
+    sums = sum(np.roll(original, i, axis).astype(int) for i in (-1, 1) for axis in (1, 2))
+    views = ((4 * original.astype(int) + sums) // 8).astype(np.int16)[None]
+    before = np.square(views[0].astype(float) - original).sum(axis=(1, 2))
+    weight = 2000.0
+    found = loop_filter_search.search_filters(views, 0, original, weight)
+    filters = loop_filter.new_filters(1)
+    filters.modes[0], filters.taps[0] = found.modes, found.taps
+    loop_filter.filter_view(views, 0, filters, *loop_filter.memory(40, 48))
+    saved = before - np.square(views[0].astype(float) - original).sum(axis=(1, 2))
+    assert (saved > 0.4 * before).all()
+    # Bits of three filters of 8 to 14 taps lie between 10 and 2000; rounding adds 1/12 a sample.
+    assert ((saved - np.array(found.gains)) / weight > 10).all()
+    assert ((saved - np.array(found.gains)) / weight < 2000).all()
+
+
+def smooth_plane(grid, height, width):
+    """Texture without sharp edges, and sensor noise: coarse quantisers leave errors that neighbours tell."""
+    rng = np.random.default_rng(0)
+    texture = rng.normal(0, 1, (height + 8, width + 8, 3))
+    for axis in 4 * (0, 1):
+        texture = (np.roll(texture, 1, axis) + texture + np.roll(texture, -1, axis)) / 3
+    field = np.empty((height, grid[0], width, grid[1], 3))
+    for v in range(grid[0]):
+        for u in range(grid[1]):
+            field[:, v, :, u] = 128 + texture[v : v + height, u : u + width] * (40 / texture.std())
+    noisy = np.clip(field + rng.normal(0, 2, field.shape), 0, 255).astype(np.uint8)
+    return IIPicture(noisy.reshape(height * grid[0], width * grid[1], 3), (width, height), grid[::-1])
+
+
+@pytest.mark.parametrize("tune", ["ctc", "rgb"])
+def test_filtered_views_predict(monkeypatch, tune):
+    """Half a decibel more at equal size; decoders repeat the filters, and threads change no byte."""
+    picture, scheme = smooth_plane((3, 4), 41, 50), f"si-lf:tune={tune}"
+    filtered = encode(picture, scheme, qp=34)
+    assert encode(picture, f"{scheme},threads=2", qp=34).payload == filtered.payload
+    source = lf.Source(picture, checked_options(lf.LightField(), {"tune": tune}))
+    payload, field = source.coded(34 * lf.FRACTIONS)
+    assert payload == filtered.payload and len(set(field.filters.modes.ravel().tolist())) > 1
+    shown = np.empty_like(picture.pixels)
+    field.show(shown)
+    for threads in "", ",threads=2":
+        np.testing.assert_array_equal(decode(encode(picture, scheme + threads, qp=34)).pixels, shown)
+    monkeypatch.setattr(loop_filter_search, "HEAD", 1e9)
+    plain = encode(picture, scheme, qp=34)
+    measured = [source.psnr(field), source.psnr(source.coded(34 * lf.FRACTIONS)[1])]
+    assert measured[0] - measured[1] > 6 * np.log2(filtered.nbytes / plain.nbytes) + 0.5
+
+
+@pytest.mark.parametrize("views", [(1, 1), (1, 7), (5, 1)])
+@pytest.mark.parametrize("size", [(1, 1), (3, 2), (33, 18)])
+def test_rows_single_views_and_tiny_ones_are_coded(views, size):
+    rng = np.random.default_rng(5)
+    pixels = rng.integers(0, 65536, (size[1] * views[1], size[0] * views[0], 3)).astype(np.uint16)
+    picture = IIPicture(pixels, size, views)
+    coarse, fine = (q_global(picture, decode(encode(picture, "si-lf", qp=qp))) for qp in (40, 4))
+    assert fine > coarse + 12
+
+
+def test_damaged_streams_decode_to_something_or_are_refused():
+    picture = shifted_plane((1, 1), grid=(3, 3), height=16, width=20)
+    whole = encode(picture, "si-lf", qp=30).payload
+    blank, options = picture.with_pixels(np.zeros_like(picture.pixels)), checked_options(lf.LightField(), {})
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        damaged = bytearray(whole)
+        damaged[rng.integers(len(damaged))] ^= 1 << rng.integers(8)
+        try:
+            pixels, _ = lf.LightField().decode(bytes(damaged), blank, options)
+        except ValueError:
+            continue
+        assert pixels.shape == picture.pixels.shape

@@ -1,1 +1,0 @@
-"""Bad input, full disks, killed processes and wrong arguments, across packages."""

@@ -1,1 +1,0 @@
-"""Scenes, files and pictures for several test files."""
