@@ -23,12 +23,9 @@ SCHARR = np.array([[3.0, 10, 3], [0, 0, 0], [-3, -10, -3]]) / 64
 
 
 @checks.checked(
-    disparity=checks.numbers,
-    truth=checks.numbers,
-    border=checks.whole_from(0, 1 << 16),
-    regions=checks.mapping,
+    disparity=checks.numbers, truth=checks.numbers, border=checks.whole_from(0, 1 << 16), regions=checks.mapping,
     camera=checks.instance(IICamera),
-)
+)  # fmt: skip
 def depth_errors(
     disparity: ArrayLike,
     truth: ArrayLike,
