@@ -92,14 +92,17 @@ def array_depth(path: str | os.PathLike[str]) -> NDArray[np.float32] | None:
     check_file(path)
     if not _is_hdf5(path):
         return None
-    with _opened(path) as file:
-        found = _dataset(file, DEPTH)
-        if found is None or found.ndim != 4 or found.dtype.kind != "f":
-            return None
-        v, u, y, x = _bounded(path, found.shape, 4)
-        depth = np.empty((y, v, x, u), np.float32)
-        for a, b in np.ndindex(v, u):
-            depth[:, a, :, u - 1 - b] = found[a, b]
+    try:
+        with _opened(path) as file:
+            found = _dataset(file, DEPTH)
+            if found is None or found.ndim != 4 or found.dtype.kind != "f":
+                return None
+            v, u, y, x = _bounded(path, found.shape, 4)
+            depth = np.empty((y, v, x, u), np.float32)
+            for a, b in np.ndindex(v, u):
+                depth[:, a, :, u - 1 - b] = found[a, b]
+    except (OSError, RuntimeError, KeyError, TypeError) as error:
+        raise ValueError(f"{path} has a damaged {DEPTH}: {one_line(error)}") from None
     return depth.reshape(y * v, x * u)
 
 
