@@ -132,7 +132,7 @@ IMAGES = "docs/images"
 # Closed experiments with their pictures: they stay on pages, script and records are in git up to this commit.
 LAST = "018e29e"
 CLOSED: dict[str, tuple[str, ...]] = {
-    "accuracy/eye_views": ("opinions_simulated.png",),
+    "accuracy/eye_views": (),
     "coding/crossing": (),
     "coding/light_field_bounds": (),
     "coding/light_field_threads": (),
@@ -141,12 +141,12 @@ CLOSED: dict[str, tuple[str, ...]] = {
         f"concepts/{n}.png" for n in ("components", "maps", "pixels", "rays", "sequence", "views")
     ),
     "pages/display_pictures": ("display_eye.webp", "display_zones.png"),
-    "pages/focus_patterns": ("focus_patterns.png",),
+    "pages/focus_patterns": (),
     "pages/make_textures": (),
     "speed/before_after": (),
     "speed/feature_ablation": (),
     "speed/take_cost": (),
-    "speed/texture_filter": ("texture_filter.png",),
+    "speed/texture_filter": (),
     "stability/install": (),
     "study/reasons": (),
     "study/volume_model": (),
@@ -190,7 +190,7 @@ BENCHMARKS = {
         Benchmark("accuracy.estimated_depth", records=OWN, fills=("docs/depth.md",)),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
         Benchmark("speed.eye", records=OWN, fills=("docs/display.md",)),
-        Benchmark("accuracy.map_precision", records=OWN, writes=(f"{IMAGES}/map_precision.*",)),
+        Benchmark("accuracy.map_precision", records=OWN),
         Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),
         Benchmark(
             "accuracy.povray",

@@ -3,8 +3,8 @@
     python -m benchmarks run map_precision [--scale 4]
 
 For each format the largest and the root mean square angle between stored and true direction (µrad), the same for
-locations (µm), and the PSNR of *Apples* and *Cuboid* rendered from the maps against float maps. Numbers and chart go
-to ``benchmarks/results/map_precision.jsonl`` and ``docs/images/map_precision.png``.
+locations (µm), and the PSNR of *Apples* and *Cuboid* rendered from the maps against float maps. Numbers go
+to ``benchmarks/results/map_precision.jsonl``.
 """
 
 from __future__ import annotations
@@ -17,11 +17,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import write_chart
-from benchmarks.records import Records, number
+from benchmarks.records import Records
 from ii_core import IICamera, IIPicture, preset, read_maps, write_maps
 from ii_core.camera.maps import FORMATS
-from ii_core.display.figure import new_figure
 from metrics import q_global
 from raytrace_ii import load_scene, render
 
@@ -32,11 +30,10 @@ CAMERAS = ("setup1", "setup3", "spherical")
 
 
 def main() -> None:
-    """Measure, keep and draw."""
+    """Measure and keep."""
     asked = command_line(__doc__, scale=SCALE, cameras=CAMERAS).parse_args()
     keys = [{"scale": asked.scale, "camera": name, "format": form} for name in asked.cameras for form in FORMATS]
     RECORDS.run(keys, measured, asked.again)
-    write_chart(chart(RECORDS.rows(scale=SCALE)), "map_precision.png", dpi=120)
 
 
 def measured(scale: int, camera: str, format: str) -> dict[str, Any]:
@@ -80,31 +77,3 @@ def errors(camera: IICamera, maps: Any) -> dict[str, float]:
         "place_max_um": float(place.max() * 1e3),
         "place_rms_um": float(np.sqrt((place**2).mean()) * 1e3),
     }
-
-
-def chart(rows: list[dict[str, Any]]) -> Any:
-    """Draw PSNR over bytes: one marker per format, one colour per camera."""
-    figure = new_figure(10, 4.5)
-    markers = dict(zip(FORMATS, "osD^", strict=True))
-    colours = dict(zip(CAMERAS, ("#0072B2", "#D55E00", "#009E73"), strict=True))
-    for axes, scene in zip(figure.subplots(1, 2, sharey=True), SCENES, strict=True):
-        for row in rows:
-            if not np.isfinite(number(row[f"psnr_{scene}"])):
-                continue  # the float maps are the reference
-            axes.plot(
-                row["bytes_per_pixel"], row[f"psnr_{scene}"], markers[row["format"]], color=colours[row["camera"]],
-                markersize=8,
-            )  # fmt: skip
-        axes.set_title(scene)
-        axes.set_xlabel("bytes per ray, as stored")
-        axes.grid(True, color="0.9")
-        axes.set_xscale("log")
-    axes = figure.axes[0]
-    axes.set_ylabel("PSNR against float maps [dB]")
-    for format in FORMATS:
-        if format != "exr":
-            axes.plot([], [], markers[format], color="0.4", label=format)
-    for name in CAMERAS:
-        axes.plot([], [], "s", color=colours[name], label=name)
-    axes.legend(fontsize="small")
-    return figure

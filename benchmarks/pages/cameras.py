@@ -159,9 +159,7 @@ def precision() -> str:
             [name, f"{min(size):.2g}–{max(size):.2g}", f"{figure(angle)} µrad", f"{figure(place)} µm", shown]
         )
     made = table("format | bytes per ray | angle | location | PSNR", lines)
-    return "\n".join(
-        [PRECISION, *made, "", origin(rows), "", VERDICT, "", "![PSNR over bytes](images/map_precision.png)", ""]
-    )
+    return "\n".join([PRECISION, *made, "", origin(rows), "", VERDICT, ""])
 
 
 PRECISION = """

@@ -26,6 +26,7 @@ def wall(layer: float, steps: float, seed: int = 0, facing: float = 1.0, **mater
     """Return a wall of random grey patches on one layer, before the camera or, for ``facing`` −1, behind it.
 
     The darkest and the brightest patch differ by ``steps`` of 8-bit sRGB around middle grey.
+    That is a whole code: between two, rounding would draw a texture.
     """
     z = layer * CAMERA.gap_mm
     half = 2 * z  # larger than the field of view
@@ -33,7 +34,7 @@ def wall(layer: float, steps: float, seed: int = 0, facing: float = 1.0, **mater
         [[-half, -half, facing * z], [half, -half, facing * z], [half, half, facing * z], [-half, half, facing * z]]
     )
     cells = round(2 * half / (2 * z * CAMERA.pixel_pitch_mm / CAMERA.gap_mm))  # two pixels under a lens per patch
-    codes = 127.5 + steps * (np.random.default_rng(seed).random((cells, cells, 1)) - 0.5)
+    codes = 128 + steps * (np.random.default_rng(seed).random((cells, cells, 1)) - 0.5)
     texture = Image(np.repeat(linear(codes / 255), 3, axis=2).astype(np.float32))
     return Body(
         name="wall", vertices=corners, faces=np.array([[0, 2, 1], [0, 3, 2]]),

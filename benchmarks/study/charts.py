@@ -17,7 +17,6 @@ from metrics.plots.rd_chart import edges, set_rate_axis
 
 from .claims import NAMES, Results, of_scenes
 from .rates import MODERN, REFERENCE, SI, VOLUME
-from .views import BEYOND
 
 LABELS = {
     **{scheme: f"{name}-PVS" for scheme, name in NAMES.items()},
@@ -47,9 +46,9 @@ def draw_all(results: Results, folder: Path) -> list[Path]:
         if figure is not None:
             made.append(folder / f"{name}.png")
             save(figure, made[-1], dpi=90)
-    for scene, result in of_scenes(results, "views").items():
-        made.append(folder / f"depth-rate-{scene}.png")
-        depth_rate_chart(depth_study(scene, result), made[-1])
+    if result := of_scenes(results, "views").get("apples"):
+        made.append(folder / "depth-rate-apples.png")
+        depth_rate_chart(depth_study("apples", result), made[-1])
     return made
 
 
@@ -240,8 +239,6 @@ CHARTS: dict[str, Callable[[Results], Any]] = {
     "structures": structures,
     "plane": plane,
     "q-view": over_rate("views", THEIRS, "q_view"),
-    "q-view-modern": over_rate("views", (SI, "ei-h264:chroma=420", *BEYOND), "q_view"),
-    "q-depth-modern": over_rate("views", (SI, "ei-h264:chroma=420", *BEYOND), "q_depth_mean"),
     "layers": layers,
     "angles": angles,
 }

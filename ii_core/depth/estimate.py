@@ -46,6 +46,9 @@ APART, JUDGE = 0.5, (-4.5, -0.29, -0.70, -1.31, 0.62)
 BLOCK, EVEN = 8, 0.1
 
 
+MOST_DISPARITY = 1e4  # px a step, of a range that is given
+
+
 @dataclass(frozen=True, eq=False)
 class DepthEstimate:
     """Disparity of a view, estimated from all views.
@@ -70,8 +73,8 @@ class DepthEstimate:
 @checks.checked(
     picture=checks.instance(IIPicture),
     view=checks.indices,
-    low=checks.number,
-    high=checks.number,
+    low=checks.number_from(-MOST_DISPARITY, MOST_DISPARITY),
+    high=checks.number_from(-MOST_DISPARITY, MOST_DISPARITY),
     workers=checks.whole_from(1, 1024),
     progress=checks.callable_,
 )

@@ -1,6 +1,6 @@
 """Frozen streams of `si-lf`, versions 3, 5 and 7: the same bytes decode to the same pixels on every machine.
 
-In ``tests/golden/lf``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
+In ``tests/golden/lf.zip``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
 views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
 views of *Apples* at quantiser 26; the first encoder that left out transforms wrote it. ``row.ii`` holds 1×10 views of
 *Apples* of 32×16 pixels at quantiser 36, by cdd3aba: its first view is matched to one that no other view is made of.
@@ -12,7 +12,6 @@ alone, so that a hash of the pixels is the expectation.
 import hashlib
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,8 +21,9 @@ from codec.coders.lf import stream
 from codec.coders.lf.blocks import CODED, EXPLICIT, INTRA, KIND, LOG, SKIPPED, SYNTHESIS
 from codec.coders.lf.field import Field
 from codec.coders.lf.pyramid import ALIKE, NEAREST, _spread, pyramid
+from tests.support.golden import unpacked
 
-FOLDER = Path(__file__).parents[1] / "golden" / "lf"
+FOLDER = unpacked("lf.zip")
 PIXELS = {
     "lossy": "defb0393182954c2a0827acfe2c0d408fd37d1c8abcac248e83ca5d02bb8f7ee",
     "skipped": "4bb0232b9f5557feb2f5d26ac1904b48c687300269542c6db1bf73b3e635b603",

@@ -1,7 +1,6 @@
 """`si-lf` with references in time: round trips, groups in time, random access, damage."""
 
 import hashlib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,9 @@ from codec.coders.lf.blocks import MIXED, TIMED
 from codec.coders.lf.field import Field
 from codec.contract import checked_options, find
 from ii_core import IIPicture, sub_images, video_of
+from tests.support.golden import unpacked
 
-FROZEN = Path(__file__).parents[1] / "golden" / "lf"
+FROZEN = unpacked("lf.zip")
 PIXELS = {
     "take": "8b3cb59440303240863c58aa18f1e6b9c4e41870d01515ba256ac8f0cd051c5d",
     "tuned_take": "91a07b475cca35a7f71736e6bdecdd3553d78ed161b562d26da7d3196ca487f3",
