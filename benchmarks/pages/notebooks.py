@@ -11,8 +11,6 @@ import io
 import tempfile
 from typing import Any
 
-import nbformat
-from nbclient import NotebookClient
 from PIL import Image
 
 from benchmarks.records import ROOT
@@ -23,6 +21,9 @@ QUALITY = 85  # of JPEG
 
 def main() -> None:
     """Run all notebooks."""
+    import nbformat  # of the extra for notebooks
+    from nbclient import NotebookClient
+
     for path in sorted(EXAMPLES.glob("*.ipynb")):
         book = nbformat.read(path, as_version=4)
         with tempfile.TemporaryDirectory() as folder:  # files of cells go there
