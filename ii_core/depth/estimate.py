@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from ..base import checks
+from ..base.extras import Lazy
 from ..base.parallel import over_rows
 from ..camera.camera import IICamera, Pair
 from ..picture.disparity import depth_of_disparity, disparity_of_depth
@@ -22,6 +22,7 @@ from .disparity_kernels import Views
 from .focus_kernels import choose, pass_on
 from .layers import FARTHEST, first_mm
 
+ndimage = Lazy("scipy.ndimage")
 Map = NDArray[np.float32]
 Progress = Callable[[int, int, str], Any]
 

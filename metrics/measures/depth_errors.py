@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage
 
 from ii_core import IICamera, depth_of_disparity
 from ii_core.base import checks
 from ii_core.base.colour import KB, KG, KR
+from ii_core.base.extras import Lazy
 
+ndimage = Lazy("scipy.ndimage")
 BORDER = 15  # px at each side that do not count
 THRESHOLDS = (0.01, 0.03, 0.07)  # px
 FINE = 0.15  # px by which thin things are too fat or too thin

@@ -27,6 +27,7 @@ def pictures(segments, scene=SCENE, camera=CAMERA, **options):
     ]
 
 
+@pytest.mark.slow
 def test_same_picture_up_to_tessellation():
     errors = []
     for segments in (4, 8, 16, 32):

@@ -14,11 +14,12 @@ from benchmarks.stability.fuzz_readers import __main__ as fuzz
 from benchmarks.stability.fuzz_readers import containers, seeds, trees
 from benchmarks.stability.fuzz_readers.readers import READERS
 from raytrace_ii.files.load import read_model
+from tests.support.slow import first_fast
 
 CASES = 100
 
 
-@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("name", first_fast(READERS, 8))
 def test_short_run(name, tmp_path):
     """On b1dc540 only the coders were fuzzed (benchmarks.coding.fuzz)."""
     found = {}
@@ -77,6 +78,7 @@ def test_outcomes(monkeypatch):
     assert fuzz.outcome(lambda: logging.getLogger("stranger").warning("look")).startswith("printed: stranger: look")
 
 
+@pytest.mark.slow
 def test_limits_of_time_and_memory_are_findings():
     """A case that takes too much memory raises MemoryError; the system kills a case that takes too long."""
     script = """

@@ -225,6 +225,7 @@ def test_coders_continue_and_take_subsets(monkeypatch, capsys):
         run("--schemes", "jpg2000")
 
 
+@pytest.mark.slow
 def test_decode_seconds_exclude_the_measure(monkeypatch):
     """A measure that takes half a second: decoding 128×64 px takes a few milliseconds still."""
     picture = render(load_scene("cuboid"), preset("setup1", scale=64), support=()).picture

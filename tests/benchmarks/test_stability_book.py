@@ -101,6 +101,7 @@ def test_bd_rate_error_falls_with_more_points():
     assert rows[4] > rows[6] > rows[12] and rows[6] < 1
 
 
+@pytest.mark.slow
 def test_depth_from_focus_needs_texture_above_the_noise():
     (none,) = depth.depth_contrast((0,))
     assert none["robust, σ 0"] == none["dissertation, σ 0"] == 0 and none["dissertation, σ 1"] < 0.1
@@ -108,6 +109,7 @@ def test_depth_from_focus_needs_texture_above_the_noise():
     assert none["robust, σ 1"] < 0.01 and none["robust, σ 1, sure"] == none["dissertation, σ 1, sure"] == 0
 
 
+@pytest.mark.slow
 def test_a_strong_mirror_has_the_depth_of_the_mirrored_scene():
     (whole,) = depth.depth_two_layers((0.9,))
     for kind in ("mirror", "clear"):

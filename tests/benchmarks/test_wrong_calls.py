@@ -29,6 +29,7 @@ def named(tmp_path_factory):
     return calls(tmp_path_factory.mktemp("calls"))
 
 
+@pytest.mark.slow
 def test_no_error_is_accidental(named, tmp_path, monkeypatch):
     """On b1dc540 1271 of 4530 calls raised AttributeErrors, IndexErrors and accidental TypeErrors.
 

@@ -203,6 +203,7 @@ def test_a_stopped_run_continues(run, tmp_path, monkeypatch):
     assert not (tmp_path / "r.points.jsonl").exists()
 
 
+@pytest.mark.slow
 def test_a_video_is_rendered_coded_and_ranked(run, refused, tmp_path):
     made, data = tmp_path / "tiny.toml", tmp_path / "data"
     made.write_text(VIDEO)

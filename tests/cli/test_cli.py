@@ -147,6 +147,7 @@ def test_a_killed_study_continues_where_it_was(run, picture, tmp_path, monkeypat
     assert [point["target_bpp"] for point in points] == [0.3, 0.6, 1, 2] * 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("measures", ["q_global", "q_global,q_angle_min"])
 def test_a_study_killed_after_its_numbers_is_drawn_from_them(run, refused, picture, tmp_path, monkeypatch, measures):
     """It refused to go on, and --force measured all again."""
@@ -179,6 +180,7 @@ def stopped(*arguments, **options):
     raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 def test_a_measurement_stopped_between_its_outputs_leaves_none(run, picture, tmp_path, monkeypatch):
     """Numbers without charts were left: the same command was refused."""
     command = ("measure", picture, picture, "--layers", "3", "--json", tmp_path / "m.json", "--plots", tmp_path / "p")

@@ -33,6 +33,7 @@ def direct(picture, kind, order):
     return np.array(c), np.array(e)
 
 
+@pytest.mark.slow
 @given(
     structure=st.tuples(counts, counts, counts, counts),
     dtype=st.sampled_from(["uint8", "uint16", "float32"]),

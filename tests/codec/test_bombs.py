@@ -155,6 +155,7 @@ def ended(tmp_path_factory):
     return decoded(cases)
 
 
+@pytest.mark.slow
 def test_claims_are_refused_fast_and_small(ended):
     results = ended["claims",]
     assert len(results) >= 6 * 4

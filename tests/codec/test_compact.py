@@ -19,6 +19,7 @@ VALUES = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(st.lists(VALUES, max_size=5))
 def test_values_come_back_with_their_types(values):
     back = read_values(write_values(values))

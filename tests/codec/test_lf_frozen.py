@@ -144,6 +144,7 @@ def test_references_are_the_nearest_views_by_definition(grid, log_stride):
         assert (node.references, node.sources) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grid", [(1, 1 << 14), (128, 128)], ids=str)
 def test_the_order_of_many_views_is_quick(grid):
     """A row of 16 384 views took 67 s."""

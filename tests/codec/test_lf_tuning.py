@@ -12,6 +12,7 @@ from codec.contract import checked_options
 from ii_core import IIPicture, sub_images
 from metrics import q_ctc_psnr, q_global
 from tests.codec.test_lf import shifted_plane
+from tests.support.slow import first_fast
 
 
 @pytest.mark.parametrize("scales", [(64, 64), (35, 20), (12, 255), (1, 1)])
@@ -254,7 +255,7 @@ def smooth_plane(grid, height, width):
     return IIPicture(noisy.reshape(height * grid[0], width * grid[1], 3), (width, height), grid[::-1])
 
 
-@pytest.mark.parametrize("tune", ["ctc", "rgb"])
+@pytest.mark.parametrize("tune", first_fast(["ctc", "rgb"]))
 def test_filtered_views_predict(monkeypatch, tune):
     """Half a decibel more at equal size; decoders repeat the filters, and threads change no byte."""
     picture, scheme = smooth_plane((3, 4), 41, 50), f"si-lf:tune={tune}"

@@ -88,6 +88,7 @@ def package(kept, tmp_path):
     return shutil.copytree(kept, tmp_path / "copy")
 
 
+@pytest.mark.slow
 def test_a_copied_cache_is_read(called, package):
     assert called(package, "old.kernels") == (42, 1)
 

@@ -334,6 +334,7 @@ def test_views_larger_than_memory_are_refused_before_it_is_taken(view):
         view(noise(camera()), (10**6, 10**6))
 
 
+@pytest.mark.slow
 def test_64_rays_cost_no_more_than_30_view_images_and_no_memory():
     """At full setup1; the memory is that of the result."""
     made = preset("setup1")

@@ -41,6 +41,7 @@ def drag(tab, x, y, dx, dy):
     tab.mouse.up()
 
 
+@pytest.mark.slow
 def test_reset_returns_to_what_the_page_opened_with(tab):
     opened = tab.evaluate("ii.viewer.state")
     assert opened["f"] != 0 and opened["mode"] == "split" and opened["a"] == 1.5

@@ -69,6 +69,7 @@ def shows(tab, video, frame, **state):
 PLACES = [(0, 0, 0), (3, 0.7, -0.3), (5, -1, 1), (1, 0.4, 0.9)]
 
 
+@pytest.mark.slow
 def test_every_instant_and_place_shows_its_view_image(tab, take, other):
     slider = tab.locator("[data-state=t]")
     for frame, x, y in PLACES:

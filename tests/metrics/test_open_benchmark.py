@@ -545,6 +545,7 @@ class Counted:
         return self.coder.encode(picture, scheme, bpp=bpp)
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_late_continues(tmp_path, definition, picture, coder):
     """On b1dc540 and until 2026-11-22 a run that failed at its last point kept nothing."""
     path = tmp_path / "r.points.jsonl"

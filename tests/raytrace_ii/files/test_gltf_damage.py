@@ -155,6 +155,7 @@ def test_accessor_rows_without_data_are_bounded(count, tmp_path):
         read_model(gltf.save(tmp_path / "m.glb"))
 
 
+@pytest.mark.slow
 def test_instances_are_counted_before_they_are_made(tmp_path):
     """A small file may contain very many instances of a large mesh."""
     gltf = Gltf()
@@ -301,6 +302,7 @@ STRANGE = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(st.data())
 def test_a_file_with_strange_values_is_read_or_refused_in_words(tmp_path_factory, data):

@@ -59,6 +59,7 @@ def test_threads_of_ones_own(scene, whole):
         assert pool.submit(int, 1).result() == 1, "the executor stays open"
 
 
+@pytest.mark.slow
 def test_processes_read_the_scene_once_and_a_broken_pool_is_one_line(scene, whole, monkeypatch):
     # forkserver: changes in the parent do not reach the children, as on other systems
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("forkserver")) as pool:

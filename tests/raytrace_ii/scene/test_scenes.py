@@ -13,6 +13,7 @@ import pytest
 from ii_core import orthoscopic, preset, projection_camera
 from raytrace_ii import load_scene, render, scene_names, trace
 from tests.support.pictures import scene
+from tests.support.slow import first_fast
 
 NAMES = ("apples", "car", "cuboid", "dolphin", "hairdo", "mountains", "objects", "twins")
 SURROUNDINGS = {"floor", "road", "meadow", "wood", "sea"}
@@ -95,7 +96,7 @@ def test_fill(measured):
         assert measured(high).fill > 0.6, high
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", first_fast(NAMES, 2))
 def test_scenes_load_the_same_every_time_and_are_no_burden(name):
     first, second = scene(name), load_scene(name)
     assert [body.name for body in first.bodies] == [body.name for body in second.bodies]

@@ -11,6 +11,7 @@ from raytrace_ii.rendering import job
 from raytrace_ii.scene.textures import Checker, Noise
 from raytrace_ii.tracing.kernels import sampling as sample_kernels
 from raytrace_ii.tracing.sample_places import MOST, doubling_places, fixed_places
+from tests.support.slow import first_fast
 from tests.support.trace_scenes import BLACK, UNIFORM, WHITE, body, hall, sphere, wall
 
 SMALL = preset("setup1", scale=64)  # 128×64 px, 8×4 lenses
@@ -85,7 +86,7 @@ def test_places_of_a_table_are_turned_or_mirrored_alike_for_all_samples_of_a_pix
     assert (far.argmin(axis=1) != np.abs(places(2, 0, 9)[:, None] - variants).max(axis=(2, 3)).argmin(axis=1)).any()
 
 
-@pytest.mark.parametrize("samples", range(1, MOST + 1))
+@pytest.mark.parametrize("samples", first_fast(range(1, MOST + 1), 4))
 def test_places_of_few_samples_miss_less_of_an_edge_than_the_sequence(samples):
     """Of edges of all angles 10 to 35 % less, root mean square; along rows and columns as well."""
     own = np.empty((200, samples, 2))
@@ -234,7 +235,7 @@ def test_aperture_and_pixel_are_sampled_together():
 HEXAGONAL = IICamera(pixels=(100, 61), lenses=(8, 5), pixel_pitch_mm=0.4, gap_mm=11.7, lattice="hexagonal")
 
 
-@pytest.mark.parametrize("camera", [SMALL, HEXAGONAL, ONE_LENS], ids=["regular", "hexagonal", "2d"])
+@pytest.mark.parametrize("camera", first_fast([SMALL, HEXAGONAL, ONE_LENS]), ids=["regular", "hexagonal", "2d"])
 def test_same_bits_for_any_workers_and_tiles(camera, monkeypatch):
     scene = hall()
     options = {"samples": (4, 16), "error": 2.0, "seed": 3, "support": ("samples", "depth", "ray_length")}

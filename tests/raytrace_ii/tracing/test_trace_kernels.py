@@ -21,6 +21,7 @@ from raytrace_ii.tracing.kernels.light import keep_unblocked
 from raytrace_ii.tracing.kernels.packets import NO_CALLS, Tools
 from raytrace_ii.tracing.kernels.start import start_rays, start_separable_rays
 from tests.support.pictures import scene
+from tests.support.slow import first_fast
 from tests.support.trace_scenes import WHITE, body, hall, sphere, wall
 
 NAMES = ("start_rays", "add_unblocked", "pass_faces", "pass_clear_face", "start_inside", "tell_inside")
@@ -42,7 +43,7 @@ def crowded():
     return replace(scene, bodies=[*scene.bodies, sieve, water, sea])
 
 
-@pytest.mark.parametrize("glass", [True, False])
+@pytest.mark.parametrize("glass", first_fast([True, False]))
 def test_tracing_in_python_sees_the_same(glass, monkeypatch):
     """Python keeps float32 where numba continues in float64: the same rays, except rare ones on an edge."""
     scene = hall(max_depth=4)
@@ -52,6 +53,7 @@ def test_tracing_in_python_sees_the_same(glass, monkeypatch):
     assert (agree(scene, monkeypatch).count.rays["refraction"] > 0) == glass
 
 
+@pytest.mark.slow
 def test_passing_in_python_sees_the_same(monkeypatch):
     compiled = agree(crowded(), monkeypatch)
     assert compiled.count.rays["passed"] > 600 and compiled.count.rays["refraction"] > 600

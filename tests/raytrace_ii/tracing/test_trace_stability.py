@@ -273,6 +273,7 @@ def test_faces_without_area_are_not_there():
     assert (nothing.object_id == -1).all()
 
 
+@pytest.mark.slow
 def test_needles_and_slivers_give_numbers():
     """Triangles down to a width of nothing in float32."""
     for width in 10.0 ** np.arange(0, -46, -3):
