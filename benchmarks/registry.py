@@ -129,28 +129,21 @@ def source(module: str) -> Path:
 
 
 IMAGES = "docs/images"
-# Closed experiments with their pictures: they stay on pages, script and records are in git up to this commit.
-LAST = "018e29e"
+# Closed experiments, whose figures stay on pages, by the last commit with their scripts and records.
 CLOSED: dict[str, tuple[str, ...]] = {
-    "accuracy/eye_views": (),
-    "coding/crossing": (),
-    "coding/light_field_bounds": (),
-    "coding/light_field_threads": (),
-    "coding/neighbours": (),
-    "pages/concepts": tuple(
-        f"concepts/{n}.png" for n in ("components", "maps", "pixels", "rays", "sequence", "views")
+    "018e29e": (
+        "accuracy/eye_views", "coding/crossing", "coding/light_field_bounds", "coding/light_field_threads",
+        "coding/neighbours", "pages/concepts", "pages/display_pictures", "pages/focus_patterns",
+        "pages/make_textures", "speed/before_after", "speed/feature_ablation", "speed/take_cost",
+        "speed/texture_filter", "stability/install", "study/reasons", "study/volume_model",
     ),
-    "pages/display_pictures": ("display_eye.webp", "display_zones.png"),
-    "pages/focus_patterns": (),
-    "pages/make_textures": (),
-    "speed/before_after": (),
-    "speed/feature_ablation": (),
-    "speed/take_cost": (),
-    "speed/texture_filter": (),
-    "stability/install": (),
-    "study/reasons": (),
-    "study/volume_model": (),
-}
+    "58549fc": ("coding/bframes", "coding/cost", "coding/disparity", "coding/headers", "coding/volume"),
+}  # fmt: skip
+# Pictures of closed experiments.
+KEPT = (
+    *(f"{IMAGES}/concepts/{n}.png" for n in ("components", "maps", "pixels", "rays", "sequence", "views")),
+    f"{IMAGES}/display_eye.webp", f"{IMAGES}/display_zones.png",
+)  # fmt: skip
 STABLE, SPEED = "docs/stability.md", "docs/speed_accuracy.md"
 HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
 # In the order of a whole study: pages after the measurements that they show.
@@ -166,18 +159,12 @@ BENCHMARKS = {
         Benchmark(
             "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)
         ),
-        Benchmark("coding.disparity", records=OWN),
         Benchmark("coding.orders", records=OWN, fills=("docs/structure.md",)),
-        Benchmark("coding.headers", records=OWN, fills=("docs/structure.md",)),
-        Benchmark("pages.floors_chart", needs="records of headers", writes=(f"{IMAGES}/floors.*",)),
-        Benchmark("coding.cost", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.coders", records=OWN),
-        Benchmark("coding.bframes", records=OWN),
-        Benchmark("pages.coding_docs", needs="records of coders and bframes", fills=("docs/coding.md", SPEED),
+        Benchmark("pages.coding_docs", needs="records of coders", fills=("docs/coding.md", SPEED),
             writes=(f"{IMAGES}/coders*",)),
         Benchmark("coding.takes", records=OWN, fills=("docs/video.md",)),
         Benchmark("pages.video", needs="records of takes", writes=(f"{IMAGES}/takes_[aft]*",)),
-        Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.jplm", needs="jpl-encoder-bin and jpl-decoder-bin", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
@@ -228,9 +215,8 @@ BENCHMARKS = {
         Benchmark("pages.gallery", writes=("docs/gallery/*",)),
         Benchmark(
             "pages.readme",
-            needs="out/demo and out/full of examples/demo.py; records of the coders, ratios, Mitsuba and POV-Ray",
-            records="*_rd.json",
-            fills=("README.md", "docs/study.md", "docs/speed_accuracy.md"),
+            needs="out/demo of examples/demo.py; records of the coders, ratios, Mitsuba and POV-Ray",
+            fills=("README.md", "docs/speed_accuracy.md"),
             writes=(f"{IMAGES}/apples_*", f"{IMAGES}/demo_*"),
         ),
         Benchmark(
