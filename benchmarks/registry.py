@@ -137,25 +137,28 @@ CLOSED: dict[str, tuple[str, ...]] = {
         "pages/make_textures", "speed/before_after", "speed/feature_ablation", "speed/take_cost",
         "speed/texture_filter", "stability/install", "study/reasons", "study/volume_model",
     ),
-    "58549fc": ("coding/bframes", "coding/cost", "coding/disparity", "coding/headers", "coding/volume"),
+    "58549fc": (
+        "accuracy/camera_in_scene", "accuracy/lens_rays", "coding/bframes", "coding/cost", "coding/disparity",
+        "coding/headers", "coding/volume", "pages/metrics_gallery", "speed/eye", "speed/viewer",
+    ),
 }  # fmt: skip
 # Pictures of closed experiments.
 KEPT = (
     *(f"{IMAGES}/concepts/{n}.png" for n in ("components", "maps", "pixels", "rays", "sequence", "views")),
     f"{IMAGES}/display_eye.webp", f"{IMAGES}/display_zones.png",
+    *(f"{IMAGES}/metrics/{n}" for n in ("errors_depth.webp", "errors_views.jpg", "q_angle.png", "q_depth_rate.png",
+        "views.webp")),
 )  # fmt: skip
 STABLE, SPEED = "docs/stability.md", "docs/speed_accuracy.md"
-HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
+HISTORY = "git history with b1dc540"
 # In the order of a whole study: pages after the measurements that they show.
 BENCHMARKS = {
     benchmark.name: benchmark
     for benchmark in (
         Benchmark("pages.cameras", writes=("docs/cameras.md", f"{IMAGES}/cameras/*", f"{IMAGES}/scenes.*")),
         Benchmark("accuracy.sample_places", records=OWN, fills=("docs/speed_accuracy.md",)),
-        Benchmark("accuracy.camera_in_scene", records=OWN, writes=(f"{IMAGES}/camera_in_scene.*",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",)),
         Benchmark("accuracy.demosaicing", records=OWN, fills=("docs/calibration.md",)),
-        Benchmark("accuracy.lens_rays", needs="--peer, an interpreter with optiland", records=OWN),
         Benchmark(
             "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)
         ),
@@ -170,13 +173,11 @@ BENCHMARKS = {
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
         Benchmark("stability.wrong_calls", records=OWN, fills=("docs/stability.md",)),
-        Benchmark("pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)),
         Benchmark("accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",),
             writes=(f"{IMAGES}/depth_truth.*",)),
         Benchmark("accuracy.field_depth", records=OWN, fills=("docs/metrics.md",)),
         Benchmark("accuracy.estimated_depth", records=OWN, fills=("docs/depth.md",)),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
-        Benchmark("speed.eye", records=OWN, fills=("docs/display.md",)),
         Benchmark("accuracy.map_precision", records=OWN),
         Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),
         Benchmark(
@@ -188,7 +189,7 @@ BENCHMARKS = {
         ),
         Benchmark(
             "stability",
-            needs="records of convergence, map_precision and depth_truth",
+            needs="records of convergence and depth_truth",
             records=OWN,
             fills=("docs/stability.md",),
             writes=(f"{IMAGES}/stability*",),
@@ -203,13 +204,12 @@ BENCHMARKS = {
         Benchmark(
             "speed.metrics_speed",
             records=OWN,
-            fills=("docs/metrics.md", "docs/speed_accuracy.md"),
-            writes=(f"{IMAGES}/depth_cost.*", f"{IMAGES}/depth_pareto.*"),
+            fills=("docs/speed_accuracy.md",),
+            writes=(f"{IMAGES}/depth_pareto.*",),
         ),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
         Benchmark("speed.commits", needs=HISTORY, records="commits.jsonl"),
         Benchmark("speed.mitsuba", needs="Mitsuba 3 and an LLVM library", records=OWN),
-        Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
         Benchmark("pages.notebooks", needs="the extra notebooks", writes=("examples/*.ipynb",)),
         Benchmark("pages.hero", writes=(f"{IMAGES}/apples.webp",)),
         Benchmark("pages.gallery", writes=("docs/gallery/*",)),

@@ -12,7 +12,7 @@ import argparse
 import numpy as np
 from PIL import Image
 
-from benchmarks.coding.takes import FRAMES, INSTANTS, PLANS, SCALE, SCHEME, TAKES, by_plan, difference, rendered
+from benchmarks.coding.takes import FRAMES, PLANS, SCALE, SCHEME, TAKES, by_plan, difference, rendered
 from benchmarks.pages.pictures import IMAGES, tidy, write_chart, write_picture
 from codec import Plan, component_cost, encode_take, open_take
 from ii_core import video_of
@@ -20,7 +20,7 @@ from ii_core.display.figure import COLOURS, MARKERS, new_figure
 from ii_core.display.look import viewpoints_around
 from metrics import measure_take, time_chart
 
-SHOWN = (0, 5, 10, 15)
+SHOWN, INSTANTS = (0, 5, 10, 15), 8
 USE_WHEN = {  # words above the plan that serves best
     "time-first, groups of 1 view": "any image at once:\nfilms of one view",
     "interleaved, groups of 16 views": "small file, quick access:\ninterleaved, groups of 16 views",
