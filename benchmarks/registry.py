@@ -139,13 +139,14 @@ CLOSED: dict[str, tuple[str, ...]] = {
     ),
     "58549fc": (
         "accuracy/camera_in_scene", "accuracy/lens_rays", "coding/bframes", "coding/cost", "coding/disparity",
-        "coding/headers", "coding/volume", "pages/metrics_gallery", "speed/eye", "speed/viewer",
+        "coding/headers", "coding/volume", "pages/metrics_gallery", "speed/eye", "speed/viewer", "stability/pictures",
     ),
 }  # fmt: skip
 # Pictures of closed experiments.
 KEPT = (
     *(f"{IMAGES}/concepts/{n}.png" for n in ("components", "maps", "pixels", "rays", "sequence", "views")),
-    f"{IMAGES}/display_eye.webp", f"{IMAGES}/display_zones.png",
+    f"{IMAGES}/display_eye.webp", f"{IMAGES}/display_zones.png", f"{IMAGES}/stability_pictures.webp",
+    f"{IMAGES}/stability_pictures_2.webp",
     *(f"{IMAGES}/metrics/{n}" for n in ("errors_depth.webp", "errors_views.jpg", "q_angle.png", "q_depth_rate.png",
         "views.webp")),
 )  # fmt: skip
@@ -192,7 +193,7 @@ BENCHMARKS = {
             needs="records of convergence and depth_truth",
             records=OWN,
             fills=("docs/stability.md",),
-            writes=(f"{IMAGES}/stability*",),
+            writes=(f"{IMAGES}/stability.*",),
         ),
         Benchmark(
             "speed.pareto",

@@ -33,7 +33,7 @@ from ii_core import (
 from ii_core.picture.regular import resampled
 from raytrace_ii import Scene, load_scene, render, scene_names
 
-DOCS, CAMERAS = ROOT / "docs", ROOT / "assets" / "cameras"
+DOCS, CAMERAS = ROOT / "docs", ROOT / "assets" / "cameras.json"
 PANEL = (320, 160)  # pixels across and down
 GAP = 6
 SCALES = {"hdtv": 5}
@@ -125,7 +125,7 @@ def entry(name: str, full: tuple[IICamera, ...], shown: IICamera) -> str:
     arrays = [f"{len(full)} arrays"] if len(full) > 1 else []
     facts = [f"{chain}{blocked}", *arrays, *facts]
     facts = [fact for fact in facts if fact not in USUAL]
-    sheet = json.loads((CAMERAS / f"{name}.json").read_text(encoding="utf-8"))
+    sheet = json.loads(CAMERAS.read_text(encoding="utf-8"))[name]
     about = sheet["about"][:1].upper() + sheet["about"][1:]
     given = f" *{', '.join(facts)}.*" if facts else ""
     text = fill(f"{about}. {sheet['notes']}{given}", 100, break_on_hyphens=False)

@@ -24,10 +24,9 @@ SCALE = 4  # scale of the large study; the small study is at full size
 
 
 def main() -> None:
-    """Fill the pages and draw the charts from the records."""
+    """Fill the pages and draw the chart from the records."""
     publish(tables())
-    for scale, name in ((SCALE, "coders.png"), (1, "coders_full.png")):
-        chart(studied(scale), scale, name)
+    chart(studied(SCALE), SCALE, "coders.png")
 
 
 def tables() -> Tables:

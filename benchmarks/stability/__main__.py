@@ -1,7 +1,7 @@
 """Limits of the methods, measured: ``python -m benchmarks run stability [-- case ...]``.
 
 Every case sweeps one parameter up to failure; cases can be run one by one. Numbers go to
-``benchmarks/results/stability.jsonl``, pictures to ``docs/images``, tables to ``docs/stability.md``,
+``benchmarks/results/stability.jsonl``, the chart to ``docs/images``, tables to ``docs/stability.md``,
 with those of ``benchmarks.accuracy.convergence``.
 """
 
@@ -12,11 +12,11 @@ from typing import Any
 
 from benchmarks.accuracy import convergence
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import IMAGES, tidy, write_chart, write_picture
+from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
 from benchmarks.records import table as markdown
-from benchmarks.stability import curves, depth, geometry, light, picture, pictures
+from benchmarks.stability import curves, depth, geometry, light, picture
 from benchmarks.stability.excerpts import EXCERPTS, Excerpt
 from benchmarks.stability.geometry import Row
 from ii_core.depth.focus import METHODS
@@ -54,8 +54,6 @@ def main() -> None:
     if unknown := set(asked) - set(CASES):
         parser.error(f"unknown case {', '.join(sorted(unknown))}: known are {', '.join(CASES)}")
     RECORDS.run(({"case": name} for name in asked), lambda case: {"rows": CASES[case]()}, arguments.again)
-    write_picture(IMAGES / "stability_pictures.webp", pictures.rendering(), lossless=True)
-    write_picture(IMAGES / "stability_pictures_2.webp", pictures.coding_and_depth(), lossless=True)
     cases = {name: row["rows"] for name, row in measured().items()}
     if missing := set(CASES) - set(cases):
         print(f"the page lacks results of {', '.join(sorted(missing))}")

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.accuracy import depth_truth
 from benchmarks.stability.geometry import Row
@@ -161,9 +160,3 @@ def _kept() -> list[dict[str, Any]]:
 def _only(rows: list[dict[str, Any]], scene: str, noise: float, method: str) -> dict[str, Any]:
     (row,) = (r for r in rows if (r["scene"], r["noise"], r["method"]) == (scene, noise, method))
     return row
-
-
-def shown(found: FocusDepth) -> NDArray[np.uint8]:
-    """Return a depth map as grey levels: near is bright, pixels without depth are black."""
-    z = found.layer + 1.0
-    return np.where(found.layer < 0, 0, np.clip(300 - 55 * np.log(np.maximum(z, 1)), 20, 255)).astype(np.uint8)
