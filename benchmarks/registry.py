@@ -138,15 +138,16 @@ CLOSED: dict[str, tuple[str, ...]] = {
         "speed/texture_filter", "stability/install", "study/reasons", "study/volume_model",
     ),
     "58549fc": (
-        "accuracy/camera_in_scene", "accuracy/lens_rays", "coding/bframes", "coding/cost", "coding/disparity",
-        "coding/headers", "coding/volume", "pages/metrics_gallery", "speed/eye", "speed/viewer", "stability/pictures",
+        "accuracy/camera_in_scene", "accuracy/field_depth", "accuracy/lens_rays", "coding/bframes", "coding/cost",
+        "coding/disparity", "coding/headers", "coding/volume", "pages/metrics_gallery", "pages/video", "speed/eye",
+        "speed/viewer", "stability/pictures",
     ),
 }  # fmt: skip
 # Pictures of closed experiments.
 KEPT = (
     *(f"{IMAGES}/concepts/{n}.png" for n in ("components", "maps", "pixels", "rays", "sequence", "views")),
     f"{IMAGES}/display_eye.webp", f"{IMAGES}/display_zones.png", f"{IMAGES}/stability_pictures.webp",
-    f"{IMAGES}/stability_pictures_2.webp",
+    f"{IMAGES}/stability_pictures_2.webp", f"{IMAGES}/takes_frames.webp", f"{IMAGES}/takes_time.png",
     *(f"{IMAGES}/metrics/{n}" for n in ("errors_depth.webp", "errors_views.jpg", "q_angle.png", "q_depth_rate.png",
         "views.webp")),
 )  # fmt: skip
@@ -167,8 +168,7 @@ BENCHMARKS = {
         Benchmark("coding.coders", records=OWN),
         Benchmark("pages.coding_docs", needs="records of coders", fills=("docs/coding.md", SPEED),
             writes=(f"{IMAGES}/coders*",)),
-        Benchmark("coding.takes", records=OWN, fills=("docs/video.md",)),
-        Benchmark("pages.video", needs="records of takes", writes=(f"{IMAGES}/takes_[aft]*",)),
+        Benchmark("coding.takes", records=OWN, fills=("docs/video.md",), writes=(f"{IMAGES}/takes_access.*",)),
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.jplm", needs="jpl-encoder-bin and jpl-decoder-bin", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
@@ -176,7 +176,6 @@ BENCHMARKS = {
         Benchmark("stability.wrong_calls", records=OWN, fills=("docs/stability.md",)),
         Benchmark("accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",),
             writes=(f"{IMAGES}/depth_truth.*",)),
-        Benchmark("accuracy.field_depth", records=OWN, fills=("docs/metrics.md",)),
         Benchmark("accuracy.estimated_depth", records=OWN, fills=("docs/depth.md",)),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
         Benchmark("accuracy.map_precision", records=OWN),

@@ -3,7 +3,7 @@
     python -m benchmarks run takes [--scale 8] [--takes apples,car,cuboid]
 
 Takes are rendered once into ``out/takes``. Numbers go to ``benchmarks/results/takes.jsonl``, the tables into
-``docs/video.md``; `benchmarks.pages.video` draws them.
+``docs/video.md``, the chart of random access to ``docs/images/takes_access.png``.
 """
 
 from __future__ import annotations
@@ -12,10 +12,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from benchmarks.arguments import command_line
+from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, origin, table
 from codec import Plan, component_cost, encode_take, open_take
 from ii_core import IIVideo, open_video, preset, video_of
+from ii_core.display.figure import COLOURS, MARKERS, new_figure
 from metrics import bd_rate, measure_take
 from metrics.rates.rd import UndefinedDifference
 from raytrace_ii import load_take, render_take
@@ -36,6 +38,12 @@ PLANS = {
     "interleaved": Plan(walk="interleaved", span=SPAN, strip=4),
     "interleaved, groups of 16 views": Plan(walk="interleaved", span=SPAN, group=16, strip=4),
 }
+USE_WHEN = {  # words above the plan that serves best
+    "time-first, groups of 1 view": "any image at once:\nfilms of one view",
+    "interleaved, groups of 16 views": "small file, quick access:\ninterleaved, groups of 16 views",
+    "stills": "each instant alone",
+    "time-first": "smallest file:\ntime-first",
+}
 
 
 def main() -> None:
@@ -43,6 +51,7 @@ def main() -> None:
     asked = command_line(__doc__, scale=SCALE, takes=TAKES).parse_args()
     keys = [{"take": take, "scale": asked.scale, "plan": plan} for plan in PLANS for take in asked.takes]
     RECORDS.run(keys, coded, asked.again)
+    access_chart()
     publish(tables())
 
 
@@ -116,3 +125,29 @@ def plan_table() -> list[str]:
 def rate_text(off: float | None) -> str:
     """Return a Bjøntegaard rate as text of a cell."""
     return "–" if off is None else f"{off:+.1f}"
+
+
+def access_chart() -> None:
+    """Draw the rate of every plan against stills over its random-access cost."""
+    figure = new_figure(8, 4.8)
+    axes = figure.subplots()
+    for i, (take, plans) in enumerate(by_plan().items()):
+        axes.plot([], [], color=COLOURS[i], linewidth=5, label=take)
+        for j, plan in enumerate(PLANS):
+            if plan in plans and (off := difference(plans["stills"]["points"], plans[plan]["points"])) is not None:
+                cost = component_cost(PLANS[plan], 256, FRAMES).mean
+                axes.plot(cost, off, marker=MARKERS[j], color=COLOURS[i], linestyle="none", markersize=8)
+    for j, plan in enumerate(PLANS):
+        axes.plot([], [], marker=MARKERS[j], color="0.3", linestyle="none", label=plan)
+    for plan, words in USE_WHEN.items():
+        place = component_cost(PLANS[plan], 256, FRAMES).mean, 4 if plan == "stills" else 29
+        side = {"stills": "left", "time-first": "right"}.get(plan, "left" if place[0] < 10 else "center")
+        axes.text(*place, words, ha=side, va="bottom", fontsize=9)
+    axes.set_ylim(top=40)
+    axes.axhline(0, color="0.5", linewidth=0.8)
+    axes.set_xscale("log")
+    axes.set_xlabel("frames decoded for one SI at one instant, mean")
+    axes.set_ylabel("rate against stills at equal quality [%]")
+    tidy(axes)
+    figure.legend(loc="outside lower left", ncols=3, frameon=False, fontsize=8)
+    write_chart(figure, "takes_access.png", dpi=110)

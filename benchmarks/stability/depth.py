@@ -122,22 +122,8 @@ def depth_highlight() -> list[Row]:
     return rows
 
 
-def depth_noise() -> list[Row]:
-    """Return the share of pixels within a tenth of their depth, over noise, by scene, from `depth_truth`."""
-    rows = [row for row in _kept() if row["scale"] == 8]
-    return [
-        {
-            "scene": scene,
-            "noise, steps": noise,
-            **{method: _only(rows, scene, noise, method)["within_10_%"] for method in METHODS},
-        }
-        for scene in dict.fromkeys(row["scene"] for row in rows)
-        for noise in sorted({row["noise"] for row in rows})
-    ]
-
-
 def depth_kinds() -> list[Row]:
-    """Return the same by kind of pixel, over all scenes."""
+    """Return the share of pixels within a tenth of their depth, by kind, over all scenes, from `depth_truth`."""
     rows = [row for row in _kept() if row["scale"] == 8]
     out = []
     for kind in KINDS:
@@ -155,8 +141,3 @@ def depth_kinds() -> list[Row]:
 
 def _kept() -> list[dict[str, Any]]:
     return list(depth_truth.data()["rows"])
-
-
-def _only(rows: list[dict[str, Any]], scene: str, noise: float, method: str) -> dict[str, Any]:
-    (row,) = (r for r in rows if (r["scene"], r["noise"], r["method"]) == (scene, noise, method))
-    return row

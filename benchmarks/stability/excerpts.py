@@ -75,7 +75,6 @@ EXCERPTS: dict[str, Excerpt] = {
     "rate_ends": Excerpt(keep={"asked, bit/pixel": (0.001, 1, 12, 60)}, across=False),
     "tiny_frames": Excerpt(keep={"pixels a lens": ("1×1", "2×2", "7×9")}, across=False),
     "depth_contrast": Excerpt(keep={"contrast, steps": (0, 8, 16, 32, 128)}),
-    "depth_noise": Excerpt(keep=NOISE, across=False),
     "depth_kinds": Excerpt(keep=NOISE, across=False),
     "depth_two_layers": Excerpt(
         keep={"of the light from behind": (0.1, 0.25, 0.5, 0.75, 1)},

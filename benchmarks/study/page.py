@@ -25,6 +25,7 @@ from .runner import FORMAT, VERSION, digest_of
 from .theirs import said
 
 PAGE, IMAGES = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study"
+MEANT_SMALL = ("plane-", "types-2008-", "component-images", "other-cameras")  # steps
 KEPT = ROOT / "benchmarks/results/study.jsonl.gz"  # compressed to a sixth of its size
 PHOTOGRAPHS = {"component-images": ".jpg", "other-cameras": ".jpg", "artefacts-": ".webp", "equal-": ".webp"}
 
@@ -111,18 +112,9 @@ def sizes(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
 
 def smaller(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Return a sentence with the steps that have no result at full size."""
-    found: dict[int, list[str]] = {}
-    for name, record in best.items():
-        scale = record["parameters"].get("scale", 1)
-        if scale > 1 and not name.startswith(("plane-", "types-2008-", "component-images", "other-cameras")):
-            found.setdefault(scale, []).append(name)
-    plane = best.get("plane-apples-1", {"parameters": {"scale": 1}})["parameters"]["scale"]
-    if plane > 1:
-        found.setdefault(plane, []).append("plane-*")
-    if not found:
-        return ["All at full size."]
-    lists = [f"at scale {scale} " + ", ".join(f"`{n}`" for n in names) for scale, names in sorted(found.items())]
-    return ["Not at full size yet: " + "; ".join(lists) + ". What disagrees there may be no more than that."]
+    small = [name for name, record in best.items() if record["parameters"].get("scale", 1) > 1]
+    named = [f"`{name}`" for name in small if name == "plane-apples-1" or not name.startswith(MEANT_SMALL)]
+    return [f"Not at full size yet: {', '.join(named)}." if named else "All at full size."]
 
 
 def shown_tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
