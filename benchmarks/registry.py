@@ -139,8 +139,8 @@ CLOSED: dict[str, tuple[str, ...]] = {
     ),
     "58549fc": (
         "accuracy/camera_in_scene", "accuracy/field_depth", "accuracy/lens_rays", "coding/bframes", "coding/cost",
-        "coding/disparity", "coding/headers", "coding/volume", "pages/metrics_gallery", "pages/video", "speed/eye",
-        "speed/viewer", "stability/pictures",
+        "coding/disparity", "coding/headers", "coding/orders", "coding/volume", "pages/metrics_gallery", "pages/video",
+        "speed/eye", "speed/viewer", "stability/pictures",
     ),
 }  # fmt: skip
 # Pictures of closed experiments.
@@ -164,7 +164,6 @@ BENCHMARKS = {
         Benchmark(
             "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)
         ),
-        Benchmark("coding.orders", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.coders", records=OWN),
         Benchmark("pages.coding_docs", needs="records of coders", fills=("docs/coding.md", SPEED),
             writes=(f"{IMAGES}/coders*",)),

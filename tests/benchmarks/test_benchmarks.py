@@ -74,13 +74,13 @@ def test_cost_is_that_of_the_newest_records(monkeypatch, tmp_path):
         {"key": {"row": 1}, "seconds": 99.0, "cpu_seconds": 30.0, "result": {}},
         {"key": {"row": 2}, "seconds": 60.0, "result": {}},
     ]
-    (tmp_path / "orders.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    assert len(newest(tmp_path / "orders.jsonl")) == 2
-    assert BENCHMARKS["orders"].minutes() == (1.5, False)
+    (tmp_path / "takes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert len(newest(tmp_path / "takes.jsonl")) == 2
+    assert BENCHMARKS["takes"].minutes() == (1.5, False)
     rows.append({"key": {"row": 3}, "seconds": None, "result": {"encode_seconds": 30.0}})
-    (tmp_path / "orders.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    assert BENCHMARKS["orders"].minutes() == (2.0, True)
-    assert "at least 2.0 min" in command.description(BENCHMARKS["orders"])
+    (tmp_path / "takes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert BENCHMARKS["takes"].minutes() == (2.0, True)
+    assert "at least 2.0 min" in command.description(BENCHMARKS["takes"])
 
 
 def test_list_names_all_benchmarks_without_importing_them():
@@ -93,19 +93,19 @@ def test_list_names_all_benchmarks_without_importing_them():
 
 def test_prune_removes_older_records_of_a_benchmark(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr("benchmarks.registry.RESULTS", tmp_path)
-    (tmp_path / "orders.jsonl").write_text('{"key": 1, "run": 0}\n{"key": 1, "run": 1}\n')
-    command.main(["prune", "orders"])
-    assert capsys.readouterr().out == "orders.jsonl: 1 older records removed\n"
-    assert (tmp_path / "orders.jsonl").read_text() == '{"key": 1, "run": 1}\n'
+    (tmp_path / "takes.jsonl").write_text('{"key": 1, "run": 0}\n{"key": 1, "run": 1}\n')
+    command.main(["prune", "takes"])
+    assert capsys.readouterr().out == "takes.jsonl: 1 older records removed\n"
+    assert (tmp_path / "takes.jsonl").read_text() == '{"key": 1, "run": 1}\n'
 
 
 def test_run_passes_options_to_the_benchmark(monkeypatch):
     seen = []
-    monkeypatch.setattr("benchmarks.coding.orders.main", lambda: seen.append(sys.argv))
+    monkeypatch.setattr("benchmarks.coding.takes.main", lambda: seen.append(sys.argv))
     monkeypatch.setattr("benchmarks.stability.__main__.main", lambda: seen.append(sys.argv))
-    command.main(["run", "orders", "--scale", "8"])
+    command.main(["run", "takes", "--scale", "8"])
     command.main(["run", "stability", "--", "bd_dents"])
-    command.main(["run", "orders", "stability"])
+    command.main(["run", "takes", "stability"])
     assert [words[1:] for words in seen] == [["--scale", "8"], ["bd_dents"], [], []]
 
 
@@ -114,8 +114,8 @@ def test_run_passes_options_to_the_benchmark(monkeypatch):
     [
         (["run", "coder"], "no benchmark 'coder'"),
         (["run"], "run needs a name"),
-        (["run", "orders", "takes", "--scale", "8"], "need a single name"),
-        (["list", "orders", "--scale"], "list takes names alone"),
+        (["run", "takes", "coders", "--scale", "8"], "need a single name"),
+        (["list", "takes", "--scale"], "list takes names alone"),
     ],
 )
 def test_wrong_arguments_are_named(words, says, capsys):
