@@ -139,8 +139,8 @@ CLOSED: dict[str, tuple[str, ...]] = {
     ),
     "58549fc": (
         "accuracy/camera_in_scene", "accuracy/field_depth", "accuracy/lens_rays", "coding/bframes", "coding/cost",
-        "coding/disparity", "coding/headers", "coding/orders", "coding/volume", "pages/metrics_gallery", "pages/video",
-        "speed/eye", "speed/viewer", "stability/pictures",
+        "coding/disparity", "coding/headers", "coding/orders", "coding/volume", "pages/metrics_gallery",
+        "pages/video", "speed/eye", "speed/viewer", "stability/pictures",
     ),
 }  # fmt: skip
 # Pictures of closed experiments.
