@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 from benchmarks.age import report
 from benchmarks.records import prune
-from benchmarks.registry import BENCHMARKS, CLOSED, LAST, Benchmark
+from benchmarks.registry import BENCHMARKS, CLOSED, Benchmark
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -42,7 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for name in asked.names or BENCHMARKS:
             show(BENCHMARKS[name])
         if show is listed and not asked.names:
-            print(f"    closed experiments, in git up to {LAST}: {', '.join(CLOSED)}")
+            for last, names in CLOSED.items():
+                print(f"    closed experiments, in git up to {last}: {', '.join(names)}")
         return
     if not asked.names:
         parser.error("run needs a name: python -m benchmarks list prints them")

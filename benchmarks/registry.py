@@ -129,67 +129,54 @@ def source(module: str) -> Path:
 
 
 IMAGES = "docs/images"
-# Closed experiments with their pictures: they stay on pages, script and records are in git up to this commit.
-LAST = "018e29e"
+# Closed experiments, whose figures stay on pages, by the last commit with their scripts and records.
 CLOSED: dict[str, tuple[str, ...]] = {
-    "accuracy/eye_views": (),
-    "coding/crossing": (),
-    "coding/light_field_bounds": (),
-    "coding/light_field_threads": (),
-    "coding/neighbours": (),
-    "pages/concepts": tuple(
-        f"concepts/{n}.png" for n in ("components", "maps", "pixels", "rays", "sequence", "views")
+    "018e29e": (
+        "accuracy/eye_views", "coding/crossing", "coding/light_field_bounds", "coding/light_field_threads",
+        "coding/neighbours", "pages/concepts", "pages/display_pictures", "pages/focus_patterns",
+        "pages/make_textures", "speed/before_after", "speed/feature_ablation", "speed/take_cost",
+        "speed/texture_filter", "stability/install", "study/reasons", "study/volume_model",
     ),
-    "pages/display_pictures": ("display_eye.webp", "display_zones.png"),
-    "pages/focus_patterns": (),
-    "pages/make_textures": (),
-    "speed/before_after": (),
-    "speed/feature_ablation": (),
-    "speed/take_cost": (),
-    "speed/texture_filter": (),
-    "stability/install": (),
-    "study/reasons": (),
-    "study/volume_model": (),
-}
+    "58549fc": (
+        "accuracy/camera_in_scene", "accuracy/field_depth", "accuracy/lens_rays", "coding/bframes", "coding/cost",
+        "coding/disparity", "coding/headers", "coding/orders", "coding/volume", "pages/metrics_gallery",
+        "pages/video", "speed/eye", "speed/viewer", "stability/pictures",
+    ),
+}  # fmt: skip
+# Pictures of closed experiments.
+KEPT = (
+    *(f"{IMAGES}/concepts/{n}.png" for n in ("components", "maps", "pixels", "rays", "sequence", "views")),
+    f"{IMAGES}/display_eye.webp", f"{IMAGES}/display_zones.png", f"{IMAGES}/stability_pictures.webp",
+    f"{IMAGES}/stability_pictures_2.webp", f"{IMAGES}/takes_frames.webp", f"{IMAGES}/takes_time.png",
+    *(f"{IMAGES}/metrics/{n}" for n in ("errors_depth.webp", "errors_views.jpg", "q_angle.png", "q_depth_rate.png",
+        "views.webp")),
+)  # fmt: skip
 STABLE, SPEED = "docs/stability.md", "docs/speed_accuracy.md"
-HISTORY, BROWSER = "git history with b1dc540", "chromium and playwright"
+HISTORY = "git history with b1dc540"
 # In the order of a whole study: pages after the measurements that they show.
 BENCHMARKS = {
     benchmark.name: benchmark
     for benchmark in (
         Benchmark("pages.cameras", writes=("docs/cameras.md", f"{IMAGES}/cameras/*", f"{IMAGES}/scenes.*")),
         Benchmark("accuracy.sample_places", records=OWN, fills=("docs/speed_accuracy.md",)),
-        Benchmark("accuracy.camera_in_scene", records=OWN, writes=(f"{IMAGES}/camera_in_scene.*",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",)),
         Benchmark("accuracy.demosaicing", records=OWN, fills=("docs/calibration.md",)),
-        Benchmark("accuracy.lens_rays", needs="--peer, an interpreter with optiland", records=OWN),
         Benchmark(
             "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)
         ),
-        Benchmark("coding.disparity", records=OWN),
-        Benchmark("coding.orders", records=OWN, fills=("docs/structure.md",)),
-        Benchmark("coding.headers", records=OWN, fills=("docs/structure.md",)),
-        Benchmark("pages.floors_chart", needs="records of headers", writes=(f"{IMAGES}/floors.*",)),
-        Benchmark("coding.cost", records=OWN, fills=("docs/structure.md",)),
         Benchmark("coding.coders", records=OWN),
-        Benchmark("coding.bframes", records=OWN),
-        Benchmark("pages.coding_docs", needs="records of coders and bframes", fills=("docs/coding.md", SPEED),
+        Benchmark("pages.coding_docs", needs="records of coders", fills=("docs/coding.md", SPEED),
             writes=(f"{IMAGES}/coders*",)),
-        Benchmark("coding.takes", records=OWN, fills=("docs/video.md",)),
-        Benchmark("pages.video", needs="records of takes", writes=(f"{IMAGES}/takes_[aft]*",)),
-        Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
+        Benchmark("coding.takes", records=OWN, fills=("docs/video.md",), writes=(f"{IMAGES}/takes_access.*",)),
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.jplm", needs="jpl-encoder-bin and jpl-decoder-bin", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
         Benchmark("stability.wrong_calls", records=OWN, fills=("docs/stability.md",)),
-        Benchmark("pages.metrics_gallery", records="metrics_study.json", writes=(f"{IMAGES}/metrics/*",)),
         Benchmark("accuracy.depth_truth", records=OWN, fills=("docs/metrics.md",),
             writes=(f"{IMAGES}/depth_truth.*",)),
-        Benchmark("accuracy.field_depth", records=OWN, fills=("docs/metrics.md",)),
         Benchmark("accuracy.estimated_depth", records=OWN, fills=("docs/depth.md",)),
         Benchmark("accuracy.waves", records=OWN, fills=("docs/waves.md",), writes=(f"{IMAGES}/waves.*",)),
-        Benchmark("speed.eye", records=OWN, fills=("docs/display.md",)),
         Benchmark("accuracy.map_precision", records=OWN),
         Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),
         Benchmark(
@@ -201,10 +188,10 @@ BENCHMARKS = {
         ),
         Benchmark(
             "stability",
-            needs="records of convergence, map_precision and depth_truth",
+            needs="records of convergence and depth_truth",
             records=OWN,
             fills=("docs/stability.md",),
-            writes=(f"{IMAGES}/stability*",),
+            writes=(f"{IMAGES}/stability.*",),
         ),
         Benchmark(
             "speed.pareto",
@@ -216,21 +203,19 @@ BENCHMARKS = {
         Benchmark(
             "speed.metrics_speed",
             records=OWN,
-            fills=("docs/metrics.md", "docs/speed_accuracy.md"),
-            writes=(f"{IMAGES}/depth_cost.*", f"{IMAGES}/depth_pareto.*"),
+            fills=("docs/speed_accuracy.md",),
+            writes=(f"{IMAGES}/depth_pareto.*",),
         ),
         Benchmark("speed.ratios", needs=HISTORY, records="speed.jsonl"),
         Benchmark("speed.commits", needs=HISTORY, records="commits.jsonl"),
         Benchmark("speed.mitsuba", needs="Mitsuba 3 and an LLVM library", records=OWN),
-        Benchmark("speed.viewer", needs=BROWSER, records="viewer.json", writes=("docs/viewer.md",)),
         Benchmark("pages.notebooks", needs="the extra notebooks", writes=("examples/*.ipynb",)),
         Benchmark("pages.hero", writes=(f"{IMAGES}/apples.webp",)),
         Benchmark("pages.gallery", writes=("docs/gallery/*",)),
         Benchmark(
             "pages.readme",
-            needs="out/demo and out/full of examples/demo.py; records of the coders, ratios, Mitsuba and POV-Ray",
-            records="*_rd.json",
-            fills=("README.md", "docs/study.md", "docs/speed_accuracy.md"),
+            needs="out/demo of examples/demo.py; records of the coders, ratios, Mitsuba and POV-Ray",
+            fills=("README.md", "docs/speed_accuracy.md"),
             writes=(f"{IMAGES}/apples_*", f"{IMAGES}/demo_*"),
         ),
         Benchmark(

@@ -19,18 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.accuracy.analytic import Array, Ball, World, still_life
-from benchmarks.accuracy.camera_in_scene import lens_bodies
 from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.records import Records
 from ii_core import IICamera, preset
-from ii_core.camera.optics import SphericalLenslet
 from ii_core.display.figure import COLOURS, new_figure
 from raytrace_ii import Body, Light, Material, Scene, trace
 from raytrace_ii.scene.textures import Image
 
-MODULES = tuple(f"benchmarks.accuracy.{name}" for name in ("convergence", "analytic", "camera_in_scene"))
-RECORDS = Records("convergence", MODULES)
+RECORDS = Records("convergence", tuple(f"benchmarks.accuracy.{name}" for name in ("convergence", "analytic")))
 FINEST = 768  # segments of the finest ball on the page
 COARSEST = 12
 STEEP = 0.2  # least cosine between ray and normal for comparing depth: nearer to the rim its error is unbounded
@@ -55,7 +52,6 @@ def main() -> None:
     parts: dict[str, Callable[[], list[dict[str, Any]]]] = {
         "balls": lambda: balls(levels, preset("setup1", scale=16)),
         "ball lens": lambda: ball_lens(levels),
-        "plano-convex lens": lambda: plano_convex([4, 8, 16, 32, 64]),
         "images": lambda: images(max(levels)),
     }
     keys = [{"part": part, "finest": asked.finest} for part in parts]
@@ -67,15 +63,15 @@ def measured(finest: int = FINEST) -> dict[str, Any]:
     """Return all rows, with the orders fitted to them."""
     parts = {row["part"]: row for row in RECORDS.rows(finest=finest)}
     rows = parts["balls"]["rows"]
-    lenses = [*parts["ball lens"]["rows"], *parts["plano-convex lens"]["rows"]]
+    lenses = parts["ball lens"]["rows"]
     return {
         "rows": rows,
         "orders": {name: order(rows, name) for name in ORDERS},
         "expected": ORDERS,
         "lenses": lenses,
-        "lens_orders": lens_orders(lenses),
+        "lens_orders": {kind: order(lenses, kind) for kind in ("flat", "smooth")},
         "images": parts["images"]["rows"],
-        "parts": list(parts.values()),
+        "parts": [row for part, row in parts.items() if part != "plano-convex lens"],
     }
 
 
@@ -188,44 +184,6 @@ def ball_lens(levels: list[int]) -> list[dict[str, Any]]:
     return rows
 
 
-def plano_convex(levels: list[int]) -> list[dict[str, Any]]:
-    """Return errors of parallel rays onto the curved face of a lenslet of ``segments``² squares, against Snell."""
-    radius, ior, pitch, gap = 10.0, GLASS.ior, 6.0, 1.0
-    camera = IICamera(
-        pixels=(16, 16), lenses=(1, 1), pixel_pitch_mm=pitch / 16, gap_mm=gap,
-        optics=(SphericalLenslet(radius_mm=radius, ior=ior),),
-    )  # fmt: skip
-    model = camera.lens_model
-    assert isinstance(model, SphericalLenslet)
-    thickness = model.thickness(camera.lens_pitch_mm)
-    behind = radius / (ior - 1) - thickness / ior  # distance from the flat face to the focus, lensmaker's formula
-    height = pitch / 2 * np.linspace(0.05, 0.9, 12)
-    o = _ring(height, gap + 30.0)
-    d = np.broadcast_to([0.0, 0.0, -1.0], o.shape)
-    incident = np.arcsin(height / radius)
-    bent = incident - np.arcsin(np.sin(incident) / ior)  # angle to the axis within the glass
-    sag = radius - np.sqrt(radius**2 - height**2)
-    spot = height - (thickness - sag) * np.tan(bent) - behind * np.tan(np.arcsin(ior * np.sin(bent)))
-    true = o[:, :2] / np.repeat(height, RING)[:, None] * np.repeat(spot, RING)[:, None]
-    rows = []
-    for segments in levels:
-        row: dict[str, Any] = {"lens": "plano-convex", "segments": segments, "h": pitch / radius / segments}
-        for kind in ("flat", "smooth"):
-            glass = lens_bodies(camera, segments, smooth=kind == "smooth")[0]
-            row[kind] = _rms(np.linalg.norm(_spots(glass, o, d, gap - behind) - true, axis=1))
-        rows.append(row)
-    return rows
-
-
-def lens_orders(rows: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
-    """Fitted orders of each lens, flat and smooth."""
-    kinds = {row["lens"] for row in rows}
-    return {
-        lens: {kind: order([row for row in rows if row["lens"] == lens], kind) for kind in ("flat", "smooth")}
-        for lens in sorted(kinds)
-    }
-
-
 def images(segments: int) -> list[dict[str, Any]]:
     """Return the error of the image distance of a ball lens against Gauss: 1/a + 1/b = 1/f from its centre."""
     radius, ior = 5.0, GLASS.ior
@@ -310,13 +268,11 @@ def chart(result: dict[str, Any]) -> Any:
         picture.semilogx(segments, inner, "os"[i] + ":", color=COLOURS[i], label=label)
     picture.set_title("and the light they send, against a tracer without triangles", loc="left", fontsize=10)
     picture.set_ylabel("PSNR of linear light [dB]")
-    for i, name in enumerate(("ball", "plano-convex")):
-        chosen = [row for row in result["lenses"] if row["lens"] == name]
-        for j, kind in enumerate(("flat", "smooth")):
-            label = f"{name}, {kind}: $h^{{{result['lens_orders'][name][kind]:.2f}}}$"
-            x = [2 * np.pi / row["h"] for row in chosen]
-            lens.loglog(x, [row[kind] for row in chosen], "os"[i] + "-:"[j], color=COLOURS[2 * i + j], label=label)
-    lens.set_title("lenses of triangles: where rays end, against Snell", loc="left", fontsize=10)
+    for i, kind in enumerate(("flat", "smooth")):
+        label = f"{kind}: $h^{{{result['lens_orders'][kind]:.2f}}}$"
+        x = [2 * np.pi / row["h"] for row in result["lenses"]]
+        lens.loglog(x, [row[kind] for row in result["lenses"]], "o" + "-:"[i], color=COLOURS[i], label=label)
+    lens.set_title("ball lens of triangles: where rays end, against Snell", loc="left", fontsize=10)
     lens.set_ylabel("root mean square error at the focus [mm]")
     tidy(geometry, picture, lens)
     for axes in (geometry, picture, lens):

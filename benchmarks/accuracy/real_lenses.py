@@ -3,12 +3,11 @@
 A plenoptic 1.0 camera behind a real lens, and its ideal twin: a thin lens of the same magnification between the same
 planes. Points of the plane in focus have disparity 0 through the twin at every field. Through the real lens the rays
 of one lenslet spread over this plane: their slope against the pixel is a disparity error (field curvature), their
-bend is coma. The second part codes *Apples* through both.
+bend is coma.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,24 +17,16 @@ from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
-from codec import decode, encode
 from ii_core import IICamera, preset
 from ii_core.camera.elements import Bundle
 from ii_core.camera.optics import Lens
 from ii_core.camera.prescriptions import lens
-from ii_core.camera.presets import scaled
 from ii_core.design.properties import through_front_mm
 from ii_core.display.figure import new_figure, save
-from metrics import bd_rate, q_global
-from raytrace_ii import load_scene, render
 
 RECORDS = Records("real_lenses", ("benchmarks.accuracy.real_lenses",))
 LENSES = {"double-gauss": 0.5, "triplet": 1.0}  # enlarged to f = 50 mm
-SCALE = 8
 FIELDS = 25
-QPS = (22, 27, 32, 37)  # quantisers of SI-PVS
-RATES = (0.8, 1.6, 3.2, 6.4)  # bpp of JPEG 2000, for the qualities of SI-PVS
-BACK_MM = 130.0  # shift of *Apples* to the plane in focus
 CHART = IMAGES / "real_lenses.png"
 
 
@@ -117,44 +108,10 @@ def field_errors(name: str) -> dict[str, Any]:
     return {"focus_mm": focus, "disparity_per_mm": per_mm, "fields": rows}
 
 
-def coding(name: str) -> dict[str, Any]:
-    """Return the gain of SI-PVS over JPEG 2000 on *Apples* through a real lens and through its twin."""
-    real, scene, pose = scaled(real_camera(name), SCALE), load_scene("apples"), np.eye(4)
-    pose[2, 3] = -BACK_MM
-    result: dict[str, Any] = {}
-    for which, camera in (("real", real), ("ideal", ideal_twin(real))):
-        picture = render(scene, camera, samples=4, pose=pose, support=()).picture
-        curves = {
-            "si-h264": [encode(picture, "si-h264", qp=qp) for qp in QPS],
-            "jpeg2000": [encode(picture, "jpeg2000", bpp=bpp) for bpp in RATES],
-        }
-        points = {
-            scheme: [(coded.bpp, q_global(picture, decode(coded))) for coded in all_coded]
-            for scheme, all_coded in curves.items()
-        }
-        result[which] = {
-            "points": points,
-            "si_over_jpeg2000_percent": bd_rate(
-                *zip(*points["jpeg2000"], strict=True), *zip(*points["si-h264"], strict=True)
-            ),
-        }
-    curves_of = {which: result[which]["points"]["si-h264"] for which in ("ideal", "real")}
-    result["real_over_ideal_percent"] = difference(*curves_of.values())
-    return result
-
-
-def difference(anchor: Sequence[tuple[float, float]], tested: Sequence[tuple[float, float]]) -> float:
-    """Return the Bjøntegaard difference in rate, %, of points (bpp, dB)."""
-    return bd_rate(*np.transpose(anchor), *np.transpose(tested))
-
-
 def main() -> None:
     arguments = command_line(__doc__).parse_args()
-    keys = [{"part": part, "lens": name} for part in ("field", "coding") for name in LENSES]
-    for key in RECORDS.todo(keys, arguments.again):
-        work = field_errors if key["part"] == "field" else coding
-        RECORDS.measure(key, lambda work=work, key=key: work(key["lens"]))
-        print(key, flush=True)
+    keys = [{"part": "field", "lens": name} for name in LENSES]
+    RECORDS.run(keys, lambda part, lens: field_errors(lens), arguments.again)
     draw()
     publish(tables())
 
@@ -185,7 +142,7 @@ def draw() -> None:
 
 
 def tables() -> Tables:
-    """Return the table of errors at two fields, and that of coding."""
+    """Return the table of errors at two fields."""
     rows = RECORDS.rows(part="field")
     lines = [
         "| lens | field | light | disparity error, tangential · sagittal | depth error | bend |",
@@ -199,18 +156,7 @@ def tables() -> Tables:
                 f"{s['disparity']:+.4f} | {t['depth_mm']:+.2f} · {s['depth_mm']:+.2f} mm | "
                 f"{t['bend']:.4f} · {s['bend']:.4f} |"
             )
-    return {("docs/real_lenses.md", "field"): [*lines, "", origin(rows)], **_coding_table()}
-
-
-def _coding_table() -> Tables:
-    """Return the table of coding; none before its first record."""
-    rows = RECORDS.rows(part="coding")
-    table = ["| lens | SI-PVS over JPEG 2000, real | ideal | SI-PVS: real over ideal |", "|---|---|---|---|"] + [
-        f"| {row['lens']} | {row['real']['si_over_jpeg2000_percent']:+.1f} % | "
-        f"{row['ideal']['si_over_jpeg2000_percent']:+.1f} % | {row['real_over_ideal_percent']:+.1f} % |"
-        for row in rows
-    ]
-    return {("docs/real_lenses.md", "coding"): [*table, "", origin(rows)]} if rows else {}
+    return {("docs/real_lenses.md", "field"): [*lines, "", origin(rows)]}
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ from __future__ import annotations
 import statistics
 from typing import Any
 
-from benchmarks.coding import bframes
 from benchmarks.coding.coders import (
     ANCHOR,
     NEAR,
@@ -25,24 +24,20 @@ SCALE = 4  # scale of the large study; the small study is at full size
 
 
 def main() -> None:
-    """Fill the pages and draw the charts from the records."""
+    """Fill the pages and draw the chart from the records."""
     publish(tables())
-    for scale, name in ((SCALE, "coders.png"), (1, "coders_full.png")):
-        chart(studied(scale), scale, name)
+    chart(studied(SCALE), SCALE, "coders.png")
 
 
 def tables() -> Tables:
     """Return all tables of schemes."""
     coders, full = studied(SCALE), studied(1)
-    trials = [row for row in coders if row["scheme"] in TRIALS]
     others = [row for row in coders if row["scheme"] not in TRIALS]
     page = "docs/coding.md"
     return {
         (page, "which"): which(others),
         (page, "coders"): [*size(SCALE, others), "", *rate_table(others, shortened(summary(others)))],
         (page, "full"): [*size(1, full), "", *rate_table(full)],
-        (page, "trials"): [*size(SCALE, trials), "", *trial_table(trials)],
-        (page, "bframes"): bframes.conditions_table(),
         ("docs/speed_accuracy.md", "coding"): [*size(SCALE, others), "", *front_table(coders)],
     }
 
@@ -85,16 +80,6 @@ def front_table(rows: list[dict[str, Any]]) -> list[str]:
         "",
         f"Bold: the fastest scheme whose rate is within {100 * NEAR:.0f} % of the least.",
     ]
-
-
-def trial_table(rows: list[dict[str, Any]]) -> list[str]:
-    """Return mean rate and time of each trial; rates of the scenes are in the records."""
-    lines = []
-    best = summary(rows)
-    for row in best:
-        mean = "–" if row["mean"] is None else f"{row['mean']:+.0f}"
-        lines.append(f"`{row['scheme']}` | {mean} | {row['seconds']:.2f}")
-    return table("scheme | mean, % | CPU s", lines, [row["commits"] for row in best])
 
 
 def size(scale: int, rows: list[dict[str, Any]]) -> list[str]:

@@ -1,13 +1,11 @@
 """Measured pictures and figures of README, tutorial and other pages: ``python -m benchmarks run readme``.
 
-Copies the numbers of ``make demo`` (out/demo) and of ``python examples/demo.py --scale 1 -o out/full`` to
-``benchmarks/results``, and pictures of the demo to ``docs/images``. Fills tables from records: the peers of the
-README, the gains of docs/study.md, the ratios of docs/speed_accuracy.md.
+Copies pictures of ``make demo`` (out/demo) to ``docs/images``. Fills tables from records: the peers of the README and
+the ratios of docs/speed_accuracy.md.
 """
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
@@ -17,16 +15,13 @@ from benchmarks.coding import coders, jplm, light_field
 from benchmarks.coding.light_field import BY_RGB, IMPORTED, OURS, SCENES, rate_change
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT, commit_of, origin, with_commits
+from benchmarks.records import ROOT, origin
 from benchmarks.speed import mitsuba, ratios
 from benchmarks.speed.before import COMMIT, MENDED
 from benchmarks.speed.pareto import BAND
 from ii_core import preset
-from metrics import read_study, summary_table
 from raytrace_ii import scene_names
 
-RESULTS = ROOT / "benchmarks" / "results"
-SIZES = {"demo": "4096×2048, 256×128 lenses (the demo)", "full": "8192×4096, 512×256 lenses (full `setup1`)"}
 SHOWN = {  # pictures of the demo, on the page of the tutorial
     "apples_detail.png": "apples_detail.webp",
     "apples_view_front.png": "apples_view_front.webp",
@@ -44,11 +39,7 @@ Pairs = Mapping[str, tuple[Row, Row]]
 
 
 def main() -> None:
-    """Copy measured numbers and pictures, and fill the tables."""
-    IMAGES.mkdir(parents=True, exist_ok=True)
-    for run in SIZES:
-        for study in sorted((ROOT / "out" / run).glob("*_rd.json")):
-            shutil.copy(study, RESULTS / f"{run}_{study.name}")
+    """Copy pictures, and fill the tables."""
     for name, target in SHOWN.items():
         write_picture(IMAGES / target, ROOT / "out" / "demo" / name)
     publish(tables())
@@ -58,7 +49,6 @@ def tables() -> Tables:
     """Return the tables of all pages."""
     return {
         ("README.md", "peers"): peers_table(),
-        ("docs/study.md", "gain"): gain_table(),
         ("docs/speed_accuracy.md", "before"): before_table(),
         ("docs/speed_accuracy.md", "speed"): speed_table(),
     }
@@ -154,21 +144,6 @@ def span(texts: Sequence[str]) -> str:
     """Return the first and the last of these texts with one unit."""
     ends = list(dict.fromkeys((texts[0], texts[-1]) if texts else ()))
     return " to ".join([*(text.rpartition(" ")[0] for text in ends[:-1]), *ends[-1:]]) or NONE
-
-
-def gain_table() -> list[str]:
-    """Return the gain of pseudo video sequences over JPEG 2000 by scene and size."""
-    lines = ["| scene | picture | SI-PVS | RI-PVS | EI-PVS |", "|---|---|---|---|---|"]
-    commits = []
-    for path in sorted(RESULTS.glob("*_*_rd.json")):
-        run, scene, _ = path.stem.split("_")
-        study = read_study(path)
-        gains = {row["scheme"]: row["gain"] for row in summary_table(study, anchor="jpeg2000")}
-        cells = " | ".join(gains[f"{kind}-h264"] for kind in ("si", "ri", "ei"))
-        lines.append(f"| {scene} | {SIZES[run]} | {cells} |")
-        commits.append(commit_of(study))
-    told = origin({"commit": commit} for commit in commits)
-    return [*with_commits(lines, [[commit] for commit in commits]), "", told]
 
 
 def before_table() -> list[str]:

@@ -21,9 +21,6 @@ from ii_core.base.files import atomic_path
 
 Tables = Mapping[tuple[str, str], list[str]]
 OWNERS = tuple(benchmark.tables for benchmark in BENCHMARKS.values() if benchmark.tables)
-ELSEWHERE = {
-    ("docs/viewer.md", "viewer")
-}  # filled by benchmarks.speed.viewer, which needs a browser and has a file of its own
 MARK = re.compile(r"^<!-- ([a-z][\w-]*) -->$", re.M)
 
 
@@ -87,7 +84,7 @@ def stale(owners: Iterable[str] = OWNERS, root: Path = ROOT) -> list[str]:
                 wrong.append(f"{page}: table {mark} differs from the records: type python -m benchmarks run tables")
     pages = [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
     marks = {(p.relative_to(root).as_posix(), mark) for p in pages for mark in MARK.findall(p.read_text("utf-8"))}
-    return wrong + [f"{page}: no benchmark fills {mark}" for page, mark in sorted(marks - owned - ELSEWHERE)]
+    return wrong + [f"{page}: no benchmark fills {mark}" for page, mark in sorted(marks - owned)]
 
 
 if __name__ == "__main__":

@@ -1,42 +1,33 @@
-"""CPU time of the metrics at the full size of setup1 (33.5 Mpixel), and Q_depth accuracy against time.
+"""Accuracy of depth from focus and of Q_depth against CPU time.
 
     python -m benchmarks run metrics_speed
 
-Times are CPU seconds of the process, which depend little on other processes. Memory is the peak of numpy's
-allocations during a call, beyond the two pictures; for Q_depth it is the growth of the process. Numbers go to
-``benchmarks/results/metrics_speed.jsonl``, the chart to ``docs/images/depth_cost.png``.
+Times are CPU seconds of the process, which depend little on other processes. Numbers go to
+``benchmarks/results/metrics_speed.jsonl``, the chart to ``docs/images/depth_pareto.png``.
 """
 
 from __future__ import annotations
 
-import statistics
-import subprocess
-import sys
 import time
-import tracemalloc
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage.metrics import structural_similarity
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ROOT, Records, origin, with_commits
 from codec import decode, encode
-from ii_core import IIPicture, five_viewpoints, preset
+from ii_core import IIPicture, preset
 from ii_core.depth.virtual_camera import virtual_camera_pixels
 from ii_core.display.figure import COLOURS, MARKERS, new_figure, save
-from metrics import depth_from_focus, linear_layers, q_angle, q_depth, q_global, q_view
-from metrics.measures.view import LUMA, view_pair
+from metrics import depth_from_focus, linear_layers, q_depth
 from raytrace_ii import Shot, load_scene, render
 
 RECORDS = Records("metrics_speed", ("benchmarks.speed.metrics_speed",))
-CHART, FRONT = ROOT / "docs/images/depth_cost.png", ROOT / "docs/images/depth_pareto.png"
+FRONT = ROOT / "docs/images/depth_pareto.png"
 NEAR = 0.05  # share of correct depths that the recommended setting may lose against the best
-REPEATS = 7
 SCENES, SCALE, BPP = ("apples", "twins"), 4, 0.35  # conditions of the accuracy chart
 FARTHEST = 250  # largest d of layers z = d·f
 
@@ -44,128 +35,26 @@ FARTHEST = 250  # largest d of layers z = d·f
 def main() -> None:
     """Measure all, print, record and draw."""
     asked = command_line(__doc__, scenes=SCENES).parse_args()
-    for key in RECORDS.todo(({"what": what} for what in TARGETS), asked.again):
-        RECORDS.measure(key, lambda what=key["what"]: {"value": value_of(what)})
-    for row in data()["rows"]:
-        print(f"{row['what']:<56} {row['target']:>5}  {row['value']:.3g}", flush=True)
     keys = [{"accuracy": name, "scale": SCALE, "bpp": BPP} for name in asked.scenes]
     for key in RECORDS.todo(keys, asked.again):
         RECORDS.measure(key, lambda name=key["accuracy"]: {"points": accuracy(name)})
-    kept = data()
-    for figure, path in ((draw(kept), CHART), (draw_front(kept["accuracy"]), FRONT)):
-        save(figure, path)
-        write_picture(path, path)
+    save(draw_front(measured()), FRONT)
+    write_picture(FRONT, FRONT)
     publish(tables())
 
 
-# Rows of the table, and their targets.
-TARGETS = {
-    "q_global / numpy subtract and square": "≤ 3",
-    "q_global: MiB allocated at most": "",
-    "q_angle / numpy subtract and square": "≤ 3",
-    "q_angle: MiB allocated at most": "",
-    "q_view: CPU s beyond SSIM's own": "≤ 1",
-    "q_depth, 250 layers, 25 + 25 EIs: CPU s / 2 cores": "≤ 30",
-    "q_depth: GiB over the pictures": "≤ 1",
-    "q_depth, robust: CPU s / 2 cores": "",
-    "q_depth, robust: GiB over the pictures": "",
-}
-
-
-def value_of(what: str) -> float:
-    """Measure one row."""
-    if what.startswith("q_depth"):
-        seconds, gib = q_depth_at_full_size("robust" if "robust" in what else "dissertation")
-        return gib if "GiB" in what else seconds / 2
-    a, b = full_size()
-    if what.startswith("q_view"):
-        return view_seconds(a, b)
-    metric = {"q_global": q_global, "q_angle": q_angle}[what.replace(":", " ").split()[0]]
-    metric(a, b)
-    return _peak(lambda: metric(a, b)) if "MiB" in what else against_numpy(metric, a, b)
-
-
-def data() -> dict[str, list[dict[str, Any]]]:
-    """Return the newest rows and points of the accuracy chart."""
-    rows = {row["what"]: row for row in RECORDS.rows() if "what" in row}
-    points = [
+def measured() -> list[dict[str, Any]]:
+    """Return the newest points of all scenes."""
+    return [
         {"scene": row["accuracy"], "commit": row["commit"], **point}
         for row in RECORDS.rows(scale=SCALE, bpp=BPP)
         for point in row["points"]
     ]
-    return {
-        "rows": [{"target": target, **rows[what]} for what, target in TARGETS.items() if what in rows],
-        "accuracy": points,
-    }
 
 
 def tables() -> Tables:
-    """Return the tables of the records."""
-    kept = data()
-    lines = [f"| {row['what']} | {row['value']:.3g} |" for row in kept["rows"]]
-    cost = with_commits(["| | measured |", "|---|---|", *lines], [[row["commit"]] for row in kept["rows"]])
-    return {
-        ("docs/speed_accuracy.md", "evaluation"): front_table(kept),
-        ("docs/metrics.md", "speed"): [*cost, "", origin(kept["rows"])],
-    }
-
-
-def full_size() -> tuple[IIPicture, IIPicture]:
-    """Return two pictures of noise that differ by noise."""
-    camera = preset("setup1")
-    rng = np.random.default_rng(0)
-    blocks = [rng.integers(0, 250, (256, 512, 3), dtype=np.uint8) for _ in range(2)]
-    blocks[1] = blocks[0] + blocks[1] % 5
-    a, b = (IIPicture(np.tile(x, (16, 16, 1)), camera.lenses, camera.ei_pixels, camera) for x in blocks)
-    return a, b
-
-
-def against_numpy(metric: Callable[[IIPicture, IIPicture], object], a: IIPicture, b: IIPicture) -> float:
-    """Return the CPU time of a measure over that of numpy's subtraction and square of bytes."""
-
-    def plain() -> None:
-        difference = np.subtract(a.pixels, b.pixels)  # of bytes, with wraparound: a lower bound of numpy's time
-        np.square(difference, out=difference)
-
-    return statistics.median([_cpu(lambda: metric(a, b)) / _cpu(plain) for _ in range(REPEATS)])
-
-
-def view_seconds(a: IIPicture, b: IIPicture) -> float:
-    """Return the CPU time of q_view minus that of scikit-image's SSIM on the same five pairs of views."""
-    pairs = []
-    for viewpoint in five_viewpoints(a.camera).values():  # type: ignore[arg-type]
-        x, y, _ = view_pair(a, b, viewpoint)
-        pairs.append((x @ LUMA, y @ LUMA))
-    options: Any = {"data_range": 255, "gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
-
-    def ssim() -> None:
-        for x, y in pairs:
-            structural_similarity(x, y, **options)
-
-    q_view(a, b)
-    return statistics.median([_cpu(lambda: q_view(a, b)) - _cpu(ssim) for _ in range(REPEATS)])
-
-
-def q_depth_at_full_size(method: str) -> tuple[float, float]:
-    """Return CPU seconds and memory growth in GiB of the second q_depth; the first one compiles."""
-    script = f"""
-import time
-from benchmarks.speed.metrics_speed import full_size
-from metrics import linear_layers, q_depth
-from ii_core import IIPicture, preset
-small = preset("setup1", scale=32)
-a, b = full_size()
-tiny = IIPicture(a.pixels[: small.pixels[1], : small.pixels[0]].copy(), small.lenses, small.ei_pixels, small)
-q_depth(tiny, tiny, method={method!r}, layers_mm=linear_layers(small))
-def most():  # not `getrusage`, which would begin with what the process that started this one holds
-    return int(dict(line.split(":") for line in open("/proc/self/status"))["VmHWM"].split()[0])
-before, started = most(), time.process_time()
-q_depth(a, b, method={method!r}, layers_mm=linear_layers(a.camera))
-print(time.process_time() - started, (most() - before) / 2**20)
-"""
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT)
-    seconds, gib = map(float, run.stdout.split())
-    return seconds, gib
+    """Return the table of the page of speed and accuracy."""
+    return {("docs/speed_accuracy.md", "evaluation"): front_table(measured())}
 
 
 def accuracy(name: str) -> list[dict[str, Any]]:
@@ -218,38 +107,6 @@ def compared(shot: Shot, decoded: IIPicture, found: Any, measured: Any) -> dict[
     return {"right": float(right.mean()), "off_db": float(np.average(off, weights=true.counts[held]))}
 
 
-def draw(data: dict[str, Any]) -> Any:
-    """Draw accuracy against time, one row per parameter."""
-    points = data["accuracy"]
-    kinds = list(dict.fromkeys(point["what"] for point in points))
-    titles = {"layers": "number of layers", "EIs": "number of EIs, B + R", "filter": "side of the filter h"}
-    figure = new_figure(8.5, 3 * len(kinds) + 0.8)
-    panels = figure.subplots(len(kinds), 2, sharey="col", squeeze=False)
-    lines = list(dict.fromkeys((point["scene"], point["method"]) for point in points))
-    for row, what in zip(panels, kinds, strict=True):
-        for i, (scene, method) in enumerate(lines):
-            line = [p for p in points if (p["what"], p["scene"], p["method"]) == (what, scene, method)]
-            for axes, value in zip(row, ("right", "off_db"), strict=True):
-                x, y = [p["cpu_seconds"] for p in line], [p[value] for p in line]
-                axes.plot(x, y, marker=MARKERS[i], color=COLOURS[i], label=f"{scene}, {method}")
-                for at, point in zip(zip(x, y, strict=True), line, strict=True):
-                    axes.annotate(point["number"], at, xytext=(3, 4), textcoords="offset points", fontsize=9)
-        for axes in row:
-            axes.set_title(titles[what], loc="left", fontsize=11)
-        row[0].set_ylabel("depths correct within 10 % [share]")
-        row[1].set_ylabel(r"$Q_\mathrm{depth}$ error against true depth [dB]")
-    for axes in panels[-1]:
-        axes.set_xlabel("CPU time [s]")
-    for axes in panels.flat:
-        axes.set_xlim(left=0)
-        axes.grid(True, color="0.9", linewidth=0.8)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
-    handles, names = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=2, frameon=False)
-    return figure
-
-
 def fronts(points: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
     """Return the Pareto front of time and correct depths of each scene, by time."""
     found: dict[str, list[dict[str, Any]]] = {point["scene"]: [] for point in points}
@@ -272,18 +129,18 @@ def setting(point: dict[str, Any]) -> str:
     return f"{point['method']}, {changed}"
 
 
-def front_table(data: dict[str, Any]) -> list[str]:
+def front_table(points: list[dict[str, Any]]) -> list[str]:
     """Return the fronts as a table, the recommended setting in bold."""
     lines = ["| scene | setting | correct depths | error of Q_depth | CPU time |", "|---|---|---|---|---|"]
     commits = []
-    for scene, best in fronts(data["accuracy"]).items():
+    for scene, best in fronts(points).items():
         pick = recommended(best)
         for point in best:
             name = f"**{setting(point)}**" if point is pick else setting(point)
             cells = f"{point['right']:.0%} | {point['off_db']:.1f} dB | {point['cpu_seconds']:.2f} s"
             lines.append(f"| {scene} | {name} | {cells} |")
             commits.append([point["commit"]])
-    size = f"`setup1` at `scale={SCALE}`, JPEG 2000 at {BPP} bit/pixel. {origin(data['accuracy'])}"
+    size = f"`setup1` at `scale={SCALE}`, JPEG 2000 at {BPP} bit/pixel. {origin(points)}"
     return [
         size,
         "",
@@ -324,22 +181,6 @@ def draw_front(points: list[dict[str, Any]]) -> Any:
     handles, names = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     return figure
-
-
-def _cpu(call: Callable[[], object]) -> float:
-    started = time.process_time()
-    call()
-    return time.process_time() - started
-
-
-def _peak(call: Callable[[], object]) -> float:
-    """Return the peak MiB allocated by Python and numpy during a call."""
-    tracemalloc.start()
-    try:
-        call()
-        return tracemalloc.get_traced_memory()[1] / 2**20
-    finally:
-        tracemalloc.stop()
 
 
 if __name__ == "__main__":

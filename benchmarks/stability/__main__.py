@@ -1,7 +1,7 @@
 """Limits of the methods, measured: ``python -m benchmarks run stability [-- case ...]``.
 
 Every case sweeps one parameter up to failure; cases can be run one by one. Numbers go to
-``benchmarks/results/stability.jsonl``, pictures to ``docs/images``, tables to ``docs/stability.md``,
+``benchmarks/results/stability.jsonl``, the chart to ``docs/images``, tables to ``docs/stability.md``,
 with those of ``benchmarks.accuracy.convergence``.
 """
 
@@ -12,26 +12,26 @@ from typing import Any
 
 from benchmarks.accuracy import convergence
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import IMAGES, tidy, write_chart, write_picture
+from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin
 from benchmarks.records import table as markdown
-from benchmarks.stability import curves, depth, geometry, light, picture, pictures
+from benchmarks.stability import curves, depth, geometry, light, picture
 from benchmarks.stability.excerpts import EXCERPTS, Excerpt
 from benchmarks.stability.geometry import Row
 from ii_core.depth.focus import METHODS
 from ii_core.display.figure import COLOURS, new_figure
 
-ACCURACY = tuple(f"benchmarks.accuracy.{name}" for name in ("analytic", "map_precision", "depth_truth"))
+ACCURACY = tuple(f"benchmarks.accuracy.{name}" for name in ("analytic", "depth_truth"))
 RECORDS = Records("stability", ("benchmarks.stability", *ACCURACY))
 CASES: dict[str, Callable[[], list[Row]]] = {
     case.__name__: case
     for case in (
         geometry.lift, geometry.scales, geometry.coplanar, geometry.contact_shadow, geometry.bad_faces,
         geometry.huge_beside_tiny, light.terminator, light.covered, light.grazing, light.camera_in_glass,
-        light.camera_in_body, light.lamp_at_surface, light.bounces, picture.pitches, picture.view_borders,
-        picture.rate_ends, picture.tiny_frames, picture.quantised_maps, picture.map_bits, depth.depth_contrast,
-        depth.depth_noise, depth.depth_kinds, depth.depth_two_layers, depth.depth_highlight, curves.bd_overlap,
+        light.camera_in_body, light.lamp_at_surface, light.bounces, picture.view_borders, picture.rate_ends,
+        picture.tiny_frames, depth.depth_contrast,
+        depth.depth_kinds, depth.depth_two_layers, depth.depth_highlight, curves.bd_overlap,
         curves.bd_dents,
         curves.bd_points,
     )
@@ -40,8 +40,6 @@ CASES: dict[str, Callable[[], list[Row]]] = {
 PIVOTS = {
     "rate_ends": (("asked, bit/pixel",), "scheme", ("got, bit/pixel", "PSNR, dB", "said reached")),
     "tiny_frames": (("lenses", "pixels a lens"), "scheme", ("got, bit/pixel", "PSNR, dB")),
-    "quantised_maps": (("stored as",), "camera", ("direction off, µrad", "apples, dB", "cuboid, dB")),
-    "depth_noise": (("scene",), "noise, steps", ("dissertation", "robust")),
     "depth_kinds": (("seen", "pixels"), "noise, steps", ("dissertation", "robust")),
 }
 
@@ -55,8 +53,6 @@ def main() -> None:
     if unknown := set(asked) - set(CASES):
         parser.error(f"unknown case {', '.join(sorted(unknown))}: known are {', '.join(CASES)}")
     RECORDS.run(({"case": name} for name in asked), lambda case: {"rows": CASES[case]()}, arguments.again)
-    write_picture(IMAGES / "stability_pictures.webp", pictures.rendering(), lossless=True)
-    write_picture(IMAGES / "stability_pictures_2.webp", pictures.coding_and_depth(), lossless=True)
     cases = {name: row["rows"] for name, row in measured().items()}
     if missing := set(CASES) - set(cases):
         print(f"the page lacks results of {', '.join(sorted(missing))}")
@@ -109,11 +105,9 @@ def orders() -> list[str]:
     for name, expected in found["expected"].items():
         values = [name.replace("_", ", "), *map(number, (first[name], last[name], found["orders"][name]))]
         lines.append(f"{' | '.join(values)} ({expected})")
-    for lens, orders in found["lens_orders"].items():
-        rows = [row for row in found["lenses"] if row["lens"] == lens]
-        for kind, expected in (("flat", 1), ("smooth", 2)):
-            ends = number(rows[0][kind]), number(rows[-1][kind])
-            lines.append(f"{lens} lens, {kind} | {ends[0]} | {ends[1]} | {number(orders[kind])} ({expected})")
+    for kind, expected in (("flat", 1), ("smooth", 2)):
+        ends = [number(found["lenses"][i][kind]) for i in (0, -1)]
+        lines.append(f"ball lens, {kind} | {ends[0]} | {ends[1]} | {number(found['lens_orders'][kind])} ({expected})")
     worst = max(abs(row["off"]) for row in found["images"])
     heads = f"error | {first['segments']} segments | {last['segments']} segments | order"
     told = f"Images of a ball lens lie where Gauss puts them to {worst:.1g} of their distance."
@@ -157,8 +151,6 @@ PANELS: list[tuple[str, str, list[str], str, str]] = [
     ("grazing", "angle, rad", ["place off by, mm"], "xy", "hits at grazing angles, mm off"),
     ("view_borders", "of half the viewing angle", ["PSNR of linear light, dB"], "", "views from aside, dB"),
     ("bounces", "depth", ["light missing"], "y", "light missing in a room of mirrors"),
-    ("pitches", "pixels a lens", ["PSNR, dB"], "", "resampled lenses, dB"),
-    ("map_bits", "bits", ["apples, dB", "cuboid, dB"], "", "stored directions, dB"),
     ("depth_contrast", "contrast, steps", [f"{method}, σ {sigma}" for method in METHODS for sigma in (0, 1)], "x",
      "depth of a wall found, share"),
     ("depth_two_layers", "of the light from behind", [f"mirror, robust: {what}" for what in ("wall", "behind")], "",
@@ -172,8 +164,8 @@ PANELS: list[tuple[str, str, list[str], str, str]] = [
 
 def chart(cases: Mapping[str, list[Row]]) -> Any:
     """Draw one panel per sweep."""
-    figure = new_figure(8.5, 19)
-    for axes, (case, across, names, logarithmic, title) in zip(figure.subplots(8, 2).flat, PANELS, strict=True):
+    figure = new_figure(8.5, 16.6)
+    for axes, (case, across, names, logarithmic, title) in zip(figure.subplots(7, 2).flat, PANELS, strict=True):
         rows = [row for row in cases[case] if row[across] is not None]
         smallest = min(row[across] for row in rows if row[across] > 0)
         for i, name in enumerate(names):

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.accuracy import depth_truth
 from benchmarks.stability.geometry import Row
@@ -123,22 +122,8 @@ def depth_highlight() -> list[Row]:
     return rows
 
 
-def depth_noise() -> list[Row]:
-    """Return the share of pixels within a tenth of their depth, over noise, by scene, from `depth_truth`."""
-    rows = [row for row in _kept() if row["scale"] == 8]
-    return [
-        {
-            "scene": scene,
-            "noise, steps": noise,
-            **{method: _only(rows, scene, noise, method)["within_10_%"] for method in METHODS},
-        }
-        for scene in dict.fromkeys(row["scene"] for row in rows)
-        for noise in sorted({row["noise"] for row in rows})
-    ]
-
-
 def depth_kinds() -> list[Row]:
-    """Return the same by kind of pixel, over all scenes."""
+    """Return the share of pixels within a tenth of their depth, by kind, over all scenes, from `depth_truth`."""
     rows = [row for row in _kept() if row["scale"] == 8]
     out = []
     for kind in KINDS:
@@ -156,14 +141,3 @@ def depth_kinds() -> list[Row]:
 
 def _kept() -> list[dict[str, Any]]:
     return list(depth_truth.data()["rows"])
-
-
-def _only(rows: list[dict[str, Any]], scene: str, noise: float, method: str) -> dict[str, Any]:
-    (row,) = (r for r in rows if (r["scene"], r["noise"], r["method"]) == (scene, noise, method))
-    return row
-
-
-def shown(found: FocusDepth) -> NDArray[np.uint8]:
-    """Return a depth map as grey levels: near is bright, pixels without depth are black."""
-    z = found.layer + 1.0
-    return np.where(found.layer < 0, 0, np.clip(300 - 55 * np.log(np.maximum(z, 1)), 20, 255)).astype(np.uint8)

@@ -68,17 +68,13 @@ EXCERPTS: dict[str, Excerpt] = {
     "camera_in_body": Excerpt(columns=("scene", "inside seen", "lit")),
     "lamp_at_surface": Excerpt(keep={"height / lift": (-1, 0, 0.9, 1.1, 10)}, columns=("height / lift", "lit")),
     "bounces": Excerpt(keep={"depth": (0, 4, 16, 64)}, columns=("depth", "light missing", "largest difference")),
-    "pitches": Excerpt(keep={"pixels a lens": (16, 16.1, 16.5, 17)}, columns=("pixels a lens", "PSNR, dB")),
     "view_borders": Excerpt(
         keep={"of half the viewing angle": (0, 0.95, 1, 1.05, 1.5)},
         columns=("of half the viewing angle", "PSNR of linear light, dB", "without a pixel"),
     ),
     "rate_ends": Excerpt(keep={"asked, bit/pixel": (0.001, 1, 12, 60)}, across=False),
     "tiny_frames": Excerpt(keep={"pixels a lens": ("1×1", "2×2", "7×9")}, across=False),
-    "quantised_maps": Excerpt(keep={"camera": ("setup1",)}, across=False),
-    "map_bits": Excerpt(keep={"bits": (8, 12, 14, 16, 20)}),
     "depth_contrast": Excerpt(keep={"contrast, steps": (0, 8, 16, 32, 128)}),
-    "depth_noise": Excerpt(keep=NOISE, across=False),
     "depth_kinds": Excerpt(keep=NOISE, across=False),
     "depth_two_layers": Excerpt(
         keep={"of the light from behind": (0.1, 0.25, 0.5, 0.75, 1)},

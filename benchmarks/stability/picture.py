@@ -2,92 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from benchmarks.accuracy import map_precision
 from benchmarks.accuracy.analytic import still_life
 from benchmarks.stability.geometry import Row
 from codec import decode, encode
-from ii_core import IICamera, IIPicture, preset, view_image
-from ii_core.base.colour import srgb
-from ii_core.picture.regular import resampled
+from ii_core import IIPicture, preset, view_image
 from metrics import q_global
 from raytrace_ii import load_scene, render, trace
 
 
-def quantised_maps() -> list[Row]:
-    """Return the records of `benchmarks.accuracy.map_precision`."""
-    rows = map_precision.RECORDS.rows(scale=map_precision.SCALE)
-    return [
-        {
-            "camera": row["camera"], "stored as": row["format"], "direction off, µrad": row["angle_max_urad"],
-            "place off, µm": row["place_max_um"], "apples, dB": _finite(row["psnr_apples"]),
-            "cuboid, dB": _finite(row["psnr_cuboid"]),
-        }
-        for row in rows
-    ]  # fmt: skip
-
-
-def map_bits() -> list[Row]:
-    """Return the loss of the picture by unit directions of so many bits per component, over −1…1."""
-    camera = preset("setup1", scale=16)
-    L, D = camera.rays()
-    scenes = {name: load_scene(name) for name in ("apples", "cuboid")}
-    exact = {name: _srgb(trace(scene, L, D).radiance) for name, scene in scenes.items()}
-    D = _unit(D)
-    rows = []
-    for bits in (6, 8, 10, 12, 14, 16, 20):
-        step = 2 / (2**bits - 1)
-        coarse = step * np.rint((D + 1) / step) - 1
-        off = np.linalg.norm(np.cross(D, _unit(coarse)), axis=-1).max()
-        row: Row = {"bits": bits, "direction off, µrad": float(1e6 * off)}
-        for name, scene in scenes.items():
-            mse = float(np.mean((_srgb(trace(scene, L, coarse).radiance) - exact[name]) ** 2))
-            row[f"{name}, dB"] = float(-10 * np.log10(mse)) if mse > 0 else None
-        rows.append(row)
-    return rows
-
-
-def _unit(vectors: Any) -> Any:
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
-def _srgb(light: Any) -> Any:
-    return srgb(np.clip(light.astype(np.float64), 0, 1))
-
-
 def _finite(value: float | None) -> float | None:
     return value if value is not None and np.isfinite(value) else None
-
-
-def pitches() -> list[Row]:
-    """Return PSNR of resampled pictures of lenses of 16 to 17 pixels, against pictures of the regular camera."""
-    scene = still_life().scene(192)
-    lenses = (32, 16)
-    usual = preset("setup1", scale=16)
-    rows = []
-    for pitch in (16.0, 16.05, 16.1, 16.25, 16.5, 16.75, 17.0):
-        pixels = tuple(int(np.ceil(n * pitch)) for n in lenses)
-        camera = IICamera(
-            pixels=pixels, lenses=lenses, pixel_pitch_mm=usual.lens_pitch_mm[0] / pitch, gap_mm=usual.gap_mm,
-            lens_pitch_mm=usual.lens_pitch_mm[0],
-        )  # fmt: skip
-        taken = render(scene, camera, samples=4, support=()).picture
-        regular, valid = resampled(taken)
-        assert isinstance(regular.camera, IICamera)
-        direct = render(scene, regular.camera, samples=4, support=()).picture
-        error = (regular.pixels.astype(float) - direct.pixels)[valid]
-        mse = float(np.mean(error**2))
-        rows.append(
-            {
-                "pixels a lens": pitch, "brought to": regular.ei_pixels[0],
-                "PSNR, dB": float(10 * np.log10(255**2 / mse)) if mse > 0 else None,
-                "without a sample": float(1 - valid.mean()),
-            }
-        )  # fmt: skip
-    return rows
 
 
 def view_borders() -> list[Row]:

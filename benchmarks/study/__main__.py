@@ -9,7 +9,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from . import __doc__ as about
-from . import pictures, rates, scripts, structures, views
+from . import pictures, rates, structures, views
 from .page import publish
 from .runner import Step, perform
 
@@ -58,4 +58,4 @@ def all_steps(scale: int) -> list[Step]:
     """
     if scale not in (1, 2, 4, 8, 16):
         raise ValueError(f"scale is {scale}: 1, 2, 4, 8 or 16 is needed")
-    return [step for part in (pictures, rates, views, structures, scripts) for step in part.steps(scale)]
+    return [step for part in (pictures, rates, views, structures) for step in part.steps(scale)]

@@ -16,7 +16,7 @@ from metrics.plots.depth_chart import depth_rate_chart
 from metrics.plots.rd_chart import edges, set_rate_axis
 
 from .claims import NAMES, Results, of_scenes
-from .rates import MODERN, REFERENCE, SI, VOLUME
+from .rates import REFERENCE, SI, VOLUME
 
 LABELS = {
     **{scheme: f"{name}-PVS" for scheme, name in NAMES.items()},
@@ -232,7 +232,6 @@ def best_of(duel: Mapping[str, Any], rate: float) -> tuple[str | None, str]:
 
 CHARTS: dict[str, Callable[[Results], Any]] = {
     "rates": over_rate("rates", THEIRS),
-    "rates-modern": over_rate("rates", (SI, "si-h264", *MODERN, REFERENCE)),
     "orders": over_rate(
         "orders", tuple(f"{SI},order={o}" for o in ("row", "column", "parallel", "zigzag", "spiral"))
     ),

@@ -375,15 +375,6 @@ def decline(values: np.ndarray, pixels: np.ndarray) -> float:
     return pooled(values, np.where(near, pixels, 0)) - pooled(values, np.where(near, 0, pixels))
 
 
-def by_detail(row: Sequence[Any], depth_mm: Sequence[float], detail: Mapping[str, Any]) -> tuple[float, float, float]:
-    """Return the fluctuation of Q_depth, its correlation with the detail of layers, and the residual."""
-    value = dict(zip(depth_mm, (number(v) for v in row), strict=True))
-    pairs = [(-10 * np.log10(1 + d), value[z]) for z, d in zip(detail["depth_mm"], detail["detail"], strict=True)]
-    x, y = np.array([pair for pair in pairs if np.isfinite(pair[1])]).T
-    left = y - np.polyval(np.polyfit(x, y, 1), x)
-    return float(y.std()), float(np.corrcoef(x, y)[0, 1]), float(left.std())
-
-
 def fluctuation(values: np.ndarray, pixels: np.ndarray) -> float:
     """Return the standard deviation over layers with pixels."""
     return float(np.std(values[(pixels > 0) & np.isfinite(values)]))

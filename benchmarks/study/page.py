@@ -18,17 +18,16 @@ from metrics.rates.rd import UndefinedDifference
 
 from . import beside, theirs
 from .charts import LABELS, draw_all
-from .claims import Claim, Results, by_detail, claims, gain, of_scenes, shown, type_table
+from .claims import Claim, Results, claims, gain, of_scenes, shown, type_table
 from .coding import SCENES
-from .rates import APART, BFRAMES, GOPS, MODEL, MODERN, PVS, REFERENCE, SI, VOLUME
+from .rates import APART, BFRAMES, GOPS, MODEL, REFERENCE, SI, VOLUME
 from .runner import FORMAT, VERSION, digest_of
 from .theirs import said
 
 PAGE, IMAGES = ROOT / "docs" / "study.md", ROOT / "docs" / "images" / "study"
+MEANT_SMALL = ("plane-", "types-2008-", "component-images", "other-cameras")  # steps
 KEPT = ROOT / "benchmarks/results/study.jsonl.gz"  # compressed to a sixth of its size
 PHOTOGRAPHS = {"component-images": ".jpg", "other-cameras": ".jpg", "artefacts-": ".webp", "equal-": ".webp"}
-TIMED_RATES = (0.015, 0.15, 0.63, 1.5)  # bpp
-OLDER = ("types-2008-4", "types-2008-2", "types-2008")  # from small pictures to large
 
 
 def publish(folder: Path, *, page: Path = PAGE, images: Path = IMAGES, kept: Path = KEPT) -> None:
@@ -55,7 +54,6 @@ def tables(kept: Path = KEPT) -> Tables:
     made = {
         **shown_tables(results, best),
         "gain-by-size": sizes(everything),
-        "view-by-size": views_by_size(everything),
     }
     return {("docs/study.md", mark): lines for mark, lines in made.items()}
 
@@ -112,36 +110,11 @@ def sizes(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
     return lines
 
 
-def views_by_size(everything: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
-    """Return a table of Q_view at 0.15 bpp of sub-images and elementary images by lenses, below full setup 3."""
-    found: dict[tuple[str, int], str] = {}
-    for scene in SCENES:
-        for record in everything.get(f"artefacts-{scene}", ()):
-            points = {p["scheme"]: p for p in record["result"]["points"]}
-            pair = (points[scheme] for scheme in (SI, "ei-h264:chroma=420"))
-            cell = " · ".join(f"{p['q_view']:.3f}" + ("" if p["reached"] else f" ({p['bpp']:.2f} bpp)") for p in pair)
-            found[scene, record["parameters"]["scale"]] = cell
-    lines = ["| lenses | " + " | ".join(SCENES) + " |", "|---" * (len(SCENES) + 1) + "|"]
-    for scale in sorted({scale for _, scale in found if scale > 1}, reverse=True):
-        cells = [found.get((scene, scale), "") for scene in SCENES]
-        lines.append(f"| {64 // scale}×{64 // scale} | " + " | ".join(cells) + " |")
-    return lines
-
-
 def smaller(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Return a sentence with the steps that have no result at full size."""
-    found: dict[int, list[str]] = {}
-    for name, record in best.items():
-        scale = record["parameters"].get("scale", 1)
-        if scale > 1 and not name.startswith(("plane-", "types-2008-", "component-images", "other-cameras")):
-            found.setdefault(scale, []).append(name)
-    plane = best.get("plane-apples-1", {"parameters": {"scale": 1}})["parameters"]["scale"]
-    if plane > 1:
-        found.setdefault(plane, []).append("plane-*")
-    if not found:
-        return ["All at full size."]
-    lists = [f"at scale {scale} " + ", ".join(f"`{n}`" for n in names) for scale, names in sorted(found.items())]
-    return ["Not at full size yet: " + "; ".join(lists) + ". What disagrees there may be no more than that."]
+    small = [name for name, record in best.items() if record["parameters"].get("scale", 1) > 1]
+    named = [f"`{name}`" for name in small if name == "plane-apples-1" or not name.startswith(MEANT_SMALL)]
+    return [f"Not at full size yet: {', '.join(named)}." if named else "All at full size."]
 
 
 def shown_tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
@@ -150,13 +123,10 @@ def shown_tables(results: Results, best: Mapping[str, Mapping[str, Any]]) -> dic
     return {
         "agreement": [*summary(made), "", *smaller(best)],
         **beside.tables(made),
-        "gains-modern": gains_modern(results),
         "table-types": types_beside(results),
         "volume-model": volume_table(results),
-        "times-by-rate": time_table(results),
-        "detail": detail_table(results),
         "artefact-rates": artefact_table(results),
-        "records": record_table(best),
+        "records": origins(best),
     }
 
 
@@ -210,40 +180,6 @@ def volume_table(results: Results) -> list[str]:
     return table(" | ".join(["our volume", *scenes]), lines) if scenes else []
 
 
-def time_table(results: Results) -> list[str]:
-    """Return a table of CPU seconds of SI-PVS and JPEG 2000 by rate: encoding, decoding."""
-    made = of_scenes(results, "rates")
-    if not made:
-        return []
-    points = next(iter(made.values()))["points"]
-    rates = sorted({p["target_bpp"] for p in points if p["scheme"] == REFERENCE}.intersection(TIMED_RATES))
-    lines = []
-    for scheme in (SI, REFERENCE):
-        own = {p["target_bpp"]: p for p in points if p["scheme"] == scheme}
-        cells = [
-            f"{own[r]['encode_seconds']:.2f} · {own[r]['decode_seconds']:.2f}" if r in own else "" for r in rates
-        ]
-        lines.append([LABELS[scheme], *cells])
-    return table(" | ".join(["", *(f"{rate:g} bpp" for rate in rates)]).strip(), lines)
-
-
-def detail_table(results: Results) -> list[str]:
-    """Return a table of the dependence of Q_depth on the detail of layers."""
-    judged, detail = of_scenes(results, "equal"), of_scenes(results, "detail")
-    scenes = [scene for scene in judged if scene in detail]
-    if not scenes:
-        return []
-    lines = []
-    for place, first in enumerate(judged[scenes[0]]["rows"]):
-        cells = []
-        for scene in scenes:
-            row, depth_mm = judged[scene]["rows"][place]["q_depth"], judged[scene]["depth_mm"]
-            _, correlation, left = by_detail(row, depth_mm, detail[scene])
-            cells.append(f"{correlation:.2f} · {left:.1f}")
-        lines.append([LABELS[first["scheme"]], *(cell.replace("-", "−") for cell in cells)])
-    return table(" | ".join(["", *scenes]).strip(), lines)
-
-
 def artefact_table(results: Results) -> list[str]:
     """Return PSNR of the front view and Q_view of the pictures of Figures 5.13 to 5.18, with a rate not reached."""
     steps = {"setup 1, apples": "artefacts-setup1", **{f"setup 3, {s}": f"artefacts-{s}" for s in SCENES}}
@@ -261,21 +197,6 @@ def artefact_table(results: Results) -> list[str]:
     return lines
 
 
-def gains_modern(results: Results) -> list[str]:
-    """Return a table of Bjøntegaard rates of the study's schemes to SI-PVS and JPEG 2000."""
-    made = of_scenes(results, "rates")
-    schemes = (SI, *PVS[1:], *MODERN, VOLUME, REFERENCE)
-    curves = {
-        scene: {s: pairs([p for p in result["points"] if p["scheme"] == s]) for s in schemes}
-        for scene, result in made.items()
-    }
-    lines = []
-    for scheme in schemes:
-        pair = ([rate_cell(curves[scene][one], curves[scene][scheme]) for one in (SI, REFERENCE)] for scene in made)
-        lines.append([LABELS.get(scheme, scheme), *(" · ".join(cells) for cells in pair)])
-    return table(" | ".join(["scheme", *made]), lines)
-
-
 def pairs(points: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
     """Return (rate, PSNR) of a rising curve, from either form of points."""
     same = [{"bpp": p["bpp"], "psnr": p["psnr"] if "psnr" in p else float(p["q_global"])} for p in points]
@@ -290,15 +211,9 @@ def rate_cell(anchor: Sequence[tuple[float, float]], curve: Sequence[tuple[float
         return "–"
 
 
-def record_table(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Return a row a commit: its steps, their CPU seconds, and how many repetitions were equal."""
-    by_commit: dict[str, list[Mapping[str, Any]]] = {}
-    for record in best.values():
-        git = record["git"] or {"commit": "none", "dirty": False}
-        by_commit.setdefault(git["commit"][:10] + (", dirty" if git["dirty"] else ""), []).append(record)
-    lines = []
-    for commit, records in by_commit.items():
-        again = [record["repeats"] for record in records if record.get("repeats") is not None]
-        seconds = sum(record.get("cpu_seconds", 0) for record in records)
-        lines.append([commit, len(records), f"{seconds:.0f}", f"{sum(again)} of {len(again)}" if again else "–"])
-    return table("commit | steps | CPU seconds | repeated alike", lines)
+def origins(best: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return the commits of the shown records, and how many of the repeated ones were equal."""
+    again = [record["repeats"] for record in best.values() if record.get("repeats") is not None]
+    git = (record["git"] or {"commit": "none", "dirty": False} for record in best.values())
+    commits = dict.fromkeys(f"`{one['commit'][:7]}{'+' * one['dirty']}`" for one in git)
+    return [f"Measured by {', '.join(commits)}; {sum(again)} of {len(again)} repeated steps gave the same bits."]

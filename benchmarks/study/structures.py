@@ -6,13 +6,20 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from benchmarks.coding.headers import SIDES, duel
-from ii_core import preset
+import numpy as np
+
+from codec import decode, encode
+from codec.inspect.header_bits import floor, si_below_ei, si_below_ri
+from ii_core import IIPicture, preset
 from ii_core.base.parallel import cores
+from metrics import q_global
 from raytrace_ii import load_scene, render
 
 from .runner import Step
 
+SIDES = (16, 32, 64, 128, 256)  # pixels of an elementary image
+RATES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
+KINDS = ("si", "ei", "ri")
 SCENES = ("apples", "car")  # scenes of Figure 5.12
 SMALLER = (1, 2, 4, 8)  # divisors of the lenses of setup 2
 FEWEST = (4, 2)  # least number of lenses across and down
@@ -27,9 +34,8 @@ def steps(scale: int) -> list[Step]:
         sides = [side for side in SIDES if fits(side, scale * smaller)]
         shows = "Figure 5.12" if smaller == 1 else "(5.14), (5.15) for smaller pictures"
         given = {"scene": scene, "scale": scale * smaller, "sides": sides}
-        name, uses = f"plane-{scene}-{smaller}", ("benchmarks.coding.headers",)
         if sides:
-            found.append(Step(name=name, shows=shows, run=duels, parameters=given, uses=uses))
+            found.append(Step(name=f"plane-{scene}-{smaller}", shows=shows, run=duels, parameters=given))
     return found
 
 
@@ -52,3 +58,29 @@ def duels(_folder: Path, *, scene: str, scale: int, sides: list[int]) -> dict[st
 
     with ThreadPoolExecutor(cores()) as pool:
         return {"duels": list(pool.map(one, sides))}
+
+
+def duel(picture: IIPicture) -> dict[str, Any]:
+    """Return PSNR of the three kinds at equal rates, H.264 at constant bit rate, without missed rates."""
+    psnr: dict[str, dict[float, float]] = {}
+    for kind in KINDS:
+        psnr[kind] = {}
+        for rate in RATES:
+            coded = encode(picture, f"{kind}-h264:rate=cbr", bpp=rate)
+            if coded.reached:
+                psnr[kind][rate] = q_global(picture, decode(coded))
+    structure = picture.lenses, picture.ei_pixels
+    black = {kind: floor(f"{kind}-h264", *structure).bits for kind in KINDS}
+    found: dict[str, Any] = {
+        "psnr": {kind: {f"{r:g}": q for r, q in points.items()} for kind, points in psnr.items()}
+    }
+    for other, predicted in (("ei", si_below_ei(*structure)), ("ri", si_below_ri(*structure))):
+        both = psnr["si"].keys() & psnr[other].keys()
+        found[other] = {
+            "predicted": predicted,
+            "fewer_header_bits": black["si"] < black[other],
+            "gain_db": float(np.mean([psnr["si"][r] - psnr[other][r] for r in both])) if both else None,
+            "rates_both": sorted(both),
+            "lowest": {kind: min(psnr[kind], default=None) for kind in ("si", other)},
+        }
+    return found

@@ -52,8 +52,6 @@ RATE_28_DB = {"JPEG 2000": 0.35, "PVI": 0.26, "SI": 0.14, "EI": 0.08}
 # Figure 5.21 and §5.8.5.3: EI-PVS and JPEG 2000 lose most from near to far, SI-PVS less; SI-PVI fluctuates least.
 DECLINE = {"EI": 2.0, "JPEG 2000": 2.0, "SI": 1.0}
 FLUCTUATION = {"EI": 3.0, "JPEG 2000": 3.0, "SI": 2.0, "PVI": 1.0}
-# Figure 5.23: SI-PVS has the higher mean and the higher minimum over depth.
-DEPTH_MEAN = {"SI": 1.0, "JPEG 2000": 0.0}
 
 TWICE = 2.0
 

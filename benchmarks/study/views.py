@@ -14,7 +14,6 @@ from codec import decode, encode
 from ii_core import IIPicture, five_viewpoints, view_image
 from ii_core.base.files import write_image
 from ii_core.base.parallel import cores
-from ii_core.depth.layers import virtual_viewpoint
 from ii_core.picture.view import camera_of
 from metrics import (
     FocusDepth,
@@ -56,7 +55,6 @@ def steps(scale: int) -> list[Step]:
             ("views", "Figures 5.19, 5.22, 5.23", over_rate, {"schemes": (*SHOWN, *BEYOND)}),
             ("artefacts", f"Figure 5.{figure}", artefacts, {"camera": "setup3", "crop": None}),
             ("equal", "Figures 4.5, 4.6, 5.20, 5.21", equal, {"schemes": SHOWN}),
-            ("detail", "why Q_depth fluctuates in Figure 5.21", detail, {}),
         ):
             given = {"scene": scene, "scale": small, **parameters}
             shown = f"{shows}, {scene}"
@@ -143,27 +141,6 @@ def judged(made: Shot, focus: FocusDepth, decoded: IIPicture, coded: Any) -> dic
         "q_angle": rounded(angle[angle.shape[0] // 2].tolist()),
         "q_depth": rounded(layers.values.tolist()),
         "q_depth_focus": rounded(guessed.values.tolist()),
-    }
-
-
-def detail(_folder: Path, *, scene: str, scale: int) -> dict[str, Any]:
-    """Return the mean squared difference of neighbouring pixels of the virtual camera's view by layer."""
-    made = shot(scene, "setup3", scale)
-    assert made.picture.camera is not None
-    layers = q_depth(made.picture, made.picture, **truth(made))
-    view, _ = view_image(made.picture, virtual_viewpoint(made.picture.camera), interpolation="nearest")
-    down, across = (np.square(np.diff(view.astype(float), axis=axis)).mean(axis=2) for axis in (0, 1))
-    steps = np.zeros(view.shape[:2])
-    steps[1:] += down
-    steps[:-1] += down
-    steps[:, 1:] += across
-    steps[:, :-1] += across
-    inside = layers.layer >= 0
-    total = np.bincount(layers.layer[inside], weights=steps[inside], minlength=layers.counts.size)
-    held = layers.counts > 0
-    return {
-        "depth_mm": rounded(layers.depth_mm[held].tolist()),
-        "detail": rounded((total[held] / layers.counts[held]).tolist()),
     }
 
 

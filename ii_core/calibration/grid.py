@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from ..base.extras import Lazy
 from ..camera.lattice import DRIFT_TERMS, Drift, Lattice, axes_of, drift_terms
 from .mean_image import MeanImage
-from .peaks import FEWEST, SMOOTH, Floats, Summits, Vectors, lattice_vectors, middle_of_one
-from .refusal import NoLenses
+from .peaks import FEWEST, SMOOTH, Floats, NoLenses, Summits, Vectors, lattice_vectors, middle_of_one
 
 ndimage = Lazy("scipy.ndimage")
 

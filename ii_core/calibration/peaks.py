@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.extras import Lazy
-from .refusal import NoLenses
 
 ndimage = Lazy("scipy.ndimage")
 
@@ -23,6 +22,10 @@ STEP = 0.4  # σ, from the centre to the samples round it: with 0.6 they met the
 KERNEL = 2.5  # σ, where the kernel ends: half a pitch, short of the neighbours' light
 Floats = NDArray[np.float64]
 Vectors = tuple[Floats, Floats]
+
+
+class NoLenses(ValueError):
+    """A picture in which no lens grid is found."""
 
 
 def lattice_vectors(grey: NDArray[np.float32]) -> Vectors:

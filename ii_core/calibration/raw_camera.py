@@ -18,7 +18,7 @@ from ..formats.lytro import RawColour
 from ..picture.picture import IIPicture
 from ..picture.regular import owners
 from .demosaic import METHODS, MOSAICS, demosaiced, evened
-from .refusal import NoLenses
+from .peaks import NoLenses
 
 if TYPE_CHECKING:  # scipy takes a third of a second
     from .grid import LensGrid

@@ -1,4 +1,4 @@
-"""Cameras by name, from the JSON files of ``assets/cameras`` or of the user."""
+"""Cameras by name from ``assets/cameras.json``, or from JSON files of the user."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ from .prescriptions import placed
 from .surfaces import surfaces_of
 
 ALIASES = {"setup2": "setup2-16"}
+PACKAGE = Path(str(files(assets) / "cameras.json"))
 
 
 def camera_names() -> dict[str, str]:
     """Return the names of the cameras of the package with a description in one line."""
-    return {path.stem: str(_read(path).get("about", "")) for path in _folder().glob("*.json")}
+    return {name: str(camera.get("about", "")) for name, camera in _read(PACKAGE).items()}
 
 
 @checks.checked(name=checks.path, scale=checks.number)
@@ -61,17 +62,17 @@ def preset_cameras(name: str | os.PathLike[str], *, scale: int = 1) -> tuple[IIC
 
     Parameters and errors are those of `preset`.
     """
-    path = Path(name)
-    if path.suffix != ".json":
-        stem = ALIASES.get(str(name), str(name))
-        if stem not in {found.stem for found in _folder().glob("*.json")}:
-            known = ", ".join([*sorted(camera_names()), *ALIASES])
-            raise ValueError(f"unknown camera {checks.shown(str(name))}: known are {known}, or give a .json file")
-        path = _folder() / f"{stem}.json"
-    data = _read(path)
+    path, stem = Path(name), ALIASES.get(str(name), str(name))
+    if path.suffix == ".json":
+        data, stem, folder = _read(path), path.stem, path.parent
+    else:
+        if stem not in (known := _read(PACKAGE)):
+            names = ", ".join([*known, *ALIASES])
+            raise ValueError(f"unknown camera {checks.shown(str(name))}: known are {names}, or give a .json file")
+        data, folder = known[stem], PACKAGE.parent
     try:
         members = data["cameras"] if data.get("kind") == "set" else [data]
-        members = [_with_lenses({"name": path.stem, **member}, path.parent) for member in members]
+        members = [_with_lenses({"name": stem, **member}, folder) for member in members]
         return tuple(scaled(IICamera.from_json(member), scale) for member in members)
     except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
         raise ValueError(f"{path if Path(name).suffix else name}: {one_line(error)}") from None
@@ -171,10 +172,6 @@ def _with_lenses(camera: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
 
 def _times(lengths: tuple[float, ...], scale: int) -> Any:
     return tuple(x * scale for x in lengths)
-
-
-def _folder() -> Path:
-    return Path(str(files(assets) / "cameras"))
 
 
 def _read(path: Path) -> Mapping[str, Any]:

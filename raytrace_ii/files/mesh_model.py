@@ -1,4 +1,4 @@
-"""Content of a mesh file of any type: parts with materials, and lights."""
+"""Content of a mesh file of any type: parts with materials, lights, and shares with a tolerance."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 from ..scene.scene import Light, Material
 from ..shapes.primitives import Mesh
+
+BEYOND = 1e-5  # by so much float32 rounding in files may move numbers past their bounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,3 +32,10 @@ class Model:
     parts: list[Part]
     lights: list[Light] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+
+
+def share(value: float) -> float:
+    """Return a share clipped to [0, 1] if it is at most 1e-5 outside; other values are returned unchanged."""
+    if -BEYOND <= value < 0:
+        return 0.0
+    return 1.0 if 1 < value <= 1 + BEYOND else value

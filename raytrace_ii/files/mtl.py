@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..scene.scene import Material, Vector
 from ..scene.textures import Image, image_texture, linear
 from .beside import beside, decoded_text, read_bytes, read_texture
-from .tolerance import share
+from .mesh_model import share
 
 Note = Callable[[str], None]
 

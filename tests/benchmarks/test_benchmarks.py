@@ -10,8 +10,7 @@ import pytest
 
 from benchmarks import __main__ as command
 from benchmarks import age
-from benchmarks.registry import BENCHMARKS, CLOSED, IMAGES, LAST, entry, newest, source
-from benchmarks.study.scripts import SCRIPTS
+from benchmarks.registry import BENCHMARKS, CLOSED, KEPT, entry, newest
 
 ROOT = Path(__file__).parents[2]
 # Modules with a ``main`` that others start: a process of `ratios`.
@@ -43,7 +42,7 @@ def test_every_file_of_results_and_every_picture_has_one_owner():
             if path.suffix in endings
         ]
         if folder == "docs":
-            owned += [f"{IMAGES}/{picture}" for pictures in CLOSED.values() for picture in pictures]
+            owned += KEPT
         there = [
             path.relative_to(ROOT).as_posix()
             for path in (ROOT / folder).rglob("*")
@@ -52,13 +51,14 @@ def test_every_file_of_results_and_every_picture_has_one_owner():
         assert sorted(owned) == sorted(there)
 
 
-def test_scripts_of_closed_experiments_are_in_git():
-    if subprocess.run(["git", "cat-file", "-e", LAST], cwd=ROOT, capture_output=True).returncode:
+@pytest.mark.parametrize("last", CLOSED)
+def test_scripts_of_closed_experiments_are_in_git(last):
+    if subprocess.run(["git", "cat-file", "-e", last], cwd=ROOT, capture_output=True).returncode:
         pytest.skip("no history, or a shallow one")
-    there = subprocess.run(["git", "ls-tree", "-r", "--name-only", LAST], cwd=ROOT, capture_output=True, text=True)
-    paths = {name: f"benchmarks/{name.partition(':')[0]}.py" for name in CLOSED}
-    assert set(paths.values()) <= set(there.stdout.splitlines())
-    assert not any((ROOT / path).exists() for name, path in paths.items() if ":" not in name)
+    there = subprocess.run(["git", "ls-tree", "-r", "--name-only", last], cwd=ROOT, capture_output=True, text=True)
+    paths = [f"benchmarks/{name}.py" for name in CLOSED[last]]
+    assert set(paths) <= set(there.stdout.splitlines())
+    assert not any((ROOT / path).exists() for path in paths)
 
 
 @pytest.mark.parametrize("one", [one for one in BENCHMARKS.values() if one.tables], ids=lambda one: one.name)
@@ -74,13 +74,13 @@ def test_cost_is_that_of_the_newest_records(monkeypatch, tmp_path):
         {"key": {"row": 1}, "seconds": 99.0, "cpu_seconds": 30.0, "result": {}},
         {"key": {"row": 2}, "seconds": 60.0, "result": {}},
     ]
-    (tmp_path / "orders.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    assert len(newest(tmp_path / "orders.jsonl")) == 2
-    assert BENCHMARKS["orders"].minutes() == (1.5, False)
+    (tmp_path / "takes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert len(newest(tmp_path / "takes.jsonl")) == 2
+    assert BENCHMARKS["takes"].minutes() == (1.5, False)
     rows.append({"key": {"row": 3}, "seconds": None, "result": {"encode_seconds": 30.0}})
-    (tmp_path / "orders.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    assert BENCHMARKS["orders"].minutes() == (2.0, True)
-    assert "at least 2.0 min" in command.description(BENCHMARKS["orders"])
+    (tmp_path / "takes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert BENCHMARKS["takes"].minutes() == (2.0, True)
+    assert "at least 2.0 min" in command.description(BENCHMARKS["takes"])
 
 
 def test_list_names_all_benchmarks_without_importing_them():
@@ -93,19 +93,19 @@ def test_list_names_all_benchmarks_without_importing_them():
 
 def test_prune_removes_older_records_of_a_benchmark(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr("benchmarks.registry.RESULTS", tmp_path)
-    (tmp_path / "orders.jsonl").write_text('{"key": 1, "run": 0}\n{"key": 1, "run": 1}\n')
-    command.main(["prune", "orders"])
-    assert capsys.readouterr().out == "orders.jsonl: 1 older records removed\n"
-    assert (tmp_path / "orders.jsonl").read_text() == '{"key": 1, "run": 1}\n'
+    (tmp_path / "takes.jsonl").write_text('{"key": 1, "run": 0}\n{"key": 1, "run": 1}\n')
+    command.main(["prune", "takes"])
+    assert capsys.readouterr().out == "takes.jsonl: 1 older records removed\n"
+    assert (tmp_path / "takes.jsonl").read_text() == '{"key": 1, "run": 1}\n'
 
 
 def test_run_passes_options_to_the_benchmark(monkeypatch):
     seen = []
-    monkeypatch.setattr("benchmarks.coding.orders.main", lambda: seen.append(sys.argv))
+    monkeypatch.setattr("benchmarks.coding.takes.main", lambda: seen.append(sys.argv))
     monkeypatch.setattr("benchmarks.stability.__main__.main", lambda: seen.append(sys.argv))
-    command.main(["run", "orders", "--scale", "8"])
+    command.main(["run", "takes", "--scale", "8"])
     command.main(["run", "stability", "--", "bd_dents"])
-    command.main(["run", "orders", "stability"])
+    command.main(["run", "takes", "stability"])
     assert [words[1:] for words in seen] == [["--scale", "8"], ["bd_dents"], [], []]
 
 
@@ -114,19 +114,14 @@ def test_run_passes_options_to_the_benchmark(monkeypatch):
     [
         (["run", "coder"], "no benchmark 'coder'"),
         (["run"], "run needs a name"),
-        (["run", "orders", "cost", "--scale", "8"], "need a single name"),
-        (["list", "orders", "--scale"], "list takes names alone"),
+        (["run", "takes", "coders", "--scale", "8"], "need a single name"),
+        (["list", "takes", "--scale"], "list takes names alone"),
     ],
 )
 def test_wrong_arguments_are_named(words, says, capsys):
     with pytest.raises(SystemExit) as stop:
         command.main(words)
     assert stop.value.code == 2 and says in capsys.readouterr().err
-
-
-def test_scripts_of_the_study_are_registered():
-    assert {name for name, *_ in SCRIPTS} <= {*BENCHMARKS, "demo"}
-    assert all(source(one.module).is_file() for one in BENCHMARKS.values())
 
 
 def test_code_is_the_same_without_words_and_imports():

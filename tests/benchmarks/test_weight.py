@@ -11,7 +11,7 @@ from benchmarks.pages.pictures import WIDEST, with_palette, write_picture
 
 ROOT = Path(__file__).parents[2]
 FILE, TREE = 1.0, 12.0  # largest sizes in MB
-FILES = 880
+FILES = 800
 
 
 def tracked():

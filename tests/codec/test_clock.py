@@ -7,9 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from codec import parse_scheme
 from codec.clock import TASKS, OwnThreads, cpu_seconds
 from codec.coders.video import open_encoder
+from codec.contract import parse_scheme
 from ii_core import IIPicture
 
 pytestmark = pytest.mark.skipif(not os.path.isdir(TASKS), reason="only Linux tells the time of each thread")

@@ -6,9 +6,12 @@ Every block of ```python runs, top to bottom of its page with one set of names, 
 
 import importlib.util
 import itertools
+import math
 import os
 import re
 import shlex
+import shutil
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -18,8 +21,11 @@ import codec
 import ii_core
 import metrics
 import raytrace_ii
+from benchmarks.pages.cameras import KINDS as GROUPS
 from benchmarks.registry import BENCHMARKS
 from codec import decode, encode
+from ii_core import IICamera, camera_names, panel_display
+from ii_core.camera.optics import KINDS, LensModel
 from raytrace_ii.cli import app
 
 ROOT = Path(__file__).parents[2]
@@ -179,3 +185,126 @@ def test_every_public_name_has_a_docstring(package):
 def test_the_first_pages_are_short(page, most):
     """A stranger reads them in minutes; what is longer has a page of its own."""
     assert len(PAGES[page].split()) <= most
+
+
+# -- pages of cameras: every key, element and camera, and the numbers of the worked display
+
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "camera_files.md").read_text(encoding="utf-8")
+ITEMS = dict(re.findall(r"^- (?:\*\*)?`([\w-]+)[^`]*`((?:.|\n(?=  ))*)", PAGE, re.M))  # text by key
+
+
+def test_every_key_of_a_camera_file_has_an_item():
+    keys = {field.name for field in fields(IICamera)} - {"name"}
+    assert keys <= set(ITEMS) and "`name`" in PAGE and "`about`, `notes`" in PAGE
+
+
+def test_every_element_has_an_item_with_its_parameters():
+    for kind, element in KINDS.items():
+        for field in fields(element):
+            assert f"`{field.name}`" in ITEMS[kind], f"{kind}: {field.name}"
+    models = PAGE[PAGE.index("## Optical elements") : PAGE.index("Elements in front")]
+    assert {kind for kind, element in KINDS.items() if issubclass(element, LensModel)} == set(
+        re.findall(r"^- `([\w-]+)`", models, re.M)
+    )
+
+
+def test_the_worked_display_is_the_design():
+    made = panel_display(size_mm=15.6 * 25.4, pixels=(3840, 2160), lens_pitch_mm=1.0, viewer_mm=600)
+    camera = made.camera
+    across, down = camera.lenses
+    numbers = {
+        f"{camera.pixel_pitch_mm:.4f} mm", f"{across}×{down} lenses", f"{camera.ei_pitch_mm[0]:.4f} mm",
+        f"{camera.lens_pitch_mm[0]:.4f} mm", f"{camera.gap_mm:.3f} mm",
+        f"{camera.ei_pitch_mm[0] * 600 / camera.gap_mm:.1f} mm",
+    }  # fmt: skip
+    for number in numbers:
+        assert number in " ".join(PAGE.split()), number
+    assert math.isclose(camera.view_angle_deg, 30)
+
+
+def test_every_camera_is_on_its_page_once():
+    named = [name for names in GROUPS.values() for name in names]
+    assert sorted(named) == sorted(name for name in camera_names() if not name.startswith("setup2"))
+    text = (DOCS / "cameras.md").read_text(encoding="utf-8")
+    assert re.findall(r"^### (\S+)$", text, re.M) == named
+    assert [kind for kind in re.findall(r"^## (.+)$", text, re.M) if kind in GROUPS] == list(GROUPS)
+
+
+# -- the site of docs/: a small tree with our hook, built strictly by MkDocs (skipped without the extra ``docs``)
+
+
+HOOKS = ROOT / "docs" / "site" / "hooks.py"
+CONFIG = """
+site_name: small
+docs_dir: ..
+site_dir: ../../out
+use_directory_urls: false
+exclude_docs: /site/*
+hooks: [hooks.py]
+theme: {name: mkdocs}
+plugins: []
+validation: {omitted_files: warn, absolute_links: warn, unrecognized_links: warn, anchors: warn}
+"""
+# files outside docs/, by what MkDocs could take them for
+OUTWARD = ("README.md", "room/README.md", "room/notes.markdown", ".ci/run", "run.py", "page.html", "a.json")
+
+
+@pytest.fixture
+def build(tmp_path):
+    """Return a function that builds pages of docs/ and returns the folder of the site."""
+    commands = pytest.importorskip("mkdocs.commands.build")
+    load_config = pytest.importorskip("mkdocs.config").load_config
+    root = tmp_path / "repository"
+    for file in OUTWARD:
+        path = root / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"# Head\n\nThis is {file}; [a link](nowhere.md).\n")
+    (root / "docs" / "site").mkdir(parents=True)
+    (root / "docs" / "site" / "mkdocs.yml").write_text(CONFIG)
+    shutil.copy(HOOKS, root / "docs" / "site")
+
+    def built(pages):
+        for name, text in pages.items():
+            path = root / "docs" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+        commands.build(load_config(str(root / "docs" / "site" / "mkdocs.yml"), strict=True))
+        return root / "out"
+
+    return built
+
+
+def targets(page):
+    """Return the relative links of a page's own text, as files."""
+    links = re.findall(r'href="([^"#:]*source/[^"]+)"', page.read_text(encoding="utf-8"))
+    return [(page.parent / link).resolve() for link in links]
+
+
+def lines(prefix):
+    """Return links to all files outside docs/, with and without an anchor."""
+    return "\n\n".join(f"[one]({prefix}{file}) and [two]({prefix}{file}#head)" for file in OUTWARD)
+
+
+def test_links_out_of_docs_lead_to_plain_copies(build, tmp_path):
+    site = build({"index.md": f"# A\n\n{lines('../')}\n", "deep/other.md": f"# B\n\n{lines('../../')}\n"})
+    for page in (site / "index.html", site / "deep" / "other.html"):
+        found = targets(page)
+        assert len(found) == 2 * len(OUTWARD)
+        for file, path in zip(OUTWARD, found[::2], strict=True):
+            assert path.read_text() == (tmp_path / "repository" / file).read_text()
+        assert found[::2] == found[1::2]
+
+
+def test_a_dead_link_out_of_docs_stops_the_build(build):
+    with pytest.raises(BaseException, match="strict mode"):
+        build({"index.md": "# A\n\n[gone](../GONE.md)\n"})
+
+
+def test_scenes_lead_to_pages_that_are_there(build):
+    gallery = "# Gallery\n\n- apples\n- car\n"
+    pages = {"gallery/car.html": "-"}
+    site = build({"index.md": "# A\n\n[gallery](gallery/README.md)\n", "gallery/README.md": gallery, **pages})
+    text = (site / "gallery" / "index.html").read_text(encoding="utf-8")
+    assert '<a href="car.html">car</a>' in text and "apples.html" not in text

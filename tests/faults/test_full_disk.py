@@ -38,7 +38,7 @@ from metrics.observers.simulated import write_simulated
 from metrics.plots.opinion_chart import opinion_chart
 from raytrace_ii import load_scene, render_to
 from raytrace_ii.rendering import render_sets
-from tests.support.full_disk import full_disk
+from tests.support.processes import full_disk
 from tests.support.slow import first_fast
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="RLIMIT_FSIZE is of POSIX")

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.accuracy.lens_rays import cases
 from ii_core import IICamera, preset
 from ii_core.camera.elements import Bundle
 from ii_core.camera.glass import CATALOGUE, LINE_C_NM, LINE_D_NM, LINE_F_NM, Glass, catalogue, glass
@@ -190,8 +189,8 @@ def test_rays_are_reversible(values, y, slope):
 
 
 # optiland 0.6.3 at 486.1327 nm with our indices: rays from 10 mm before the first vertex, x, y and direction cosines
-# there and in the image plane. `benchmarks/accuracy/lens_rays.py` compares thousands; the library with its
-# dependencies takes 1.3 GB, too much for every test run.
+# there and in the image plane. `benchmarks/accuracy/lens_rays.py` of commit 58549fc
+# compared thousands; the library with its dependencies takes 1.3 GB, too much for every test run.
 STARTS = ((0.0, 3.0, 0.0, 0.05), (1.0, -2.0, 0.06, 0.0))
 IMAGES = {
     "triplet": (
@@ -207,6 +206,35 @@ IMAGES = {
         (1.9289870244801757, -0.2663496783472954, 0.00747696796818903, 0.06117641564668418),
     ),
 }
+
+
+def conic_singlet(wavelength_nm: float) -> tuple[Surfaces, float]:
+    """Return a lens of N-SF11 with an ellipsoid and a hyperboloid, and its back distance."""
+    made = Surfaces(
+        z_mm=0.0,
+        wavelength_nm=wavelength_nm,
+        surfaces=(
+            Surface(
+                radius_mm=40.0, conic=-0.6, thickness_mm=9.0, glass=CATALOGUE["N-SF11"], diameter_mm=30.0, stop=True
+            ),
+            Surface(radius_mm=-70.0, conic=-3.0, diameter_mm=30.0),
+        ),
+    )
+    return made, 25.0
+
+
+def cases():
+    """Return functions from the wavelength to a lens and its back distance."""
+
+    def published(name):
+        made = lens(name)
+        return lambda nm: (made.at(0.0, wavelength_nm=nm), made.back_mm)
+
+    return {
+        "triplet": published("triplet"),
+        "double-gauss": published("double-gauss"),
+        "conic singlet": conic_singlet,
+    }
 
 
 @pytest.mark.parametrize("name", IMAGES)
@@ -408,7 +436,7 @@ def test_an_achromat_corrects_lateral_colour():
 
 
 def test_channels_are_the_lens_at_their_wavelengths():
-    """So `benchmarks run lens_rays` compares the rays of each channel with optiland."""
+    """So what holds for the rays of one wavelength holds for each channel."""
     for name in ("triplet", "double-gauss"):
         three = lens(name).at(40.0, wavelengths_nm=CHANNELS_NM)
         for channel, wavelength in enumerate(CHANNELS_NM):

@@ -1,9 +1,11 @@
-"""Commands in a new process, for properties of processes: streams, limits of memory, the end of the interpreter."""
+"""Processes: commands in a new one, Ctrl-C for it, and a full disk, which a limit on the size of files simulates."""
 
 import json
 import os
+import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 
 SCRIPT = """
 import json, sys
@@ -38,3 +40,21 @@ def in_one_process(*commands, before="", cwd=None, **environment):
     out, err = done.stdout.split("\0"), done.stderr.split("\0")
     assert len(err) == len(commands) + 1 and out[-1] == err[-1] == "", done
     return [(int(code), o, e) for o, code, e in zip(out[:-1:2], out[1::2], err[:-1], strict=True)]
+
+
+def hear_interrupts() -> None:
+    """Restore the handler of Ctrl-C, which commands started by a shell with ``&`` ignore."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@contextmanager
+def full_disk(limit):
+    """Let no file of this process grow beyond ``limit`` bytes; Python ignores the signal, so that writing fails."""
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)

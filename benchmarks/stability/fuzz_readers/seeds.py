@@ -49,9 +49,9 @@ def png_files() -> tuple[bytes, ...]:
 
 @lru_cache
 def camera_trees() -> dict[str, Any]:
-    """Return the camera files of the package."""
-    folder = Path(str(files("assets") / "cameras"))
-    return {path.stem: json.loads(path.read_text("utf-8")) for path in sorted(folder.glob("*.json"))}
+    """Return the cameras of the package."""
+    trees: dict[str, Any] = json.loads((files("assets") / "cameras.json").read_text("utf-8"))
+    return trees
 
 
 @lru_cache

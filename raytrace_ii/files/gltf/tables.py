@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from ..tolerance import share
+from ..mesh_model import share
 
 Index = Annotated[int, Field(ge=0)]
 

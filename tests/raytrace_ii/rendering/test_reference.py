@@ -17,7 +17,7 @@ from raytrace_ii import Scene, load_scene, render
 from raytrace_ii.rendering import render_sets as reference
 from raytrace_ii.scene.hashing import content_hash
 from raytrace_ii.tracing.packing import packed
-from tests.support.interrupts import hear_interrupts
+from tests.support.processes import hear_interrupts
 from tests.support.trace_scenes import body, hall, sphere, wall
 
 CAMERA = preset("setup1", scale=64)

@@ -1,5 +1,0 @@
-"""Errors of calibration for pictures without a lens grid."""
-
-
-class NoLenses(ValueError):
-    """A picture in which no lens grid is found."""
