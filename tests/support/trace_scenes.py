@@ -12,7 +12,7 @@ from raytrace_ii.tracing.kernels import lanes
 from raytrace_ii.tracing.kernels.images import read_images
 from raytrace_ii.tracing.kernels.lanes import BLOCK, work
 from raytrace_ii.tracing.kernels.noise import fractal_lanes
-from raytrace_ii.tracing.kernels.textures import noise_colour, pattern_colour
+from raytrace_ii.tracing.kernels.textures import alpha, noise_colour, pattern_colour
 from raytrace_ii.tracing.texture_table import TextureTable
 
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
@@ -120,6 +120,13 @@ def texture_at(texture, points):
         sums = octaves(points / texture.size, texture.octaves, texture.seed)
         return np.array([noise_colour(table, 0, total) for total in sums])
     return np.array([pattern_colour(table, 0, *p) for p in points])
+
+
+def alpha_at(image, points):
+    """Alpha, (n,), of an image at (n, 3) texture coordinates."""
+    packed = TextureTable([image])
+    alphas = packed.alphas.astype(np.float64)  # else Python would reckon in float32, compiled code does not
+    return np.array([alpha(packed.table, 0, alphas, u, v) for u, v, _ in np.asarray(points, np.float64)])
 
 
 def blocks(points):

@@ -81,12 +81,12 @@ def take_materials(surfaces, work):
     take_rows(
         surfaces.looks, np.int64(LANED), np.int64(0), work.whole, np.int64(at.BODY), single, np.int64(at.R0)
     )  # fmt: skip
-    extras = _ZERO
+    extras = 0
     for k in range(BLOCK):
-        extras += single[at.EXTRA + k] * single[at.HIT + k]
+        extras += (single[at.EXTRA + k] > _ZERO) & (single[at.HIT + k] > _ZERO)  # whole numbers: sums in vectors
     for k in range(3 * BLOCK):
         single[at.T0 + k] = _ONE
-    return extras > _ZERO
+    return extras > 0
 
 
 @lane_stage

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from ii_core.base.jit import exact_kernel as kernel
 from ii_core.base.jit import exact_lane_stage as stage_kernel
-from ii_core.base.jit import inline_kernel, lane_stage, part_kernel
+from ii_core.base.jit import inline_kernel, part_kernel
 
 from . import lanes as at
 from .addresses import call
-from .lanes import BLOCK
+from .lanes import BLOCK, side
 
 # Rows of a packet.
 _NEAR, DIRECTION, _TIME, FAR, MASK, _FLAGS, U, V, FACE, GEOMETRY, INSTANCE = 3, 4, 7, 8, 9, 11, 15, 16, 17, 18, 19
@@ -66,11 +66,6 @@ class Tools(NamedTuple):
     occluded: Calls
     active: NDArray[np.int32]
     chosen: NDArray[np.int32]
-
-
-def _reduce(function: Any) -> Any:
-    """A kernel's inner function whose minima may be taken in any order, and so in vectors: packets have no NaN."""
-    return lane_stage(function, fastmath={"nnan", "nsz"})
 
 
 @inline_kernel
@@ -138,15 +133,12 @@ def _fill(packet, numbers, width, lane, o, d, ray, far):
     numbers[_at(GEOMETRY, width, lane)] = -1
 
 
-@_reduce
+@stage_kernel
 def _spread(packet, first, width):
     """Sum of the sides of the box around a quantity of three rows."""
     total = np.float32(0)
     for c in range(first, first + 3):
-        low = high = packet[c * width]
-        for lane in range(1, width):
-            low, high = min(low, packet[c * width + lane]), max(high, packet[c * width + lane])
-        total += high - low
+        total += side(packet, c * width, width)
     return total
 
 
@@ -306,7 +298,7 @@ def occluded_of_lanes(tools, reach, work, width):
         for k in range(first, first + width):
             on = single[at.WANTED + k] > 0
             some += on
-            one = k if on else one
+            one = max(one, k if on else first)
         if some == 0:
             continue
         _begin(packet, numbers, width)
@@ -315,9 +307,11 @@ def occluded_of_lanes(tools, reach, work, width):
             a = at.AX + c * BLOCK
             place, way = single[o + one] + single[a + one], single[d + one]
             for lane in range(width):
-                on = single[at.WANTED + first + lane] > 0
-                packet[c * width + lane] = single[o + first + lane] + single[a + first + lane] if on else place
-                packet[(DIRECTION + c) * width + lane] = single[d + first + lane] if on else way
+                on = single[at.WANTED + first + lane] > 0  # all is read before it is chosen: for vectors
+                own_place = single[o + first + lane] + single[a + first + lane]
+                own_way = single[d + first + lane]
+                packet[c * width + lane] = own_place if on else place
+                packet[(DIRECTION + c) * width + lane] = own_way if on else way
         for lane in range(width):
             packet[FAR * width + lane] = reach
         for lane in range(width):

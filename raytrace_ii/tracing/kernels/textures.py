@@ -148,7 +148,7 @@ def is_cut_out(coordinates, textures, alphas, materials, body, f, u, v):
     if materials[body, CUTOFF] == 0.0:
         return False
     x, y, _ = interpolate(coordinates, f, u, v)
-    return _alpha(textures, int(materials[body, TEXTURE]), alphas, x, y) < materials[body, CUTOFF]
+    return alpha(textures, int(materials[body, TEXTURE]), alphas, x, y) < materials[body, CUTOFF]
 
 
 @part_kernel
@@ -166,16 +166,16 @@ def share_there(coordinates, textures, alphas, materials, body, f, u, v, au, av,
         part = level - near
         for tap in range(int(taps)):
             s = (tap + 0.5) / taps - 0.5
-            here = _alpha(textures, row + near, alphas, x + s * bu, y + s * bv)
+            here = alpha(textures, row + near, alphas, x + s * bu, y + s * bv)
             if part > 0.0:
-                here += part * (_alpha(textures, row + near + 1, alphas, x + s * bu, y + s * bv) - here)
+                here += part * (alpha(textures, row + near + 1, alphas, x + s * bu, y + s * bv) - here)
             total += here
         share *= total / taps
     return share
 
 
 @part_kernel
-def _alpha(textures, row, alphas, x, y):
+def alpha(textures, row, alphas, x, y):
     """Alpha of an image at (u, v), bilinear."""
     across, down, width = textures[row, 6], textures[row, 7], textures[row, 2]
     x, y = folded(x, across), 1.0 - folded(y, down)

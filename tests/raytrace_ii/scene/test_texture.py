@@ -17,7 +17,7 @@ from raytrace_ii.tracing.kernels.srgb import encode_srgb, encode_steps
 from raytrace_ii.tracing.kernels.tables import FLAT_COLUMNS
 from raytrace_ii.tracing.packing import packed
 from raytrace_ii.tracing.texture_table import TextureTable
-from tests.support.trace_scenes import BLACK, WHITE, body, box, octaves, sphere, texture_at, wall
+from tests.support.trace_scenes import BLACK, WHITE, alpha_at, body, box, octaves, sphere, texture_at, wall
 
 BOARD = Checker((WHITE, BLACK), (2.0, 2.0, 2.0))
 CLOUD = Noise((BLACK, WHITE), (1.0, 1.0, 1.0), contrast=1.0)
@@ -165,57 +165,73 @@ def test_noise_mixes_its_colours():
 PIXELS = np.random.default_rng(0).random((3, 5, 3)).astype(np.float32)
 
 
+def single_rounding(height=3, width=5):
+    """Largest error of a bilinear colour in lanes: places, weights and sums are float32.
+
+    Half a rounding of the place in [0, 1], a texel's share of it; of the place in texels; three of a weight, five of
+    the sum. Neighbouring texels differ by 1 at most.
+    """
+    places = sum(size * 2.0**-25 + np.spacing(np.float32(size)) / 2 for size in (height, width))
+    return float(places) + (3 + 5) * 2.0**-24
+
+
+def ways(image, points):
+    """Both ways to read an image: colours in float32 lanes, and values of alpha in float64; with their errors."""
+    exact = [
+        alpha_at(Image(image.pixels, wrap=image.wrap, alpha=np.ascontiguousarray(image.pixels[..., c])), points)
+        for c in range(3)
+    ]
+    return (texture_at(image, points), single_rounding(*image.pixels.shape[:2])), (np.stack(exact, axis=1), 0.0)
+
+
 def test_texel_centres_are_exact_and_row_0_is_on_top():
-    texture = Image(PIXELS)
     for j in range(3):
         for i in range(5):
-            seen = texture_at(texture, [((i + 0.5) / 5, 1 - (j + 0.5) / 3, 0)])[0]
-            # (u, v) have an ulp of 1, five texels wide
-            np.testing.assert_allclose(seen, PIXELS[j, i], atol=1e-6)
+            for seen, error in ways(Image(PIXELS), [((i + 0.5) / 5, 1 - (j + 0.5) / 3, 0)]):
+                # (u, v) have an ulp of 1, five texels wide
+                np.testing.assert_allclose(seen[0], PIXELS[j, i], rtol=0, atol=1e-14 + error)
 
 
 def test_between_texels_images_are_bilinear():
-    texture = Image(PIXELS)
     for fx, fy in ((0.25, 0.5), (0.9, 0.1)):
-        seen = texture_at(texture, [((1.5 + fx) / 5, 1 - (0.5 + fy) / 3, 0)])[0]
-        top = (1 - fx) * PIXELS[0, 1].astype(float) + fx * PIXELS[0, 2]
-        bottom = (1 - fx) * PIXELS[1, 1].astype(float) + fx * PIXELS[1, 2]
-        np.testing.assert_allclose(seen, (1 - fy) * top + fy * bottom, atol=1e-6)
+        (a, b), (c, d) = PIXELS[:2, 1:3].astype(float)
+        top, bottom = (1 - fx) * a + fx * b, (1 - fx) * c + fx * d
+        for seen, error in ways(Image(PIXELS), [((1.5 + fx) / 5, 1 - (0.5 + fy) / 3, 0)]):
+            np.testing.assert_allclose(seen[0], (1 - fy) * top + fy * bottom, rtol=0, atol=1e-14 + error)
 
 
 @given(st.floats(0, 1, exclude_max=True), st.floats(0, 1, exclude_max=True), st.integers(-3, 3), st.integers(-3, 3))
 @settings(max_examples=50)
 def test_images_repeat(u, v, i, j):
-    a, b = texture_at(Image(PIXELS), [(u, v, 0), (u + i, v + j, 0)])
-    np.testing.assert_allclose(a, b, atol=2e-6)  # places in float32
+    for (a, b), error in ways(Image(PIXELS), [(u, v, 0), (u + i, v + j, 0)]):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-13 + 2 * error)  # an ulp of 4, five texels wide
 
 
 def test_images_join_at_their_borders():
-    texture = Image(PIXELS)
-    left, right, top, bottom = texture_at(texture, [(0, 0.5, 0), (1, 0.5, 0), (0.5, 1, 0), (0.5, 0, 0)])
-    np.testing.assert_allclose(left, (PIXELS[1, 0].astype(float) + PIXELS[1, 4]) / 2, atol=1e-6)
-    np.testing.assert_array_equal(left, right)
-    np.testing.assert_array_equal(top, bottom)
-    # a step before the border changes little: the seam is smooth
-    before = texture_at(texture, [(1 - 1e-9, 0.5, 0)])[0]
-    np.testing.assert_allclose(before, right, atol=1e-6)
+    points = [(0, 0.5, 0), (1, 0.5, 0), (0.5, 1, 0), (0.5, 0, 0), (1 - 1e-9, 0.5, 0)]
+    for (left, right, top, bottom, before), error in ways(Image(PIXELS), points):
+        middle = (PIXELS[1, 0].astype(float) + PIXELS[1, 4]) / 2
+        np.testing.assert_allclose(left, middle, rtol=0, atol=1e-14 + error)
+        np.testing.assert_array_equal(left, right)
+        np.testing.assert_array_equal(top, bottom)
+        # a step before the border changes little: the seam is smooth
+        np.testing.assert_allclose(before, right, rtol=0, atol=1e-8 + 2 * error)
 
 
 @given(st.floats(-3, 3), st.floats(-3, 3))
 @settings(max_examples=50)
 def test_images_are_mirrored_or_clamped(u, v):
     """Mirrored, it is the picture beside its mirror image; clamped, its own border goes on."""
-    mirrored = Image(PIXELS, wrap=("mirror", "repeat"))
-    twice = Image(np.concatenate([PIXELS, PIXELS[:, ::-1]], axis=1))
-    np.testing.assert_allclose(*(texture_at(i, [p]) for i, p in ((mirrored, (u, v, 0)), (twice, (u / 2, v, 0)))),
-                               atol=2e-6)  # places in float32  # fmt: skip
-    twice = Image(np.concatenate([PIXELS[::-1], PIXELS]))
-    down = Image(PIXELS, wrap=("repeat", "mirror"))
-    np.testing.assert_allclose(*(texture_at(i, [p]) for i, p in ((down, (u, v, 0)), (twice, (u, v / 2, 0)))),
-                               atol=2e-6)  # fmt: skip
-    clamped = Image(PIXELS, wrap=("clamp", "clamp"))
+    twice = Image(np.concatenate([PIXELS, PIXELS[:, ::-1]], axis=1)), Image(np.concatenate([PIXELS[::-1], PIXELS]))
     inner = np.clip(u, 0.1, 0.9), np.clip(v, 1 / 6, 5 / 6), 0  # the middles of the outermost texels
-    np.testing.assert_allclose(*(texture_at(clamped, [p]) for p in ((u, v, 0), inner)), atol=1e-6)
+    clamped = Image(PIXELS, wrap=("clamp", "clamp"))
+    for one, other, at, ulp in (
+        (Image(PIXELS, wrap=("mirror", "repeat")), twice[0], (u / 2, v, 0), 1e-13),  # of 4, five texels wide
+        (Image(PIXELS, wrap=("repeat", "mirror")), twice[1], (u, v / 2, 0), 1e-13),
+        (clamped, clamped, inner, 1e-14),
+    ):
+        for (a, error), (b, also) in zip(ways(one, [(u, v, 0)]), ways(other, [at]), strict=True):
+            np.testing.assert_allclose(a, b, rtol=0, atol=ulp + error + also)
 
 
 def test_an_unknown_wrapping_is_refused():

@@ -265,14 +265,15 @@ def test_narrower_cpus_and_embreex_give_the_same_pictures(configuration, says, u
             np.testing.assert_array_equal(other[name], expected, err_msg=name)
             continue
         # Single pixels differ by a float32 rounding, presumably where a ray meets the edge of two faces: either
-        # may be found. Up to 2 of 1395 pixels were seen to differ, by 1 code of 16 bits; of depths 5.
+        # may be found. Up to 1 of 1395 pixels was seen to differ, by 1 code of 16 bits; of depths 4, by one or two
+        # roundings, all in rows 17–22 where the glass ball's faces are smaller than pixels (2026-11-25).
         differs = (other[name] != expected) & ~(np.isnan(other[name]) & np.isnan(expected))
         if (says, name) == ("packets of 4", "odd lenses, 3 samples"):
             # One sample's primary hit is the same and its radiance 1e-4 off: a later ray meets the other face.
             assert np.argwhere(differs.any(axis=-1)).tolist() in ([], [[0, 23]])
             assert np.abs(other[name].astype(float) - expected).max() <= 2
             continue
-        assert differs.sum() <= 6, name
+        assert differs.sum() <= 4, name
         step = 2.0**-22 * expected[differs] if "depth" in name else 1
         assert (np.abs(other[name][differs].astype(float) - expected[differs]) <= step).all(), name
 
