@@ -179,6 +179,8 @@ BENCHMARKS = {
         Benchmark("pages.video", needs="records of takes", writes=(f"{IMAGES}/takes_[aft]*",)),
         Benchmark("coding.volume", records=OWN, fills=("docs/volume.md",)),
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
+        Benchmark("coding.anchors", needs="imageio-ffmpeg, and the photographs of the benchmark", records=OWN,
+            fills=("docs/benchmark.md",)),
         Benchmark("coding.jplm", needs="jpl-encoder-bin and jpl-decoder-bin", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),
