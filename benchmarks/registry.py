@@ -169,6 +169,8 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/coders*",)),
         Benchmark("coding.takes", records=OWN, fills=("docs/video.md",), writes=(f"{IMAGES}/takes_access.*",)),
         Benchmark("coding.light_field", records=OWN, fills=("docs/lf.md",)),
+        Benchmark("coding.anchors", needs="imageio-ffmpeg, and the photographs of the benchmark", records=OWN,
+            fills=("docs/benchmark.md",)),
         Benchmark("coding.jplm", needs="jpl-encoder-bin and jpl-decoder-bin", records=OWN, fills=("docs/lf.md",)),
         Benchmark("coding.fuzz", records=OWN, fills=("docs/formats.md",)),
         Benchmark("stability.fuzz_readers", records=OWN, fills=("docs/stability.md",)),

@@ -107,23 +107,27 @@ class AnchorCoder:
         ValueError
             If the subject is a video or not of 8 bit, or FFmpeg fails.
         """
-        if not isinstance(subject, IIPicture) or subject.pixels.dtype != np.uint8:
-            raise ValueError(f"anchor {self.name} codes pictures of 8 bit")
-        count = math.prod(subject.size)
+        key = _hash(picture := _picture(self.name, subject))
+        count = math.prod(picture.size)
         limit = bpp * count / 8 * (1 + self.rate_tolerance)
-        key = hashlib.sha256(np.ascontiguousarray(subject.pixels).data).hexdigest()
         spent = 0.0
 
         def size(index: int) -> int:
             nonlocal spent
-            data, seconds = self._run(key, subject, index)
+            data, seconds = self._run(key, picture, index)
             spent += seconds
             return len(data)
 
         anchor = self.anchor
         found = largest(size, limit, round((anchor.coarsest - anchor.finest) / anchor.step))
-        data, _ = self._run(key, subject, found)
-        return Stream(data, 8 * len(data) / count, spent, len(data) <= limit, subject)
+        data, _ = self._run(key, picture, found)
+        return Stream(data, 8 * len(data) / count, spent, len(data) <= limit, picture)
+
+    def encode_at(self, subject: Subject, quantiser: float) -> Stream:
+        """Return the file of the step of the anchor's scale that is nearest to a quantiser; errors as of `encode`."""
+        picture, anchor = _picture(self.name, subject), self.anchor
+        data, seconds = self._run(_hash(picture), picture, round((anchor.coarsest - quantiser) / anchor.step))
+        return Stream(data, 8 * len(data) / math.prod(picture.size), seconds, True, picture)
 
     def decode(self, coded: Stream) -> Decoded:
         """Return the picture, and its 10-bit YCbCr codes if those were coded."""
@@ -145,6 +149,16 @@ class AnchorCoder:
             with self._lock:
                 self._runs[key, index] = known
         return known
+
+
+def _picture(name: str, subject: Subject) -> IIPicture:
+    if not isinstance(subject, IIPicture) or subject.pixels.dtype != np.uint8:
+        raise ValueError(f"anchor {name} codes pictures of 8 bit")
+    return subject
+
+
+def _hash(picture: IIPicture) -> str:
+    return hashlib.sha256(np.ascontiguousarray(picture.pixels).data).hexdigest()
 
 
 def largest(size: Callable[[int], int], limit: float, finest: int) -> int:
