@@ -262,6 +262,7 @@ class Source:
             skipping=bool(options["skip"]) and not exact,
             tuned=not exact,
             filtered=not exact,
+            dependent=not exact,
             steps=(),
         )
 
