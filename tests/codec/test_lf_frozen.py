@@ -9,9 +9,14 @@ views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. Th
 alone, so that a hash of the pixels is the expectation.
 """
 
+import contextlib
 import hashlib
+import os
+import subprocess
+import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +26,7 @@ from codec.coders.lf import stream
 from codec.coders.lf.blocks import CODED, EXPLICIT, INTRA, KIND, LOG, SKIPPED, SYNTHESIS
 from codec.coders.lf.field import Field
 from codec.coders.lf.pyramid import ALIKE, NEAREST, _spread, pyramid
+from ii_core.base.jit import lean_kernel
 from tests.support.golden import unpacked
 
 FOLDER = unpacked("lf.zip")
@@ -115,6 +121,33 @@ def test_the_lossy_stream_has_factors_between_planes():
     except ValueError:
         return
     assert digest(pixels) != PIXELS["lossy"]
+
+
+def decode_with_checks():
+    """Decode the frozen streams, and ten damaged ones of each; a kernel that leaves an array raises IndexError."""
+    with pytest.raises(IndexError):
+        lean_kernel(_beyond)(np.zeros(3), np.int64(4))  # checks are on
+    rng = np.random.default_rng(0)
+    for name in PIXELS:
+        coded = Encoded.load(FOLDER / f"{name}.ii")
+        assert digest(decode(coded).pixels) == PIXELS[name]
+        for _ in range(10):
+            payload = bytearray(coded.payload)
+            payload[rng.integers(40, len(payload))] ^= 1 << rng.integers(8)
+            with contextlib.suppress(ValueError):
+                decode(replace(coded, payload=bytes(payload)))
+
+
+def _beyond(values, at):
+    return values[at]
+
+
+@pytest.mark.slow
+def test_no_kernel_leaves_its_arrays(tmp_path):
+    """In a process of its own, whose kernels are compiled with checks of bounds."""
+    run = "from tests.codec.test_lf_frozen import decode_with_checks; decode_with_checks()"
+    variables = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", run], env=variables, cwd=Path(__file__).parents[2], check=True)
 
 
 def nodes_by_sorting(rows, cols, log_stride, references, sources):

@@ -40,9 +40,8 @@ def test_the_measure_is_that_of_the_test_conditions(dtype):
     np.testing.assert_allclose(ours, q_ctc_psnr(original, decoded).values.ravel(), rtol=1e-9)
 
 
-def test_planes_are_scaled_so_that_errors_count_as_the_measure_counts_them(monkeypatch):
+def test_planes_are_scaled_so_that_errors_count_as_the_measure_counts_them():
     """Of Y with four times the error, Cb's squared error changes the mean of logarithms by 4/6 of what Y's does."""
-    monkeypatch.setattr(tuning, "FACTOR", 1.0)
     scales = 40, 40  # squares of errors in planes: 3 of Y, 3 · (40/64)² of Cb and Cr
     errors = np.array([3 * 4e6, 3 * (40 / 64) ** 2 * 1e6, 3 * (40 / 64) ** 2 * 2e6])
     found = np.array(tuning.better_scales(scales, errors))
