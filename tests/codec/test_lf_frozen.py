@@ -1,11 +1,12 @@
-"""Frozen streams of `si-lf`, versions 3, 5 and 7: the same bytes decode to the same pixels on every machine.
+"""Frozen streams of `si-lf`, versions 3, 5, 7 and 8: the same bytes decode to the same pixels on every machine.
 
 In ``tests/golden/lf.zip``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
 views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
 views of *Apples* at quantiser 26; the first encoder that left out transforms wrote it. ``row.ii`` holds 1×10 views of
 *Apples* of 32×16 pixels at quantiser 36, by cdd3aba: its first view is matched to one that no other view is made of.
 ``tuned.ii`` and ``rotated.ii``, of version 7, hold 7×6 views of 58×38 pixels and 7×2 of them of the benchmark's 9×9
-views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. The decoder has integer arithmetic
+views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. ``dependent.ii``, of
+version 8, holds 5×4 of those views of 46×35 pixels at quantiser 32. The decoder has integer arithmetic
 alone, so that a hash of the pixels is the expectation.
 """
 
@@ -35,6 +36,7 @@ PIXELS = {
     "skipped": "4bb0232b9f5557feb2f5d26ac1904b48c687300269542c6db1bf73b3e635b603",
     "tuned": "d9d30a671b25efd3a58ad8856f476928dc720daa03306e3642c3d62d8d79c0de",
     "rotated": "1c1d667939667f5b19d172dd13ee2637d5e29ae8e9c7d0f11a44a72bcd47be85",
+    "dependent": "acb8e241356f7e43f530b611839fbefbbac435bae303635eafc0b8c355efe3cf",
     "row": "8779e10e45bc0ef8e8a3921c5f3ed192d0b0dad3092e0d9619ae1a54c87281c0",
     "exact": "be2c46c242ca2aae010544f6e178dd5dfa93b5aec5566384427e4a469a1b2cfd",
 }
@@ -46,6 +48,7 @@ VERSIONS = {
     "row": stream.SKIPPING,
     "tuned": stream.TUNED,
     "rotated": stream.TUNED,
+    "dependent": stream.DEPENDENT,
 }
 
 
@@ -79,8 +82,8 @@ def test_the_lossy_stream_has_all_kinds_of_blocks(monkeypatch):
 
 
 def test_versions_are_the_numbers_in_the_streams():
-    numbers = stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED, stream.TUNED
-    assert numbers == (2, 3, 5, 6, 7)
+    numbers = stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED
+    assert (*numbers, stream.TUNED, stream.DEPENDENT) == (2, 3, 5, 6, 7, 8)
 
 
 def test_the_third_stream_has_blocks_without_a_transform(monkeypatch):

@@ -297,3 +297,8 @@ def test_damaged_streams_decode_to_something_or_are_refused():
         except ValueError:
             continue
         assert pixels.shape == picture.pixels.shape
+
+
+def test_an_error_of_quality_names_the_measure():
+    with pytest.raises(ValueError, match=r"quality is 5: .* is needed \(.*quality is PSNR in dB by the measure"):
+        encode(shifted_plane((1, 1), grid=(2, 2)), "si-lf", quality=5)
