@@ -397,7 +397,8 @@ def checked_goal(coder: Coder, options: Options, bpp: Any, qp: Any, quality: Any
     for name, value, bounds in (("qp", qp, coder.qp_range), ("quality", quality, coder.quality_range)):
         if value is not None and bounds is not None:
             if (number := _within(value, bounds)) is None:
-                raise ValueError(f"{name} is {value!r}: {_allowed(bounds)} is needed")
+                about = f" ({coder.scale_about})" if coder.scale_about else ""
+                raise ValueError(f"{name} is {value!r}: {_allowed(bounds)} is needed{about}")
             return Goal(qp=int(number)) if name == "qp" else Goal(quality=number)
     return Goal()
 

@@ -125,7 +125,7 @@ def changes(rows: Sequence[Mapping[str, Any]], names: Sequence[str], scheme: str
     """
     curves = {(row["picture"], row["scheme"]): row["points"] for row in rows}
     found: dict[str, dict[str, float]] = {}
-    for measure, ours in (("ctc", OURS), (LUMA, OURS), ("psnr", BY_RGB)):
+    for measure, ours in (("ctc", OURS), (LUMA, OURS), ("psnr", BY_RGB), ("worst", OURS)):
         pairs = {name: (curves.get((name, scheme)), curves.get((name, ours))) for name in names}
         rates = {name: rate_change(*pair, measure) for name, pair in pairs.items() if None not in pair}
         found[measure] = {name: rate for name, rate in rates.items() if rate is not None}
@@ -148,9 +148,31 @@ def comparison(rows: Sequence[Mapping[str, Any]], names: Sequence[str], others: 
         for other in others:
             for measure in ("ctc", LUMA, "psnr"):
                 values = list(each[other][measure].values())
-                cells.append(percent(float(of(values))) if len(values) == len(shown) else "–")
+                some = f" of {len(values)}" if len(values) < len(shown) else ""
+                cells.append(percent(float(of(values))) + some if values else "–")
         lines.append([f"**{label}**", "", *cells])
     return [*table(" | ".join(["picture", "views of pixels", *heads]), lines)]
+
+
+def by_view(rows: Sequence[Mapping[str, Any]], names: Sequence[str], others: Sequence[str]) -> list[str]:
+    """Return a table of what the mean over views hides: rates by the worst view, changes from view to view."""
+    curves = {(row["picture"], row["scheme"]): row["points"] for row in rows}
+    lines = []
+    for other in others:
+        found = changes(rows, names, other)
+        both = [name for name in names if name in found["ctc"]]
+        if not both:
+            continue
+        steps = [
+            float(np.mean([point["step"] for name in both for point in curves[name, scheme]]))
+            for scheme in (OURS, other)
+        ]
+        rates = (
+            percent(float(np.mean([found[measure][name] for name in found[measure]]))) for measure in ("ctc", "worst")
+        )
+        lines.append([f"`{other}`", str(len(both)), *rates, *(f"{step:.2f}" for step in steps)])
+    heads = "anchor | pictures | rate by mean view | rate by worst view | change, `si-lf`, dB | change, anchor, dB"
+    return [*table(heads, lines)]
 
 
 def percent(rate: float | None) -> str:
@@ -171,4 +193,6 @@ def tables() -> Tables:
         used = [row for row in rows if row["picture"] in names]
         lines = [*comparison(used, names, others), "", origin(used)] if used else ["Not measured yet."]
         found["docs/benchmark.md", mark] = lines
+    names, others = kinds["anchors-photographs"]
+    found["docs/benchmark.md", "anchors-views"] = by_view(rows, names, others)
     return found

@@ -46,6 +46,7 @@ QUANTISERS = {
     "mpeg2": (1, 2, 4, 7, 12, 20, 31),
     "lf": (20, 28, 36, 44, 52),
 }
+TUNED = ("si-lf:tune=rgb",)  # for the measure of these tables
 LETTERS = 8  # height of labels in the chart, typographic points
 NEAR = 0.1  # tolerance of the recommended setting, relative to the least rate
 # Trials with one option changed, which led to defaults and presets.
@@ -120,7 +121,7 @@ def candidates() -> list[str]:
     """Return the anchor, every scheme with adjustable quality, its presets, and the trials."""
     lossy = [name for name in schemes() if qualities(name)]
     named = [f"{name}:{setting}" for name in lossy for setting in find(name).presets]
-    return list(dict.fromkeys([ANCHOR, *lossy, *named, *TRIALS]))
+    return list(dict.fromkeys([ANCHOR, *lossy, *named, *TUNED, *TRIALS]))
 
 
 def qualities(scheme: str) -> list[dict[str, Any]]:

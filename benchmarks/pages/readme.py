@@ -11,7 +11,7 @@ from statistics import median
 from typing import Any
 
 from benchmarks.accuracy import povray
-from benchmarks.coding import coders, jplm, light_field
+from benchmarks.coding import anchors, coders, jplm, light_field
 from benchmarks.coding.light_field import BY_RGB, IMPORTED, OURS, SCENES, rate_change
 from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
@@ -30,6 +30,8 @@ SHOWN = {  # pictures of the demo, on the page of the tutorial
 PEERS = {"si-avif:best": "AV1", "si-hevc:best": "HEVC"}
 TIMED = "AV1"  # the peer whose CPU times are compared, too
 SMALL = 8  # scale of the scenes of `light_field`
+ANCHORS = {"vvenc": "VVC", "libaom": "AV1", "x265": "HEVC"}  # those of users, by the common test conditions
+MEASURES = {"ctc": "PSNR-YUV", "psnr": "PSNR of RGB"}
 LARGE = (1, 4)  # scales of `coders`; each peer is shown at the first that it was measured at
 TIMES = {"encoding": ("encode_us", "codec_seconds"), "decoding": ("decode_us", "decode_seconds")}
 NONE = "–"
@@ -64,18 +66,49 @@ def peers_table() -> list[str]:
         ("`render`: CPU time", f"Mitsuba {version}", f"512×{BAND}", time, NONE),
         ("`render`: PSNR", "POV-Ray", NONE, span([f"{value:.0f} dB" for value in sorted(psnr)]), NONE),
     ]
+    lines, compared = anchor_claims()
+    claims += lines
     for peer, scale, pairs in coded:
+        if scale == SMALL and peer in PEERS.values():
+            continue  # anchors tell of these
         change = {name: rate_change(theirs["points"], ours["points"]) for name, (theirs, ours) in pairs.items()}
-        claims.append((f"`{OURS}`: rate", peer, views(scale), *(percents(some) for some in split(change))))
+        claims.append(
+            (f"`{OURS}`: rate by {MEASURES['psnr']}", peer, views(scale), *(percents(some) for some in split(change)))
+        )
     for what, keys in TIMES.items():
         for peer, scale, pairs in coded:
             if peer == TIMED:
                 ratio = {name: cpu(ours, keys) / cpu(theirs, keys) for name, (theirs, ours) in pairs.items()}
                 cells = (factors(some) for some in split(ratio))
                 claims.append((f"`{OURS}`: CPU time of {what}", peer, views(scale), *cells))
-    head = ["| measure | against | view | scenes | photograph |", "|---|---|---|---|---|"]
-    used = [*speed, *pictures, *(row for _, _, pairs in coded for pair in pairs.values() for row in pair)]
+    head = ["| measure | against | view | scenes | photographs |", "|---|---|---|---|---|"]
+    used = [*speed, *pictures, *compared, *(row for _, _, pairs in coded for pair in pairs.values() for row in pair)]
     return [*head, *(f"| {' | '.join(claim)} |" for claim in claims), "", origin(used)]
+
+
+def anchor_claims() -> tuple[list[tuple[str, ...]], list[Row]]:
+    """Return `si-lf` against each anchor by each measure, and the rows that say it: mean, and the worst picture."""
+    rows = anchors.RECORDS.rows()
+    groups = (*light_field.SCENES, *light_field.FIELDS), [f"{name}-5x5" for name in anchors.PHOTOGRAPHS]
+    claims: list[tuple[str, ...]] = []
+    for measure, label in MEASURES.items():
+        for scheme, peer in ANCHORS.items():
+            cells = [mean_and_worst(anchors.changes(rows, group, scheme)[measure]) for group in groups]
+            claims.append(
+                (f"`{OURS}`: rate by {label}", peer, "[own](docs/benchmark.md#results-on-photographs)", *cells)
+            )
+    shown = {*groups[0], *groups[1]}, {*ANCHORS, OURS, BY_RGB}
+    return claims, [row for row in rows if row["picture"] in shown[0] and row["scheme"] in shown[1]]
+
+
+def mean_and_worst(rates: Mapping[str, float]) -> str:
+    """Return the mean of rates by picture and the greatest, with the number of pictures."""
+    if not rates:
+        return NONE
+    mean, worst = (
+        f"{value:+.0f}".replace("-", "−") for value in (sum(rates.values()) / len(rates), max(rates.values()))
+    )
+    return f"{mean} % (worst {worst}, of {len(rates)})"
 
 
 def meetings() -> list[tuple[str, int, Pairs]]:

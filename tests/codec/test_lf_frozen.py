@@ -1,17 +1,23 @@
-"""Frozen streams of `si-lf`, versions 3, 5 and 7: the same bytes decode to the same pixels on every machine.
+"""Frozen streams of `si-lf`, versions 3, 5, 7 and 8: the same bytes decode to the same pixels on every machine.
 
 In ``tests/golden/lf.zip``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
 views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
 views of *Apples* at quantiser 26; the first encoder that left out transforms wrote it. ``row.ii`` holds 1×10 views of
 *Apples* of 32×16 pixels at quantiser 36, by cdd3aba: its first view is matched to one that no other view is made of.
 ``tuned.ii`` and ``rotated.ii``, of version 7, hold 7×6 views of 58×38 pixels and 7×2 of them of the benchmark's 9×9
-views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. The decoder has integer arithmetic
+views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. ``dependent.ii``, of
+version 8, holds 5×4 of those views of 46×35 pixels at quantiser 32. The decoder has integer arithmetic
 alone, so that a hash of the pixels is the expectation.
 """
 
+import contextlib
 import hashlib
+import os
+import subprocess
+import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +27,7 @@ from codec.coders.lf import stream
 from codec.coders.lf.blocks import CODED, EXPLICIT, INTRA, KIND, LOG, SKIPPED, SYNTHESIS
 from codec.coders.lf.field import Field
 from codec.coders.lf.pyramid import ALIKE, NEAREST, _spread, pyramid
+from ii_core.base.jit import lean_kernel, part_kernel
 from tests.support.golden import unpacked
 
 FOLDER = unpacked("lf.zip")
@@ -29,6 +36,7 @@ PIXELS = {
     "skipped": "4bb0232b9f5557feb2f5d26ac1904b48c687300269542c6db1bf73b3e635b603",
     "tuned": "d9d30a671b25efd3a58ad8856f476928dc720daa03306e3642c3d62d8d79c0de",
     "rotated": "1c1d667939667f5b19d172dd13ee2637d5e29ae8e9c7d0f11a44a72bcd47be85",
+    "dependent": "acb8e241356f7e43f530b611839fbefbbac435bae303635eafc0b8c355efe3cf",
     "row": "8779e10e45bc0ef8e8a3921c5f3ed192d0b0dad3092e0d9619ae1a54c87281c0",
     "exact": "be2c46c242ca2aae010544f6e178dd5dfa93b5aec5566384427e4a469a1b2cfd",
 }
@@ -40,6 +48,7 @@ VERSIONS = {
     "row": stream.SKIPPING,
     "tuned": stream.TUNED,
     "rotated": stream.TUNED,
+    "dependent": stream.DEPENDENT,
 }
 
 
@@ -73,8 +82,8 @@ def test_the_lossy_stream_has_all_kinds_of_blocks(monkeypatch):
 
 
 def test_versions_are_the_numbers_in_the_streams():
-    numbers = stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED, stream.TUNED
-    assert numbers == (2, 3, 5, 6, 7)
+    numbers = stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED
+    assert (*numbers, stream.TUNED, stream.DEPENDENT) == (2, 3, 5, 6, 7, 8)
 
 
 def test_the_third_stream_has_blocks_without_a_transform(monkeypatch):
@@ -115,6 +124,38 @@ def test_the_lossy_stream_has_factors_between_planes():
     except ValueError:
         return
     assert digest(pixels) != PIXELS["lossy"]
+
+
+def decode_with_checks():
+    """Decode the frozen streams, and ten damaged ones of each; a kernel that leaves an array raises IndexError."""
+    with pytest.raises(IndexError):
+        lean_kernel(_through)(np.zeros(3), np.int64(4))  # checks are on, in parts of kernels, too
+    rng = np.random.default_rng(0)
+    for name in PIXELS:
+        coded = Encoded.load(FOLDER / f"{name}.ii")
+        assert digest(decode(coded).pixels) == PIXELS[name]
+        for _ in range(10):
+            payload = bytearray(coded.payload)
+            payload[rng.integers(40, len(payload))] ^= 1 << rng.integers(8)
+            with contextlib.suppress(ValueError):
+                decode(replace(coded, payload=bytes(payload)))
+
+
+@part_kernel
+def _beyond(values, at):
+    return values[at]
+
+
+def _through(values, at):
+    return _beyond(values, at)
+
+
+@pytest.mark.slow
+def test_no_kernel_leaves_its_arrays(tmp_path):
+    """In a process of its own, whose kernels are compiled with checks of bounds."""
+    run = "from tests.codec.test_lf_frozen import decode_with_checks; decode_with_checks()"
+    variables = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", run], env=variables, cwd=Path(__file__).parents[2], check=True)
 
 
 def nodes_by_sorting(rows, cols, log_stride, references, sources):

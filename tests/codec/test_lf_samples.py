@@ -1,4 +1,4 @@
-"""Residuals of `si-lf` without a transform."""
+"""Residuals of `si-lf` without a transform, and by a dependent quantiser."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from codec import decode, encode
-from codec.coders.lf import arithmetic, contexts, samples, stream
+from codec.coders.lf import arithmetic, coefficients, contexts, samples, stream
 from codec.coders.lf import coder as lf
 from codec.coders.lf.blocks import CODED, LOG, SKIPPED
 from codec.coders.lf.field import Field
@@ -60,7 +60,7 @@ def test_decoding_repeats_the_encoder_to_the_bit(dtype, options):
     picture = specks(dtype, grid=(3, 4), lenses=(19, 10))
     source = lf.Source(picture, checked_options(lf.LightField(), options))
     payload, field = source.coded(30 * lf.FRACTIONS)
-    assert payload[0] == stream.TUNED
+    assert payload[0] == stream.DEPENDENT
     shown = np.empty_like(picture.pixels)
     field.show(shown)
     coded = encode(picture, "si-lf:cross=0" if options else "si-lf", qp=30)
@@ -96,3 +96,82 @@ def _some_levels(rng, n, density):
     sizes = np.minimum(rng.geometric(0.3, (n, n)) ** rng.integers(1, 5, (n, n)), samples.MOST_LEVEL)
     levels[:n, :n] = sizes * rng.choice([-1, 1], (n, n)) * (rng.random((n, n)) < density)
     return levels
+
+
+NEXT_STATE = {(0, 0): 0, (0, 1): 2, (1, 0): 2, (1, 1): 0, (2, 0): 1, (2, 1): 3, (3, 0): 3, (3, 1): 1}
+
+
+def places_from_the_last(levels, log):
+    """Rows and columns in the order of coding, by the definition of the scan."""
+    n = 1 << log
+    order = sorted((y + x, y if (x + y) % 2 else x, y, x) for y in range(n) for x in range(n))
+    last = max(i for i, (_, _, y, x) in enumerate(order) if levels[y, x])
+    return [(y, x) for _, _, y, x in order[last::-1]]
+
+
+def values_by_definition(levels, log):
+    """Values in halves of a distance that a decoder gives magnitudes with signs."""
+    state, values = 0, np.zeros_like(levels)
+    for y, x in places_from_the_last(levels, log):
+        size = abs(int(levels[y, x]))
+        values[y, x] = np.sign(levels[y, x]) * (2 * size - (state >> 1) * (size > 0))
+        state = NEXT_STATE[state, size & 1]
+    return values
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(2, 4), st.integers(0, 2), st.integers(0, 2**32 - 1), st.sampled_from([0.02, 0.3, 1.0]))
+def test_levels_of_a_dependent_quantiser_are_read_as_they_were_written(log, plane, seed, density):
+    rng = np.random.default_rng(seed)
+    levels = np.zeros((32, 32), np.int32)
+    levels[:16, :16] = _some_levels(rng, 1 << log, density)[:16, :16] // 2
+    levels[rng.integers(4), rng.integers(4)] = 1
+    values = values_by_definition(levels, log)
+    coder = arithmetic.writer(contexts.starting_contexts(), 1 << 14)
+    coefficients.code_coefficients(coder, values, plane, log, 1, 1, 1)
+    reader = arithmetic.reader(contexts.starting_contexts(), arithmetic.finish(coder))
+    found = np.zeros((32, 32), np.int32)
+    coefficients.code_coefficients(reader, found, plane, log, 1, 1, 1)
+    np.testing.assert_array_equal(found, values)
+
+
+def quantised(block, log, step, weight, dependent):
+    """Levels, bits and squared error by the encoder, with the contexts of a stream's beginning."""
+    levels, costs = np.zeros((32, 32), np.int32), arithmetic.bit_costs(contexts.starting_contexts())
+    given = costs, block, 0, log, np.float32(step), np.float32(weight), levels, 1
+    if dependent:
+        return levels, *coefficients.quantise_dependent(*given, coefficients.new_trellis())
+    return levels, *coefficients.quantise(*given)
+
+
+@pytest.mark.parametrize(("log", "seed"), [(2, 0), (3, 1), (4, 2)])
+def test_a_dependent_quantiser_keeps_to_its_states_and_knows_its_error(log, seed):
+    """Levels are those of a walk through the states; error and bits are what decoder and stream have."""
+    rng = np.random.default_rng(seed)
+    n, step = 1 << log, 40
+    block = np.zeros((32, 32), np.int32)
+    block[:n, :n] = rng.laplace(0, 90 / (1 + np.add.outer(np.arange(n), np.arange(n)) / 4))
+    levels, bits, error = quantised(block, log, step, 0.12 * step**2, True)
+    assert levels.any() and (np.sign(levels) * np.sign(block) >= 0).all()
+    np.testing.assert_array_equal(values_by_definition(np.sign(levels) * ((abs(levels) + 1) // 2), log), levels)
+    decoded = np.zeros((32, 32), np.int32)
+    coefficients.dequantise(levels, log, 16 * step, decoded, True)
+    np.testing.assert_allclose(decoded, levels * step * 9 / 16, atol=0.5)
+    np.testing.assert_allclose(np.square(decoded - block).sum(), error, rtol=0.05)  # the decoder rounds
+    coder = arithmetic.writer(contexts.starting_contexts(), 1 << 14)
+    coefficients.code_coefficients(coder, levels, 0, log, 1, 1, 1)
+    # Contexts learn while they are written, and costs leave out those that are mixed with others.
+    assert abs(8 * len(arithmetic.finish(coder)) / bits - 1) < 0.15
+
+
+def test_a_dependent_quantiser_costs_less():
+    """Squared error and weighted bits of blocks with many coefficients, against one level after another."""
+    rng, step = np.random.default_rng(5), 40
+    costs = np.zeros(2)
+    for _ in range(8):
+        block = np.zeros((32, 32), np.int32)
+        block[:8, :8] = rng.laplace(0, 80, (8, 8))
+        for dependent in (0, 1):
+            _, bits, error = quantised(block, 3, step, 0.12 * step**2, dependent)
+            costs[dependent] += error + 0.12 * step**2 * bits
+    assert costs[1] < 0.98 * costs[0]

@@ -74,6 +74,8 @@ class Job(NamedTuple):
         Vectors of decoded views, if there are earlier instants.
     finer : int
         Whether large coefficients have contexts by their neighbourhood.
+    dependent : int
+        Whether the quantiser of coefficients is a dependent one.
     """
 
     views: Any
@@ -95,6 +97,7 @@ class Job(NamedTuple):
     past: Any = motion.NOTHING
     motions: Any = motion.NOTHING
     finer: Any = 0
+    dependent: Any = 0
 
 
 class Work(NamedTuple):
@@ -620,7 +623,9 @@ def code_block(coder, job, work, y0, x0, log):
                 first = some
         if decoding:
             if some or cross:
-                rows, cols = rebuild(work, work.levels, log, job.step, some, cross, job.crossed, skipped)
+                rows, cols = rebuild(
+                    work, work.levels, log, job.step, some, cross, job.crossed, skipped, job.dependent
+                )
                 if p == 0:
                     keep_first(work, rows, cols)
             store(job, work, p, y0, x0, n, some or cross)
@@ -660,7 +665,7 @@ def _code_plane(coder, job, work, y0, x0, log, p, kind, first, skipped):
         if decoding:
             _note_levels(job, work, p, y0, x0, n)
     elif some:
-        code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0, job.finer)
+        code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0, job.finer, job.dependent)
     return some, cross
 
 

@@ -18,7 +18,7 @@ from ... import clock
 from ...contract import Coder, Goal, Option, Options, Pixels
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
 from . import arithmetic, loop_filter_search, planes, ranges, search, stream, synthesis, tuning
-from .blocks import Job, code_blend, new_work
+from .blocks import Job, Work, code_blend, code_view, new_work
 from .contexts import Contexts
 from .field import Field
 from .pyramid import Node, Place
@@ -38,11 +38,12 @@ GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below whic
 # Views of more samples than so many are smoother, and their blocks cheaper: there GOOD is less by their share.
 GOOD_SAMPLES = 128 * 64
 SURELY = 5.0, 5.0, 2.0  # times GOOD: intra modes are not tried below it
+FIRST_TRIES = 8  # intra modes that are coded on trial in the first view
 BLEND_ROWS = 4, 4, 1  # the kind of blending is chosen by every so many-th row
 WEIGHT = 0.12  # squared error a bit is worth, in squared steps
-# Quantisers by which each level is finer than the next, for more is predicted from it, and the first is finer than
-# the last.
-FINER_A_LEVEL, FINER_FIRST = 1.5, 14.0
+# Quantisers by which each level is finer than the next, for more is predicted from it. The first view is finer than
+# the last ones by so many, and so many more for each doubling of the views that it predicts.
+FINER_A_LEVEL, FINER_FIRST, FINER_A_DOUBLING = 1.5, 5.0, 1.1
 TRIAL_LEVELS = 2  # of views that show how errors share among planes
 CROSS = stream.QUARTERS, stream.EIGHTHS  # unit of factors between planes: of principal axes, and of BT.709
 MOST_VIEWS = 1 << 14
@@ -261,6 +262,7 @@ class Source:
             skipping=bool(options["skip"]) and not exact,
             tuned=not exact,
             filtered=not exact,
+            dependent=not exact,
             steps=(),
         )
 
@@ -331,8 +333,13 @@ class Source:
         if self.header.exact:
             offsets = [0.0] * (last + 2)
         else:
-            offsets = [FINER_FIRST, *(FINER_A_LEVEL * (last - level) for level in range(last + 1))]
+            offsets = [self.finer_first(), *(FINER_A_LEVEL * (last - level) for level in range(last + 1))]
         return tuple(max(1, round(128 * 2 ** ((setting / FRACTIONS - 8 - less) / 6))) for less in offsets)
+
+    def finer_first(self) -> float:
+        """Return the quantisers by which the first view is finer than the last ones; 0 of a view alone."""
+        views = self.grid[0] * self.grid[1]
+        return FINER_FIRST + FINER_A_DOUBLING * math.log2(views) if views > 1 else 0.0
 
     def field(self, header: Header, past: Sequence[Field] = ()) -> Field:
         """Return the views to be coded: nothing yet, but the pixels if coding is lossless."""
@@ -351,7 +358,10 @@ class Source:
                 room = (EXACT_BYTES if field.header.exact else VIEW_BYTES) * field.shape[0] * field.shape[1] + 1024
                 coder = arithmetic.writer(contexts.of(number), room)
                 for nodes in field.batches(number):
-                    found = partial(self._found, field, arithmetic.bit_costs(coder.contexts))
+                    costs = arithmetic.bit_costs(coder.contexts)
+                    if number == 0 and self.effort and not field.header.exact and not field.past:
+                        costs = self._learned_costs(field, nodes[0], costs, contexts, work)
+                    found = partial(self._found, field, costs)
                     jobs, made, blends, filters = zip(*workers.map(found, nodes), strict=True)
                     for job, nearest in zip(jobs, blends, strict=True):
                         if job.synthesised:
@@ -371,6 +381,16 @@ class Source:
                 contexts.after(number)
         return levels
 
+    def _learned_costs(
+        self, field: Field, node: Node, costs: NDArray[np.float32], contexts: Contexts, work: Work
+    ) -> NDArray[np.float32]:
+        """Return costs of bits after a first run of the first view, whose initial contexts are of other pictures."""
+        job, _ = field.job(node)
+        search.find_blocks(costs, job, self._search(job, self.view(node.row, node.col)))
+        coder = arithmetic.writer(contexts.of(node.level).copy(), VIEW_BYTES * job.levels[0].size + 1024)
+        code_view(coder, job, work)
+        return arithmetic.bit_costs(coder.contexts)
+
     def _found(
         self, field: Field, costs: NDArray[np.float32], node: Node
     ) -> tuple[Job, synthesis.Synthesis, int, loop_filter_search.Found | None]:
@@ -387,12 +407,13 @@ class Source:
     def _search(self, job: Any, original: NDArray[np.int16]) -> Search:
         share = min(1.0, GOOD_SAMPLES / (self.height * self.width))
         # The first view is one of many, and of photographs half of all bytes and more: it is always searched well.
-        effort = self.effort if len(job.references) or not self.effort else 2
+        first = self.effort > 0 and not len(job.references)
+        effort = 2 if first else self.effort
         return Search(
             original=original,
             weight=np.float32(worth(job.step)),
             least=3 if effort == 0 else 2,
-            intra_tries=(1, 1, 3)[effort],
+            intra_tries=FIRST_TRIES if first else (1, 1, 3)[effort],
             good=np.float32(GOOD[effort] * share),
             surely=np.float32(SURELY[effort]),
             planes=1 if effort == 0 else 3,

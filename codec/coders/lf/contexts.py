@@ -53,7 +53,12 @@ FILTERED = REST_NEAR + 288  # plane 3 × the view before: none, off, on 3
 FILTER_SAME = FILTERED + 9  # plane 3
 FILTER_CLASSES = FILTER_SAME + 3  # plane 3 × (more than one, eight)
 TAP = FILTER_CLASSES + 6  # first plane or another 2 × group of taps 4 × 12 digits
-COUNT = TAP + 96
+# Of a dependent quantiser.
+SIGNIFICANT_FINE = TAP + 96  # state 2, 3 × those of SIGNIFICANT
+SIGNIFICANT_THERE_FINE = SIGNIFICANT_FINE + 2 * 384  # state 2, 3 × those of SIGNIFICANT_THERE
+ABOVE_ONE_FINE = SIGNIFICANT_THERE_FINE + 2 * 384  # those of ABOVE_ONE
+ABOVE_ONE_THERE_FINE = ABOVE_ONE_FINE + 48  # those of ABOVE_ONE_THERE
+COUNT = ABOVE_ONE_THERE_FINE + 96
 
 # Probabilities to begin with: log(p / (1 - p)) from -6.2 up in steps of 0.2, by its digit; * where none is known. The
 # mean over eight coded pictures: three scenes and a flower of a real light field camera, at two quantisers each.
@@ -153,6 +158,15 @@ def starting_contexts() -> NDArray[np.int32]:
     unknown = np.tile([1 << 15, 1 << 15, 0], (COUNT - EXACT, 1))
     contexts = np.concatenate([found, weights, unknown]).astype(np.int32)
     contexts[REST_NEAR:FILTERED] = np.repeat(contexts[REST:BLEND].reshape(3, 1, 16, 3), 6, axis=1).reshape(-1, 3)
+    for to, of, end in (
+        (SIGNIFICANT_FINE, SIGNIFICANT, ABOVE_ONE),
+        (SIGNIFICANT_FINE + 384, SIGNIFICANT, ABOVE_ONE),
+        (SIGNIFICANT_THERE_FINE, SIGNIFICANT_THERE, ABOVE_ONE_THERE),
+        (SIGNIFICANT_THERE_FINE + 384, SIGNIFICANT_THERE, ABOVE_ONE_THERE),
+        (ABOVE_ONE_FINE, ABOVE_ONE, ABOVE_TWO),
+        (ABOVE_ONE_THERE_FINE, ABOVE_ONE_THERE, WEIGHTS),
+    ):
+        contexts[to : to + end - of] = contexts[of:end]
     return contexts
 
 

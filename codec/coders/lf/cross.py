@@ -76,14 +76,14 @@ def subtract_cross(work, cross, shift):
 
 
 @tuned_kernel
-def rebuild(work, levels, log, step, some, cross, shift, skipped):
+def rebuild(work, levels, log, step, some, cross, shift, skipped, dependent):
     """work.block = the residual, of levels if there are ``some``, and of the first plane by a factor in 2^-shift.
 
     Return the rows and columns of work.coefficients that hold it.
     """
     rows = cols = 0
     if some:
-        rows, cols = dequantise(levels, log, step, work.coefficients)
+        rows, cols = dequantise(levels, log, step, work.coefficients, dependent and not skipped)
     if cross:
         high, wide = max(rows, work.reach[0]), max(cols, work.reach[1])
         for y in range(high):

@@ -89,6 +89,7 @@ class Field:
             synthesised=int(known),
             crossed=self.header.crossed,
             finer=int(self.header.tuned),
+            dependent=int(self.header.dependent),
             skipping=int(self.header.skipping),
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),

@@ -10,7 +10,7 @@ from ii_core.base.jit import part_kernel, stage_kernel
 
 from .arithmetic import bit_cost
 from .blocks import LIMIT, coded_context, residual_context, skipped_context
-from .coefficients import quantise
+from .coefficients import Trellis, new_trellis, quantise, quantise_dependent
 from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
 from .intra import MODES
 from .matching import HUGE
@@ -32,6 +32,7 @@ class Trial(NamedTuple):
     skipped: Any  # (6,) whether there is no transform
     trial_skipped: Any  # (1,)
     errors: Any  # (MODES,) of intra prediction
+    trellis: Trellis
 
 
 def new_trial() -> Trial:
@@ -46,6 +47,7 @@ def new_trial() -> Trial:
         skipped=np.zeros(6, np.int64),
         trial_skipped=np.zeros(1, np.int64),
         errors=np.zeros(MODES, np.float32),
+        trellis=new_trellis(),
     )
 
 
@@ -57,19 +59,22 @@ def _copy_block(block, to, n):
 
 
 @part_kernel
-def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped, finer):
+def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped, ways):
     """Quantise work.coefficients, which are samples if the transform is skipped."""
     if skipped:
         return quantise_samples(costs, work.coefficients, trial.trial_levels, plane, log, step, weight, levels)
+    finer, dependent = ways
+    if dependent:
+        return quantise_dependent(costs, work.coefficients, plane, log, step, weight, levels, finer, trial.trellis)
     return quantise(costs, work.coefficients, plane, log, step, weight, levels, finer)
 
 
 @part_kernel
-def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crossed, error, skipped, finer):
+def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crossed, error, skipped, ways):
     """Quantise work.block; return bits, whether there are levels, which array has them, and the factor of `cross`.
 
-    ``first`` says whether the first plane has a residual, ``error`` is the squared error without one, and ``finer``
-    says whether contexts are those of version 7.
+    ``first`` says whether the first plane has a residual, ``error`` is the squared error without one, and ``ways``
+    say whether contexts are those of version 7, and whether the quantiser is dependent.
     """
     context = coded_context(plane, log, kind, first, skipped)
     free, full = bit_cost(costs, context, np.int64(0)), bit_cost(costs, context, np.int64(1))
@@ -82,14 +87,14 @@ def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crosse
         _copy_block(work.block, work.coefficients, 1 << log)
     else:
         forward(work.block, log, work.half, work.coefficients)
-    more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.levels, skipped, finer)
+    more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.levels, skipped, ways)
     best = error + weight * bits
     if more > 0 and missed + weight * (more + full + none) < best:
         best, bits, some = missed + weight * (more + full + none), more + full + none, 1
     factor = best_cross(work, crossed) if predictable else np.int64(0)
     if factor:
         subtract_cross(work, factor, crossed)
-        more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.spare, skipped, finer)
+        more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.spare, skipped, ways)
         more += (full if more > 0 else free) + cross_cost(costs, plane, log, factor)
         if missed + weight * more < best:
             bits, some, cross = more, 1, factor
@@ -141,18 +146,19 @@ def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit)
     step = np.float32(job.step / 16)
     bits, error, without = np.float32(0), np.float32(0), np.float32(0)
     first, coded = 0, 0
+    ways = job.finer, job.dependent
     for p in range(3):
         least = _subtract_prediction(search, work, p, y0, x0, n)
         without += least
         more, some, cross = _try_plane(
-            costs, work, trial, p, log, step, search.weight, kind, first, job.crossed, least, skipped, job.finer
+            costs, work, trial, p, log, step, search.weight, kind, first, job.crossed, least, skipped, ways
         )
         bits += more
         if p:
             trial.trial_cross[p - 1] = cross
         if some:
             levels = work.spare if cross else work.levels
-            rows, cols = rebuild(work, levels, log, job.step, 1, cross, job.crossed, skipped)
+            rows, cols = rebuild(work, levels, log, job.step, 1, cross, job.crossed, skipped, job.dependent)
             if p == 0:
                 keep_first(work, rows, cols)
                 first = 1

@@ -13,8 +13,9 @@ from ...bitstream.compact import leb128, read_leb128
 from .planes import bt709_colours
 
 # Versions 2, 3, 5 and 6 say by their number which tools they have: by factors between planes, and residuals without a
-# transform. Version 4 is that of segments of takes. Version 7 has flags; lossless coding still writes 2 and 3.
-VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED, TUNED = 3, 2, 5, 6, 7
+# transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent
+# quantiser as well; lossless coding still writes 2 and 3.
+VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED, TUNED, DEPENDENT = 3, 2, 5, 6, 7, 8
 _VERSIONS = {
     (False, False): UNCROSSED,
     (True, False): VERSION,
@@ -23,7 +24,7 @@ _VERSIONS = {
 }
 _TOOLS = {version: tools for tools, version in _VERSIONS.items()}
 QUARTERS, EIGHTHS = 2, 3  # binary logarithms of the unit of factors between planes
-# Flags of version 7; the lowest two bits are 0, or the logarithm of the factors' unit.
+# Flags of versions 7 and 8; the lowest two bits are 0, or the logarithm of the factors' unit.
 _SKIPS, _FILTERS, _DOWN, _BT709, _SKEWED, _FLAGS = 4, 8, 16, 32, 64, 128
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
@@ -69,9 +70,11 @@ class Header:
     skipping : bool
         Whether small blocks may have a residual without a transform.
     tuned : bool
-        Version 7: large coefficients have contexts by their neighbourhood, and views may be filtered.
+        Versions 7 and 8: large coefficients have contexts by their neighbourhood, and views may be filtered.
     filtered : bool
         Whether views may be filtered in the loop.
+    dependent : bool
+        Version 8: the quantiser of coefficients is a dependent one.
     steps : tuple of int
         The quantiser's step of each level, in 2^-7 of an 8-bit code.
     """
@@ -88,6 +91,7 @@ class Header:
     skipping: bool
     tuned: bool = False
     filtered: bool = False
+    dependent: bool = False
     steps: tuple[int, ...]
 
 
@@ -106,7 +110,13 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
         return _HEAD.pack(version, *common, *colours) + b"".join(_LEVEL.pack(*level) for level in index)
     flags = header.crossed | _SKIPS * header.skipping | _FILTERS * header.filtered
     flags |= _DOWN * (header.lattice[2] < 0) | _BT709 * (header.scales is not None) | _SKEWED * _skewed(header)
-    head = _TUNED.pack(TUNED, flags, header.log_stride | header.sources << 3, header.low, header.high)
+    head = _TUNED.pack(
+        DEPENDENT if header.dependent else TUNED,
+        flags,
+        header.log_stride | header.sources << 3,
+        header.low,
+        header.high,
+    )
     head += bytes(header.scales) if header.scales else _ROTATION.pack(*colours)
     head += _LATTICE.pack(*header.lattice) if _skewed(header) else b""
     return head + b"".join(leb128(step) + leb128(length) for step, length in index)
@@ -137,11 +147,11 @@ def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
     if len(payload) < max(1, least_bytes(pixels)):
         raise ValueError(f"its light field has {len(payload)} bytes, too few for {pixels} pixels")
     version = payload[0]
-    if version not in _TOOLS and version != TUNED:
-        known = ", ".join(map(str, sorted((*_TOOLS, TUNED))))
+    if version not in _TOOLS and version not in (TUNED, DEPENDENT):
+        known = ", ".join(map(str, sorted((*_TOOLS, TUNED, DEPENDENT))))
         raise ValueError(f"its light field is of version {version}: this decoder reads versions {known}")
     try:
-        values, index, start = (_read_tuned if version == TUNED else _read_fixed)(payload)
+        values, index, start = (_read_fixed if version in _TOOLS else _read_tuned)(payload)
     except (IndexError, ValueError, struct.error):
         raise ValueError(f"its light field has {len(payload)} bytes, too few for its header and index") from None
     header = Header(**values, steps=tuple(step for step, _ in index))
@@ -184,7 +194,7 @@ def _read_fixed(payload: bytes) -> _Read:
 
 
 def _read_tuned(payload: bytes) -> _Read:
-    _, flags, counts, low, high = _TUNED.unpack_from(payload)
+    version, flags, counts, low, high = _TUNED.unpack_from(payload)
     at, scales = _TUNED.size, None
     if flags & _BT709:
         scales = payload[at], payload[at + 1]
@@ -214,5 +224,6 @@ def _read_tuned(payload: bytes) -> _Read:
         "skipping": bool(flags & _SKIPS),
         "tuned": True,
         "filtered": bool(flags & _FILTERS),
+        "dependent": version == DEPENDENT,
     }
     return values, index, at

@@ -13,10 +13,6 @@ PEAK = 1023  # of 10 bit
 LEAST_ERROR = 1e-12  # 120 dB
 # Scales of the planes of Cb and Cr with which a trial begins, their least, and their most.
 START, LEAST, MOST = 35, 12, SCALE
-# Times the scale at which an error in a plane of colour counts as one in Y: the trial's first views are coarser than
-# the picture's, and larger scales keep more of colours. From 0.28 to 0.41 of `SCALE` rates by CTC differ by 1 % on
-# two photographs (2026-11-25).
-FACTOR = 1.3
 
 
 def psnr_yuv(original: NDArray[np.uint8 | np.uint16], decoded: NDArray[np.uint8 | np.uint16]) -> float:
@@ -40,6 +36,6 @@ def better_scales(scales: tuple[int, int], errors: NDArray[np.float64]) -> tuple
     that of Cb. Planes are scaled so that equal squared errors in them change it equally.
     """
     least = np.maximum(errors, 1.0)
-    found = [FACTOR * scale * np.sqrt(least[0] / (6 * error)) for scale, error in zip(scales, least[1:], strict=True)]
+    found = [scale * np.sqrt(least[0] / (6 * error)) for scale, error in zip(scales, least[1:], strict=True)]
     cb, cr = (int(min(max(round(float(scale)), LEAST), MOST)) for scale in found)
     return cb, cr
