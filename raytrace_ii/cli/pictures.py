@@ -13,6 +13,9 @@ from .progress import progress_bar, say_done, spinner
 from .words import say
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ii_core import Rig
 
 
@@ -95,6 +98,9 @@ def import_(
             help="White picture of a raw one, or the camera's calibration data to choose from: a folder, .tar."
         ),
     ] = None,
+    depth: Annotated[
+        Path | None, typer.Option(help="Write z in mm (.exr) of every pixel, where an .h5 of the HCI has GT_DEPTH.")
+    ] = None,
     force: Force = False,
 ) -> None:
     """Import a light field of other programs as an II-picture.
@@ -104,12 +110,13 @@ def import_(
     parameters.cfg of an HCI folder, or given: --camera, or --baseline-mm, --focal-mm and --sensor-mm.
     """
     from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset
-    from ii_core.base.files import check_type, image_types
+    from ii_core.base.files import check_type, image_types, write_image
     from ii_core.picture.assumed import ASSUMED_ANGLE_DEG, with_assumed_camera
     from ii_core.picture.picture import sidecar
 
     types = image_types(output)
-    check_outputs([output, sidecar(output)], force)
+    check_outputs([output, sidecar(output), *([depth] if depth else [])], force)
+    true = None if depth is None else _true_depth(source, depth, ei_pixels or grid or middle or whites)
     if whites is not None or source.suffix.lower() in (".lfp", ".lfr", ".raw"):
         _import_raw(source, whites, output, 8 if "uint8" in types else 16)
         return
@@ -137,6 +144,8 @@ def import_(
     if nominal:
         made = with_assumed_camera(made)
     made.save(output)
+    if true is not None and depth is not None:
+        write_image(depth, true)
     (k, l), (u, v) = made.lenses, made.ei_pixels
     say_done(f"{output}: {k}×{l} lenses of {u}×{v} px, {made.pixels.dtype}")
     if order is not None:
@@ -146,6 +155,20 @@ def import_(
             f"no camera is known: a nominal one of {ASSUMED_ANGLE_DEG:g}°, with pixels of 1 mm, is written; "
             f"raytrace-ii camera {output} --set … replaces it"
         )
+
+
+def _true_depth(source: Path, output: Path, arranged: object) -> NDArray[np.float32]:
+    """Return z in mm of every pixel from an old file of the HCI."""
+    from ii_core.base.files import check_type
+    from ii_core.formats.arrays import array_depth
+
+    check_type(output, "float32")
+    if arranged:
+        raise ValueError("depth is that of a whole file: leave out --ei-pixels, --grid, --middle and --whites")
+    metres = array_depth(source) if source.suffix.lower() in (".h5", ".hdf5") else None
+    if metres is None:
+        raise ValueError(f"{source} has no GT_DEPTH: leave out --depth")
+    return 1000 * metres
 
 
 def _import_raw(source: Path, whites: Path | None, output: Path, bits: int) -> None:

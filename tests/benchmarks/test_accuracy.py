@@ -21,6 +21,7 @@ def rows():
 
 
 # Three halvings, sampled at pixels: fitted orders were within 0.05 of theory for geometry, within 0.25 for light.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "within"),
     [

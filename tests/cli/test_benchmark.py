@@ -185,6 +185,7 @@ def test_a_set_keeps_foreign_files_and_refuses_options(run, refused, tmp_path):
     assert not (tmp_path / "new").exists() and not list(tmp_path.glob("r*"))
 
 
+@pytest.mark.slow
 def test_a_stopped_run_continues(run, tmp_path, monkeypatch):
     (tmp_path / "tiny.toml").write_text(TINY)
     calls, encode = [], codec.encode

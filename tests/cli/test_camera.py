@@ -96,6 +96,7 @@ def test_values_of_presets():
     assert preset("plenoptic").ei_pixels == pytest.approx((13.84, 13.84), abs=0.005)
 
 
+@pytest.mark.slow
 def test_a_hexagonal_picture_is_made_regular_and_coded(run, refused, tmp_path):
     assert run("render", "apples", "--camera", "hexagonal", "--scale", 8, "-o", tmp_path / "h.png")[0] == 0
     for method, ei in (("resample", (16, 14)), ("rectangle", (16, 18))):

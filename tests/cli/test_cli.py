@@ -88,6 +88,7 @@ def test_study_leaves_chart_numbers_and_a_table(run, picture, tmp_path):
     assert read_image(tmp_path / "s" / "small_rd.png").shape[0] > 300
 
 
+@pytest.mark.slow
 def test_study_of_several_pictures_with_anchor_and_default_rates(run, refused, picture, tmp_path):
     other = tmp_path / "other.png"
     IIPicture.load(picture).with_pixels(IIPicture.load(picture).pixels[:, ::-1].copy()).save(other)
@@ -417,6 +418,7 @@ CAMERA = preset("setup1", scale=128)  # 64×32 px, 4×2 lenses
 OBJECTS = ("render", "objects", "--scale", 128)
 
 
+@pytest.mark.slow
 def test_support_images_in_one_file_and_alone(run, tmp_path):
     extra = {"depth": "depth", "ray_length": "ray-length", "disparity": "disparity", "normal": "normal"}
     extra |= {"object_id": "object-id", "shading_normal": "shading-normal"}

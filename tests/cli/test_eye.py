@@ -124,6 +124,7 @@ def test_what_is_written_is_read_to_half_a_code(run, tmp_path, format):
         np.testing.assert_allclose(a, b, atol=0.51 * float(np.ptp(b)) / codes + 1e-6 * float(abs(b).max()))
 
 
+@pytest.mark.slow
 def test_pictures_are_spread_by_a_folder_and_by_the_depth_met(run, tmp_path):
     camera = preset("setup1", scale=64)
     folder = stored(run, tmp_path / "cam", "--spread", "60", "--format", "exr")

@@ -343,6 +343,7 @@ def test_messages_carry_no_terminal_escapes(run, refused, picture, tmp_path):
     assert code == 0 and "\x1b" not in out and "\\x1b]0;title" in out
 
 
+@pytest.mark.slow
 def test_a_terminal_of_ascii():
     commands = ("cameras",), ("camera", "setup1"), ("encode", "a×b.png", "-o", "c")
     found = in_one_process(*commands, PYTHONIOENCODING="ascii", PYTHONUTF8="0")

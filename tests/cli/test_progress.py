@@ -33,6 +33,7 @@ def test_version_and_bare_command(run):
     assert (code, err) == (0, "") and out.startswith("Usage:") and "\n  render " in out
 
 
+@pytest.mark.slow
 def test_every_command_can_be_quiet(run):
     for command in app.registered_commands:
         code, out, _ = run(command.name or command.callback.__name__, "--help")

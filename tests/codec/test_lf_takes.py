@@ -112,6 +112,7 @@ def test_groups_in_time_need_no_other():
         again[0]
 
 
+@pytest.mark.slow
 def test_one_view_is_that_of_the_whole_and_takes_the_views_that_are_counted(monkeypatch):
     video = plane(frames=3, grid=(5, 6))
     coded = encode_take(video, "si-lf", qp=26, plan=Plan(span=3))

@@ -140,6 +140,7 @@ def turned_plane(turn, grid=(5, 5), height=40, width=48, step=5.0):
     return IIPicture(pixels, (width, height), grid[::-1])
 
 
+@pytest.mark.slow
 def test_views_of_a_turned_grid_are_predicted(monkeypatch):
     """The lattice is found, and saves a third of the bytes."""
     picture = turned_plane(0.06)

@@ -99,6 +99,7 @@ def file(package):
     return package
 
 
+@pytest.mark.slow
 def test_the_file_of_the_page_is_known_to_every_command_that_it_is_given_to(file, command):
     assert "unknown scheme 'deflate'" in command("encode", "noise.png", "--scheme", "deflate", "-o", "a.ii", ok=False)
     plugin = ("--plugin", "mine.py")

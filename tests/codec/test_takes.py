@@ -361,6 +361,7 @@ def test_sub_images_of_a_coded_take_are_those_of_its_frames(saved):
 # The command
 
 
+@pytest.mark.slow
 def test_the_command_codes_and_decodes_takes(run, tmp_path):
     video = take(5)
     video.save(tmp_path / "take")

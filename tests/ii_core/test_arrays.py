@@ -5,6 +5,7 @@ import pytest
 import scipy.io
 
 from ii_core import IIPicture, picture_of, preset
+from ii_core.base.files import read_depth
 from ii_core.formats.arrays import array_depth, array_views, write_array
 from ii_core.formats.find import find_views
 
@@ -78,7 +79,7 @@ def test_export_and_import_by_the_command(run, tmp_path):
     assert code == 2 and "does not end in .mat" in error
 
 
-def test_the_old_files_of_the_hci_have_depth_and_cameras(tmp_path):
+def test_the_old_files_of_the_hci_have_depth_and_cameras(run, refused, tmp_path):
     """Views from right to left, dH·f/z − shift the disparity in pixels."""
     values = field(shape=(3, 3, 6, 5))
     depth = np.random.default_rng(1).uniform(5, 9, (3, 3, 6, 5)).astype("<f4")
@@ -91,6 +92,14 @@ def test_the_old_files_of_the_hci_have_depth_and_cameras(tmp_path):
     rig = array_views(tmp_path / "buddha.h5").rig
     per_mm = rig.baseline_mm * rig.focal_mm / (rig.sensor_mm / 6)
     assert per_mm / 8000 - per_mm / rig.focus_mm == pytest.approx(0.05 * 700 / 8 - 5)
+
+    given = ("import", tmp_path / "buddha.h5", "-o", tmp_path / "p.png", "--depth", tmp_path / "z.exr")
+    refused(run(*given, "--middle", "1x1"), "leave out --ei-pixels, --grid, --middle")
+    assert run(*given)[0] == 0
+    np.testing.assert_array_equal(read_depth(tmp_path / "z.exr")[1::3, 0::3], 1000 * depth[1, 2])
+    with h5py.File(tmp_path / "buddha.h5", "a") as file:
+        del file["GT_DEPTH"]
+    refused(run(*given, "--force"), "has no GT_DEPTH")
 
 
 @pytest.mark.parametrize("kind", ["external", "soft", "virtual", "raw", "object", "two", "none", "wide", "range"])

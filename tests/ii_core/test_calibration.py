@@ -95,6 +95,7 @@ def test_a_distorted_grid_is_followed(kind, border_pitches):
     assert found["centres_px"] < 0.02 and found["straight_px"] > 0.5
 
 
+@pytest.mark.slow
 def test_a_drift_steeper_than_cameras_have_is_named():
     with pytest.raises(NoLenses, match=r"drift by up to \d+\.\d px off a straight grid, which no camera can follow"):
         distorted("radial", 2.0, 0)
@@ -447,6 +448,7 @@ def test_marks_stand_on_centres(tmp_path):
     assert back.camera == found.camera and not back.regular
 
 
+@pytest.mark.slow
 def test_alternating_lens_types_are_reported():
     """A 2×2 pattern of sharp and blurred lenses, as of multi-focus arrays."""
     camera, _ = shot(12, size=(500, 500), pitch=16.0)

@@ -208,6 +208,7 @@ def test_command_refuses(run, refused, apples, tmp_path, arguments, said):
     assert not list(tmp_path.glob("a*"))
 
 
+@pytest.mark.slow
 def test_the_command_writes_displays(run, apples, tmp_path):
     apples.save(tmp_path / "p.png")
     for kind in ("quilt", "lenticular", "simulation"):

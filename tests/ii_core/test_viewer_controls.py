@@ -9,6 +9,8 @@ from ii_core.display.viewer import write_viewer
 from tests.ii_core.conftest import LABELS
 from tests.support.one_tab import with_script
 
+pytestmark = pytest.mark.slow  # the page itself is in `test_viewer.py`
+
 PHONE = {"width": 390, "height": 844}
 WIDE = {"width": 780, "height": 260}  # controls stand beside the picture
 

@@ -123,6 +123,7 @@ PLAYED = """([times, step]) => {
     return due; }"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("step", "by"), [(50, 1), (100, 1), (300, 3)])
 def test_frames_come_in_order_and_at_their_rate(tab, step, by):
     """At 10 frames a second; where the screen is slower, frames are left out."""

@@ -223,6 +223,7 @@ def test_a_camera_looks_at_a_point_with_its_top_up():
         camera_pose(up=(0, 0, 2))
 
 
+@pytest.mark.slow
 def test_the_command_turns_the_camera(run, refused, tmp_path):
     """A body to the right of the camera fills its picture after a rotation to the right."""
     (tmp_path / "s.toml").write_text(

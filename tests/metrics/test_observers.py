@@ -476,6 +476,7 @@ def coded(tmp_path_factory):
     return [folder / "a.png", *sorted(folder.glob("a??.ii"))]
 
 
+@pytest.mark.slow
 def test_the_commands_from_pictures_to_a_table(run, coded, tmp_path):
     code, out, err = run("subjective", *coded, "-o", tmp_path / "t.html", "--show", "front", "--training", "0")
     assert code == 0 and "6 presentations, about 3 minutes" in out, err

@@ -75,6 +75,7 @@ def downloaded(tab, path):
     return download.value.suggested_filename
 
 
+@pytest.mark.slow
 def test_a_whole_test_gives_results_that_are_read(opened, page, tmp_path):
     tab = opened(page, "#observer=2")
     begun(tab)

@@ -31,14 +31,15 @@ def others():
 
 def rendering():
     from ii_core import preset, resampled, smallest_rectangle
-    from raytrace_ii import load_scene, render
+    from raytrace_ii import load_scene, render, trace
     from tests.support.trace_scenes import hall
 
-    for name in "apples", "objects":
+    for name in "apples", "car", "objects", "twins":
         for camera in preset("setup1", scale=64), preset("pinhole2d", scale=64):
             render(load_scene(name), camera, support=("depth", "normal"))
     render(hall(), preset("setup1", scale=128), samples=(4, 16), error=4.0)
     render(hall(), preset("setup1", scale=128), samples=4, dtype="float32", audit=0.1)
+    trace(hall(), np.zeros((3, 99)), np.ones((3, 99)))
     hexagonal = render(load_scene("apples"), preset("hexagonal", scale=8)).picture
     smallest_rectangle(hexagonal)
     resampled(hexagonal)

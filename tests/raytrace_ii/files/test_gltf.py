@@ -397,6 +397,7 @@ def test_a_file_of_only_what_is_supported_warns_of_nothing(tmp_path):
         scene_of(tmp_path, gltf)
 
 
+@pytest.mark.slow
 def test_the_command_warns_in_one_line(run, tmp_path):
     gltf = Gltf()
     gltf.node(mesh=gltf.mesh(SQUARE, SQUARE_FACES))

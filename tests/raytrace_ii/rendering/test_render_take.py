@@ -146,6 +146,7 @@ def test_missing_frames_are_named(take, tmp_path, run):
     assert code == 2 and "does not move" in err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["apples", "car", "cuboid"])
 def test_reference_takes_move_in_every_frame(name):
     take = load_take(name)

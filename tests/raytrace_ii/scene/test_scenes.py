@@ -55,6 +55,7 @@ def test_all_reference_scenes_come_with_the_package():
     assert set(NAMES) <= set(scene_names())
 
 
+@pytest.mark.slow
 def test_packaged_scenes_load_and_have_a_description():
     for name, about in scene_names().items():
         assert about

@@ -61,13 +61,15 @@ def test_passing_in_python_sees_the_same(monkeypatch):
 
 @pytest.mark.parametrize(
     ("name", "stages"),
-    [
-        ("apples", {"paint"}),
-        ("car", {"paint", "reflect"}),
-        ("cuboid", {"footprints", "look_closely"}),
-        ("dolphin", {"paint", "attenuate", "reflect"}),
-        ("objects", {"attenuate", "look_closely", "spawn"}),
-    ],
+    first_fast(
+        [
+            ("apples", {"paint"}),
+            ("car", {"paint", "reflect"}),
+            ("cuboid", {"footprints", "look_closely"}),
+            ("dolphin", {"paint", "attenuate", "reflect"}),
+            ("objects", {"attenuate", "look_closely", "spawn"}),
+        ]
+    ),
 )
 def test_a_scene_compiles_only_the_stages_it_needs(name, stages):
     """One function of all stages took 16 s more to compile for Apples, which uses the fewest."""

@@ -370,6 +370,7 @@ def test_the_length_of_a_direction_does_not_matter():
         np.testing.assert_array_equal(unit.depth, other.depth)
 
 
+@pytest.mark.slow
 def test_black_is_black():
     """A scene without light is black, for all materials."""
     bodies = [body(sphere(3), at=(0, 0, 20), mirror=(0.5,) * 3, transmission=(0.5,) * 3), body(wall(40), specular=1)]
