@@ -14,6 +14,7 @@ import statistics
 import textwrap
 import time
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -178,6 +179,7 @@ def psnr(error: np.ndarray) -> float:
     return float(10 * np.log10(255**2 / np.mean(error**2)))
 
 
+@lru_cache(maxsize=1)
 def shot_of(scene: str, camera: IICamera) -> tuple[IIPicture, np.ndarray]:
     """Return a render of 16 samples a pixel, and z of the rays through the middles of its pixels."""
     made = load_scene(scene)
