@@ -336,7 +336,11 @@ def shadowed(polygon):
     ("polygons", "made", "most"),
     [
         ([SQUARE], lambda p: {"bodies": [on_wall(p, emission=WHITE)]}, 0.06),
-        ([EDGE], lambda p: {"bodies": [body(wall(22), mirror=WHITE), on_wall(p, -18, emission=WHITE)]}, 0.012),
+        (
+            [EDGE],
+            lambda p: {"bodies": [body(wall(22), mirror=WHITE), on_wall(p, 62, at=(0, 0, -80), emission=WHITE)]},
+            0.012,
+        ),
         (
             [EDGE],
             lambda p: {"bodies": [on_wall(p, 12, transmission=GREY, ior=1.0), body(wall(22), emission=WHITE)]},
