@@ -4,9 +4,9 @@
 
 The error is PSNR in 16-bit sRGB against a reference of 256 samples per pixel and 12 bounces, with triangles half as
 large where the scene file sets the tessellation. Time is CPU seconds of `render` without support images, the least of
-two or three. Samples per pixel, adaptive sampling, recursion depth and tessellation are varied. The code of an
-earlier commit renders each setting in turn with the present one, each in a process of its own and against its own
-reference. A band of lenses stands for pictures with more rows of them. Records go to
+two or three. Samples per pixel, adaptive sampling, samples by edges, recursion depth and tessellation are varied. The
+code of an earlier commit renders each setting that it has in turn with the present one, each in a process of its own
+and against its own reference. A band of lenses stands for pictures with more rows of them. Records go to
 ``benchmarks/results/pareto.jsonl``, tables to ``docs/speed_accuracy.md``, charts of both scales to ``docs/images``.
 """
 
@@ -31,6 +31,7 @@ from ii_core import IICamera, preset
 from ii_core.display.figure import COLOURS, new_figure
 from raytrace_ii import load_scene
 from raytrace_ii.tracing.packing import packed
+from raytrace_ii.tracing.sampling import EDGES
 
 MODULES = tuple(f"benchmarks.speed.{name}" for name in ("pareto", "shots", "before", "tessellation"))
 RECORDS, SCALE = Records("pareto", MODULES), 32  # scale on the page
@@ -41,6 +42,7 @@ AT_DEPTHS = (1, 4)  # samples at which other depths are tried
 DEPTHS = (0, 1, 2, 3, 4, 6, 8)
 ERRORS = (8.0, 4.0, 2.0, 1.0, 0.5)  # of adaptive sampling between LEAST and MOST, steps of 8 bits
 LEAST, MOST = 4, 16
+EDGE_ERRORS = (16.0, 8.0, 4.0, 2.0)  # of samples by edges, which the earlier code has not
 FINER = 2.0  # tessellation of the reference
 CUTS = (0.25, 0.5, 1.0, FINER)
 TRUE = {"samples": 256, "depth": 12}
@@ -85,6 +87,7 @@ def tables() -> Tables:
         (page, "fronts"): fronts_table(data, measured(FINE_SCALE)),
         (page, "recommended"): recommended_table(data),
         (page, "samples"): samples_table(data),
+        (page, "edges"): edges_table(data),
         (page, "depth"): depth_table(data),
         (page, "cut"): cut_table(data),
     }
@@ -136,11 +139,12 @@ def study(name: str, facts: dict[str, Any], codes: Sequence[Shots]) -> list[dict
         repeats_to = [shoot(cut=max(cuts), depth=TRUE["depth"], repeats=1, options=options)[1] for shoot in codes]
     rows: list[list[dict[str, Any]]] = [[] for _ in codes]
     for sweep, cut, depth, samples, error in settings(most_depth, bounces, cuts):
-        how: dict[str, Any] = {"samples": samples} if error is None else {"samples": (LEAST, samples), "error": error}
+        how: dict[str, Any] = {"samples": (LEAST, samples) if sweep == "adaptive" else samples}
+        how |= {"error": error} if error is not None else {}
         shown = {"sweep": sweep, "samples": samples, "depth": depth if bounces else 0, "error": error, "cut": cut}
-        for shoot, found in zip(codes, rows, strict=True):
+        for shoot, found in zip(codes[: 1 if sweep == "edges" else None], rows, strict=False):
             seconds, psnr = shoot(
-                cut=cut, depth=depth, repeats=3 if samples <= 2 else 2, options={**how, "workers": 1}
+                cut=cut, depth=depth, repeats=3 if samples in (1, 2) else 2, options={**how, "workers": 1}
             )
             found.append({**shown, "seconds": seconds, "psnr": psnr})
     return [
@@ -154,13 +158,15 @@ def study(name: str, facts: dict[str, Any], codes: Sequence[Shots]) -> list[dict
 
 def settings(
     most_depth: int, bounces: bool, cuts: Sequence[float]
-) -> Iterator[tuple[str, float, int, int, float | None]]:
+) -> Iterator[tuple[str, float, int, int | str, float | None]]:
     """Yield sweep, tessellation, depth, samples and error of every setting; with an error, the most samples."""
     for depth in sorted({*DEPTHS, most_depth}) if bounces else (most_depth,):
         for samples in SAMPLES if depth == most_depth else AT_DEPTHS:
             yield "samples" if depth == most_depth else "depth", 1.0, depth, samples, None
     for error in ERRORS:
         yield "adaptive", 1.0, most_depth, MOST, error
+    for error in EDGE_ERRORS:
+        yield "edges", 1.0, most_depth, EDGES, error
     for cut in cuts:
         if cut != 1:
             yield "cut", cut, most_depth, BASE, None
@@ -185,16 +191,19 @@ def recommended(best: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def setting(row: dict[str, Any]) -> str:
     """Return the description of a setting."""
+    if row["samples"] == EDGES:
+        return f"edges, error {row['error']:g}"
     how = f"{LEAST} to {MOST} samples, error {row['error']:g}" if row["error"] else f"{row['samples']} samples"
     how = how.replace("1 samples", "1 sample") if row["samples"] == 1 else how
     return how + (f", depth {row['depth']}" if row["depth"] else "") + (f", cut ×{row['cut']:g}" * (row["cut"] != 1))
 
 
-SWEEPS = {"samples": "o", "adaptive": "D", "depth": "v", "cut": "s"}
+SWEEPS = {"samples": "o", "adaptive": "D", "edges": "^", "depth": "v", "cut": "s"}
 OLD, NEW = ("0.8", 4), ("0.35", 2)  # grey level and line width of fronts
 NAMES = {
     "samples": "1, 2, 4, 9, 16 samples", "adaptive": f"adaptive, {LEAST} to {MOST} samples",
-    "depth": "other recursion depths", "cut": f"triangles × ¼, ½, {FINER:g}, {BASE} samples",
+    "edges": "edges, error 16 to 2", "depth": "other recursion depths",
+    "cut": f"triangles × ¼, ½, {FINER:g}, {BASE} samples",
 }  # fmt: skip
 
 
@@ -214,7 +223,7 @@ def chart(data: dict[str, Any]) -> Any:
             )  # fmt: skip
         for i, (sweep, marker) in enumerate(SWEEPS.items()):
             chosen = [r for r in rows if r["sweep"] == sweep]
-            joined = "-" if sweep in ("samples", "adaptive") else ""
+            joined = "-" if sweep in ("samples", "adaptive", "edges") else ""
             axes.plot(
                 [r["seconds"] for r in chosen], [r["psnr"] for r in chosen], marker + joined, color=COLOURS[i],
                 markersize=4 if sweep == "depth" else 6, linewidth=1, label=NAMES[sweep],
@@ -297,6 +306,21 @@ def samples_table(data: dict[str, Any]) -> list[str]:
         share = fine["seconds"] / plain[MOST]["seconds"]
         lines.append([name, *(f"{plain[s]['psnr']:.1f}" for s in SAMPLES), f"{fine['psnr']:.1f}", f"{share:.2f}"])
     return table(" | ".join(["scene", *map(str, SAMPLES), f"adaptive to ½ step | its time / {MOST} samples"]), lines)
+
+
+def edges_table(data: dict[str, Any]) -> list[str]:
+    """Return PSNR and time of samples by edges, and how many times longer fixed sets take to the same PSNR."""
+    lines = []
+    for name, one in data.items():
+        sets = sorted((r["psnr"], math.log(r["seconds"])) for r in one["rows"] if r["sweep"] == "samples")
+        cells = []
+        for row in (r for r in one["rows"] if r["sweep"] == "edges"):
+            inside = sets[0][0] <= row["psnr"] <= sets[-1][0]
+            factor = math.exp(np.interp(row["psnr"], *zip(*sets, strict=True))) / row["seconds"]
+            cells.append(f"{row['psnr']:.1f}, {row['seconds']:.2f}, {f'{factor:.2f}' if inside else '–'}")
+        if cells:
+            lines.append([name, *cells])
+    return table(" | ".join(["scene", *(f"error {error:g}" for error in EDGE_ERRORS)]), lines)
 
 
 def depth_table(data: dict[str, Any]) -> list[str]:

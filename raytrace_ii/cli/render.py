@@ -81,10 +81,10 @@ class Place:
 class Sampling:
     """Options of the samples of pixels."""
 
-    samples: Annotated[str, typer.Option(help="Rays per pixel; adaptive between two powers of 2: 4..64.")] = "1"
+    samples: Annotated[str, typer.Option(help="Rays per pixel, 4..64 (adaptive, powers of 2), or edges [1].")] = ""
     error: Annotated[
         float | None,
-        typer.Option(help="Target standard error of adaptive samples, in 8-bit steps [0.5]."),
+        typer.Option(help="Target error of a pixel in 8-bit steps [0.5]; alone it means edges."),
     ] = None
     seed: Annotated[int, typer.Option(help="Seed of samples and noise.")] = 0
     noise: Annotated[float, typer.Option(help="σ of sensor noise, in 8-bit steps.")] = 0.0
@@ -297,17 +297,19 @@ def _all_support(array: Any) -> list[str]:
 
 
 def _samples(samples: str, error: float | None) -> dict[str, Any]:
-    """Return the number of samples or their range, and the target error of a range."""
+    """Return the number of samples, their range or edges, and the target error of the latter two."""
+    target = {} if error is None else {"error": error}
+    samples = samples or ("1" if error is None else "edges")
+    if samples == "edges":
+        return {"samples": samples, **target}
     least, dots, most = samples.partition("..")
     try:
         numbers = (int(least), int(most)) if dots else int(least)
     except ValueError:
-        raise ValueError(f"samples is {samples!r}: a whole number, or two like 4..64, is needed") from None
-    if error is None:
-        return {"samples": numbers}
-    if not dots:
+        raise ValueError(f"samples is {samples!r}: a whole number, two like 4..64, or edges is needed") from None
+    if error is not None and not dots:
         raise ValueError(f"error is {error:g}, but the number of samples is fixed: a range like 4..64 is needed")
-    return {"samples": numbers, "error": error}
+    return {"samples": numbers, **target}
 
 
 def _render_set(name: str, folder: Path, views: Views, options: dict[str, Any], means: Means, force: bool) -> None:

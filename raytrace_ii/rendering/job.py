@@ -15,11 +15,12 @@ from ii_core import Camera, IICamera, MapCamera
 from ii_core.base.colour import srgb
 
 from ..scene.scene import Scene
+from ..tracing.edges import RECORDED, Sight, edge_mean
 from ..tracing.kernels.arrays import Start
 from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb, encode_steps
 from ..tracing.packing import packed, share
-from ..tracing.sampling import Adaptive, Sampling, Shoot, adaptive_mean, fixed_sum
+from ..tracing.sampling import Adaptive, Edges, Sampling, Shoot, adaptive_mean, fixed_sum, number_of_samples
 from ..tracing.tracer import LOBE_RAYS, RayCount, Support, Tracer, start_tables
 from .audit import FULL_DEPTH, FULL_SAMPLES, Audit, chosen, compared
 from .nearness import parts_of_pixel, pixels_are_nearer, steps_at_content
@@ -111,7 +112,7 @@ class Job:
 
     def tiles(self) -> list[Tile]:
         """Return the tiles that cover the picture, in rows of tiles; independent of the workers."""
-        return list(tiles(self.camera, TILE_RAYS, whole_lenses=isinstance(self.sampling, Adaptive)))
+        return list(tiles(self.camera, TILE_RAYS, whole_lenses=not isinstance(self.sampling, int)))
 
     def stop(self) -> None:
         """Make all threads of this process leave their tiles after the current sample."""
@@ -139,8 +140,11 @@ class Job:
         shape = rows.stop - rows.start, cols.stop - cols.start
         order = ray_order(self.camera, rows, cols, self._by_lens())
         support = self._support_room(len(order.pixels))
-        if isinstance(self.sampling, Adaptive):
-            radiance, samples = self._adaptive(tracer, self.sampling, rows, cols, order, support)
+        if isinstance(self.sampling, Adaptive | Edges):
+            if isinstance(self.sampling, Edges):
+                radiance, samples, support = self._edges(tracer, self.sampling, rows, cols, order)
+            else:
+                radiance, samples = self._adaptive(tracer, self.sampling, rows, cols, order, support)
             counts, times = np.unique(samples, return_counts=True)
             histogram = dict(zip(counts.tolist(), times.tolist(), strict=True))
             divisor = 1
@@ -172,7 +176,7 @@ class Job:
         It has as many samples per pixel as the picture has at most, but at least FULL_SAMPLES, or all of stored maps;
         at least FULL_DEPTH bounces; and filtered textures.
         """
-        most = self.sampling.most if isinstance(self.sampling, Adaptive) else self.sampling
+        _, most = number_of_samples(self.sampling)
         scene = self.scene.with_depth(max(self.scene.max_depth, FULL_DEPTH))
         share(self.scene, scene)
         return replace(
@@ -234,24 +238,25 @@ class Job:
 
     def _lobes(self) -> tuple[int, int]:
         """Return the rays of a sample over a rough mirror's lobe, and the samples that share the lobe's positions."""
-        least, most = (self.sampling.least, self.sampling.most) if isinstance(self.sampling, Adaptive) else (
-            self.sampling, self.sampling
-        )  # fmt: skip
+        least, most = number_of_samples(self.sampling)
         return -(-LOBE_RAYS // least), most
 
     def _footprint(self) -> tuple[float, float]:
         """Return the width of a sample's ray at its origin in mm, and its growth per mm: its part of the pixel."""
         if not self.texture_filter or not packed(self.scene).images:
             return 0.0, 0.0
-        samples = self.sampling.most if isinstance(self.sampling, Adaptive) else self.sampling
+        _, samples = number_of_samples(self.sampling)
         width, spread = footprint(self.camera)
         return width / samples**0.5, spread / samples**0.5
 
     def _support_room(self, rays: int) -> Support | None:
         """Return support arrays for so many rays; None if no support image is requested."""
-        if not set(self.support) - {"samples"}:
-            return None
-        return Support.empty((rays,), {"depth" if name == "disparity" else name for name in self.support})
+        recorded = self._recorded()
+        return Support.empty((rays,), recorded) if recorded else None
+
+    def _recorded(self) -> set[str]:
+        """Return the names of the support arrays that the tracer fills."""
+        return {"depth" if name == "disparity" else name for name in self.support if name != "samples"}
 
     def _fixed(
         self, tracer: Tracer, samples: int, rows: slice, cols: slice, order: Order, support: Support | None
@@ -312,6 +317,20 @@ class Job:
             self.camera, wanted, self.seed, rows, cols, order.pixels, TILE_RAYS, codes, self._parts, shoot
         )  # fmt: skip
 
+    def _edges(
+        self, tracer: Tracer, wanted: Edges, rows: slice, cols: slice, order: Order
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32], Support]:
+        """Return radiance of a tile, rays per pixel and support arrays, in the order of the rays."""
+        codes, camera, width = CURVES["uint8"], self.camera, self._footprint()
+        assert isinstance(camera, IICamera) and codes is not None
+        support = Support.empty((len(order.pixels),), self._recorded() | RECORDED)
+        tracer.footprint, tracer.lobes = width, (LOBE_RAYS, 1)
+        centres = self._fixed(tracer, 1, rows, cols, order, support)
+        sight = Sight(
+            camera, tracer, self.seed, TILE_RAYS, width, self._parts, self._shoot(tracer, None), self._check_stopped
+        )
+        return *edge_mean(sight, wanted, rows, cols, order.pixels, centres, support, codes), support
+
     def _shoot(self, tracer: Tracer, support: Support | None) -> Shoot:
         """Return the function that traces samples of pixels and keeps support arrays of the first ones."""
 
@@ -320,7 +339,7 @@ class Job:
         ) -> NDArray[np.float32]:
             self._check_stopped()
             radiance = np.zeros((len(L), 3), np.float32)
-            room = self._support_room(len(L)) if first is not None else None
+            room = self._support_room(len(L)) if first is not None and support is not None else None
             tracer.run(L, D, radiance, room, shares, self._keys(*numbers), traced=traced)
             if room is not None and first is not None:
                 every = len(L) // (first.stop - first.start)

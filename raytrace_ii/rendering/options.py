@@ -23,7 +23,7 @@ MOST_NOISE = 1e6  # 8-bit steps, of which white has 255
 class SetKeywords(TypedDict, total=False):
     """Keywords of `render_set` for the fields of `RenderOptions`; a set has poses and bits of its own."""
 
-    samples: int | tuple[int, int]
+    samples: int | tuple[int, int] | str
     error: float
     seed: int
     noise: float
@@ -46,15 +46,17 @@ class RenderOptions:
 
     Parameters
     ----------
-    samples : int or (least, most)
+    samples : int, (least, most) or "edges"
         Rays per pixel. One ray starts at the pixel's centre. Several are the first of a scrambled (0, 2)-sequence,
         which ``seed`` and the pixel select: any power of 2 has one in each cell of every grid of as many equal cells,
         over the pixel and likewise over an aperture. All pass the lens of the pixel. A pair selects adaptive
-        sampling: pixels get the least number, then more up to the most, until they meet ``error``. Stored maps fix
-        the number of samples.
+        sampling: pixels get the least number, then more up to the most, until they meet ``error``. ``"edges"``
+        takes the centre of each pixel and looks for edges where neighbours differ, see `edges`; cameras with an
+        aperture get (4, 64). Stored maps fix the number of samples.
     error : float
         Target of adaptive sampling: standard error of a pixel in 8-bit steps, estimated from its samples and from its
-        neighbours under the same lens; see `sampling` for the estimate and its limits.
+        neighbours under the same lens; see `sampling` for the estimate and its limits. With ``"edges"``, root mean
+        square error of the pixels that get more than one ray.
     seed : int
         Seed of samples and noise.
     noise : float
@@ -81,7 +83,7 @@ class RenderOptions:
         If an option has another type or is out of range.
     """
 
-    samples: int | tuple[int, int] = 1
+    samples: int | tuple[int, int] | str = 1
     error: float = 0.5
     seed: int = 0
     noise: float = 0.0

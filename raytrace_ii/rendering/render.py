@@ -23,7 +23,7 @@ from ii_core.picture.picture import picture_rows, sidecar
 from ii_core.picture.sensor_noise import NOISE_ROWS, noisy_rows
 
 from ..scene.scene import Scene
-from ..tracing.sampling import sampling
+from ..tracing.sampling import of_camera, sampling
 from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES, UNITS
 from ..tracing.tracer import RayCount, check_scene, rigid
 from .audit import Audit
@@ -366,8 +366,11 @@ def _job(scene: Scene, camera: IICamera | MapCamera, options: RenderOptions, sup
         raise ValueError(f"unknown support image {', '.join(sorted(unknown))}: known are {known}")
     if "disparity" in support:
         check_disparity(camera)
+    wanted = sampling(samples, options.error)
+    if isinstance(camera, IICamera):
+        wanted = of_camera(wanted, camera)
     return Job(
-        scene, camera, sampling(samples, options.error), int(options.seed), rigid(options.pose), options.dtype,
+        scene, camera, wanted, int(options.seed), rigid(options.pose), options.dtype,
         support, bool(options.texture_filter), float(options.audit),
     )  # fmt: skip
 

@@ -50,17 +50,30 @@ class Adaptive:
     error: float
 
 
-Sampling = int | Adaptive
+@dataclass(frozen=True)
+class Edges:
+    """The centre of each pixel, and more where the picture has a step, within ``error`` steps of 8 bits: `edges`."""
+
+    error: float
+
+
+EDGES = "edges"
+APERTURE_SAMPLES = 4, 64  # of `EDGES` with a camera whose rays spread over an aperture
+Sampling = int | Adaptive | Edges
 
 
 def sampling(samples: Any, error: float) -> Sampling:
-    """A number of samples, or a pair and an error, checked.
+    """A number of samples, a pair or `EDGES` and an error, checked.
 
     Raises
     ------
     ValueError
         If a number is not whole or too small, or the error is not positive.
     """
+    if isinstance(samples, str):
+        if samples != EDGES:
+            raise ValueError(f"samples is {samples!r}: a whole number, a pair of them or {EDGES!r} is needed")
+        return Edges(_error(error))
     pair = samples if isinstance(samples, tuple) else (samples,)
     for value in pair:
         if not isinstance(value, int | np.integer) or isinstance(value, bool) or not 1 <= value <= MOST_SAMPLES:
@@ -69,9 +82,27 @@ def sampling(samples: Any, error: float) -> Sampling:
         return int(pair[0])
     if len(pair) != 2 or not 4 <= pair[0] <= pair[1] or any(n & (n - 1) for n in pair):
         raise ValueError(f"samples is {samples!r}: two powers of 2 are needed, at least 4 and the second not less")
+    return Adaptive(int(pair[0]), int(pair[1]), _error(error))
+
+
+def _error(error: float) -> float:
     if not 0 < error < math.inf:
         raise ValueError(f"error is {error}: a positive number of 8-bit steps is needed")
-    return Adaptive(int(pair[0]), int(pair[1]), float(error))
+    return float(error)
+
+
+def of_camera(wanted: Sampling, camera: IICamera) -> Sampling:
+    """Return the sampling for a camera: rays over an aperture blur edges, and get adaptive samples instead."""
+    if isinstance(wanted, Edges) and camera.samples_aperture:
+        return Adaptive(*APERTURE_SAMPLES, wanted.error)
+    return wanted
+
+
+def number_of_samples(wanted: Sampling) -> tuple[int, int]:
+    """Return the least and the most samples of a pixel: 1 with `EDGES`, where more follow from the picture."""
+    if isinstance(wanted, Adaptive):
+        return wanted.least, wanted.most
+    return (wanted, wanted) if isinstance(wanted, int) else (1, 1)
 
 
 class Shoot(Protocol):
@@ -140,7 +171,7 @@ def adaptive_mean(
         pixels (every ``least``-th ray) they begin; radiance of the rays comes back.
     """
     height, width = rows.stop - rows.start, cols.stop - cols.start
-    m, n, lens = _with_rim(camera, rows, cols)
+    m, n, lens = with_rim(camera, rows, cols)
     own = ((n >= rows.start) & (n < rows.stop) & (m >= cols.start) & (m < cols.stop)).ravel()
     m, n = m.ravel(), n.ravel()
     quarters = np.zeros((len(m), 4, 3))
@@ -155,7 +186,7 @@ def adaptive_mean(
             radiance = shoot(*rays, numbers=numbers, first=block if begins and first == 0 else None, traced=traced)
             sample_kernels.add_samples(radiance, some, first, many, (start + count) // 4, quarters)
 
-    inside, rim = np.flatnonzero(own), np.flatnonzero(~own & _needed(lens, own))
+    inside, rim = np.flatnonzero(own), np.flatnonzero(~own & needed(lens, own))
     corner = int(inside[0]) // lens.shape[1], int(inside[0]) % lens.shape[1]
     inside = inside[order]
     add(inside, 0, wanted.least, begins=True)
@@ -182,7 +213,7 @@ def adaptive_mean(
     return found, counts
 
 
-def _with_rim(camera: IICamera, rows: slice, cols: slice) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.int64]]:
+def with_rim(camera: IICamera, rows: slice, cols: slice) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.int64]]:
     """Columns, rows and lens numbers of a block with one pixel around it, as far as there are any."""
     columns, lines = camera.pixels
     n, m = np.mgrid[
@@ -192,7 +223,7 @@ def _with_rim(camera: IICamera, rows: slice, cols: slice) -> tuple[NDArray[Any],
     return m, n, np.asarray(l, np.int64) * camera.lenses[0] + np.asarray(k, np.int64)
 
 
-def _needed(lens: NDArray[np.int64], own: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def needed(lens: NDArray[np.int64], own: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which pixels have one of the block's own under the same lens beside them."""
     mine = np.pad(np.where(own.reshape(lens.shape), lens, -1), 1, constant_values=-1)
     height, width = lens.shape

@@ -274,12 +274,43 @@ class Tracer:
         the rays in the order in which they are traced: that of ``radiance``, ``support`` and ``keys``, which are
         needed if the scene is glossy. ``traced`` names them likewise, but they keep their rows.
         """
+        room, n = self._started(locations, directions, shares, traced if len(traced) else order)
+        locations = locations.reshape(-1, 3)
+        if len(traced):
+            room.pixels[:n] = traced[room.pixels[:n]]
+        if support is not None and n < len(locations):
+            support.clear()
+        if keys is not None:
+            room.keys[:n] = keys[room.pixels[:n]]
+        self._trace(room, n, radiance, support, _NO_START)
+
+    def bodies(
+        self, locations: NDArray[Any], directions: NDArray[Any], shares: NDArray[np.float64] | None = None
+    ) -> NDArray[np.int32]:
+        """Return the bodies that rays meet, −1 where none, for scenes whose rays pass no faces: `sees_bodies`."""
+        room, n = self._started(locations, directions, shares, _NO_ROWS)
+        self.count.rays["primary"] += n
+        faces = self._nearest(room.origins[:n], room.directions[:n], placed=False).faces
+        found = np.full(len(locations), -1, np.int32)
+        found[room.pixels[:n]] = np.where(faces >= 0, self.scene.object_of_face[faces], -1)
+        return found
+
+    @property
+    def sees_bodies(self) -> bool:
+        """Whether the nearest face of a ray is there: not cut out, not within another body, not seen through."""
+        return not (self.scene.passes or self.scene.blends)
+
+    def _started(
+        self, locations: NDArray[Any], directions: NDArray[Any], shares: NDArray[np.float64] | None,
+        order: NDArray[np.int32],
+    ) -> tuple[Rays, int]:  # fmt: skip
+        """Return the room of primary rays and how many of them carry light."""
         shape = locations.shape[:-1]
         locations, directions = locations.reshape(-1, 3), directions.reshape(-1, 3)
         shares = np.empty(0) if shares is None else shares.reshape(-1)
         room = self._primary
         n, bad = start_rays(
-            locations, directions, shares, traced if len(traced) else order, self.pose[:3, :3], self.pose[:3, 3],
+            locations, directions, shares, order, self.pose[:3, :3], self.pose[:3, 3],
             room.origins, room.directions, room.weights, room.pixels, room.inside,
         )  # fmt: skip
         if bad >= 0:
@@ -288,13 +319,7 @@ class Tracer:
                 f"ray [{where}] from {locations[bad].tolist()} along {directions[bad].tolist()}: "
                 "a finite place and a finite direction other than zero are needed"
             )
-        if len(traced):
-            room.pixels[:n] = traced[room.pixels[:n]]
-        if support is not None and n < len(locations):
-            support.clear()
-        if keys is not None:
-            room.keys[:n] = keys[room.pixels[:n]]
-        self._trace(room, n, radiance, support, _NO_START)
+        return room, n
 
     def run_separable(
         self, start: Start, radiance: NDArray[np.float32], support: Support | None,

@@ -100,8 +100,12 @@ def test_each_setting_is_rendered_by_both_codes_in_turn_after_their_references()
     facts = {"faces": {"1.0": 12}, "max_depth": 6}
     now, before = pareto.study("cuboid", facts, (code("now", 1.0), code("before", 2.0)))
     assert [options["samples"] for _, options in calls[:4]] == [pareto.TRUE["samples"]] * 2 + [64] * 2
+    assert [name for name, options in calls if options["samples"] == "edges"] == ["now"] * len(pareto.EDGE_ERRORS)
+    calls = [(name, options) for name, options in calls if options["samples"] != "edges"]
     assert [name for name, _ in calls] == ["now", "before"] * (len(calls) // 2)
     assert all(one == other for (_, one), (_, other) in zip(calls[::2], calls[1::2], strict=True))
-    assert len(now["rows"]) == len(pareto.SAMPLES) + len(pareto.ERRORS), "nothing mirrors, one tessellation"
+    assert len(now["rows"]) == len(pareto.SAMPLES) + len(pareto.ERRORS + pareto.EDGE_ERRORS), (
+        "nothing mirrors, one tessellation"
+    )
     assert before["recommended"]["setting"] == "4 to 16 samples, error 8"
     assert {row["seconds"] for row in now["rows"]} == {1.0} and {row["seconds"] for row in before["rows"]} == {2.0}

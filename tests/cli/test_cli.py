@@ -462,7 +462,7 @@ def test_audit(run, refused, tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--samples", "many"), "samples is 'many': a whole number, or two like 4..64, is needed"),
+        (("--samples", "many"), "samples is 'many': a whole number, two like 4..64, or edges is needed"),
         (("--samples", "4.."), "samples is '4..'"),
         (("--samples", "4..48"), "two powers of 2 are needed"),
         (("--samples", "64..4"), "two powers of 2 are needed, at least 4 and the second not less"),

@@ -6,9 +6,10 @@ import pytest
 from benchmarks.accuracy.sample_places import squares
 from ii_core import IICamera, preset
 from ii_core.camera import optics
-from raytrace_ii import Scene, render, trace
+from raytrace_ii import Light, Scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.scene.textures import Checker, Noise
+from raytrace_ii.shapes.primitives import Mesh
 from raytrace_ii.tracing.kernels import sampling as sample_kernels
 from raytrace_ii.tracing.sample_places import MOST, doubling_places, fixed_places
 from tests.support.slow import first_fast
@@ -262,6 +263,132 @@ def test_support_images_are_those_of_the_first_sample():
         np.testing.assert_array_equal(getattr(shot, name).reshape(getattr(seen, name).shape), getattr(seen, name))
 
 
+def on_wall(corners, z=22.0, **material):
+    """A polygon with corners in pixels of `ONE_LENS`, columns and rows from the left top, as a body at one z."""
+    points = np.asarray(corners, float)
+    scale = (z - 2) / 20
+    vertices = np.column_stack([(12 - points[:, 0]) * scale, (points[:, 1] - 8) * scale, np.full(len(points), z)])
+    fan = np.array([[0, k, k + 1] for k in range(1, len(points) - 1)])
+    return body(Mesh(vertices, fan, None, None), **material)
+
+
+def half(degrees, offset, far=60.0):
+    """A square whose one side passes at a distance from pixel (12.2, 8.1)."""
+    along, across = np.array([[np.cos(a), np.sin(a)] for a in (np.radians(degrees), np.radians(degrees + 90))])
+    middle = np.array([12.2, 8.1]) + offset * across
+    return [
+        middle - far * along,
+        middle + far * along,
+        middle + far * (along + across),
+        middle + far * (across - along),
+    ]
+
+
+def areas(polygon):
+    """Share of each pixel of `ONE_LENS` within a convex polygon, by clipping it (Sutherland and Hodgman 1974)."""
+    found = np.zeros((16, 24))
+    for n, m in np.ndindex(16, 24):
+        points = [np.asarray(p, float) for p in polygon]
+        for axis, low, sign in ((0, m, 1), (0, m + 1, -1), (1, n, 1), (1, n + 1, -1)):
+            kept = []
+            for p, q in zip(points, points[1:] + points[:1], strict=True):
+                a, b = sign * (p[axis] - low), sign * (q[axis] - low)
+                kept += [p] if a >= 0 else []
+                kept += [p + (q - p) * a / (a - b)] if (a >= 0) != (b >= 0) else []
+            points = kept
+        x, y = np.array([*points, *points[:1]]).T if points else (np.zeros(1), np.zeros(1))
+        found[n, m] = abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2
+    return found
+
+
+def by_edges(scene, error=1.0, **more):
+    return render(scene, ONE_LENS, samples="edges", error=error, dtype="float32", support=(), **more)
+
+
+INNER = np.s_[1:-1, 1:-1]  # beyond the border of the picture edges are not known
+
+
+@pytest.mark.parametrize("degrees", first_fast(range(0, 180, 15), 3))
+def test_edges_of_half_planes_are_exact(degrees):
+    for offset in (-0.37, 0.0, 0.21):
+        polygon = half(degrees, offset)
+        shot = by_edges(Scene(bodies=[on_wall(polygon, colour=WHITE)], ambient=WHITE), error=0.1)
+        assert np.abs(shot.picture.pixels[..., 0] - areas(polygon))[INNER].max() < 1 / 512
+        assert shot.stats.mean_samples < 4
+
+
+SQUARE = [(8.3, 5.2), (16.4, 5.9), (15.8, 11.3), (7.9, 10.6)]
+EDGE, UPPER = half(70, 0.1), [(-9, -9), (11.7, -9), (11.7, 8.4), (-9, 8.4)]
+LOWER = [(11.7, -9), (40, -9), (40, 8.4), (11.7, 8.4)]
+GREY = (0.2, 0.2, 0.2)
+
+
+def shadowed(polygon):
+    """A wall with the shadow of what stands beside the picture."""
+    beside = on_wall(polygon, at=(12, 0, -10))
+    return {
+        "bodies": [body(wall(22), colour=WHITE), beside],
+        "lights": [Light(kind="directional", vector=(-1.2, 0, 1), colour=WHITE)],
+    }
+
+
+@pytest.mark.parametrize(
+    ("polygons", "made", "most"),
+    [
+        ([SQUARE], lambda p: {"bodies": [on_wall(p, emission=WHITE)]}, 0.06),
+        (
+            [EDGE],
+            lambda p: {"bodies": [body(wall(22), mirror=WHITE), on_wall(p, 62, at=(0, 0, -80), emission=WHITE)]},
+            0.012,
+        ),
+        (
+            [EDGE],
+            lambda p: {"bodies": [on_wall(p, 12, transmission=GREY, ior=1.0), body(wall(22), emission=WHITE)]},
+            0.012,
+        ),
+        ([EDGE], shadowed, 0.012),
+        ([UPPER, LOWER], lambda p, q: {"bodies": [on_wall(p, emission=WHITE), on_wall(q, emission=GREY)]}, 0.06),
+    ],
+    ids=["corners", "mirror", "glass", "shadow", "junction"],
+)
+def test_other_edges_have_the_light_of_their_areas(polygons, made, most):
+    seen = by_edges(Scene(**made(*polygons))).picture.pixels[..., 0].astype(float)
+    shares = [areas(polygon) for polygon in polygons]
+    out = np.median(seen[sum(shares) == 0])
+    light = out + sum(share * ((np.median(seen[share == 1]) if (share == 1).any() else 1) - out) for share in shares)
+    off = np.abs(seen - light)[INNER] / np.ptp(light)
+    assert off.max() < most
+    assert np.sqrt(np.mean(off[(light != out)[INNER]] ** 2)) < most / 3
+
+
+@pytest.mark.parametrize(
+    "camera", first_fast([SMALL, HEXAGONAL, ONE_LENS], 2), ids=["regular", "hexagonal", "2d"][:3]
+)
+def test_edges_are_the_same_bits_for_any_workers_and_kept_in_support(camera):
+    scene = hall()
+    options = {"samples": "edges", "error": 4.0, "support": ("samples", "depth", "object_id")}
+    whole = render(scene, camera, workers=1, **options)
+    other = render(scene, camera, workers=3, executor=None, **options)
+    one = render(scene, camera, support=("depth", "object_id"))
+    np.testing.assert_array_equal(whole.picture.pixels, other.picture.pixels)
+    assert 1 < whole.samples.mean() < 20
+    assert whole.samples.sum() == sum(n * pixels for n, pixels in whole.stats.samples.items())
+    calm = whole.samples == 1
+    # some have corners whose rays their neighbours sent
+    assert (whole.picture.pixels[calm] == one.picture.pixels[calm]).mean() > 0.99
+    for name in ("depth", "object_id"):
+        np.testing.assert_array_equal(getattr(whole, name), getattr(one, name))
+
+
+def test_edges_with_an_aperture_are_adaptive_samples():
+    soft = IICamera(
+        pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0, optics=(optics.Lenslet(focal_mm=2.0),)
+    )
+    options = {"error": 2.0, "support": (), "seed": 5}
+    shots = [render(half_plane(), soft, samples=samples, **options) for samples in ("edges", (4, 64))]
+    np.testing.assert_array_equal(*(shot.picture.pixels for shot in shots))
+
+
 @pytest.mark.parametrize(
     ("samples", "error", "says"),
     [
@@ -273,6 +400,8 @@ def test_support_images_are_those_of_the_first_sample():
         ((4, 1 << 20), 0.5, "from 1 to 65536"),
         ((4, 16), 0.0, "error is 0.0: a positive number of 8-bit steps"),
         ((4, 16), float("nan"), "error is nan"),
+        ("edges", 0.0, "error is 0.0: a positive number of 8-bit steps"),
+        ("corners", 1.0, "samples is 'corners': a whole number, a pair of them or 'edges' is needed"),
     ],
 )
 def test_invalid_parameters_are_refused(samples, error, says):

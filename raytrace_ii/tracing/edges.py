@@ -1,0 +1,276 @@
+"""Samples where the edges are: one through the centre of each pixel, more where the picture has a step.
+
+A pixel whose neighbours under the same lens look alike has the light of its centre. Any other one is a cell between
+corners that neighbours share, see `kernels.cells`. If corners and centre agree, it has their mean; an edge between
+two groups of them is found by bisection, mostly by visibility alone, and checked on both sides. What is neither gets
+a set of samples, the larger the step, the more. A tile that is full of such pixels gets sets at once. (Corners and
+their comparison: Whitted 1980.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ii_core import IICamera
+
+from .kernels import cells as kernels
+from .kernels.cells import CUT, MISSED, OPEN, UNITS, Places, Points, Sides
+from .kernels.sampling import lobe_keys
+from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
+from .tracer import LOBE_RAYS, Support, Tracer
+
+ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
+SETS = np.array([4, 6, 9, 12, 16, 32, 64])  # samples of pixels that are no cells
+DENSE = 0.3  # share of the pixels, around which much meets, from which on no edges are looked for
+FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
+FINEST = 4096  # places in a pixel along each side that have keys of their own
+RECORDED = frozenset({"object_id", "shading_normal", "ray_length"})  # what centres have to record
+
+Floats = NDArray[np.float64]
+Radiance = NDArray[np.float32]
+Whole = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What looks at places of a tile's pixels: ``width`` is the footprint of a pixel's ray, ``check`` may stop it."""
+
+    camera: IICamera
+    tracer: Tracer
+    seed: int
+    batch: int
+    width: tuple[float, float]
+    parts: Parts
+    shoot: Shoot
+    check: Callable[[], None]
+
+
+@dataclass
+class Cells:
+    """Pixels of a tile and its rim in rows: columns and rows in the picture, lenses, and what is seen of them."""
+
+    sight: Sight
+    wanted: Edges
+    curve: Floats
+    m: NDArray[np.int64]
+    n: NDArray[np.int64]
+    lens: NDArray[np.int64]
+    own: NDArray[np.bool_]
+    points: Points = field(init=False)
+    rays: Whole = field(init=False)
+    sums: Floats = field(init=False)
+    _count: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._count = n = self.lens.size
+        self.points = Points(
+            np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32), np.full(n, -1, np.int32),
+            np.zeros((n, 3), np.float32),
+        )  # fmt: skip
+        self.rays, self.sums = np.ones(n, np.int32), np.zeros((n, 3))
+
+    def look_around(self, centres: Places) -> None:
+        """Look at centres of the rim."""
+        first = self._look(centres)
+        for array in self.points:
+            array[centres.pixel] = array[first : self._count]
+        self._count = first
+
+    def refine(self, inside: NDArray[np.int64], reach: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Find the light, `sums`, of all pixels whose centres do not tell it; return which they are.
+
+        ``inside`` are the own pixels in the order of the tile's rays, ``reach`` the lengths of all pixels' rays.
+        """
+        error = self.wanted.error
+        steps, opened = np.zeros(self.lens.size, np.float32), np.zeros(self.lens.size, np.bool_)
+        kernels.encode(self.points.light[: self._count], self.curve, self.points.code)
+        kernels.doubtful(self.points, self.lens, self.own, error, steps)
+        doubtful = steps > 0
+        if kernels.count_crowded(self.points, self.lens, steps) > DENSE * len(inside):
+            pixels = inside[doubtful[inside]]
+            opened[pixels] = True
+            self._sample(pixels, np.full(len(pixels), np.sqrt(np.mean(steps[pixels] ** 2)), np.float32))
+            return opened
+        corner_of = np.full((self.lens.size, 4), -1, np.int32)
+        for _ in range(ROUNDS):
+            pixels = np.flatnonzero(doubtful & ~opened & self.own)
+            if not len(pixels):
+                break
+            opened[pixels] = True
+            self._open(self._near_together(pixels, reach), corner_of, doubtful)
+        return opened
+
+    def _near_together(self, pixels: NDArray[np.int64], reach: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Return pixels in an order in which the edges that they see are close to each other in the scene.
+
+        Rays and shadow rays of one packet then meet the same things: they take 311 instead of 436 ns (*Apples*,
+        `setup1` at scale 4, 2026-11-25). An edge belongs to the nearest body around the pixel.
+        """
+        near = np.empty(self.lens.size, np.float32)
+        kernels.nearest_around(reach, self.lens, near)
+        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
+        far = near[pixels].astype(np.float64)
+        known = np.isfinite(far)
+        far[~known] = np.median(far[known]) if known.any() else 1.0
+        length = np.linalg.norm(D, axis=-1)
+        points = L + D * (far / np.where(length > 0, length, 1.0))[:, None]
+        low, high = np.percentile(points, (1, 99), axis=0)
+        steps = ((points - low) / np.where(high > low, high - low, 1.0) * 1023).clip(0, 1023).astype(np.int64)
+        ranks = sum((steps[:, axis] >> bit & 1) << (3 * bit + axis) for bit in range(10) for axis in range(3))
+        return pixels[np.argsort(ranks, kind="stable")]
+
+    def _open(self, pixels: NDArray[np.int64], corner_of: Whole, wanted: NDArray[np.bool_]) -> None:
+        """Find the light of pixels as cells between their corners."""
+        count = len(pixels)
+        corners, places = np.empty((count, 4), np.int32), _places(4 * count)
+        new = kernels.open_pixels(pixels, self.lens, corner_of, self._count, corners, places)
+        self._look(_part(places, slice(new)))
+        verdict, groups, steps = np.empty(count, np.int8), np.zeros(count, np.int8), np.zeros(count, np.float32)
+        kernels.judge(
+            pixels, corners, self.points, self.wanted.error, self.lens, self.sums, verdict, groups, steps, wanted
+        )
+        cut = np.flatnonzero(verdict == CUT)
+        if len(cut):
+            verdict[cut] = self._cut(pixels[cut], corners[cut], groups[cut])
+        left = verdict == OPEN
+        self._sample(pixels[left], steps[left])
+
+    def _cut(self, pixels: NDArray[np.int64], corners: Whole, groups: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Find the light of cells with one edge; return which of them turn out to have none, or more."""
+        many, error = len(pixels), self.wanted.error
+        of_cell, sides = np.empty((many, 4), np.int32), _sides(2 * many)
+        side_of = np.full((self.lens.size, 4), -1, np.int32)
+        made = kernels.gather_sides(pixels, corners, groups, self.lens, side_of, sides, of_cell)
+        sides = _part(sides, slice(made))
+        by_body = self.sight.tracer.sees_bodies
+        while True:
+            which, places = np.empty(made, np.int32), _places(made)
+            seen, shaded = kernels.probe_sides(sides, self.points, error, by_body, which, places)
+            if not seen + shaded:
+                break
+            for part, bodies in ((slice(seen), True), (slice(made - shaded, made), False)):
+                if part.stop > (part.start or 0):
+                    first = self._look(_part(places, part), bodies)
+                    kernels.narrow_sides(sides, which[part], first, self.points)
+                    self._count = first  # they are not needed again
+        shares, places, verdict = np.empty(many), _places(2 * many), np.empty(many, np.int8)
+        kernels.chords(pixels, corners, groups, of_cell, sides, self.points, error, verdict, shares, places)
+        sure = np.flatnonzero(verdict == CUT)
+        beside = self._look(_part(places, np.stack([2 * sure, 2 * sure + 1], axis=1).reshape(-1)))
+        checked = verdict[sure]
+        kernels.confirm(
+            pixels[sure], corners[sure], groups[sure], shares[sure], beside, self.points, error, checked, self.sums
+        )
+        self._count = beside
+        verdict[sure] = checked
+        return verdict
+
+    def _look(self, places: Places, bodies: bool = False) -> int:
+        """Look at places; return the row of the first of their points, of which ``bodies`` alone may be wanted."""
+        first, n, s = self._count, len(places.pixel), self.sight
+        self._count += n
+        if len(self.points.body) < self._count:
+            self.points = _grown(self.points, first, 2 * self._count)
+        points = _part(self.points, slice(first, self._count))
+        kernels.count_rays(places.pixel, self.rays)
+        for start in range(0, n, s.batch):
+            some = slice(start, start + s.batch)
+            self._trace(_part(places, some), _part(points, some), bodies)
+        if not bodies:
+            kernels.encode(points.light, self.curve, points.code)
+        return first
+
+    def _trace(self, places: Places, points: Points, bodies: bool) -> None:
+        s, m, n = self.sight, self.m[places.pixel], self.n[places.pixel]
+        s.check()
+        within = np.stack([places.x, places.y], axis=1).astype(np.float64) / UNITS
+        rays = s.camera.weighted_rays_at(m, n, within)
+        if bodies:
+            points.body[:] = s.tracer.bodies(*rays)
+            return
+        keys = None
+        if s.tracer.scene.glossy:
+            fine = (within * FINEST).astype(np.int64)
+            keys = np.empty(len(m), np.uint64)
+            across, down = FINEST * m + fine[:, 0], FINEST * n + fine[:, 1]
+            lobe_keys(s.seed, across, down, FINEST * s.camera.pixels[0] + 1, 0, 1, keys)
+        s.tracer.footprint, s.tracer.lobes = (s.width[0] / FINER, s.width[1] / FINER), (LOBE_RAYS, 1)
+        points.light[:] = 0
+        s.tracer.run(
+            *rays[:2], points.light, Support(object_id=points.body, shading_normal=points.normal), rays[2], keys
+        )
+
+    def _sample(self, pixels: NDArray[np.int64], steps: NDArray[np.float32]) -> None:
+        """Find the light of pixels by sets of samples: n miss an edge by `MISSED` / n^¾ of its step."""
+        s, least = self.sight, (MISSED * steps / self.wanted.error) ** (4 / 3)
+        numbers = SETS[np.searchsorted(SETS[:-1], least)]
+        for number in np.unique(numbers).tolist():
+            some = pixels[numbers == number]
+            s.tracer.footprint = s.width[0] / number**0.5, s.width[1] / number**0.5
+            s.tracer.lobes = -(-LOBE_RAYS // number), number
+            light = fixed_sum(s.camera, number, s.seed, self.m[some], self.n[some], s.batch, s.parts, s.shoot)
+            self.sums[some] = light / number
+            self.rays[some] += number
+
+
+def edge_mean(
+    sight: Sight, wanted: Edges, rows: slice, cols: slice, order: Whole, centres: Radiance, seen: Support,
+    curve: Floats,
+) -> tuple[Radiance, Whole]:  # fmt: skip
+    """Mean radiance (h·w, 3) of a block of pixels and the number of rays (h·w,) of each, in a given order.
+
+    Parameters
+    ----------
+    order : ndarray of int, (h·w,)
+        The block's pixels, by their numbers in C order.
+    centres, seen
+        Radiance of the pixels' centres in that order, and what they `RECORDED`.
+    curve : ndarray
+        8-bit codes at even steps of linear light.
+    """
+    m, n, lens = with_rim(sight.camera, rows, cols)
+    own = ((n >= rows.start) & (n < rows.stop) & (m >= cols.start) & (m < cols.stop)).ravel()
+    rim = ~own & needed(lens, own)
+    lens = np.where((own | rim).reshape(lens.shape), lens, -1)
+    cells = Cells(sight, wanted, curve, m.ravel(), n.ravel(), lens, own)
+    inside, points, reach = np.flatnonzero(own)[order], cells.points, np.full(lens.size, np.nan, np.float32)
+    assert seen.object_id is not None and seen.shading_normal is not None and seen.ray_length is not None
+    points.light[inside], points.body[inside] = centres, seen.object_id
+    points.normal[inside], reach[inside] = seen.shading_normal, seen.ray_length
+    around = np.flatnonzero(rim)
+    if len(around):
+        half = np.full(len(around), UNITS / 2, np.float32)
+        cells.look_around(Places(around.astype(np.int32), half, half))
+    opened = cells.refine(inside, reach)[inside]
+    found = centres.copy()
+    found[opened] = cells.sums[inside[opened]]
+    return found, cells.rays[inside]
+
+
+Table = TypeVar("Table", Points, Places, Sides)
+
+
+def _part(table: Table, rows: slice | NDArray[np.int64]) -> Table:
+    arrays: list[Any] = [array[rows] for array in table]
+    return type(table)(*arrays)
+
+
+def _grown(points: Points, kept: int, room: int) -> Points:
+    arrays: list[Any] = [np.empty((room, *array.shape[1:]), array.dtype) for array in points]
+    for array, old in zip(arrays, points, strict=True):
+        array[:kept] = old[:kept]
+    return Points(*arrays)
+
+
+def _places(n: int) -> Places:
+    return Places(np.empty(n, np.int32), np.empty(n, np.float32), np.empty(n, np.float32))
+
+
+def _sides(n: int) -> Sides:
+    whole = [np.empty(n, np.int32) for _ in range(4)]
+    return Sides(whole[0], whole[1], np.empty((n, 2), np.int32), whole[2], whole[3], np.empty(n, np.bool_))
