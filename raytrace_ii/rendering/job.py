@@ -329,8 +329,9 @@ class Job:
         if not hasattr(self._local, "small"):
             pixel = footprint(camera)
             self._local.small = pixel, small_balls(self.scene, self.pose, pixel)
+        pixel, balls = self._local.small
         sight = Sight(
-            camera, tracer, self.seed, TILE_RAYS, width, *self._local.small, self._parts, self._shoot(tracer, None),
+            camera, tracer, self.seed, TILE_RAYS, width, pixel, balls, self._parts, self._shoot(tracer, None),
             self._check_stopped,
         )  # fmt: skip
         return *edge_mean(sight, wanted, rows, cols, order.pixels, centres, support, codes), support
