@@ -14,9 +14,11 @@ import statistics
 import textwrap
 import time
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import convolve1d
 
 from benchmarks.arguments import command_line
 from benchmarks.pages.tables import Tables, publish
@@ -32,6 +34,7 @@ from ii_core import (
     retarget,
     sub_images,
 )
+from ii_core.base.colour import linear, srgb
 from ii_core.depth.all_views import disparity_of_views
 from ii_core.depth.focus import depth_from_focus
 from metrics import depth_errors, depth_regions
@@ -42,8 +45,10 @@ RECORDS = Records("estimated_depth", ("benchmarks.accuracy.estimated_depth",))
 FIELDS = ("cuboid", "twins", "apples")
 SETUP1 = ("apples", "twins", "car", "cuboid", "objects", "dolphin", "hairdo", "mountains")
 MOVED = ("apples", "car", "cuboid")
-TARGETS = ("upright", "double")
+TARGETS = ("upright", "coarse", "double", "quilt")
+QUILT = 48  # views across
 METHODS = ("views", "robust")
+PARTS = ("seen", "filled", "outside")
 SURE, BORDER = 0.9, 15
 
 
@@ -81,11 +86,13 @@ def field_errors(scene: str, method: str) -> dict[str, Any]:
     seconds = time.process_time() - before
     u, v = camera.ei_pixels
     view = sub_images(picture)[v // 2, u // 2]
-    errors = depth_errors(disparity, true, regions=depth_regions(true, view), camera=camera)
+    regions = depth_regions(true, view)
+    errors = depth_errors(disparity, true, regions=regions, camera=camera)
     inner = np.isfinite(true) & _inner(true.shape)
     bad = ~(np.abs(disparity - true) <= 0.07)
     return {
         **errors, "cpu": seconds, "sure": float(sure[inner].mean()),
+        "sure_where_textured": float(sure[inner & ~regions["textureless"]].mean()),
         "bad_where_sure": float(bad[inner & sure].mean()) if (inner & sure).any() else None,
     }  # fmt: skip
 
@@ -119,33 +126,62 @@ def moved(scene: str, target: str) -> dict[str, Any]:
     camera = preset("setup1", scale=4)
     picture, true = shot_of(scene, camera)
     (k, l), (u, v) = camera.lenses, camera.ei_pixels
-    if target == "upright":
-        other = replace(camera, optics=({"kind": "grin"},))  # type: ignore[arg-type]
-    else:
-        other = IICamera(
-            pixels=camera.pixels,
-            lenses=(k // 2, l // 2),
-            pixel_pitch_mm=camera.pixel_pitch_mm,
-            gap_mm=2 * camera.gap_mm,
-        )
-    wanted = render(load_scene(scene), other, samples=16, seed=1).picture.pixels.astype(float)
+    other = replace(camera, optics=({"kind": "grin"},)) if target == "upright" else of_double_pitch(camera, target)
+    wanted = render(load_scene(scene), other, samples=16, seed=1).picture
     found = estimate_depth(picture)
     known = {
         "true": disparity_of_depth(camera, true).reshape(l, v, k, u).transpose(1, 3, 0, 2),
         "estimated": disparity_of_views(picture, found.disparity, found.view),
     }
     result: dict[str, Any] = {}
-    for name, disparity in known.items():
-        made = retarget(picture, other, disparity)
-        seen, filled, outside = made.shares
-        error = (made.picture.pixels - wanted)[made.mask == 2]
-        result |= {
-            f"{name}_psnr": float(10 * np.log10(255**2 / np.mean(error**2))), f"{name}_seen": seen,
-            f"{name}_filled": filled, f"{name}_outside": outside,
-        }  # fmt: skip
+    ways = [("true", False), ("estimated", False)] + (
+        [("true", True), ("estimated", True)] if target == "double" else []
+    )
+    for name, refine in ways:
+        made = retarget(picture, other, known[name], refine=refine)
+        error, mask = made.picture.pixels - wanted.pixels.astype(float), made.mask
+        if target == "quilt":  # the middle row of views
+            rows = slice(other.ei_pixels[1] // 2, None, other.ei_pixels[1])
+            error, mask = error[rows], mask[rows]
+        name += "_refined" if refine else ""
+        result |= {f"{name}_psnr": psnr(error[mask == 2])} | {
+            f"{name}_{part}": float((mask == code).mean()) for part, code in zip(PARTS, (2, 1, 0), strict=True)
+        }
+        result[f"{name}_filled_psnr"] = psnr(error[mask == 1]) if (mask == 1).any() else None
+    if target == "double":
+        result["footprint_psnr"] = psnr(of_twice_the_step(wanted) - wanted.pixels)
     return result
 
 
+def of_double_pitch(camera: IICamera, target: str) -> IICamera:
+    """Return the camera with lenses of twice the pitch and the same viewing angle.
+
+    Under a lens are as many pixels of twice the size (``coarse``), twice as many (``double``), or `QUILT`.
+    """
+    (k, l), (u, v) = camera.lenses, camera.ei_pixels
+    under = {"coarse": (u, v), "double": (2 * u, 2 * v), "quilt": (QUILT, QUILT)}[target]
+    pitch = 2 * u * camera.pixel_pitch_mm / under[0]
+    return IICamera(
+        pixels=(k // 2 * under[0], l // 2 * under[1]), lenses=(k // 2, l // 2), pixel_pitch_mm=pitch,
+        gap_mm=2 * camera.gap_mm,
+    )  # fmt: skip
+
+
+def of_twice_the_step(picture: IIPicture) -> np.ndarray:
+    """Return a picture as if each of its pixels took in light of two steps of directions: what the source has."""
+    (k, l), (u, v) = picture.lenses, picture.ei_pixels
+    light = linear(picture.pixels / 255).reshape(l, v, k, u, 3)
+    for axis in (1, 3):
+        light = convolve1d(light, [0.25, 0.5, 0.25], axis=axis, mode="nearest")
+    return 255 * srgb(light.reshape(picture.pixels.shape))
+
+
+def psnr(error: np.ndarray) -> float:
+    """Return dB of an error in codes of 8 bit."""
+    return float(10 * np.log10(255**2 / np.mean(error**2)))
+
+
+@lru_cache(maxsize=1)
 def shot_of(scene: str, camera: IICamera) -> tuple[IIPicture, np.ndarray]:
     """Return a render of 16 samples a pixel, and z of the rays through the middles of its pixels."""
     made = load_scene(scene)
@@ -182,14 +218,15 @@ def tables() -> Tables:
         [
             r["scene"], "all views" if r["method"] == "views" else "focus, robust",
             *(f"{r[f'badpix_{t}']:.1f}" for t in ("007", "003", "001")), f"{r['mse_100']:.3g}", f"{r['q_25']:.2f}",
-            f"{r['badpix_007_outlines']:.0f}", f"{r['badpix_007_textureless']:.0f}", f"{100 * r['sure']:.0f}",
+            f"{r['badpix_007_outlines']:.0f}", f"{r['badpix_007_textureless']:.0f}",
+            f"{100 * r['sure_where_textured']:.0f}",
             "–" if r["bad_where_sure"] is None else f"{100 * r['bad_where_sure']:.1f}", f"{r['cpu']:.0f}",
         ]
         for r in fields
     ]  # fmt: skip
     heads = (
         "field | method | > 0.07 px, % | > 0.03 | > 0.01 | MSE×100 | Q25 | outlines, % | textureless, % | "
-        "sure, % | bad where sure, % | CPU s"
+        "sure where textured, % | bad where sure, % | CPU s"
     )
     small = [r for r in rows if r["study"] == "setup1"]
     places = [
@@ -201,10 +238,15 @@ def tables() -> Tables:
         for r in small
     ]  # fmt: skip
     turned = [r for r in rows if r["study"] == "retarget"]
+
+    def cell(row: dict[str, Any], name: str) -> str:
+        return "–" if row.get(name) is None else f"{row[name]:.1f}"
+
     pictures = [
         [
-            r["scene"], r["target"], f"{r['true_psnr']:.1f}", f"{r['estimated_psnr']:.1f}",
-            f"{100 * r['estimated_filled']:.1f}", f"{100 * r['estimated_outside']:.1f}",
+            r["scene"], r["target"],
+            *(cell(r, f"{n}_psnr") for n in ("true", "true_refined", "footprint", "estimated", "estimated_refined")),
+            f"{100 * r['true_filled']:.1f}", cell(r, "true_filled_psnr"), f"{100 * r['estimated_outside']:.1f}",
         ]
         for r in turned
     ]  # fmt: skip
@@ -219,7 +261,11 @@ def tables() -> Tables:
             *_wrapped(f"Median of the scenes {median:.1f} %. {origin(small)}"),
         ],
         (page, "retargeted"): [
-            *table("scene | target | PSNR with true depth, dB | estimated | filled, % | outside, %", pictures),
+            *table(
+                "scene | target | PSNR with true depth, dB | refined | footprint | estimated | refined | filled, % | "
+                "PSNR there | outside, %",
+                pictures,
+            ),
             "",
             *_wrapped(f"PSNR over seen pixels. {origin(turned)}"),
         ],

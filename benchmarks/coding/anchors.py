@@ -44,7 +44,7 @@ QUANTISERS = {
     "vvenc": (20, 25, 30, 35, 40),
     "libaom": (14, 24, 34, 44, 54),
 }
-OF_SINGLE = (43, 48, 53, 58, 63)  # of `si-lf` for a view alone: the first of many is finer than the rest
+OF_SINGLE = (29, 34, 39, 44, 49)  # of `si-lf` for a view alone: the first of many is finer than the rest
 SCHEMES = (OURS, BY_RGB, AVIF, "x265", "vvenc", "libaom")
 MEASURES = {"ctc": "q_ctc_psnr", "psnr": "q_global", "ssim": "q_ctc_ssim", "worst": "q_ctc_min", "step": "q_ctc_step"}
 LUMA = "luma"  # PSNR of Y in the codes of the common test conditions, mean over views

@@ -102,13 +102,13 @@ def anchor_claims() -> tuple[list[tuple[str, ...]], list[Row]]:
 
 
 def mean_and_worst(rates: Mapping[str, float]) -> str:
-    """Return the mean of rates by picture and the greatest, with the number of pictures."""
+    """Return the mean of rates by picture; in brackets the greatest, and the number of pictures."""
     if not rates:
         return NONE
     mean, worst = (
         f"{value:+.0f}".replace("-", "−") for value in (sum(rates.values()) / len(rates), max(rates.values()))
     )
-    return f"{mean} % (worst {worst}, of {len(rates)})"
+    return f"{mean} % ({worst}, {len(rates)})"
 
 
 def meetings() -> list[tuple[str, int, Pairs]]:

@@ -31,7 +31,7 @@ CASES: dict[str, Callable[[], list[Row]]] = {
         geometry.huge_beside_tiny, light.terminator, light.covered, light.grazing, light.camera_in_glass,
         light.camera_in_body, light.lamp_at_surface, light.bounces, picture.view_borders, picture.rate_ends,
         picture.tiny_frames, depth.depth_contrast,
-        depth.depth_kinds, depth.depth_two_layers, depth.depth_highlight, curves.bd_overlap,
+        depth.depth_kinds, depth.depth_two_layers, depth.depth_highlight, depth.depth_of_views, curves.bd_overlap,
         curves.bd_dents,
         curves.bd_points,
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.accuracy import depth_truth
 from benchmarks.stability.geometry import Row
-from ii_core import IIPicture, add_sensor_noise, preset
+from ii_core import IIPicture, add_sensor_noise, estimate_depth, preset
 from ii_core.depth.focus import METHODS
 from metrics import FocusDepth, depth_from_focus, linear_layers
 from raytrace_ii import Body, Light, Material, Scene, render
@@ -137,6 +137,62 @@ def depth_kinds() -> list[Row]:
                 cells[method] = sum(row[f"pixels_{kind}"] * row[f"within_10_%_{kind}"] for row in held) / pixels
             out.append({"seen": kind, "pixels": pixels, "noise, steps": noise, **cells})
     return out
+
+
+# Share of a mirrored wall; width of a bar in px; noise and contrast in 8-bit codes.
+SWEEPS: dict[str, tuple[float, ...]] = {
+    "mirror": (0.1, 0.25, 0.5, 0.9), "thin": (1, 3, 5), "noise": (0, 8, 24), "contrast": (0, 2, 8),
+}  # fmt: skip
+WALL, BAR, MIRRORED, INNER = 0.8, 2.6, -1.2, 6
+
+
+def depth_of_views(sweeps: dict[str, tuple[float, ...]] = SWEEPS) -> list[Row]:
+    """Return how `estimate_depth` does on walls in closed form: 5×5 views of 48×40 px, inside the border."""
+    rows = []
+    for kind, amounts in sweeps.items():
+        for amount in amounts:
+            picture, truth = closed_form(kind, amount)
+            found = estimate_depth(picture, low=-4, high=4)
+            inner = slice(INNER, -INNER), slice(INNER, -INNER)
+            good = (np.abs(found.disparity - truth) <= 0.07)[inner]
+            sure, bar = (found.confidence >= 0.9)[inner], (truth == BAR)[inner]
+            rows.append({
+                "kind": kind, "amount": amount, "within 0.07 px": float(good.mean()), "sure": float(sure.mean()),
+                "bad where sure": float(1 - good[sure].mean()) if sure.any() else None,
+                "on the bar": float(good[bar].mean()) if bar.any() else None,
+            })  # fmt: skip
+    return rows
+
+
+def closed_form(kind: str, amount: float) -> tuple[IIPicture, np.ndarray]:
+    """Return a field of a wall of known texture, and its disparity: light is known between pixels."""
+    size, views, draw = (48, 40), (5, 5), np.random.default_rng(3)
+    waves, phases, sizes = draw.uniform(-0.9, 0.9, (24, 2)), draw.uniform(0, 6.3, (24, 3)), draw.uniform(0.3, 1, 24)
+
+    def light(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        turns = x[..., None] * waves[:, 0] + y[..., None] * waves[:, 1]
+        return np.clip(0.5 + (np.sin(turns[..., None] + phases) * sizes[:, None]).sum(axis=-2) / 16, 0, 1)
+
+    y, x = np.mgrid[: size[1], : size[0]].astype(float)
+    out = np.empty((size[1], views[1], size[0], views[0], 3))
+    for j, i in np.ndindex(views[1], views[0]):
+        down, right = j - 2, i - 2
+        seen = light(x + right * WALL, y + down * WALL)
+        if kind == "mirror":
+            seen = (1 - amount) * seen + amount * light(x + right * MIRRORED + 31, y + down * MIRRORED + 17)
+        elif kind == "thin":
+            on = np.abs(x + right * BAR - 24) < amount / 2
+            seen = np.where(on[..., None], light(x + right * BAR + 50, y + down * BAR) / 2, seen)
+        elif kind == "noise":
+            seen = seen + draw.normal(0, amount / 255, seen.shape)
+        else:
+            seen = 0.5 + (seen - 0.5) * amount / 255
+        out[:, j, :, i] = seen
+    truth = np.full(x.shape, WALL)
+    if kind == "thin":
+        truth[np.abs(x - 24) < amount / 2] = BAR
+    codes = np.clip(np.rint(255 * out), 0, 255).astype(np.uint8)
+    return IIPicture(codes.reshape(size[1] * views[1], size[0] * views[0], 3), size, views), truth
 
 
 def _kept() -> list[dict[str, Any]]:

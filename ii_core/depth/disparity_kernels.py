@@ -122,16 +122,20 @@ def _better_half(total, count, on, x, limit):
 
 
 @lean_kernel
-def add_evidence(views, disparity, limit, smooth, push, weight, first, last):
-    """Add up one Gauss–Newton step over all views: d + push/weight is the least-squares disparity of each pixel.
+def add_evidence(views, disparity, limit, smooth, push, weight, mean, first, last):
+    """Add up a Gauss–Newton step by quarters of views: d + Σpush/Σweight is a pixel's least-squares disparity.
 
-    A view's weight is 1/(1 + r²/limit²)², r² the mean squared difference over 3×3 pixels, ``smooth`` (3, H, W) the
-    reference view filtered for gradients. Rows ``first`` to ``last`` of ``push`` and ``weight`` (H, W) are filled.
+    A view's weight is 1/(1 + r²/limit²)², r² its squared difference, ``smooth`` (3, H, W) the image of the gradients.
+    ``push`` and ``weight`` (4, H, W) are filled, and ``mean`` (3, H, W), the weighted mean of all views at the
+    disparity. Diagonals bound the quarters.
     """
     height, width = disparity.shape
+    own = views.pixels[0]
     for y in range(first, last):
         for x in range(width):
-            push[y, x], weight[y, x] = 0.0, 0.0
+            push[:, y, x], weight[:, y, x] = 0.0, 0.0
+            for c in range(3):
+                mean[c, y, x] = own[c, y, x]
         if y < 1 or y > height - 2:
             continue
         for x in range(1, width - 1):
@@ -141,9 +145,8 @@ def add_evidence(views, disparity, limit, smooth, push, weight, first, last):
             gy0 = np.float32(0.5) * (smooth[0, y + 1, x] - smooth[0, y - 1, x])
             gy1 = np.float32(0.5) * (smooth[1, y + 1, x] - smooth[1, y - 1, x])
             gy2 = np.float32(0.5) * (smooth[2, y + 1, x] - smooth[2, y - 1, x])
-            own = views.pixels[0]
             o0, o1, o2 = np.float32(own[0, y, x]), np.float32(own[1, y, x]), np.float32(own[2, y, x])
-            up, total = np.float32(0.0), np.float32(0.0)
+            m0, m1, m2, mass = np.float32(0.0), np.float32(0.0), np.float32(0.0), np.float32(1.0)
             d = disparity[y, x]
             for n in range(1, views.steps.shape[0]):
                 a, b = views.steps[n, 0], views.steps[n, 1]
@@ -160,9 +163,16 @@ def add_evidence(views, disparity, limit, smooth, push, weight, first, last):
                 s0, s1, s2 = a * gy0 + b * gx0, a * gy1 + b * gx1, a * gy2 + b * gx2
                 w = np.float32(1.0) / (np.float32(1.0) + (e0 * e0 + e1 * e1 + e2 * e2) / (limit * limit))
                 w *= w
-                up += w * (e0 * s0 + e1 * s1 + e2 * s2)
-                total += w * (s0 * s0 + s1 * s1 + s2 * s2)
-            push[y, x], weight[y, x] = up, total
+                q = (2 if a + b > 0.0 or (a + b == 0.0 and a > 0.0) else 0) + (
+                    1 if a - b > 0.0 or (a - b == 0.0 and a > 0.0) else 0
+                )
+                push[q, y, x] += w * (e0 * s0 + e1 * s1 + e2 * s2)
+                weight[q, y, x] += w * (s0 * s0 + s1 * s1 + s2 * s2)
+                m0 += w * e0
+                m1 += w * e1
+                m2 += w * e2
+                mass += w
+            mean[0, y, x], mean[1, y, x], mean[2, y, x] = o0 + m0 / mass, o1 + m1 / mass, o2 + m2 / mass
 
 
 @stage_kernel

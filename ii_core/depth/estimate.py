@@ -27,7 +27,7 @@ Map = NDArray[np.float32]
 Progress = Callable[[int, int, str], Any]
 
 # In 8-bit codes summed over R, G and B: the difference of another surface; prices of `pass_on`.
-OTHER_SURFACE, SLOPE, LEAP, ALIKE = 30.0, 30.0, 12.0, 25.0
+OTHER_SURFACE, SLOPE, LEAP, ALIKE = 30.0, 60.0, 30.0, 25.0
 FEW_RANGES = 3.0  # labels of all disparities over the most labels, up to which none are searched
 STEP = 0.48  # px that neighbouring labels are apart in the farthest view of a half-line
 MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of costs are then 4 times the field
@@ -35,14 +35,15 @@ MOST_LABELS, FEWEST_LABELS = 1.5, 96  # labels a view, at most: two volumes of c
 # codes of the least span less than VALLEY px.
 SEARCH_SIDE, MANY, NOISE, VALLEY = 128, 16, 4.0, 2.0
 # Gauss–Newton: differences of occluded views, 8-bit codes; window of planes, px; likeness in codes and disparity;
-# weight of the old disparity, codes² a px²; weight of level planes over that of the data.
-STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT = 3, 6.0, 5, 15.0, 0.13, 1000.0, 1.0
-# Gradients are of a view blurred by BLUR px, with noise of NOISY 8-bit codes; without noise the blur is a bias:
-# antinous of the HCI fields has 28 % above 0.07 px with it and 21 % without, `apples` 61 % and 78 % (2026-11-25).
-BLUR, NOISY, CLEAN = 0.6, 0.9, 0.5
+# weight of the old disparity, codes² a px²; weight of level planes over that of the data; longest step, px.
+STEPS, OCCLUDED, RADIUS, SAME_COLOUR, SAME_SURFACE, PRIOR, FLAT, LONGEST = 4, 6.0, 5, 15.0, 0.13, 1000.0, 1.0, 0.3
+# Steps end where quarters of the views disagree by more than AT_ODDS px and BY_NOISE times what noise explains: by a
+# moving reflection, a hidden edge, or rendering noise that all views share. On antinous of the HCI fields 15.4 % are
+# above 0.07 px with this rule, more than 20 % without (2026-11-25).
+AT_ODDS, BY_NOISE, SUDDEN = 0.003, 4.0, 8
 # Confidence: labels so many px away are rivals; logistic regression on 950 000 pixels of four fields of 9×9 views,
-# `cuboid`, `twins`, `apples` with noise of one code and antinous, its constant lowered by 0.2 (2026-11-25).
-APART, JUDGE = 0.5, (-4.5, -0.29, -0.70, -1.31, 0.62)
+# `cuboid`, `twins`, `apples` with noise of one code and antinous, its constant lowered by 0.3 (2026-11-25).
+APART, JUDGE = 0.5, (-3.48, -0.58, -0.20, -0.83, 0.66, -1.06)
 # Even blocks from which noise is estimated: side in px, and their share.
 BLOCK, EVEN = 8, 0.1
 
@@ -92,7 +93,8 @@ def estimate_depth(
 
     1. Every label, a disparity, costs the mean difference along half-lines of views, the better half of eight.
     2. Costs are passed on along rows and columns; the least one wins, a parabola places it between labels.
-    3. Gauss–Newton steps over all views; planes in bilateral windows average them.
+    3. Gauss–Newton steps over all views, with gradients of their mean; planes in bilateral windows average them.
+       Where quarters of the views disagree, the matched disparity stays.
 
     Parameters
     ----------
@@ -142,15 +144,15 @@ def estimate_depth(
         low, high = found[0] if low is None else low, found[1] if high is None else high
         high = high if high > low else low + 1.0
     told(2, total, "costs")
-    start, *rivals = matched(views, labels_between(views, low, high), workers)
+    start, ratio, margin = matched(views, labels_between(views, low, high), workers)
     disparity, noise = start, noise_codes(views)
-    push, weight = np.zeros_like(disparity), np.zeros_like(disparity)
+    mean = views.pixels[0].astype(np.float32)
     for step in range(STEPS):
         told(3 + step, total, f"step {step + 1} over all views")
-        disparity, _ = refined(views, disparity, noise, push, weight, workers)
+        disparity, mean, odds = refined(views, disparity, noise, mean, workers)
     told(3 + STEPS, total, "confidence")
     disparity[np.isnan(start)] = np.nan
-    confidence = judged(disparity, start, *rivals)
+    confidence = judged(disparity, start, ratio, margin, odds)
     depth = None if picture.camera is None else depth_of_disparity(picture.camera, disparity)
     told(total, total, "")
     return DepthEstimate(disparity, confidence, depth, at)
@@ -251,7 +253,7 @@ def matched(views: Views, labels: Map, workers: int | None) -> tuple[Map, Map, M
     return np.asarray(ndimage.median_filter(labelled(total, labels), 3)), ratio, margin / CODES
 
 
-def judged(disparity: Map, start: Map, ratio: Map, margin: Map) -> Map:
+def judged(disparity: Map, start: Map, ratio: Map, margin: Map, odds: Map) -> Map:
     """Return the estimated probability that disparities are within 0.07 px."""
     known = np.nan_to_num(disparity)
     spread = ndimage.maximum_filter(known, 7) - ndimage.minimum_filter(known, 7)
@@ -260,40 +262,42 @@ def judged(disparity: Map, start: Map, ratio: Map, margin: Map) -> Map:
         np.log(np.abs(known - np.nan_to_num(start)) + 0.005),  # steps after matching
         np.log(np.clip(ratio, 0.05, 2)),
         np.log(np.maximum(margin, 0) + 2),
+        np.log(odds + 0.1),  # quarters of the views
     )
     sum_ = JUDGE[0] + sum(weight * term for weight, term in zip(JUDGE[1:], terms, strict=True))
     return np.where(np.isnan(disparity), 0, 1 / (1 + np.exp(-sum_))).astype(np.float32)
 
 
-def refined(
-    views: Views, disparity: Map, noise: float, push: Map, weight: Map, workers: int | None
-) -> tuple[Map, Map]:
-    """Return the disparity after a Gauss–Newton step over all views, and the weight of its windows."""
-    height = disparity.shape[0]
+def refined(views: Views, disparity: Map, noise: float, mean: Map, workers: int | None) -> tuple[Map, Map, Map]:
+    """Return the disparity after a Gauss–Newton step over all views, their mean there, and `at_odds`.
+
+    Gradients are of ``mean``, (3, H, W): those of one view have its noise, which makes steps too short.
+    """
+    height, width = disparity.shape
     known = np.nan_to_num(disparity)
-    view = views.pixels[0].astype(np.float32)
-    blur = BLUR * min(max((noise - CLEAN) / (NOISY - CLEAN), 0.0), 1.0)
-    smooth = ndimage.gaussian_filter(view, (0, blur, blur)) if blur > 0 else view
-    run(workers, height, kernels.add_evidence, views, known, np.float32(OCCLUDED * CODES), smooth, push, weight)
+    push, weight = (np.empty((4, height, width), np.float32) for _ in range(2))
+    seen = np.empty_like(mean)
+    run(workers, height, kernels.add_evidence, views, known, np.float32(OCCLUDED * CODES), mean, push, weight, seen)
+    odds = at_odds(push, weight, noise)
     out, sure = np.empty_like(known), np.empty_like(known)
+    view = views.pixels[0].astype(np.float32)
     likeness = np.float32(SAME_COLOUR * CODES), np.float32(SAME_SURFACE)
-    run(
-        workers,
-        height,
-        kernels.fit_planes,
-        known,
-        push,
-        weight,
-        view,
-        RADIUS,
-        *likeness,
-        PRIOR * CODES**2,
-        FLAT,
-        out,
-        sure,
-    )
-    out = known + np.clip(out - known, -0.15, 0.15)
-    return np.asarray(ndimage.median_filter(out, 3)), sure
+    evidence = known, push.sum(axis=0), weight.sum(axis=0), view
+    run(workers, height, kernels.fit_planes, *evidence, RADIUS, *likeness, PRIOR * CODES**2, FLAT, out, sure)
+    out = known + np.clip(out - known, -LONGEST, LONGEST) / (1 + odds**SUDDEN)
+    return np.asarray(ndimage.median_filter(out, 3)), seen, odds
+
+
+def at_odds(push: Map, weight: Map, noise: float) -> Map:
+    """Return by how much quarters of the views disagree over what is allowed, in windows of planes."""
+    side = 2 * RADIUS + 1
+    pushes, weights = (ndimage.uniform_filter(part, (0, side, side)) * side**2 for part in (push, weight))
+    heavy = np.maximum(weights, 1)
+    mass = heavy.sum(axis=0)
+    away = pushes / heavy - pushes.sum(axis=0) / mass
+    quarters = max(int((weight.sum(axis=(1, 2)) > 0).sum()) - 1, 1)
+    spread = np.sqrt((heavy * away**2).sum(axis=0) / mass / quarters)
+    return np.asarray(spread / (AT_ODDS + BY_NOISE * np.sqrt(3 / mass) * noise * CODES))
 
 
 def noise_codes(views: Views) -> float:

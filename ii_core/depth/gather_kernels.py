@@ -50,6 +50,10 @@ def add_view(image, own, down, across, weight, limit, disparity, total, mass, fi
             mass[y, x] += w
 
 
+# Longest shift between views, px and share of a view's shorter side. Beyond it light changes with the direction
+# alone: the line to a far point leaves the view or passes many edges. Apples to lenses of twice the pitch: 25.2 dB
+# without a limit, 26.1, 26.6, 26.9 and 26.9 with 1, 2, 4 and 8 px (2026-11-25).
+SHIFT, SHIFT_SHARE = 4.0, 1 / 16
 SPAN = 0.75  # views beyond the outermost ones that a ray may lie outside
 # Disparities of one point in two views, and of neighbours on one surface, differ by less, px and share of themselves.
 AGREE, AGREE_SHARE, JUMP, JUMP_SHARE = 0.35, 0.05, 0.75, 0.1
@@ -63,12 +67,14 @@ def _near(depths, j, i, y, x):
 
 
 @lean_kernel
-def look_up(views, depths, places, low, high, order, total, mask, first, last):
+def look_up(views, depths, low, high, order, places, total, ends, mask, first, last):
     """Add the light of rays at ``places`` (x, y, u, v) to ``total``; ``mask`` 2 is seen, 1 filled, 0 outside.
 
+    ``ends`` becomes the disparity where each ray ends.
     ``depths`` are shifts of a point in x and y from view to view; ``order`` is 1 if large shifts are near, else −1.
     """
     rows, cols, height, width = views.shape[:4]
+    longest = max(SHIFT, min(height, width) * SHIFT_SHARE)
     for n in range(first, last):
         for m in range(places.shape[1]):
             x, y, u, v = places[n, m]
@@ -107,9 +113,10 @@ def look_up(views, depths, places, low, high, order, total, mask, first, last):
                 if (q & 1 and right == left) or (q & 2 and below == top):
                     continue
                 w = max(1.0 - abs(v - j), 1e-6) * max(1.0 - abs(u - i), 1e-6)
-                shift, share = _place(depths, j, i, y, x, v - j, u - i, at, low, high)
+                shift, share = _place(depths, j, i, y, x, v - j, u - i, at, low, high, longest)
                 w *= share
-                sy, sx = y + shift * (v - j), x + shift * (u - i)
+                sy = y + min(max(shift * (v - j), -longest), longest)
+                sx = x + min(max(shift * (u - i), -longest), longest)
                 sy, sx = min(max(sy, 0.0), height - 1.0), min(max(sx, 0.0), width - 1.0)
                 if share < 1.0:  # beside an edge: interpolation would mix both surfaces
                     sy, sx = float(int(sy + 0.5)), float(int(sx + 0.5))
@@ -121,11 +128,12 @@ def look_up(views, depths, places, low, high, order, total, mask, first, last):
                 total[n, m, 0] += max(r / mass, 0.0)
                 total[n, m, 1] += max(g / mass, 0.0)
                 total[n, m, 2] += max(b / mass, 0.0)
+                ends[n, m] = at
                 mask[n, m] = max(mask[n, m], 1) if hidden else 2
 
 
 @stage_kernel
-def _place(depths, j, i, y, x, down, across, at, low, high):
+def _place(depths, j, i, y, x, down, across, at, low, high, longest):
     """Return the shift nearest to ``at`` whose place in a view has the disparity ``at``, and a weight.
 
     The surface seen through a hole, or the sky, is taken from where the view sees it next.
@@ -137,7 +145,8 @@ def _place(depths, j, i, y, x, down, across, at, low, high):
     for k in range(steps + 1):
         for side in range(2 if k > 0 else 1):
             shift = at + (1 - 2 * side) * (k * 0.5 / reach if reach > 0.0 else 0.0)
-            sy, sx = y + shift * down, x + shift * across
+            sy = y + min(max(shift * down, -longest), longest)
+            sx = x + min(max(shift * across, -longest), longest)
             if (
                 -0.5 <= sy <= height - 0.5
                 and -0.5 <= sx <= width - 0.5

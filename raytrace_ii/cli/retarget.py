@@ -31,6 +31,10 @@ def retarget(
         Path | None, typer.Option(help="Write a picture: white is seen, grey filled, black outside the field.")
     ] = None,
     samples: Annotated[int, typer.Option(help="Rays across a pixel, 1 to 16.")] = 1,
+    refine: Annotated[
+        bool,
+        typer.Option("--refine", help="Halve the directions of the field first, for finer pixels of the camera."),
+    ] = False,
     angle: Angle = None,
     workers: Workers = None,
     plugin: Plugins = None,
@@ -53,7 +57,7 @@ def retarget(
     check_outputs(files, force)
     with progress_bar(f"retarget {field.name}") as report:
         disparity = _disparity(shown, depth, workers, report)
-        made = converted(shown, target, disparity, samples=samples, workers=workers, progress=report)
+        made = converted(shown, target, disparity, samples=samples, refine=refine, workers=workers, progress=report)
     made.picture.save(output)
     if mask is not None:
         write_image(mask, np.asarray(GREYS, np.uint8)[made.mask])

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .kernels import packets
-from .kernels.lanes import aligned
-from .kernels.packets import PACKET_ROWS, Calls, packet_kernels
+from .kernels.lanes import PACKET, Work, aligned, work
+from .kernels.packets import PACKET_ROWS, Calls, Tools, packet_kernels
 
 CONFIGURATION = "RAYTRACE_II_EMBREE"  # environment variable: Embree's device configuration, or "embreex"
 # Trees of eight children a node: Embree keeps to four on CPUs that slow down under wide vectors, and takes 5 % longer
@@ -138,7 +138,6 @@ class Tree:
     def __init__(self, library: Library, corners: Floats, robust: bool) -> None:
         self.library = library
         self.corners = with_spare(corners)  # Embree keeps no copy
-        self._faces = self.corners if len(corners) else np.zeros((1, 3, 3), np.float32)  # misses read the first
         self._indices = np.arange(corners.size // 3 + _SPARE, dtype=np.uint32)
         some = self.corners[:: len(corners) // _SOME_FACES + 1]
         edges = np.linalg.norm(some - np.roll(some, 1, axis=1), axis=2)
@@ -170,19 +169,13 @@ class Tree:
         directions: Floats,
         reach: Floats,
         out: HitArrays,
-        placed: bool = True,
     ) -> None:
-        """Fill row of the face (−1 on a miss), u, v and distance of the nearest hit, placed in float64 if ``placed``.
-
-        ``reach`` of no length is no end.
-        """
-        kernel = packet_kernels(self.library.width)[0]
-        kernel(*self._room("rtcIntersect"), origins, directions, reach, self._faces, placed, *out)
+        """Fill row of the face (−1 on a miss), u, v and distance of the nearest hit; no ``reach`` is no end."""
+        packet_kernels(self.library.width)[0](*self._room(), origins, directions, reach, *out)
 
     def occluded(self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32]) -> None:
         """Fill 0 where something is hit within reach, −1 where not."""
-        kernel = packet_kernels(self.library.width)[1]
-        kernel(*self._room("rtcOccluded"), origins, directions, reach, out)
+        packet_kernels(self.library.width)[1](*self._room(), origins, directions, reach, out)
 
     def few(self, function: str, origins: Floats, directions: Floats, reach: float) -> HitArrays:
         """As `nearest`, or of ``rtcOccluded`` with distances below 0 where something is hit, without a kernel.
@@ -190,7 +183,7 @@ class Tree:
         Neither the few rays that choose a packet's rays nor those of `_layouts_hold` are worth compiling one.
         """
         n, width, (active, _) = len(origins), self.library.width, lane_masks()
-        packet = aligned(packets.PACKET_ROWS * width).reshape(-1, width)
+        packet = aligned(PACKET_ROWS * width).reshape(-1, width)
         numbers, call = packet.view(np.int32), getattr(self.library.functions, f"{function}{width}")
         faces, (u, v, distances) = np.empty(n, np.int32), np.empty((3, n), np.float32)
         for first in range(0, n, width):
@@ -207,17 +200,16 @@ class Tree:
                 out[some] = packet[row, :lanes]
         return faces, u, v, distances
 
-    def _room(self, function: str) -> tuple[Any, ...]:
-        """Addresses, most spread and room for rays, which threads must not share: kept for each of them."""
-        kept: dict[str, tuple[Any, ...]] = vars(self._rooms)
-        if function not in kept:
-            kept[function] = self._new_room(function)
-        return kept[function]
-
-    def _new_room(self, function: str) -> tuple[Any, ...]:
-        active, chosen = lane_masks()
-        packet = aligned(PACKET_ROWS * self.library.width)
-        return self.calls(function, active, packet), active, chosen, packet, packet.view(np.int32)
+    def _room(self) -> tuple[Tools, Work]:
+        """Calls and room for rays, which threads must not share: kept for each of them."""
+        kept: dict[str, Any] = vars(self._rooms)
+        if not kept:
+            room, (active, chosen) = work(), lane_masks()
+            packet = room.single[PACKET:]
+            nearest, stop = (self.calls(name, active, packet) for name in ("rtcIntersect", "rtcOccluded"))
+            kept["room"] = Tools(nearest, stop, active, chosen), room
+        found: tuple[Tools, Work] = kept["room"]
+        return found
 
     def calls(self, function: str, active: NDArray[np.int32], packet: Floats) -> Calls:
         """What a function is called with for packets in memory of the caller, which threads must not share."""

@@ -52,7 +52,7 @@ class Intersector:
         self._first_clear = first_of_same(corners[opaque:]) if self._clear is not None else None
 
     def nearest(self, origins: Floats, directions: Floats, placed: bool = True) -> tuple[Hits, float]:
-        """Nearest hit of every ray, and CPU seconds inside Embree; ``placed`` as in `embree.Tree`."""
+        """Nearest hit of every ray, and CPU seconds inside Embree; ``placed`` by float64, else by Embree."""
         return _nearest(self._all, self._first, origins, directions, _NO_REACH, placed)
 
     def distances(self, origins: Floats, directions: Floats) -> Floats:
@@ -105,13 +105,11 @@ class SingleRays:
         vertices = np.ascontiguousarray(corners.reshape(-1, 3), np.float32)
         TriangleMesh(self._scene, vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3))
 
-    def nearest(self, origins: Floats, directions: Floats, reach: Floats, out: Hits, placed: bool = True) -> None:
+    def nearest(self, origins: Floats, directions: Floats, reach: Floats, out: Hits) -> None:
         dists = reach.copy() if len(reach) else None  # embreex overwrites it
         found = self._scene.run(origins, directions, dists=dists, query="INTERSECT", output=True)
         for array, name in zip(out, ("primID", "u", "v", "tfar"), strict=True):
             array[:] = found[name]
-        if placed:
-            place_hits(origins, directions, self.corners, *out)
 
     def occluded(self, origins: Floats, directions: Floats, reach: Floats, out: NDArray[np.int32]) -> None:
         out[:] = self._scene.run(origins, directions, dists=reach.copy(), query="OCCLUDED")
@@ -128,9 +126,9 @@ def _nearest(
     n = len(origins)
     hits = Hits(np.empty(n, np.int32), *(np.empty(n, np.float32) for _ in range(3)))
     start = time.thread_time()
-    tree.nearest(origins, directions, reach, hits, placed)
+    tree.nearest(origins, directions, reach, hits)
     if first is not None:
         hits.faces[:] = np.where(hits.faces >= 0, first[hits.faces], -1)
-    if first is not None and placed:
+    if placed:
         place_hits(origins, directions, tree.corners, *hits)
     return hits, time.thread_time() - start

@@ -16,7 +16,7 @@ from ..scene.textures import Image
 from . import lift
 from .intersect import Intersector
 from .kernels import tables
-from .kernels.arrays import FaceTables, Maps, Surfaces, Surroundings
+from .kernels.arrays import Maps, Surfaces, Surroundings
 from .kernels.lanes import aligned
 from .kernels.tables import DIRECTIONAL, LEAST_WEIGHT, MATERIAL_COLUMNS, POINT, SPOT
 from .texture_table import TextureTable
@@ -109,10 +109,6 @@ class PackedScene:
             rows.reshape(-1), rows.shape[1], len(normals) > 0, self.corners, self.faces, self.coordinates,
             self.object_of_face, self.materials, laned, self._maps(bodies), self.textures.table,
             self.textures.levels, self.textures.texels, self.textures.alphas,
-        )  # fmt: skip
-        self.face_tables = FaceTables(
-            self.corners, self.faces, self.coordinates, self.object_of_face, self.materials, self.textures.table,
-            self.textures.alphas,
         )  # fmt: skip
         self.surroundings = Surroundings(self.lights, self.background, self.fog, self.ambient)
 

@@ -415,7 +415,7 @@ class Tracer:
         n = len(rays.pixels)
         onward = Onward(np.empty((n, 3), np.float32), np.empty((n, 3), np.float32), np.empty(n, np.int32))
         for _ in range(MOST_CLEAR_FACES):
-            count = pass_faces(found, rows, table, rays.directions, rays.inside, s.face_tables, onward)
+            count = pass_faces(found, rows, table, rays.directions, rays.inside, s.surfaces, onward)
             if not count:
                 break
             self.count.rays["passed"] += count
@@ -442,10 +442,7 @@ class Tracer:
             self.count.rays["passed"] += count
             hits, seconds = s.intersector.nearest_clear(origins[:count], directions[:count])
             self.count.embree_seconds += seconds
-            count = tell_inside(
-                hits.faces, hits.u, hits.v, rows, candidates, origins, directions, rays.inside,
-                s.corners, s.faces, s.object_of_face, s.opaque_faces,
-            )  # fmt: skip
+            count = tell_inside(hits, rows, candidates, origins, directions, rays.inside, s.surfaces, s.opaque_faces)
 
     def _light(self, shadow: ShadowRays, radiance: NDArray[np.float32], tested: bool) -> None:
         """Add the light of shadow rays that nothing opaque stops, as told here or before, dimmed by what is clear."""
@@ -456,12 +453,12 @@ class Tracer:
             if not s.lets_through:
                 add_unblocked(found, shadow.colours, shadow.pixels, radiance)
                 return
-            kept = keep_unblocked(found, *shadow)
+            kept = keep_unblocked(found, shadow)
         for _ in range(MOST_CLEAR_FACES):
             shadow = _rows(shadow, slice(kept))
             hits, seconds = s.intersector.nearest_clear(shadow.origins, shadow.directions, shadow.reach)
             self.count.embree_seconds += seconds
-            kept = pass_clear_face(hits, shadow, s.face_tables, s.opaque_faces, radiance)
+            kept = pass_clear_face(hits, shadow, s.surfaces, s.opaque_faces, radiance)
             if not kept:
                 return
             self.count.rays["shadow"] += kept

@@ -116,6 +116,16 @@ def test_a_strong_mirror_has_the_depth_of_the_mirrored_scene():
         assert whole[f"{kind}, robust: wall"] < 0.05 and whole[f"{kind}, robust: behind"] > 0.95
 
 
+def test_depth_of_views_fails_at_mirrors_thin_bars_noise_and_without_texture():
+    rows = depth.depth_of_views({"mirror": (0.1, 0.9), "thin": (1, 5), "noise": (8, 24), "contrast": (0, 8)})
+    good = {(row["kind"], row["amount"]): row["within 0.07 px"] for row in rows}
+    sure = {(row["kind"], row["amount"]): row["sure"] for row in rows}
+    assert good["mirror", 0.1] > 0.95 and good["mirror", 0.9] == 0 and sure["mirror", 0.9] > 0.5
+    assert [row["on the bar"] > 0.9 for row in rows if row["kind"] == "thin"] == [False, True]
+    assert good["noise", 8] > 0.95 and good["noise", 24] < 0.5 and sure["noise", 24] < 0.05
+    assert good["contrast", 8] > 0.95 and good["contrast", 0] == sure["contrast", 0] == 0
+
+
 def test_tables_hold_every_row():
     rows = [{"a": 1, "b": name, "c": value} for name, value in (("x", 0.5), ("y", None))]
     assert book.table(rows) == ["| a | b | c |", "|---|---|---|", "| 1 | x | 0.5 |", "| 1 | y | – |"]

@@ -303,3 +303,14 @@ def test_damaged_streams_decode_to_something_or_are_refused():
 def test_an_error_of_quality_names_the_measure():
     with pytest.raises(ValueError, match=r"quality is 5: .* is needed \(.*quality is PSNR in dB by the measure"):
         encode(shifted_plane((1, 1), grid=(2, 2)), "si-lf", quality=5)
+
+
+def test_the_first_view_is_finer_the_more_views_it_predicts_and_a_view_alone_is_not():
+    first = []
+    for grid in [(1, 1), (1, 2), (3, 3), (5, 5)]:
+        source = lf.Source(shifted_plane((1, 1), grid=grid, height=16), checked_options(lf.LightField(), {}))
+        steps = source.steps(26 * lf.FRACTIONS)
+        assert steps[-1] == 128 * 2**3  # of quantiser 26
+        first.append(steps[0])
+    assert first[0] == 128 * 2**3 and sorted(first, reverse=True) == first
+    assert 8 < 6 * np.log2(first[0] / first[-1]) < 12

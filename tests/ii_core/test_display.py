@@ -9,7 +9,7 @@ from ii_core import IICamera, IIPicture, five_viewpoints, preset, view_image
 from ii_core.display.devices import DEVICES, device
 from ii_core.display.film import write_animation
 from ii_core.display.lenticular import lenticular
-from ii_core.display.look import focused_view, look, viewpoints_across, viewpoints_around, zone_half_deg
+from ii_core.display.look import focused_view, held, look, viewpoints_across, viewpoints_around, zone_half_deg
 from ii_core.display.quilt import cone_share, quilt
 from ii_core.display.simulate import display_simulation
 from ii_core.formats.quilt import quilt_name
@@ -206,6 +206,13 @@ def test_command_refuses(run, refused, apples, tmp_path, arguments, said):
     arguments = [tmp_path / a if a.startswith("a.") else a for a in arguments]
     refused(run("display", tmp_path / "p.png", *arguments), said)
     assert not list(tmp_path.glob("a*"))
+
+
+def test_the_focus_falls_to_0_at_both_borders_of_the_array():
+    """Half a lens beyond the outermost lens is the border."""
+    for lens, room in ((-0.5, 0), (0, 0.5), (2, 2.5), (6, 1.5), (7.5, 0), (8, 0)):
+        assert (held(9, lens, 8), held(-9, lens, 8)) == (room, -room)
+    assert held(0.2, 3, 8) == 0.2
 
 
 @pytest.mark.slow

@@ -69,6 +69,43 @@ def test_a_hole_beside_a_near_square_is_filled_by_the_wall():
     assert (lenses[0][:6] == 2).all() and (lenses[1][:6] == 60).all()
 
 
+def test_a_near_square_stays_out_of_the_far_sky():
+    """The line from a ray of the sky to the farthest disparity ends at the outline of the square, half sky."""
+    disparity = np.full((5, 5, 20, 24), -40.0, np.float32)
+    disparity[:, :, 8:12, 8:14] = 0.0  # on the lenses
+    pixels = np.full((20, 24, 5, 5, 3), 60, np.uint8)
+    pixels[7:13, 7:15] = 130
+    pixels[8:12, 8:14] = 200
+    source = IIPicture(pixels.transpose(0, 2, 1, 3, 4).reshape(100, 120, 3), (24, 20), (5, 5), PARALLEL)
+    finer = replace(PARALLEL, pixels=(240, 200), pixel_pitch_mm=0.05)
+    made = retarget(source, finer, disparity)
+    by_lens = made.picture.pixels.reshape(20, 10, 24, 10, 3).transpose(0, 2, 1, 3, 4)
+    far = np.ones((20, 24), bool)
+    far[3:17, 3:19] = False
+    assert (by_lens[far] == 60).all() and (by_lens[9:11, 9:13] == 200).all()
+
+
+def test_refined_directions():
+    """Pixels that are means over their directions: halved, they come nearer to means over half of them."""
+    far = 30.0  # 3 lens pitches between views
+
+    def integrated(camera):
+        start, way = camera.rays()
+        place = start + (far - start[..., 2:]) / way[..., 2:] * way
+        width = far * camera.pixel_pitch_mm / camera.gap_mm
+        waves = [np.sin(k * place[..., axis]) * np.sinc(k * width / 2 / np.pi) for k in (0.8, 1.3) for axis in (0, 1)]
+        light = np.repeat(0.5 + 0.1 * np.sum(waves, axis=0)[..., None], 3, 2)
+        return IIPicture(light.astype(np.float32), camera.lenses, camera.ei_pixels, camera)
+
+    disparity = np.full((5, 5, 20, 24), disparity_of_depth(PARALLEL, far), np.float32)
+    finer = replace(PARALLEL, pixels=(240, 200), pixel_pitch_mm=0.05)
+    wanted = integrated(finer).pixels
+    inner = np.s_[70:130, 70:170]
+    plain, refined = (retarget(integrated(PARALLEL), finer, disparity, refine=refine) for refine in (False, True))
+    error = [np.sqrt(np.mean((made.picture.pixels - wanted)[inner] ** 2)) for made in (plain, refined)]
+    assert error[1] < 0.75 * error[0] and (plain.mask == refined.mask).all()
+
+
 @pytest.mark.parametrize(
     ("picture", "disparity", "said"),
     [

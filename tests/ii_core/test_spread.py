@@ -8,7 +8,7 @@ from scipy.signal import resample
 
 from ii_core import DisplayModel, Eye, IICamera, IIPicture, eye_image, preset
 from ii_core.camera.optics import Lenslet
-from ii_core.waves.spread import FIRST_ZERO, _kernel, scatter, spread_maps, spread_picture
+from ii_core.waves.spread import FIRST_ZERO, _extent, _kernel, scatter, spread_maps, spread_picture
 from ii_core.waves.wave import diffraction_limit, lens_spread
 from tests.support.slow import first_fast
 
@@ -106,6 +106,12 @@ def test_a_picture_leaves_as_much_light_in_its_pixels_as_the_transfer():
     light = spread_picture(point(made), maps).pixels[:16, :16, 1]
     assert light[8, 8] == pytest.approx(1 - 0.171, abs=3e-3)
     assert light.sum() == pytest.approx(1, rel=1e-6)
+
+
+def test_no_ray_leaves_the_extent():
+    r = np.linspace(0, 1, 100_001)
+    for disk, aberration in ((3, 0), (3, 2), (3, -2), (1, -3), (0, 2)):
+        assert _extent(disk, aberration) == pytest.approx(abs(disk * r + aberration * r**3).max(), abs=1e-8)
 
 
 def test_without_wavelength_it_is_the_disk_of_rays():

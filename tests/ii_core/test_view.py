@@ -9,7 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ii_core import IICamera, IIPicture, five_viewpoints, orthoscopic, preset, refocus, view_image
+from ii_core import (
+    IICamera,
+    IIPicture,
+    depth_of_disparity,
+    disparity_of_depth,
+    five_viewpoints,
+    orthoscopic,
+    preset,
+    refocus,
+    view_image,
+)
+from ii_core.camera.optics import Grin
 from ii_core.picture.view import view_positions
 
 CAMERA = IICamera(pixels=(42, 30), lenses=(7, 5), pixel_pitch_mm=0.25, gap_mm=2.0)  # 6×6 px under each lens
@@ -306,3 +317,22 @@ def test_a_shifted_array_shows_the_same_to_a_shifted_viewer():
             assert (one != other).mean() < 0.01  # rounding of the sum may move a value by one code
     with pytest.raises(ValueError, match="not before the lens plane"):
         view_image(b, (0, 0, 0.6 + there.gap_mm))
+
+
+@pytest.mark.parametrize("viewer", [None, 300.0])
+@pytest.mark.parametrize("optics", [(), (Grin(),)])
+def test_disparity_and_the_meeting_of_zones_are_those_of_the_rays(optics, viewer):
+    camera = replace(CAMERA, optics=optics, viewer_mm=viewer, lens_pitch_mm=None, origin_mm=(1.0, 2.0, 5.0))
+    starts, directions = (a[0].reshape(7, 6, 3) for a in camera.rays(rows=slice(15, 16), cols=slice(0, 42)))
+    slopes = directions[..., 0] / directions[..., 2]
+    middle, lens = slopes[:, 2:4].mean(axis=1), starts[:, 0]
+    if viewer is None:
+        np.testing.assert_allclose(middle, 0, atol=1e-12)
+    else:  # before the lens plane
+        np.testing.assert_allclose(lens[:, 0] - viewer * middle, camera.origin_mm[0], atol=1e-9)
+    for z in (-20.0, 7.0, 37.0, 500.0):
+        x = starts[..., 0] + (z - starts[..., 2]) * slopes
+        seen_under = (3.0 - x[0]) / np.diff(x, axis=0).mean(axis=0)  # the lens whose ray of each pixel meets a point
+        step = np.diff(seen_under) * (1 if camera.erect else -1)
+        np.testing.assert_allclose(disparity_of_depth(camera, z), step, atol=1e-9)
+        assert depth_of_disparity(camera, disparity_of_depth(camera, z)) == pytest.approx(z)

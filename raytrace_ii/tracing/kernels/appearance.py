@@ -105,15 +105,9 @@ def scatter(ambient, single):
 def paint(generation, first, lanes, _):
     """Textures of bodies that have patterns, and nothing else of ``EXTRAS``."""
     g = value_at(generation)
-    materials, noisy = g.surfaces.materials, np.int64(0)  # no literal: another signature
-    for k in range(lanes):
-        body = np.uint64(g.work.whole[at.BODY + k])
-        g.work.single[at.CLEAR + k] = 0.0
-        seen = g.work.single[at.HIT + k] > _ZERO and g.work.single[at.SCATTERED + k] > _ZERO
-        if seen and materials[body, TEXTURE] >= 0:
-            noisy += _take_pattern(k, int(materials[body, TEXTURE]), g.surfaces, g.work, noisy)
-    if noisy > 0:
-        _colour_by_noise(noisy, g.surfaces, g.work)
+    for k in range(BLOCK):
+        g.work.single[at.CLEAR + k] = _ZERO
+    _take_patterns(lanes, g.surfaces, g.work)
 
 
 @late_lane_kernel
@@ -187,8 +181,7 @@ def _choose_images(column, lanes, surfaces, work):
 def _blend(k, surfaces, single, whole):
     """Share a lane's weight out to a blended surface and to what is seen through it."""
     there = share_there(
-        surfaces.coordinates, surfaces.textures, surfaces.alphas, surfaces.materials, whole[at.BODY + k],
-        whole[at.FACE + k], single[at.U + k], single[at.V + k],
+        surfaces, whole[at.BODY + k], whole[at.FACE + k], single[at.U + k], single[at.V + k],
         single[at.AU + k], single[at.AV + k], single[at.BU + k], single[at.BV + k],
     )  # fmt: skip
     for c in range(3):
@@ -199,26 +192,34 @@ def _blend(k, surfaces, single, whole):
 @lane_stage
 def _take_textures(lanes, surfaces, work):
     """Colours of the textures of all lanes."""
-    single, whole, noisy, some = work.single, work.whole, np.int64(0), False  # no literal: another signature
-    for k in range(BLOCK):
-        whole[at.IMAGE + k] = -1
-        coloured = single[at.SCATTERED + k] > _ZERO or single[at.METAL + k] > _ZERO
-        if k < lanes and coloured and _is_special(k, single):
-            row = int(surfaces.materials[np.uint64(whole[at.BODY + k]), TEXTURE])
-            if row >= 0:
-                if surfaces.textures[np.uint64(row), 0] == IMAGE:
-                    whole[at.IMAGE + k], some = row, True
-                else:
-                    noisy += _take_pattern(k, row, surfaces, work, noisy)
-    if some:
+    single, whole = work.single, work.whole
+    if _take_patterns(lanes, surfaces, work):
         read_images(surfaces, work)
         for k in range(BLOCK):
             if whole[at.IMAGE + k] >= 0:
                 single[at.T0 + k], single[at.T1 + k], single[at.T2 + k] = (
                     single[at.Q0 + k], single[at.Q1 + k], single[at.Q2 + k],
                 )  # fmt: skip
+
+
+@stage_kernel
+def _take_patterns(lanes, surfaces, work):
+    """Colours of the patterns of all lanes; return whether any has an image, whose row comes to ``IMAGE``."""
+    single, whole, noisy, some = work.single, work.whole, np.int64(0), False  # no literal: another signature
+    for k in range(BLOCK):
+        whole[at.IMAGE + k] = -1
+    for k in range(lanes):
+        coloured = single[at.SCATTERED + k] > _ZERO or single[at.METAL + k] > _ZERO
+        if coloured and _is_special(k, single):
+            row = int(surfaces.materials[np.uint64(whole[at.BODY + k]), TEXTURE])
+            if row >= 0:
+                if surfaces.textures[np.uint64(row), 0] == IMAGE:
+                    whole[at.IMAGE + k], some = row, True
+                else:
+                    noisy += _take_pattern(k, row, surfaces, work, noisy)
     if noisy > 0:
         _colour_by_noise(noisy, surfaces, work)
+    return some
 
 
 @stage_kernel

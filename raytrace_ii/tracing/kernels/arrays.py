@@ -100,18 +100,6 @@ class Surfaces(NamedTuple):
     alphas: Single
 
 
-class FaceTables(NamedTuple):
-    """The part of `Surfaces` that says whether a ray passes a face."""
-
-    corners: Single
-    faces: Single
-    coordinates: Single
-    object_of_face: Whole
-    materials: Double
-    textures: Double
-    alphas: Single
-
-
 class Onward(NamedTuple):
     """Rays that go on behind a face, packed to the front, and their rows in the table of hits."""
 

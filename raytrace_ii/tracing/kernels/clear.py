@@ -11,6 +11,7 @@ from ii_core.base.jit import lean_kernel as kernel
 from ii_core.base.jit import stage_kernel
 
 from .fresnel import fresnel
+from .light import move
 from .media import cross, enter, leave, media_at, medium_of, refractive_index, transmits
 from .tables import ABSORPTION, ALPHA_BLEND, FAR, LEAST_WEIGHT, TRANSMISSION
 from .textures import is_cut_out, share_there
@@ -33,7 +34,7 @@ class Crossing(NamedTuple):
 
 
 @kernel
-def pass_faces(found, rows, hits, directions, inside, tables, onward):
+def pass_faces(found, rows, hits, directions, inside, surfaces, onward):
     """Let rays pass the faces that are not there: cut out by alpha, or hidden in a body of higher priority.
 
     ``found`` are hits of the rays ``rows``, or of all if it is of no length; they are entered in the table ``hits``,
@@ -55,9 +56,9 @@ def pass_faces(found, rows, hits, directions, inside, tables, onward):
         if f < 0:
             continue
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-        entering = tables.faces[f, 0] * dx + tables.faces[f, 1] * dy + tables.faces[f, 2] * dz < 0.0
-        if _passes(tables, f, hits.u[i], hits.v[i], inside, i, entering):
-            put_behind(onward.origins, count, tables.corners, tables.faces, f, hits.u[i], hits.v[i], entering)
+        entering = surfaces.faces[f, 0] * dx + surfaces.faces[f, 1] * dy + surfaces.faces[f, 2] * dz < 0.0
+        if _passes(surfaces, f, hits.u[i], hits.v[i], inside, i, entering):
+            put_behind(onward.origins, count, surfaces, f, hits.u[i], hits.v[i], entering)
             put(onward.directions, count, dx, dy, dz)
             onward.rows[count] = i
             count += 1
@@ -65,14 +66,14 @@ def pass_faces(found, rows, hits, directions, inside, tables, onward):
 
 
 @stage_kernel
-def _passes(tables, f, u, v, inside, i, entering):
+def _passes(surfaces, f, u, v, inside, i, entering):
     """Return whether a face is not there; note the body whose hidden face a ray passes."""
-    body = tables.object_of_face[f]
-    if is_cut_out(tables.coordinates, tables.textures, tables.alphas, tables.materials, body, f, u, v):
+    body = surfaces.object_of_face[f]
+    if is_cut_out(surfaces, body, f, u, v):
         return True
-    if not transmits(tables.materials, body):
+    if not transmits(surfaces.materials, body):
         return False
-    before, after = media_at(inside, i, tables.materials, body, entering)
+    before, after = media_at(inside, i, surfaces.materials, body, entering)
     if before != after:
         return False
     cross(inside, i, body, entering)
@@ -80,7 +81,7 @@ def _passes(tables, f, u, v, inside, i, entering):
 
 
 @kernel
-def pass_clear_face(hits, rays, tables, first_clear, radiance):
+def pass_clear_face(hits, rays, surfaces, first_clear, radiance):
     """Take shadow rays through the next transmissive or cut-out face: coloured shadows.
 
     A ray that met no face arrives and its light is added; the others are dimmed by Fresnel, colour and absorption,
@@ -102,38 +103,38 @@ def pass_clear_face(hits, rays, tables, first_clear, radiance):
         met = hits.faces[i] >= 0
         at = Crossing(-1, -1, False, False, False, 0.0)
         if met:
-            at = _crossing(tables, hits.faces[i] + first_clear, hits.u[i], hits.v[i], dx, dy, dz)
+            at = _crossing(surfaces, hits.faces[i] + first_clear, hits.u[i], hits.v[i], dx, dy, dz)
         if at.solid and at.free == 0.0:
             continue
         if at.clear and not at.entering:
             enter(rays.inside, i, at.body)
         way = min(float(hits.distances[i]), rays.reach[i]) if met else rays.reach[i]
-        _absorb(rays.colours, i, tables.materials, medium_of(rays.inside, i, tables.materials, -1), way, length)
+        _absorb(rays.colours, i, surfaces.materials, medium_of(rays.inside, i, surfaces.materials, -1), way, length)
         if not met:
             for c in range(3):
                 radiance[rays.pixels[i], c] += rays.colours[i, c]
             continue
-        if _dim(rays.colours, i, tables, at, rays.inside, dx, dy, dz, length) >= LEAST_WEIGHT:
-            _keep(rays, i, kept, at)
-            put_behind(rays.origins, kept, tables.corners, tables.faces, at.face, hits.u[i], hits.v[i], at.entering)
-            put(rays.directions, kept, dx, dy, dz)
+        if _dim(rays.colours, i, surfaces, at, rays.inside, dx, dy, dz, length) >= LEAST_WEIGHT:
+            move(rays, i, kept)
+            if at.clear:
+                cross(rays.inside, kept, at.body, at.entering)
+            put_behind(rays.origins, kept, surfaces, at.face, hits.u[i], hits.v[i], at.entering)
             # A point light's direction ends at the light: what is left of it, as a share of the same direction.
-            rays.reach[kept] = rays.reach[i] - hits.distances[i] if rays.reach[i] < FAR else FAR
+            rays.reach[kept] = rays.reach[kept] - hits.distances[i] if rays.reach[kept] < FAR else FAR
             kept += 1
     return kept
 
 
 @stage_kernel
-def _crossing(tables, f, u, v, dx, dy, dz):
+def _crossing(surfaces, f, u, v, dx, dy, dz):
     """Return what a shadow ray meets at a place of a face."""
-    body = np.int64(tables.object_of_face[f])
-    entering = tables.faces[f, 0] * dx + tables.faces[f, 1] * dy + tables.faces[f, 2] * dz < 0.0
-    coordinates, textures, alphas, materials = tables.coordinates, tables.textures, tables.alphas, tables.materials
-    there = not is_cut_out(coordinates, textures, alphas, materials, body, f, u, v)
+    body = np.int64(surfaces.object_of_face[f])
+    entering = surfaces.faces[f, 0] * dx + surfaces.faces[f, 1] * dy + surfaces.faces[f, 2] * dz < 0.0
+    there = not is_cut_out(surfaces, body, f, u, v)
     free = 0.0
-    if there and materials[body, ALPHA_BLEND] > 0.0:
-        free = 1.0 - share_there(coordinates, textures, alphas, materials, body, f, u, v, 0.0, 0.0, 0.0, 0.0)
-    clear = there and transmits(materials, body)
+    if there and surfaces.materials[body, ALPHA_BLEND] > 0.0:
+        free = 1.0 - share_there(surfaces, body, f, u, v, 0.0, 0.0, 0.0, 0.0)
+    clear = there and transmits(surfaces.materials, body)
     return Crossing(f, body, entering, there and not clear, clear, free)
 
 
@@ -146,9 +147,9 @@ def _absorb(colours, i, materials, medium, way, length):
 
 
 @stage_kernel
-def _dim(colours, i, tables, at, inside, dx, dy, dz, length):
+def _dim(colours, i, surfaces, at, inside, dx, dy, dz, length):
     """Dim a ray by the face that it crosses; return its strongest colour."""
-    materials = tables.materials
+    materials = surfaces.materials
     strongest = 0.0
     before, after = -1, -1
     if at.clear:
@@ -157,23 +158,11 @@ def _dim(colours, i, tables, at, inside, dx, dy, dz, length):
         through = 0.0 if at.solid else 1.0
         if before != after:
             through = materials[at.body, TRANSMISSION + c] * (
-                1.0 - _straight_reflectance(materials, before, after, c, tables.faces, at.face, dx, dy, dz, length)
+                1.0 - _straight_reflectance(materials, before, after, c, surfaces.faces, at.face, dx, dy, dz, length)
             )
         colours[i, c] *= at.free + (1.0 - at.free) * through
         strongest = max(strongest, colours[i, c])
     return strongest
-
-
-@stage_kernel
-def _keep(rays, i, kept, at):
-    """Move a ray's colour, pixel and bodies to the front."""
-    for c in range(3):
-        rays.colours[kept, c] = rays.colours[i, c]
-    for j in range(rays.inside.shape[1]):
-        rays.inside[kept, j] = rays.inside[i, j]
-    if at.clear:
-        cross(rays.inside, kept, at.body, at.entering)
-    rays.pixels[kept] = rays.pixels[i]
 
 
 @stage_kernel
@@ -216,9 +205,7 @@ def start_inside(origins, bounds, first_body, out_rows, out_candidates):
 
 
 @kernel
-def tell_inside(
-    primitives, u, v, rows, candidates, origins, directions, inside, corners, faces, object_of_face, first_clear
-):
+def tell_inside(hits, rows, candidates, origins, directions, inside, surfaces, first_clear):
     """Tell by the first face of each candidate along a ray whether it starts inside: there the ray leaves the body.
 
     Rays with candidates left are moved behind the face and kept, packed to the front. A body left later was
@@ -230,11 +217,11 @@ def tell_inside(
         How many rays were kept.
     """
     kept = 0
-    for i in range(primitives.shape[0]):
-        if primitives[i] < 0:
+    for i in range(hits.faces.shape[0]):
+        if hits.faces[i] < 0:
             continue
-        f = primitives[i] + first_clear
-        body = object_of_face[f]
+        f = hits.faces[i] + first_clear
+        body, faces = surfaces.object_of_face[f], surfaces.faces
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
         entering = faces[f, 0] * dx + faces[f, 1] * dy + faces[f, 2] * dz < 0.0
         row, was = rows[i], candidates.shape[1]
@@ -251,7 +238,7 @@ def tell_inside(
         if candidates[kept, 0] < 0:
             continue
         rows[kept] = row
-        put_behind(origins, kept, corners, faces, f, u[i], v[i], entering)
+        put_behind(origins, kept, surfaces, f, hits.u[i], hits.v[i], entering)
         put(directions, kept, dx, dy, dz)
         kept += 1
     return kept

@@ -9,13 +9,14 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload
+from numba.core.typing import templates
 from numpy.typing import NDArray
 
 from ii_core.base.jit import inline_kernel
 
 BLOCK = 16  # rays that go from their start to their light together: what is kept of them stays in the first cache
 LINE = 64  # bytes of a cache line
+NO_END = np.float32(1e37)
 
 
 class Work(NamedTuple):
@@ -85,7 +86,8 @@ _offsets(15)
 FAR_LEVEL = next(_offset)
 _offsets(15)
 PACKET = next(_offset)  # Embree's rays, see packets.py
-_offsets(35)
+_offsets(20)
+END, REACH = _offsets(2)  # how far rays reach, and those to the light at hand, in their own lengths
 _SINGLES = next(_offset)
 
 # Quantities in float64. Of a noise: place, sum and strength of the octave.
@@ -115,6 +117,7 @@ def slot(quantity, lane):
 def work() -> Work:
     """Room for the stages of one thread."""
     single = aligned(_SINGLES)
+    single[END : END + BLOCK] = NO_END
     return Work(single, single.view(np.int32), np.zeros(_DOUBLES), np.zeros(_WHOLES, np.int64))
 
 
@@ -125,16 +128,16 @@ def aligned(count: int) -> NDArray[np.float32]:
     return raw[start : start + 4 * count].view(np.float32)
 
 
-def take_rows(table: Any, columns: Any, first: Any, rows: Any, at: Any, out: Any, to: Any) -> None:
-    """Read 16 numbers, from column ``first`` on, of row ``rows[at + k]`` of a table for each lane k.
+def compiled_by(typing: Any) -> Any:
+    """Have kernels take the code of an intrinsic in place of a function, whose source Python runs."""
 
-    Quantity c of lane k comes to ``out[to + BLOCK·c + k]``. Whole vectors are loaded and transposed in registers:
-    LLVM gathers number by number, which takes three times as long (*Apples*, full `setup1`, 2026-11-25).
-    """
-    for k in range(BLOCK):
-        row = int(rows[at + k]) * int(columns) + int(first)
-        for c in range(16):
-            out[to + BLOCK * c + k] = table[row + c]
+    def replaced(function: Any) -> Any:
+        template = templates.make_intrinsic_template(function, typing, function.__name__)
+        templates.infer(template)
+        templates.infer_global(function, types.Function(template))
+        return function
+
+    return replaced
 
 
 def _take_rows(typing: Any, table: Any, columns: Any, first: Any, rows: Any, at: Any, out: Any, to: Any) -> Any:
@@ -157,15 +160,17 @@ def _take_rows(typing: Any, table: Any, columns: Any, first: Any, rows: Any, at:
     return types.void(table, types.intp, types.intp, rows, types.intp, out, types.intp), generate
 
 
-def add_rows(tables: Any, rows: Any, at: Any, out: Any, to: Any) -> None:
-    """Add 8 numbers of two tables of float64 for each lane k: rows ``rows[at[0] + k]`` and ``rows[at[1] + k]``.
+@compiled_by(_take_rows)
+def take_rows(table: Any, columns: Any, first: Any, rows: Any, at: Any, out: Any, to: Any) -> None:
+    """Read 16 numbers, from column ``first`` on, of row ``rows[at + k]`` of a table for each lane k.
 
-    Sum c of lane k comes to ``out[to + BLOCK·c + k]``, as by `take_rows`.
+    Quantity c of lane k comes to ``out[to + BLOCK·c + k]``. Whole vectors are loaded and transposed in registers:
+    LLVM gathers number by number, which takes three times as long (*Apples*, full `setup1`, 2026-11-25).
     """
     for k in range(BLOCK):
-        a, b = 8 * int(rows[at[0] + k]), 8 * int(rows[at[1] + k])
-        for c in range(8):
-            out[to + BLOCK * c + k] = tables[0][a + c] + tables[1][b + c]
+        row = int(rows[at + k]) * int(columns) + int(first)
+        for c in range(16):
+            out[to + BLOCK * c + k] = table[row + c]
 
 
 def _add_rows(typing: Any, tables: Any, rows: Any, at: Any, out: Any, to: Any) -> Any:
@@ -196,6 +201,18 @@ def _add_rows(typing: Any, tables: Any, rows: Any, at: Any, out: Any, to: Any) -
     return types.void(tables, rows, types.UniTuple(types.intp, 2), out, types.intp), generate
 
 
+@compiled_by(_add_rows)
+def add_rows(tables: Any, rows: Any, at: Any, out: Any, to: Any) -> None:
+    """Add 8 numbers of two tables of float64 for each lane k: rows ``rows[at[0] + k]`` and ``rows[at[1] + k]``.
+
+    Sum c of lane k comes to ``out[to + BLOCK·c + k]``, as by `take_rows`.
+    """
+    for k in range(BLOCK):
+        a, b = 8 * int(rows[at[0] + k]), 8 * int(rows[at[1] + k])
+        for c in range(8):
+            out[to + BLOCK * c + k] = tables[0][a + c] + tables[1][b + c]
+
+
 def _transposed(builder: Any, rows: Any) -> Any:
     """As many vectors as each has numbers, a power of 2, transposed by butterflies."""
     many = len(rows)
@@ -211,15 +228,6 @@ def _transposed(builder: Any, rows: Any) -> Any:
                 turned[i + step] = builder.shuffle_vector(a, b, ir.Constant(kind, high))
         rows = turned
     return rows
-
-
-def side(values: Any, at: Any, width: Any) -> Any:
-    """Largest less smallest of 16, 8 or 4 numbers, none of them NaN.
-
-    LLVM makes no vectors of numba's minima: one number after the other takes 4 ns a ray (*Apples*, full `setup1`,
-    2026-11-25).
-    """
-    return max(values[at : at + width]) - min(values[at : at + width])
 
 
 def _side(typing: Any, values: Any, at: Any, width: Any) -> Any:
@@ -242,47 +250,31 @@ def _side(typing: Any, values: Any, at: Any, width: Any) -> Any:
     return types.float32(values, types.intp, types.intp), generate
 
 
-def bits_of(number: Any) -> Any:
-    """The 32 bits of a float32."""
-    return np.float32(number).view(np.int32)
+@compiled_by(_side)
+def side(values: Any, at: Any, width: Any) -> Any:
+    """Largest less smallest of 16, 8 or 4 numbers, none of them NaN.
 
-
-def single_of(number: Any) -> Any:
-    """The float32 of 32 bits."""
-    return np.int32(number).view(np.float32)
+    LLVM makes no vectors of numba's minima: one number after the other takes 4 ns a ray (*Apples*, full `setup1`,
+    2026-11-25).
+    """
+    return max(values[at : at + width]) - min(values[at : at + width])
 
 
 def _bits_of(typing: Any, number: Any) -> Any:
     return types.int32(types.float32), lambda _c, builder, _s, values: builder.bitcast(values[0], ir.IntType(32))
 
 
+@compiled_by(_bits_of)
+def bits_of(number: Any) -> Any:
+    """The 32 bits of a float32."""
+    return np.float32(number).view(np.int32)
+
+
 def _single_of(typing: Any, number: Any) -> Any:
     return types.float32(types.int32), lambda _c, builder, _s, values: builder.bitcast(values[0], ir.FloatType())
 
 
-_bits_of_number: Any = intrinsic(_bits_of)
-_single_of_bits: Any = intrinsic(_single_of)
-overload(bits_of, inline="always")(lambda number: lambda number: _bits_of_number(number))
-overload(single_of, inline="always")(lambda number: lambda number: _single_of_bits(number))
-_take_rows_vectors: Any = intrinsic(_take_rows)
-_add_rows_vectors: Any = intrinsic(_add_rows)
-_side_of_vector: Any = intrinsic(_side)
-overload(side, inline="always")(
-    lambda values, at, width: lambda values, at, width: _side_of_vector(values, at, width)
-)
-
-
-@overload(add_rows, inline="always")
-def _compiled_sums(tables: Any, rows: Any, at: Any, out: Any, to: Any) -> Any:
-    def compiled(tables: Any, rows: Any, at: Any, out: Any, to: Any) -> Any:
-        return _add_rows_vectors(tables, rows, at, out, to)
-
-    return compiled
-
-
-@overload(take_rows, inline="always")
-def _compiled(table: Any, columns: Any, first: Any, rows: Any, at: Any, out: Any, to: Any) -> Any:
-    def compiled(table: Any, columns: Any, first: Any, rows: Any, at: Any, out: Any, to: Any) -> Any:
-        return _take_rows_vectors(table, columns, first, rows, at, out, to)
-
-    return compiled
+@compiled_by(_single_of)
+def single_of(number: Any) -> Any:
+    """The float32 of 32 bits."""
+    return np.int32(number).view(np.float32)

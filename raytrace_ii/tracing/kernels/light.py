@@ -113,21 +113,18 @@ def weigh(lights, light, single, counts):
 
 
 @stage_kernel
-def reach_of(lights, light):
-    """How far shadow rays to a light reach, in their own lengths."""
-    return FAR if lights[light, 0] == DIRECTIONAL else _TO_LAMP
-
-
-@stage_kernel
 def lift_rays(lights, light, single):
-    """Start shadow rays on the smooth surface: at (OX …) + (AX …), to a lamp by so much less."""
-    share = _ZERO if lights[light, 0] == DIRECTIONAL else _ONE
+    """Start shadow rays on the smooth surface: at (OX …) + (AX …), to a lamp by so much less; and end them there."""
+    far = lights[light, 0] == DIRECTIONAL
+    share, reach = _ZERO if far else _ONE, FAR if far else _TO_LAMP
     for k in range(3 * BLOCK):
         single[at.LX + k] -= share * single[at.AX + k]
+    for k in range(BLOCK):
+        single[at.REACH + k] = reach
 
 
 @stage_kernel
-def keep_rays(lanes, first, lights, light, rays, shadows, row, single):
+def keep_rays(lanes, first, rays, shadows, row, single):
     """Write the shadow rays of a packet from row ``row`` on, for those that follow them through clear bodies.
 
     Returns
@@ -135,7 +132,7 @@ def keep_rays(lanes, first, lights, light, rays, shadows, row, single):
     int
         How many there are.
     """
-    start, reach = row, reach_of(lights, light)
+    start = row
     for k in range(lanes):
         if single[at.WANTED + k] == _ZERO:
             continue
@@ -144,7 +141,7 @@ def keep_rays(lanes, first, lights, light, rays, shadows, row, single):
             shadows.origins[to, c] = single[slot(at.OX + c * BLOCK, k)] + single[slot(at.AX + c * BLOCK, k)]
             shadows.directions[to, c] = single[slot(at.LX + c * BLOCK, k)]
             shadows.colours[to, c] = single[slot(at.C0 + c * BLOCK, k)]
-        shadows.reach[to] = reach
+        shadows.reach[to] = single[slot(at.REACH, k)]
         shadows.pixels[to] = rays.pixels[i]
         for j in range(rays.inside.shape[1]):
             shadows.inside[to, j] = rays.inside[i, j]
@@ -172,23 +169,23 @@ def add_unblocked(blocked, colours, pixels, radiance):
                 radiance[pixel, c] += colours[i, c]
 
 
-@kernel
-def keep_unblocked(blocked, origins, directions, reach, colours, pixels, inside):
-    """Pack the shadow rays that nothing opaque stops to the front.
+@stage_kernel
+def move(rays, i, to):
+    """Move a shadow ray to another row."""
+    for c in range(3):
+        rays.origins[to, c], rays.directions[to, c] = rays.origins[i, c], rays.directions[i, c]
+        rays.colours[to, c] = rays.colours[i, c]
+    rays.reach[to], rays.pixels[to] = rays.reach[i], rays.pixels[i]
+    for j in range(rays.inside.shape[1]):
+        rays.inside[to, j] = rays.inside[i, j]
 
-    Returns
-    -------
-    int
-        How many there are.
-    """
+
+@kernel
+def keep_unblocked(blocked, rays):
+    """Pack the shadow rays that nothing opaque stops to the front; return how many there are."""
     kept = 0
     for i in range(blocked.shape[0]):
         if blocked[i] != 0:
-            for c in range(3):
-                origins[kept, c], directions[kept, c] = origins[i, c], directions[i, c]
-                colours[kept, c] = colours[i, c]
-            reach[kept], pixels[kept] = reach[i], pixels[i]
-            for j in range(inside.shape[1]):
-                inside[kept, j] = inside[i, j]
+            move(rays, i, kept)
             kept += 1
     return kept

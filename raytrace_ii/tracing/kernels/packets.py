@@ -18,17 +18,16 @@ from numpy.typing import NDArray
 
 from ii_core.base.jit import exact_kernel as kernel
 from ii_core.base.jit import exact_lane_stage as stage_kernel
-from ii_core.base.jit import inline_kernel, part_kernel
+from ii_core.base.jit import inline_kernel, lane_kernel, part_kernel
 
 from . import lanes as at
 from .addresses import call
-from .lanes import BLOCK, side
+from .lanes import BLOCK, NO_END, side
+from .vectors import three_of_row
 
 # Rows of a packet.
 _NEAR, DIRECTION, _TIME, FAR, MASK, _FLAGS, U, V, FACE, GEOMETRY, INSTANCE = 3, 4, 7, 8, 9, 11, 15, 16, 17, 18, 19
-_CORNERS = 24  # the hit ends with `instPrimID`, row 20; behind it room for the nine coordinates of the faces hit
-PACKET_ROWS = _CORNERS + 9
-_NO_END = np.float32(1e37)
+PACKET_ROWS = 21  # the last one is `instPrimID`
 _LONE = 2  # state of a ray without a group
 # A packet whose rays spread too far is parted into groups of at least half of its rays, which are apart from their
 # first by at most this share of the most spread. After so many rays without a group all others are traced at once
@@ -117,22 +116,6 @@ def _begin(packet, numbers, width):
         numbers[INSTANCE * width + lane] = -1
 
 
-@inline_kernel
-def _at(row, width, lane):
-    """Index of a number in a packet: unsigned, so that numba need not look for negative ones."""
-    return np.uint64(row * width + lane)
-
-
-@stage_kernel
-def _fill(packet, numbers, width, lane, o, d, ray, far):
-    i = np.uint64(ray)
-    for c in range(3):
-        packet[_at(c, width, lane)] = o[i, c]
-        packet[_at(DIRECTION + c, width, lane)] = d[i, c]
-    packet[_at(FAR, width, lane)] = far
-    numbers[_at(GEOMETRY, width, lane)] = -1
-
-
 @stage_kernel
 def _spread(packet, first, width):
     """Sum of the sides of the box around a quantity of three rows."""
@@ -148,38 +131,6 @@ def _together(packet, calls, ahead, width):
     x, y, z = packet[DIRECTION * width], packet[(DIRECTION + 1) * width], packet[(DIRECTION + 2) * width]
     apart, turned = _spread(packet, np.int64(0), width), _spread(packet, np.int64(DIRECTION), width)
     return (apart + turned * ahead <= calls.near) & (turned <= calls.narrow * (abs(x) + abs(y) + abs(z)))
-
-
-@stage_kernel
-def _place(packet, numbers, width, corners):
-    """Put u, v and distance as `place_hit` gives them in place of Embree's: a loop without branches, for vectors."""
-    for lane in range(width):
-        f = np.uint64(numbers[_at(FACE, width, lane)] if numbers[_at(GEOMETRY, width, lane)] >= 0 else 0)
-        for k in range(9):
-            packet[_at(_CORNERS + k, width, lane)] = corners[f, k // 3, k % 3]
-    for lane in range(width):
-        u, v, t, sure = place_hit(
-            packet[lane], packet[width + lane], packet[2 * width + lane],
-            packet[DIRECTION * width + lane], packet[(DIRECTION + 1) * width + lane],
-            packet[(DIRECTION + 2) * width + lane],
-            packet[_CORNERS * width + lane], packet[(_CORNERS + 1) * width + lane],
-            packet[(_CORNERS + 2) * width + lane], packet[(_CORNERS + 3) * width + lane],
-            packet[(_CORNERS + 4) * width + lane], packet[(_CORNERS + 5) * width + lane],
-            packet[(_CORNERS + 6) * width + lane], packet[(_CORNERS + 7) * width + lane],
-            packet[(_CORNERS + 8) * width + lane],
-        )  # fmt: skip
-        packet[U * width + lane] = u if sure else packet[U * width + lane]
-        packet[V * width + lane] = v if sure else packet[V * width + lane]
-        packet[FAR * width + lane] = t if sure else packet[FAR * width + lane]
-
-
-@stage_kernel
-def _take(packet, numbers, width, lane, ray, primitives, u, v, distances):
-    i = np.uint64(ray)
-    primitives[i] = numbers[_at(FACE, width, lane)] if numbers[_at(GEOMETRY, width, lane)] >= 0 else -1
-    u[i], v[i], distances[i] = (
-        packet[_at(U, width, lane)], packet[_at(V, width, lane)], packet[_at(FAR, width, lane)],
-    )  # fmt: skip
 
 
 @stage_kernel
@@ -268,7 +219,7 @@ def nearest_of_lanes(tools, first_of_same, ahead, lanes, work, width):
                 packet[c * width + lane] = single[at.START + c * BLOCK + first + lane]
                 packet[(DIRECTION + c) * width + lane] = single[at.DX + c * BLOCK + first + lane]
         for lane in range(width):
-            packet[FAR * width + lane] = _NO_END
+            packet[FAR * width + lane] = single[at.END + first + lane]
         for lane in range(width):
             numbers[GEOMETRY * width + lane] = -1
             tools.active[lane] = -1 if lane < some else 0
@@ -289,7 +240,7 @@ def nearest_of_lanes(tools, first_of_same, ahead, lanes, work, width):
 
 
 @stage_kernel
-def occluded_of_lanes(tools, reach, work, width):
+def occluded_of_lanes(tools, work, width):
     """Take those shadow rays in the lanes out of ``WANTED`` that a face stops."""
     single, room = work.single, at.PACKET
     packet, numbers = single[room : room + PACKET_ROWS * width], work.bits[room : room + PACKET_ROWS * width]
@@ -313,7 +264,7 @@ def occluded_of_lanes(tools, reach, work, width):
                 packet[c * width + lane] = own_place if on else place
                 packet[(DIRECTION + c) * width + lane] = own_way if on else way
         for lane in range(width):
-            packet[FAR * width + lane] = reach
+            packet[FAR * width + lane] = single[at.REACH + first + lane]
         for lane in range(width):
             tools.active[lane] = -1 if single[at.WANTED + first + lane] > 0 else 0
         _trace(tools.occluded, tools.active, tools.chosen, packet, np.float32(0), some, width)
@@ -322,48 +273,48 @@ def occluded_of_lanes(tools, reach, work, width):
             single[at.WANTED + first + lane] = single[at.WANTED + first + lane] if free else np.float32(0)
 
 
+@stage_kernel
+def _take(first, lanes, origins, directions, reach, o, d, end, single):
+    """Bring rays from arrays to quantities ``o``, ``d`` and ``end``; lanes to spare have the last one."""
+    for k in range(BLOCK):
+        i = np.uint64(first + min(k, lanes - 1))
+        single[o + k], single[o + BLOCK + k], single[o + 2 * BLOCK + k] = three_of_row(origins, i)
+        single[d + k], single[d + BLOCK + k], single[d + 2 * BLOCK + k] = three_of_row(directions, i)
+        single[end + k] = reach[i] if reach.shape[0] > 0 else NO_END
+
+
 @cache
 def packet_kernels(width: int) -> tuple[Any, Any]:
-    """The kernels for packets of so many rays: nearest hit, and whether anything is hit.
+    """The kernels for rays in arrays, in packets of so many: nearest hit, and whether anything is hit.
 
-    Rays go in packets of ``width`` in their order; one that spreads too far is parted. u, v and distance are those of
-    `place_hit` if ``placed``, else Embree's; of misses they mean nothing.
+    u, v and distance are Embree's; of misses they mean nothing. A ``reach`` of no length is no end.
     """
 
-    @kernel
-    def nearest(
-        calls, active, chosen, packet, numbers, origins, directions, reach, corners, placed, primitives, u, v,
-        distances,
-    ):  # fmt: skip
-        n, wide = origins.shape[0], np.int64(width)  # no literal: parts are compiled once
-        ahead = np.float32(0)  # distance of the last hit
-        _begin(packet, numbers, wide)
-        for first in range(0, n, width):
-            lanes = min(width, n - first)
-            for lane in range(width):
-                i = first + min(lane, lanes - 1)
-                active[lane] = -1 if lane < lanes else 0
-                far = reach[i] if reach.shape[0] > 0 else _NO_END
-                _fill(packet, numbers, wide, lane, origins, directions, i, far)
-            _trace(calls, active, chosen, packet, ahead, np.int64(lanes), wide)
-            if placed:
-                _place(packet, numbers, wide, corners)
-            ahead = packet[FAR * width] if numbers[GEOMETRY * width] >= 0 else ahead
-            for lane in range(lanes):
-                _take(packet, numbers, wide, lane, first + lane, primitives, u, v, distances)
+    @lane_kernel
+    def nearest(tools, work, origins, directions, reach, primitives, u, v, distances):
+        n, wide, ahead = origins.shape[0], np.int64(width), np.float32(0)  # no literal: parts are compiled once
+        single, whole = work.single, work.whole
+        o, d, end = np.int64(at.START), np.int64(at.DX), np.int64(at.END)
+        for first in range(0, n, BLOCK):
+            lanes = min(BLOCK, n - first)
+            _take(first, lanes, origins, directions, reach, o, d, end, single)
+            ahead = nearest_of_lanes(tools, primitives[:0], ahead, lanes, work, wide)
+            for k in range(lanes):
+                i = np.uint64(first + k)
+                primitives[i], u[i], v[i] = whole[at.FACE + k], single[at.U + k], single[at.V + k]
+                distances[i] = single[at.DISTANCE + k]
 
-    @kernel
-    def occluded(calls, active, chosen, packet, numbers, origins, directions, reach, found):
-        n, wide = origins.shape[0], np.int64(width)  # no literal: parts are compiled once
-        _begin(packet, numbers, wide)
-        for first in range(0, n, width):
-            lanes = min(width, n - first)
-            for lane in range(width):
-                i = first + min(lane, lanes - 1)
-                active[lane] = -1 if lane < lanes else 0
-                _fill(packet, numbers, wide, lane, origins, directions, i, reach[i])
-            _trace(calls, active, chosen, packet, np.float32(0), np.int64(lanes), wide)
-            for lane in range(lanes):
-                found[first + lane] = 0 if packet[FAR * width + lane] < 0 else -1
+    @lane_kernel
+    def occluded(tools, work, origins, directions, reach, found):
+        n, wide, single = origins.shape[0], np.int64(width), work.single
+        o, d, end = np.int64(at.OX), np.int64(at.LX), np.int64(at.REACH)
+        for first in range(0, n, BLOCK):
+            lanes = min(BLOCK, n - first)
+            _take(first, lanes, origins, directions, reach, o, d, end, single)
+            for k in range(BLOCK):
+                single[at.WANTED + k] = np.float32(1) if k < lanes else np.float32(0)
+            occluded_of_lanes(tools, work, wide)
+            for k in range(lanes):
+                found[first + k] = -1 if single[at.WANTED + k] > 0 else 0
 
     return nearest, occluded

@@ -115,7 +115,7 @@ def _pass_through(k, i, rays, surfaces, passage, following, work, counts):
     if max(b0, b1, b2) < passage.least:
         return
     x, y, z = behind(
-        surfaces.corners, surfaces.faces, work.whole[at.FACE + k], single[at.U + k], single[at.V + k],
+        surfaces, work.whole[at.FACE + k], single[at.U + k], single[at.V + k],
         single[at.ENTERING + k] > 0.0,
     )  # fmt: skip
     dx, dy, dz = three_doubles(single, at.DX, k)

@@ -6,17 +6,8 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
 
-
-def add_mixed(pixels: Any, places: Any, weights: Any, out: Any, at: Any) -> None:
-    """Add the weighted sum of four texels of float32 to ``out[at:at + 3]``; ``out[at + 3]`` is changed, too.
-
-    ``places`` are of the first channels; a number that follows the last texel is read.
-    """
-    for place, weight in zip(places, weights, strict=True):
-        for c in range(4):
-            out[at + c] += weight * pixels[int(place) + c]
+from .lanes import compiled_by
 
 
 def _add_mixed(typing: Any, pixels: Any, places: Any, weights: Any, out: Any, at: Any) -> Any:
@@ -41,12 +32,12 @@ def _add_mixed(typing: Any, pixels: Any, places: Any, weights: Any, out: Any, at
     return types.void(pixels, places, weights, out, types.intp), generate
 
 
-_add_mixed_vectors: Any = intrinsic(_add_mixed)
+@compiled_by(_add_mixed)
+def add_mixed(pixels: Any, places: Any, weights: Any, out: Any, at: Any) -> None:
+    """Add the weighted sum of four texels of float32 to ``out[at:at + 3]``; ``out[at + 3]`` is changed, too.
 
-
-@overload(add_mixed, inline="always")
-def _compiled(pixels: Any, places: Any, weights: Any, out: Any, at: Any) -> Any:
-    def compiled(pixels: Any, places: Any, weights: Any, out: Any, at: Any) -> Any:
-        return _add_mixed_vectors(pixels, places, weights, out, at)
-
-    return compiled
+    ``places`` are of the first channels; a number that follows the last texel is read.
+    """
+    for place, weight in zip(places, weights, strict=True):
+        for c in range(4):
+            out[at + c] += weight * pixels[int(place) + c]

@@ -143,20 +143,22 @@ def folded(t, wrap):
 
 
 @stage_kernel
-def is_cut_out(coordinates, textures, alphas, materials, body, f, u, v):
+def is_cut_out(surfaces, body, f, u, v):
     """Whether the texture's alpha leaves no surface at a place of a face."""
-    if materials[body, CUTOFF] == 0.0:
+    cutoff = surfaces.materials[body, CUTOFF]
+    if cutoff == 0.0:
         return False
-    x, y, _ = interpolate(coordinates, f, u, v)
-    return alpha(textures, int(materials[body, TEXTURE]), alphas, x, y) < materials[body, CUTOFF]
+    x, y, _ = interpolate(surfaces.coordinates, f, u, v)
+    return alpha(surfaces.textures, int(surfaces.materials[body, TEXTURE]), surfaces.alphas, x, y) < cutoff
 
 
 @part_kernel
-def share_there(coordinates, textures, alphas, materials, body, f, u, v, au, av, bu, bv):
+def share_there(surfaces, body, f, u, v, au, av, bu, bv):
     """The share of a blended surface that is there: its factor times the texture's alpha, where it has one."""
-    share, row = materials[body, ALPHA_BLEND], int(materials[body, TEXTURE])
+    textures, alphas = surfaces.textures, surfaces.alphas
+    share, row = surfaces.materials[body, ALPHA_BLEND], int(surfaces.materials[body, TEXTURE])
     if row >= 0 and textures[row, 0] == IMAGE and textures[row, 4] >= 0.0:
-        x, y, _ = interpolate(coordinates, f, u, v)
+        x, y, _ = interpolate(surfaces.coordinates, f, u, v)
         taps, level, bu, bv = filter_taps(
             np.float32(textures[row, 2]), np.float32(textures[row, 3]), np.float32(textures[row, LEVELS]),
             np.float32(au), np.float32(av), np.float32(bu), np.float32(bv),

@@ -45,16 +45,17 @@ def edge(corners, f, k):
 
 
 @part_kernel
-def behind(corners, faces, f, u, v, entering):
+def behind(surfaces, f, u, v, entering):
     """A place just behind a face, seen along a ray that enters or leaves by it."""
-    px, py, pz = start_point(corners, faces, f, u, v)
+    faces = surfaces.faces
+    px, py, pz = start_point(surfaces.corners, faces, f, u, v)
     lift = -faces[f, 3] if entering else faces[f, 3]
     return px + lift * faces[f, 0], py + lift * faces[f, 1], pz + lift * faces[f, 2]
 
 
 @inline_kernel
-def put_behind(out, i, corners, faces, f, u, v, entering):
-    x, y, z = behind(corners, faces, f, u, v, entering)
+def put_behind(out, i, surfaces, f, u, v, entering):
+    x, y, z = behind(surfaces, f, u, v, entering)
     put(out, i, x, y, z)
 
 

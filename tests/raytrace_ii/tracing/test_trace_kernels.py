@@ -14,7 +14,7 @@ from raytrace_ii.tracing import tracer
 from raytrace_ii.tracing.embree import lane_masks
 from raytrace_ii.tracing.intersect import Intersector
 from raytrace_ii.tracing.kernels import appearance, attributes, sky, spawn, way
-from raytrace_ii.tracing.kernels.arrays import Start
+from raytrace_ii.tracing.kernels.arrays import ShadowRays, Start
 from raytrace_ii.tracing.kernels.fresnel import fresnel
 from raytrace_ii.tracing.kernels.lanes import work
 from raytrace_ii.tracing.kernels.light import keep_unblocked
@@ -178,7 +178,7 @@ def test_shadow_rays_that_arrive_are_packed_to_the_front():
     rows += [rng.integers(0, 99, 50).astype(np.int32), rng.integers(-1, 9, (50, 2)).astype(np.int32)]
     for function in (keep_unblocked, keep_unblocked.py_func):
         packed = [row.copy() for row in rows]
-        kept = function(blocked, *packed)
+        kept = function(blocked, ShadowRays(*packed))
         assert kept == (blocked == -1).sum()
         for row, array in zip(rows, packed, strict=True):
             np.testing.assert_array_equal(array[:kept], row[blocked == -1])
