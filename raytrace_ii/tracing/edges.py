@@ -28,7 +28,7 @@ from .tracer import LOBE_RAYS, Support, Tracer
 ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
 SETS = np.array([4, 6, 9, 12, 16, 32, 64])  # samples of pixels that are no cells
 DENSE = 0.3  # share of the pixels, around which much meets, from which on no edges are looked for
-SMALL, MOST_SMALL = 3.0, 256  # pixels across, and bodies that pixels are asked for: 3 ns each
+SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 3 ns a pixel each
 FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
 FINEST = 4096  # places in a pixel along each side that have keys of their own
 RECORDED = frozenset({"object_id", "shading_normal", "ray_length"})  # what centres have to record
