@@ -219,7 +219,7 @@ def tables() -> Tables:
             r["scene"], "all views" if r["method"] == "views" else "focus, robust",
             *(f"{r[f'badpix_{t}']:.1f}" for t in ("007", "003", "001")), f"{r['mse_100']:.3g}", f"{r['q_25']:.2f}",
             f"{r['badpix_007_outlines']:.0f}", f"{r['badpix_007_textureless']:.0f}",
-            f"{100 * r['sure_where_textured']:.0f}",
+            f"{100 * r['sure_where_textured']:.0f}" if "sure_where_textured" in r else "–",
             "–" if r["bad_where_sure"] is None else f"{100 * r['bad_where_sure']:.1f}", f"{r['cpu']:.0f}",
         ]
         for r in fields

@@ -320,6 +320,8 @@ def edges_table(data: dict[str, Any]) -> list[str]:
             cells.append(f"{row['psnr']:.1f}, {row['seconds']:.2f}, {f'{factor:.2f}' if inside else '–'}")
         if cells:
             lines.append([name, *cells])
+    if not lines:
+        return ["Samples by edges are not measured."]
     return table(" | ".join(["scene", *(f"error {error:g}" for error in EDGE_ERRORS)]), lines)
 
 

@@ -3,8 +3,8 @@
 A pixel whose neighbours under the same lens look alike has the light of its centre. Any other one is a cell between
 corners that neighbours share, see `kernels.cells`. If corners and centre agree, it has their mean; an edge between
 two groups of them is found by bisection, mostly by visibility alone, and checked on both sides. What is neither gets
-a set of samples, the larger the step, the more. A tile that is full of such pixels gets sets at once. (Corners and
-their comparison: Whitted 1980.)
+a set of samples, the larger the step, the more; and so do pixels in which a body of few pixels may be. A tile that is
+full of such pixels gets sets at once. (Corners and their comparison: Whitted 1980.)
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ii_core import IICamera
 
+from ..scene.scene import Scene
 from .kernels import cells as kernels
 from .kernels.cells import CUT, MISSED, OPEN, UNITS, Places, Points, Sides
 from .kernels.sampling import lobe_keys
@@ -27,6 +28,7 @@ from .tracer import LOBE_RAYS, Support, Tracer
 ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
 SETS = np.array([4, 6, 9, 12, 16, 32, 64])  # samples of pixels that are no cells
 DENSE = 0.3  # share of the pixels, around which much meets, from which on no edges are looked for
+SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 3 ns a pixel each
 FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
 FINEST = 4096  # places in a pixel along each side that have keys of their own
 RECORDED = frozenset({"object_id", "shading_normal", "ray_length"})  # what centres have to record
@@ -38,13 +40,19 @@ Whole = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Sight:
-    """What looks at places of a tile's pixels: ``width`` is the footprint of a pixel's ray, ``check`` may stop it."""
+    """What looks at places of a tile's pixels.
+
+    ``width`` is the footprint of a pixel's ray over textures, ``pixel`` that of the pixel. ``balls`` (b, 4) are
+    centres and radii around small bodies in the camera's frame; ``check`` may stop it.
+    """
 
     camera: IICamera
     tracer: Tracer
     seed: int
     batch: int
     width: tuple[float, float]
+    pixel: tuple[float, float]
+    balls: Floats
     parts: Parts
     shoot: Shoot
     check: Callable[[], None]
@@ -91,8 +99,12 @@ class Cells:
         kernels.encode(self.points.light[: self._count], self.curve, self.points.code)
         kernels.doubtful(self.points, self.lens, self.own, error, steps)
         doubtful = steps > 0
+        if len(self.sight.balls):
+            pixels = inside[self._touched(inside)]
+            opened[pixels] = True
+            self._sample(pixels, np.full(len(pixels), np.inf, np.float32))
         if kernels.count_crowded(self.points, self.lens, steps) > DENSE * len(inside):
-            pixels = inside[doubtful[inside]]
+            pixels = inside[(doubtful & ~opened)[inside]]
             opened[pixels] = True
             self._sample(pixels, np.full(len(pixels), np.sqrt(np.mean(steps[pixels] ** 2)), np.float32))
             return opened
@@ -104,6 +116,15 @@ class Cells:
             opened[pixels] = True
             self._open(self._near_together(pixels, reach), corner_of, doubtful)
         return opened
+
+    def _touched(self, pixels: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which pixels small bodies may be seen in."""
+        L, D, _ = self.sight.camera.weighted_rays_at(self.m[pixels], self.n[pixels])
+        length = np.linalg.norm(D, axis=-1, keepdims=True)
+        found = np.empty(len(pixels), np.bool_)
+        D = np.divide(D, length, out=D, where=length > 0)
+        kernels.touched(L, D, self.sight.balls, *self.sight.pixel, found)
+        return found
 
     def _near_together(self, pixels: NDArray[np.int64], reach: NDArray[np.float32]) -> NDArray[np.int64]:
         """Return pixels in an order in which the edges that they see are close to each other in the scene.
@@ -216,6 +237,17 @@ class Cells:
             light = fixed_sum(s.camera, number, s.seed, self.m[some], self.n[some], s.batch, s.parts, s.shoot)
             self.sums[some] = light / number
             self.rays[some] += number
+
+
+def small_balls(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats:
+    """Return balls (b, 4) around bodies that look smaller than `SMALL` pixels, in the camera's frame."""
+    ends = [(np.min(body.vertices, axis=0), np.max(body.vertices, axis=0)) for body in scene.bodies]
+    low, high = np.array(ends, np.float64).reshape(-1, 2, 3).swapaxes(0, 1)
+    centres = ((low + high) / 2 - pose[:3, 3]) @ pose[:3, :3]
+    radii = np.linalg.norm(high - low, axis=1) / 2
+    width, spread = pixel
+    small = 2 * radii < SMALL * (width + spread * np.linalg.norm(centres, axis=1))
+    return np.column_stack([centres, radii])[small][:MOST_SMALL]
 
 
 def edge_mean(

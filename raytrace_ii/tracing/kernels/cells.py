@@ -23,6 +23,7 @@ MISSED = 0.3
 SAME_WAY = np.float32(0.94)  # least cosine between normals of one surface
 WITHIN = 1.5  # how much more than pixels' centres the colours of one group of a cell may differ
 OWN = 0.3  # of the step between two colours: how far a point of one may be from it
+HALF_DIAGONAL = 0.75  # of a pixel, with something to spare
 LEAST_AWAY = 0.02  # pixels beside a chord at which it is checked
 LIKE = 0.4  # the same among the pixels around one
 MOST_GROUPS = 3  # of surfaces and colours around a pixel that is looked at as a cell
@@ -161,6 +162,21 @@ def nearest_around(reach, lens, out):
                     if lens[b, a] == lens[y, x] and reach[b * width + a] < least:
                         least = reach[b * width + a]
             out[y * width + x] = least if least < math.inf else math.nan
+
+
+@kernel
+def touched(locations, directions, balls, width, spread, found):
+    """Tell which pixels, by rays of unit directions through their centres, balls (x, y, z, radius) may be seen in.
+
+    Pixels are ``width`` wide where their rays start and grow by ``spread`` a mm.
+    """
+    for i in range(locations.shape[0]):
+        found[i] = False
+        for b in range(balls.shape[0]):
+            x, y, z = balls[b, 0] - locations[i, 0], balls[b, 1] - locations[i, 1], balls[b, 2] - locations[i, 2]
+            along = x * directions[i, 0] + y * directions[i, 1] + z * directions[i, 2]
+            near = balls[b, 3] + HALF_DIAGONAL * (width + spread * along)
+            found[i] |= along > 0.0 and x * x + y * y + z * z - along * along <= near * near
 
 
 @inline_kernel

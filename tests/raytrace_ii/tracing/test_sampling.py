@@ -380,6 +380,20 @@ def test_edges_are_the_same_bits_for_any_workers_and_kept_in_support(camera):
         np.testing.assert_array_equal(getattr(whole, name), getattr(one, name))
 
 
+@pytest.mark.parametrize("side", [0.3, 0.7, 2.0])
+def test_small_bodies_are_all_found_by_edges(side):
+    """Squares of 6·4 places in the pixels: a fixed ray a pixel would lose nine of ten of the smallest."""
+    offsets = np.random.default_rng(4).random((24, 2))
+    bodies, squares = [], []
+    for (row, column), offset in zip(np.ndindex(4, 6), offsets, strict=True):
+        low = np.array([2.0 + 3.4 * column, 1.5 + 3.4 * row]) + offset
+        squares.append([low + side * np.array(corner) for corner in ((0, 0), (1, 0), (1, 1), (0, 1))])
+        bodies.append(on_wall(squares[-1], name=f"{row} {column}", emission=WHITE))
+    seen = by_edges(Scene(bodies=bodies), error=8.0).picture.pixels[..., 0]
+    assert seen.sum() == pytest.approx(24 * side**2, rel=0.05)
+    assert all(seen[areas(square) > 0].sum() > 0 for square in squares)
+
+
 def test_edges_with_an_aperture_are_adaptive_samples():
     soft = IICamera(
         pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0, optics=(optics.Lenslet(focal_mm=2.0),)
