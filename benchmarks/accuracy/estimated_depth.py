@@ -11,16 +11,21 @@ varies. *Retargeted*: those pictures to other cameras, against renders through t
 from __future__ import annotations
 
 import statistics
+import subprocess
+import sys
 import textwrap
 import time
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import convolve1d
 
 from benchmarks.arguments import command_line
+from benchmarks.pages.pictures import IMAGES, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin, table
 from ii_core import (
@@ -35,6 +40,7 @@ from ii_core import (
     sub_images,
 )
 from ii_core.base.colour import linear, srgb
+from ii_core.base.files import read_image
 from ii_core.depth.all_views import disparity_of_views
 from ii_core.depth.focus import depth_from_focus
 from metrics import depth_errors, depth_regions
@@ -50,6 +56,7 @@ QUILT = 48  # views across
 METHODS = ("views", "robust")
 PARTS = ("seen", "filled", "outside")
 SURE, BORDER = 0.9, 15
+FOCUSED = IMAGES / "depth.webp"
 
 
 def main() -> None:
@@ -59,7 +66,23 @@ def main() -> None:
     keys += [{"study": "setup1", "scene": s} for s in SETUP1 if s in asked.scenes]
     keys += [{"study": "retarget", "scene": s, "target": t} for s in MOVED for t in TARGETS if s in asked.scenes]
     RECORDS.run(keys, row, asked.again)
+    if "apples" in asked.scenes:
+        write_focused()
     publish(tables())
+
+
+def write_focused() -> None:
+    """Write the picture of the page: *Apples* focused on two planes and everywhere, by the command."""
+    with TemporaryDirectory() as folder:
+        field, out = Path(folder, "field.png"), Path(folder, "out.png")
+        shot_of("apples", preset("setup1", scale=4))[0].save(field)
+        seen = []
+        for how in ["--at", "25mm"], ["--at", "60mm"], ["--all-in-focus"]:
+            command = [sys.executable, "-m", "raytrace_ii.cli", "focus", field, *how, "-o", out, "--force"]
+            subprocess.run(command, check=True)
+            seen.append(read_image(out)[..., :3])
+        gap = np.full((seen[0].shape[0], 8, 3), 255, np.uint8)
+        write_picture(FOCUSED, np.hstack([seen[0], gap, seen[1], gap, seen[2]]))
 
 
 def row(study: str, scene: str, method: str = "", target: str = "") -> dict[str, Any]:
