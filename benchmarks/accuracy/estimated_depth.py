@@ -80,8 +80,8 @@ def write_focused() -> None:
         for how in ["--at", "25mm"], ["--at", "60mm"], ["--all-in-focus"]:
             command = [sys.executable, "-m", "raytrace_ii.cli", "focus", field, *how, "-o", out, "--force"]
             subprocess.run(command, check=True)
-            seen.append(read_image(out)[..., :3])
-        gap = np.full((seen[0].shape[0], 8, 3), 255, np.uint8)
+            seen.append(read_image(out)[..., :3].repeat(2, axis=0).repeat(2, axis=1))  # views are small
+        gap = np.full((seen[0].shape[0], 16, 3), 255, np.uint8)
         write_picture(FOCUSED, np.hstack([seen[0], gap, seen[1], gap, seen[2]]))
 
 
