@@ -39,7 +39,7 @@ def rendering():
             render(load_scene(name), camera, support=("depth", "normal"))
     render(hall(), preset("setup1", scale=128), samples=(4, 16), error=4.0)
     render(hall(), preset("setup1", scale=128), samples=4, dtype="float32", audit=0.1)
-    trace(hall(), np.zeros((3, 99)), np.ones((3, 99)))
+    trace(hall(), np.zeros((99, 3)), np.ones((99, 3)))
     hexagonal = render(load_scene("apples"), preset("hexagonal", scale=8)).picture
     smallest_rectangle(hexagonal)
     resampled(hexagonal)
