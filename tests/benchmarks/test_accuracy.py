@@ -37,6 +37,7 @@ def test_errors_fall_with_the_expected_order_in_mesh_size(rows, name, within):
     assert convergence.order(rows, name, skip=0) == pytest.approx(convergence.ORDERS[name], abs=within)
 
 
+@pytest.mark.slow
 def test_the_picture_of_a_fine_mesh_equals_the_closed_form(rows):
     """Outlines dominate the error: the share of wrong pixels falls with h², the root mean square error with h."""
     assert rows[-1]["psnr_smooth"] > 48

@@ -77,6 +77,7 @@ def test_wrong_calls_are_one_line_before_work(run, monkeypatch, tmp_path, argume
     assert code == 2 and message in error and len(error.splitlines()) == 1 and not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_set_is_rendered_checked_and_used(run, tmp_path):
     made = tmp_path / "tiny.toml"
     made.write_text(TINY + f'sha256 = "{"0" * 64}"\n')

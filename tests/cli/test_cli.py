@@ -69,6 +69,7 @@ def test_from_scene_to_measurement(run, tmp_path):
     assert json.loads(numbers.read_text())["q_global"] == measured["q_global"]
 
 
+@pytest.mark.slow
 def test_study_leaves_chart_numbers_and_a_table(run, picture, tmp_path):
     code, out, _ = run(
         "study",

@@ -163,6 +163,7 @@ def test_claims_are_refused_fast_and_small(ended):
     assert wrong == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "side", "said"), SIZES)
 def test_forged_streams_that_agree_with_a_forged_structure_are_refused_small(ended, scheme, side, said):
     """The test above forges only the structure, which the size of the stream contradicts."""

@@ -58,6 +58,7 @@ def test_grey_pictures_are_tuned_by_rgb(dtype):
     assert stream.unpack(by_default.payload, grey.pixels.size // 3)[0].scales is None
 
 
+@pytest.mark.slow
 def test_each_tuning_is_better_by_its_own_measure():
     """Unrelated views with much colour, at sizes that differ by less than the measures do."""
     rng = np.random.default_rng(3)

@@ -311,6 +311,7 @@ def test_detail_of_light_is_demosaiced_better_by_direction():
     assert np.std(errors[0]) < 0.5 * np.std(errors[1])
 
 
+@pytest.mark.slow
 def test_dead_and_hot_pixels_are_found_by_the_white_picture_and_repaired():
     _, white = shot(5, hexagonal=True, pitch=14.3)
     rng = np.random.default_rng(2)
@@ -425,6 +426,7 @@ def replace_camera(picture, **values):
     return IIPicture(picture.pixels, camera.lenses, camera.ei_pixels, camera)
 
 
+@pytest.mark.slow
 def test_the_drift_of_a_real_main_lens_is_followed():
     """A double Gauss: its pupil moves with the field, and micro-images with it. Truth is the light without noise."""
     found = behind_glass(scale=16)

@@ -140,6 +140,7 @@ def test_a_quilt_video_has_its_name_its_rate_and_its_views(tmp_path):
         open_quilt_video(tmp_path / "no_qs2x2a1.mp4")
 
 
+@pytest.mark.slow
 def test_films_of_views_and_along_a_path(tmp_path):
     import av
 

@@ -19,6 +19,8 @@ from ii_core.video.video import IIVideo
 from tests.ii_core.test_viewer import snapshot
 from tests.support.serving import served
 
+pytestmark = pytest.mark.slow  # the page itself is in `test_viewer.py`
+
 FRAMES = 6
 
 

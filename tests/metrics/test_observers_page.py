@@ -15,6 +15,8 @@ from metrics.observers.store import ResultFolder
 from raytrace_ii.cli.server import Answers, PageServer
 from tests.support.browser import true_of
 
+pytestmark = pytest.mark.slow
+
 CAMERA = preset("setup1", scale=32)
 QUICK = {"seconds": 0.05, "grey_seconds": 0.0, "training": 1, "block": 2, "frames": 3, "observers": 2}
 

@@ -66,6 +66,7 @@ def test_packaged_scenes_load_and_have_a_description():
         assert np.isfinite(seen.radiance).all() and seen.radiance.max() > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("high", ["twins", "cuboid", "hairdo"])
 def test_scenes_of_high_detail_have_twice_the_edges_of_those_of_low(measured, high):
     for low in ("apples", "car", "objects", "dolphin"):
@@ -78,12 +79,14 @@ def test_scenes_of_short_depth(measured, name):
     assert 12 < near and far < 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["objects", "dolphin"])
 def test_scenes_of_medium_depth(measured, name):
     near, far = np.percentile(measured(name).depth, [5, 95])
     assert 12 < near and 30 < far < 110
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["apples", "cuboid", "mountains"])
 def test_scenes_of_long_depth(measured, name):
     near, far = np.percentile(measured(name).every_depth, [5, 95])
@@ -97,6 +100,7 @@ def test_fill(measured):
         assert measured(high).fill > 0.6, high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", first_fast(NAMES, 2))
 def test_scenes_load_the_same_every_time_and_are_no_burden(name):
     first, second = scene(name), load_scene(name)

@@ -43,7 +43,8 @@ def crowded():
     return replace(scene, bodies=[*scene.bodies, sieve, water, sea])
 
 
-@pytest.mark.parametrize("glass", first_fast([True, False]))
+@pytest.mark.slow
+@pytest.mark.parametrize("glass", [True, False])
 def test_tracing_in_python_sees_the_same(glass, monkeypatch):
     """Python keeps float32 where numba continues in float64: the same rays, except rare ones on an edge."""
     scene = hall(max_depth=4)
