@@ -37,6 +37,7 @@ h5py, matlab = Lazy("h5py"), Lazy("scipy.io")
 ARRAYS = (".mat", ".h5", ".hdf5")
 NAME, STRUCTURE, DEPTH = "LF", "structure", "GT_DEPTH"
 HDF5 = b"\x89HDF\r\n\x1a\n"
+MATLAB_5 = b"MATLAB 5.0 MAT-file".ljust(116)  # the text that such a file begins with
 MATLAB_73 = 512  # bytes of text before the HDF5 of MATLAB's version 7.3
 MOST_MATLAB = 2**31 - 1  # bytes of a variable of version 5
 MOST_ALONG = 1 << 16  # views or pixels along an axis
@@ -137,6 +138,8 @@ def write_array(picture: IIPicture, path: str | os.PathLike[str]) -> Path:
             stack[row, col] = view
         with atomic_path(path) as temporary, temporary.open("wb") as file:
             matlab.savemat(file, {NAME: stack, STRUCTURE: structure}, do_compression=True)
+            file.seek(0)
+            file.write(MATLAB_5)  # SciPy's has the time of day
         return path
     with atomic_path(path) as temporary, h5py.File(temporary, "w", track_times=False) as file:
         made = file.create_dataset(

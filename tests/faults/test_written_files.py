@@ -21,6 +21,7 @@ from ii_core.base.atomic import atomic_paths
 from ii_core.base.files import atomic_path, image_header, pixel_digest, read_image, read_json, write_image, write_json
 from ii_core.camera.maps import write_maps
 from ii_core.display.view_sheets import plot_pair, plot_views
+from ii_core.formats.arrays import write_array
 from ii_core.picture.picture import sidecar
 from metrics import rd_chart, read_study, write_csv, write_latex, write_study
 from raytrace_ii import load_scene, render
@@ -138,8 +139,9 @@ def content(name):
 
 
 def test_equal_content_makes_equal_files(tmp_path):
-    """EXR and TIFF had the time of day in them, Matroska random numbers."""
-    coded = encode(picture(), "si-h264", qp=30)
+    """EXR, TIFF and MATLAB's files had the time of day in them, Matroska random numbers."""
+    field = picture()
+    coded = encode(field, "si-h264", qp=30)
     made = []
     for folder in ("one", "two"):
         time.sleep(1.1 * bool(made))  # dates are of seconds
@@ -148,8 +150,10 @@ def test_equal_content_makes_equal_files(tmp_path):
             write_image(tmp_path / folder / name, content(name))
         for name in ("a.mkv", "a.mp4"):
             extract(coded, tmp_path / folder / name)
+        for name in ("a.mat", "a.h5"):
+            write_array(field, tmp_path / folder / name)
         made.append({path.name: path.read_bytes() for path in (tmp_path / folder).iterdir()})
-    assert len(made[0]) == 5
+    assert len(made[0]) == 7
     for name, data in made[0].items():
         assert data == made[1][name], name
         assert not re.search(rb"20\d\d:\d\d:\d\d", data), name

@@ -15,7 +15,7 @@ from PIL import Image, ImageCms
 
 from ii_core import IIPicture, preset
 from ii_core.display.looking_glass import native_picture, read_looking_glass, view_numbers
-from ii_core.formats.arrays import array_depth, write_array
+from ii_core.formats.arrays import MATLAB_5, array_depth, write_array
 from ii_core.formats.find import find_views, picture_of
 from ii_core.formats.grid import read_view
 from ii_core.formats.lytro import Setting
@@ -112,7 +112,10 @@ def _arrays(folder: Path) -> dict[str, tuple[bytes, ...]]:
     picture = IIPicture(pixels, camera.lenses, camera.ei_pixels, camera)
     field = pixels.reshape(-1)[: 2 * 3 * 4 * 5 * 4].reshape(2, 3, 4, 5, 4)
     for name, data in (("plain", field), ("float", field / 255.0)):
-        scipy.io.savemat(folder / f"{name}.mat", {"LF": data, "Meta": {"a": 1.0}}, do_compression=name == "plain")
+        with (folder / f"{name}.mat").open("wb") as file:
+            scipy.io.savemat(file, {"LF": data, "Meta": {"a": 1.0}}, do_compression=name == "plain")
+            file.seek(0)
+            file.write(MATLAB_5)  # SciPy's has the time of day, of which cases must not depend
     with h5py.File(folder / "turned.mat", "w", userblock_size=512) as file:
         file["LF"] = field.T
     with h5py.File(folder / "hci.h5", "w") as file:
