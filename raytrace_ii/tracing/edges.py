@@ -24,7 +24,7 @@ from ii_core import IICamera
 
 from ..scene.scene import Scene
 from .kernels import cells as kernels
-from .kernels.cells import CUT, OPEN, UNITS, Places, Points, Sides
+from .kernels.cells import CUT, DONE, OPEN, UNITS, Places, Points, Sides
 from .kernels.sampling import lobe_keys
 from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
@@ -74,7 +74,10 @@ class Sight:
 
 @dataclass
 class Cells:
-    """Pixels of a tile and its rim in rows: columns and rows in the picture, lenses, and what is seen of them."""
+    """Pixels of a tile and its rim in rows: columns and rows in the picture, lenses, and what is seen of them.
+
+    ``verdicts`` are those of `kernels.cells`, −1 for pixels that are no cells.
+    """
 
     sight: Sight
     wanted: Edges
@@ -86,7 +89,7 @@ class Cells:
     points: Points = field(init=False)
     rays: Whole = field(init=False)
     sums: Floats = field(init=False)
-    cells: NDArray[np.int64] = field(init=False)
+    verdicts: NDArray[np.int8] = field(init=False)
     _count: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -96,7 +99,7 @@ class Cells:
             np.zeros((n, 3), np.float32),
         )  # fmt: skip
         self.rays, self.sums = np.ones(n, np.int32), np.zeros((n, 3))
-        self.cells = np.zeros(3, np.int64)
+        self.verdicts = np.full(n, -1, np.int8)
 
     def look_around(self, centres: Places) -> None:
         """Look at centres of the rim."""
@@ -194,7 +197,7 @@ class Cells:
         cut = np.flatnonzero(verdict == CUT)
         if len(cut):
             verdict[cut] = self._cut(pixels[cut], corners[cut], groups[cut])
-        self.cells += np.bincount(verdict, minlength=3)
+        self.verdicts[pixels] = verdict
         left = verdict == OPEN
         rough[pixels[left]] = steps[left] ** 2 / 3
         return pixels[left]
@@ -274,7 +277,8 @@ class Cells:
         eighths, which, times = np.unique(
             np.rint(8 * np.log2(weights)).astype(np.int64), return_inverse=True, return_counts=True
         )
-        weights, (done, cut, _) = 2.0 ** (eighths / 8), self.cells
+        weights = 2.0 ** (eighths / 8)
+        done, cut = (int(np.count_nonzero(self.verdicts == verdict)) for verdict in (DONE, CUT))
         expected = weights**SPREAD_ERROR / np.average(weights**SPREAD_ERROR, weights=times)
         least = (EDGE * weights / (FAR * error) ** 2) ** (1 / EDGES_FALL)
         squares = error**2 * (len(pixels) + done * (1 - DONE_ERROR**2) + cut * (1 - CUT_ERROR**2))
