@@ -41,6 +41,7 @@ ALIKE = 0.8  # square of the difference of both in parts of the sum of the squar
 EDGE, EDGES_FALL, NOISE_FALLS = 0.085, 1.5, 1.1  # square error of edges per roughness; powers of n by which it falls
 FAR = 3.0  # how much more than the error wanted an edge in one pixel may cause
 DONE_ERROR, CUT_ERROR = 0.5, 0.9  # of cells, in parts of the error wanted
+FOLLOWED, OF_THIN = 64, 16  # how far a thin body is followed, in pixels, and samples to find it
 WHITE = 255.0  # code
 SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 3 ns a pixel each
 FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
@@ -130,15 +131,16 @@ class Cells:
             opened[pixels] = True
             self._share_out(pixels, rough, 0.0)
             return opened
-        left = []
+        left, thin = [], np.zeros(many, np.bool_)
         corner_of = np.full((many, 4), -1, np.int32)
         for _ in range(ROUNDS):
             pixels = np.flatnonzero(doubtful & ~opened & self.own)
             if not len(pixels):
                 break
             opened[pixels] = True
-            left.append(self._open(self._near_together(pixels, reach), corner_of, doubtful, rough))
+            left.append(self._open(self._near_together(pixels, reach), corner_of, doubtful, rough, thin))
         self._share_out(np.concatenate(left or [inside[:0]]), rough, SPREAD)
+        self._follow(thin, opened)
         return opened
 
     def _look_beyond(self, steps: NDArray[np.float32], rough: NDArray[np.float32]) -> None:
@@ -182,8 +184,9 @@ class Cells:
         return pixels[np.argsort(ranks, kind="stable")]
 
     def _open(
-        self, pixels: NDArray[np.int64], corner_of: Whole, wanted: NDArray[np.bool_], rough: NDArray[np.float32]
-    ) -> NDArray[np.int64]:
+        self, pixels: NDArray[np.int64], corner_of: Whole, wanted: NDArray[np.bool_], rough: NDArray[np.float32],
+        thin: NDArray[np.bool_],
+    ) -> NDArray[np.int64]:  # fmt: skip
         """Find the light of pixels as cells between their corners; return those that are none."""
         count = len(pixels)
         corners, places = np.empty((count, 4), np.int32), _places(4 * count)
@@ -194,6 +197,7 @@ class Cells:
             pixels, corners, self.points, LOOSE * self.wanted.error, self.lens, self.sums, verdict, groups, steps,
             wanted,
         )  # fmt: skip
+        kernels.find_thin(pixels, corners, self.points, LOOSE * self.wanted.error, self.lens, thin)
         cut = np.flatnonzero(verdict == CUT)
         if len(cut):
             verdict[cut] = self._cut(pixels[cut], corners[cut], groups[cut])
@@ -201,6 +205,20 @@ class Cells:
         left = verdict == OPEN
         rough[pixels[left]] = steps[left] ** 2 / 3
         return pixels[left]
+
+    def _follow(self, thin: NDArray[np.bool_], opened: NDArray[np.bool_]) -> None:
+        """Find the light of pixels in which a thin body may go on that was met nearby, as far as it does."""
+        calm = self.own & (self.verdicts != OPEN)
+        pixels = np.flatnonzero(thin & calm)
+        for _ in range(FOLLOWED):
+            if not len(pixels):
+                break
+            calm[pixels], opened[pixels], thin[:] = False, True, False
+            self._sample(pixels, np.full(len(pixels), OF_THIN))
+            light = self.sums[pixels].astype(np.float32)
+            kernels.encode(light, self.curve, codes := np.empty_like(light))
+            kernels.follow(pixels, codes, self.points, LOOSE * self.wanted.error, self.lens, thin)
+            pixels = np.flatnonzero(thin & calm & (self.verdicts != CUT))
 
     def _cut(self, pixels: NDArray[np.int64], corners: Whole, groups: NDArray[np.int8]) -> NDArray[np.int8]:
         """Find the light of cells with one edge; return which of them turn out to have none, or more."""

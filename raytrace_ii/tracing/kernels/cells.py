@@ -346,6 +346,53 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
                 wanted[b * width + a] = True
 
 
+@inline_kernel
+def _differs(points, i, j, error):
+    return points.body[i] != points.body[j] and _apart(points, i, j) * MISSED > error
+
+
+@kernel
+def find_thin(pixels, corners, points, error, lens, thin):
+    """Mark pixels around places of another body than all next to them: centres among corners, corners among centres."""
+    height, width = lens.shape
+    for i in range(pixels.shape[0]):
+        y, x = pixels[i] // width, pixels[i] % width
+        alone = True
+        for k in range(4):
+            right, down = _right_down(k)
+            alone &= _differs(points, pixels[i], corners[i, k], error)
+            corner_alone = True
+            for around in range(4):
+                b, a = y + down - 1 + around // 2, x + right - 1 + around % 2
+                if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
+                    corner_alone &= _differs(points, corners[i, k], b * width + a, error)
+            if corner_alone:
+                _mark(lens, y + down - 1, y + down, x + right - 1, x + right, lens[y, x], thin)
+        if alone:
+            _mark(lens, y - 1, y + 1, x - 1, x + 1, lens[y, x], thin)
+
+
+@inline_kernel
+def _mark(lens, top, bottom, left, right, of, out):
+    height, width = lens.shape
+    for b in range(max(top, 0), min(bottom + 1, height)):
+        for a in range(max(left, 0), min(right + 1, width)):
+            if lens[b, a] == of:
+                out[b * width + a] = True
+
+
+@kernel
+def follow(pixels, codes, points, error, lens, wanted):
+    """Mark the pixels around those whose mean is not the light of their centre."""
+    width = lens.shape[1]
+    for i in range(pixels.shape[0]):
+        apart, y, x = np.float32(0), pixels[i] // width, pixels[i] % width
+        for c in range(3):
+            apart = max(apart, abs(codes[i, c] - points.code[pixels[i], c]))
+        if apart > error:
+            _mark(lens, y - 1, y + 1, x - 1, x + 1, lens[y, x], wanted)
+
+
 @kernel
 def gather_sides(pixels, corners, groups, lens, side_of, sides, of_cell):
     """Note the sides of cells that pass from one group to the other, each once; ``of_cell`` are those of each cell.
