@@ -15,7 +15,7 @@ from ii_core import Camera, IICamera, MapCamera
 from ii_core.base.colour import srgb
 
 from ..scene.scene import Scene
-from ..tracing.edges import RECORDED, Sight, edge_mean, small_balls
+from ..tracing.edges import RECORDED, Sight, edge_mean, small_rods
 from ..tracing.kernels.arrays import Start
 from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb, encode_steps
@@ -328,10 +328,10 @@ class Job:
         centres = self._fixed(tracer, 1, rows, cols, order, support)
         if not hasattr(self._local, "small"):
             pixel = footprint(camera)
-            self._local.small = pixel, small_balls(self.scene, self.pose, pixel)
-        pixel, balls = self._local.small
+            self._local.small = pixel, small_rods(self.scene, self.pose, pixel)
+        pixel, rods = self._local.small
         sight = Sight(
-            camera, tracer, self.seed, TILE_RAYS, width, pixel, balls, self._parts, self._shoot(tracer, None),
+            camera, tracer, self.seed, TILE_RAYS, width, pixel, rods, self._parts, self._shoot(tracer, None),
             self._check_stopped,
         )  # fmt: skip
         return *edge_mean(sight, wanted, rows, cols, order.pixels, centres, support, codes), support
