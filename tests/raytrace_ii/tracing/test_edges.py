@@ -1,18 +1,21 @@
 """Samples by edges against closed forms: areas of polygons, lines, discs, checkers and a horizon, and equal bits."""
 
+import json
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 
-from ii_core import IICamera, IIPicture, preset
+from ii_core import IICamera, IIPicture, preset, read_maps, write_maps
 from ii_core.base.colour import srgb
 from raytrace_ii import Light, Scene, render
 from raytrace_ii.rendering.render import render_to
 from raytrace_ii.scene.textures import Checker
 from raytrace_ii.shapes.primitives import Mesh
+from raytrace_ii.tracing.support_images import name_hashes
 from tests.support.slow import first_fast
 from tests.support.trace_scenes import BLACK, WHITE, body, hall, wall
 
@@ -246,3 +249,47 @@ def test_processes_and_files_have_the_same_bits(tmp_path):
     np.testing.assert_array_equal(whole.picture.pixels, other.picture.pixels)
     render_to(tmp_path / "p.png", scene, camera, workers=2, **options)
     np.testing.assert_array_equal(whole.picture.pixels, IIPicture.load(tmp_path / "p.png").pixels)
+
+
+@pytest.mark.parametrize("degrees", [0, 20, 70])
+def test_coverage_is_the_area_of_bodies_and_the_sky_has_the_rest(degrees):
+    polygon = half(degrees, 0.1)
+    bodies = [on_wall(polygon, name="half"), on_wall(UPPER, z=30.0, name="behind")]
+    alone = render(Scene(bodies=bodies[:1]), ONE_LENS, support=("coverage",)).coverage
+    np.testing.assert_allclose(alone[..., 0], areas(polygon), atol=1 / 512)
+    shot = render(Scene(bodies=bodies), ONE_LENS, support=("coverage",))
+    near, behind = areas(polygon), areas(UPPER)
+    hashes = name_hashes(["half", "behind"]).view(np.float32)
+    shares = [np.where(shot.coverage[..., 1::2] == one, shot.coverage[..., 2::2], 0).sum(axis=-1) for one in hashes]
+    np.testing.assert_allclose(shares[0], near, atol=0.03)  # with three bodies in a pixel it is sampled
+    np.testing.assert_allclose(shares[1][near == 0], behind[near == 0], atol=0.03)
+    np.testing.assert_allclose(shot.coverage[..., 0], sum(shares), atol=1e-6)
+    assert (np.diff(shot.coverage[..., 2::2], axis=-1) <= 0).all(), "the largest share first"
+
+
+def test_coverage_in_a_file_is_a_cryptomatte(tmp_path):
+    """Hashes of names as in the sample files of the specification, and what OpenImageIO reads."""
+    known = {"равнина": "9623511e", 'name containing a "quote"  ': "af8bfa09", "ball_asset": "79b62f5e"}
+    known |= {"toroidal_asset": "1539c043", "rect_[_top": "c1fa3f1f", "name, with, comma": "62fa4db8"}
+    assert [f"{value:08x}" for value in name_hashes([*known])] == [*known.values()]
+    scene, path = hall(), tmp_path / "c.exr"
+    shot = render(scene, SMALL, support=("coverage",), workers=1)
+    render_to(None, scene, SMALL, support={"coverage": path}, workers=3)
+    file = oiio.ImageInput.open(str(path))
+    spec = file.spec()
+    assert spec.channelnames[:5] == ("A", *(f"CryptoObject00.{c}" for c in "RGBA"))
+    np.testing.assert_array_equal(file.read_image("float"), shot.coverage)
+    (key,) = {a.name.rpartition("/")[0] for a in spec.extra_attribs if a.name.startswith("cryptomatte/")}
+    assert (len(key), spec[f"{key}/name"]) == (len("cryptomatte/") + 7, "CryptoObject")
+    assert (spec[f"{key}/hash"], spec[f"{key}/conversion"]) == ("MurmurHash3_32", "uint32_to_float32")
+    names = {np.uint32(int(v, 16)).view(np.float32): k for k, v in json.loads(spec[f"{key}/manifest"]).items()}
+    sure = shot.coverage[..., 2] == 1
+    found = [names[value] for value in shot.coverage[sure][:, 1]]
+    centres = np.array(shot.object_names)[render(scene, SMALL).object_id[sure]]
+    assert (found == centres).mean() > 0.999
+
+
+def test_coverage_of_stored_maps_is_refused(tmp_path):
+    write_maps([ONE_LENS], tmp_path, format="exr")
+    with pytest.raises(ValueError, match="coverage: stored maps have no rays between those of pixels"):
+        render(Scene(bodies=[body(wall(5))]), read_maps(tmp_path)[0], support=("coverage",))
