@@ -142,6 +142,7 @@ CLOSED: dict[str, tuple[str, ...]] = {
         "coding/disparity", "coding/headers", "coding/orders", "coding/volume", "pages/metrics_gallery",
         "pages/video", "speed/eye", "speed/viewer", "stability/pictures",
     ),
+    "eab643c": ("accuracy/lens_setup1",),
 }  # fmt: skip
 # Pictures of closed experiments.
 KEPT = (
