@@ -87,3 +87,12 @@ def test_a_constant_block_is_one_coefficient():
     assert abs(out[0, 0] - 800) <= 1
     out[0, 0] = 0
     assert not out.any()
+
+
+def test_costs_of_bits_are_the_information_of_the_nearest_probability():
+    """The table has 4096 probabilities: a cost lies between those of the neighbours half a step away."""
+    p = np.arange(2 * arithmetic.LEAST, arithmetic.ONE - 2 * arithmetic.LEAST, 7)
+    costs = arithmetic.bit_costs(np.stack([p, p], axis=1).astype(np.int32))
+    for bit, share in ((1, p), (0, arithmetic.ONE - p)):
+        least, most = (-np.log2((share + half) / arithmetic.ONE) for half in (8.5, -8.5))
+        assert (least <= costs[:, bit]).all() and (costs[:, bit] <= most).all()
