@@ -372,11 +372,11 @@ def test_edges_are_the_same_bits_for_any_workers_and_kept_in_support(camera):
     other = render(scene, camera, workers=3, executor=None, **options)
     one = render(scene, camera, support=("depth", "object_id"))
     np.testing.assert_array_equal(whole.picture.pixels, other.picture.pixels)
-    assert 1 < whole.samples.mean() < 20
+    assert 1 < whole.samples.mean() < 40
     assert whole.samples.sum() == sum(n * pixels for n, pixels in whole.stats.samples.items())
     calm = whole.samples == 1
     # some have corners whose rays their neighbours sent
-    assert (whole.picture.pixels[calm] == one.picture.pixels[calm]).mean() > 0.99
+    assert (whole.picture.pixels[calm] == one.picture.pixels[calm]).mean() > 0.98
     for name in ("depth", "object_id"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(one, name))
 
