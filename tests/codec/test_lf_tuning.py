@@ -6,7 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from codec import decode, encode
-from codec.coders.lf import arithmetic, contexts, loop_filter, loop_filter_search, planes, ranges, stream, tuning
+from codec.coders.lf import (
+    arithmetic,
+    contexts,
+    loop_filter,
+    loop_filter_search,
+    planes,
+    ranges,
+    stream,
+    tuning,
+)
 from codec.coders.lf import coder as lf
 from codec.contract import checked_options
 from ii_core import IIPicture, sub_images
@@ -41,12 +50,13 @@ def test_the_measure_is_that_of_the_test_conditions(dtype):
 
 
 def test_planes_are_scaled_so_that_errors_count_as_the_measure_counts_them():
-    """Of Y with four times the error, Cb's squared error changes the mean of logarithms by 4/6 of what Y's does."""
+    """Of Y with twice the error, Cb's squared error changes the mean of logarithms by 2/6 of what Y's does."""
     scales = 40, 40  # squares of errors in planes: 3 of Y, 3 · (40/64)² of Cb and Cr
-    errors = np.array([3 * 4e6, 3 * (40 / 64) ** 2 * 1e6, 3 * (40 / 64) ** 2 * 2e6])
-    found = np.array(tuning.better_scales(scales, errors))
-    np.testing.assert_allclose((found / 64) ** 2, [4 / 6 / 1, 4 / 6 / 2], rtol=0.03)
-    assert tuning.better_scales(scales, np.array([1e6, 0, 1e12])) == (tuning.MOST, tuning.LEAST)
+    errors = np.array([3 * 2e6, 3 * (40 / 64) ** 2 * 1e6, 3 * (40 / 64) ** 2 * 2e6])
+    for views, more in [(1, 1), (25, 1), (45, 1.3**0.5), (81, 1.3), (256, 1.3)]:
+        found = np.array(tuning.better_scales(scales, errors, views))
+        np.testing.assert_allclose((found / 64) ** 2, np.multiply([2 / 6 / 1, 2 / 6 / 2], more**2), rtol=0.05)
+    assert tuning.better_scales(scales, np.array([1e6, 0, 1e12]), 25) == (tuning.MOST, tuning.LEAST)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])

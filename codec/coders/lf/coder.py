@@ -320,7 +320,7 @@ class Source:
         for place in np.argwhere(trial.decoded).tolist():
             decoded = trial.views[trial.number((place[0], place[1]))]
             errors += np.square(decoded.astype(np.float32) - self.view(*place)).sum(axis=(1, 2), dtype=np.float64)
-        return self._scaled(header, tuning.better_scales(scales, errors))
+        return self._scaled(header, tuning.better_scales(scales, errors, len(trial.views)))
 
     def _scaled(self, header: Header, scales: tuple[int, int]) -> Header:
         """Return the header with other scales of planes; the source's planes get them, too."""
