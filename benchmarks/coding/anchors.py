@@ -107,7 +107,8 @@ def at_quantiser(
 ) -> tuple[Any, Any, Any]:
     """Return what was coded, the decoded picture, and the codes that an anchor returned."""
     if anchor is None:
-        coded = encode(original, scheme, **{"bpp" if scheme == BY_RATE else "qp": quantiser})
+        goal: Any = {"bpp" if scheme == BY_RATE else "qp": quantiser}
+        coded = encode(original, scheme, **goal)
         return coded, timed_decode(coded).picture, None
     stream = anchor.encode_at(original, quantiser)
     answer = anchor.decode(stream)

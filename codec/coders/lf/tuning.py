@@ -13,8 +13,8 @@ PEAK = 1023  # of 10 bit
 LEAST_ERROR = 1e-12  # 120 dB
 # Scales of the planes of Cb and Cr with which a trial begins, their least, and their most.
 START, LEAST, MOST = 35, 12, SCALE
-# From few to many views scales grow to so many times those of the measure, by the logarithm of their number: scenes of
-# 256 views then take 0.4–1.6 % less by CTC and 11–17 % less by RGB.
+# From few to many views scales grow to so many times those of the measure, by the logarithm of their number: scenes
+# of 256 views then take 0.4–1.6 % less by CTC and 11–17 % less by RGB.
 FACTOR, FEW_VIEWS, MANY_VIEWS = 1.3, 25, 80
 
 
