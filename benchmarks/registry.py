@@ -142,6 +142,7 @@ CLOSED: dict[str, tuple[str, ...]] = {
         "coding/disparity", "coding/headers", "coding/orders", "coding/volume", "pages/metrics_gallery",
         "pages/video", "speed/eye", "speed/viewer", "stability/pictures",
     ),
+    "eab643c": ("accuracy/lens_setup1",),
 }  # fmt: skip
 # Pictures of closed experiments.
 KEPT = (
@@ -159,6 +160,7 @@ BENCHMARKS = {
     for benchmark in (
         Benchmark("pages.cameras", writes=("docs/cameras.md", f"{IMAGES}/cameras/*", f"{IMAGES}/scenes.*")),
         Benchmark("accuracy.sample_places", records=OWN, fills=("docs/speed_accuracy.md",)),
+        Benchmark("accuracy.edges", records=OWN, fills=("docs/speed_accuracy.md",), writes=(f"{IMAGES}/edges.png",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",)),
         Benchmark("accuracy.demosaicing", records=OWN, fills=("docs/calibration.md",)),
         Benchmark(

@@ -56,7 +56,7 @@ class RenderOptions:
     error : float
         Target of adaptive sampling: standard error of a pixel in 8-bit steps, estimated from its samples and from its
         neighbours under the same lens; see `sampling` for the estimate and its limits. With ``"edges"``, root mean
-        square error of the pixels that get more than one ray.
+        square error of the pixels that get more than one ray, measured while they are sampled.
     seed : int
         Seed of samples and noise.
     noise : float

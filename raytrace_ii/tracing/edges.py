@@ -3,8 +3,12 @@
 A pixel whose neighbours under the same lens look alike has the light of its centre. Any other one is a cell between
 corners that neighbours share, see `kernels.cells`. If corners and centre agree, it has their mean; an edge between
 two groups of them is found by bisection, mostly by visibility alone, and checked on both sides. What is neither gets
-a set of samples, the larger the step, the more; and so do pixels in which a body of few pixels may be. A tile that is
-full of such pixels gets sets at once. (Corners and their comparison: Whitted 1980.)
+a set of samples, and so do pixels in which a body of few pixels may be. A tile that is full of such pixels gets sets
+at once. (Corners and their comparison: Whitted 1980.)
+
+The error wanted is the root mean square of all pixels of a tile that get more than a ray. Some of them get two sets,
+whose difference tells how far sets of any number are off; the others get as many samples as the error then allows,
+more where the picture is rougher. Not known to it: what the filter of textures errs alike in all sets.
 """
 
 from __future__ import annotations
@@ -20,14 +24,25 @@ from ii_core import IICamera
 
 from ..scene.scene import Scene
 from .kernels import cells as kernels
-from .kernels.cells import CUT, MISSED, OPEN, UNITS, Places, Points, Sides
+from .kernels.cells import CUT, DONE, OPEN, UNITS, Places, Points, Sides
 from .kernels.sampling import lobe_keys
 from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
 
 ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
-SETS = np.array([4, 6, 9, 12, 16, 32, 64])  # samples of pixels that are no cells
+# Numbers of samples of pixels that are no cells.
+SETS = np.array([2, 3, 4, 6, 9, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192, 256])
+SETS_ENDS, MOST_SAMPLES = np.sqrt(SETS[:-1] * SETS[1:]), 64  # the latter where a small body may be
 DENSE = 0.3  # share of the pixels, around which much meets, from which on no edges are looked for
+LOOSE = 2.0  # how much more than the error wanted of all pixels may be hidden in one
+SPREAD, SPREAD_ERROR = 0.3, 0.75  # powers of the roughness by which samples of a pixel and their error grow
+PILOTS, OF_PILOTS = 768, (4, 9)  # pixels of a tile that get two sets, which tell of the error
+ALIKE = 0.8  # square of the difference of both in parts of the sum of the squares of their errors
+EDGE, EDGES_FALL, NOISE_FALLS = 0.085, 1.5, 1.1  # square error of edges per roughness; powers of n by which it falls
+FAR = 3.0  # how much more than the error wanted an edge in one pixel may cause
+DONE_ERROR, CUT_ERROR = 0.5, 0.9  # of cells, in parts of the error wanted
+FOLLOWED, OF_THIN = 64, 16  # how far a thin body is followed, in pixels, and samples to find it
+WHITE = 255.0  # code
 SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 3 ns a pixel each
 FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
 FINEST = 4096  # places in a pixel along each side that have keys of their own
@@ -60,7 +75,10 @@ class Sight:
 
 @dataclass
 class Cells:
-    """Pixels of a tile and its rim in rows: columns and rows in the picture, lenses, and what is seen of them."""
+    """Pixels of a tile and its rim in rows: columns and rows in the picture, lenses, and what is seen of them.
+
+    ``verdicts`` are those of `kernels.cells`, −1 for pixels that are no cells.
+    """
 
     sight: Sight
     wanted: Edges
@@ -72,6 +90,7 @@ class Cells:
     points: Points = field(init=False)
     rays: Whole = field(init=False)
     sums: Floats = field(init=False)
+    verdicts: NDArray[np.int8] = field(init=False)
     _count: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -81,6 +100,7 @@ class Cells:
             np.zeros((n, 3), np.float32),
         )  # fmt: skip
         self.rays, self.sums = np.ones(n, np.int32), np.zeros((n, 3))
+        self.verdicts = np.full(n, -1, np.int8)
 
     def look_around(self, centres: Places) -> None:
         """Look at centres of the rim."""
@@ -94,28 +114,46 @@ class Cells:
 
         ``inside`` are the own pixels in the order of the tile's rays, ``reach`` the lengths of all pixels' rays.
         """
-        error = self.wanted.error
-        steps, opened = np.zeros(self.lens.size, np.float32), np.zeros(self.lens.size, np.bool_)
+        many, error = self.lens.size, LOOSE * self.wanted.error
+        steps, rough, opened = np.zeros(many, np.float32), np.zeros(many, np.float32), np.zeros(many, np.bool_)
         kernels.encode(self.points.light[: self._count], self.curve, self.points.code)
         kernels.doubtful(self.points, self.lens, self.own, error, steps)
+        kernels.roughness(self.points, self.lens, np.empty((many, 2), np.float32), rough)
+        self._look_beyond(steps, rough)
         doubtful = steps > 0
         if len(self.sight.balls):
             pixels = inside[self._touched(inside)]
             opened[pixels] = True
-            self._sample(pixels, np.full(len(pixels), np.inf, np.float32))
-        if kernels.count_crowded(self.points, self.lens, steps) > DENSE * len(inside):
+            self._sample(pixels, np.full(len(pixels), MOST_SAMPLES))
+        kernels.crowded(self.points, self.lens, steps, crowded := np.empty(many, np.bool_))
+        if np.count_nonzero(crowded) > DENSE * len(inside):
             pixels = inside[(doubtful & ~opened)[inside]]
             opened[pixels] = True
-            self._sample(pixels, np.full(len(pixels), np.sqrt(np.mean(steps[pixels] ** 2)), np.float32))
+            self._share_out(pixels, rough, 0.0)
             return opened
-        corner_of = np.full((self.lens.size, 4), -1, np.int32)
+        left, thin = [], np.zeros(many, np.bool_)
+        corner_of = np.full((many, 4), -1, np.int32)
         for _ in range(ROUNDS):
             pixels = np.flatnonzero(doubtful & ~opened & self.own)
             if not len(pixels):
                 break
             opened[pixels] = True
-            self._open(self._near_together(pixels, reach), corner_of, doubtful)
+            left.append(self._open(self._near_together(pixels, reach), corner_of, doubtful, rough, thin))
+        self._share_out(np.concatenate(left or [inside[:0]]), rough, SPREAD)
+        self._follow(thin, opened)
         return opened
+
+    def _look_beyond(self, steps: NDArray[np.float32], rough: NDArray[np.float32]) -> None:
+        """Doubt pixels at the border of a lens on whose outer side another body is seen."""
+        places = _places(4 * int(np.count_nonzero(self.own)))
+        places = _part(places, slice(kernels.beyond(self.lens, self.own, steps, places)))
+        if not len(places.pixel):
+            return
+        first = self._look(places, self.sight.tracer.sees_bodies)
+        other = places.pixel[self.points.body[first : self._count] != self.points.body[places.pixel]]
+        self._count = first
+        usual = np.median(rough[steps > 0]) if (steps > 0).any() else 0.0
+        steps[other], rough[other] = WHITE, np.maximum(rough[other], usual)
 
     def _touched(self, pixels: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return which pixels small bodies may be seen in."""
@@ -145,25 +183,46 @@ class Cells:
         ranks = sum((steps[:, axis] >> bit & 1) << (3 * bit + axis) for bit in range(10) for axis in range(3))
         return pixels[np.argsort(ranks, kind="stable")]
 
-    def _open(self, pixels: NDArray[np.int64], corner_of: Whole, wanted: NDArray[np.bool_]) -> None:
-        """Find the light of pixels as cells between their corners."""
+    def _open(
+        self, pixels: NDArray[np.int64], corner_of: Whole, wanted: NDArray[np.bool_], rough: NDArray[np.float32],
+        thin: NDArray[np.bool_],
+    ) -> NDArray[np.int64]:  # fmt: skip
+        """Find the light of pixels as cells between their corners; return those that are none."""
         count = len(pixels)
         corners, places = np.empty((count, 4), np.int32), _places(4 * count)
         new = kernels.open_pixels(pixels, self.lens, corner_of, self._count, corners, places)
         self._look(_part(places, slice(new)))
         verdict, groups, steps = np.empty(count, np.int8), np.zeros(count, np.int8), np.zeros(count, np.float32)
         kernels.judge(
-            pixels, corners, self.points, self.wanted.error, self.lens, self.sums, verdict, groups, steps, wanted
-        )
+            pixels, corners, self.points, LOOSE * self.wanted.error, self.lens, self.sums, verdict, groups, steps,
+            wanted,
+        )  # fmt: skip
+        kernels.find_thin(pixels, corners, self.points, LOOSE * self.wanted.error, self.lens, thin)
         cut = np.flatnonzero(verdict == CUT)
         if len(cut):
             verdict[cut] = self._cut(pixels[cut], corners[cut], groups[cut])
+        self.verdicts[pixels] = verdict
         left = verdict == OPEN
-        self._sample(pixels[left], steps[left])
+        rough[pixels[left]] = steps[left] ** 2 / 3
+        return pixels[left]
+
+    def _follow(self, thin: NDArray[np.bool_], opened: NDArray[np.bool_]) -> None:
+        """Find the light of pixels in which a thin body may go on that was met nearby, as far as it does."""
+        calm = self.own & (self.verdicts != OPEN)
+        pixels = np.flatnonzero(thin & calm)
+        for _ in range(FOLLOWED):
+            if not len(pixels):
+                break
+            calm[pixels], opened[pixels], thin[:] = False, True, False
+            self._sample(pixels, np.full(len(pixels), OF_THIN))
+            light = self.sums[pixels].astype(np.float32)
+            kernels.encode(light, self.curve, codes := np.empty_like(light))
+            kernels.follow(pixels, codes, self.points, LOOSE * self.wanted.error, self.lens, thin)
+            pixels = np.flatnonzero(thin & calm & (self.verdicts != CUT))
 
     def _cut(self, pixels: NDArray[np.int64], corners: Whole, groups: NDArray[np.int8]) -> NDArray[np.int8]:
         """Find the light of cells with one edge; return which of them turn out to have none, or more."""
-        many, error = len(pixels), self.wanted.error
+        many, error = len(pixels), LOOSE * self.wanted.error
         of_cell, sides = np.empty((many, 4), np.int32), _sides(2 * many)
         side_of = np.full((self.lens.size, 4), -1, np.int32)
         made = kernels.gather_sides(pixels, corners, groups, self.lens, side_of, sides, of_cell)
@@ -226,17 +285,66 @@ class Cells:
             *rays[:2], points.light, Support(object_id=points.body, shading_normal=points.normal), rays[2], keys
         )
 
-    def _sample(self, pixels: NDArray[np.int64], steps: NDArray[np.float32]) -> None:
-        """Find the light of pixels by sets of samples: n miss an edge by `MISSED` / n^¾ of its step."""
-        s, least = self.sight, (MISSED * steps / self.wanted.error) ** (4 / 3)
-        numbers = SETS[np.searchsorted(SETS[:-1], least)]
+    def _share_out(self, pixels: NDArray[np.int64], rough: NDArray[np.float32], spread: float) -> None:
+        """Find the light of pixels by sets of samples, as many as give all opened pixels the error wanted."""
+        if not len(pixels):
+            return
+        weights, error = np.maximum(rough[pixels], 1.0).astype(np.float64), self.wanted.error
+        pilots = slice((every := max(len(pixels) // PILOTS, 4)) // 2, None, every)
+        edges, noise = self._pilot(pixels[pilots], float(np.mean(weights[pilots])))
+        eighths, which, times = np.unique(
+            np.rint(8 * np.log2(weights)).astype(np.int64), return_inverse=True, return_counts=True
+        )
+        weights = 2.0 ** (eighths / 8)
+        done, cut = (int(np.count_nonzero(self.verdicts == verdict)) for verdict in (DONE, CUT))
+        expected = weights**SPREAD_ERROR / np.average(weights**SPREAD_ERROR, weights=times)
+        least = (EDGE * weights / (FAR * error) ** 2) ** (1 / EDGES_FALL)
+        squares = error**2 * (len(pixels) + done * (1 - DONE_ERROR**2) + cut * (1 - CUT_ERROR**2))
+        low, high = -10.0, 10.0
+        for _ in range(30):
+            middle = (low + high) / 2
+            n = _numbers(np.maximum(2.0**middle * weights**spread, least))
+            more = np.sum(times * expected * (edges * n**-EDGES_FALL + noise * n**-NOISE_FALLS)) > squares
+            low, high = (middle, high) if more else (low, middle)
+        numbers = _numbers(np.maximum(2.0**high * weights**spread, least))[which]
+        todo = np.ones(len(pixels), np.bool_)
+        todo[pilots] = numbers[pilots] > sum(OF_PILOTS)
+        self._sample(pixels[todo], numbers[todo])
+
+    def _pilot(self, some: NDArray[np.int64], rough: float) -> tuple[float, float]:
+        """Return the mean square errors, in codes, of a sample: of edges and of noise.
+
+        Two sets in the same pixels differ by the sum of their errors. What is more than of edges is noise.
+        """
+        sets, self.sums[some] = [], 0.0
+        for number in OF_PILOTS:
+            light = np.ascontiguousarray(self._mean(some, number, number), np.float32)
+            self.sums[some] += light * (number / sum(OF_PILOTS))
+            sets.append(np.empty_like(light))
+            kernels.encode(light, self.curve, sets[-1])
+        apart = float(np.mean((sets[0] - sets[1]) ** 2)) / ALIKE
+        of_edges, of_noise = (sum(n**power for n in OF_PILOTS) for power in (-EDGES_FALL, -NOISE_FALLS))
+        edges = min(EDGE * rough, apart / of_edges)
+        return edges, (apart - edges * of_edges) / of_noise
+
+    def _sample(self, pixels: NDArray[np.int64], numbers: NDArray[np.int64]) -> None:
+        """Find the light of pixels by sets of so many samples."""
         for number in np.unique(numbers).tolist():
             some = pixels[numbers == number]
-            s.tracer.footprint = s.width[0] / number**0.5, s.width[1] / number**0.5
-            s.tracer.lobes = -(-LOBE_RAYS // number), number
-            light = fixed_sum(s.camera, number, s.seed, self.m[some], self.n[some], s.batch, s.parts, s.shoot)
-            self.sums[some] = light / number
-            self.rays[some] += number
+            self.sums[some] = self._mean(some, number)
+
+    def _mean(self, pixels: NDArray[np.int64], number: int, seed: int = 0) -> Floats:
+        """Return the mean light of a set of samples of each pixel."""
+        s = self.sight
+        s.tracer.footprint = s.width[0] / number**0.5, s.width[1] / number**0.5
+        s.tracer.lobes = -(-LOBE_RAYS // number), number
+        light = fixed_sum(s.camera, number, s.seed + seed, self.m[pixels], self.n[pixels], s.batch, s.parts, s.shoot)
+        self.rays[pixels] += number
+        return light / number
+
+
+def _numbers(least: Floats) -> NDArray[np.int64]:
+    return SETS[np.searchsorted(SETS_ENDS, least)]
 
 
 def small_balls(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats:

@@ -100,3 +100,12 @@ def test_sines_compact_what_grows_away_from_a_border():
         forward(block, np.int64(3), half, out, np.int64(kind))
         shares.append(out[0, 0] ** 2 / np.square(out.astype(float)).sum())
     assert shares[0] > 0.95 > 0.85 > shares[1] > shares[2]
+
+
+def test_costs_of_bits_are_the_information_of_the_nearest_probability():
+    """The table has 4096 probabilities: a cost lies between those of the neighbours half a step away."""
+    p = np.arange(2 * arithmetic.LEAST, arithmetic.ONE - 2 * arithmetic.LEAST, 7)
+    costs = arithmetic.bit_costs(np.stack([p, p], axis=1).astype(np.int32))
+    for bit, share in ((1, p), (0, arithmetic.ONE - p)):
+        least, most = (-np.log2((share + half) / arithmetic.ONE) for half in (8.5, -8.5))
+        assert (least <= costs[:, bit]).all() and (costs[:, bit] <= most).all()

@@ -124,13 +124,13 @@ def doubtful(points, lens, own, error, steps):
 
 
 @kernel
-def count_crowded(points, lens, steps):
-    """Count the doubtful pixels around which more than `MOST_GROUPS` surfaces and colours meet."""
+def crowded(points, lens, steps, out):
+    """Tell around which doubtful pixels more than `MOST_GROUPS` surfaces and colours meet."""
     height, width = lens.shape
-    crowded = 0
     for y in range(height):
         for x in range(width):
             i = y * width + x
+            out[i] = False
             if steps[i] == 0:
                 continue
             second, third, many = i, i, 1
@@ -141,8 +141,54 @@ def count_crowded(points, lens, steps):
                     known = known or _like(points, j, i, steps[i]) or _like(points, j, second, steps[i])
                     if not known and not _like(points, j, third, steps[i]):
                         second, third, many = third, j, many + 1
-            crowded += many > MOST_GROUPS
-    return crowded
+            out[i] = many > MOST_GROUPS
+
+
+@kernel
+def roughness(points, lens, steps, out):
+    """Mean square of the steps of colour, in codes, from pixel to pixel among each one and the eight around it.
+
+    ``steps`` (n, 2) is room for those to the right and down; −1 where another lens begins.
+    """
+    height, width = lens.shape
+    for y in range(height):
+        for x in range(width):
+            i = y * width + x
+            right = x + 1 < width and lens[y, x + 1] == lens[y, x]
+            down = y + 1 < height and lens[y + 1, x] == lens[y, x]
+            steps[i, 0] = _apart(points, i, i + 1) ** 2 if right else np.float32(-1)
+            steps[i, 1] = _apart(points, i, i + width) ** 2 if down else np.float32(-1)
+    for y in range(height):
+        for x in range(width):
+            total, many = np.float32(0), 0
+            for b in range(max(y - 1, 0), min(y + 2, height)):
+                for a in range(max(x - 1, 0), min(x + 2, width)):
+                    j = b * width + a
+                    if lens[b, a] != lens[y, x]:
+                        continue
+                    if a <= x and steps[j, 0] >= 0:
+                        total, many = total + steps[j, 0], many + 1
+                    if b <= y and steps[j, 1] >= 0:
+                        total, many = total + steps[j, 1], many + 1
+            out[y * width + x] = total / max(many, 1)
+
+
+@kernel
+def beyond(lens, own, steps, places):
+    """Middles of those sides of calm own pixels behind which another lens begins; return how many there are."""
+    height, width = lens.shape
+    made = 0
+    for y in range(height):
+        for x in range(width):
+            if not own[y * width + x] or steps[y * width + x] > 0:
+                continue
+            for side in range(4):
+                b, a = y + (side == 2) - (side == 0), x + (side == 1) - (side == 3)
+                if not (0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]):
+                    places.pixel[made] = y * width + x
+                    places.x[made], places.y[made] = (1 + a - x) * UNITS // 2, (1 + b - y) * UNITS // 2
+                    made += 1
+    return made
 
 
 @inline_kernel
@@ -298,6 +344,53 @@ def judge(pixels, corners, points, error, lens, sums, verdict, groups, steps, wa
             beside = 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]
             if beside and _apart(points, k[side], k[(side + 1) % 4]) * MISSED > error:
                 wanted[b * width + a] = True
+
+
+@inline_kernel
+def _differs(points, i, j, error):
+    return points.body[i] != points.body[j] and _apart(points, i, j) * MISSED > error
+
+
+@kernel
+def find_thin(pixels, corners, points, error, lens, thin):
+    """Mark pixels around places of a body that no place beside them has: centres among corners, and the other way."""
+    height, width = lens.shape
+    for i in range(pixels.shape[0]):
+        y, x = pixels[i] // width, pixels[i] % width
+        alone = True
+        for k in range(4):
+            right, down = _right_down(k)
+            alone &= _differs(points, pixels[i], corners[i, k], error)
+            corner_alone = True
+            for around in range(4):
+                b, a = y + down - 1 + around // 2, x + right - 1 + around % 2
+                if 0 <= b < height and 0 <= a < width and lens[b, a] == lens[y, x]:
+                    corner_alone &= _differs(points, corners[i, k], b * width + a, error)
+            if corner_alone:
+                _mark(lens, y + down - 1, y + down, x + right - 1, x + right, lens[y, x], thin)
+        if alone:
+            _mark(lens, y - 1, y + 1, x - 1, x + 1, lens[y, x], thin)
+
+
+@inline_kernel
+def _mark(lens, top, bottom, left, right, of, out):
+    height, width = lens.shape
+    for b in range(max(top, 0), min(bottom + 1, height)):
+        for a in range(max(left, 0), min(right + 1, width)):
+            if lens[b, a] == of:
+                out[b * width + a] = True
+
+
+@kernel
+def follow(pixels, codes, points, error, lens, wanted):
+    """Mark the pixels around those whose mean is not the light of their centre."""
+    width = lens.shape[1]
+    for i in range(pixels.shape[0]):
+        apart, y, x = np.float32(0), pixels[i] // width, pixels[i] % width
+        for c in range(3):
+            apart = max(apart, abs(codes[i, c] - points.code[pixels[i], c]))
+        if apart > error:
+            _mark(lens, y - 1, y + 1, x - 1, x + 1, lens[y, x], wanted)
 
 
 @kernel

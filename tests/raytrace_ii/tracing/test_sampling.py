@@ -308,7 +308,8 @@ def by_edges(scene, error=1.0, **more):
 INNER = np.s_[1:-1, 1:-1]  # beyond the border of the picture edges are not known
 
 
-@pytest.mark.parametrize("degrees", first_fast(range(0, 180, 15), 3))
+@pytest.mark.slow
+@pytest.mark.parametrize("degrees", range(0, 180, 15))
 def test_edges_of_half_planes_are_exact(degrees):
     for offset in (-0.37, 0.0, 0.21):
         polygon = half(degrees, offset)
@@ -332,6 +333,7 @@ def shadowed(polygon):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("polygons", "made", "most"),
     [
@@ -361,9 +363,8 @@ def test_other_edges_have_the_light_of_their_areas(polygons, made, most):
     assert np.sqrt(np.mean(off[(light != out)[INNER]] ** 2)) < most / 3
 
 
-@pytest.mark.parametrize(
-    "camera", first_fast([SMALL, HEXAGONAL, ONE_LENS], 2), ids=["regular", "hexagonal", "2d"][:3]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("camera", [SMALL, HEXAGONAL, ONE_LENS], ids=["regular", "hexagonal", "2d"])
 def test_edges_are_the_same_bits_for_any_workers_and_kept_in_support(camera):
     scene = hall()
     options = {"samples": "edges", "error": 4.0, "support": ("samples", "depth", "object_id")}
@@ -371,15 +372,16 @@ def test_edges_are_the_same_bits_for_any_workers_and_kept_in_support(camera):
     other = render(scene, camera, workers=3, executor=None, **options)
     one = render(scene, camera, support=("depth", "object_id"))
     np.testing.assert_array_equal(whole.picture.pixels, other.picture.pixels)
-    assert 1 < whole.samples.mean() < 20
+    assert 1 < whole.samples.mean() < 40
     assert whole.samples.sum() == sum(n * pixels for n, pixels in whole.stats.samples.items())
     calm = whole.samples == 1
     # some have corners whose rays their neighbours sent
-    assert (whole.picture.pixels[calm] == one.picture.pixels[calm]).mean() > 0.99
+    assert (whole.picture.pixels[calm] == one.picture.pixels[calm]).mean() > 0.98
     for name in ("depth", "object_id"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(one, name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [0.3, 0.7, 2.0])
 def test_small_bodies_are_all_found_by_edges(side):
     """Squares of 6·4 places in the pixels: a fixed ray a pixel would lose nine of ten of the smallest."""
@@ -394,6 +396,7 @@ def test_small_bodies_are_all_found_by_edges(side):
     assert all(seen[areas(square) > 0].sum() > 0 for square in squares)
 
 
+@pytest.mark.slow
 def test_edges_with_an_aperture_are_adaptive_samples():
     soft = IICamera(
         pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0, optics=(optics.Lenslet(focal_mm=2.0),)
