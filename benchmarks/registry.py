@@ -231,8 +231,7 @@ BENCHMARKS = {
             tables_in="study.page",
             writes=(f"{IMAGES}/study/*",),
         ),
-        Benchmark("pages.data_card", needs="results of `raytrace-ii benchmark` for photographs-small",
-            records="photographs-small/*.json", fills=("docs/benchmark.md",)),
+        Benchmark("pages.data_card", fills=("docs/benchmark.md",)),
         Benchmark("pages.tables", needs="records of all others"),
     )
 }  # fmt: skip

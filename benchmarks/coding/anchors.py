@@ -139,23 +139,24 @@ def changes(rows: Sequence[Mapping[str, Any]], names: Sequence[str], scheme: str
 
 
 def comparison(rows: Sequence[Mapping[str, Any]], names: Sequence[str], others: Sequence[str]) -> list[str]:
-    """Return a table of Bjøntegaard rates by picture, their mean and the worst."""
+    """Return a table of Bjøntegaard rates by picture, their mean and the worst; without columns that are empty."""
     measured = {row["picture"]: row for row in rows}
     shown = [name for name in names if name in measured]
     each = {other: changes(rows, shown, other) for other in others}
-    heads = [f"{label}: `{other}`" for other in others for label in ("CTC", "luma", "RGB")]
+    labels = {"ctc": "CTC", LUMA: "luma", "psnr": "RGB"}
+    columns = [(other, measure) for other in others for measure in labels if each[other][measure]]
+    heads = [f"{labels[measure]}: `{other}`" for other, measure in columns]
     lines = []
     for name in shown:
         (k, l), (u, v) = measured[name]["lenses"], measured[name]["ei_pixels"]
-        cells = [percent(each[other][measure].get(name)) for other in others for measure in ("ctc", LUMA, "psnr")]
+        cells = [percent(each[other][measure].get(name)) for other, measure in columns]
         lines.append([name.removesuffix(f"-{u}x{v}") if u < 9 else name, f"{u}×{v} of {k}×{l}", *cells])
     for label, of in (("mean", np.mean), ("worst", max)):
         cells = []
-        for other in others:
-            for measure in ("ctc", LUMA, "psnr"):
-                values = list(each[other][measure].values())
-                some = f" of {len(values)}" if len(values) < len(shown) else ""
-                cells.append(percent(float(of(values))) + some if values else "–")
+        for other, measure in columns:
+            values = list(each[other][measure].values())
+            some = f" of {len(values)}" if len(values) < len(shown) else ""
+            cells.append(percent(float(of(values))) + some)
         lines.append([f"**{label}**", "", *cells])
     return [*table(" | ".join(["picture", "views of pixels", *heads]), lines)]
 

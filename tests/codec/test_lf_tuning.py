@@ -89,9 +89,10 @@ def test_each_tuning_is_better_by_its_own_measure():
     st.sampled_from([(0, 0, 1024), (0, 0, -1024)]) | st.tuples(*2 * [st.integers(-4096, 4096)], st.integers(1, 4096)),
     st.tuples(st.booleans(), st.booleans()),
     st.none() | st.tuples(st.integers(1, 255), st.integers(1, 255)),
+    st.sampled_from(stream.FLAGGED),
     st.integers(0, 2**32 - 1),
 )
-def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, seed):
+def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, version, seed):
     rng = np.random.default_rng(seed)
     log_stride, sources, crossed = numbers
     low, high = sorted(rng.integers(-(1 << 14), (1 << 14) + 1, 2).tolist())
@@ -110,6 +111,8 @@ def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, 
         skipping=tools[0],
         tuned=True,
         filtered=tools[1],
+        dependent=version > stream.TUNED,
+        directed=version > stream.DEPENDENT,
         steps=tuple(rng.integers(1, (1 << 18) + 1, log_stride + 2).tolist()),
     )
     levels = [rng.bytes(int(rng.integers(0, 300))) for _ in header.steps]

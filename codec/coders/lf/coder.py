@@ -266,6 +266,7 @@ class Source:
             tuned=not exact,
             filtered=not exact,
             dependent=not exact,
+            directed=not exact,
             steps=(),
         )
 
