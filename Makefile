@@ -5,7 +5,7 @@ PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 p
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo study test test-all lint kernels bench docs gallery clean
+.PHONY: demo study test test-all lint kernels sources bench docs gallery clean
 
 demo: $(VENV)/.installed
 	$(BIN)/python examples/demo.py
@@ -17,10 +17,10 @@ study: $(VENV)/.installed
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 # tests start many processes: a compiled source is imported in 60 % of the time
-test test-all: export PYTHONDONTWRITEBYTECODE :=
+test test-all sources: export PYTHONDONTWRITEBYTECODE :=
 
 test: $(VENV)/.installed
-	$(MAKE) --no-print-directory -j2 lint kernels
+	$(MAKE) --no-print-directory -j2 lint kernels sources
 	$(PYTEST) -m "not slow"
 
 # the slow tests, which `test` leaves out
@@ -31,6 +31,10 @@ test-all: $(VENV)/.installed kernels
 kernels: kernels-light-field kernels-others
 kernels-%: $(VENV)/.installed
 	$(BIN)/python -m tests.support.kernels $*
+
+# tests are read once, in a process of its own while others compile: each worker would take twice as long for it
+sources: $(VENV)/.installed
+	$(BIN)/python -m pytest -q --collect-only -m "not slow" >/dev/null
 
 lint: $(VENV)/.installed
 	$(BIN)/ruff check .

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .files.load import load_scene, scene_names
+    from .files.rgbd import rgbd_scene
     from .files.take import Take, load_take
     from .rendering.audit import Audit
     from .rendering.options import RenderOptions
@@ -33,6 +34,7 @@ __all__ = [
     "render",
     "render_take",
     "render_to",
+    "rgbd_scene",
     "scene_names",
     "trace",
 ]
@@ -40,6 +42,7 @@ __all__ = [
 _HOMES = {
     "load_scene": "files.load",
     "scene_names": "files.load",
+    "rgbd_scene": "files.rgbd",
     "Take": "files.take",
     "load_take": "files.take",
     "trace": "tracing.tracer",

@@ -30,10 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import IMAGES, write_picture
+from benchmarks.pages.pictures import IMAGES, enlarged, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import ALL, Records, origin, table
-from benchmarks.study.sheets import enlarged
 from ii_core import (
     IICamera,
     NoLenses,

@@ -1,27 +1,24 @@
 """Ray optics against wave optics: error of pictures by rays and by point-spread models.
 
-    python -m benchmarks run waves [--parts field,setup1] [--again all]
+    python -m benchmarks run waves [--again all]
 
 A row of pixels under one lens shows a texture of even stripes, 8 pixels wide in the mean. The truth is the wave's
 point-spread function, summed over pixels: of a round lens by its angular spectrum, or Airy's closed form where the
 field would be too large. The model by rays leaves the texture as it is. The point-spread maps of
 `ii_core.waves.spread` are the model of round lenses, the box of rays folded with sinc² that of slits. Errors are PSNR
-of linear light. The last rows spread *Apples* and *Cuboid* as ideal and as glass lenses of full setup1 do, and code
-them (`lens_setup1`).
+of linear light.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.accuracy.lens_setup1 import LENSES, oblique, spread_scene
 from benchmarks.arguments import command_line
 from benchmarks.pages.pictures import tidy, write_chart
 from benchmarks.pages.tables import Tables, publish
@@ -32,13 +29,12 @@ from ii_core.waves.spread import spread_maps, spread_picture
 from ii_core.waves.wave import diffraction_limit, lens_spread, model_spread, pixel_kernel
 from metrics.plots.rd_chart import COLOURS, MARKERS, new_figure
 
-RECORDS = Records("waves", ("benchmarks.accuracy.waves", "benchmarks.accuracy.lens_setup1"))
+RECORDS = Records("waves", ("benchmarks.accuracy.waves",))
 PIXELS = 16  # under a lens
 REACH = 2 * PIXELS  # of a kernel
 PITCH, RATIO, WAVELENGTH = 0.0976, 1.8718, 550.0  # of setup1: mm, gap over pitch, nm
 WAVELENGTHS = (450.0, 550.0, 650.0)
 ENOUGH_DB = 40.0
-SCENES, SCALE = ("apples", "cuboid"), 8
 TEXTURE, PATCH = 4096, 8  # pixels of the texture, and of a stripe in the mean
 SHAPES = ("round", "slit")
 # Sweeps: values, and label of the axis.
@@ -52,12 +48,9 @@ SWEEPS: dict[str, tuple[tuple[float, ...], str]] = {
 
 def main() -> None:
     """Measure, keep, draw, fill the page."""
-    parser = command_line(__doc__, parts=tuple(PARTS))
-    asked = parser.parse_args()
-    if unknown := set(asked.parts) - set(PARTS):
-        parser.error(f"no part {min(unknown)!r}: known are {', '.join(PARTS)}")
-    for part in asked.parts:
-        RECORDS.run(*PARTS[part], asked.again)
+    asked = command_line(__doc__).parse_args()
+    keys = [{"sweep": n, "wavelength_nm": w, "lens": s} for s in SHAPES for n in SWEEPS for w in WAVELENGTHS]
+    RECORDS.run(keys, swept, asked.again)
     write_chart(draw(), "waves.png")
     publish(tables())
 
@@ -65,22 +58,6 @@ def main() -> None:
 def swept(sweep: str, wavelength_nm: float, lens: str) -> dict[str, Any]:
     """Return the result of a sweep by its key."""
     return {"points": sweep_points(sweep, wavelength_nm, lens)}
-
-
-def diagonal(lens: str, field: str) -> dict[str, Any]:
-    """Return the spots along the diagonal of a lens of setup1, by the key of their row."""
-    return {"pixels": oblique()}
-
-
-# Parts of the run: the keys of the rows, and the function that measures one.
-PARTS: dict[str, tuple[list[dict[str, Any]], Callable[..., dict[str, Any]]]] = {
-    "sweeps": (
-        [{"sweep": n, "wavelength_nm": w, "lens": s} for s in SHAPES for n in SWEEPS for w in WAVELENGTHS],
-        swept,
-    ),
-    "field": ([{"lens": "glass", "field": "diagonal"}], diagonal),
-    "setup1": ([{"scene": name, "scale": SCALE, "lens": lens} for name in SCENES for lens in LENSES], spread_scene),
-}
 
 
 def sweep_points(name: str, wavelength_nm: float, shape: str) -> list[dict[str, float]]:
@@ -185,9 +162,8 @@ def draw() -> Any:
 
 
 def tables() -> Tables:
-    """Return where each model leaves 40 dB, what becomes of setup1, and what maps of glass lenses leave out."""
-    page = "docs/waves.md"
-    return {(page, "limits"): limits_table(), (page, "setup1"): setup1_table(), (page, "field"): field_table()}
+    """Return where each model leaves 40 dB."""
+    return {("docs/waves.md", "limits"): limits_table()}
 
 
 def limits_table() -> list[str]:
@@ -218,28 +194,3 @@ def crossing(points: list[dict[str, float]], key: str) -> str:
             )
             return f"{value:.3g} ({pixel:.1f} λΛ/δL)"
     return "always " + ("above" if number(points[0][key]) > ENOUGH_DB else "below")
-
-
-def setup1_table() -> list[str]:
-    """Error by spread light, disparity, and the coding gain, of each lens."""
-    rows, lines = [row for row in RECORDS.rows(scale=SCALE) if "lens" in row], []
-    for row in rows:
-        same = row["lens"] == "rays"
-        head = "– | –" if same else f"{row['psnr']:.1f} dB | {row['q_view']:.4f}"
-        moved = "–" if same else f"{row['disparity_change']:.3f}"
-        tail = f"{moved} | {row['disparity_error']:.3f} | {row['gain']:+.2f} dB"
-        lines.append(f"{row['scene']} | {row['lens']} | {head} | {tail}")
-    heads = "scene | lens | PSNR | Q_view | disparity: median change | error, median | gain of SI-PVS"
-    return [*table(heads, lines), "", origin(rows)]
-
-
-def field_table() -> list[str]:
-    """Rms radius of the rays' spot along the diagonal of a lens, and that of maps."""
-    rows = RECORDS.rows(field="diagonal")
-    if not rows:
-        return []
-    lines = ["| pixels from the axis | all rays, px | maps, px |", "|---|---|---|"]
-    lines += [
-        f"| {p['from_axis_px']:.1f} | {p['traced_px']:.2f} | {p['maps_px']:.2f} |" for p in rows[0]["pixels"][1::2]
-    ]
-    return [*lines, "", origin(rows)]

@@ -43,8 +43,13 @@ QUANTISERS = {
     "x265": (16, 21, 26, 31, 36),
     "vvenc": (20, 25, 30, 35, 40),
     "libaom": (14, 24, 34, 44, 54),
+    "svtav1": (16, 26, 36, 46, 56),
+    "jpegxl": (0.6, 1.5, 4, 9, 15),
+    "si-jpeg2000": (2, 1, 0.5, 0.25, 0.12),
 }
+BY_RATE = "si-jpeg2000"  # its quantisers are rates in bpp
 OF_SINGLE = (29, 34, 39, 44, 49)  # of `si-lf` for a view alone: the first of many is finer than the rest
+OTHERS = ("svtav1", "jpegxl", BY_RATE)
 SCHEMES = (OURS, BY_RGB, AVIF, "x265", "vvenc", "libaom")
 MEASURES = {"ctc": "q_ctc_psnr", "psnr": "q_global", "ssim": "q_ctc_ssim", "worst": "q_ctc_min", "step": "q_ctc_step"}
 LUMA = "luma"  # PSNR of Y in the codes of the common test conditions, mean over views
@@ -54,7 +59,7 @@ def main() -> None:
     """Measure, print, record and fill the page."""
     views = [f"{name}-5x5" for name in PHOTOGRAPHS if name != "worm"]  # its views are smaller than any coder's blocks
     single = [f"{name}-1x1" for name in (*PHOTOGRAPHS, *SINGLE)]
-    parser = command_line(__doc__, pictures=(*views, *single, *SCENES, *FIELDS), schemes=SCHEMES)
+    parser = command_line(__doc__, pictures=(*views, *single, *SCENES, *FIELDS), schemes=(*SCHEMES, *OTHERS))
     parser.add_argument("--photographs", type=Path, help="folder of the benchmark's photographs")
     asked = parser.parse_args()
     keys = [{"picture": name, "scheme": scheme} for name in asked.pictures for scheme in asked.schemes]
@@ -85,7 +90,7 @@ def curve(original: IIPicture, scheme: str) -> dict[str, Any]:
     measure: Any = measuring(original, list(MEASURES.values()))
     anchor, points = AnchorCoder(scheme) if scheme in ANCHORS else None, []
     if anchor is None:
-        compiled(scheme, qp=QUANTISERS[OURS][0])
+        compiled(scheme, **({"bpp": 1} if scheme == BY_RATE else {"qp": QUANTISERS[OURS][0]}))
     alone = original.ei_pixels == (1, 1) and scheme.startswith(OURS)
     for quantiser in OF_SINGLE if alone else QUANTISERS[scheme.partition(":")[0]]:
         coded, picture, own = at_quantiser(original, scheme, anchor, quantiser)
@@ -98,11 +103,12 @@ def curve(original: IIPicture, scheme: str) -> dict[str, Any]:
 
 
 def at_quantiser(
-    original: IIPicture, scheme: str, anchor: AnchorCoder | None, quantiser: int
+    original: IIPicture, scheme: str, anchor: AnchorCoder | None, quantiser: float
 ) -> tuple[Any, Any, Any]:
     """Return what was coded, the decoded picture, and the codes that an anchor returned."""
     if anchor is None:
-        coded = encode(original, scheme, qp=quantiser)
+        goal: Any = {"bpp" if scheme == BY_RATE else "qp": quantiser}
+        coded = encode(original, scheme, **goal)
         return coded, timed_decode(coded).picture, None
     stream = anchor.encode_at(original, quantiser)
     answer = anchor.decode(stream)
@@ -133,23 +139,24 @@ def changes(rows: Sequence[Mapping[str, Any]], names: Sequence[str], scheme: str
 
 
 def comparison(rows: Sequence[Mapping[str, Any]], names: Sequence[str], others: Sequence[str]) -> list[str]:
-    """Return a table of Bjøntegaard rates by picture, their mean and the worst."""
+    """Return a table of Bjøntegaard rates by picture, their mean and the worst; without columns that are empty."""
     measured = {row["picture"]: row for row in rows}
     shown = [name for name in names if name in measured]
     each = {other: changes(rows, shown, other) for other in others}
-    heads = [f"{label}: `{other}`" for other in others for label in ("CTC", "luma", "RGB")]
+    labels = {"ctc": "CTC", LUMA: "luma", "psnr": "RGB"}
+    columns = [(other, measure) for other in others for measure in labels if each[other][measure]]
+    heads = [f"{labels[measure]}: `{other}`" for other, measure in columns]
     lines = []
     for name in shown:
         (k, l), (u, v) = measured[name]["lenses"], measured[name]["ei_pixels"]
-        cells = [percent(each[other][measure].get(name)) for other in others for measure in ("ctc", LUMA, "psnr")]
+        cells = [percent(each[other][measure].get(name)) for other, measure in columns]
         lines.append([name.removesuffix(f"-{u}x{v}") if u < 9 else name, f"{u}×{v} of {k}×{l}", *cells])
     for label, of in (("mean", np.mean), ("worst", max)):
         cells = []
-        for other in others:
-            for measure in ("ctc", LUMA, "psnr"):
-                values = list(each[other][measure].values())
-                some = f" of {len(values)}" if len(values) < len(shown) else ""
-                cells.append(percent(float(of(values))) + some if values else "–")
+        for other, measure in columns:
+            values = list(each[other][measure].values())
+            some = f" of {len(values)}" if len(values) < len(shown) else ""
+            cells.append(percent(float(of(values))) + some)
         lines.append([f"**{label}**", "", *cells])
     return [*table(" | ".join(["picture", "views of pixels", *heads]), lines)]
 
@@ -185,12 +192,14 @@ def tables() -> Tables:
     rows = RECORDS.rows()
     kinds = {
         "anchors-photographs": ([f"{name}-5x5" for name in PHOTOGRAPHS], ("vvenc", "libaom", "x265")),
+        "anchors-others": ([f"{name}-5x5" for name in PHOTOGRAPHS], OTHERS),
         "anchors-single": ([f"{name}-1x1" for name in (*PHOTOGRAPHS, *SINGLE)], ("libaom", AVIF)),
         "anchors-scenes": ([*SCENES, *FIELDS], ("vvenc", "libaom", "x265")),
     }
     found = {}
     for mark, (names, others) in kinds.items():
-        used = [row for row in rows if row["picture"] in names]
+        compared = {row["picture"] for row in rows if row["scheme"] in others}
+        used = [row for row in rows if row["picture"] in compared.intersection(names)]
         lines = [*comparison(used, names, others), "", origin(used)] if used else ["Not measured yet."]
         found["docs/benchmark.md", mark] = lines
     names, others = kinds["anchors-photographs"]

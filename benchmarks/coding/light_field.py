@@ -15,17 +15,15 @@ PSNR of RGB, for which its second curve is. Numbers go to ``benchmarks/results/l
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.arguments import command_line
-from benchmarks.coding import coders
 from benchmarks.coding.rd import compiled
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin, table
@@ -55,7 +53,6 @@ QUANTISERS = {
 }
 OTHERS = ("si-avif:best", "si-hevc:best")
 LOSSLESS = ("si-lf:lossless=1", "si-ffv1", "jpegxl:lossless=1")
-TARGET_SCALES = (4, 1)  # of the records of `coders`
 VIEWS, GAP = 9, 6  # views per side; factor on disparity, by a larger gap
 
 
@@ -183,52 +180,13 @@ def tables() -> Tables:
         ),
         "lf-tools": table(" | ".join(["picture", *heads]), tools),
     }
-    own = {("docs/lf.md", mark): [*lines, "", origin(rows)] for mark, lines in made.items()}
-    peers = {scale: coders.RECORDS.rows(scale=scale) for scale in TARGET_SCALES}
-    return {("docs/lf.md", "lf-targets"): targets(peers), **own}
-
-
-def targets(records: Mapping[int, Sequence[Mapping[str, Any]]]) -> list[str]:
-    """Return a table of `si-lf` against the best of all other schemes, by records of `coders` by scale.
-
-    Schemes are in order of their Bjøntegaard rate against the anchor of `coders`; each then meets the best so far.
-    """
-    lines: list[str] = []
-    for scale, rows in records.items():
-        for scene in SCENES:
-            curves = {row["scheme"]: row["points"] for row in rows if row["scene"] == scene}
-            others = [name for name in curves if not _is_ours(name)]
-            best = least_rate(curves, others)
-            lines += [
-                f"{scale} | {scene}{'' if name == OURS else f', `{name}`'} | `{best}` | {len(others)} | "
-                f"{difference(curves[best], curves[name])}"
-                for name in filter(_is_ours, curves if best else ())
-            ]
-    heads = "scale | scene | least rate of all others | others | rate of `si-lf`"
-    return [*table(heads, lines), "", origin(chain(*records.values()))] if lines else ["Not measured yet."]
+    return {("docs/lf.md", mark): [*lines, "", origin(rows)] for mark, lines in made.items()}
 
 
 def ours_by_rgb(curves: Mapping[tuple[str, str], Any], name: str) -> Any:
     """Return our curve that is tuned for RGB: of versions that had no other tuning, the only one; else None."""
     tuned, only = curves.get((name, BY_RGB)), curves.get((name, OURS))
     return tuned or (None if only and "ctc" in only[0] else only)
-
-
-def least_rate(curves: Mapping[str, Any], names: Sequence[str]) -> str:
-    """Return the scheme with the least rate of these; none without the anchor's curve."""
-    if coders.ANCHOR not in curves:
-        return ""
-    rates = {name: rate_change(curves[coders.ANCHOR], curves[name]) for name in names}
-    known = {name: rate for name, rate in rates.items() if rate is not None}
-    best = coders.ANCHOR
-    for other in sorted(known, key=known.__getitem__):
-        if (rate_change(curves[best], curves[other]) or 0) < 0:
-            best = other
-    return best
-
-
-def _is_ours(scheme: str) -> bool:
-    return scheme.partition(":")[0] == OURS
 
 
 def difference(anchor: Any, tested: Any, quality: str = "psnr") -> str:

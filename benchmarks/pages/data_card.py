@@ -1,21 +1,13 @@
-"""Data card, anchors and results of the benchmark, for ``docs/benchmark.md``."""
+"""Data card and anchors of the benchmark, for ``docs/benchmark.md``."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from benchmarks.pages.tables import Tables, publish
-from benchmarks.records import ROOT
 from metrics.benchmark.anchors import ANCHORS
 from metrics.benchmark.card import CAPTION, card_table
 from metrics.benchmark.profile import profile, profile_names
-from metrics.benchmark.ranking import check_comparable, ranked, worst
-from metrics.benchmark.ranking_page import conditions
-from metrics.benchmark.result import read_result
-
-RESULTS = ROOT / "benchmarks" / "results"
 
 
 def main() -> None:
@@ -32,31 +24,8 @@ def tables() -> Tables:
         lines += [*short_table(name, card_table(profile(name))[:-2]), ""]
     anchors = ["| anchor | samples | arguments of the encoder |", "|---|---|---|"]
     anchors += [f"| `{name}` | `{anchor.pixels}` | `{anchor.encoder}` |" for name, anchor in ANCHORS.items()]
-    found = {"data-card": [*lines, CAPTION], "anchors": anchors, "photographs-small": results("photographs-small")}
+    found = {"data-card": [*lines, CAPTION], "anchors": anchors}
     return {("docs/benchmark.md", mark): table for mark, table in found.items()}
-
-
-def results(name: str) -> list[str]:
-    """Return the Bjøntegaard rates of the stored results of a profile: mean, and worst picture."""
-    defined = profile(name)
-    read = [(path.name, read_result(path)) for path in sorted((RESULTS / name).glob("*.json"))]
-    check_comparable(defined, read)
-    rows = ranked(defined, [result for _, result in read])
-    lines = [
-        "| coder | targets met | by PSNR-YUV (CTC) | by RGB PSNR | by SSIM (CTC) | commit |",
-        "|---|---|---|---|---|---|",
-    ]
-    for row in rows:
-        cells = [f"`{row['coder']}`", f"{row['met']} of {row['targets']}"]
-        for measure in ("q_ctc_psnr", "q_global", "q_ctc_ssim"):
-            each = row["differences"][measure]
-            most = worst(each)
-            whole = most is not None and len(each) == len(defined.pictures)
-            cells.append(
-                f"{np.mean(list(each.values())):+.1f} %; {most[1]:+.1f} % {most[0]}" if whole and most else "–"
-            )
-        lines.append(f"| {' | '.join(cells)} | `{row['result']['git']['commit'][:7]}` |")
-    return ["BD rate against `x265`: mean; worst picture. " + conditions(defined, rows), "", *lines]
 
 
 def short_table(name: str, lines: Sequence[str]) -> list[str]:

@@ -21,12 +21,12 @@ from ii_core import (
 from ii_core.base.files import write_image
 from raytrace_ii import load_scene, render
 
+from ..pages.pictures import GAP, enlarged, sheet
 from .coding import setup3_scale, shot
 from .runner import Step
-from .sheets import GAP, enlarged, sheet
 
 PANEL = (208, 104)  # pixels of a panel of Figure 2.25 and Figure 3.8
-USES = ("benchmarks.study.coding", "benchmarks.study.sheets")
+USES = ("benchmarks.study.coding", "benchmarks.pages.pictures")
 CLOSE = 8  # lenses across a detail of Figure 3.8
 
 

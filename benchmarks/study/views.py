@@ -28,10 +28,10 @@ from metrics import (
 )
 from raytrace_ii import Shot
 
+from ..pages.pictures import enlarged, sheet
 from .coding import CODED, SCENES, curves, rated, setup3_scale, shot
 from .rates import REFERENCE, VOLUME
 from .runner import Step
-from .sheets import enlarged, sheet
 
 PVS = ("si-h264:chroma=420", "ei-h264:chroma=420", "ri-h264:chroma=420")
 SHOWN = (REFERENCE, VOLUME, *PVS)  # the order of Figures 5.13 to 5.18
@@ -43,7 +43,7 @@ EQUAL_DB = 28.0
 TRIES = 6
 CLOSE_DB = 0.05
 PANEL = 256  # pixels across
-USES = (*CODED, "benchmarks.study.sheets")
+USES = (*CODED, "benchmarks.pages.pictures")
 
 
 def steps(scale: int) -> list[Step]:

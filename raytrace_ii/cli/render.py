@@ -50,6 +50,28 @@ class Placing:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Photograph:
+    """Options of a picture with depth in place of a scene."""
+
+    rgbd: Annotated[
+        tuple[Path, Path] | None,
+        typer.Option(help="A picture and its depth map (.exr, .pfm, .png) as a scene."),
+    ] = None
+    field_deg: Annotated[float, typer.Option(help="Horizontal angle of view of its camera.")] = 60.0
+    inverse: Annotated[
+        float | None,
+        typer.Option(help="The map is 1/z without a scale: the darkest is so many times as far as the brightest."),
+    ] = None
+
+    def scene(self) -> Scene:
+        """Return the scene of the files."""
+        from ..files.rgbd import read_rgbd
+
+        assert self.rgbd is not None
+        return read_rgbd(*self.rgbd, field_deg=self.field_deg, inverse=self.inverse)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Place:
     """Options of where the camera stands."""
 
@@ -170,6 +192,7 @@ def render(
     ] = "",
     camera: Annotated[str, typer.Option(help="A camera's name, a .json file, or a folder of maps.")] = "setup1",
     scale: Annotated[int, typer.Option(help="Divides the number of lenses, at the same pixels per lens.")] = 1,
+    photograph: Photograph,
     motion: Motion,
     placing: Placing,
     place: Place,
@@ -190,8 +213,12 @@ def render(
     --frames renders a moving scene into a folder: frame_0000.png and so on, and support images as frame_0000_NAME.
     Unchanged frames are kept.
     """
-    if bool(scene) == bool(set_name):
-        raise ValueError("a scene, or --set, is needed: `raytrace-ii scenes` lists scenes")
+    if bool(scene) + bool(set_name) + bool(photograph.rgbd) != 1:
+        raise ValueError("a scene, --set or --rgbd is needed: `raytrace-ii scenes` lists scenes")
+    if photograph.rgbd:
+        check_unused(context, "a picture with depth", "rotate", "fit", "frames", "clip", "fps")
+    else:
+        check_unused(context, "a scene", "field_deg", "inverse")
     if set_name.partition(":")[0] == "benchmark":
         from .benchmark_pictures import render_profiles
 
@@ -231,7 +258,7 @@ def render(
         options |= {"dtype": dtype, "audit": sampling.audit}
         from ..files.load import load_scene
 
-        loaded = load_scene(scene, **placing.options())
+        loaded = photograph.scene() if photograph.rgbd else load_scene(scene, **placing.options())
         _render_scene(loaded, output, views, images, options, means, spread)
 
 

@@ -35,6 +35,7 @@ def test_the_demo_writes_all_its_files(tmp_path, monkeypatch, capsys):
     assert best["si-h264"] > best["jpeg2000"] + 3  # several dB, even with so few lenses
 
 
+@pytest.mark.slow
 def test_the_readme_example_runs(tmp_path, monkeypatch, capsys):
     code = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
     assert code is not None

@@ -47,6 +47,7 @@ def shape(path):
         return film.size, film.n_frames, film.info["loop"]
 
 
+@pytest.mark.slow
 def test_the_readme_opens_with_a_light_film(tmp_path):
     """The script writes the film from a larger picture; b1dc540 had a still of an eighth of the lenses."""
     assert hero.PATH.stat().st_size < 1e6

@@ -34,6 +34,7 @@ def test_a_contact_shadow_begins_at_one_lift():
     assert [row["in shadow"] for row in geometry.contact_shadow()] == [0, 0, 0, 1, 1, 1]
 
 
+@pytest.mark.slow
 def test_small_bodies_lose_shadows_only_on_huge_faces():
     rows = {row["floor, mm"]: row for row in geometry.huge_beside_tiny(balls=40, segments=12)}
     assert rows[1e4]["shadows there"] == 1 and rows[2e7]["shadows there"] == 0
@@ -58,6 +59,7 @@ def test_grazing_light_stays_right_and_hits_drift():
     assert rows[0]["place off by, mm"] < 1e-4 < rows[-1]["place off by, mm"]
 
 
+@pytest.mark.slow
 def test_a_camera_in_glass_agrees_with_the_closed_form_up_to_the_mesh():
     """96 segments leave up to 2e-3 mm between them."""
     rows = light.camera_in_glass(segments=96, n=500)
@@ -72,6 +74,7 @@ def test_lamps_light_a_floor_from_one_lift_on():
     assert {row["scene"]: row["lit"] for row in light.camera_in_body()} == {"lamp outside": 0, "lamp within": 1}
 
 
+@pytest.mark.slow
 def test_light_of_missing_bounces_is_the_rest_of_the_geometric_series():
     assert max(row["largest difference"] for row in light.bounces()) < 1e-6
 
@@ -116,6 +119,7 @@ def test_a_strong_mirror_has_the_depth_of_the_mirrored_scene():
         assert whole[f"{kind}, robust: wall"] < 0.05 and whole[f"{kind}, robust: behind"] > 0.95
 
 
+@pytest.mark.slow
 def test_depth_of_views_fails_at_mirrors_thin_bars_noise_and_without_texture():
     rows = depth.depth_of_views({"mirror": (0.1, 0.9), "thin": (1, 5), "noise": (8, 24), "contrast": (0, 8)})
     good = {(row["kind"], row["amount"]): row["within 0.07 px"] for row in rows}

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.pages.pictures import STRIP
 from benchmarks.pages.tables import filled
 from benchmarks.study import beside, claims, theirs
 from benchmarks.study.__main__ import all_steps, main
 from benchmarks.study.page import PAGE, largest, publish, tables
 from benchmarks.study.runner import Step, code_of, known, perform, records, timeless
-from benchmarks.study.sheets import STRIP
 from benchmarks.study.views import towards
 from ii_core.base.files import read_image, write_image
 

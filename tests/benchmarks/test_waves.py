@@ -1,6 +1,5 @@
 """Chart of rays against waves: its errors by hand, and the rule of thumb of its page in its records."""
 
-import inspect
 import math
 
 import numpy as np
@@ -36,30 +35,6 @@ def test_round_kernels_agree_where_the_field_gives_way_to_airys_pattern():
     closed = waves.diffraction_limit(np.hypot(airy, airy[:, None]), pitch, gap, 550.0, 2).sum(axis=0)
     both = [waves.pixel_kernel(places, light, pixel, 8) for places, light in ((x, columns), (airy, closed))]
     assert waves.error_db(*both) > 60
-
-
-def test_spot_off_the_axis_is_that_of_all_rays_in_the_middle():
-    """In the middle the maps hold all that the rays do, to the fifth order; at the corner they lack the rest."""
-    (key,), measured = waves.PARTS["field"]
-    spots = measured(**key)["pixels"]
-    recorded = waves.RECORDS.rows(**key)[0]["pixels"]  # measured by a driver of its own, before --parts
-    assert [one["maps_px"] for one in spots] == pytest.approx([one["maps_px"] for one in recorded], rel=1e-3)
-    assert spots[0]["maps_px"] == pytest.approx(spots[0]["traced_px"], rel=0.1)
-    assert spots[-1]["traced_px"] > spots[0]["traced_px"]
-
-
-def test_every_recorded_row_is_of_a_part(monkeypatch, capsys):
-    """Rows of setup1 and of the field were measured by drivers that nobody else had."""
-    keys = [key for keys, _ in waves.PARTS.values() for key in keys]
-    for row in waves.RECORDS.newest():
-        assert row["key"] in keys or "lens" not in row["key"]  # the first rows had no lens
-    for keys, measured in waves.PARTS.values():
-        for key in keys:
-            inspect.signature(measured).bind(**key)
-    monkeypatch.setattr("sys.argv", ["waves", "--parts", "field,everything"])
-    with pytest.raises(SystemExit):
-        waves.main()
-    assert "no part 'everything': known are sweeps, field, setup1" in capsys.readouterr().err
 
 
 def test_the_rule_of_thumb_is_what_was_measured():

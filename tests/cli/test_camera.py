@@ -156,6 +156,7 @@ def frames(tmp_path_factory):
     return folder, camera
 
 
+@pytest.mark.slow
 def test_a_raw_picture_becomes_an_ordinary_ii_picture(run, frames, tmp_path):
     """Calibrated, regular with odd rows under even ones, coded and decoded."""
     folder, camera = frames

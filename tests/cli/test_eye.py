@@ -156,6 +156,7 @@ def _srgb(light):
     return srgb(light)
 
 
+@pytest.mark.slow
 def test_an_eye_sees_the_light_spread_towards_it(run, tmp_path):
     assert run("render", "apples", "--scale", 64, "-o", tmp_path / "a.png")[0] == 0
     folder = stored(run, tmp_path / "cam", "--spread", "-200", "--format", "exr")
@@ -168,6 +169,7 @@ def test_an_eye_sees_the_light_spread_towards_it(run, tmp_path):
     np.testing.assert_array_equal(seen[1], seen[2])
 
 
+@pytest.mark.slow
 def test_arrays_of_a_set_have_their_own_and_bad_input_is_one_line(run, refused, tmp_path):
     stacked = stored(run, tmp_path / "set", "--spread", "inf", name="stacked-sensors")
     assert len(read_spread(stacked)) == 3 and (stacked / "S_2.png").exists()

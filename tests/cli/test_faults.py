@@ -151,6 +151,7 @@ resource.setrlimit(resource.RLIMIT_DATA, (used + (1 << 29),) * 2)
 """
 
 
+@pytest.mark.slow
 def test_sizes_in_headers_are_checked_before_decoding(picture, refused, tmp_path):
     bomb(picture, 40000, 40000)
     IIPicture(np.zeros((32, 64, 3), np.uint8), (8, 4), (8, 8)).save(tmp_path / "good.png")
@@ -314,6 +315,7 @@ def test_a_stopped_command_leaves_no_partial_folder(run, picture, tmp_path, monk
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
+@pytest.mark.slow
 def test_brackets_in_names_are_printed_unchanged(run, picture, tmp_path, monkeypatch):
     """The library of bars and tables interprets brackets as markup."""
     monkeypatch.chdir(tmp_path)  # a long path would be cut at the terminal's width
@@ -327,6 +329,7 @@ def test_brackets_in_names_are_printed_unchanged(run, picture, tmp_path, monkeyp
         assert run("study", tmp_path / f"{name}.png", "--orders", "-o", tmp_path / "s")[0] == 0
 
 
+@pytest.mark.slow
 def test_a_name_that_is_no_utf8_is_one_line(picture, tmp_path):
     strange = os.fsencode(tmp_path) + b"/\xff.png"
     os.rename(picture, strange)
@@ -410,6 +413,7 @@ def asked(port, path, host):
     return connection.getresponse().status
 
 
+@pytest.mark.slow
 def test_only_this_machines_own_names_are_served(served):
     """A site whose name resolves to 127.0.0.1 could read the picture (DNS rebinding)."""
     process, port, folder = served

@@ -189,6 +189,7 @@ def test_the_smallest_jpeg_stream_decodes(chroma):
     assert decode(encode(picture, f"jpeg:chroma={chroma}", quality=1)).pixels.max() <= 1  # a rounding of colour
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", STYLES)
 def test_forged_precincts_and_tiles_of_jpeg2000_take_no_memory(ended, how):
     """Small precincts took 1600 bytes per pixel; the tests above forge only sizes."""

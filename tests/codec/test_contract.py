@@ -15,9 +15,9 @@ from tests.support.slow import first_fast
 SCHEMES = sorted(schemes())
 
 
-def quick_ones(names):
+def quick_ones(names, *slow):
     """Schemes of a test of coders, not of kinds of images: other kinds than sub-images are slow tests."""
-    others = [name for name in names if name[:3] in ("ei-", "ri-") and f"si-{name[3:]}" in names]
+    others = [*slow, *(name for name in names if name[:3] in ("ei-", "ri-") and f"si-{name[3:]}" in names)]
     return [pytest.param(name, marks=pytest.mark.slow) if name in others else name for name in names]
 
 
@@ -167,7 +167,7 @@ def test_eight_bits_come_back_to_the_bit(scheme):
     np.testing.assert_array_equal(decoded.pixels, textured().pixels)
 
 
-@pytest.mark.parametrize("scheme", quick_ones(RATED))
+@pytest.mark.parametrize("scheme", quick_ones(RATED, "si-lf"))
 def test_target_rates_are_met(scheme):
     picture = large() if scheme == "ei-mpeg2" else many()  # MPEG-2 fills frames of 12×12 px up to 16×16
     coded = encode(picture, quick(scheme), bpp=1.5)
@@ -186,7 +186,7 @@ def test_all_bytes_are_accounted_for(scheme, tmp_path):
     assert coded.bpp == 8 * coded.nbytes / picture.pixels[..., 0].size
 
 
-@pytest.mark.parametrize("scheme", quick_ones(SCHEMES))
+@pytest.mark.parametrize("scheme", quick_ones(SCHEMES, "si-lf"))
 def test_coding_is_reproducible_alone_and_in_parallel(scheme):
     picture, asked = textured(), medium(scheme)
     first = moderate(scheme).payload

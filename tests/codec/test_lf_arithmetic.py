@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codec.coders.lf import arithmetic
+from codec.coders.lf import arithmetic, transform
 from codec.coders.lf.transform import forward, inverse
 from ii_core.base.jit import array_kernel
 
@@ -67,23 +67,45 @@ def test_a_reader_detects_the_end_of_the_code():
     assert arithmetic.overrun(coder)
 
 
+@pytest.mark.parametrize("kind", [0, 1, 2, 3])
 @pytest.mark.parametrize("log", [2, 3, 4, 5])
-def test_transforms_invert_and_keep_the_energy(log):
+def test_transforms_invert_and_keep_the_energy(log, kind):
     n = 1 << log
     rng = np.random.default_rng(log)
     block, half, out, back = (np.zeros((32, 32), np.int32) for _ in range(4))
     block[:n, :n] = rng.integers(-7000, 7001, (n, n))
-    forward(block, np.int64(log), half, out)
-    inverse(out, np.int64(log), np.int64(n), np.int64(n), half, back)
-    # Matrices rounded to 2^-10 are off by 2^-12 in the mean, of which n² terms add up at random.
-    assert np.abs(back - block)[:n, :n].max() < 7000 * n / 2**12
+    forward(block, np.int64(log), half, out, np.int64(kind))
+    inverse(out, np.int64(log), np.int64(n), np.int64(n), half, back, np.int64(kind))
+    # Matrices rounded to 2^-10 are off by 2^-12 in the mean, those of sines by twice as much.
+    assert np.abs(back - block)[:n, :n].max() < 7000 * (n + 4) / 2**11
     assert (out[:n, :n].astype(float) ** 2).sum() == pytest.approx((block[:n, :n].astype(float) ** 2).sum(), rel=3e-3)
 
 
 def test_a_constant_block_is_one_coefficient():
     block, half, out = (np.zeros((32, 32), np.int32) for _ in range(3))
     block[:8, :8] = 100
-    forward(block, np.int64(3), half, out)
+    forward(block, np.int64(3), half, out, np.int64(0))
     assert abs(out[0, 0] - 800) <= 1
     out[0, 0] = 0
     assert not out.any()
+
+
+def test_sines_compact_what_grows_away_from_a_border():
+    """A ramp from zero at the block's upper border is one coefficient more nearly than by cosines."""
+    block, half = (np.zeros((32, 32), np.int32) for _ in range(2))
+    block[:8, :8] = 100 * (1 + np.arange(8))[:, None]
+    shares = []
+    for kind in (transform.SINE_DOWN, 0, transform.SINE_ACROSS):
+        out = np.zeros((32, 32), np.int32)
+        forward(block, np.int64(3), half, out, np.int64(kind))
+        shares.append(out[0, 0] ** 2 / np.square(out.astype(float)).sum())
+    assert shares[0] > 0.95 > 0.85 > shares[1] > shares[2]
+
+
+def test_costs_of_bits_are_the_information_of_the_nearest_probability():
+    """The table has 4096 probabilities: a cost lies between those of the neighbours half a step away."""
+    p = np.arange(2 * arithmetic.LEAST, arithmetic.ONE - 2 * arithmetic.LEAST, 7)
+    costs = arithmetic.bit_costs(np.stack([p, p], axis=1).astype(np.int32))
+    for bit, share in ((1, p), (0, arithmetic.ONE - p)):
+        least, most = (-np.log2((share + half) / arithmetic.ONE) for half in (8.5, -8.5))
+        assert (least <= costs[:, bit]).all() and (costs[:, bit] <= most).all()

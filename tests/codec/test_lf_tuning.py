@@ -6,7 +6,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from codec import decode, encode
-from codec.coders.lf import arithmetic, contexts, loop_filter, loop_filter_search, planes, ranges, stream, tuning
+from codec.coders.lf import (
+    arithmetic,
+    contexts,
+    denoise,
+    loop_filter,
+    loop_filter_search,
+    planes,
+    ranges,
+    stream,
+    tuning,
+)
 from codec.coders.lf import coder as lf
 from codec.contract import checked_options
 from ii_core import IIPicture, sub_images
@@ -41,12 +51,13 @@ def test_the_measure_is_that_of_the_test_conditions(dtype):
 
 
 def test_planes_are_scaled_so_that_errors_count_as_the_measure_counts_them():
-    """Of Y with four times the error, Cb's squared error changes the mean of logarithms by 4/6 of what Y's does."""
+    """Of Y with twice the error, Cb's squared error changes the mean of logarithms by 2/6 of what Y's does."""
     scales = 40, 40  # squares of errors in planes: 3 of Y, 3 · (40/64)² of Cb and Cr
-    errors = np.array([3 * 4e6, 3 * (40 / 64) ** 2 * 1e6, 3 * (40 / 64) ** 2 * 2e6])
-    found = np.array(tuning.better_scales(scales, errors))
-    np.testing.assert_allclose((found / 64) ** 2, [4 / 6 / 1, 4 / 6 / 2], rtol=0.03)
-    assert tuning.better_scales(scales, np.array([1e6, 0, 1e12])) == (tuning.MOST, tuning.LEAST)
+    errors = np.array([3 * 2e6, 3 * (40 / 64) ** 2 * 1e6, 3 * (40 / 64) ** 2 * 2e6])
+    for views, more in [(1, 1), (25, 1), (45, 1.3**0.5), (81, 1.3), (256, 1.3)]:
+        found = np.array(tuning.better_scales(scales, errors, views))
+        np.testing.assert_allclose((found / 64) ** 2, np.multiply([2 / 6 / 1, 2 / 6 / 2], more**2), rtol=0.05)
+    assert tuning.better_scales(scales, np.array([1e6, 0, 1e12]), 25) == (tuning.MOST, tuning.LEAST)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
@@ -78,9 +89,10 @@ def test_each_tuning_is_better_by_its_own_measure():
     st.sampled_from([(0, 0, 1024), (0, 0, -1024)]) | st.tuples(*2 * [st.integers(-4096, 4096)], st.integers(1, 4096)),
     st.tuples(st.booleans(), st.booleans()),
     st.none() | st.tuples(st.integers(1, 255), st.integers(1, 255)),
+    st.sampled_from(stream.FLAGGED),
     st.integers(0, 2**32 - 1),
 )
-def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, seed):
+def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, version, seed):
     rng = np.random.default_rng(seed)
     log_stride, sources, crossed = numbers
     low, high = sorted(rng.integers(-(1 << 14), (1 << 14) + 1, 2).tolist())
@@ -99,6 +111,8 @@ def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, 
         skipping=tools[0],
         tuned=True,
         filtered=tools[1],
+        dependent=version > stream.TUNED,
+        directed=version > stream.DEPENDENT,
         steps=tuple(rng.integers(1, (1 << 18) + 1, log_stride + 2).tolist()),
     )
     levels = [rng.bytes(int(rng.integers(0, 300))) for _ in header.steps]
@@ -260,6 +274,7 @@ def smooth_plane(grid, height, width):
 def test_filtered_views_predict(monkeypatch, tune):
     """A quarter of a decibel more at equal size; decoders repeat the filters, and threads change no byte."""
     monkeypatch.setattr(lf, "FINER_FIRST", 14.0)
+    monkeypatch.setattr(lf, "DENOISED_LEVELS", 0)
     picture, scheme = smooth_plane((3, 4), 41, 50), f"si-lf:tune={tune}"
     filtered = encode(picture, scheme, qp=34)
     assert encode(picture, f"{scheme},threads=2", qp=34).payload == filtered.payload
@@ -274,6 +289,55 @@ def test_filtered_views_predict(monkeypatch, tune):
     plain = encode(picture, scheme, qp=34)
     measured = [source.psnr(field), source.psnr(source.coded(34 * lf.FRACTIONS)[1])]
     assert measured[0] - measured[1] > 6 * np.log2(filtered.nbytes / plain.nbytes) + 0.25
+
+
+def noisy_plane(disparity, sigma):
+    """A plane at whole disparities without noise and with it, and the source of the noisy one."""
+    clean = shifted_plane(disparity, grid=(5, 5), height=36, width=52)
+    smooth = clean.with_pixels((64 + clean.pixels // 2).astype(np.uint8))
+    noise = np.random.default_rng(6).normal(0, sigma, clean.pixels.shape)
+    noisy = smooth.with_pixels(np.clip(np.rint(smooth.pixels + noise), 0, 255).astype(np.uint8))
+    return tuple(lf.Source(picture, checked_options(lf.LightField(), {})) for picture in (smooth, noisy)), noisy
+
+
+@pytest.mark.parametrize("place", [(2, 2), (0, 4)], ids=["middle", "corner"])
+@pytest.mark.parametrize("disparity", [(0, 0), (2, -2)], ids=str)
+def test_neighbours_take_noise_and_leave_everything_else(disparity, place):
+    (clean, noisy), _ = noisy_plane(disparity, 4.0)
+    step, header = 128 * 32, noisy.header
+    found = denoise.denoised(noisy.view, noisy.grid, place, header.lattice, (header.low, header.high), step).astype(
+        float
+    )
+    inner = np.s_[:, 8:-8, 8:-8]  # borders show what neighbours do not
+    before, after = (
+        np.square(planes_.astype(float) - clean.view(*place))[inner].mean() for planes_ in (noisy.view(*place), found)
+    )
+    assert after < (0.35 if place == (2, 2) else 0.55) * before
+    same = denoise.denoised(clean.view, clean.grid, place, header.lattice, (header.low, header.high), step)
+    np.testing.assert_allclose(same[inner], clean.view(*place)[inner], atol=8)  # of one code
+
+
+def test_a_fine_step_hides_no_noise_and_a_view_alone_has_no_neighbours():
+    (_, noisy), _ = noisy_plane((1, 1), 4.0)
+    header = noisy.header
+    for grid, step in [(noisy.grid, 64), ((1, 1), 4096)]:
+        place = grid[0] // 2, grid[1] // 2
+        found = denoise.denoised(noisy.view, grid, place, header.lattice, (header.low, header.high), step)
+        np.testing.assert_allclose(found, noisy.view(*place), atol=1)
+
+
+@pytest.mark.slow
+def test_noise_that_is_not_coded_saves_rate(monkeypatch):
+    """A tenth of the bytes at equal quality against the noisy original."""
+    _, picture = noisy_plane((1, 1), 4.0)
+    results = []
+    for levels in (2, 0):
+        monkeypatch.setattr(lf, "DENOISED_LEVELS", levels)
+        source = lf.Source(picture, checked_options(lf.LightField(), {}))
+        payload, field = source.coded(36 * lf.FRACTIONS)
+        results.append((source.psnr(field), len(payload)))
+    (with_less, fewer), (psnr, more) = results
+    assert with_less - psnr > 6 * np.log2(0.9 * fewer / more)
 
 
 @pytest.mark.parametrize("views", [(1, 1), (1, 7), (5, 1)])

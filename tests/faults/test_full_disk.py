@@ -201,6 +201,7 @@ def test_a_full_disk_is_reported_and_no_broken_file_is_left(writers, name, tmp_p
         shutil.rmtree(tmp_path / "cut")
 
 
+@pytest.mark.slow
 def test_commands_end_with_one_line_and_leave_nothing(tmp_path, monkeypatch, run):
     monkeypatch.chdir(tmp_path)
     assert run("render", "objects", "--scale", 64, "-o", "p.png")[0] == 0
@@ -223,6 +224,7 @@ def test_commands_end_with_one_line_and_leave_nothing(tmp_path, monkeypatch, run
         assert sorted(path.name for path in tmp_path.iterdir()) == before, command
 
 
+@pytest.mark.slow
 def test_a_set_renders_broken_files_again(tmp_path, monkeypatch):
     monkeypatch.setitem(render_sets.SETS, "reference", ("cuboid",))
     monkeypatch.setattr(render_sets, "FLAT_PIXELS", 64)

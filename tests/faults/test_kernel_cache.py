@@ -117,6 +117,7 @@ def test_foreign_files(called, package):
     assert called(package, "old.kernels") == (42, 0)
 
 
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_written(package):
     limited = package / "limited.py"
     limited.write_text("import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n" + KERNEL)

@@ -347,6 +347,7 @@ def test_colours_of_the_metadata_are_applied_after_levels_and_before_the_curve()
     assert calibrated_picture(found, over, colour=colour, full_scale=900.0).pixels.min() >= 254
 
 
+@pytest.mark.slow
 def test_a_calibrated_picture_shows_the_views_of_a_straight_camera():
     """A rotated hexagonal array, calibrated and converted to a regular structure: the same views as a straight array.
 

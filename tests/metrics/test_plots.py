@@ -131,6 +131,7 @@ def test_charts_depend_on_the_known_qualities(tmp_path):
     assert plot_all(bare, bare, None, tmp_path) == [tmp_path / "q_angle.png"]
 
 
+@pytest.mark.slow
 def test_the_command_draws(run, refused, tmp_path):
     a = picture((12, 12))
     a.save(tmp_path / "a.png")

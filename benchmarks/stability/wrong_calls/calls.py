@@ -370,6 +370,7 @@ def of_scenes(made: Made) -> dict[str, Values]:
         "Scene": {"bodies": made.scene.bodies, "lights": made.scene.lights, "background": made.scene.background},
         "Fog": {"density_per_mm": 0.1},
         "load_scene": {"name": "cuboid"},
+        "rgbd_scene": {"picture": np.zeros((4, 6, 3), np.uint8), "depth": np.ones((4, 6)), "inverse": None},
         "render": {"support": (), **one},
         "render_to": {"picture": made.folder / "r.png", "support": {}, **one},
         "trace": {"locations": [0.0, 0, 0], "directions": [0.0, 0, 1]},

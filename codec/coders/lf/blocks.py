@@ -20,17 +20,18 @@ from .coefficients import code_coefficients
 from .cross import code_cross, keep_first, rebuild
 from .intra import MODES, SMOOTH, fill_border, predict_intra
 from .samples import LARGEST_SKIPPED, code_samples
-from .transform import LARGEST
+from .transform import LARGEST, SINE_ACROSS, SINE_DOWN
 from .warp import LATTICE, lead, moved_block
 
 LOG_LARGEST, LOG_LEAST = 5, 2
 INTRA, EXPLICIT, SYNTHESIS, TIMED, MIXED = range(5)
 MOST_REFERENCES = 4
+SIDE, STRAIGHT = 17, 8  # directions from one side, and the place of the straight one among them
 LIMIT = 8191  # of a decoded sample's magnitude, in eighths of an 8-bit code
 MOST_INDEX = 1 << 14
 UNKNOWN = -32768  # disparity
 DIFFERENT = 205  # disparities that lead this far apart, in 2^-8 samples, are of different surfaces
-# What is known of each 4×4.
+# What is known of each 4×4. SKIPPED is 1 without a transform, else twice its kind.
 KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, CROSS_1, CROSS_2, SKIPPED, FIELDS = range(11)
 
 
@@ -76,6 +77,8 @@ class Job(NamedTuple):
         Whether large coefficients have contexts by their neighbourhood.
     dependent : int
         Whether the quantiser of coefficients is a dependent one.
+    directed : int
+        Whether intra blocks have the modes and transforms of version 9.
     """
 
     views: Any
@@ -98,6 +101,7 @@ class Job(NamedTuple):
     motions: Any = motion.NOTHING
     finer: Any = 0
     dependent: Any = 0
+    directed: Any = 0
 
 
 class Work(NamedTuple):
@@ -127,7 +131,7 @@ def new_work() -> Work:
         first=np.zeros(square, np.int32),
         reach=np.zeros(2, np.int64),
         spare=np.zeros(square, np.int32),
-        border=np.zeros((2, 2 * LARGEST + 2), np.int32),
+        border=np.zeros((4, 2 * LARGEST + 2), np.int32),
         rows=np.zeros((LARGEST + 6, LARGEST + 8), np.int32),
     )
 
@@ -196,7 +200,7 @@ def residual_context(job, by, bx, log, kind):
 @tuned_kernel
 def coded_context(plane, log, kind, first, skipped):
     """By plane, size, kind, whether the first plane has a residual, and whether the transform is skipped."""
-    if skipped:
+    if skipped == 1:
         return at.SAMPLE_CODED + (plane * 2 + log - 2) * 2 + first
     return at.CODED + ((plane * 4 + log - 2) * 2 + (1 if kind == INTRA else 0)) * 2 + first
 
@@ -328,15 +332,7 @@ def code_kind(coder, job, by, bx, log, kind, index, mask, direction):
     if kind == SYNTHESIS:
         index = guesses(job, by, bx, log)[0]
     elif kind == INTRA:
-        first, second = likely_directions(blocks, by, bx)
-        if code_bit(coder, np.int64(at.INTRA_MODE), 1 if direction == first else 0):
-            direction = first
-        elif code_bit(coder, np.int64(at.INTRA_MODE + 1), 1 if direction == second else 0):
-            direction = second
-        elif code_bit(coder, np.int64(at.INTRA_MODE + 2), 1 if direction <= SMOOTH else 0):
-            direction = code_raw(coder, direction)
-        else:
-            direction = _code_direction(coder, direction)
+        direction = _code_mode(coder, job, by, bx, log, direction)
     else:
         index = _code_index(coder, job, by, bx, log, index)
         where = from_where(job, by, bx, log, index)
@@ -346,9 +342,35 @@ def code_kind(coder, job, by, bx, log, kind, index, mask, direction):
 
 
 @tuned_kernel
-def _code_direction(coder, direction):
+def mode_contexts(job, by, bx, log):
+    """Of the first likely mode, the second, flat or smooth, and which of these; the last is -1 of even bits."""
+    if not job.directed:
+        return np.int64(at.INTRA_MODE), np.int64(at.INTRA_MODE + 1), np.int64(at.INTRA_MODE + 2), np.int64(-1)
+    blocks = job.blocks
+    like = neighbours(blocks, np.int64(KIND), np.int64(INTRA), by, bx)
+    if like == 2 and blocks[DIRECTION, by, bx - 1] == blocks[DIRECTION, by - 1, bx]:
+        like = 3
+    first = np.int64(at.LIKELY + (log - 2) * 4 + like)
+    return first, first + 16, np.int64(at.UNDIRECTED + log - 2), np.int64(at.UNDIRECTED + 4)
+
+
+@tuned_kernel
+def _code_mode(coder, job, by, bx, log, mode):
+    """Write or read an intra mode: one of two likely ones, flat, smooth, or a direction."""
+    first, second = likely_directions(job.blocks, by, bx)
+    one, two, undirected, smooth = mode_contexts(job, by, bx, log)
+    if code_bit(coder, one, 1 if mode == first else 0):
+        return first
+    if code_bit(coder, two, 1 if mode == second else 0):
+        return second
+    if code_bit(coder, undirected, 1 if mode <= SMOOTH else 0):
+        return code_bit(coder, smooth, mode) if smooth >= 0 else code_raw(coder, mode)
+    return 2 + (_code_slope(coder, mode - 2) if job.directed else _code_direction(coder, mode - 2))
+
+
+@tuned_kernel
+def _code_direction(coder, value):
     """34 directions: 30 of five bits, the last 4 of six."""
-    value = direction - 2
     long = value >= 30
     head = 30 + ((value - 30) >> 1) if long else value
     found = 0
@@ -356,7 +378,54 @@ def _code_direction(coder, direction):
         found = 2 * found + code_raw(coder, (head >> place) & 1)
     if found >= 30:
         found = 30 + 2 * (found - 30) + code_raw(coder, (value - 30) & 1)
-    return min(found, 33) + 2
+    return min(found, 33)
+
+
+@tuned_kernel
+def _code_slope(coder, value):
+    """34 directions: from which side, straight or not, which way it turns, and how far."""
+    side = code_bit(coder, np.int64(at.SIDE), 1 if value >= SIDE else 0)
+    slope = value - SIDE * side - STRAIGHT
+    if code_bit(coder, np.int64(at.STRAIGHT + side), 1 if slope == 0 else 0):
+        return SIDE * side + STRAIGHT
+    back = code_bit(coder, np.int64(at.TURN + side), 1 if slope < 0 else 0)
+    size, node = abs(slope) - 1, np.int64(1)
+    for place in range(2, -1, -1):
+        node = 2 * node + code_bit(coder, at.SLOPE + 8 * side + node, (size >> place) & 1)
+    return SIDE * side + STRAIGHT + (7 - node if back else node - 7)
+
+
+@part_kernel
+def _slope_cost(costs, value):
+    """Bits that `_code_slope` would take."""
+    side = 1 if value >= SIDE else 0
+    slope = value - SIDE * side - STRAIGHT
+    bits = bit_cost(costs, np.int64(at.SIDE), side) + bit_cost(costs, at.STRAIGHT + side, 1 if slope == 0 else 0)
+    if slope:
+        bits += bit_cost(costs, at.TURN + side, 1 if slope < 0 else 0)
+        size, node = abs(slope) - 1, 1
+        for place in range(2, -1, -1):
+            bit = (size >> place) & 1
+            bits += bit_cost(costs, at.SLOPE + 8 * side + node, bit)
+            node = 2 * node + bit
+    return bits
+
+
+@part_kernel
+def _mode_cost(costs, job, by, bx, log, mode):
+    """Bits that `_code_mode` would take."""
+    first, second = likely_directions(job.blocks, by, bx)
+    one, two, undirected, smooth = mode_contexts(job, by, bx, log)
+    bits = bit_cost(costs, one, 1 if mode == first else 0)
+    if mode == first:
+        return bits
+    bits += bit_cost(costs, two, 1 if mode == second else 0)
+    if mode == second:
+        return bits
+    bits += bit_cost(costs, undirected, 1 if mode <= SMOOTH else 0)
+    if mode <= SMOOTH:
+        return bits + (bit_cost(costs, smooth, mode) if smooth >= 0 else np.float32(1))
+    return bits + (_slope_cost(costs, mode - 2) if job.directed else np.float32(5.1))
 
 
 @tuned_kernel
@@ -411,13 +480,7 @@ def kind_cost(costs, job, by, bx, log, kind, index, mask, direction):
         context = at.INTRA + neighbours(blocks, np.int64(KIND), np.int64(INTRA), by, bx)
         bits += bit_cost(costs, context, 1 if kind == INTRA else 0)
     if kind == INTRA:
-        first, second = likely_directions(blocks, by, bx)
-        bits += bit_cost(costs, np.int64(at.INTRA_MODE), 1 if direction == first else 0)
-        if direction != first:
-            bits += bit_cost(costs, np.int64(at.INTRA_MODE + 1), 1 if direction == second else 0)
-            if direction != second:
-                bits += bit_cost(costs, np.int64(at.INTRA_MODE + 2), 1 if direction <= SMOOTH else 0)
-                bits += np.float32(1) if direction <= SMOOTH else np.float32(5.1)
+        bits += _mode_cost(costs, job, by, bx, log, direction)
     elif kind == EXPLICIT:
         bits += _index_cost(costs, job, by, bx, log, index)
         if count > 1 and mask:
@@ -522,8 +585,8 @@ def predict_synthesis(job, work, y0, x0, n):
 @tuned_kernel
 def predict_direction(job, work, plane, y0, x0, n, direction):
     """work.predicted[plane] from the block's surroundings."""
-    fill_border(job.views, job.at, plane, job.blocks, np.int64(DONE), y0, x0, n, work.border)
-    predict_intra(work.border, direction, n, work.predicted, plane)
+    fill_border(job.views, job.at, plane, job.blocks, np.int64(DONE), y0, x0, n, work.border, job.directed)
+    predict_intra(work.border, direction, n, work.predicted, plane, job.directed)
 
 
 @tuned_kernel
@@ -599,6 +662,29 @@ def _clear(levels, n):
 
 
 @tuned_kernel
+def _code_transform(coder, log, kind):
+    """Write or read the kind of transform of an intra block."""
+    context = np.int64(at.TRANSFORM + (log - 2) * 3)
+    if not code_bit(coder, context, 1 if kind else 0):
+        return 0
+    if code_bit(coder, context + 1, 1 if kind == SINE_DOWN + SINE_ACROSS else 0):
+        return SINE_DOWN + SINE_ACROSS
+    return SINE_ACROSS if code_bit(coder, context + 2, 1 if kind == SINE_ACROSS else 0) else SINE_DOWN
+
+
+@part_kernel
+def transform_cost(costs, log, kind):
+    """Bits that the kind of transform of an intra block would take."""
+    context = at.TRANSFORM + (log - 2) * 3
+    bits = bit_cost(costs, context, 1 if kind else 0)
+    if kind:
+        bits += bit_cost(costs, context + 1, 1 if kind == SINE_DOWN + SINE_ACROSS else 0)
+    if 0 < kind < SINE_DOWN + SINE_ACROSS:
+        bits += bit_cost(costs, context + 2, 1 if kind == SINE_ACROSS else 0)
+    return bits
+
+
+@tuned_kernel
 def code_block(coder, job, work, y0, x0, log):
     """Write a block that is marked, or read and decode one."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
@@ -614,7 +700,9 @@ def code_block(coder, job, work, y0, x0, log):
     coded = code_bit(coder, residual_context(job, by, bx, log, kind), np.int64(blocks[CODED, by, bx]))
     first = skipped = 0
     if coded and job.skipping and log <= LARGEST_SKIPPED:
-        skipped = code_bit(coder, skipped_context(job, by, bx, log), np.int64(blocks[SKIPPED, by, bx]))
+        skipped = code_bit(coder, skipped_context(job, by, bx, log), np.int64(blocks[SKIPPED, by, bx]) & 1)
+    if coded and job.directed and kind == INTRA and not skipped:
+        skipped = 2 * _code_transform(coder, log, np.int64(blocks[SKIPPED, by, bx]) >> 1)
     for p in range(3):
         some = cross = 0
         if coded:
@@ -660,7 +748,7 @@ def _code_plane(coder, job, work, y0, x0, log, p, kind, first, skipped):
     some = code_bit(coder, coded_context(p, log, kind, first, skipped), some)
     if some and decoding:
         _clear(work.levels, n)
-    if some and skipped:
+    if some and skipped == 1:
         code_samples(coder, work.levels, job.levels, y0, x0, p, log)
         if decoding:
             _note_levels(job, work, p, y0, x0, n)

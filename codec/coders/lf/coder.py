@@ -17,11 +17,11 @@ from ii_core import IIPicture
 from ... import clock
 from ...contract import Coder, Goal, Option, Options, Pixels
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
-from . import arithmetic, loop_filter_search, planes, ranges, search, stream, synthesis, tuning
-from .blocks import Job, Work, code_blend, code_view, new_work
+from . import arithmetic, denoise, loop_filter_search, planes, ranges, search, stream, synthesis, tuning
+from .blocks import MOST_REFERENCES, Job, Work, code_blend, code_view, new_work
 from .contexts import Contexts
 from .field import Field
-from .pyramid import Node, Place
+from .pyramid import Node, Place, pyramid
 from .search import Search
 from .stream import Header
 from .workers import Workers
@@ -44,6 +44,7 @@ WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 # Quantisers by which each level is finer than the next, for more is predicted from it. The first view is finer than
 # the last ones by so many, and so many more for each doubling of the views that it predicts.
 FINER_A_LEVEL, FINER_FIRST, FINER_A_DOUBLING = 1.5, 5.0, 1.1
+DENOISED_LEVELS = 2  # of views, by neighbours, from `balanced` on
 TRIAL_LEVELS = 2  # of views that show how errors share among planes
 CROSS = stream.QUARTERS, stream.EIGHTHS  # unit of factors between planes: of principal axes, and of BT.709
 MOST_VIEWS = 1 << 14
@@ -249,6 +250,8 @@ class Source:
         else:
             self.axes = colours = planes.detail_axes(self.pixels, self.grid)
         low, high, lattice = ranges.estimated(self.view, self.grid, skewed=not exact)
+        self._target_of: Any = None
+        self._latest_target = np.zeros((3, 0, 0), np.int16)
         self.header = Header(
             log_stride=int(options["stride"]),
             sources=int(options["sources"]),
@@ -263,6 +266,7 @@ class Source:
             tuned=not exact,
             filtered=not exact,
             dependent=not exact,
+            directed=not exact,
             steps=(),
         )
 
@@ -320,7 +324,7 @@ class Source:
         for place in np.argwhere(trial.decoded).tolist():
             decoded = trial.views[trial.number((place[0], place[1]))]
             errors += np.square(decoded.astype(np.float32) - self.view(*place)).sum(axis=(1, 2), dtype=np.float64)
-        return self._scaled(header, tuning.better_scales(scales, errors))
+        return self._scaled(header, tuning.better_scales(scales, errors, len(trial.views)))
 
     def _scaled(self, header: Header, scales: tuple[int, int]) -> Header:
         """Return the header with other scales of planes; the source's planes get them, too."""
@@ -329,11 +333,13 @@ class Source:
 
     def steps(self, setting: float) -> tuple[int, ...]:
         """Return the quantiser's step of each level."""
-        last = self.header.log_stride
+        levels = pyramid(*self.grid, self.header.log_stride, MOST_REFERENCES, self.header.sources)
         if self.header.exact:
-            offsets = [0.0] * (last + 2)
+            offsets = [0.0] * len(levels)
         else:
-            offsets = [self.finer_first(), *(FINER_A_LEVEL * (last - level) for level in range(last + 1))]
+            later = [len(level) > 0 for level in levels[1:]]  # levels without views make no difference
+            finer = (FINER_A_LEVEL * sum(later[i + 1 :]) for i in range(len(later)))
+            offsets = [self.finer_first(), *finer]
         return tuple(max(1, round(128 * 2 ** ((setting / FRACTIONS - 8 - less) / 6))) for less in offsets)
 
     def finer_first(self) -> float:
@@ -386,7 +392,7 @@ class Source:
     ) -> NDArray[np.float32]:
         """Return costs of bits after a first run of the first view, whose initial contexts are of other pictures."""
         job, _ = field.job(node)
-        search.find_blocks(costs, job, self._search(job, self.view(node.row, node.col)))
+        search.find_blocks(costs, job, self._search(job, self._target(field, node)))
         coder = arithmetic.writer(contexts.of(node.level).copy(), VIEW_BYTES * job.levels[0].size + 1024)
         code_view(coder, job, work)
         return arithmetic.bit_costs(coder.contexts)
@@ -396,13 +402,24 @@ class Source:
     ) -> tuple[Job, synthesis.Synthesis, int, loop_filter_search.Found | None]:
         """A view's blocks, found and decoded; its synthesis, in which way that is blended, and its best filters."""
         job, made = field.job(node)
-        original = self.view(node.row, node.col)
+        original = self._target(field, node)
         nearest = _nearer_blend(made, original, BLEND_ROWS[self.effort]) if job.synthesised else 0
         search.find_blocks(costs, job, self._search(job, original))
         filters = None
         if field.header.filtered:
             filters = loop_filter_search.search_filters(field.views, job.at, original, worth(job.step))
         return job, made, nearest, filters
+
+    def _target(self, field: Field, node: Node) -> NDArray[np.int16]:
+        """Return the planes to be coded: those of the view, with less noise where it predicts many others."""
+        place, header = (node.row, node.col), field.header
+        if node.level >= DENOISED_LEVELS or not self.effort or header.exact or field.past:
+            return self.view(*place)
+        key, limits = (place, header.steps, header.scales), (header.low, header.high)
+        if self._target_of != key:  # the first view is coded twice
+            found = denoise.denoised(self.view, self.grid, place, header.lattice, limits, header.steps[-1])
+            self._target_of, self._latest_target = key, found
+        return self._latest_target
 
     def _search(self, job: Any, original: NDArray[np.int16]) -> Search:
         share = min(1.0, GOOD_SAMPLES / (self.height * self.width))

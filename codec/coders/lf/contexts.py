@@ -58,7 +58,15 @@ SIGNIFICANT_FINE = TAP + 96  # state 2, 3 × those of SIGNIFICANT
 SIGNIFICANT_THERE_FINE = SIGNIFICANT_FINE + 2 * 384  # state 2, 3 × those of SIGNIFICANT_THERE
 ABOVE_ONE_FINE = SIGNIFICANT_THERE_FINE + 2 * 384  # those of ABOVE_ONE
 ABOVE_ONE_THERE_FINE = ABOVE_ONE_FINE + 48  # those of ABOVE_ONE_THERE
-COUNT = ABOVE_ONE_THERE_FINE + 96
+# Of version 9: intra modes, directions and transforms.
+LIKELY = ABOVE_ONE_THERE_FINE + 96  # first, second 2 × block size 4 × intra neighbours: none, one, two, alike 4
+UNDIRECTED = LIKELY + 32  # flat or smooth: block size 4; smooth
+SIDE = UNDIRECTED + 5
+STRAIGHT = SIDE + 1  # side 2
+TURN = STRAIGHT + 2  # side 2
+SLOPE = TURN + 2  # side 2 × nodes of a tree of 8 leaves 8
+TRANSFORM = SLOPE + 16  # block size 4 × (not of cosines alone, of sines alone, sines across) 3
+COUNT = TRANSFORM + 12
 
 # Probabilities to begin with: log(p / (1 - p)) from -6.2 up in steps of 0.2, by its digit; * where none is known. The
 # mean over eight coded pictures: three scenes and a flower of a real light field camera, at two quantisers each.

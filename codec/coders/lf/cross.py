@@ -79,11 +79,12 @@ def subtract_cross(work, cross, shift):
 def rebuild(work, levels, log, step, some, cross, shift, skipped, dependent):
     """work.block = the residual, of levels if there are ``some``, and of the first plane by a factor in 2^-shift.
 
-    Return the rows and columns of work.coefficients that hold it.
+    ``skipped`` is 1 without a transform, else twice its kind. Return the rows and columns of work.coefficients that
+    hold it.
     """
     rows = cols = 0
     if some:
-        rows, cols = dequantise(levels, log, step, work.coefficients, dependent and not skipped)
+        rows, cols = dequantise(levels, log, step, work.coefficients, dependent and skipped != 1)
     if cross:
         high, wide = max(rows, work.reach[0]), max(cols, work.reach[1])
         for y in range(high):
@@ -93,10 +94,10 @@ def rebuild(work, levels, log, step, some, cross, shift, skipped, dependent):
                     value += (cross * work.first[y, x]) >> shift
                 work.coefficients[y, x] = value
         rows, cols = high, wide
-    if skipped:
+    if skipped == 1:
         for y in range(1 << log):
             for x in range(1 << log):
                 work.block[y, x] = work.coefficients[y, x] if y < rows and x < cols else 0
     else:
-        inverse(work.coefficients, log, rows, cols, work.half, work.block)
+        inverse(work.coefficients, log, rows, cols, work.half, work.block, skipped >> 1)
     return rows, cols

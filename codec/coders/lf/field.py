@@ -90,6 +90,7 @@ class Field:
             crossed=self.header.crossed,
             finer=int(self.header.tuned),
             dependent=int(self.header.dependent),
+            directed=int(self.header.directed),
             skipping=int(self.header.skipping),
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),

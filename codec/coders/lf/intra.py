@@ -12,14 +12,18 @@ FLAT, SMOOTH, DIRECTIONS = 0, 1, 34
 MODES = 2 + DIRECTIONS
 # Eighths of a sample by the slope's magnitude and the place.
 BEYOND = np.array([[64 * (i + 1) // max(slope, 1) for i in range(LARGEST)] for slope in range(9)])
+# Of version 9, by block size (4, 8, 16, 32): least slopes of directions that go on from a smoothed border, and how
+# far the border draws flat, smooth and straight blocks: its weight halves after 2^(fade - 1) samples.
+LEAST_SLOPES, FADES = (99, 7, 2, 1), (0, 1, 1, 2)
 # Directions 0–16 go on from the row above by (m − 8) / 8 of a sample a row; 17–33 likewise from the column left.
 
 
 @tuned_kernel
-def fill_border(views, at, plane, blocks, done, y0, x0, n, border):
+def fill_border(views, at, plane, blocks, done, y0, x0, n, border, smoothed):
     """border[0] = the corner and 2·n samples above, border[1] = the corner and 2·n to the left.
 
-    ``blocks[done]`` says by 4×4 samples what is decoded. What is not there takes the value before it.
+    ``blocks[done]`` says by 4×4 samples what is decoded. What is not there takes the value before it. border[2:] is
+    the same, ``smoothed`` by (1, 2, 1) / 4, if blocks are larger than 4×4.
     """
     height, width = views.shape[2:]
     above, left = y0 > 0, x0 > 0
@@ -43,26 +47,34 @@ def fill_border(views, at, plane, blocks, done, y0, x0, n, border):
             border[1, i + 1] = border[0, 1] if above else 0
     corner = views[at, plane, y0 - 1, x0 - 1] if above and left else (border[0, 1] if above else border[1, 1])
     border[0, 0] = border[1, 0] = corner
+    if smoothed and n > 4:
+        for side in range(2):
+            row, into = border[side], border[2 + side]
+            into[0] = (border[0, 1] + 2 * corner + border[1, 1] + 2) >> 2
+            for i in range(1, 2 * n):
+                into[i] = (row[i - 1] + 2 * row[i] + row[i + 1] + 2) >> 2
+            into[2 * n] = row[2 * n]
 
 
 @tuned_kernel
-def predict_intra(border, mode, n, out, plane):
-    """out[plane, :n, :n] = the prediction."""
-    square = out[plane]
+def predict_intra(border, mode, n, out, plane, smoothed):
+    """out[plane, :n, :n] = the prediction; of version 9, ``smoothed``."""
+    square, log = out[plane], _doubled_log(n) - 1
     if mode == FLAT:
         total = n
         for i in range(1, n + 1):
             total += border[0, i] + border[1, i]
-        value = np.int32(total >> _doubled_log(n))
+        value = np.int32(total >> (log + 1))
         for y in range(n):
             row = square[y]
             for x in range(n):
                 row[x] = value
     elif mode == SMOOTH:
-        halvings, side = np.int32(_doubled_log(n)), border[0]
-        right, below = side[n + 1], border[1, n + 1]
+        first = 2 if smoothed and n > 4 else 0
+        halvings, side, other = np.int32(log + 1), border[first], border[first + 1]
+        right, below = side[n + 1], other[n + 1]
         for y in range(n):
-            row, left = square[y], border[1, y + 1]
+            row, left = square[y], other[y + 1]
             up, down = np.int32(n - 1 - y), np.int32((y + 1) * below + n)
             for x in range(n):
                 level = np.int32(np.int32(n - 1 - x) * left) + np.int32(np.int32(x + 1) * right)
@@ -70,7 +82,8 @@ def predict_intra(border, mode, n, out, plane):
     else:
         from_left = mode - 2 >= DIRECTIONS // 2
         slope = (mode - 2) % (DIRECTIONS // 2) - 8
-        side, other = border[1 if from_left else 0], border[0 if from_left else 1]
+        first = 2 if smoothed and abs(slope) >= LEAST_SLOPES[log - 2] else 0
+        side, other = border[first + (1 if from_left else 0)], border[first + (0 if from_left else 1)]
         for along in range(n):  # the distance from the border
             row, shift = square[along], (along + 1) * slope
             across = 0
@@ -85,8 +98,40 @@ def predict_intra(border, mode, n, out, plane):
                 one, two = side[np.uint64(start + i)], side[np.uint64(start + i + 1)]
                 both = np.int32(np.int32(one * rest) + np.int32(two * part))
                 row[np.uint64(i)] = np.int32(both + np.int32(4)) >> np.int32(3)
+        if smoothed and slope == 0:
+            _draw_straight(other, square, n, FADES[log - 2])
         if from_left:
             _transpose(square, n)
+    if smoothed and mode <= SMOOTH:
+        _draw_to_border(border, square, n, FADES[log - 2])
+
+
+@stage_kernel
+def _weight(distance, fade):
+    """Of a border's sample, in 2^-6."""
+    return np.int32(32) >> np.int32(2 * distance >> fade)
+
+
+@stage_kernel
+def _draw_to_border(border, square, n, fade):
+    """Move samples near the border towards it (Said et al. 2016, position dependent intra prediction)."""
+    reach = min(n, 3 << fade)
+    for y in range(n):
+        row, left = square[y], np.int32(border[1, y + 1])
+        down = _weight(y, fade) if y < reach else np.int32(0)
+        for x in range(n if y < reach else reach):
+            across = _weight(x, fade) if x < reach else np.int32(0)
+            near = np.int32(across * left) + np.int32(down * border[0, x + 1])
+            row[x] = np.int32(near + np.int32((64 - across - down) * row[x]) + 32) >> 6
+
+
+@stage_kernel
+def _draw_straight(other, square, n, fade):
+    """Add to samples that repeat one side what the other side differs from the corner, the less the further."""
+    for y in range(n):
+        row, more = square[y], np.int32(other[y + 1] - other[0])
+        for x in range(min(n, 3 << fade)):
+            row[x] += np.int32(_weight(x, fade) * more + 32) >> 6
 
 
 @stage_kernel

@@ -14,14 +14,14 @@ FIRST_DIRECTION = MODES - DIRECTIONS
 
 
 @part_kernel
-def _add_magnitudes(search, work, y0, x0, n, plane, modes, errors):
+def _add_magnitudes(search, work, y0, x0, n, plane, modes, smoothed, errors):
     """errors[mode] += sum of magnitudes of a plane's difference from the intra prediction."""
     first, last, step = modes
     predicted = work.predicted[plane]
     for mode in range(first, last, step):
         if mode < 0 or mode >= MODES:
             continue
-        predict_intra(work.border, mode, n, work.predicted, plane)
+        predict_intra(work.border, mode, n, work.predicted, plane, smoothed)
         total = np.int32(0)
         for y in range(n):
             own, row = search.original[plane, np.uint64(y0 + y)], predicted[y]
@@ -59,8 +59,8 @@ def _add_planes(job, search, work, y0, x0, n, modes, errors):
     for mode in range(first, last, step):
         errors[max(mode, 0)] = 0
     for p in range(3):
-        fill_border(job.views, job.at, p, job.blocks, np.int64(DONE), y0, x0, n, work.border)
-        _add_magnitudes(search, work, y0, x0, n, p, modes, errors)
+        fill_border(job.views, job.at, p, job.blocks, np.int64(DONE), y0, x0, n, work.border, job.directed)
+        _add_magnitudes(search, work, y0, x0, n, p, modes, job.directed, errors)
 
 
 @stage_kernel

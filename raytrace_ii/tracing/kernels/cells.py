@@ -360,7 +360,7 @@ def _differs(points, i, j, error):
 
 @kernel
 def find_thin(pixels, corners, points, error, lens, thin):
-    """Mark pixels around places of other bodies than next to them: centres among corners, corners among centres."""
+    """Mark pixels around places of a body that no place beside them has: centres among corners, and the other way."""
     height, width = lens.shape
     for i in range(pixels.shape[0]):
         y, x = pixels[i] // width, pixels[i] % width

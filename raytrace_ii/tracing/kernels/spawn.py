@@ -179,10 +179,10 @@ def _reflect_over_lobe(k, i, m0, m1, m2, rays, passage, following, work, counts)
     for j in range(many):
         across, around = _in_lobe(key, j * passage.lobe_stride)
         rx, ry, rz, share = glossy_direction(rough * rough, across, around, dx, dy, dz, nx, ny, nz)
-        share /= many
-        if share * max(m0, m1, m2) * many < passage.least:
+        if share == 0.0:  # into the surface
             counts[WEAK_REFLECTION] += 1
             continue
+        share /= many
         along = rx * gx + ry * gy + rz * gz
         if along <= 0.0:  # out of the face that it would go into
             rx, ry, rz = rx - 2.0 * along * gx, ry - 2.0 * along * gy, rz - 2.0 * along * gz

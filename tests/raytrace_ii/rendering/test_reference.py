@@ -72,6 +72,7 @@ def test_a_set_is_pictures_support_images_projections_a_contact_sheet_and_a_mani
     assert stored["scenes"]["two"]["hash"] == content_hash(small_set["two"])
 
 
+@pytest.mark.slow
 def test_only_what_changed_is_made_again(small_set, tmp_path):
     make(tmp_path)
     before = files(tmp_path)

@@ -73,6 +73,7 @@ def test_scenes_of_high_detail_have_twice_the_edges_of_those_of_low(measured, hi
         assert measured(high).detail > 2 * measured(low).detail
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["car", "twins", "hairdo"])
 def test_scenes_of_short_depth(measured, name):
     near, far = np.percentile(measured(name).depth, [5, 95])
@@ -93,6 +94,7 @@ def test_scenes_of_long_depth(measured, name):
     assert near < 70 and far > 150
 
 
+@pytest.mark.slow
 def test_fill(measured):
     for low in ("apples", "twins", "objects", "dolphin"):
         assert measured(low).fill < 0.45, low

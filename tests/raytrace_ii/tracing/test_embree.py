@@ -68,7 +68,7 @@ def room(n):
     return np.full(n, -7, np.int32), *np.full((3, n), np.nan, np.float32)
 
 
-@pytest.mark.parametrize("configuration", ["", *NARROWER])
+@pytest.mark.parametrize("configuration", first_fast(["", *NARROWER]))
 @pytest.mark.parametrize("spread", [0.001, 0.05, 1.0], ids=["packets", "some", "single"])
 @pytest.mark.parametrize("n", [0, 1, 3, 15, 16, 17, 1000])
 def test_hits_are_those_of_single_rays(configuration, spread, n):
@@ -116,7 +116,7 @@ class Watched:
         return kind(call)
 
 
-@pytest.mark.parametrize("configuration", ["", *NARROWER])
+@pytest.mark.parametrize("configuration", first_fast(["", *NARROWER]))
 def test_bundles_that_share_a_packet_are_traced_coherently_and_scattered_rays_at_once(configuration):
     """Rays of two bundles in turn, as at the edge of a body: two calls a packet. Scattered rays: one call."""
     n = 64

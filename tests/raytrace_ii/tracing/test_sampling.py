@@ -36,6 +36,16 @@ def half_plane(z=20.0):
     return Scene(bodies=[body(half, colour=WHITE)], ambient=WHITE)
 
 
+@pytest.mark.parametrize(("step", "n"), [(0.0, 16), (0.0, 64), (0.4, 16)])
+def test_the_standard_error_is_that_of_four_independent_means(step, n):
+    """s²/4 of the four, with three degrees of freedom; what a pixel beside its neighbours hides adds step²/n³."""
+    means = np.array([0.1, 0.2, 0.3, 0.4])
+    quarters, found = np.broadcast_to(means[:, None] * n / 4, (1, 4, 3)).copy(), np.empty(1)
+    curve = np.linspace(0, 255, 256)
+    sample_kernels.standard_errors(quarters, np.zeros(1, np.int64), np.full((1, 3), step), n, curve, found)
+    assert found[0] == pytest.approx(255 * np.sqrt(means.var(ddof=1) / 4 + step**2 / n**3), rel=1e-9)
+
+
 @pytest.mark.parametrize("pair", [0, 1])
 def test_first_samples_of_every_power_of_two_lie_one_in_each_cell_of_every_grid(pair):
     m, n = np.array([3, 4, 8191]), np.array([5, 5, 77])
@@ -262,6 +272,7 @@ def test_support_images_are_those_of_the_first_sample():
         np.testing.assert_array_equal(getattr(shot, name).reshape(getattr(seen, name).shape), getattr(seen, name))
 
 
+@pytest.mark.slow
 def test_edges_with_an_aperture_are_adaptive_samples():
     soft = IICamera(
         pixels=(24, 16), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0, optics=(optics.Lenslet(focal_mm=2.0),)

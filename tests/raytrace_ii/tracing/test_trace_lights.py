@@ -8,7 +8,7 @@ import pytest
 from raytrace_ii import Background, Fog, Light, Scene, load_scene, trace
 from raytrace_ii.scene.textures import Image, VertexColours
 from raytrace_ii.tracing.packing import packed
-from tests.support.trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, sphere, spread, wall
+from tests.support.trace_scenes import BLACK, UNIFORM, WHITE, body, box, floor, lamp, sphere, spread, wall
 
 
 def spot_on_floor(x, *, cone_deg=(20, 30), colour=WHITE):
@@ -127,6 +127,19 @@ def test_the_length_of_a_ray_is_to_its_hit_from_its_start():
     seen = trace(Scene(bodies=[body(wall(23, 90))]), np.broadcast_to(start, (3, 3)), directions)
     np.testing.assert_allclose(seen.ray_length, [20, 20 * math.sqrt(1.25), math.nan], rtol=1e-6)
     np.testing.assert_array_equal(np.isnan(seen.depth), [False, False, True])
+
+
+def test_shadow_rays_of_smooth_surfaces_end_at_the_lamp():
+    """They start on the smooth surface, up to 0.7 mm off the faces: an edge just beside the lamp hides none of it."""
+    bodies = [body(sphere(10, 8), at=(0, 0, 40), colour=WHITE)]
+    x, y = np.random.default_rng(0).uniform(-7, 7, (2, 2000))
+    rays = np.column_stack([x, y, np.full(2000, 10.0)]), np.broadcast_to((0.0, 0.0, 1.0), (2000, 3))
+    free, beside = (
+        trace(Scene(bodies=bodies + more, lights=[lamp((0, 0, 5))]), *rays)
+        for more in ([], [body(wall(5.05, 20), at=(side, 0, 0)) for side in (20.05, -20.05)])
+    )
+    np.testing.assert_array_equal(free.radiance, beside.radiance)
+    assert free.radiance.mean() > 0.3
 
 
 HAZE, DENSITY = (0.5, 0.6, 0.9), 0.03
