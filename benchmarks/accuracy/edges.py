@@ -115,7 +115,7 @@ def tables() -> Tables:
         cells = [scene, f"{row['4']['all'][0]:.1f}", f"**{row['2']['all'][0]:.1f}**"]
         for name in CLASSES:
             off, share = row["2"][name]
-            cells.append(f"{off:.1f} ({share * 100:.0f} %)" if off is not None and share >= 0.005 else "–")
+            cells.append(f"{off:.1f}" if off is not None and share >= 0.005 else "–")
         lines.append(cells)
     heads = " | ".join(["scene", "error 4", "error 2", *CLASSES])
     return {(PAGE, "edge-errors"): [*table(heads, lines), "", origin(rows.values())]}

@@ -77,9 +77,9 @@ def test_one_file_for_all_support_images(scene, tmp_path):
     render_to(None, scene, SMALL, support=dict.fromkeys(ALL, path))
     assert [p.name for p in tmp_path.iterdir()] == ["all.exr"], "no picture was asked for"
     shot, stored = render(scene, SMALL, support=ALL), read_channels(path)
-    assert set(stored) == {channel for image in SUPPORT_IMAGES.values() for channel in image.channels}
-    for name, image in SUPPORT_IMAGES.items():
-        for i, channel in enumerate(image.channels):
+    assert set(stored) == {channel for name in ALL for channel in SUPPORT_IMAGES[name].channels}
+    for name in ALL:
+        for i, channel in enumerate(SUPPORT_IMAGES[name].channels):
             expected = np.atleast_3d(getattr(shot, name))[..., i]
             np.testing.assert_array_equal(stored[channel], expected.astype(np.float32))
     np.testing.assert_array_equal(read_depth(path), shot.depth)
