@@ -142,12 +142,13 @@ class Images:
     normal: Annotated[Exr, typer.Option(help="Write unit normals of the faces to this .exr.")] = None
     shading_normal: Annotated[Exr, typer.Option(help="Write unit shading normals to this .exr.")] = None
     object_id: Annotated[Exr, typer.Option(help="Write object numbers to this .exr, −1 for none.")] = None
+    coverage: Annotated[Exr, typer.Option(help="Write objects' shares of pixels to this .exr, a cryptomatte.")] = None
     projection: Annotated[Path | None, typer.Option(help="Write the picture of a 2-D camera to this .png.")] = None
 
     @property
     def single(self) -> dict[str, Path]:
         """Files of single support images, by their name."""
-        names = ("depth", "ray_length", "disparity", "normal", "object_id", "shading_normal")
+        names = ("depth", "ray_length", "disparity", "normal", "object_id", "shading_normal", "coverage")
         return {name: path for name in names if (path := getattr(self, name)) is not None}
 
     @property

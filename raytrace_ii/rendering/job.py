@@ -15,7 +15,8 @@ from ii_core import Camera, IICamera, MapCamera
 from ii_core.base.colour import srgb
 
 from ..scene.scene import Scene
-from ..tracing.edges import RECORDED, Sight, edge_mean, small_balls
+from ..tracing.coverage import covered
+from ..tracing.edges import RECORDED, Sight, edge_mean, small_rods
 from ..tracing.kernels.arrays import Start
 from ..tracing.kernels.sampling import lobe_keys
 from ..tracing.kernels.srgb import encode_srgb, encode_steps
@@ -112,7 +113,8 @@ class Job:
 
     def tiles(self) -> list[Tile]:
         """Return the tiles that cover the picture, in rows of tiles; independent of the workers."""
-        return list(tiles(self.camera, TILE_RAYS, whole_lenses=not isinstance(self.sampling, int)))
+        whole = not isinstance(self.sampling, int) or "coverage" in self.support
+        return list(tiles(self.camera, TILE_RAYS, whole_lenses=whole))
 
     def stop(self) -> None:
         """Make all threads of this process leave their tiles after the current sample."""
@@ -152,7 +154,9 @@ class Job:
             radiance, divisor = self._fixed(tracer, self.sampling, rows, cols, order, support), self.sampling
             samples = np.full(len(radiance) if "samples" in self.support else 0, divisor, np.int32)
             histogram = {divisor: len(radiance)}
-        found = {} if support is None else vars(support)
+        found = {} if support is None else dict(vars(support))
+        if "coverage" in self.support:
+            found["coverage"] = self._covered(tracer, rows, cols, order)
         arrays = {"pixels": encoded(radiance, order.pixels, divisor, self.dtype).reshape(*shape, 3)}
         for name in self.support:
             values: NDArray[Any] = samples if name == "samples" else found["depth" if name == "disparity" else name]
@@ -256,7 +260,8 @@ class Job:
 
     def _recorded(self) -> set[str]:
         """Return the names of the support arrays that the tracer fills."""
-        return {"depth" if name == "disparity" else name for name in self.support if name != "samples"}
+        traced = set(self.support) - {"samples", "coverage"}
+        return {"depth" if name == "disparity" else name for name in traced}
 
     def _fixed(
         self, tracer: Tracer, samples: int, rows: slice, cols: slice, order: Order, support: Support | None
@@ -326,15 +331,24 @@ class Job:
         support = Support.empty((len(order.pixels),), self._recorded() | RECORDED)
         tracer.footprint, tracer.lobes = width, (LOBE_RAYS, 1)
         centres = self._fixed(tracer, 1, rows, cols, order, support)
+        found = edge_mean(self._sight(tracer), wanted, rows, cols, order.pixels, centres, support, codes)
+        return *found, support
+
+    def _covered(self, tracer: Tracer, rows: slice, cols: slice, order: Order) -> NDArray[np.float32]:
+        """Return the coverage of a tile, in the order of the rays."""
+        names = [body.name for body in self.scene.bodies]
+        return covered(self._sight(tracer), rows, cols, order.pixels, names)
+
+    def _sight(self, tracer: Tracer) -> Sight:
+        assert isinstance(self.camera, IICamera)
         if not hasattr(self._local, "small"):
-            pixel = footprint(camera)
-            self._local.small = pixel, small_balls(self.scene, self.pose, pixel)
-        pixel, balls = self._local.small
-        sight = Sight(
-            camera, tracer, self.seed, TILE_RAYS, width, pixel, balls, self._parts, self._shoot(tracer, None),
-            self._check_stopped,
+            pixel = footprint(self.camera)
+            self._local.small = pixel, small_rods(self.scene, self.pose, pixel)
+        pixel, rods = self._local.small
+        return Sight(
+            self.camera, tracer, self.seed, TILE_RAYS, self._footprint(), pixel, rods, self._parts,
+            self._shoot(tracer, None), self._check_stopped,
         )  # fmt: skip
-        return *edge_mean(sight, wanted, rows, cols, order.pixels, centres, support, codes), support
 
     def _shoot(self, tracer: Tracer, support: Support | None) -> Shoot:
         """Return the function that traces samples of pixels and keeps support arrays of the first ones."""

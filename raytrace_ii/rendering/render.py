@@ -24,7 +24,7 @@ from ii_core.picture.sensor_noise import NOISE_ROWS, noisy_rows
 
 from ..scene.scene import Scene
 from ..tracing.sampling import of_camera, sampling
-from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES, UNITS
+from ..tracing.support_images import SUPPORT, SUPPORT_IMAGES, UNITS, coverage_header
 from ..tracing.tracer import RayCount, check_scene, rigid
 from .audit import Audit
 from .executors import Tile, run
@@ -84,6 +84,9 @@ class Shot:
         `job.disparity`.
     samples : ndarray of int, (N, M)
         Number of samples of the pixel.
+    coverage : ndarray, (N, M, 13)
+        Share of the pixel that is not sky, then six times the name of a body, as a hash in the bits of the float,
+        and its share, the largest first; see `support_images`.
     """
 
     picture: IIPicture
@@ -94,6 +97,7 @@ class Shot:
     shading_normal: NDArray[np.float32] | None
     disparity: NDArray[np.float32] | None
     samples: NDArray[np.int32] | None
+    coverage: NDArray[np.float32] | None
     object_names: list[str]
     stats: Stats
 
@@ -129,7 +133,8 @@ def render(
     Parameters
     ----------
     support : tuple of str
-        Support images to return, of depth, normal, object_id, ray_length, shading_normal, disparity and samples.
+        Support images to return, of depth, normal, object_id, ray_length, shading_normal, disparity, samples and
+        coverage.
     progress : callable, optional
         Called in the calling thread with the number of finished tiles and of all tiles.
     **options
@@ -242,13 +247,15 @@ def _outputs(
             nothing = np.broadcast_to(np.zeros(1, job.dtype), (*camera.pixels[::-1], 3))
             structure = IIPicture(nothing, camera.lenses, camera.ei_pixels, camera.model, camera.erect != upright)
             out.append((stack.enter_context(picture_rows(structure, file, beside, named=picture)), ["pixels"]))
-        about = {"objectNames": json.dumps([body.name for body in job.scene.bodies]), "units": UNITS}
+        bodies = [body.name for body in job.scene.bodies]
+        about = {"objectNames": json.dumps(bodies), "units": UNITS}
         for target, file in zip(unique, temporaries[len(pair) :], strict=True):
             names = [name for name in files if target in files[name]]
             channels = [channel for name in names for channel in SUPPORT_IMAGES[name].channels]
+            header = coverage_header(bodies) if "coverage" in names else {}
             writer = image_rows(
-                file, camera.pixels, len(channels), "float32", names=channels if len(names) > 1 else (), about=about,
-                named=target,
+                file, camera.pixels, len(channels), "float32",
+                names=channels if len(names) > 1 or header else (), about=about | header, named=target,
             )  # fmt: skip
             out.append((stack.enter_context(writer), names))
         yield stack, out
@@ -366,6 +373,8 @@ def _job(scene: Scene, camera: IICamera | MapCamera, options: RenderOptions, sup
         raise ValueError(f"unknown support image {', '.join(sorted(unknown))}: known are {known}")
     if "disparity" in support:
         check_disparity(camera)
+    if "coverage" in support and not isinstance(camera, IICamera):
+        raise ValueError("coverage: stored maps have no rays between those of pixels, an IICamera is needed")
     wanted = sampling(samples, options.error)
     if isinstance(camera, IICamera):
         wanted = of_camera(wanted, camera)

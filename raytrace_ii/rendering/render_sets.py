@@ -154,8 +154,8 @@ def _products(
 
 
 def support_images(camera: Camera) -> list[str]:
-    """Return all support images of a camera except the number of samples."""
-    names = [name for name in SUPPORT_IMAGES if name != "samples"]
+    """Return all support images of a camera, except the number of samples and coverage, which takes more rays."""
+    names = [name for name in SUPPORT_IMAGES if name not in ("samples", "coverage")]
     try:
         check_disparity(camera)
     except ValueError:

@@ -24,7 +24,7 @@ from ii_core import IICamera
 
 from ..scene.scene import Scene
 from .kernels import cells as kernels
-from .kernels.cells import CUT, DONE, OPEN, UNITS, Places, Points, Sides
+from .kernels.cells import CUT, DONE, MISSED, OPEN, UNITS, Places, Points, Sides
 from .kernels.sampling import lobe_keys
 from .sampling import Edges, Parts, Shoot, fixed_sum, needed, with_rim
 from .tracer import LOBE_RAYS, Support, Tracer
@@ -32,7 +32,7 @@ from .tracer import LOBE_RAYS, Support, Tracer
 ROUNDS = 3  # how often neighbours of pixels follow an edge that they did not see
 # Numbers of samples of pixels that are no cells.
 SETS = np.array([2, 3, 4, 6, 9, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192, 256])
-SETS_ENDS, MOST_SAMPLES = np.sqrt(SETS[:-1] * SETS[1:]), 64  # the latter where a small body may be
+SETS_ENDS = np.sqrt(SETS[:-1] * SETS[1:])
 DENSE = 0.3  # share of the pixels, around which much meets, from which on no edges are looked for
 LOOSE = 2.0  # how much more than the error wanted of all pixels may be hidden in one
 SPREAD, SPREAD_ERROR = 0.3, 0.75  # powers of the roughness by which samples of a pixel and their error grow
@@ -43,7 +43,10 @@ FAR = 3.0  # how much more than the error wanted an edge in one pixel may cause
 DONE_ERROR, CUT_ERROR = 0.5, 0.9  # of cells, in parts of the error wanted
 FOLLOWED, OF_THIN = 64, 16  # how far a thin body is followed, in pixels, and samples to find it
 WHITE = 255.0  # code
-SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 3 ns a pixel each
+SMALL, MOST_SMALL = 1.5, 256  # pixels across, any larger square covers a centre; bodies, 5 ns a pixel each
+THIN = 0.75  # pixels across a body, wider ones cover centres and corners all along
+OF_SMALL = 32, 64  # least and most samples where a small or thin body may be
+OF_ROD = 500  # vertices that tell the longest axis of a body
 FINER = 4.0  # how much narrower than a pixel's ray are those at corners and edges
 FINEST = 4096  # places in a pixel along each side that have keys of their own
 RECORDED = frozenset({"object_id", "shading_normal", "ray_length"})  # what centres have to record
@@ -57,8 +60,8 @@ Whole = NDArray[np.int32]
 class Sight:
     """What looks at places of a tile's pixels.
 
-    ``width`` is the footprint of a pixel's ray over textures, ``pixel`` that of the pixel. ``balls`` (b, 4) are
-    centres and radii around small bodies in the camera's frame; ``check`` may stop it.
+    ``width`` is the footprint of a pixel's ray over textures, ``pixel`` that of the pixel. ``rods`` (b, 7) are
+    ends and radii around small and thin bodies in the camera's frame; ``check`` may stop it.
     """
 
     camera: IICamera
@@ -67,7 +70,7 @@ class Sight:
     batch: int
     width: tuple[float, float]
     pixel: tuple[float, float]
-    balls: Floats
+    rods: Floats
     parts: Parts
     shoot: Shoot
     check: Callable[[], None]
@@ -121,10 +124,11 @@ class Cells:
         kernels.roughness(self.points, self.lens, np.empty((many, 2), np.float32), rough)
         self._look_beyond(steps, rough)
         doubtful = steps > 0
-        if len(self.sight.balls):
+        if len(self.sight.rods):
             pixels = inside[self._touched(inside)]
             opened[pixels] = True
-            self._sample(pixels, np.full(len(pixels), MOST_SAMPLES))
+            number = _numbers(np.clip((MISSED * WHITE / 2 / self.wanted.error) ** (4 / 3), *OF_SMALL))
+            self._sample(pixels, np.full(len(pixels), number))
         kernels.crowded(self.points, self.lens, steps, crowded := np.empty(many, np.bool_))
         if np.count_nonzero(crowded) > DENSE * len(inside):
             pixels = inside[(doubtful & ~opened)[inside]]
@@ -161,7 +165,7 @@ class Cells:
         length = np.linalg.norm(D, axis=-1, keepdims=True)
         found = np.empty(len(pixels), np.bool_)
         D = np.divide(D, length, out=D, where=length > 0)
-        kernels.touched(L, D, self.sight.balls, *self.sight.pixel, found)
+        kernels.touched(L, D, self.sight.rods, *self.sight.pixel, found)
         return found
 
     def _near_together(self, pixels: NDArray[np.int64], reach: NDArray[np.float32]) -> NDArray[np.int64]:
@@ -343,19 +347,37 @@ class Cells:
         return light / number
 
 
-def _numbers(least: Floats) -> NDArray[np.int64]:
+def _numbers(least: Any) -> Any:
+    """Return the numbers of samples that are nearest."""
     return SETS[np.searchsorted(SETS_ENDS, least)]
 
 
-def small_balls(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats:
-    """Return balls (b, 4) around bodies that look smaller than `SMALL` pixels, in the camera's frame."""
-    ends = [(np.min(body.vertices, axis=0), np.max(body.vertices, axis=0)) for body in scene.bodies]
-    low, high = np.array(ends, np.float64).reshape(-1, 2, 3).swapaxes(0, 1)
-    centres = ((low + high) / 2 - pose[:3, 3]) @ pose[:3, :3]
-    radii = np.linalg.norm(high - low, axis=1) / 2
+def small_rods(scene: Scene, pose: Floats, pixel: tuple[float, float]) -> Floats:
+    """Return rods (b, 7) around bodies thinner than `THIN` pixels or smaller than `SMALL`.
+
+    They are ends in the camera's frame, and radii.
+    """
+    rods = np.array([_rod(np.asarray(body.vertices, np.float64)) for body in scene.bodies]).reshape(-1, 7)
+    ends = (rods[:, :6].reshape(-1, 2, 3) - pose[:3, 3]) @ pose[:3, :3]
     width, spread = pixel
-    small = 2 * radii < SMALL * (width + spread * np.linalg.norm(centres, axis=1))
-    return np.column_stack([centres, radii])[small][:MOST_SMALL]
+    far = np.linalg.norm(ends, axis=2).min(axis=1)
+    across, pixels = 2 * rods[:, 6], width + spread * far
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    small = (across < THIN * pixels) | (np.maximum(across, length) < SMALL * pixels)
+    return np.column_stack([ends.reshape(-1, 6), rods[:, 6]])[small][:MOST_SMALL]
+
+
+def _rod(vertices: Floats) -> Floats:
+    """Return the ends of the longest axis of a body, and the greatest distance from it."""
+    some = vertices[:: -(-len(vertices) // OF_ROD)]
+    middle = some.mean(axis=0)
+    axis = np.linalg.svd(some - middle, full_matrices=False)[2][0]
+    for points in (some, vertices):  # most bodies are seen to be thick by some of their vertices
+        along = (points - middle) @ axis
+        radius = np.sqrt(np.square(points - middle - along[:, None] * axis).sum(axis=1).max())
+        if radius > np.ptp(along) / 4:
+            break
+    return np.array([*(middle + along.min() * axis), *(middle + along.max() * axis), radius])
 
 
 def edge_mean(

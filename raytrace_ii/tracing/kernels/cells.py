@@ -211,17 +211,24 @@ def nearest_around(reach, lens, out):
 
 
 @kernel
-def touched(locations, directions, balls, width, spread, found):
-    """Tell which pixels, by rays of unit directions through their centres, balls (x, y, z, radius) may be seen in.
+def touched(locations, directions, rods, width, spread, found):
+    """Tell which pixels, by rays of unit directions through their centres, rods (two ends, radius) may be seen in.
 
     Pixels are ``width`` wide where their rays start and grow by ``spread`` a mm.
     """
     for i in range(locations.shape[0]):
         found[i] = False
-        for b in range(balls.shape[0]):
-            x, y, z = balls[b, 0] - locations[i, 0], balls[b, 1] - locations[i, 1], balls[b, 2] - locations[i, 2]
-            along = x * directions[i, 0] + y * directions[i, 1] + z * directions[i, 2]
-            near = balls[b, 3] + HALF_DIAGONAL * (width + spread * along)
+        dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
+        for b in range(rods.shape[0]):
+            x, y, z = rods[b, 0] - locations[i, 0], rods[b, 1] - locations[i, 1], rods[b, 2] - locations[i, 2]
+            u, v, w = rods[b, 3] - rods[b, 0], rods[b, 4] - rods[b, 1], rods[b, 5] - rods[b, 2]
+            turned = u * dx + v * dy + w * dz
+            square = u * u + v * v + w * w - turned * turned
+            nearest = (turned * (x * dx + y * dy + z * dz) - (u * x + v * y + w * z)) / max(square, 1e-12)
+            s = min(max(nearest, 0.0), 1.0)  # the place along the rod
+            x, y, z = x + s * u, y + s * v, z + s * w
+            along = x * dx + y * dy + z * dz
+            near = rods[b, 6] + HALF_DIAGONAL * (width + spread * along)
             found[i] |= along > 0.0 and x * x + y * y + z * z - along * along <= near * near
 
 

@@ -6,10 +6,9 @@ import pytest
 from benchmarks.accuracy.sample_places import squares
 from ii_core import IICamera, preset
 from ii_core.camera import optics
-from raytrace_ii import Light, Scene, render, trace
+from raytrace_ii import Scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.scene.textures import Checker, Noise
-from raytrace_ii.shapes.primitives import Mesh
 from raytrace_ii.tracing.kernels import sampling as sample_kernels
 from raytrace_ii.tracing.sample_places import MOST, doubling_places, fixed_places
 from tests.support.slow import first_fast
@@ -271,139 +270,6 @@ def test_support_images_are_those_of_the_first_sample():
     seen = trace(scene, *SMALL.rays(sample=place.reshape(64, 128, 2)))
     for name in ("depth", "normal", "object_id", "ray_length"):
         np.testing.assert_array_equal(getattr(shot, name).reshape(getattr(seen, name).shape), getattr(seen, name))
-
-
-def on_wall(corners, z=22.0, **material):
-    """A polygon with corners in pixels of `ONE_LENS`, columns and rows from the left top, as a body at one z."""
-    points = np.asarray(corners, float)
-    scale = (z - 2) / 20
-    vertices = np.column_stack([(12 - points[:, 0]) * scale, (points[:, 1] - 8) * scale, np.full(len(points), z)])
-    fan = np.array([[0, k, k + 1] for k in range(1, len(points) - 1)])
-    return body(Mesh(vertices, fan, None, None), **material)
-
-
-def half(degrees, offset, far=60.0):
-    """A square whose one side passes at a distance from pixel (12.2, 8.1)."""
-    along, across = np.array([[np.cos(a), np.sin(a)] for a in (np.radians(degrees), np.radians(degrees + 90))])
-    middle = np.array([12.2, 8.1]) + offset * across
-    return [
-        middle - far * along,
-        middle + far * along,
-        middle + far * (along + across),
-        middle + far * (across - along),
-    ]
-
-
-def areas(polygon):
-    """Share of each pixel of `ONE_LENS` within a convex polygon, by clipping it (Sutherland and Hodgman 1974)."""
-    found = np.zeros((16, 24))
-    for n, m in np.ndindex(16, 24):
-        points = [np.asarray(p, float) for p in polygon]
-        for axis, low, sign in ((0, m, 1), (0, m + 1, -1), (1, n, 1), (1, n + 1, -1)):
-            kept = []
-            for p, q in zip(points, points[1:] + points[:1], strict=True):
-                a, b = sign * (p[axis] - low), sign * (q[axis] - low)
-                kept += [p] if a >= 0 else []
-                kept += [p + (q - p) * a / (a - b)] if (a >= 0) != (b >= 0) else []
-            points = kept
-        x, y = np.array([*points, *points[:1]]).T if points else (np.zeros(1), np.zeros(1))
-        found[n, m] = abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2
-    return found
-
-
-def by_edges(scene, error=1.0, **more):
-    return render(scene, ONE_LENS, samples="edges", error=error, dtype="float32", support=(), **more)
-
-
-INNER = np.s_[1:-1, 1:-1]  # beyond the border of the picture edges are not known
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("degrees", range(0, 180, 15))
-def test_edges_of_half_planes_are_exact(degrees):
-    for offset in (-0.37, 0.0, 0.21):
-        polygon = half(degrees, offset)
-        shot = by_edges(Scene(bodies=[on_wall(polygon, colour=WHITE)], ambient=WHITE), error=0.1)
-        assert np.abs(shot.picture.pixels[..., 0] - areas(polygon))[INNER].max() < 1 / 512
-        assert shot.stats.mean_samples < 4
-
-
-SQUARE = [(8.3, 5.2), (16.4, 5.9), (15.8, 11.3), (7.9, 10.6)]
-EDGE, UPPER = half(70, 0.1), [(-9, -9), (11.7, -9), (11.7, 8.4), (-9, 8.4)]
-LOWER = [(11.7, -9), (40, -9), (40, 8.4), (11.7, 8.4)]
-GREY = (0.2, 0.2, 0.2)
-
-
-def shadowed(polygon):
-    """A wall with the shadow of what stands beside the picture."""
-    beside = on_wall(polygon, at=(12, 0, -10))
-    return {
-        "bodies": [body(wall(22), colour=WHITE), beside],
-        "lights": [Light(kind="directional", vector=(-1.2, 0, 1), colour=WHITE)],
-    }
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("polygons", "made", "most"),
-    [
-        ([SQUARE], lambda p: {"bodies": [on_wall(p, emission=WHITE)]}, 0.06),
-        (
-            [EDGE],
-            lambda p: {"bodies": [body(wall(22), mirror=WHITE), on_wall(p, 62, at=(0, 0, -80), emission=WHITE)]},
-            0.012,
-        ),
-        (
-            [EDGE],
-            lambda p: {"bodies": [on_wall(p, 12, transmission=GREY, ior=1.0), body(wall(22), emission=WHITE)]},
-            0.012,
-        ),
-        ([EDGE], shadowed, 0.012),
-        ([UPPER, LOWER], lambda p, q: {"bodies": [on_wall(p, emission=WHITE), on_wall(q, emission=GREY)]}, 0.06),
-    ],
-    ids=["corners", "mirror", "glass", "shadow", "junction"],
-)
-def test_other_edges_have_the_light_of_their_areas(polygons, made, most):
-    seen = by_edges(Scene(**made(*polygons))).picture.pixels[..., 0].astype(float)
-    shares = [areas(polygon) for polygon in polygons]
-    out = np.median(seen[sum(shares) == 0])
-    light = out + sum(share * ((np.median(seen[share == 1]) if (share == 1).any() else 1) - out) for share in shares)
-    off = np.abs(seen - light)[INNER] / np.ptp(light)
-    assert off.max() < most
-    assert np.sqrt(np.mean(off[(light != out)[INNER]] ** 2)) < most / 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("camera", [SMALL, HEXAGONAL, ONE_LENS], ids=["regular", "hexagonal", "2d"])
-def test_edges_are_the_same_bits_for_any_workers_and_kept_in_support(camera):
-    scene = hall()
-    options = {"samples": "edges", "error": 4.0, "support": ("samples", "depth", "object_id")}
-    whole = render(scene, camera, workers=1, **options)
-    other = render(scene, camera, workers=3, executor=None, **options)
-    one = render(scene, camera, support=("depth", "object_id"))
-    np.testing.assert_array_equal(whole.picture.pixels, other.picture.pixels)
-    assert 1 < whole.samples.mean() < 40
-    assert whole.samples.sum() == sum(n * pixels for n, pixels in whole.stats.samples.items())
-    calm = whole.samples == 1
-    # some have corners whose rays their neighbours sent
-    assert (whole.picture.pixels[calm] == one.picture.pixels[calm]).mean() > 0.98
-    for name in ("depth", "object_id"):
-        np.testing.assert_array_equal(getattr(whole, name), getattr(one, name))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("side", [0.3, 0.7, 2.0])
-def test_small_bodies_are_all_found_by_edges(side):
-    """Squares of 6·4 places in the pixels: a fixed ray a pixel would lose nine of ten of the smallest."""
-    offsets = np.random.default_rng(4).random((24, 2))
-    bodies, squares = [], []
-    for (row, column), offset in zip(np.ndindex(4, 6), offsets, strict=True):
-        low = np.array([2.0 + 3.4 * column, 1.5 + 3.4 * row]) + offset
-        squares.append([low + side * np.array(corner) for corner in ((0, 0), (1, 0), (1, 1), (0, 1))])
-        bodies.append(on_wall(squares[-1], name=f"{row} {column}", emission=WHITE))
-    seen = by_edges(Scene(bodies=bodies), error=8.0).picture.pixels[..., 0]
-    assert seen.sum() == pytest.approx(24 * side**2, rel=0.05)
-    assert all(seen[areas(square) > 0].sum() > 0 for square in squares)
 
 
 @pytest.mark.slow

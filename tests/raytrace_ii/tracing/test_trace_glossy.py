@@ -9,6 +9,7 @@ from ii_core import IICamera, preset
 from raytrace_ii import Background, Scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.scene.textures import Image
+from raytrace_ii.shapes.primitives import Mesh
 from raytrace_ii.tracing.kernels.glossy import glossy_direction
 from raytrace_ii.tracing.packing import packed
 from tests.support.slow import first_fast
@@ -68,6 +69,17 @@ def test_a_rough_mirror_reflects_the_integral_of_the_lobe(roughness, elevation):
     got, error = reflected(roughness, elevation, SLOPE)
     # noise within a lobe of 16 stratified rays is less than that of single ones
     assert abs(got[0] - height) < 4 * error[0] + 1e-4, (got, height)
+
+
+def test_rays_of_a_lobe_that_would_enter_the_face_leave_it():
+    """Under a bent normal half of the lobe points into the floor: mirrored at it, all rays see the sky."""
+    flat, bent, ahead = floor(), np.array([-0.6, 0.8, 0.0]), np.array([-math.cos(1.2), -math.sin(1.2), 0.0])
+    mesh = Mesh(flat.vertices, flat.faces, np.broadcast_to(bent, flat.vertices.shape))
+    scene = Scene(bodies=[body(mesh, mirror=WHITE, roughness=0.5)], background=UNIFORM, max_depth=1)
+    n = 10_000
+    seen = trace(scene, np.broadcast_to(-9 * ahead, (n, 3)), np.broadcast_to(ahead, (n, 3))).radiance[:, 0]
+    albedo = lobe_mean(0.5, math.asin(-ahead @ bent), lambda out: 1.0)
+    assert abs(seen.mean() - albedo) < 4 * seen.std() / math.sqrt(n) + 1e-4, (seen.mean(), albedo)
 
 
 @pytest.mark.parametrize("elevation", [0.05, 0.7, math.pi / 2])

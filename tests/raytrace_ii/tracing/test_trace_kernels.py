@@ -5,6 +5,8 @@ from dataclasses import replace
 import numba
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from ii_core import preset
 from raytrace_ii import trace
@@ -20,6 +22,7 @@ from raytrace_ii.tracing.kernels.lanes import work
 from raytrace_ii.tracing.kernels.light import keep_unblocked
 from raytrace_ii.tracing.kernels.packets import NO_CALLS, Tools
 from raytrace_ii.tracing.kernels.start import start_rays, start_separable_rays
+from raytrace_ii.tracing.same_faces import first_of_same
 from tests.support.pictures import scene
 from tests.support.slow import first_fast
 from tests.support.trace_scenes import WHITE, body, hall, sphere, wall
@@ -190,3 +193,27 @@ def test_a_part_of_a_kernel_runs_as_python_when_called_from_python():
     assert fresnel(1.0, 1.5) == pytest.approx((0.04, 1.0), rel=1e-14)
     fresnel.compile((numba.float64, numba.float64))  # as a kernel that calls it does
     assert fresnel(1.0, 1.5) == pytest.approx((0.04, 1.0), rel=1e-14)
+
+
+def by_loops(corners):
+    """The first face with the same set of corners, by comparing all pairs."""
+    sets = [sorted(map(tuple, face.tolist())) for face in corners]
+    return [sets.index(face) for face in sets]
+
+
+@given(data=st.lists(st.lists(st.sampled_from([0.0, -0.0, 1.0, 1e-38, -2.5]), min_size=9, max_size=9), max_size=30))
+def test_as_by_comparison_of_all_pairs(data):
+    corners = np.array(data, np.float32).reshape(-1, 3, 3)
+    found, expected = first_of_same(corners), by_loops(corners)
+    if found is None:
+        assert expected == list(range(len(corners)))
+    else:
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_one_copy_in_many_blocks_is_found():
+    corners = np.random.default_rng(0).random((600_000, 3, 3), dtype=np.float32)
+    assert first_of_same(corners) is None
+    corners[599_999] = corners[7][[2, 0, 1]]
+    found = first_of_same(corners)
+    assert found[599_999] == 7 and (np.delete(found, 599_999) == np.arange(599_999)).all()
