@@ -53,6 +53,7 @@ OTHERS = ("svtav1", "jpegxl", BY_RATE)
 SCHEMES = (OURS, BY_RGB, AVIF, "x265", "vvenc", "libaom")
 MEASURES = {"ctc": "q_ctc_psnr", "psnr": "q_global", "ssim": "q_ctc_ssim", "worst": "q_ctc_min", "step": "q_ctc_step"}
 LUMA = "luma"  # PSNR of Y in the codes of the common test conditions, mean over views
+LABELS = {"ctc": "CTC", LUMA: "luma", "psnr": "RGB"}
 
 
 def main() -> None:
@@ -138,12 +139,13 @@ def changes(rows: Sequence[Mapping[str, Any]], names: Sequence[str], scheme: str
     return found
 
 
-def comparison(rows: Sequence[Mapping[str, Any]], names: Sequence[str], others: Sequence[str]) -> list[str]:
+def comparison(
+    rows: Sequence[Mapping[str, Any]], names: Sequence[str], others: Sequence[str], labels: Mapping[str, str] = LABELS
+) -> list[str]:
     """Return a table of Bjøntegaard rates by picture, their mean and the worst; without columns that are empty."""
     measured = {row["picture"]: row for row in rows}
     shown = [name for name in names if name in measured]
     each = {other: changes(rows, shown, other) for other in others}
-    labels = {"ctc": "CTC", LUMA: "luma", "psnr": "RGB"}
     columns = [(other, measure) for other in others for measure in labels if each[other][measure]]
     heads = [f"{labels[measure]}: `{other}`" for other, measure in columns]
     lines = []
@@ -200,7 +202,8 @@ def tables() -> Tables:
     for mark, (names, others) in kinds.items():
         compared = {row["picture"] for row in rows if row["scheme"] in others}
         used = [row for row in rows if row["picture"] in compared.intersection(names)]
-        lines = [*comparison(used, names, others), "", origin(used)] if used else ["Not measured yet."]
+        labels = {"ctc": "CTC"} if others == OTHERS else LABELS
+        lines = [*comparison(used, names, others, labels), "", origin(used)] if used else ["Not measured yet."]
         found["docs/benchmark.md", mark] = lines
     names, others = kinds["anchors-photographs"]
     found["docs/benchmark.md", "anchors-views"] = by_view(rows, names, others)

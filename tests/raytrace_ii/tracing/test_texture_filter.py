@@ -10,6 +10,7 @@ from ii_core import IICamera, preset
 from raytrace_ii import Background, Scene, render
 from raytrace_ii.rendering.job import footprint
 from raytrace_ii.scene.textures import Image
+from raytrace_ii.shapes.primitives import rotation
 from raytrace_ii.tracing.kernels.texels import add_mixed
 from raytrace_ii.tracing.kernels.textures import filter_taps, logarithm
 from raytrace_ii.tracing.kernels.textures import footprint as face_footprint
@@ -86,8 +87,9 @@ def test_a_long_ellipse_is_read_along_its_length():
     assert along[0] > 0.99 and along[1] == pytest.approx(0.5, abs=0.07), along
 
 
+@pytest.mark.parametrize("turn", [(0, 0, 0), (20, 130, 70)])
 @pytest.mark.parametrize("slant", [0.0, 0.5, 1.2, math.pi / 2 - 1e-5])
-def test_the_footprint_is_where_the_rays_beside_it_meet_the_face(slant):
+def test_the_footprint_is_where_the_rays_beside_it_meet_the_face(slant, turn):
     """Diameters over (u, v) against neighbouring parallel rays, in the plane of incidence and across it.
 
     A ray that grazes the face has a thousandfold width at most.
@@ -97,9 +99,12 @@ def test_the_footprint_is_where_the_rays_beside_it_meet_the_face(slant):
     coordinates = np.zeros_like(corners)
     coordinates[..., :2] = mesh.uv[mesh.faces]
     ahead = np.array([math.sin(slant), 0.0, math.cos(slant)])
-    edges = (corners[0, 1:] - corners[0, 0]).astype(float).ravel()
+    matrix = rotation(turn)
+    edges = ((corners[0, 1:] - corners[0, 0]).astype(float) @ matrix.T).ravel()
     grows = (coordinates[0, 1:, :2] - coordinates[0, 0, :2]).ravel()
-    across_u, across_v, along_u, along_v = face_footprint(*edges, *grows, 0.2, *ahead, 0.0, 0.0, -1.0)
+    across_u, across_v, along_u, along_v = face_footprint(
+        *edges, *grows, 0.2, *matrix @ ahead, *matrix @ (0.0, 0.0, -1.0)
+    )
     ways = {tuple(np.round(np.abs(way), 9)) for way in ((across_u, across_v), (along_u, along_v))}
     # the wall is 100 mm wide: u and v grow by 1/100 a mm
     truth = {(0.0, 0.002), (round(0.002 * min(1 / math.cos(slant), 1000), 9), 0.0)}
