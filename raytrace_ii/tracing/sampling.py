@@ -58,6 +58,7 @@ class Edges:
 
 
 EDGES = "edges"
+EDGE_ERRORS = 1e-3, 1e3  # least and largest that mean anything: no set is as good, no step as large
 APERTURE_SAMPLES = 4, 64  # of `EDGES` with a camera whose rays spread over an aperture
 Sampling = int | Adaptive | Edges
 
@@ -73,7 +74,7 @@ def sampling(samples: Any, error: float) -> Sampling:
     if isinstance(samples, str):
         if samples != EDGES:
             raise ValueError(f"samples is {samples!r}: a whole number, a pair of them or {EDGES!r} is needed")
-        return Edges(_error(error))
+        return Edges(min(max(_error(error), EDGE_ERRORS[0]), EDGE_ERRORS[1]))
     pair = samples if isinstance(samples, tuple) else (samples,)
     for value in pair:
         if not isinstance(value, int | np.integer) or isinstance(value, bool) or not 1 <= value <= MOST_SAMPLES:

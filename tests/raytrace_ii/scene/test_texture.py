@@ -1,6 +1,8 @@
 """Textures: counted checkers, noise on its lattice, texels of images, exact codes."""
 
+import itertools
 import math
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from raytrace_ii import Scene, trace
 from raytrace_ii.rendering.job import CURVES, STEPS
 from raytrace_ii.scene.textures import Checker, Image, Noise, Stripes, image_texture, linear, normal_map
 from raytrace_ii.shapes.primitives import rotation
-from raytrace_ii.tracing.kernels.noise import gradient_noise
+from raytrace_ii.tracing.kernels.noise import _slope, gradient_noise
 from raytrace_ii.tracing.kernels.srgb import encode_srgb, encode_steps
 from raytrace_ii.tracing.kernels.tables import FLAT_COLUMNS
 from raytrace_ii.tracing.packing import packed
@@ -91,6 +93,19 @@ def test_a_solid_texture_turns_with_its_body():
 
 def noise(points, seed=0):
     return np.array([gradient_noise(*map(float, p), seed) for p in points])
+
+
+def test_gradients_of_noise_are_perlins():
+    """They point to the twelve edges of a cube, four of them twice, by the upper four bits of the hash."""
+    found = {}
+    for cell in range(400):
+        place = (cell * 0x1E3779B97F4A7C15) % 2**64 >> 60
+        with np.errstate(over="ignore"):  # the hash wraps
+            found[place] = tuple(_slope(cell, *axis) for axis in np.eye(3).tolist())
+    edges = [edge for edge in itertools.product((-1, 0, 1), repeat=3) if np.abs(edge).sum() == 2]
+    counts = Counter(found.values())
+    assert len(found) == 16 and set(counts) == set(edges)
+    assert sorted(counts.values()) == [1] * 8 + [2] * 4
 
 
 def test_noise_is_nothing_on_the_lattice():

@@ -287,6 +287,13 @@ def test_coverage_in_a_file_is_a_cryptomatte(tmp_path):
     assert (found == centres).mean() > 0.999
 
 
+def test_any_positive_error_makes_a_picture():
+    scene = Scene(bodies=[on_wall(SQUARE, emission=WHITE)])
+    coarse, fine = (by_edges(scene, error=error).picture.pixels for error in (1e300, 1e-300))
+    np.testing.assert_array_equal(coarse, render(scene, ONE_LENS, dtype="float32").picture.pixels)
+    assert np.abs(fine[..., 0] - areas(SQUARE))[INNER].max() < 0.01
+
+
 def test_coverage_of_stored_maps_is_refused(tmp_path):
     write_maps([ONE_LENS], tmp_path, format="exr")
     with pytest.raises(ValueError, match="coverage: stored maps have no rays between those of pixels"):

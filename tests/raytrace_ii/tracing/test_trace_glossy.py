@@ -9,7 +9,7 @@ from ii_core import IICamera, preset
 from raytrace_ii import Background, Scene, render, trace
 from raytrace_ii.rendering import job
 from raytrace_ii.scene.textures import Image
-from raytrace_ii.shapes.primitives import Mesh
+from raytrace_ii.shapes.primitives import Mesh, rotation
 from raytrace_ii.tracing.kernels.glossy import glossy_direction
 from raytrace_ii.tracing.packing import packed
 from tests.support.slow import first_fast
@@ -84,12 +84,14 @@ def test_rays_of_a_lobe_that_would_enter_the_face_leave_it():
 
 @pytest.mark.parametrize("elevation", [0.05, 0.7, math.pi / 2])
 def test_no_roughness_is_the_mirror(elevation):
-    normal, ahead = np.array([0.6, 0.0, 0.8]), np.array([-math.cos(elevation), 0.0, -math.sin(elevation)])
-    ahead = np.array([0.8 * ahead[0] + 0.6 * ahead[2], 0.0, -0.6 * ahead[0] + 0.8 * ahead[2]])
+    turn = rotation((20, 130, 70))
+    normal, ahead = turn @ (0.0, 0.0, 1.0), turn @ (-math.cos(elevation), 0.0, -math.sin(elevation))
     for across, around in np.random.default_rng(0).random((50, 2)):
         *out, share = glossy_direction(1e-7, across, around, *ahead, *normal)
         np.testing.assert_allclose(out, ahead - 2 * (ahead @ normal) * normal, atol=1e-4)
         assert share == pytest.approx(1, abs=1e-6)
+        *out, _ = glossy_direction(0.5, across, around, *ahead, *normal)
+        assert np.linalg.norm(out) == pytest.approx(1, abs=1e-9)
 
 
 def test_a_nearly_smooth_mirror_shows_the_mirrors_picture():
