@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from ii_core import IICamera, preset
+from ii_core import IICamera, camera_pose, preset
 from raytrace_ii import Background, Scene, render
 from raytrace_ii.rendering.job import footprint
 from raytrace_ii.scene.textures import Image
@@ -179,3 +179,18 @@ def test_scenes_without_images_do_not_change():
     plain = Scene(bodies=[ball], background=Background(horizon=WHITE))
     a, b = (render(plain, CAMERA, texture_filter=on).picture.pixels for on in (True, False))
     np.testing.assert_array_equal(a, b)
+
+
+def test_meridians_of_a_sky_are_grey_where_they_meet():
+    """Stripes of 2° by longitude are 0.35° wide at an elevation of 80°, where a pixel of 2.9° sees eight of them."""
+    camera = IICamera(pixels=(12, 8), lenses=(1, 1), pixel_pitch_mm=0.1, gap_mm=2.0)
+    stripes = np.broadcast_to((np.arange(360) % 4 < 2)[None, :, None], (180, 360, 3)).astype(np.float32)
+    below = body(sphere(0.01, 8), at=(0, -50, 0))
+    scene = Scene(bodies=[below], background=Background(image=Image(stripes)))
+    slope = math.radians(80)
+    pose = camera_pose((0, 0, 0), look_at_mm=(0, 99 * math.sin(slope), 99 * math.cos(slope)), up=(0, 0, -1))
+    seen, points = (
+        render(scene, camera, pose=pose, dtype="float32", support=(), texture_filter=on).picture.pixels[..., 0]
+        for on in (True, False)
+    )
+    assert np.abs(seen - 0.5).max() < 0.2 and np.abs(points - 0.5).max() > 0.4
