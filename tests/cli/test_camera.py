@@ -29,7 +29,7 @@ def test_maps_are_written_and_rendered(run, tmp_path, format):
     mapped, direct = (IIPicture.load(tmp_path / name) for name in ("a.png", "b.png"))
     assert mapped.camera == direct.camera and mapped.erect
     code, out, _ = run("measure", tmp_path / "b.png", tmp_path / "a.png")
-    assert code == 0 and float(out.split()[1].replace("inf", "99")) > 20  # as `map_precision` charts
+    assert code == 0 and float(out.split()[1].replace("inf", "99")) > 20
 
 
 def test_a_set_of_arrays_gives_numbered_pictures(run, tmp_path):
