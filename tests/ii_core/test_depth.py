@@ -68,6 +68,12 @@ def test_range_is_found_and_confidence_is_honest():
     assert sure.mean() > 0.4 and (np.abs(found.disparity - truth)[sure] > 0.07).mean() <= 0.02
 
 
+def test_range_of_large_views_is_found_in_halved_ones():
+    picture, truth = slanted(views=(5, 5), size=(300, 240), at=-6.0, slope=0.002)
+    low, high = field_range(picture)
+    assert low < truth.min() < truth.max() < high and high - low < 5
+
+
 def test_any_view_and_any_number_of_threads():
     picture, truth = slanted(views=(5, 5), at=0.7, slope=0.0)
     one = estimate_depth(picture, view=(0, 4), low=-2, high=2, workers=1)
