@@ -192,10 +192,11 @@ def behind(
 def surface(
     depth: Floats, there: NDArray[np.bool_], cut: float, whole: NDArray[np.bool_] | None = None
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Return vertices (u, v, z) and faces of the pixels that are there, cut where depth leaps.
+    """Return vertices (u, v, z, s, t) and faces of the pixels that are there, cut where depth leaps.
 
-    u and v are from 0 to 1, from the left and from the bottom. A cut runs along the borders of pixels. Pixels of
-    ``whole`` are never cut from their neighbours.
+    u and v, of places, and s and t, of colours, are from 0 to 1, from the left and from the bottom. A cut runs along
+    the borders of pixels, up to which each side has the colour of its own. Pixels of ``whole`` are never cut from
+    their neighbours.
     """
     z, there = np.pad(depth, 1, "edge"), np.pad(there, 1, "edge")
     never = np.zeros_like(there) if whole is None else np.pad(whole, 1, "edge")
@@ -212,12 +213,12 @@ def surface(
     faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     split = ~joined & on.any(axis=1)
     uv = np.stack([np.tile(x, height), np.repeat(y, width)], axis=1)
-    vertices = np.column_stack([uv, z.ravel()])
+    vertices = np.column_stack([uv, z.ravel(), uv])
     if split.any():
         more, new = _quarters(uv[corners[split]], q[split], on[split], agree[split])
         faces = np.concatenate([faces, new + len(vertices)])
         vertices = np.concatenate([vertices, more])
-    vertices[:, 1] = 1 - vertices[:, 1]
+    vertices[:, [1, 4]] = 1 - vertices[:, [1, 4]]
     used, numbers = np.unique(faces, return_inverse=True)
     return vertices[used], numbers.reshape(-1, 3)
 
@@ -244,26 +245,30 @@ def _quarters(
     middle = (one * q[:, None, :]).sum(axis=2) / one.sum(axis=2)
     parts, centre = [], uv.mean(axis=1)
     for i in range(4):
-        after, before = (i + 1) % 4, (i - 1) % 4
-        sides = []
+        after, before, own = (i + 1) % 4, (i - 1) % 4, uv[:, i]
+        sides, colour = [], own.copy()
         for other, joined in ((after, agree[:, i]), (before, agree[:, before])):
             depth = np.where(joined, (q[:, i] + q[:, other]) / 2, q[:, i])
-            sides.append(np.column_stack([(uv[:, i] + uv[:, other]) / 2, 1 / depth]))
-        corner = np.column_stack([uv[:, i], 1 / q[:, i]])
-        inner = np.column_stack([centre, 1 / middle[:, i]])
+            half = (uv[:, other] - own) / 2
+            colour += half * joined[:, None]
+            sides.append(np.column_stack([own + half, 1 / depth, own + half * joined[:, None]]))
+        alone = agree[:, i] & agree[:, before] & ~one[:, i, (i + 2) % 4]  # the middle has colour of the corner beyond
+        colour[alone] = own[alone]
+        corner = np.column_stack([own, 1 / q[:, i], own])
+        inner = np.column_stack([centre, 1 / middle[:, i], colour])
         parts.append(np.stack([corner, sides[0], inner, sides[1]], axis=1)[on[:, i]])
     vertices = np.concatenate(parts)
     numbers = np.arange(4 * len(vertices)).reshape(-1, 4)
-    return vertices.reshape(-1, 3), np.concatenate([numbers[:, [0, 1, 2]], numbers[:, [0, 2, 3]]])
+    return vertices.reshape(-1, 5), np.concatenate([numbers[:, [0, 1, 2]], numbers[:, [0, 2, 3]]])
 
 
 def _body(name: str, mesh: tuple[Floats, NDArray[np.int64]], slope: float, back: float, texture: Image) -> Body:
-    """Return the shining body of a surface over (u, v): its camera stands at z = ``back``."""
-    (u, v, z), faces = mesh[0].T, mesh[1]
+    """Return the shining body of a surface: its camera stands at z = ``back``."""
+    (u, v, z, s, t), faces = mesh[0].T, mesh[1]
     n, m = texture.pixels.shape[:2]
     x, y = (2 * u - 1) * slope * z, (2 * v - 1) * slope * z * n / m
     material = Material(colour=(0, 0, 0), emission=(1, 1, 1), emission_map=_clamped(texture))
-    places = np.column_stack([u, v, np.zeros_like(u)])
+    places = np.column_stack([s, t, np.zeros_like(s)])
     vertices = np.column_stack([x, y, z + back])
     return Body(name=name, vertices=vertices, faces=faces, material=material, texture_coordinates=places)
 

@@ -37,16 +37,12 @@ def rays(near, middle, offset=(0.25, 0.25), aside=0.0):
 
 @pytest.mark.parametrize("offset", [(0.25, 0.25), (0.75, 0.25), (0.02, 0.97)])
 def test_from_its_own_place_the_scene_is_picture_and_depth(offset):
-    """The cut runs along the borders of pixels, all around the square."""
+    """The cut runs along the borders of pixels, all around the square, and no colour bleeds over it."""
     pixels, depth = picture_and_depth()
     origins, directions, back, unit = rays(5.0, 10.0, offset)
     seen = trace(rgbd_scene(pixels, depth, field_deg=FIELD), origins, directions)
     np.testing.assert_allclose(seen.depth.reshape(SIZE), back + unit * depth, rtol=1e-4)
-    off = np.abs(seen.radiance.reshape(*SIZE, 3) - pixels)[..., 0]
-    calm = np.ones(SIZE, bool)  # beside the cut colours are read between those of both sides
-    calm[7:17, 9:21] = False
-    calm[9:15, 11:19] = True
-    assert off[calm].max() < 1e-3
+    assert np.abs(seen.radiance.reshape(*SIZE, 3) - pixels).max() < 1e-3
 
 
 def test_a_slanted_plane_comes_back_exactly():
