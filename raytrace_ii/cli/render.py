@@ -214,7 +214,7 @@ def render(
     Unchanged frames are kept.
     """
     if bool(scene) + bool(set_name) + bool(photograph.rgbd) != 1:
-        raise ValueError("a scene, --set or --rgbd is needed: `raytrace-ii scenes` lists scenes")
+        raise ValueError("one of a scene, --set and --rgbd is needed: `raytrace-ii scenes` lists scenes")
     if photograph.rgbd:
         check_unused(context, "a picture with depth", "rotate", "fit", "frames", "clip", "fps")
     else:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -275,4 +276,4 @@ def _body(name: str, mesh: tuple[Floats, NDArray[np.int64]], slope: float, back:
 
 def _clamped(texture: Image) -> Image:
     """Return a texture whose border continues: at a repeated one the opposite side would show."""
-    return Image(texture.pixels, codes=texture.codes, wrap=("clamp", "clamp"))
+    return replace(texture, wrap=("clamp", "clamp"))

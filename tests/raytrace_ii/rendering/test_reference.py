@@ -168,8 +168,8 @@ def test_wrong_input_is_one_line(run, refused, tmp_path):
 
     out = ("-o", tmp_path / "set")
     refused(call("--set", "all", *out), "unknown set 'all': known are reference")
-    refused(call("apples", "--set", "reference", *out), "a scene, --set or --rgbd is needed")
-    refused(call(*out), "a scene, --set or --rgbd is needed")
+    refused(call("apples", "--set", "reference", *out), "one of a scene, --set and --rgbd is needed")
+    refused(call(*out), "one of a scene, --set and --rgbd is needed")
     refused(call("--set", "reference", "--depth", tmp_path / "d.exr", *out), "a set includes all support images")
     refused(call("--set", "reference", "--samples", "0", "--scale", "64", *out), "samples is 0")
     refused(call("--set", "reference", "--scale", "7", *out), "scale 7 does not divide")
