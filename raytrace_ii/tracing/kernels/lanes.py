@@ -68,7 +68,7 @@ R0, R1, R2, K0, K1, K2, E0, E1, E2, SCATTERED, GLOSS, EXPONENT, HALF_FROM, ROUGH
 CLEAR = next(_offset)  # share let through
 T0, T1, T2 = _offsets(3)  # colour of the texture
 LX, LY, LZ, COSINE, HALF, SHINE, CONE = _offsets(7)  # of the light at hand
-C0, C1, C2, WANTED = _offsets(4)  # what its shadow rays would let through, and 1 where there is one
+C0, C1, C2, WANTED, LEFT = _offsets(5)  # what its shadow rays would let through, and 1 where there is one, or is left
 L0, L1, L2 = _offsets(3)  # light that a ray brings
 Q0, Q1, Q2 = _offsets(3)  # colours of images
 QUAD = next(_offset)  # the same, four numbers a lane

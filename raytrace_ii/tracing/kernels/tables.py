@@ -9,9 +9,9 @@ LEAST_WEIGHT = 0.5 / 255 / 12.92
 FAR = np.float32(1e30)  # how far a shadow ray to a directional light reaches, in its own lengths
 # What is counted.
 (
-    REFLECTION, REFRACTION, WEAK_SHADOW, WEAK_REFLECTION, WEAK_REFRACTION, PASSED, SPAWNED, SHADOW, SHADOW_PACKETS,
-    UNTESTED, EMBREE_TICKS, TICKS, COUNTS,
-) = range(13)  # fmt: skip
+    REFLECTION, REFRACTION, WEAK_SHADOW, WEAK_REFLECTION, WEAK_REFRACTION, PASSED, SHADOW, SHADOW_PACKETS, UNTESTED,
+    EMBREE_TICKS, TICKS, COUNTS,
+) = range(12)  # fmt: skip
 IMAGE, CHECKER, NOISE, VERTEX, STRIPES = 0, 1, 2, 3, 4  # kinds of texture
 REPEAT, MIRROR, CLAMP = 0, 1, 2  # how an image goes on beyond its border
 POINT, DIRECTIONAL, SPOT = 0, 1, 2  # kinds of light
