@@ -117,10 +117,10 @@ class LightField(Coder):
         """Level by level; a level that ends early is damage."""
         started = clock.cpu_seconds()
         field, levels = _opened(payload, blank)
-        for _ in decoded_batches(field, levels, threads_of(options)):
-            pass
         pixels = np.empty(blank.pixels.shape, blank.pixels.dtype)
-        field.show(pixels)
+        for _, nodes, _ in decoded_batches(field, levels, threads_of(options)):
+            field.show(pixels, nodes)
+            field.forget(nodes)
         return pixels, clock.cpu_seconds() - started
 
     def decode_component(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
@@ -296,13 +296,13 @@ class Source:
     def run(self, setting: float) -> Run:
         """The payload at a quantiser."""
         started = clock.cpu_seconds()
-        payload, _ = self.coded(setting)
+        payload, _ = self.coded(setting, forgetful=True)
         return Run(payload, clock.cpu_seconds() - started)
 
-    def coded(self, setting: float) -> tuple[bytes, Field]:
-        """The payload at a quantiser, and what the decoder will make of it."""
+    def coded(self, setting: float, *, forgetful: bool = False) -> tuple[bytes, Field]:
+        """The payload at a quantiser, and what the decoder will make of it: all, or views that predict others."""
         field = self.field(self.header_at(setting))
-        levels = self.levels(field, Contexts())
+        levels = self.levels(field, Contexts(), forgetful=forgetful)
         return stream.pack(field.header, levels, self.count), field
 
     def header_at(self, setting: float) -> Header:
@@ -356,7 +356,7 @@ class Source:
             field.pixels[:] = by_view.reshape(field.pixels.shape)
         return field
 
-    def levels(self, field: Field, contexts: Contexts) -> list[bytes]:
+    def levels(self, field: Field, contexts: Contexts, *, forgetful: bool = False) -> list[bytes]:
         """Return the bytes of each level; the field then holds what the decoder will make of them."""
         work, levels = new_work(), []
         with Workers(self.threads) as workers:
@@ -382,6 +382,8 @@ class Source:
                         field.code(coder, job, work, same)
                     workers.map(field.refine, nodes, jobs, made)
                     field.finish(nodes)
+                    if forgetful:
+                        field.forget(nodes)
                     del job, jobs, made  # before the next batch takes as much
                 levels.append(arithmetic.finish(coder))
                 contexts.after(number)

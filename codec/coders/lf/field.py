@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import mmap
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -46,7 +48,7 @@ class Field:
         self.grid = grid
         self.levels = pyramid(*grid, header.log_stride, MOST_REFERENCES, header.sources)
         self.shape = -(-height // 4) * 4, -(-width // 4) * 4
-        self.views = np.zeros((grid[0] * grid[1], 3, *self.shape), np.int16)
+        self.views, self._memory = _zeros((grid[0] * grid[1], 3, *self.shape))
         self.disparities = np.zeros((len(self.views), *self.shape), np.int16)
         # Pixels by view, if coding is lossless.
         self.pixels = np.zeros((len(self.views) if header.exact else 0, height, width, 3), dtype)
@@ -125,12 +127,12 @@ class Field:
         scatter(self.views, number, (1, 1), 0, 0, self.header.colours, pixels.itemsize == 2, pixels)
         return pixels
 
-    def show(self, pixels: NDArray[Any]) -> None:
-        """Write all views into a picture's pixels (N, M, 3)."""
+    def show(self, pixels: NDArray[Any], nodes: Sequence[Node] | None = None) -> None:
+        """Write all views, or those of some nodes, into a picture's pixels (N, M, 3)."""
         rows, cols = self.grid
-        for number in range(len(self.views)):
-            row, col = divmod(number, cols)
-            pixels[row::rows, col::cols] = self.view_pixels(number)
+        places = np.ndindex(rows, cols) if nodes is None else ((node.row, node.col) for node in nodes)
+        for row, col in places:
+            pixels[row::rows, col::cols] = self.view_pixels(self.number((row, col)))
 
     def refine(self, node: Node, job: Job, made: Synthesis) -> None:
         """Filter a decoded view, and note its disparity, for those that follow."""
@@ -153,6 +155,16 @@ class Field:
         last = nodes[-1]
         if last.level == 1 and (last.phase in FIRST_AGAIN or last is self.levels[1][-1]):
             self._first()
+
+    def forget(self, nodes: Sequence[Node]) -> None:
+        """Give back the memory of views of a finished batch that no other is predicted from; they become 0."""
+        size = self.views[0].nbytes
+        for node in nodes:
+            if self._memory is not None and node.level > 1 and (node.row, node.col) not in self.used:
+                start = self.number((node.row, node.col)) * size
+                first, end = -(-start // mmap.PAGESIZE), (start + size) // mmap.PAGESIZE  # whole pages
+                if end > first:
+                    self._memory.madvise(mmap.MADV_DONTNEED, first * mmap.PAGESIZE, (end - first) * mmap.PAGESIZE)
 
     def batches(self, level: int) -> Iterator[list[Node]]:
         """Views of a level that are coded together."""
@@ -184,6 +196,14 @@ class Field:
         spread = self.header.high - self.header.low
         farthest = (int(np.abs(references[:, 1:]).max()) + UPRIGHT // 2) >> LATTICE
         return max(EIGHTH // max(farthest, 1), -(-spread // MOST_SEARCHED), 1)
+
+
+def _zeros(shape: tuple[int, ...]) -> tuple[NDArray[np.int16], mmap.mmap | None]:
+    """Return zeros, and their memory where the system takes parts of it back."""
+    if not hasattr(mmap, "MADV_DONTNEED"):
+        return np.zeros(shape, np.int16), None
+    memory = mmap.mmap(-1, 2 * math.prod(shape), flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    return np.frombuffer(memory, np.int16).reshape(shape), memory
 
 
 assert MOST_INDEX > MOST_SEARCHED and DONE
