@@ -16,6 +16,14 @@ EXPLAINED = 0.25  # of the variation from lens to lens, that types must explain 
 CHANCE = 1e-6  # probability that an even array shows as much
 
 Classes = NDArray[np.int64]
+# Types of lenses by pattern, in rows that repeat over the array; of a hexagonal one no two neighbours are alike.
+MATRICES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "one": ((0,),),
+    "2×1": ((0, 1),),
+    "1×2": ((0,), (1,)),
+    "2×2": ((0, 1), (2, 3)),
+    "3": ((0, 1, 2), (2, 0, 1)),
+}
 
 
 @dataclass(frozen=True)
@@ -91,7 +99,9 @@ def _local_mean(values: NDArray[np.float64], ok: NDArray[np.bool_], lenses: tupl
 
 
 def _patterns(k: Classes, l: Classes, hexagonal: bool) -> list[tuple[str, int, Classes]]:
-    patterns = [("2×1", 2, k % 2), ("1×2", 2, l % 2), ("2×2", 4, k % 2 + 2 * (l % 2))]
-    if hexagonal:
-        patterns.append(("3", 3, (k - (l - l % 2) // 2 - l) % 3))
+    patterns = []
+    for name, rows in MATRICES.items():
+        if name != "one" and (hexagonal or name != "3"):
+            matrix = np.array(rows)
+            patterns.append((name, int(matrix.max()) + 1, matrix[l % matrix.shape[0], k % matrix.shape[1]]))
     return patterns

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import mmap
 from collections.abc import Iterator, Sequence
@@ -49,7 +50,7 @@ class Field:
         self.levels = pyramid(*grid, header.log_stride, MOST_REFERENCES, header.sources)
         self.shape = -(-height // 4) * 4, -(-width // 4) * 4
         self.views, self._memory = _zeros((grid[0] * grid[1], 3, *self.shape))
-        self.disparities = np.zeros((len(self.views), *self.shape), np.int16)
+        self.disparities, _ = _zeros((len(self.views), *self.shape))
         # Pixels by view, if coding is lossless.
         self.pixels = np.zeros((len(self.views) if header.exact else 0, height, width, 3), dtype)
         self._exact = new_exact(height, width, dtype)
@@ -199,10 +200,16 @@ class Field:
 
 
 def _zeros(shape: tuple[int, ...]) -> tuple[NDArray[np.int16], mmap.mmap | None]:
-    """Return zeros, and their memory where the system takes parts of it back."""
+    """Return zeros, and their memory where the system takes parts of it back.
+
+    Huge pages would take the memory of views that are never written, beside others that are.
+    """
     if not hasattr(mmap, "MADV_DONTNEED"):
         return np.zeros(shape, np.int16), None
     memory = mmap.mmap(-1, 2 * math.prod(shape), flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    if hasattr(mmap, "MADV_NOHUGEPAGE"):
+        with contextlib.suppress(OSError):  # a system without huge pages
+            memory.madvise(mmap.MADV_NOHUGEPAGE)
     return np.frombuffer(memory, np.int16).reshape(shape), memory
 
 
