@@ -35,7 +35,7 @@ from ..camera.camera import IICamera
 from ..camera.optics import Lenslet
 from ..picture.picture import IIPicture
 from ..picture.regular import owners
-from .lens_types import MATRICES, LensTypes
+from .lens_types import LensTypes
 
 ndimage = Lazy("scipy.ndimage")
 
@@ -175,7 +175,7 @@ def lens_foci(
     """
     import itertools
 
-    matrix = MATRICES[types.pattern]
+    matrix = types.rows
     count = len(types.detail)
     if count < 2:
         return None
@@ -229,7 +229,7 @@ def fused(
     Returns
     -------
     picture : IIPicture
-        Of the same structure and camera.
+        Of the same structure. Its camera has pinholes, or lenses of the one type.
     taken : ndarray of bool, (N, M)
         True where a pixel is that of other lenses.
 
@@ -239,7 +239,9 @@ def fused(
         If the camera has one focus, or there is no such type.
     """
     camera = picture.camera
-    foci = foci if foci is not None or camera is None else of_camera(camera)
+    if camera is None:
+        raise ValueError("the picture has no camera: one is needed")
+    foci = of_camera(camera) if foci is None else foci
     if foci is None:
         raise ValueError("the camera has no lenses of several focal lengths: only one focus is known")
     count = len(foci.shifts)
@@ -257,7 +259,10 @@ def fused(
         lambda a, b: fuse(source, owner, x, y, kinds, at, shifts, wanted, reach, whole, most, a, b, out, taken),
         len(owner),
     )
-    return picture.with_pixels(out), taken
+    model: tuple[Any, ...] = ()  # pinholes
+    if only is not None:
+        model = (Lenslet(focal_mm=camera.gap_mm / (1 + foci.shifts[only]), aperture_mm=min(camera.lens_pitch_mm)),)
+    return replace(picture, pixels=out, camera=replace(camera, optics=(*model, *camera.front))), taken
 
 
 def _lenses(picture: IIPicture) -> tuple[Any, NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
