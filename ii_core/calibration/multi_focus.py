@@ -1,4 +1,4 @@
-"""Multi-focus arrays, as of Raytrix cameras: where each lens type is in focus, and pictures in focus under all lenses.
+"""Multi-focus arrays, as of Raytrix cameras: where lens types are in focus, and pictures in focus under all lenses.
 
 A point at the distance a before the lens plane that stands at the offset r under one lens stands at r + s·Δ under
 another whose centre lies Δ away. s = Λ/a is its *shift*, the inverse of the virtual depth a/Λ; it is negative for
@@ -211,7 +211,11 @@ def lens_foci(
 
 @checks.checked(picture=checks.instance(IIPicture), foci=checks.instance(Foci))
 def fused(
-    picture: IIPicture, foci: Foci | None = None, *, only: int | None = None, shifts: NDArray[np.float32] | None = None
+    picture: IIPicture,
+    foci: Foci | None = None,
+    *,
+    only: int | None = None,
+    shifts: NDArray[np.float32] | None = None,
 ) -> tuple[IIPicture, NDArray[np.bool_]]:
     """Return a picture in which every pixel is as the best focused lenses around show its point.
 
@@ -302,8 +306,7 @@ def _lines(
     bins = np.floor((shift[known] / MOST_SHIFT + 1) / 2 * BINS).astype(np.int64)
     at = bins * count + kind[known]
     pixels, total, place = (
-        np.bincount(at, weights, BINS * count).reshape(BINS, count)
-        for weights in (None, detail[known], shift[known])
+        np.bincount(at, weights, BINS * count).reshape(BINS, count) for weights in (None, detail[known], shift[known])
     )
     enough = (pixels >= FEWEST_PIXELS).all(axis=1) & (total > 0).all(axis=1)
     if enough.sum() < 2:
@@ -396,7 +399,7 @@ def _vertex(costs, best, r, c):
 
 @kernel
 def fuse(source, owner, x, y, kinds, foci, shifts, wanted, reach, whole, most, first, last, out, taken):
-    """Replace pixels in rows of pixels by the mean of the nearest lenses whose type is best focused at their shift."""
+    """Replace pixels in rows of pixels by the mean of lenses whose type is best focused at their shift."""
     value, total = np.empty(3), np.empty(3)
     for n in range(first, last):
         for m in range(owner.shape[1]):

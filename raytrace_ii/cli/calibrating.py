@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 FociOption = Annotated[
     str | None,
     typer.Option(
-        help="Multi-focus arrays: virtual depth in focus of each lens type, as in 2.1,3.4,9, or the .xml of a Raytrix "
-        "camera; found if not given."
+        help="Multi-focus arrays: virtual depth in focus of each lens type, as in 2.1,3.4,9, or the .xml of a "
+        "Raytrix camera; found if not given."
     ),
 ]
 

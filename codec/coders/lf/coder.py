@@ -18,7 +18,7 @@ from ... import clock
 from ...contract import Coder, Goal, Option, Options, Pixels
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
 from . import arithmetic, denoise, loop_filter_search, planes, ranges, search, stream, synthesis, tuning
-from .blocks import MOST_REFERENCES, Job, Work, code_blend, code_view, new_work
+from .blocks import MOST_REFERENCES, Job, Work, code_blend, code_view, new_work, zeros
 from .contexts import Contexts
 from .field import Field
 from .pyramid import Node, Place, pyramid
@@ -414,7 +414,7 @@ class Source:
             nearest = _nearer_blend(made, self._target(field, node), BLEND_ROWS[self.effort])
         if forgetful:
             nothing = made.made[:, :0].copy()
-            job, made = job._replace(made=nothing), made._replace(made=nothing)
+            job, made = job._replace(made=nothing, levels=nothing), made._replace(made=nothing)
         return job, made, nearest
 
     def _found(
@@ -423,8 +423,8 @@ class Source:
         """A view's blocks, found and decoded; its synthesis, and its best filters."""
         node, job, made, nearest = begun
         if not made.made.size:
-            made = made._replace(made=np.zeros_like(job.levels))
-            job = job._replace(made=made.made, levels=np.zeros_like(job.levels))
+            samples, levels = (zeros((3, *field.shape))[0] for _ in range(2))
+            job, made = job._replace(made=samples, levels=levels), made._replace(made=samples)
             if job.synthesised:
                 synthesis.blend(made, nearest, 1)
         original = self._target(field, node)

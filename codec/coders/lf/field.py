@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import math
 import mmap
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -13,7 +11,7 @@ from numpy.typing import NDArray
 
 from . import loop_filter, motion, synthesis
 from .arithmetic import Arithmetic
-from .blocks import DONE, MOST_INDEX, MOST_REFERENCES, UNKNOWN, Job, Work, code_view, new_blocks
+from .blocks import DONE, MOST_INDEX, MOST_REFERENCES, UNKNOWN, Job, Work, code_view, new_blocks, zeros
 from .exact import code_exact, new_exact, prepare
 from .planes import gather, scatter
 from .pyramid import Node, Place, batches, pyramid
@@ -49,8 +47,8 @@ class Field:
         self.grid = grid
         self.levels = pyramid(*grid, header.log_stride, MOST_REFERENCES, header.sources)
         self.shape = -(-height // 4) * 4, -(-width // 4) * 4
-        self.views, self._memory = _zeros((grid[0] * grid[1], 3, *self.shape))
-        self.disparities, _ = _zeros((len(self.views), *self.shape))
+        self.views, self._memory = zeros((grid[0] * grid[1], 3, *self.shape))
+        self.disparities, _ = zeros((len(self.views), *self.shape))
         # Pixels by view, if coding is lossless.
         self.pixels = np.zeros((len(self.views) if header.exact else 0, height, width, 3), dtype)
         self._exact = new_exact(height, width, dtype)
@@ -97,7 +95,7 @@ class Field:
             skipping=int(self.header.skipping),
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),
-            levels=np.zeros((3, *self.shape), np.int16),
+            levels=zeros((3, *self.shape))[0],
             past=np.stack([field.views[at] for field in self.past]) if self.past else motion.NOTHING,
             motions=self.motions,
         )
@@ -197,20 +195,6 @@ class Field:
         spread = self.header.high - self.header.low
         farthest = (int(np.abs(references[:, 1:]).max()) + UPRIGHT // 2) >> LATTICE
         return max(EIGHTH // max(farthest, 1), -(-spread // MOST_SEARCHED), 1)
-
-
-def _zeros(shape: tuple[int, ...]) -> tuple[NDArray[np.int16], mmap.mmap | None]:
-    """Return zeros, and their memory where the system takes parts of it back.
-
-    Huge pages would take the memory of views that are never written, beside others that are.
-    """
-    if not hasattr(mmap, "MADV_DONTNEED"):
-        return np.zeros(shape, np.int16), None
-    memory = mmap.mmap(-1, 2 * math.prod(shape), flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-    if hasattr(mmap, "MADV_NOHUGEPAGE"):
-        with contextlib.suppress(OSError):  # a system without huge pages
-            memory.madvise(mmap.MADV_NOHUGEPAGE)
-    return np.frombuffer(memory, np.int16).reshape(shape), memory
 
 
 assert MOST_INDEX > MOST_SEARCHED and DONE
