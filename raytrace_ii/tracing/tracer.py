@@ -35,7 +35,6 @@ from .kernels.tables import (
     REFRACTION,
     SHADOW,
     SKY_IMAGE,
-    SPAWNED,
     TICKS,
     UNTESTED,
     WEAK_SHADOW,
@@ -218,6 +217,14 @@ def _rows(batch: Batch, some: slice) -> Batch:
     return type(batch)(*arrays)
 
 
+def _joined(rays: Rays, first: int, start: int, count: int) -> Rays:
+    """Return the first rays, followed by a number of others from row ``start`` on."""
+    for array in rays:
+        if len(array):
+            array[first : first + count] = array[start : start + count]
+    return _rows(rays, slice(first + count))
+
+
 class Tracer:
     """Traces batches of up to ``capacity`` primary rays, keeping its work arrays between batches. One a thread.
 
@@ -360,12 +367,14 @@ class Tracer:
         s, n = self.scene, len(rays.pixels)
         hits = _NO_HITS if self._finds else self._hits(rays)
         spawn = spawn and (s.mirrors or s.transmits or s.blends)
-        most = (lobe_rays if s.glossy else 1) + s.transmits + 2 * s.disperses + s.blends
-        following = _room(most * n if spawn else 0, s.nested, s.glossy, any(self.footprint))
+        through, mirrored = n * (s.transmits + 2 * s.disperses + s.blends), n * (lobe_rays if s.glossy else 1)
+        following = _room(through + mirrored if spawn else 0, s.nested, s.glossy, any(self.footprint))
         if len(self._shadow.reach) < n * len(s.lights):  # memory that nothing is written to is not used
             self._shadow = _shadow_room(n * len(s.lights), s.nested)
         counts, lit = np.zeros(COUNTS, np.int64), np.zeros(len(s.lights), np.int64)
-        passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint, placed=s.passes, later=self._later)
+        passage = Passage(
+            s.least, lobe_rays, self.lobes[1], *self.footprint, placed=s.passes, later=self._later, mirrored=through,
+        )  # fmt: skip
         images: list[Any] = [*(support or Support()).rows(), self.pose[:3, 3], self.pose[:3, 2]]
         generation = Generation(
             hits, self._tools, s.intersector.first_of_same, start, rays, s.surfaces, s.surroundings, passage,
@@ -383,7 +392,7 @@ class Tracer:
         for light in np.flatnonzero(lit):
             some = slice(light * n, light * n + lit[light])
             self._light(_rows(self._shadow, some), radiance, tested=not counts[UNTESTED])
-        return _rows(following, slice(int(counts[SPAWNED])))
+        return _joined(following, int(counts[REFRACTION] + counts[PASSED]), through, int(counts[REFLECTION]))
 
     def _stages(self, generation: Generation, recorded: bool, spawn: bool) -> Stages:
         """Addresses of the stages that the generation needs, compiled here when the first scene needs them."""

@@ -29,7 +29,7 @@ from .tables import (
     TEXTURE,
 )
 from .textures import noise_colour, pattern_colour, share_there
-from .vectors import edge, interpolate, three, three_doubles
+from .vectors import edge, three, three_doubles
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
@@ -101,12 +101,13 @@ def scatter(ambient, single):
             single[at.L0 + k] = w * single[at.E0 + k] + scattered * a if hit > _ZERO else _ZERO
 
 
-@late_kernel
+@late_lane_kernel
 def paint(generation, first, lanes, _):
     """Textures of bodies that have patterns, and nothing else of ``EXTRAS``."""
     g = value_at(generation)
     for k in range(BLOCK):
         g.work.single[at.CLEAR + k] = _ZERO
+    _place_on_textures(g.work.single, g.work.double)
     _take_patterns(lanes, g.surfaces, g.work)
 
 
@@ -119,8 +120,8 @@ def look_closely(generation, first, lanes, _):
     if g.passage.first_width == 0.0 and g.passage.spread == 0.0:
         for k in range(4 * BLOCK):
             single[at.AU + k] = _ZERO
-    if s.maps.any:
-        _place_on_images(single, double)
+    if s.coordinates.shape[0] > 0:
+        _place_on_textures(single, double)
     for k in range(3 * BLOCK):
         single[at.B0 + k] = _ZERO
     if s.maps.blend and blending:
@@ -153,13 +154,14 @@ def _is_special(k, single):
 
 
 @lane_stage
-def _place_on_images(single, double):
-    """(u, v) of all hits on the images of their bodies."""
+def _place_on_textures(single, double):
+    """Texture coordinates of all hits."""
     for k in range(BLOCK):
         u, v, c = np.float64(single[at.U + k]), np.float64(single[at.V + k]), at.COORDINATE + k
         w = 1.0 - u - v
         double[at.SU + k] = w * single[c] + u * single[c + 2 * BLOCK] + v * single[c + 4 * BLOCK]
         double[at.SV + k] = w * single[c + BLOCK] + u * single[c + 3 * BLOCK] + v * single[c + 5 * BLOCK]
+        double[at.SW + k] = w * single[at.THIRD_0 + k] + u * single[at.THIRD_1 + k] + v * single[at.THIRD_2 + k]
 
 
 @lane_stage
@@ -226,7 +228,7 @@ def _take_patterns(lanes, surfaces, work):
 def _take_pattern(k, row, surfaces, work, noisy):
     """Colour one lane by a pattern, or note the place where its noise is wanted as number ``noisy``: 1 then."""
     single, double, whole, table = work.single, work.double, work.whole, surfaces.textures
-    x, y, z = interpolate(surfaces.coordinates, np.uint64(whole[at.FACE + k]), single[at.U + k], single[at.V + k])
+    x, y, z = three_doubles(double, at.SU, k)
     if table[row, 0] != NOISE:
         t0, t1, t2 = pattern_colour(table, row, x, y, z)
         single[at.T0 + k], single[at.T1 + k], single[at.T2 + k] = t0, t1, t2

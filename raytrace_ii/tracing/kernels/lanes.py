@@ -43,15 +43,16 @@ def _offsets(many: int) -> tuple[int, ...]:
 START = next(_offset)
 _offsets(2)
 DX, DY, DZ, W0, W1, W2, U, V, DISTANCE, HIT = _offsets(10)  # weights: after fog, media and blending
-# A row of the table of faces: corners, normal, lift, pull, body; then normals and (u, v) of the corners.
+# A row of the table of faces: corners, normal, lift, body; then normals and texture coordinates of the corners.
 CORNER = next(_offset)
 _offsets(8)
 FACE_NORMAL = next(_offset)
 _offsets(2)
-LIFT, PULL, FACE_BODY, _, NORMAL = _offsets(5)
+LIFT, FACE_BODY, THIRD_0, THIRD_1, NORMAL = _offsets(5)
 _offsets(8)
 COORDINATE = next(_offset)
-_offsets(6)
+_offsets(5)
+THIRD_2 = next(_offset)
 PX, PY, PZ = _offsets(3)  # the hit, drawn to the middle of its face
 GX, GY, GZ = _offsets(3)  # the face's normal on the ray's side
 OX, OY, OZ = _offsets(3)  # where rays start that stay on that side
@@ -68,7 +69,7 @@ R0, R1, R2, K0, K1, K2, E0, E1, E2, SCATTERED, GLOSS, EXPONENT, HALF_FROM, ROUGH
 CLEAR = next(_offset)  # share let through
 T0, T1, T2 = _offsets(3)  # colour of the texture
 LX, LY, LZ, COSINE, HALF, SHINE, CONE = _offsets(7)  # of the light at hand
-C0, C1, C2, WANTED = _offsets(4)  # what its shadow rays would let through, and 1 where there is one
+C0, C1, C2, WANTED, LEFT = _offsets(5)  # what its shadow rays would let through, and 1 where there is one, or is left
 L0, L1, L2 = _offsets(3)  # light that a ray brings
 Q0, Q1, Q2 = _offsets(3)  # colours of images
 QUAD = next(_offset)  # the same, four numbers a lane
@@ -93,7 +94,7 @@ _SINGLES = next(_offset)
 # Quantities in float64. Of a noise: place, sum and strength of the octave.
 _offset = count(0, BLOCK)
 SX, SY, SZ, TOTAL, STRENGTH = _offsets(5)
-SU, SV = _offsets(2)  # place in an image
+SU, SV, SW = _offsets(3)  # texture coordinates of the hit
 RAY = next(_offset)  # origin and direction of a camera ray, of any length; two to spare
 _offsets(7)
 _DOUBLES = next(_offset)

@@ -58,11 +58,13 @@ NO_CALLS = Calls(0, 0, 0, 0, 0, 0, np.float32(0), np.float32(0))
 class Tools(NamedTuple):
     """Embree's calls for a packet in lanes: nearest hit, whether anything stops a ray, and which lanes are traced.
 
-    The address of a function is 0 if Embree cannot be called so, or if nothing stops any ray.
+    The address of a function is 0 if Embree cannot be called so, or if nothing stops any ray. ``clear`` is whether
+    a ray meets a face that lets light through.
     """
 
     nearest: Calls
     occluded: Calls
+    clear: Calls
     active: NDArray[np.int32]
     chosen: NDArray[np.int32]
 
@@ -240,8 +242,8 @@ def nearest_of_lanes(tools, first_of_same, ahead, lanes, work, width):
 
 
 @stage_kernel
-def occluded_of_lanes(tools, work, width):
-    """Take those shadow rays in the lanes out of ``WANTED`` that a face stops."""
+def occluded_of_lanes(tools, calls, work, width):
+    """Take those shadow rays in the lanes out of ``WANTED`` that meet a face."""
     single, room = work.single, at.PACKET
     packet, numbers = single[room : room + PACKET_ROWS * width], work.bits[room : room + PACKET_ROWS * width]
     for first in range(0, BLOCK, width):
@@ -267,7 +269,7 @@ def occluded_of_lanes(tools, work, width):
             packet[FAR * width + lane] = single[at.REACH + first + lane]
         for lane in range(width):
             tools.active[lane] = -1 if single[at.WANTED + first + lane] > 0 else 0
-        _trace(tools.occluded, tools.active, tools.chosen, packet, np.float32(0), some, width)
+        _trace(calls, tools.active, tools.chosen, packet, np.float32(0), some, width)
         for lane in range(width):
             free = packet[FAR * width + lane] >= 0
             single[at.WANTED + first + lane] = single[at.WANTED + first + lane] if free else np.float32(0)
@@ -313,7 +315,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
             _take(first, lanes, origins, directions, reach, o, d, end, single)
             for k in range(BLOCK):
                 single[at.WANTED + k] = np.float32(1) if k < lanes else np.float32(0)
-            occluded_of_lanes(tools, work, wide)
+            occluded_of_lanes(tools, tools.occluded, work, wide)
             for k in range(lanes):
                 found[first + k] = -1 if single[at.WANTED + k] > 0 else 0
 
