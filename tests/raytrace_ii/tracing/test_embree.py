@@ -275,7 +275,7 @@ def test_narrower_cpus_and_embreex_give_the_same_pictures(configuration, says, u
             assert np.argwhere(differs.any(axis=-1)).tolist() in ([], [[0, 23]])
             assert np.abs(other[name].astype(float) - expected).max() <= 2
             continue
-        # Packets add light that meets no glass before the light of other rays of the same pixel: up to 7 of 5952 numbers.
+        # Packets add light that meets no glass before that of other rays of a pixel: up to 7 of 5952 numbers.
         assert differs.sum() <= (differs.size // 500 if single else 4), name
         step = 2.0**-22 * expected[differs] if "depth" in name else 1
         assert (np.abs(other[name][differs].astype(float) - expected[differs]) <= step).all(), name
