@@ -453,9 +453,9 @@ def tables() -> Tables:
     focus = [
         f"A hexagonal array of three focal lengths, lenses of {row['multi_focus_px']} px, before noise at the three "
         f"depths in focus: the pattern found is {row['pattern']}, and explains {row['explained']:.0%} of the "
-        f"variation of detail; foci are off by {row['foci_error']:.3f} of shift at the most. Against the same pixels through "
-        f"pinholes the picture has {row['raw_db']:.1f} dB, and {row['fused_db']:.1f} dB with pixels of lenses in "
-        f"focus. Matching takes {row['match_seconds_a_megapixel']:.0f} CPU s a megapixel."
+        f"variation of detail; foci are off by {row['foci_error']:.3f} of shift at the most. Against the same pixels "
+        f"through pinholes the picture has {row['raw_db']:.1f} dB, and {row['fused_db']:.1f} dB with pixels of "
+        f"lenses in focus. Matching takes {row['match_seconds_a_megapixel']:.0f} CPU s a megapixel."
         for row in rows
         if "multi_focus_px" in row
     ]
