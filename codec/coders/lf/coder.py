@@ -390,7 +390,8 @@ class Source:
                         workers.map(field.refine, nodes[first : first + some], jobs, made)
                         if forgetful:
                             field.forget(nodes[first : first + some])
-                        del job, jobs, made  # before the next takes as much
+                        del part, job, jobs, made  # before the next takes as much
+                    del batch
                     field.finish(nodes)
                 levels.append(arithmetic.finish(coder))
                 contexts.after(number)
