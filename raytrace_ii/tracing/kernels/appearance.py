@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, lane_stage, late_kernel, late_lane_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import inline_kernel, lane_stage, late_lane_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
@@ -28,44 +28,53 @@ from .tables import (
     NORMAL_SCALE,
     TEXTURE,
 )
-from .textures import noise_colour, pattern_colour, share_there
+from .textures import exponential, noise_colour, pattern_colour, share_there
 from .vectors import edge, three, three_doubles
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
 
-@late_kernel
+@late_lane_kernel
 def attenuate(generation, first, lanes, _):
     """Dim rays on their way through bodies (Beer–Lambert), or through fog outside of them, which adds its light.
 
     A ray that meets an open body from behind has run inside: that is noted in ``inside``.
     """
     g = value_at(generation)
-    rays, fog, work, materials = g.rays, g.surroundings.fog, g.work, g.surfaces.materials
-    single, whole = work.single, work.whole
-    for k in range(lanes):
-        i, body, t = first + k, whole[at.BODY + k], np.float64(single[at.DISTANCE + k])
-        if fog.shape[0] > 0:
-            single[at.F0 + k], single[at.F1 + k], single[at.F2 + k] = 0.0, 0.0, 0.0
-        if single[at.HIT + k] == _ZERO:
-            continue
-        medium = -1
-        if rays.inside.shape[1] > 0:
-            if materials[body, EXTRAS] > 0.0 and single[at.ENTERING + k] < 0.0 and clearness(materials, body) > 0.0:
-                enter(rays.inside, i, body)
-            medium = medium_of(rays.inside, i, materials, -1)
-        if medium >= 0:
-            single[at.W0 + k] *= math.exp(-materials[medium, ABSORPTION] * t)
-            single[at.W1 + k] *= math.exp(-materials[medium, ABSORPTION + 1] * t)
-            single[at.W2 + k] *= math.exp(-materials[medium, ABSORPTION + 2] * t)
-        elif fog.shape[0] > 0:
-            through = math.exp(-fog[3] * t)
-            single[at.F0 + k] = single[at.W0 + k] * (1.0 - through) * fog[0]
-            single[at.F1 + k] = single[at.W1 + k] * (1.0 - through) * fog[1]
-            single[at.F2 + k] = single[at.W2 + k] * (1.0 - through) * fog[2]
-            single[at.W0 + k] *= through
-            single[at.W1 + k] *= through
-            single[at.W2 + k] *= through
+    rays, fog, single, whole = g.rays, g.surroundings.fog, g.work.single, g.work.whole
+    density, bodies = np.float32(fog[3]) if fog.shape[0] > 0 else _ZERO, False
+    for k in range(BLOCK):
+        foggy = density * single[at.HIT + k]
+        single[at.Q0 + k], single[at.Q1 + k], single[at.Q2 + k] = foggy, foggy, foggy
+        single[at.SHARE + k] = single[at.HIT + k]
+    if rays.inside.shape[1] > 0:
+        for k in range(lanes):
+            if single[at.HIT + k] > _ZERO:
+                bodies |= _take_medium(k, np.uint64(first + k), rays.inside, g.surfaces.materials, single, whole)
+    if fog.shape[0] == 0 and not bodies:
+        return
+    for c in range(3):
+        light = np.float32(fog[c]) if fog.shape[0] > 0 else _ZERO
+        for k in range(BLOCK):
+            way = single[at.DISTANCE + k]  # of a miss it may be anything
+            through = exponential(-single[at.Q0 + c * BLOCK + k] * (way if single[at.HIT + k] > _ZERO else _ZERO))
+            weight, foggy = single[at.W0 + c * BLOCK + k], single[at.SHARE + k] * light
+            single[at.F0 + c * BLOCK + k] = weight * (_ONE - through) * foggy
+            single[at.W0 + c * BLOCK + k] = weight * through
+
+
+@stage_kernel
+def _take_medium(k, i, inside, materials, single, whole):
+    """Take what absorbs the light of one lane's ray from the body that it runs in; return whether there is one."""
+    body = whole[at.BODY + k]
+    if materials[body, EXTRAS] > 0.0 and single[at.ENTERING + k] < 0.0 and clearness(materials, body) > 0.0:
+        enter(inside, i, body)
+    medium = medium_of(inside, i, materials, -1)
+    if medium >= 0:
+        for c in range(3):
+            single[at.Q0 + c * BLOCK + k] = materials[medium, ABSORPTION + c]
+        single[at.SHARE + k] = _ZERO
+    return medium >= 0
 
 
 @lane_stage

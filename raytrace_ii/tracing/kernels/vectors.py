@@ -37,7 +37,7 @@ def edge(corners, f, k):
 
 @inline_kernel
 def pull_by(lift, one, ax, ay, az, bx, by, bz):
-    """Share of the way to a face's middle that is about as long as its lift: of its longest edge, by two edges."""
+    """Share of the way to the middle of a face that is about as long as its lift, by its lift and two edges."""
     cx, cy, cz = bx - ax, by - ay, bz - az
     longest = max(ax * ax + ay * ay + az * az, max(bx * bx + by * by + bz * bz, cx * cx + cy * cy + cz * cz))
     return min(lift / math.sqrt(longest if longest > 0 else one), one / 4)
