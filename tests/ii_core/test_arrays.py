@@ -156,5 +156,5 @@ def test_three_arrays_of_colours_and_doubles_of_whole_numbers(tmp_path):
     assert array_views(path).read(0, 0).dtype == np.uint16
     for wrong in ({"lfr": codes[..., 0], "lfg": codes[..., 1]}, {f"lf{c}": codes[..., :2, 0] for c in "rgx"}):
         scipy.io.savemat(path, wrong)
-        with pytest.raises(ValueError, match="it holds [23] arrays of four or five axes"):
+        with pytest.raises(ValueError, match=r"it holds [23] arrays of four or five axes"):
             array_views(path)
