@@ -165,7 +165,7 @@ BENCHMARKS = {
         Benchmark("accuracy.edges", records=OWN, fills=("docs/speed_accuracy.md",), writes=(f"{IMAGES}/edges.png",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",)),
         Benchmark(
-            "accuracy.moire", records=OWN, fills=("docs/display.md",), writes=(f"{IMAGES}/display_moire.png",)
+            "accuracy.moire", records=OWN, fills=("docs/display.md",), writes=(f"{IMAGES}/display_moire.webp",)
         ),
         Benchmark("accuracy.demosaicing", records=OWN, fills=("docs/calibration.md",)),
         Benchmark(
