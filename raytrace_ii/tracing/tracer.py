@@ -249,6 +249,7 @@ class Tracer:
         self._shadow = _shadow_room(0, self.scene.nested)
         self._work = work()
         self._tools = self.scene.intersector.tools(self._work.single[PACKET:])
+        self._told = _NO_NUMBERS, False  # whether rays of these tables may start within glass
         self._follow = way_kernel(self.scene.intersector.width)
         # hits and shadow rays that the kernel does not see to the end
         self._finds = self._tools.nearest.packet != 0 and not self.scene.passes
@@ -337,11 +338,21 @@ class Tracer:
         room.inside.fill(-1)
         if keys is not None:
             room.keys[:n] = keys
-        if self.scene.transmits or not self._finds:  # they are wanted before the kernel runs
+        if self._near_glass(start) or not self._finds:  # they are wanted before the kernel runs
             start_separable_rays(start, self._work, room.origins, room.directions)
             room.weights.fill(1)
             start = _NO_START
         self._trace(room, n, radiance, support, start)
+
+    def _near_glass(self, start: Start) -> bool:
+        """Return whether any camera ray of the picture may start within the bounds of a clear body."""
+        if self._told[0] is not start.column_rays:
+            columns, rows = (rays.reshape(-1, 8)[:, :3] for rays in (start.column_rays, start.row_rays))
+            low, high = columns.min(axis=0) + rows.min(axis=0), columns.max(axis=0) + rows.max(axis=0)
+            around, slack = self.scene.clear_bounds, 1e-6 * (np.abs(low) + np.abs(high))  # rays start at float32's
+            near = ((low - slack <= around[:, 1]) & (high + slack >= around[:, 0])).all(axis=1).any()
+            self._told = start.column_rays, bool(near)
+        return self._told[1]
 
     def _trace(
         self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None, start: Start
@@ -349,7 +360,7 @@ class Tracer:
         """Trace the first n of the primary rays."""
         rays = _rows(primary, slice(n))
         self.count.rays["primary"] += n
-        if self.scene.transmits:
+        if self.scene.transmits and not len(start.rows):
             self._start_inside(rays)
         for depth in range(self.max_depth + 1):
             lobe_rays = self.lobes[0] if depth == 0 else 1

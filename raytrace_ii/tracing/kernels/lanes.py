@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.core.typing import templates
 from numpy.typing import NDArray
 
@@ -229,36 +228,6 @@ def _transposed(builder: Any, rows: Any) -> Any:
                 turned[i + step] = builder.shuffle_vector(a, b, ir.Constant(kind, high))
         rows = turned
     return rows
-
-
-def _side(typing: Any, values: Any, at: Any, width: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        number = ir.FloatType()
-        data = context.make_array(values)(context, builder, arguments[0]).data
-        place, found = builder.gep(data, [arguments[1]]), cgutils.alloca_once(builder, number)
-        for many in (16, 8, 4):  # the width is a constant after inlining: one of them stays
-            with builder.if_then(builder.icmp_signed("==", arguments[2], ir.Constant(arguments[2].type, many))):
-                vector = ir.VectorType(number, many)
-                row, ends = builder.load(builder.bitcast(place, vector.as_pointer()), align=4), []
-                for end in ("fmax", "fmin"):
-                    reduce = builder.module.declare_intrinsic(
-                        f"llvm.vector.reduce.{end}.v{many}f32", fnty=ir.FunctionType(number, [vector])
-                    )
-                    ends.append(builder.call(reduce, [row], fastmath=("nnan", "nsz")))
-                builder.store(builder.fsub(*ends), found)
-        return builder.load(found)
-
-    return types.float32(values, types.intp, types.intp), generate
-
-
-@compiled_by(_side)
-def side(values: Any, at: Any, width: Any) -> Any:
-    """Largest less smallest of 16, 8 or 4 numbers, none of them NaN.
-
-    LLVM makes no vectors of numba's minima: one number after the other takes 4 ns a ray (*Apples*, full `setup1`,
-    2026-11-25).
-    """
-    return max(values[at : at + width]) - min(values[at : at + width])
 
 
 def _bits_of(typing: Any, number: Any) -> Any:

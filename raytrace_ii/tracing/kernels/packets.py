@@ -22,7 +22,7 @@ from ii_core.base.jit import inline_kernel, lane_kernel, part_kernel
 
 from . import lanes as at
 from .addresses import call
-from .lanes import BLOCK, NO_END, side
+from .lanes import BLOCK, NO_END
 from .vectors import three_of_row
 
 # Rows of a packet.
@@ -119,20 +119,20 @@ def _begin(packet, numbers, width):
 
 
 @stage_kernel
-def _spread(packet, first, width):
-    """Sum of the sides of the box around a quantity of three rows."""
-    total = np.float32(0)
-    for c in range(first, first + 3):
-        total += side(packet, c * width, width)
-    return total
-
-
-@stage_kernel
 def _together(packet, calls, ahead, width):
-    """Whether rays are near enough to each other for coherent tracing, at their origins and ``ahead`` of them."""
-    x, y, z = packet[DIRECTION * width], packet[(DIRECTION + 1) * width], packet[(DIRECTION + 2) * width]
-    apart, turned = _spread(packet, np.int64(0), width), _spread(packet, np.int64(DIRECTION), width)
-    return (apart + turned * ahead <= calls.near) & (turned <= calls.narrow * (abs(x) + abs(y) + abs(z)))
+    """Whether rays are near enough to the first for coherent tracing, at their origins and ``ahead`` of them."""
+    x, y, z = packet[0], packet[width], packet[2 * width]
+    dx, dy, dz = packet[DIRECTION * width], packet[(DIRECTION + 1) * width], packet[(DIRECTION + 2) * width]
+    narrow, apart = calls.narrow * (abs(dx) + abs(dy) + abs(dz)), 0
+    for lane in range(width):
+        away = abs(packet[lane] - x) + abs(packet[width + lane] - y) + abs(packet[2 * width + lane] - z)
+        turned = (
+            abs(packet[4 * width + lane] - dx)
+            + abs(packet[5 * width + lane] - dy)
+            + abs(packet[6 * width + lane] - dz)
+        )
+        apart += (away + turned * ahead > calls.near) | (turned > narrow)
+    return apart == 0
 
 
 @stage_kernel

@@ -91,7 +91,7 @@ def way_kernel(width: int) -> Any:
             if stages.spawn and hits > 0:
                 call(stages.spawn, here, first, lanes, 0)
             g.counts[TICKS] += ticks() - start if timed else 0
-            if first == _TRIED and g.counts[SHADOW] < _SPARSE * BLOCK * g.counts[SHADOW_PACKETS]:
+            if first == _TRIED and not later and g.counts[SHADOW] < _SPARSE * BLOCK * g.counts[SHADOW_PACKETS]:
                 later, g.counts[UNTESTED] = True, 1
 
     return follow
