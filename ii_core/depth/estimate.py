@@ -235,7 +235,7 @@ def costs(views: Views, labels: Map, workers: int | None) -> Map:
 def passed_on(views: Views, cost: Map, labels: Map, workers: int | None) -> Map:
     """Return costs passed on along rows and columns, both ways."""
     height, width = views.pixels.shape[2:]
-    view = views.pixels[0].transpose(1, 2, 0).astype(np.float64)
+    view = views.pixels[0].transpose(1, 2, 0).astype(np.float32)
     total = np.zeros_like(cost)
     prices = labels.astype(np.float64), SLOPE * CODES, LEAP * CODES, ALIKE * CODES
     for columns, back in product((False, True), repeat=2):
@@ -259,6 +259,7 @@ def matched(views: Views, labels: Map, workers: int | None) -> tuple[Map, Map, M
     ratio, margin = np.empty(cost.shape[:2], np.float32), np.empty(cost.shape[:2], np.float32)
     apart = max(1, round(APART / float(labels[1] - labels[0])))
     run(workers, height, kernels.rivals, cost, total, apart, ratio, margin)
+    del cost
     return np.asarray(ndimage.median_filter(labelled(total, labels), 3)), ratio, margin / CODES
 
 
