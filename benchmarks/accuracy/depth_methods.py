@@ -2,8 +2,9 @@
 
     python -m benchmarks run depth_methods [--published FOLDER] [--scenes cuboid]
 
-*Methods*: a field of the profile ``jpeg-pleno`` as `estimated_depth` has it. OpenCV's stereo methods see two views,
-the middle one and the one four steps to the right, if ``opencv-python-headless`` is installed beside.
+*Methods*: the middle of a field of the profile ``jpeg-pleno`` as `estimated_depth` has it, 9×9 views of 256² px.
+OpenCV's stereo methods see two views, the middle one and the one four steps to the right, if
+``opencv-python-headless`` is installed beside.
 *Growth*: parts of the field of cuboid; memory is the peak of what numpy allocates.
 *Published*: folders ``antinous`` (4D Light Field Benchmark), ``stillLife_lf_3x3`` (the benchmark of 2013; truth in
 steps of 0.22 px) and ``checker_15cm`` (a chequered plane, by a Lytro) in FOLDER.
@@ -14,6 +15,7 @@ from __future__ import annotations
 import importlib
 import time
 import tracemalloc
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -38,6 +40,7 @@ METHODS = ("all views", "all views, range known", "focus, robust", "focus, disse
 PUBLISHED = ("antinous", "stillLife_lf_3x3", "checker_15cm")
 PARTS = ((9, 128), (9, 256), (9, 512), (5, 256))  # views and px a side
 RANGE = -6.0, 8.0  # of growth
+SIDE = 256  # px of the middle of a view in which methods are compared
 REACH, FINE = 4, 16  # steps between the two views of OpenCV, and its parts of a pixel
 CHART = IMAGES / "depth_methods.svg"
 
@@ -79,7 +82,11 @@ def field(scene: str) -> tuple[IIPicture, IICamera, np.ndarray]:
 
 def method(scene: str, name: str) -> dict[str, Any]:
     """Return error and CPU time of a method, compiled before."""
-    picture, camera, true = field(scene)
+    whole, camera, true = field(scene)
+    cut = slice((true.shape[0] - SIDE) // 2, (true.shape[0] + SIDE) // 2)
+    true, (u, v) = true[cut, cut], camera.ei_pixels
+    camera = replace(camera, pixels=(SIDE * u, SIDE * v), lenses=(SIDE, SIDE))
+    picture = IIPicture(of_views(sub_images(whole)[:, :, cut, cut]).pixels, camera.lenses, (u, v), camera)
     ends = float(np.nanmin(true)), float(np.nanmax(true))
 
     def found(shown: IIPicture) -> np.ndarray:
