@@ -14,6 +14,7 @@ from ..base import checks
 from ..base.extras import Lazy
 from ..base.parallel import over_rows
 from ..camera.camera import IICamera, Pair
+from ..picture.assumed import ASSUMED
 from ..picture.disparity import depth_of_disparity, disparity_of_depth
 from ..picture.picture import IIPicture
 from . import disparity_kernels as kernels
@@ -210,7 +211,7 @@ def search_range(views: Views, camera: IICamera | None, workers: int | None) -> 
 
 def possible(camera: IICamera | None, most: float) -> tuple[float, float]:
     """Return the disparities of depths before the camera, at most ``most`` px in size."""
-    if camera is None or camera.front:
+    if camera is None or camera.front or camera.name == ASSUMED:
         return -most, most
     base = camera.origin_mm[2] + camera.gap_mm
     if camera.viewer_mm is None:
