@@ -164,6 +164,9 @@ BENCHMARKS = {
         Benchmark("accuracy.sample_places", records=OWN, fills=("docs/speed_accuracy.md",)),
         Benchmark("accuracy.edges", records=OWN, fills=("docs/speed_accuracy.md",), writes=(f"{IMAGES}/edges.png",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",)),
+        Benchmark(
+            "accuracy.moire", records=OWN, fills=("docs/display.md",), writes=(f"{IMAGES}/display_moire.webp",)
+        ),
         Benchmark("accuracy.demosaicing", records=OWN, fills=("docs/calibration.md",)),
         Benchmark(
             "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)

@@ -2,10 +2,11 @@
 
     python -m benchmarks run anchors [--photographs FOLDER] [--pictures flowers-5x5,toys-1x1,apples] [--schemes vvenc]
 
-``NAME-5x5`` are the middle 5×5 views of a photograph of the benchmark ``photographs``, ``NAME-1x1`` its middle view
-alone; ``astronaut-1x1`` and its like are photographs of scikit-image. FOLDER has the photographs as NAME.png; their
-pixels are compared with the definition. The others are the pictures of `benchmarks.coding.light_field`. Every curve
-has five quantisers. Tables go to ``docs/benchmark.md``.
+``NAME-5x5`` are the photographs of the benchmark ``photographs``, ``NAME-1x1`` their middle views alone;
+``astronaut-1x1`` and its like are photographs of scikit-image. FOLDER has the photographs as NAME.png; their pixels
+are compared with the definition. The others are the pictures of `benchmarks.coding.light_field`. Every curve has five
+quantisers. ``jplm`` is the 4-D transform mode of JPEG Pleno, as in `benchmarks.coding.jplm`; its programs must be on
+the path. Tables go to ``docs/benchmark.md``.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 from skimage import data
 
 from benchmarks.arguments import command_line
+from benchmarks.coding import jplm
 from benchmarks.coding.light_field import BY_RGB, FIELDS, OURS, SCENES, pictured, rate_change
 from benchmarks.coding.rd import compiled
 from benchmarks.pages.tables import Tables, publish
@@ -28,6 +30,7 @@ from codec import encode, timed_decode
 from ii_core import IIPicture
 from metrics.benchmark.anchor_coder import AnchorCoder, versions
 from metrics.benchmark.anchors import ANCHORS
+from metrics.benchmark.external import External
 from metrics.benchmark.profile import profile
 from metrics.benchmark.subject import identity
 from metrics.measures.batch import measuring
@@ -37,6 +40,7 @@ RECORDS = Records("anchors", ("benchmarks.coding.anchors", "benchmarks.coding.li
 PHOTOGRAPHS = {reference.name: reference for reference in profile("photographs").pictures}
 SINGLE = ("astronaut", "chelsea", "coffee")  # of scikit-image
 AVIF = "si-avif:best"
+JPLM = "jplm"  # transforms over all views: of flowers, smaller ones were never chosen, and took 17 times as long
 QUANTISERS = {
     OURS: (33, 39, 45, 51, 57),
     "si-avif": (12, 22, 32, 42, 52),
@@ -46,10 +50,11 @@ QUANTISERS = {
     "svtav1": (16, 26, 36, 46, 56),
     "jpegxl": (0.6, 1.5, 4, 9, 15),
     "si-jpeg2000": (2, 1, 0.5, 0.25, 0.12),
+    JPLM: jplm.LAMBDAS,
 }
 BY_RATE = "si-jpeg2000"  # its quantisers are rates in bpp
 OF_SINGLE = (29, 34, 39, 44, 49)  # of `si-lf` for a view alone: the first of many is finer than the rest
-OTHERS = ("svtav1", "jpegxl", BY_RATE)
+OTHERS = ("svtav1", "jpegxl", BY_RATE, JPLM)
 SCHEMES = (OURS, BY_RGB, AVIF, "x265", "vvenc", "libaom")
 MEASURES = {"ctc": "q_ctc_psnr", "psnr": "q_global", "ssim": "q_ctc_ssim", "worst": "q_ctc_min", "step": "q_ctc_step"}
 LUMA = "luma"  # PSNR of Y in the codes of the common test conditions, mean over views
@@ -58,7 +63,7 @@ LABELS = {"ctc": "CTC", LUMA: "luma", "psnr": "RGB"}
 
 def main() -> None:
     """Measure, print, record and fill the page."""
-    views = [f"{name}-5x5" for name in PHOTOGRAPHS if name != "worm"]  # its views are smaller than any coder's blocks
+    views = [f"{name}-5x5" for name in PHOTOGRAPHS]
     single = [f"{name}-1x1" for name in (*PHOTOGRAPHS, *SINGLE)]
     parser = command_line(__doc__, pictures=(*views, *single, *SCENES, *FIELDS), schemes=(*SCHEMES, *OTHERS))
     parser.add_argument("--photographs", type=Path, help="folder of the benchmark's photographs")
@@ -79,18 +84,19 @@ def subject(name: str, folder: Path | None) -> IIPicture:
         return pictured(name)
     if folder is None:
         raise ValueError(f"{whole} is a photograph: --photographs names their folder")
-    picture, reference = IIPicture.load(folder / f"{whole}.png"), PHOTOGRAPHS[whole]
+    reference = PHOTOGRAPHS[whole]
+    picture = reference.part(IIPicture.load(folder / f"{whole}.png"))
     if not reference.matches(identity(whole, picture)["sha256"]):
         raise ValueError(f"{folder / whole}.png has not the pixels of the definition")
     columns, rows = map(int, count.split("x"))
-    return replace(reference, middle=True, views=(columns, rows)).part(picture)
+    return replace(reference, views=(columns, rows)).part(picture)
 
 
 def curve(original: IIPicture, scheme: str) -> dict[str, Any]:
     """Return structure, rate and qualities at each quantiser; versions of an anchor's program."""
     measure: Any = measuring(original, list(MEASURES.values()))
     anchor, points = AnchorCoder(scheme) if scheme in ANCHORS else None, []
-    if anchor is None:
+    if scheme.startswith((OURS, AVIF, BY_RATE)):
         compiled(scheme, **({"bpp": 1} if scheme == BY_RATE else {"qp": QUANTISERS[OURS][0]}))
     alone = original.ei_pixels == (1, 1) and scheme.startswith(OURS)
     for quantiser in OF_SINGLE if alone else QUANTISERS[scheme.partition(":")[0]]:
@@ -107,13 +113,17 @@ def at_quantiser(
     original: IIPicture, scheme: str, anchor: AnchorCoder | None, quantiser: float
 ) -> tuple[Any, Any, Any]:
     """Return what was coded, the decoded picture, and the codes that an anchor returned."""
+    if scheme == JPLM:
+        programs = External(encoder=jplm.encoder(original, "whole", quantiser), decoder=jplm.DECODER, kind="ycbcr")
+        stream = programs.encode(original, JPLM, bpp=jplm.MANY_BPP)
+        return stream, programs.decode(stream).picture, None
     if anchor is None:
         goal: Any = {"bpp" if scheme == BY_RATE else "qp": quantiser}
         coded = encode(original, scheme, **goal)
         return coded, timed_decode(coded).picture, None
-    stream = anchor.encode_at(original, quantiser)
-    answer = anchor.decode(stream)
-    return stream, answer.picture, answer.codes
+    sequence = anchor.encode_at(original, quantiser)
+    answer = anchor.decode(sequence)
+    return sequence, answer.picture, answer.codes
 
 
 def luma_psnr(original: IIPicture, decoded: IIPicture, own: Any = None) -> float:

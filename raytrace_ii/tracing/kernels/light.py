@@ -11,6 +11,7 @@ from ii_core.base.jit import lean_kernel as kernel
 
 from . import lanes as at
 from .lanes import BLOCK, slot
+from .packets import occluded_of_lanes
 from .tables import (
     CONE_AXIS,
     CONE_OFFSET,
@@ -147,6 +148,22 @@ def keep_rays(lanes, first, rays, shadows, row, single):
             shadows.inside[to, j] = rays.inside[i, j]
         row += 1
     return row - start
+
+
+@stage_kernel
+def add_clear(first, lanes, rays, tools, work, width):
+    """Add the light of those shadow rays that start outside of bodies and meet no clear one; leave the others."""
+    single = work.single
+    for k in range(BLOCK):
+        single[at.LEFT + k] = single[at.WANTED + k]
+    if rays.inside.shape[1] > 0:
+        for k in range(lanes):
+            within = rays.inside[np.uint64(first + k), 0] >= 0
+            single[at.WANTED + k] = _ZERO if within else single[at.WANTED + k]
+    occluded_of_lanes(tools, tools.clear, work, width)
+    add_free(single)
+    for k in range(BLOCK):
+        single[at.WANTED + k] = single[at.LEFT + k] - single[at.WANTED + k]
 
 
 @stage_kernel
