@@ -451,18 +451,18 @@ def tables() -> Tables:
         if "main_lens" in row
     ]
     focus = [
-        f"A hexagonal array of three focal lengths, lenses of {row['multi_focus_px']} px, before noise at the three "
-        f"depths in focus: the pattern found is {row['pattern']}, and explains {row['explained']:.0%} of the "
-        f"variation of detail; foci are off by {row['foci_error']:.3f} of shift at the most. Against the same pixels "
-        f"through pinholes the picture has {row['raw_db']:.1f} dB, and {row['fused_db']:.1f} dB with pixels of "
-        f"lenses in focus. Matching takes {row['match_seconds_a_megapixel']:.0f} CPU s a megapixel."
+        f"Multi-focus: three focal lengths, hexagonal, {row['multi_focus_px']} px a lens, before noise at the three "
+        f"depths in focus. Pattern {row['pattern']} explains {row['explained']:.0%} of the variation of detail; foci "
+        f"are off by {row['foci_error']:.3f} of shift at the most. Against the same pixels "
+        f"through pinholes the picture has {row['raw_db']:.1f} dB, fused {row['fused_db']:.1f} dB. "
+        f"Matching takes {row['match_seconds_a_megapixel']:.0f} CPU s a megapixel."
         for row in rows
         if "multi_focus_px" in row
     ]
     theirs = [
-        f"Letters, a raw picture of cicwi/plenoptomos with white and dark ones, {'×'.join(map(str, row['lenses']))} "
-        f"lenses: {row['lens_pitch_px'][0]:.3f}×{row['lens_pitch_px'][1]:.3f} px, turned by {row['turn_deg']:.3f}°, "
-        f"centres {row['residual_rms_px']:.3f} px rms off the grid. Its authors' program, which knows no turn, has "
+        f"Letters of cicwi/plenoptomos, {'×'.join(map(str, row['lenses']))} lenses: "
+        f"{row['lens_pitch_px'][0]:.3f}×{row['lens_pitch_px'][1]:.3f} px, turned by {row['turn_deg']:.3f}°, centres "
+        f"{row['residual_rms_px']:.3f} px rms off; its authors, without a turn: "
         f"{THEIR_PITCH[0]:.3f}×{THEIR_PITCH[1]:.3f} px."
         for row in RECORDS.rows(**LETTERS)
     ]

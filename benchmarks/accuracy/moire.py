@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.arguments import command_line
-from benchmarks.pages.pictures import write_chart
+from benchmarks.pages.pictures import IMAGES, enlarged, sheet, write_picture
 from benchmarks.pages.tables import Tables, publish
 from benchmarks.records import Records, origin, table
 from ii_core import Eye, preset
 from ii_core.base.colour import linear
 from ii_core.display.eye import EyeImage
-from ii_core.display.figure import new_figure
 from ii_core.display.looking_glass import LookingGlass, native_eye_image, native_picture, view_numbers
 from raytrace_ii import load_scene, render
 
@@ -47,7 +46,7 @@ def main() -> None:
     asked = command_line(__doc__).parse_args()
     RECORDS.run([{"calibration": name} for name in CALIBRATIONS], measured, asked.again)
     publish(tables())
-    write_chart(picture(), "display_moire.png", dpi=100)
+    write_picture(IMAGES / "display_moire.webp", picture())
 
 
 def measured(calibration: str) -> dict[str, Any]:
@@ -100,17 +99,15 @@ def tables() -> Tables:
     return {(PAGE, "moire"): [*table(heads, lines), "", origin(rows)]}
 
 
-def picture() -> Any:
-    """Draw a scene as the eye in front sees it by each calibration."""
+def picture() -> NDArray[np.uint8]:
+    """Return a scene as the eye in front sees it by each calibration."""
     shown = render(load_scene("apples"), preset("setup1", scale=4), samples=4, seed=0).picture
-    display = replace(DISPLAY, size=DRAWN)
-    figure = new_figure(9, 6.4)
-    for axes, (name, changes) in zip(figure.subplots(2, 2).flat, CALIBRATIONS.items(), strict=True):
+    display, points = replace(DISPLAY, size=DRAWN), (DRAWN[0] // 8, DRAWN[1] // 8)
+    seen = []
+    for changes in CALIBRATIONS.values():
         panel = native_picture(shown, replace(display, **changes))
-        axes.imshow(_seen(panel, 0.0, (DRAWN[0] // 8, DRAWN[1] // 8), 64, display).pixels, interpolation="bilinear")
-        axes.set_title(f"calibration: {name}", fontsize=9)
-        axes.axis("off")
-    return figure
+        seen.append(enlarged(_seen(panel, 0.0, points, 64, display).pixels, 2))
+    return sheet(seen, 2, [f"calibration: {name}" for name in CALIBRATIONS])
 
 
 if __name__ == "__main__":

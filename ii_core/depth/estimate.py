@@ -14,6 +14,7 @@ from ..base import checks
 from ..base.extras import Lazy
 from ..base.parallel import over_rows
 from ..camera.camera import IICamera, Pair
+from ..picture.assumed import ASSUMED
 from ..picture.disparity import depth_of_disparity, disparity_of_depth
 from ..picture.picture import IIPicture
 from . import disparity_kernels as kernels
@@ -210,7 +211,7 @@ def search_range(views: Views, camera: IICamera | None, workers: int | None) -> 
 
 def possible(camera: IICamera | None, most: float) -> tuple[float, float]:
     """Return the disparities of depths before the camera, at most ``most`` px in size."""
-    if camera is None or camera.front:
+    if camera is None or camera.front or camera.name == ASSUMED:
         return -most, most
     base = camera.origin_mm[2] + camera.gap_mm
     if camera.viewer_mm is None:
@@ -235,7 +236,7 @@ def costs(views: Views, labels: Map, workers: int | None) -> Map:
 def passed_on(views: Views, cost: Map, labels: Map, workers: int | None) -> Map:
     """Return costs passed on along rows and columns, both ways."""
     height, width = views.pixels.shape[2:]
-    view = views.pixels[0].transpose(1, 2, 0).astype(np.float64)
+    view = views.pixels[0].transpose(1, 2, 0).astype(np.float32)
     total = np.zeros_like(cost)
     prices = labels.astype(np.float64), SLOPE * CODES, LEAP * CODES, ALIKE * CODES
     for columns, back in product((False, True), repeat=2):
@@ -259,6 +260,7 @@ def matched(views: Views, labels: Map, workers: int | None) -> tuple[Map, Map, M
     ratio, margin = np.empty(cost.shape[:2], np.float32), np.empty(cost.shape[:2], np.float32)
     apart = max(1, round(APART / float(labels[1] - labels[0])))
     run(workers, height, kernels.rivals, cost, total, apart, ratio, margin)
+    del cost
     return np.asarray(ndimage.median_filter(labelled(total, labels), 3)), ratio, margin / CODES
 
 

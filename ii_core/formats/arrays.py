@@ -245,7 +245,7 @@ def _matlab(path: Path) -> Stored:
 
 
 def _planes(path: Path, found: list[matlab5.Array]) -> Stored | None:
-    """Return a light field of three arrays ``NAMEr``, ``NAMEg`` and ``NAMEb`` of four axes; else None."""
+    """Return a light field of arrays ``NAMEr``, ``NAMEg`` and ``NAMEb`` of four axes; None if others are there."""
     by_name = {array.name[-1:]: array for array in found}
     alike = {(array.name[:-1], array.shape, array.kind) for array in found}
     if len(alike) != 1 or set(by_name) != set("rgb") or len(found[0].shape) != 4:

@@ -154,7 +154,8 @@ def test_three_arrays_of_colours_and_doubles_of_whole_numbers(tmp_path):
     assert view.dtype == np.uint8
     scipy.io.savemat(path, {"LF": codes * 256.0})
     assert array_views(path).read(0, 0).dtype == np.uint16
-    for wrong in ({"lfr": codes[..., 0], "lfg": codes[..., 1]}, {f"lf{c}": codes[..., :2, 0] for c in "rgx"}):
+    red = codes[..., 0].astype(float)
+    for wrong in ({"lfr": red, "lfg": red}, dict.fromkeys(("lfr", "lfg", "lfx"), red)):
         scipy.io.savemat(path, wrong)
         with pytest.raises(ValueError, match=r"it holds [23] arrays of four or five axes"):
             array_views(path)

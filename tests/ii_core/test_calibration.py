@@ -35,6 +35,7 @@ from ii_core import (
     sub_images,
 )
 from ii_core.base.colour import linear, srgb
+from ii_core.base.files import write_image
 from ii_core.calibration.demosaic import METHODS, MOSAICS, demosaiced, phases
 from ii_core.calibration.lens_types import LensTypes
 from ii_core.calibration.multi_focus import fused, lens_foci, of_camera, shifts_of, virtual_depths, with_foci
@@ -555,3 +556,25 @@ def test_virtual_depths_of_a_raytrix_file(tmp_path):
         file.write_text(text)
         with pytest.raises(ValueError, match=said):
             virtual_depths(file)
+
+
+def test_import_of_a_multi_focus_picture(run, refused, multi_focus, tmp_path):
+    """Types are kept, fused, or one is taken; foci are found or given."""
+    rng = np.random.default_rng(3)
+    light = linear(multi_focus.raw.pixels / 255) * multi_focus.white[..., None]
+    for name, values in (("raw", light), ("white", multi_focus.white)):
+        write_image(tmp_path / f"{name}.png", rng.poisson(20000 * values + 10).astype(np.uint16))
+    command = "import", tmp_path / "raw.png", "--whites", tmp_path / "white.png", "-o", tmp_path / "f.png", "--force"
+    code, out, _ = run(*command, "--foci", "3.33,10,5")
+    assert code == 0 and "type 0: +0.100, type 1: +0.200, type 2: +0.300" in out
+    kept = IIPicture.load(tmp_path / "f.png")
+    assert of_camera(kept.camera).matrix == ((2, 1, 0), (0, 2, 1))  # by focal length
+    code, out, _ = run(*command, "--lens-types", "fuse")
+    made = IIPicture.load(tmp_path / "f.png")
+    assert code == 0 and "in better focus" in out and of_camera(made.camera) is None
+    assert made.lenses == kept.lenses
+    refused(run(*command, "--lens-types", "sharp"), "keep, fuse or the number of a type")
+    refused(run(*command, "--foci", "3,x"), "2 to 4 virtual depths beyond 1")
+    refused(
+        run("import", tmp_path / "f.png", "--ei-pixels", "2x2", "-o", tmp_path / "g.png", "--foci", "2,3"), "--whites"
+    )
