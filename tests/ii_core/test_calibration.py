@@ -490,6 +490,7 @@ def multi_focus():
     return multi_focus_pictures(20, (14, 12), 36)
 
 
+@pytest.mark.slow
 def test_lens_types_and_their_foci_are_found(multi_focus):
     """At every depth another type is sharp, so that types are alike over the whole picture."""
     raw, white = multi_focus.raw, multi_focus.white
@@ -511,6 +512,7 @@ def test_lens_types_and_their_foci_are_found(multi_focus):
     assert even.pattern == "one" and lens_foci(picture, even) is None
 
 
+@pytest.mark.slow
 def test_pixels_come_from_lenses_in_focus(multi_focus):
     """The truth is rendered through pinholes."""
     raw, sharp, _, true, inner = multi_focus
@@ -529,6 +531,7 @@ def test_pixels_come_from_lenses_in_focus(multi_focus):
         fused(made)
 
 
+@pytest.mark.slow
 def test_a_depth_that_one_lens_alone_shows_is_left():
     """Matching needs two other lenses that show the point; without detail nothing changes."""
     camera = preset("multi-focus", scale=64)
@@ -558,6 +561,7 @@ def test_virtual_depths_of_a_raytrix_file(tmp_path):
             virtual_depths(file)
 
 
+@pytest.mark.slow
 def test_import_of_a_multi_focus_picture(run, refused, multi_focus, tmp_path):
     """Types are kept, fused, or one is taken; foci are found or given."""
     rng = np.random.default_rng(3)
