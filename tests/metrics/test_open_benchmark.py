@@ -446,8 +446,7 @@ def test_profiles_of_the_package():
     # Version 1 measured PSNR of full-range values and SSIM of BT.601 luma: other figures than the conditions have.
     # Version 2 had the pixels of trees of four children: 1–6 of 21 or 34 million are ties that fall otherwise now.
     # Version 3 had samples of a scrambled sequence, and other ties in Car and Objects.
-    # Version 5 had texture coordinates and fog of other roundings: 11–23 of 34 million pixels of Car and Cuboid, and
-    # 0.1 % of Twins, nearly all by one code.
+    # Version 5 had fog and starts of rays of other roundings: 11–23 of 34 million pixels of Car and Cuboid.
     assert pleno.version == own.version == 6 and pleno.rank_by == "q_ctc_psnr"
     assert len(own.pictures) == 8 and {p.scale for p in own.pictures} == {1}
     for made in (pleno, own, profile("small")):

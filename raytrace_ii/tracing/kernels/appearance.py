@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, lane_stage, late_lane_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import inline_kernel, lane_stage, late_kernel, late_lane_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
@@ -110,13 +110,12 @@ def scatter(ambient, single):
             single[at.L0 + k] = w * single[at.E0 + k] + scattered * a if hit > _ZERO else _ZERO
 
 
-@late_lane_kernel
+@late_kernel
 def paint(generation, first, lanes, _):
     """Textures of bodies that have patterns, and nothing else of ``EXTRAS``."""
     g = value_at(generation)
     for k in range(BLOCK):
         g.work.single[at.CLEAR + k] = _ZERO
-    _place_on_textures(g.work.single, g.work.double)
     _take_patterns(lanes, g.surfaces, g.work)
 
 
@@ -129,8 +128,8 @@ def look_closely(generation, first, lanes, _):
     if g.passage.first_width == 0.0 and g.passage.spread == 0.0:
         for k in range(4 * BLOCK):
             single[at.AU + k] = _ZERO
-    if s.coordinates.shape[0] > 0:
-        _place_on_textures(single, double)
+    if s.maps.any:
+        _place_on_images(single, double)
     for k in range(3 * BLOCK):
         single[at.B0 + k] = _ZERO
     if s.maps.blend and blending:
@@ -163,14 +162,13 @@ def _is_special(k, single):
 
 
 @lane_stage
-def _place_on_textures(single, double):
-    """Texture coordinates of all hits."""
+def _place_on_images(single, double):
+    """(u, v) of all hits on the images of their bodies."""
     for k in range(BLOCK):
         u, v, c = np.float64(single[at.U + k]), np.float64(single[at.V + k]), at.COORDINATE + k
         w = 1.0 - u - v
         double[at.SU + k] = w * single[c] + u * single[c + 2 * BLOCK] + v * single[c + 4 * BLOCK]
         double[at.SV + k] = w * single[c + BLOCK] + u * single[c + 3 * BLOCK] + v * single[c + 5 * BLOCK]
-        double[at.SW + k] = w * single[at.THIRD_0 + k] + u * single[at.THIRD_1 + k] + v * single[at.THIRD_2 + k]
 
 
 @lane_stage
@@ -233,11 +231,23 @@ def _take_patterns(lanes, surfaces, work):
     return some
 
 
+@inline_kernel
+def _place_on_pattern(k, single):
+    """Texture coordinates of one hit, products in float32: patterns at borders of pixels depend on their rounding."""
+    u, v, c = single[at.U + k], single[at.V + k], at.COORDINATE + k
+    w = 1.0 - u - v
+    return (
+        w * single[c] + u * single[c + 2 * BLOCK] + v * single[c + 4 * BLOCK],
+        w * single[c + BLOCK] + u * single[c + 3 * BLOCK] + v * single[c + 5 * BLOCK],
+        w * single[at.THIRD_0 + k] + u * single[at.THIRD_1 + k] + v * single[at.THIRD_2 + k],
+    )
+
+
 @stage_kernel
 def _take_pattern(k, row, surfaces, work, noisy):
     """Colour one lane by a pattern, or note the place where its noise is wanted as number ``noisy``: 1 then."""
     single, double, whole, table = work.single, work.double, work.whole, surfaces.textures
-    x, y, z = three_doubles(double, at.SU, k)
+    x, y, z = _place_on_pattern(k, single)
     if table[row, 0] != NOISE:
         t0, t1, t2 = pattern_colour(table, row, x, y, z)
         single[at.T0 + k], single[at.T1 + k], single[at.T2 + k] = t0, t1, t2

@@ -93,7 +93,7 @@ _SINGLES = next(_offset)
 # Quantities in float64. Of a noise: place, sum and strength of the octave.
 _offset = count(0, BLOCK)
 SX, SY, SZ, TOTAL, STRENGTH = _offsets(5)
-SU, SV, SW = _offsets(3)  # texture coordinates of the hit
+SU, SV = _offsets(2)  # place in an image
 RAY = next(_offset)  # origin and direction of a camera ray, of any length; two to spare
 _offsets(7)
 _DOUBLES = next(_offset)
