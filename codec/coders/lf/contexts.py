@@ -66,7 +66,10 @@ STRAIGHT = SIDE + 1  # side 2
 TURN = STRAIGHT + 2  # side 2
 SLOPE = TURN + 2  # side 2 × nodes of a tree of 8 leaves 8
 TRANSFORM = SLOPE + 16  # block size 4 × (not of cosines alone, of sines alone, sines across) 3
-COUNT = TRANSFORM + 12
+# Of version 10: blocks of unequal sides.
+PARTED = TRANSFORM + 12  # area 6 × narrower or lower neighbours 3
+ACROSS = PARTED + 18  # form 3 × narrower above, lower to the left 3
+COUNT = ACROSS + 9
 
 # Probabilities to begin with: log(p / (1 - p)) from -6.2 up in steps of 0.2, by its digit; * where none is known. The
 # mean over eight coded pictures: three scenes and a flower of a real light field camera, at two quantisers each.
