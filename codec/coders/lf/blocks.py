@@ -784,7 +784,7 @@ def part_context(job, by, bx, shape):
         count += 1
     if bx > 0 and blocks[TALL, by, bx - 1] < shape[0]:
         count += 1
-    return at.PARTED + (shape[0] + shape[1] - 5) * 3 + count
+    return at.PARTED + (6 if job.references.shape[0] else 0) * 3 + (shape[0] + shape[1] - 5) * 3 + count
 
 
 @tuned_kernel

@@ -21,6 +21,7 @@ from .contexts import (
     ABOVE_ONE_THERE_FINE,
     ABOVE_TWO,
     LAST,
+    LAST_PARTED,
     REST,
     REST_NEAR,
     SIGNIFICANT,
@@ -96,6 +97,14 @@ def _place(y, x):
 
 
 @stage_kernel
+def _last_context(plane, shape):
+    """By plane and area; areas between those of squares have contexts of their own."""
+    log = size_of(shape) - 2
+    odd = (shape[0] + shape[1]) & 1
+    return LAST_PARTED + (plane * 3 + log) * 12 if odd else LAST + (plane * 4 + log) * 12
+
+
+@stage_kernel
 def _significant_context(plane, log, place, near, state):
     context = ((plane * 4 + log - 2) * 4 + place) * 8 + near
     return SIGNIFICANT + context if state < 2 else SIGNIFICANT_FINE + (state - 2) * 384 + context
@@ -120,7 +129,7 @@ def code_coefficients(coder, levels, plane, shape, intra, finer, dependent):
     last = h * w - 1
     while last > 0 and _at(levels, shape, last) == 0:
         last -= 1
-    last = min(code_number(coder, LAST + (plane * 4 + log - 2) * 12, np.int64(12), np.int64(0), last), h * w - 1)
+    last = min(code_number(coder, _last_context(plane, shape), np.int64(12), np.int64(0), last), h * w - 1)
     for k in range(last, -1, -1):
         y, x = _scanned(shape, k)
         value = np.int64(levels[y, x])
@@ -238,7 +247,7 @@ def quantise(costs, coefficients, plane, shape, step, weight, levels, finer):
         levels[np.uint64(y), np.uint64(x)] = -best if value < 0 else best
     if last < 0:
         return np.float32(0), nothing
-    bits += number_cost(costs, LAST + (plane * 4 + log - 2) * 12, np.int64(12), np.int64(0), last)
+    bits += number_cost(costs, _last_context(plane, shape), np.int64(12), np.int64(0), last)
     if error + weight * bits >= nothing:
         for y in range(h):
             for x in range(w):
@@ -271,12 +280,13 @@ def new_trellis() -> Trellis:
 @stage_kernel
 def _branch(costs, trellis, now, came, around, where, half, size, weight, finer):
     """Extend the path to a state, or begin one if it is -1, by the levels next to a coefficient; keep the better."""
-    k, place, plane, log = where
+    k, place, plane, shape = where
+    log = size_of(shape)
     first = came < 0
     state: Any = max(came, 0)
     odd = np.float32(state >> 1)
     if first:
-        bits = number_cost(costs, LAST + (plane * 4 + log - 2) * 12, np.int64(12), np.int64(0), k)
+        bits = number_cost(costs, _last_context(plane, shape), np.int64(12), np.int64(0), k)
         total = weight * bits
     else:
         total, bits = trellis.totals[now, state], trellis.bits[now, state]
@@ -325,7 +335,7 @@ def _follow(trellis, now, k, y, diagonal, n):
 @part_kernel
 def quantise_dependent(costs, coefficients, plane, shape, step, weight, levels, finer, trellis):
     """As `quantise`, by a dependent quantiser: the path of least cost through its states (Viterbi)."""
-    (h, w), log = sides(shape), size_of(shape)
+    h, w = sides(shape)
     nothing, first = _none(coefficients, np.float32(NEVER) * step, levels, h, w)
     half = step * np.float32(HALF / 16)
     now = diagonal = 0
@@ -337,7 +347,7 @@ def quantise_dependent(costs, coefficients, plane, shape, step, weight, levels, 
             diagonal = y + x
             _clear_recent(trellis.recent[now], diagonal, 3 if k == first else 1, h)
         size = abs(np.float32(coefficients[np.uint64(y), np.uint64(x)]))
-        where = k, _place(y, x), plane, log
+        where = k, _place(y, x), plane, shape
         for to in range(STATES):
             trellis.totals[1 - now, to], trellis.came[to, k], trellis.levels[to, k] = HUGE, -1, 0
         for came in range(STATES):

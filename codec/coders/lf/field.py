@@ -19,7 +19,8 @@ from .synthesis import Synthesis, chosen, new_synthesis
 from .warp import LATTICE
 
 import os
-PARTED = int(os.environ.get('PARTED', '1'))
+
+PARTED = int(os.environ.get('PARTED', '1')), int(os.environ.get('INTER', '0'))
 EIGHTH = 32  # of a sample, in units of disparity
 MOST_SEARCHED = 800  # disparities of one view
 FIRST_AGAIN = 0, 2  # views of the second level after which the first view's disparity is found anew
@@ -93,7 +94,7 @@ class Field:
             finer=int(self.header.tuned),
             dependent=int(self.header.dependent),
             directed=int(self.header.directed),
-            parted=PARTED if not len(references) else 0,
+            parted=PARTED[len(references) > 0] * self.header.parted,
             skipping=int(self.header.skipping),
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),

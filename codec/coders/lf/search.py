@@ -20,6 +20,7 @@ from .blocks import (
     LOG_LARGEST,
     LOG_LEAST,
     MIXED,
+    PARTS,
     SYNTHESIS,
     TIMED,
     Job,
@@ -44,6 +45,10 @@ from .motion_search import best_vector
 from .residual_search import BEST, copy_trial, keep, new_trial, try_residual, try_transform
 from .transform import sides
 
+# A block is not divided if so many times its cost are more than another way to code the region may cost. Of the part
+# that is coded later, at least so much of its share is taken to be needed.
+SPLIT_GAIN, PART_GAIN, REST = np.float32(0.75), np.float32(0.88), np.float32(0.4)
+MANY_SPLIT = 3  # quarters that are divided themselves: then halves are not tried
 FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
 
 
@@ -57,8 +62,8 @@ class Search(NamedTuple):
         Squared error that a bit is worth.
     least : int
         Binary logarithm of the least block.
-    intra_tries : int
-        Intra modes that are coded on trial.
+    intra_tries, part_tries : int
+        Intra modes that are coded on trial, of squares and of other blocks.
     planes : int
         Planes that count in the choice of disparity and references.
     hurried : int
@@ -73,6 +78,7 @@ class Search(NamedTuple):
     weight: Any
     least: Any
     intra_tries: Any
+    part_tries: Any
     planes: Any
     hurried: Any
     good: Any
@@ -104,7 +110,7 @@ def best_block(costs, job, search, match, work, trial, y0, x0, shape):
     if job.references.shape[0] == 0 or best > search.surely * good:
         errors = trial.errors
         rank_directions(costs, job, search, work, y0, x0, shape, errors)
-        for _ in range(search.intra_tries):
+        for _ in range(search.intra_tries if shape[0] == shape[1] else search.part_tries):
             mode = least_error(errors)
             errors[mode] = HUGE
             side = kind_cost(costs, job, by, bx, shape, np.int64(INTRA), np.int64(0), np.int64(0), mode)
@@ -251,9 +257,23 @@ def _forget(job, y0, x0, shape):
             job.blocks[DONE, y, x] = 0
 
 
+@stage_kernel
+def _split_further(blocks, by, bx, log):
+    """Number of a split square's quarters that are split or parted themselves."""
+    count, half = 0, 1 << (log - 3)
+    for part in range(4):
+        y, x = by + half * (part >> 1), bx + half * (part & 1)
+        if blocks[LOG, y, x] < log - 1 or blocks[PARTS, y, x]:
+            count += 1
+    return count
+
+
 @part_kernel
-def search_tree(costs, job, search, match, work, trial, y0, x0, shape, leaf, depth):
-    """Find, mark and decode the blocks of a square, or of a part of one; return the cost."""
+def search_tree(costs, job, search, match, work, trial, y0, x0, shape, leaf, depth, limit):
+    """Find, mark and decode the blocks of a square, or of a part of one; return the cost.
+
+    A cost beyond the limit is of no use.
+    """
     height, width = job.levels.shape[1:]
     if y0 >= height or x0 >= width:
         return np.float32(0)
@@ -267,7 +287,7 @@ def search_tree(costs, job, search, match, work, trial, y0, x0, shape, leaf, dep
         quarter, below = (log - 1, log - 1), (log - 1, np.int64(0))
         for part in range(4):
             y, x = y0 + (part >> 1) * (h >> 1), x0 + (part & 1) * (w >> 1)
-            total += search_tree(costs, job, search, match, work, trial, y, x, quarter, below, np.int64(0))
+            total += search_tree(costs, job, search, match, work, trial, y, x, quarter, below, np.int64(0), HUGE)
         return total
     best, kind, index, mask, direction, coded = best_of_all(costs, job, search, match, work, trial, y0, x0, shape)
     _fill(job, trial, y0, x0, shape)
@@ -275,17 +295,20 @@ def search_tree(costs, job, search, match, work, trial, y0, x0, shape, leaf, dep
     job.blocks[CROSS_1, by, bx], job.blocks[CROSS_2, by, bx] = trial.cross[BEST, 0], trial.cross[BEST, 1]
     note_skipped(job.blocks, by, bx, shape, trial.skipped[BEST] if coded else 0)
     ways, side = part_ways(job, shape, depth), np.float32(0)
-    best += search.weight * way_cost(costs, job, by, bx, shape, ways, 0)
     if whole and log > LOG_LEAST:
         side = search.weight * bit_cost(costs, split_context(job, by, bx, log), 0)
-    best += side
+    best += side + search.weight * way_cost(costs, job, by, bx, shape, ways, 0)
     if not coded and best <= search.good * search.weight * np.float32(h * w):
         return best
+    if (SPLIT_GAIN if whole else PART_GAIN) * best > limit:
+        return best
     kept, latest = trial.kept, True
-    for way in range(1, 4):
-        if way < 3 and not (ways >> (way - 1)) & 1:
-            continue
-        if way == 3 and not (whole and log > search.least):
+    for step in range(3):
+        way = 3 if step == 0 else step
+        if way == 3:
+            if not (whole and log > search.least):
+                continue
+        elif not (ways >> (way - 1)) & 1:
             continue
         if latest:
             _copy_region(job, kept, y0, x0, shape, 0)
@@ -297,15 +320,20 @@ def search_tree(costs, job, search, match, work, trial, y0, x0, shape, leaf, dep
             total = side + search.weight * way_cost(costs, job, by, bx, shape, ways, way)
             some, below, deeper = halved(shape, way), (log, leaf[1] + (way << (2 * depth))), depth + 1
         down, across = 1 << some[0], 1 << some[1]
-        for part in range(4 if way == 3 else 2):
+        parts = 4 if way == 3 else 2
+        for part in range(parts):
             y = y0 + down * (part >> 1 if way == 3 else (part if way == 1 else 0))
             x = x0 + across * (part & 1 if way == 3 else (part if way == 2 else 0))
-            total += search_tree(costs, job, search, match, work, trial, y, x, some, below, deeper)
+            others = np.float32(parts - 1 - part) / np.float32(parts) * REST * best
+            most = best - total - others
+            total += search_tree(costs, job, search, match, work, trial, y, x, some, below, deeper, most)
             if total > best:
                 break
         latest = total < best
         if latest:
             best = total
+            if way == 3 and _split_further(job.blocks, by, bx, log) >= MANY_SPLIT:
+                break
     if not latest:
         _copy_region(job, kept, y0, x0, shape, 1)
     return best
@@ -314,11 +342,12 @@ def search_tree(costs, job, search, match, work, trial, y0, x0, shape, leaf, dep
 @array_kernel
 def _search_view(costs, job, search, match, work, trial):
     height, width = job.levels.shape[1:]
+    largest, never = np.int64(LOG_LARGEST), np.int64(0)
     for y0 in range(0, height, 1 << LOG_LARGEST):
         for x0 in range(0, width, 1 << LOG_LARGEST):
             if job.references.shape[0]:
                 fill_products(job, search.original, y0, x0, match)
-            search_tree(costs, job, search, match, work, trial, y0, x0, (LOG_LARGEST, LOG_LARGEST), (LOG_LARGEST, 0), np.int64(0))
+            search_tree(costs, job, search, match, work, trial, y0, x0, (largest, largest), (largest, never), never, HUGE)
 
 
 def find_blocks(costs: NDArray[np.float32], job: Job, search: Search) -> None:
