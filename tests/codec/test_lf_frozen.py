@@ -1,4 +1,4 @@
-"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 9: the same bytes decode to the same pixels on every machine.
+"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 10: the same bytes decode to the same pixels on every machine.
 
 In ``tests/golden/lf.zip``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
 views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
@@ -6,7 +6,8 @@ views of *Apples* at quantiser 26; the first encoder that left out transforms wr
 *Apples* of 32×16 pixels at quantiser 36, by cdd3aba: its first view is matched to one that no other view is made of.
 ``tuned.ii`` and ``rotated.ii``, of version 7, hold 7×6 views of 58×38 pixels and 7×2 of them of the benchmark's 9×9
 views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. ``dependent.ii``, of
-version 8, and ``directed.ii``, of version 9, hold 5×4 of those views of 46×35 pixels at quantiser 32. The decoder has
+version 8, ``directed.ii``, of version 9, and ``parted.ii``, of version 10, hold 5×4 of those views of 46×35 pixels at
+quantiser 32. The decoder has
 integer arithmetic alone, so that a hash of the pixels is the expectation.
 """
 
@@ -24,7 +25,7 @@ import pytest
 
 from codec import Encoded, decode
 from codec.coders.lf import stream
-from codec.coders.lf.blocks import CODED, DIRECTION, EXPLICIT, INTRA, KIND, LOG, SKIPPED, SYNTHESIS
+from codec.coders.lf.blocks import CODED, DIRECTION, EXPLICIT, INTRA, KIND, LOG, SKIPPED, SYNTHESIS, TALL, WIDE
 from codec.coders.lf.field import Field
 from codec.coders.lf.pyramid import ALIKE, NEAREST, _spread, pyramid
 from ii_core.base.jit import lean_kernel, part_kernel
@@ -51,6 +52,7 @@ VERSIONS = {
     "rotated": stream.TUNED,
     "dependent": stream.DEPENDENT,
     "directed": stream.DIRECTED,
+    "parted": stream.PARTED,
 }
 
 
@@ -116,6 +118,25 @@ def test_the_directed_stream_has_each_kind_of_transform_and_of_modes(monkeypatch
     decode(Encoded.load(FOLDER / "directed.ii"))
     assert {0, 2, 4, 6} <= kinds
     assert {0, 1, 10, 27} <= modes and len(modes) > 20
+
+
+def test_the_parted_stream_has_blocks_of_unequal_sides(monkeypatch):
+    """Wide and tall ones, halved once and twice, of each kind of prediction and with sines."""
+    found, transforms, code = set(), set(), Field.code
+
+    def noting(field, coder, job, work, *same):
+        code(field, coder, job, work, *same)
+        fields = job.blocks[[KIND, TALL, WIDE]].reshape(3, -1).tolist()
+        found.update(zip(*fields, strict=True))
+        unequal = (job.blocks[TALL] != job.blocks[WIDE]) & (job.blocks[CODED] == 1)
+        transforms.update(job.blocks[SKIPPED][unequal].tolist())
+
+    monkeypatch.setattr(Field, "code", noting)
+    decode(Encoded.load(FOLDER / "parted.ii"))
+    assert {np.sign(tall - wide) for kind, tall, wide in found if kind == INTRA} == {-1, 0, 1}
+    assert {kind for kind, tall, wide in found if tall != wide} >= {INTRA, EXPLICIT}
+    assert max(abs(tall - wide) for _, tall, wide in found) == 2
+    assert {0, 2, 4, 6} <= transforms
 
 
 def test_the_tuned_stream_has_filters_of_several_kinds(monkeypatch):

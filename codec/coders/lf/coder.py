@@ -39,7 +39,7 @@ GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below whic
 # Views of more samples than so many are smoother, and their blocks cheaper: there GOOD is less by their share.
 GOOD_SAMPLES = 128 * 64
 SURELY = 5.0, 5.0, 2.0  # times GOOD: intra modes are not tried below it
-FIRST_TRIES, PART_TRIES = 8, int(os.environ.get('PT', '3'))  # intra modes that are coded on trial in the first view, and of its blocks of unequal sides
+FIRST_ESTIMATES, FIRST_TRIES = 8, int(os.environ.get('FT', '3'))  # intra modes of the first view that are compared by coefficients, and coded on trial
 BLEND_ROWS = 4, 4, 1  # the kind of blending is chosen by every so many-th row
 WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 # Quantisers by which each level is finer than the next, for more is predicted from it. The first view is finer than
@@ -395,7 +395,7 @@ class Source:
         """Return costs of bits after a first run of the first view, whose initial contexts are of other pictures."""
         job = field.job(node)[0]
         job = job._replace(parted=min(job.parted, int(os.environ.get('LEARN', '1'))))
-        search.find_blocks(costs, job, self._search(job, self._target(field, node)))
+        search.find_blocks(costs, job, self._search(job, self._target(field, node))._replace(intra_tries=1))
         coder = arithmetic.writer(contexts.of(node.level).copy(), VIEW_BYTES * job.levels[0].size + 1024)
         code_view(coder, job, work)
         return arithmetic.bit_costs(coder.contexts)
@@ -434,7 +434,7 @@ class Source:
             weight=np.float32(worth(job.step)),
             least=3 if effort == 0 else 2,
             intra_tries=FIRST_TRIES if first else (1, 1, 3)[effort],
-            part_tries=PART_TRIES if first else 1,
+            intra_estimates=FIRST_ESTIMATES if first else 0,
             good=np.float32(GOOD[effort] * share),
             surely=np.float32(SURELY[effort]),
             planes=1 if effort == 0 else 3,

@@ -19,6 +19,7 @@ from .samples import LARGEST_SKIPPED, quantise_samples
 from .transform import LARGEST, forward, sides, size_of
 
 BEST = 2
+FIRST_BITS, OCTAVE_BITS = 4.5, 1.6  # of a coefficient of one step, and for each doubling, about
 WORTH_SKIPPING = np.float32(1.2)  # times the least cost so far: beyond it, skipping the transform is not tried
 
 
@@ -43,6 +44,7 @@ class Trial(NamedTuple):
     skipped: Any  # (3,) whether there is no transform
     trial_skipped: Any  # (1,)
     errors: Any  # (MODES,) of intra prediction
+    modes: Any  # (MODES,) of the least errors
     trellis: Trellis
     kept: Kept
 
@@ -59,6 +61,7 @@ def new_trial() -> Trial:
         skipped=np.zeros(3, np.int64),
         trial_skipped=np.zeros(1, np.int64),
         errors=np.zeros(MODES, np.float32),
+        modes=np.zeros(MODES, np.int64),
         trellis=new_trellis(),
         kept=Kept(
             decoded=np.zeros((11, 3, LARGEST, LARGEST), np.int16),
@@ -208,6 +211,29 @@ def _try_way(costs, job, search, work, trial, y0, x0, shape, kind, skipped, limi
         for p in range(3):
             _leave(trial, work, p, shape)
     return empty, without, 0
+
+
+@part_kernel
+def estimated_cost(job, search, work, y0, x0, shape, kind, planes):
+    """Squared error + weight · bits of the first planes' differences to work.predicted, from their coefficients alone.
+
+    A coefficient is left out, or costs the error of a uniform quantiser and bits that grow with its logarithm.
+    """
+    (h, w), total = sides(shape), np.float32(0)
+    step = np.float32(job.step / 16)
+    per_step, least = np.float32(1) / step, np.float32(0.09) * step * step + np.float32(FIRST_BITS) * search.weight
+    for p in range(planes):
+        _subtract_prediction(search, work, p, y0, x0, shape)
+        forward(work.block, shape, work.half, work.coefficients, kind)
+        for y in range(h):
+            row = work.coefficients[y]
+            for x in range(w):
+                size = abs(np.float32(row[x]))
+                cost = size * size
+                if cost > least:
+                    cost = least + np.float32(OCTAVE_BITS) * search.weight * np.log2(max(size * per_step, np.float32(1)))
+                total += cost
+    return total
 
 
 @stage_kernel

@@ -39,16 +39,18 @@ from .blocks import (
 )
 from .field import EIGHTH
 from .intra_search import least_error, rank_directions
+from .intra import MODES
 from .matching import HUGE, best_explicit, fill_products, new_match
 from .motion import predict_in_time
 from .motion_search import best_vector
-from .residual_search import BEST, copy_trial, keep, new_trial, try_residual, try_transform
+from .residual_search import BEST, copy_trial, estimated_cost, keep, new_trial, try_residual, try_transform
 from .transform import sides
 
 # A block is not divided if so many times its cost are more than another way to code the region may cost. Of the part
 # that is coded later, at least so much of its share is taken to be needed.
-SPLIT_GAIN, PART_GAIN, REST = np.float32(0.75), np.float32(0.88), np.float32(0.4)
-MANY_SPLIT = 3  # quarters that are divided themselves: then halves are not tried
+SPLIT_GAIN, PART_GAIN, REST = np.float32(0.7), np.float32(0.82), np.float32(0.35)
+PROMISING = np.float32(1.02)  # other transforms are tried whose estimated cost is at most so many times that of cosines
+MANY_SPLIT = 4  # quarters that are divided themselves: then halves are not tried
 FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
 
 
@@ -62,8 +64,10 @@ class Search(NamedTuple):
         Squared error that a bit is worth.
     least : int
         Binary logarithm of the least block.
-    intra_tries, part_tries : int
-        Intra modes that are coded on trial, of squares and of other blocks.
+    intra_tries : int
+        Intra modes that are coded on trial,
+    intra_estimates : int
+        and of how many they are the best by their coefficients; 0: of all by sums of magnitudes.
     planes : int
         Planes that count in the choice of disparity and references.
     hurried : int
@@ -78,7 +82,7 @@ class Search(NamedTuple):
     weight: Any
     least: Any
     intra_tries: Any
-    part_tries: Any
+    intra_estimates: Any
     planes: Any
     hurried: Any
     good: Any
@@ -110,8 +114,12 @@ def best_block(costs, job, search, match, work, trial, y0, x0, shape):
     if job.references.shape[0] == 0 or best > search.surely * good:
         errors = trial.errors
         rank_directions(costs, job, search, work, y0, x0, shape, errors)
-        for _ in range(search.intra_tries if shape[0] == shape[1] else search.part_tries):
+        if search.intra_estimates:
+            _rank_by_estimates(costs, job, search, work, trial, y0, x0, shape)
+        for _ in range(search.intra_tries):
             mode = least_error(errors)
+            if errors[mode] >= HUGE:
+                break
             errors[mode] = HUGE
             side = kind_cost(costs, job, by, bx, shape, np.int64(INTRA), np.int64(0), np.int64(0), mode)
             for p in range(3):
@@ -127,6 +135,26 @@ def best_block(costs, job, search, match, work, trial, y0, x0, shape):
 
 
 @part_kernel
+def _rank_by_estimates(costs, job, search, work, trial, y0, x0, shape):
+    """trial.errors = estimated costs of the modes of the least errors, the others' beyond all."""
+    errors, modes = trial.errors, trial.modes
+    for k in range(search.intra_estimates):
+        modes[k] = least_error(errors)
+        errors[modes[k]] = HUGE
+    for mode in range(MODES):
+        errors[mode] = HUGE
+    for k in range(search.intra_estimates):
+        for p in range(3):
+            predict_direction(job, work, p, y0, x0, shape, modes[k])
+        side = kind_cost(
+            costs, job, y0 >> 2, x0 >> 2, shape, np.int64(INTRA), np.int64(0), np.int64(0), modes[k]
+        )
+        errors[modes[k]] = search.weight * side + estimated_cost(
+            job, search, work, y0, x0, shape, np.int64(0), np.int64(3)
+        )
+
+
+@part_kernel
 def _best_transform(costs, job, search, work, trial, y0, x0, shape, mode, best):
     """Note another transform of an intra block if it costs less than the best so far; return the least cost."""
     side = search.weight * kind_cost(
@@ -134,7 +162,12 @@ def _best_transform(costs, job, search, work, trial, y0, x0, shape, mode, best):
     )
     for p in range(3):
         predict_direction(job, work, p, y0, x0, shape, mode)
+    most = HUGE
+    if search.hurried or search.intra_estimates:
+        most = PROMISING * estimated_cost(job, search, work, y0, x0, shape, np.int64(0), np.int64(1))
     for transform in range(1, 4):
+        if most < HUGE and estimated_cost(job, search, work, y0, x0, shape, transform, np.int64(1)) > most:
+            continue
         bits, error, some = try_transform(costs, job, search, work, trial, y0, x0, shape, transform, best - side)
         total = error + search.weight * bits + side
         if some and total < best:
