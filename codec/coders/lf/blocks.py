@@ -24,6 +24,7 @@ from .transform import LARGEST, SINE_ACROSS, SINE_DOWN, sides, size_of
 from .warp import LATTICE, lead, moved_block
 
 LOG_LARGEST, LOG_LEAST = 5, 2
+MOST_HALVINGS = 2  # of a square
 INTRA, EXPLICIT, SYNTHESIS, TIMED, MIXED = range(5)
 MOST_REFERENCES = 4
 SIDE, STRAIGHT = 17, 8  # directions from one side, and the place of the straight one among them

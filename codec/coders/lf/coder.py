@@ -393,9 +393,9 @@ class Source:
         self, field: Field, node: Node, costs: NDArray[np.float32], contexts: Contexts, work: Work
     ) -> NDArray[np.float32]:
         """Return costs of bits after a first run of the first view, whose initial contexts are of other pictures."""
-        job = field.job(node)[0]
-        job = job._replace(parted=min(job.parted, int(os.environ.get('LEARN', '1'))))
-        search.find_blocks(costs, job, self._search(job, self._target(field, node))._replace(intra_tries=1))
+        job, _ = field.job(node)
+        quick = self._search(job, self._target(field, node))._replace(intra_tries=1, halvings=1)
+        search.find_blocks(costs, job, quick)
         coder = arithmetic.writer(contexts.of(node.level).copy(), VIEW_BYTES * job.levels[0].size + 1024)
         code_view(coder, job, work)
         return arithmetic.bit_costs(coder.contexts)
@@ -435,6 +435,7 @@ class Source:
             least=3 if effort == 0 else 2,
             intra_tries=FIRST_TRIES if first else (1, 1, 3)[effort],
             intra_estimates=FIRST_ESTIMATES if first else 0,
+            halvings=int(os.environ.get('FH', '2')) if first else (0, int(os.environ.get('IH', '0')), 2)[effort],
             good=np.float32(GOOD[effort] * share),
             surely=np.float32(SURELY[effort]),
             planes=1 if effort == 0 else 3,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from . import loop_filter, motion, synthesis
 from .arithmetic import Arithmetic
-from .blocks import DONE, MOST_INDEX, MOST_REFERENCES, UNKNOWN, Job, Work, code_view, new_blocks
+from .blocks import DONE, MOST_HALVINGS, MOST_INDEX, MOST_REFERENCES, UNKNOWN, Job, Work, code_view, new_blocks
 from .exact import code_exact, new_exact, prepare
 from .planes import gather, scatter
 from .pyramid import Node, Place, batches, pyramid
@@ -18,9 +18,6 @@ from .stream import UPRIGHT, Header
 from .synthesis import Synthesis, chosen, new_synthesis
 from .warp import LATTICE
 
-import os
-
-PARTED = int(os.environ.get('PARTED', '1')), int(os.environ.get('INTER', '0'))
 EIGHTH = 32  # of a sample, in units of disparity
 MOST_SEARCHED = 800  # disparities of one view
 FIRST_AGAIN = 0, 2  # views of the second level after which the first view's disparity is found anew
@@ -94,7 +91,7 @@ class Field:
             finer=int(self.header.tuned),
             dependent=int(self.header.dependent),
             directed=int(self.header.directed),
-            parted=PARTED[len(references) > 0] * self.header.parted,
+            parted=MOST_HALVINGS * self.header.parted,
             skipping=int(self.header.skipping),
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),

@@ -38,8 +38,8 @@ from .blocks import (
     way_cost,
 )
 from .field import EIGHTH
-from .intra_search import least_error, rank_directions
 from .intra import MODES
+from .intra_search import least_error, rank_directions
 from .matching import HUGE, best_explicit, fill_products, new_match
 from .motion import predict_in_time
 from .motion_search import best_vector
@@ -72,6 +72,8 @@ class Search(NamedTuple):
         Planes that count in the choice of disparity and references.
     hurried : int
         Whether intra directions are found coarse to fine, and sizes and disparities that hardly ever pay left out.
+    halvings : int
+        How often squares are halved at most.
     good : float32
         A block whose cost a sample is less, in units of the weight, is not split, and not tried in other ways.
     surely : float32
@@ -85,6 +87,7 @@ class Search(NamedTuple):
     intra_estimates: Any
     planes: Any
     hurried: Any
+    halvings: Any
     good: Any
     surely: Any
 
@@ -341,7 +344,7 @@ def search_tree(costs, job, search, match, work, trial, y0, x0, shape, leaf, dep
         if way == 3:
             if not (whole and log > search.least):
                 continue
-        elif not (ways >> (way - 1)) & 1:
+        elif depth >= search.halvings or not (ways >> (way - 1)) & 1:
             continue
         if latest:
             _copy_region(job, kept, y0, x0, shape, 0)
