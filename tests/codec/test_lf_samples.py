@@ -128,7 +128,12 @@ def values_by_definition(levels, shape):
 
 
 @settings(max_examples=20, deadline=None)
-@given(st.tuples(*2 * [st.integers(2, 4)]), st.integers(0, 2), st.integers(0, 2**32 - 1), st.sampled_from([0.02, 0.3, 1.0]))
+@given(
+    st.tuples(*2 * [st.integers(2, 4)]),
+    st.integers(0, 2),
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([0.02, 0.3, 1.0]),
+)
 def test_levels_of_a_dependent_quantiser_are_read_as_they_were_written(shape, plane, seed, density):
     rng = np.random.default_rng(seed)
     levels = np.zeros((32, 32), np.int32)
@@ -153,7 +158,9 @@ def quantised(block, shape, step, weight, dependent):
     return levels, *coefficients.quantise(*given)
 
 
-@pytest.mark.parametrize(("shape", "seed"), [((2, 2), 0), ((3, 3), 1), ((4, 4), 2), ((2, 4), 3), ((4, 3), 4)], ids=str)
+@pytest.mark.parametrize(
+    ("shape", "seed"), [((2, 2), 0), ((3, 3), 1), ((4, 4), 2), ((2, 4), 3), ((4, 3), 4)], ids=str
+)
 def test_a_dependent_quantiser_keeps_to_its_states_and_knows_its_error(shape, seed):
     """Levels are those of a walk through the states; error and bits are what decoder and stream have."""
     rng = np.random.default_rng(seed)

@@ -770,7 +770,7 @@ def _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped):
 
 @tuned_kernel
 def part_ways(job, shape, depth):
-    """Ways in which a block may be parted: 1 into an upper and a lower half, 2 into a left and a right one, 3 both."""
+    """Ways to halve a block: 1 into an upper and a lower half, 2 into a left and a right one, 3 both, 0 none."""
     if depth >= job.parted:
         return 0
     return (1 if shape[0] > LOG_LEAST else 0) + (2 if shape[1] > LOG_LEAST else 0)
@@ -790,7 +790,7 @@ def part_context(job, by, bx, shape):
 
 @tuned_kernel
 def across_context(job, by, bx, shape):
-    """Of parts beside each other: by the block's form, and whether the block above is narrower, or that left lower."""
+    """Of halves beside each other: by form, and whether the block above is narrower, or the one left lower."""
     blocks = job.blocks
     narrow = 1 if by > 0 and blocks[WIDE, by - 1, bx] < shape[1] else 0
     low = 1 if bx > 0 and blocks[TALL, by, bx - 1] < shape[0] else 0
@@ -800,7 +800,7 @@ def across_context(job, by, bx, shape):
 
 @tuned_kernel
 def code_way(coder, job, by, bx, shape, ways, way):
-    """Write or read how a block is parted: 0 for not."""
+    """Write or read how a block is halved: 0 for not."""
     if not ways or not code_bit(coder, part_context(job, by, bx, shape), 1 if way else 0):
         return 0
     if ways < 3:

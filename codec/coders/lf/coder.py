@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -39,7 +38,8 @@ GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below whic
 # Views of more samples than so many are smoother, and their blocks cheaper: there GOOD is less by their share.
 GOOD_SAMPLES = 128 * 64
 SURELY = 5.0, 5.0, 2.0  # times GOOD: intra modes are not tried below it
-FIRST_ESTIMATES, FIRST_TRIES = 8, int(os.environ.get('FT', '3'))  # intra modes of the first view that are compared by coefficients, and coded on trial
+FIRST_ESTIMATES, FIRST_TRIES = 8, 3  # intra modes of the first view that are compared by coefficients, coded on trial
+HALVINGS = 0, 1, 2  # of squares of blocks
 BLEND_ROWS = 4, 4, 1  # the kind of blending is chosen by every so many-th row
 WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 # Quantisers by which each level is finer than the next, for more is predicted from it. The first view is finer than
@@ -435,7 +435,7 @@ class Source:
             least=3 if effort == 0 else 2,
             intra_tries=FIRST_TRIES if first else (1, 1, 3)[effort],
             intra_estimates=FIRST_ESTIMATES if first else 0,
-            halvings=int(os.environ.get('FH', '2')) if first else (0, int(os.environ.get('IH', '0')), 2)[effort],
+            halvings=HALVINGS[effort],
             good=np.float32(GOOD[effort] * share),
             surely=np.float32(SURELY[effort]),
             planes=1 if effort == 0 else 3,

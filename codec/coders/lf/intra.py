@@ -12,8 +12,8 @@ FLAT, SMOOTH, DIRECTIONS = 0, 1, 34
 MODES = 2 + DIRECTIONS
 # Eighths of a sample by the slope's magnitude and the place.
 BEYOND = np.array([[64 * (i + 1) // max(slope, 1) for i in range(LARGEST)] for slope in range(9)])
-# From version 9 on, by block size (4, 8, 16, 32): least slopes of directions that go on from a smoothed border. How
-# far the border draws flat, smooth and straight blocks also goes by size: its weight halves after 2^(fade - 1) samples.
+# From version 9 on, by block size (4, 8, 16, 32): least slopes of directions that go on from a smoothed border. The
+# border draws flat, smooth and straight blocks towards it: its weight halves after 2^(fade - 1) samples.
 LEAST_SLOPES = 99, 7, 2, 1
 # Directions 0–16 go on from the row above by (m − 8) / 8 of a sample a row; 17–33 likewise from the column left.
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from ii_core.base.jit import part_kernel, stage_kernel
 
-from .arithmetic import bit_cost
 from . import motion
+from .arithmetic import bit_cost
 from .blocks import FIELDS, INTRA, LIMIT, coded_context, residual_context, skipped_context, transform_cost
 from .coefficients import Trellis, new_trellis, quantise, quantise_dependent
 from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
@@ -215,7 +215,7 @@ def _try_way(costs, job, search, work, trial, y0, x0, shape, kind, skipped, limi
 
 @part_kernel
 def estimated_cost(job, search, work, y0, x0, shape, kind, planes):
-    """Squared error + weight · bits of the first planes' differences to work.predicted, from their coefficients alone.
+    """Squared error + weight · bits of the first planes' differences to work.predicted, by their coefficients alone.
 
     A coefficient is left out, or costs the error of a uniform quantiser and bits that grow with its logarithm.
     """
@@ -231,7 +231,9 @@ def estimated_cost(job, search, work, y0, x0, shape, kind, planes):
                 size = abs(np.float32(row[x]))
                 cost = size * size
                 if cost > least:
-                    cost = least + np.float32(OCTAVE_BITS) * search.weight * np.log2(max(size * per_step, np.float32(1)))
+                    cost = least + np.float32(OCTAVE_BITS) * search.weight * np.log2(
+                        max(size * per_step, np.float32(1))
+                    )
                 total += cost
     return total
 

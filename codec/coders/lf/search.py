@@ -49,7 +49,9 @@ from .transform import sides
 # A block is not divided if so many times its cost are more than another way to code the region may cost. Of the part
 # that is coded later, at least so much of its share is taken to be needed.
 SPLIT_GAIN, PART_GAIN, REST = np.float32(0.7), np.float32(0.82), np.float32(0.35)
-PROMISING = np.float32(1.02)  # other transforms are tried whose estimated cost is at most so many times that of cosines
+PROMISING = np.float32(
+    1.02
+)  # other transforms are tried whose estimated cost is at most so many times that of cosines
 MANY_SPLIT = 4  # quarters that are divided themselves: then halves are not tried
 FEW = 12  # disparities that are all searched; of more, every second, and then those beside the best
 
@@ -149,9 +151,7 @@ def _rank_by_estimates(costs, job, search, work, trial, y0, x0, shape):
     for k in range(search.intra_estimates):
         for p in range(3):
             predict_direction(job, work, p, y0, x0, shape, modes[k])
-        side = kind_cost(
-            costs, job, y0 >> 2, x0 >> 2, shape, np.int64(INTRA), np.int64(0), np.int64(0), modes[k]
-        )
+        side = kind_cost(costs, job, y0 >> 2, x0 >> 2, shape, np.int64(INTRA), np.int64(0), np.int64(0), modes[k])
         errors[modes[k]] = search.weight * side + estimated_cost(
             job, search, work, y0, x0, shape, np.int64(0), np.int64(3)
         )
@@ -316,9 +316,9 @@ def search_tree(costs, job, search, match, work, trial, y0, x0, shape, leaf, dep
     (h, w), by, bx, log = sides(shape), y0 >> 2, x0 >> 2, leaf[0]
     total, split = np.float32(0), y0 + h > height or x0 + w > width
     whole = depth == 0
-    if whole and not split and search.hurried and log > 3 and job.past.shape[0] == 0:
-        if _much_smaller(job.blocks, by, bx, log):
-            total, split = search.weight * bit_cost(costs, split_context(job, by, bx, log), 1), True
+    hurried = search.hurried and whole and log > 3 and job.past.shape[0] == 0
+    if hurried and not split and _much_smaller(job.blocks, by, bx, log):
+        total, split = search.weight * bit_cost(costs, split_context(job, by, bx, log), 1), True
     if split:
         quarter, below = (log - 1, log - 1), (log - 1, np.int64(0))
         for part in range(4):
@@ -383,7 +383,9 @@ def _search_view(costs, job, search, match, work, trial):
         for x0 in range(0, width, 1 << LOG_LARGEST):
             if job.references.shape[0]:
                 fill_products(job, search.original, y0, x0, match)
-            search_tree(costs, job, search, match, work, trial, y0, x0, (largest, largest), (largest, never), never, HUGE)
+            search_tree(
+                costs, job, search, match, work, trial, y0, x0, (largest, largest), (largest, never), never, HUGE
+            )
 
 
 def find_blocks(costs: NDArray[np.float32], job: Job, search: Search) -> None:

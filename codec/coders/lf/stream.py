@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from ...bitstream.compact import leb128, read_leb128
 from .planes import bt709_colours
 
-# Versions 2, 3, 5 and 6 say by their number which tools they have: by factors between planes, and residuals without a
+# Versions 2, 3, 5 and 6 say by their number which tools they have: factors between planes, and residuals without a
 # transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent
-# quantiser as well, version 9 other intra modes, too, version 10 blocks of unequal sides; lossless coding still writes
-# 2 and 3.
+# quantiser as well, version 9 other intra modes, too, version 10 halved blocks; lossless coding still writes 2 and 3.
 VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED, TUNED, DEPENDENT, DIRECTED, PARTED = 3, 2, 5, 6, 7, 8, 9, 10
 FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED
 _VERSIONS = {
