@@ -164,6 +164,9 @@ BENCHMARKS = {
         Benchmark("accuracy.sample_places", records=OWN, fills=("docs/speed_accuracy.md",)),
         Benchmark("accuracy.edges", records=OWN, fills=("docs/speed_accuracy.md",), writes=(f"{IMAGES}/edges.png",)),
         Benchmark("accuracy.calibration", records=OWN, fills=("docs/calibration.md",)),
+        Benchmark(
+            "accuracy.moire", records=OWN, fills=("docs/display.md",), writes=(f"{IMAGES}/display_moire.webp",)
+        ),
         Benchmark("accuracy.demosaicing", records=OWN, fills=("docs/calibration.md",)),
         Benchmark(
             "accuracy.real_lenses", records=OWN, fills=("docs/real_lenses.md",), writes=(f"{IMAGES}/real_lenses.*",)
@@ -183,6 +186,8 @@ BENCHMARKS = {
             writes=(f"{IMAGES}/depth_truth.*",)),
         Benchmark("accuracy.estimated_depth", records=OWN, fills=("docs/depth.md",),
             writes=(f"{IMAGES}/depth.webp",)),
+        Benchmark("accuracy.depth_methods", needs="OpenCV, published fields: optional", records=OWN,
+            fills=("docs/depth.md",), writes=(f"{IMAGES}/depth_methods.svg",)),
         Benchmark("accuracy.convergence", records=OWN, writes=(f"{IMAGES}/convergence.*",)),
         Benchmark(
             "accuracy.povray",

@@ -54,8 +54,9 @@ MOVED = ("apples", "car", "cuboid")
 TARGETS = ("upright", "coarse", "double", "quilt")
 QUILT = 48  # views across
 METHODS = ("views", "robust")
+PLACES = ("outlines", "textureless", "dark")
 PARTS = ("seen", "filled", "outside")
-SURE, BORDER = 0.9, 15
+SURE, BORDER, DARK = 0.9, 15, 40  # DARK in 8-bit codes
 FOCUSED = IMAGES / "depth.webp"
 
 
@@ -113,8 +114,10 @@ def field_errors(scene: str, method: str) -> dict[str, Any]:
     errors = depth_errors(disparity, true, regions=regions, camera=camera)
     inner = np.isfinite(true) & _inner(true.shape)
     bad = ~(np.abs(disparity - true) <= 0.07)
+    places = zip(PLACES, (regions["outlines"], regions["textureless"], view.mean(axis=2) < DARK), strict=True)
     return {
         **errors, "cpu": seconds, "sure": float(sure[inner].mean()),
+        **{f"of_bad_{name}": float(place[inner & bad].mean()) for name, place in places},
         "sure_where_textured": float(sure[inner & ~regions["textureless"]].mean()),
         "bad_where_sure": float(bad[inner & sure].mean()) if (inner & sure).any() else None,
     }  # fmt: skip
@@ -241,7 +244,8 @@ def tables() -> Tables:
         [
             r["scene"], "all views" if r["method"] == "views" else "focus, robust",
             *(f"{r[f'badpix_{t}']:.1f}" for t in ("007", "003", "001")), f"{r['mse_100']:.3g}", f"{r['q_25']:.2f}",
-            f"{r['badpix_007_outlines']:.0f}", f"{r['badpix_007_textureless']:.0f}",
+            *(f"{r[f'badpix_007_{p}']:.0f}" for p in ("outlines", "textureless")),
+            *(f"{100 * r[f'of_bad_{p}']:.0f}" if f"of_bad_{p}" in r else "–" for p in PLACES),
             f"{100 * r['sure_where_textured']:.0f}" if "sure_where_textured" in r else "–",
             "–" if r["bad_where_sure"] is None else f"{100 * r['bad_where_sure']:.1f}", f"{r['cpu']:.0f}",
         ]
@@ -249,7 +253,7 @@ def tables() -> Tables:
     ]  # fmt: skip
     heads = (
         "field | method | > 0.07 px, % | > 0.03 | > 0.01 | MSE×100 | Q25 | outlines, % | textureless, % | "
-        "sure where textured, % | bad where sure, % | CPU s"
+        "of the bad: outlines | textureless | dark | sure where textured, % | bad where sure, % | CPU s"
     )
     small = [r for r in rows if r["study"] == "setup1"]
     places = [

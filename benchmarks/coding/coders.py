@@ -175,8 +175,7 @@ def summary(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         known = [rate for rate in rates.values() if rate is not None]
         mean = statistics.mean(known) if len(known) == len(scenes) else None
         seconds = statistics.mean(row["seconds"] for row in own)
-        commits = [row["commit"] for row in own]
-        out.append({"scheme": scheme, "rates": rates, "mean": mean, "seconds": seconds, "commits": commits})
+        out.append({"scheme": scheme, "rates": rates, "mean": mean, "seconds": seconds})
     return sorted(out, key=lambda row: (row["mean"] is None, row["mean"] or 0.0))
 
 
@@ -190,7 +189,7 @@ def rate_table(rows: list[dict[str, Any]], best: Sequence[Mapping[str, Any]] | N
         for row in best
     ]  # fmt: skip
     heads = ["scheme", *(f"{scene}, %" for scene in scenes), "mean, % | CPU s"]
-    return table(" | ".join(heads), lines, [row["commits"] for row in best])
+    return table(" | ".join(heads), lines)
 
 
 def shortened(best: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:

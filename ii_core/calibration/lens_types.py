@@ -13,9 +13,18 @@ from .grid import LensGrid
 ndimage, special = Lazy("scipy.ndimage"), Lazy("scipy.special")
 
 EXPLAINED = 0.25  # of the variation from lens to lens, that types must explain to be there
+NEAR = 7  # lenses across and down, in which the same type has as much detail
 CHANCE = 1e-6  # probability that an even array shows as much
 
 Classes = NDArray[np.int64]
+# Types of lenses by pattern, in rows that repeat over the array; of a hexagonal one no two neighbours are alike.
+MATRICES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "one": ((0,),),
+    "2×1": ((0, 1),),
+    "1×2": ((0,), (1,)),
+    "2×2": ((0, 1), (2, 3)),
+    "3": ((0, 1, 2), (2, 0, 1)),
+}
 
 
 @dataclass(frozen=True)
@@ -28,7 +37,7 @@ class LensTypes:
         "one", or how types take turns: "2×1" (columns), "1×2" (rows), "2×2", "3" (of a hexagonal array, no two
         neighbours alike).
     explained : float
-        Share of the variation of detail from lens to lens that the pattern explains, in [0, 1].
+        Share of the variation of detail from lens to lens that lenses of the same type nearby explain, in [0, 1].
     detail : tuple of float
         Mean of each type's logarithm of detail less that of all, type 0 first.
     """
@@ -36,6 +45,11 @@ class LensTypes:
     pattern: str
     explained: float
     detail: tuple[float, ...]
+
+    @property
+    def rows(self) -> tuple[tuple[int, ...], ...]:
+        """Types of the lenses, in rows that repeat over the array."""
+        return MATRICES[self.pattern]
 
     def describe(self) -> str:
         """One line."""
@@ -46,6 +60,8 @@ class LensTypes:
 
 def lens_types(grey: NDArray[np.float32], grid: LensGrid) -> LensTypes:
     """Whether the detail of micro-images, the size of their second derivatives, repeats with a pattern of lenses.
+
+    Which type has most detail depends on depth: each lens is compared with those of its type nearby.
 
     Parameters
     ----------
@@ -63,35 +79,45 @@ def lens_types(grey: NDArray[np.float32], grid: LensGrid) -> LensTypes:
     at = np.floor(y).astype(int).clip(0, grey.shape[0] - 1), np.floor(x).astype(int).clip(0, grey.shape[1] - 1)
     ok = level[at] > 0.1 * np.median(level[at])
     detail = np.log(np.maximum(edges[at], 1e-9) / np.maximum(level[at], 1e-9))
-    smooth = _local_mean(detail, ok, lattice.lenses)
-    detail = detail - smooth
+    detail = np.where(ok, detail - _nearby(detail, ok, lattice.lenses)[0], 0.0)
     best: tuple[str, float, float, tuple[float, ...]] = ("one", 0.0, 1.0, (0.0,))
     for name, count, classes in _patterns(k, l, lattice.hexagonal):
-        groups = [detail[ok & (classes == c)] for c in range(count)]
-        if min(len(g) for g in groups) < 8:
+        groups = [ok & (classes == c) for c in range(count)]
+        if min(int(group.sum()) for group in groups) < 8:
             continue
-        all_ = np.concatenate(groups)
-        between = sum(len(g) * (g.mean() - all_.mean()) ** 2 for g in groups)
-        share = float(between / max(((all_ - all_.mean()) ** 2).sum(), 1e-30))
-        rest = (1 - share) / (len(all_) - count)
-        chance = float(special.fdtrc(count - 1, len(all_) - count, share / (count - 1) / rest)) if rest > 0 else 0.0
+        expected, known = np.zeros(len(detail)), np.zeros(len(detail), bool)
+        for group in groups:  # without the lens itself
+            mean, others = _nearby(detail, group, lattice.lenses)
+            here = group & (others > 1.5)
+            expected[here] = (mean * others - detail)[here] / (others - 1)[here]
+            known |= here
+        left = int(known.sum()) - 2
+        if left < 1 or not (expected[known].std() > 0 and detail[known].std() > 0):
+            continue
+        along = float(np.corrcoef(expected[known], detail[known])[0, 1])
+        share = max(along, 0.0) ** 2
+        chance = float(special.fdtrc(1, left, share / max(1 - share, 1e-12) * left))
         if share - 0.02 * count > best[1]:  # of two that explain as much, the simpler
-            best = (name, share, chance, tuple(float(g.mean() - all_.mean()) for g in groups))
+            best = (name, share, chance, tuple(float(detail[group].mean()) for group in groups))
     name, share, chance, means = best
     if share < EXPLAINED or not chance < CHANCE:
         return LensTypes("one", share, (0.0,))
     return LensTypes(name, share, means)
 
 
-def _local_mean(values: NDArray[np.float64], ok: NDArray[np.bool_], lenses: tuple[int, int]) -> NDArray[np.float64]:
-    """Mean over 7×7 lenses: the scene's own changes of detail."""
+def _nearby(
+    values: NDArray[np.float64], ok: NDArray[np.bool_], lenses: tuple[int, int]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the mean of the lenses that are ok among 7×7, and their number: the scene changes slowly over them."""
     grid, weight = (a.reshape(lenses[::-1]).astype(np.float64) for a in (np.where(ok, values, 0), ok))
-    mean = ndimage.uniform_filter(grid, 7) / np.maximum(ndimage.uniform_filter(weight, 7), 1e-9)
-    return np.asarray(mean.ravel())
+    total, count = (NEAR**2 * ndimage.uniform_filter(a, NEAR, mode="constant") for a in (grid, weight))
+    return (total / np.maximum(count, 1e-9)).ravel(), count.ravel()
 
 
 def _patterns(k: Classes, l: Classes, hexagonal: bool) -> list[tuple[str, int, Classes]]:
-    patterns = [("2×1", 2, k % 2), ("1×2", 2, l % 2), ("2×2", 4, k % 2 + 2 * (l % 2))]
-    if hexagonal:
-        patterns.append(("3", 3, (k - (l - l % 2) // 2 - l) % 3))
+    patterns = []
+    for name, rows in MATRICES.items():
+        if name != "one" and (hexagonal or name != "3"):
+            matrix = np.array(rows)
+            patterns.append((name, int(matrix.max()) + 1, matrix[l % matrix.shape[0], k % matrix.shape[1]]))
     return patterns

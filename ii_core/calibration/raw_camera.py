@@ -23,6 +23,7 @@ from .peaks import NoLenses
 if TYPE_CHECKING:  # scipy takes a third of a second
     from .grid import LensGrid
     from .lens_types import LensTypes
+    from .multi_focus import Foci
 
 PIXEL_MM = 0.0061  # where nothing is known: that of the presets, and their viewing angle
 HALF_ANGLE_TAN = math.tan(math.radians(29.9 / 2))
@@ -49,6 +50,8 @@ class Calibration:
         The picture must be turned by 90° (`numpy.rot90`) first, because its rows of lenses run down.
     assumed : tuple of str
         Measures of the camera that no picture tells, and that were not given.
+    foci : Foci, optional
+        Where each type of lens is in focus, of `lens_foci`; the camera then has its focal lengths.
     """
 
     camera: IICamera
@@ -57,6 +60,7 @@ class Calibration:
     types: LensTypes
     turned: bool
     assumed: tuple[str, ...]
+    foci: Foci | None = None
 
     def report(self) -> dict[str, Any]:
         """Everything that was found, as plain values: pixels, degrees, counts, and what could not be told."""
@@ -86,6 +90,8 @@ class Calibration:
             "drift_pitches": grid.drift_px / min(across, down),
             "straight_grid_rms_px": grid.straight_rms_px,
             "lens_types": self.types.describe(),
+            "lens_type_rows": [list(row) for row in self.types.rows],
+            "foci_shift": None if self.foci is None else list(self.foci.shifts),
             "pixels_outside": {
                 "left": max(0.0, left),
                 "right": max(0.0, width - left - k * across),
@@ -129,6 +135,7 @@ class Calibration:
                 f"beyond the lenses lie {outside['left']:.1f} px at the left, {outside['right']:.1f} at the right, "
                 f"{outside['top']:.1f} at the top, {outside['bottom']:.1f} at the bottom: no view shows them",
                 f"lens types: {r['lens_types']}",
+                *([] if self.foci is None else [self.foci.describe()]),
                 *(["rows of lenses run down: the picture is turned by 90°"] if self.turned else []),
                 *(f"not told: {note}" for note in r["not_told"]),
             ]

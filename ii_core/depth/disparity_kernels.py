@@ -74,6 +74,10 @@ def _add_differences(pixels, n, y, sy, sx, limit, rows, total, count):
     y2, y3 = min(y + top + 1, height - 1), min(y + top + 2, height - 1)
     for c in range(3):
         p = pixels[n, c]
+        if sy == top:  # half of the half-lines lie along rows
+            for x in range(width):
+                rows[c, x] = p[y1, x]
+            continue
         for x in range(width):
             rows[c, x] = (
                 a0 * np.float32(p[y0, x])
@@ -83,6 +87,14 @@ def _add_differences(pixels, n, y, sy, sx, limit, rows, total, count):
             )
     own = pixels[0]
     inner, end = max(start, 1 - left), min(stop, width - 2 - left)
+    if sx == left:  # or along columns
+        for x in range(start, stop):
+            e = np.float32(0.0)
+            for c in range(3):
+                e += abs(rows[c, x + left] - np.float32(own[c, y, x]))
+            total[x] += min(e, limit)
+            count[x] += np.float32(1.0)
+        return
     for x in range(inner, end):
         i, e = x + left, np.float32(0.0)
         for c in range(3):

@@ -136,7 +136,7 @@ def eye_image(
     gaze = Gaze(
         columns=(np.arange(width) + 0.5) * step[0] - half[0],
         rows=half[1] - (np.arange(height) + 0.5) * step[1],
-        rays=_rays(count, eye.pupil_mm, step),
+        rays=pupil_rays(count, eye.pupil_mm, step),
         x=float(eye.position_mm[0] - camera.origin_mm[0]),
         y=float(eye.position_mm[1] - camera.origin_mm[1]),
         blur=0.0 if eye.focus_mm is None else 1 - distance / eye.focus_mm,
@@ -213,7 +213,7 @@ def _table(dtype: np.dtype[Any]) -> NDArray[np.float32]:
     return linear(np.arange(top + 1) / top).astype(np.float32)
 
 
-def _rays(count: int, pupil_mm: float, step: NDArray[np.float64]) -> NDArray[np.float64]:
+def pupil_rays(count: int, pupil_mm: float, step: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return places on the pupil and on a point's cell of the lens plane, mm from their centres, (count, 4)."""
     if count == 1:
         return np.zeros((1, 4))

@@ -24,10 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import checks
-from ..base.checks import Pair
+from ..base.checks import Pair, view_size
+from ..base.colour import linear
 from ..base.files import one_line, read_json
 from ..base.parallel import over_rows
 from ..picture.picture import IIPicture
+from .eye import RAYS, Eye, EyeImage, pupil_rays
 from .look import display_views
 from .quilt import cone_share, shown_shares
 
@@ -228,3 +230,80 @@ def view_of_native(
     if display.flip_y:
         seen, own = seen[::-1], own[::-1]
     return seen, own
+
+
+@checks.checked(
+    pixels=checks.array, display=checks.instance(LookingGlass), eye=checks.instance(Eye), size=checks.whole_pair,
+    rays=checks.whole_from(1, 1 << 16),
+)  # fmt: skip
+def native_eye_image(
+    pixels: NDArray[Any], display: LookingGlass, eye: Eye, *, size: Pair | None = None, rays: int = RAYS
+) -> EyeImage:
+    """Return the view of an eye of the panel's picture through the display's slanted lenses: the mean of many rays.
+
+    The panel is the plane z = 0, its middle the origin. A ray towards the eye leaves the lens at the place of the
+    panel where the lens focuses it: at the right end of the lens for eyes at the left of the cone. It has the light
+    of the stripe that lies there, three times as bright in its one colour. Beyond the cone the zones repeat.
+
+    Parameters
+    ----------
+    pixels : ndarray of uint8, (height, width, 3)
+        Of `native_picture`.
+    display : LookingGlass
+        The display itself, whichever the picture was made for; its subpixels are stripes.
+    eye : Eye
+        Its focus is the panel.
+    size : (width, height), optional
+        Points of the view, spread over the panel; its pixels if not given.
+    rays : int
+        Rays a point, spread over the pupil and over the point's part of the panel.
+
+    Raises
+    ------
+    ValueError
+        If the pixels are not the panel's, the subpixels are no stripes, or the eye is not before the panel.
+    """
+    width, height = display.size
+    if pixels.shape != (height, width, 3) or pixels.dtype != np.uint8:
+        raise ValueError(f"pixels are {pixels.dtype} {pixels.shape}: uint8 {(height, width, 3)} are needed")
+    if display.cells or display.flip_x or display.flip_y:
+        raise ValueError("the display has subpixelCells or is mirrored: upright stripes are needed")
+    distance = -eye.position_mm[2]
+    if not distance > 0:
+        raise ValueError(f"eye is at z {eye.position_mm[2]:g} mm, not before the panel: z < 0 is needed")
+    columns, rows = display.size if size is None else view_size("size", size)
+    pixel = 25.4 / display.dpi
+    step = np.array([width / columns, height / rows])  # pixels
+    places = pupil_rays(rays, eye.pupil_mm, step)
+    # Phases of lenses grow by so much a pixel to the right and up; the eye's place counts across the lenses.
+    across = display.pitch / display.dpi * math.cos(math.atan(1 / display.slope))
+    up = across / display.slope
+    half_cone = math.tan(math.radians(display.cone_deg / 2))
+    table = linear(np.arange(256) / 255).astype(np.float32)
+    light = np.zeros((rows, columns, 3), np.float32)
+
+    def fill(first: int, last: int) -> None:
+        y, x = np.meshgrid(
+            (np.arange(first, last) + 0.5) * step[1], (np.arange(columns) + 0.5) * step[0], indexing="ij"
+        )
+        for pupil_x, pupil_y, right, down in places:
+            px, py = x + right, y + down  # on the lenses, pixels from the top left
+            phase = px * across + (height - py) * up - display.centre
+            off_x = eye.position_mm[0] + pupil_x - (px - width / 2) * pixel
+            off_y = eye.position_mm[1] + pupil_y - (height / 2 - py) * pixel
+            share = 0.5 + (off_x + off_y / display.slope) / (2 * distance * half_cone)
+            wanted = (1 - share if display.inverted else share) % 1
+            shift = (np.floor(phase) + wanted - phase) / (across * across + up * up)
+            # A pixel's red stripe lies where the shader has it, around the middle of the pixel.
+            column, row = px + shift * across - 0.5 + 1 / 6, py - shift * up
+            m, n = np.floor(column).astype(np.int64), np.floor(row).astype(np.int64)
+            inside = (m >= 0) & (m < width) & (n >= 0) & (n < height)
+            stripe = np.minimum((3 * (column - m)).astype(np.int64), 2)
+            channel = 2 - stripe if display.flip_subpixels else stripe
+            m, n = m.clip(0, width - 1), n.clip(0, height - 1)
+            seen = np.where(inside, 3 * table[pixels[n, m, channel]], 0)
+            for c in range(3):
+                light[first:last, :, c] += np.where(channel == c, seen, 0) / len(places)
+
+    over_rows(fill, rows)
+    return EyeImage(light, np.ones((rows, columns), np.float32))

@@ -231,6 +231,8 @@ def _matlab(path: Path) -> Stored:
         listed = matlab5.arrays(path)
         found = [array for array in listed if len(array.shape) in (4, 5) and array.kind != "char"]
         found = [array for array in found if array.name == NAME] or found
+        if len(found) == 3 and (planes := _planes(path, found)) is not None:
+            return planes
         if len(found) != 1:
             raise ValueError(f"it holds {len(found)} arrays of four or five axes: one, named {NAME}, is needed")
         _bounded(path, found[0].shape, len(found[0].shape))
@@ -238,7 +240,26 @@ def _matlab(path: Path) -> Stored:
         text = next((array.read() for array in listed if array.name == STRUCTURE and array.kind == "char"), None)
     except (ValueError, IndexError, OverflowError) as error:
         raise ValueError(f"{path} is no light field: {one_line(error)}") from None
+    data = data if text is not None else _codes(data)
     return Stored(data.shape, data.dtype, lambda a, b: np.asarray(data[a, b]), _structure(path, text))
+
+
+def _planes(path: Path, found: list[matlab5.Array]) -> Stored | None:
+    """Return a light field of arrays ``NAMEr``, ``NAMEg`` and ``NAMEb`` of four axes; None if others are there."""
+    by_name = {array.name[-1:]: array for array in found}
+    alike = {(array.name[:-1], array.shape, array.kind) for array in found}
+    if len(alike) != 1 or set(by_name) != set("rgb") or len(found[0].shape) != 4:
+        return None
+    _bounded(path, (*found[0].shape, 3), 5)
+    data = _codes(np.stack([by_name[colour].read() for colour in "rgb"], axis=-1))
+    return Stored(data.shape, data.dtype, lambda a, b: np.asarray(data[a, b]))
+
+
+def _codes(data: NDArray[Any]) -> NDArray[Any]:
+    """Return doubles that are whole numbers beyond 1 as codes, since MATLAB's numbers are doubles unless said."""
+    if data.dtype.kind != "f" or not data.size or not 1 < (most := float(data.max())) <= 65535 or data.min() < 0:
+        return data
+    return data.astype(np.uint8 if most <= 255 else np.uint16) if (data == np.rint(data)).all() else data
 
 
 def _structure(path: Path, text: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .common import Angle, Force, app, check_outputs, image_file, load_any, pair, with_camera
+from .common import Angle, Force, app, check_outputs, check_unused, image_file, load_any, pair, with_camera
 from .plugins import Plugins, load_plugins
 from .progress import say_done, spinner
 
@@ -54,6 +54,7 @@ def look(
 
 @app.command()
 def eye(
+    context: typer.Context,
     picture: Annotated[Path, typer.Argument(help="An II-picture with its sidecar, which names its camera.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A picture; with --both NAME_left and NAME_right.")],
     at: Annotated[str | None, typer.Option(help="Position of the eye, mm: x,y,z; in front if not given.")] = None,
@@ -80,6 +81,9 @@ def eye(
         str | None,
         typer.Option(help="Spread light of pixels: auto, by the camera's lenses and the eye, or a folder of maps."),
     ] = None,
+    calibration: Annotated[
+        Path | None, typer.Option(help="visual.json of a Looking Glass, whose panel shows the picture: no sidecar.")
+    ] = None,
     force: Force = False,
 ) -> None:
     """Compute the view of an eye of a display: pupil, focus, sub-pixels, misaligned lenses.
@@ -94,6 +98,14 @@ def eye(
     paths = [output.with_stem(f"{output.stem}_{side}") if side else output for side in sides]
     check_outputs([file for path in paths for file in image_file(path, "uint8")], force)
     points = None if size is None else pair("size", size)
+    if calibration is not None:
+        unused = "focus", "angle", "layout", "fill", "lobe", "brightness", "black", "crosstalk", "lens_pitch_mm"
+        check_unused(context, "--calibration", *unused, "gap_mm", "shift", "turn", "spread")
+        if at is None:
+            raise ValueError("at is missing: x,y,z of the eye in mm from the middle of the panel, z < 0, is needed")
+        x, y, z = _numbers("at", at, 3)
+        _panel(picture, calibration, paths, Eye(position_mm=(x, y, z), pupil_mm=pupil), apart, points, rays)
+        return
     across, up = _numbers("shift", shift, 2)
     shown = with_camera(IIPicture.load(picture), str(picture), angle)
     camera = camera_of(shown)
@@ -108,6 +120,24 @@ def eye(
             seen = eye_image(_spread(shown, display, one, spread), display, one, size=points, rays=rays)
             write_image(path, seen.pixels)
         say_done(f"{path}: {seen.seen.mean():.1%} of the rays meet the panel; {_zone(display, one)}")
+
+
+def _panel(
+    picture: Path, calibration: Path, paths: list[Path], viewer: Eye, apart: float, points: tuple[int, int] | None,
+    rays: int | None,
+) -> None:  # fmt: skip
+    """Write the views of a panel's picture through the lenses of a Looking Glass."""
+    from ii_core.base.files import read_image, write_image
+    from ii_core.display.eye import RAYS
+    from ii_core.display.looking_glass import native_eye_image, read_looking_glass
+
+    display = read_looking_glass(calibration)
+    pixels = read_image(picture, size=display.size)[..., :3]
+    for path, one in zip(paths, viewer.pair(apart) if len(paths) > 1 else (viewer,), strict=True):
+        with spinner(f"eye {picture.name}"):
+            seen = native_eye_image(pixels, display, one, size=points, rays=RAYS if rays is None else rays)
+            write_image(path, seen.pixels)
+        say_done(f"{path}: {seen.light.shape[1]}×{seen.light.shape[0]} px")
 
 
 def _spread(picture: IIPicture, display: DisplayModel, eye: Eye, text: str | None) -> IIPicture:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .calibrating import FociOption, captured, with_types
 from .common import Force, app, check_folder, check_outputs, image_file, load_any, pair, picture_files
 from .plugins import Plugins, load_plugins
 from .progress import progress_bar, say_done, spinner
@@ -17,6 +18,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ii_core import Rig
+
+LensTypesOption = Annotated[
+    str,
+    typer.Option(
+        help="Multi-focus arrays: keep, fuse (each pixel from lenses around in best focus) or the number of a type."
+    ),
+]
 
 
 @app.command()
@@ -29,6 +37,7 @@ def regular(
     deshift: Annotated[
         bool, typer.Option("--deshift", help="Resample: remove the half-lens shift of odd rows of a hexagonal array.")
     ] = False,
+    lens_types: LensTypesOption = "keep",
     mask: Annotated[
         Path | None, typer.Option(help="Write a .png with white pixels where a lens owns the pixel.")
     ] = None,
@@ -48,6 +57,8 @@ def regular(
     original = IIPicture.load(picture)
     files = [*picture_files(output, original.pixels.dtype.name), *image_file(mask, "uint8")]
     check_outputs(files, force)
+    if lens_types != "keep":
+        original = with_types(original, lens_types)
     with spinner(f"{method} {picture.name}"):
         made, owned = resampled(original, deshift=True) if deshift else methods[method](original)
         made.save(output)
@@ -98,6 +109,8 @@ def import_(
             help="White picture of a raw one, or the camera's calibration data to choose from: a folder, .tar."
         ),
     ] = None,
+    lens_types: LensTypesOption = "keep",
+    foci: FociOption = None,
     depth: Annotated[
         Path | None, typer.Option(help="Write z in mm (.exr) of every pixel, where an .h5 of the HCI has GT_DEPTH.")
     ] = None,
@@ -118,8 +131,10 @@ def import_(
     check_outputs([output, sidecar(output), *([depth] if depth else [])], force)
     true = None if depth is None else _true_depth(source, depth, ei_pixels or grid or middle or whites)
     if whites is not None or source.suffix.lower() in (".lfp", ".lfr", ".raw"):
-        _import_raw(source, whites, output, 8 if "uint8" in types else 16)
+        _import_raw(source, whites, output, 8 if "uint8" in types else 16, lens_types, foci)
         return
+    if foci is not None or lens_types != "keep":
+        raise ValueError("foci and lens-types are for raw pictures: give --whites")
     views = None if ei_pixels is not None else find_views(source, grid=None if grid is None else pair("grid", grid))
     if middle is not None:
         if views is None:
@@ -171,18 +186,20 @@ def _true_depth(source: Path, output: Path, arranged: object) -> NDArray[np.floa
     return 1000 * metres
 
 
-def _import_raw(source: Path, whites: Path | None, output: Path, bits: int) -> None:
+def _import_raw(
+    source: Path, whites: Path | None, output: Path, bits: int, lens_types: str, foci: str | None
+) -> None:
     """Write the regular II-picture of a raw picture of a lenslet camera."""
     from ii_core import resampled
     from ii_core.base.files import check_type
 
-    from .calibrating import captured
-
     check_type(output, f"uint{bits}")
     with progress_bar(f"import {source.name}") as report:
-        shot = captured(source, white=whites, bits=bits, report=report)
+        shot = captured(source, white=whites, bits=bits, foci=foci, report=report)
+    picture = shot.picture if lens_types == "keep" else with_types(shot.picture, lens_types)
+    kept = lens_types == "keep" and shot.found.foci is not None  # the mean of two lenses would be of two types
     with spinner(f"resample {source.name}"):
-        made, owned = resampled(shot.picture, deshift=shot.found.grid.lattice.hexagonal)
+        made, owned = resampled(picture, deshift=shot.found.grid.lattice.hexagonal and not kept)
         made.save(output)
     (k, l), (u, v) = made.lenses, made.ei_pixels
     say(shot.found.describe())

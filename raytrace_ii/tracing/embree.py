@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from .kernels import packets
 from .kernels.lanes import PACKET, Work, aligned, work
-from .kernels.packets import PACKET_ROWS, Calls, Tools, packet_kernels
+from .kernels.packets import NO_CALLS, PACKET_ROWS, Calls, Tools, packet_kernels
 
 CONFIGURATION = "RAYTRACE_II_EMBREE"  # environment variable: Embree's device configuration, or "embreex"
 # Trees of eight children a node: Embree keeps to four on CPUs that slow down under wide vectors, and takes 5 % longer
@@ -207,7 +207,7 @@ class Tree:
             room, (active, chosen) = work(), lane_masks()
             packet = room.single[PACKET:]
             nearest, stop = (self.calls(name, active, packet) for name in ("rtcIntersect", "rtcOccluded"))
-            kept["room"] = Tools(nearest, stop, active, chosen), room
+            kept["room"] = Tools(nearest, stop, NO_CALLS, active, chosen), room
         found: tuple[Tools, Work] = kept["room"]
         return found
 

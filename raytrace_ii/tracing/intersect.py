@@ -66,11 +66,13 @@ class Intersector:
     def tools(self, packet: Floats) -> Tools:
         """Return what a kernel calls Embree with itself, for packets in memory of one thread."""
         active, chosen = lane_masks()
-        nearest, stop = (
+        nearest, stop, clear = (
             tree.calls(function, active, packet) if isinstance(tree, Tree) else NO_CALLS
-            for tree, function in ((self._all, "rtcIntersect"), (self._opaque, "rtcOccluded"))
-        )
-        return Tools(nearest, stop, active, chosen)
+            for tree, function in (
+                (self._all, "rtcIntersect"), (self._opaque, "rtcOccluded"), (self._clear, "rtcOccluded")
+            )
+        )  # fmt: skip
+        return Tools(nearest, stop, clear, active, chosen)
 
     @property
     def width(self) -> int:

@@ -15,11 +15,7 @@ SOME_FACES = 1 << 16
 
 
 def fill_face_table(corners: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """Write unit normal (0 for a face without area), lift in mm and pull of every face as rows of ``out``.
-
-    The pull takes a hit about as far towards the middle of its face as the lift takes it off the face, as a share
-    of the way.
-    """
+    """Write unit normal (0 for a face without area) and lift in mm of every face as rows of ``out``."""
     for first in range(0, len(corners), SOME_FACES):  # in float64 all at once would take ten times the table
         some = slice(first, first + SOME_FACES)
         out[some] = _face_rows(corners[some].astype(np.float64))
@@ -32,5 +28,4 @@ def _face_rows(p: NDArray[np.float64]) -> NDArray[np.float64]:
     longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
     least = np.divide(LIFT_STEPS, length[:, 0], out=np.zeros_like(longest), where=length[:, 0] > 0)
     lift = np.maximum(LIFT * np.abs(p).max(axis=(1, 2)), np.minimum(least, MOST_LIFT * longest))
-    pull = np.minimum(np.divide(lift, longest, out=np.zeros_like(lift), where=longest > 0), 0.25)
-    return np.column_stack([unit, lift, pull])
+    return np.column_stack([unit, lift])

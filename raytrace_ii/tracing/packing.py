@@ -101,7 +101,7 @@ class PackedScene:
         self.passes = self.nested > 1 or any(body.material.alpha_cutoff > 0 for body in bodies)
         self.intersector = Intersector(self.corners, self.opaque_faces)
         self.corners = self.intersector.corners
-        rows = _face_rows(self.corners, self.object_of_face, normals, self.coordinates if self.images else None)
+        rows = _face_rows(self.corners, self.object_of_face, normals, self.coordinates)
         self.faces = rows[:, tables.FACE : tables.BODY]
         laned = aligned(len(bodies) * tables.LANED)
         laned[:] = self.materials[:, : tables.LANED].reshape(-1)
@@ -229,10 +229,10 @@ def _per_corner(values: Sequence[NDArray[Any] | None], bodies: Sequence[Body]) -
 
 def _face_rows(
     corners: NDArray[np.float32], bodies: NDArray[np.int32], normals: NDArray[np.float32],
-    coordinates: NDArray[np.float32] | None,
+    coordinates: NDArray[np.float32],
 ) -> NDArray[np.float32]:  # fmt: skip
     """Return the table of faces, see `kernels.tables`: rows of one cache line or two."""
-    wide = len(normals) > 0 or coordinates is not None
+    wide = len(normals) > 0 or len(coordinates) > 0
     columns = tables.ALL_COLUMNS if wide else tables.FLAT_COLUMNS
     rows = aligned(len(corners) * columns).reshape(-1, columns)
     rows[:, : tables.FACE] = corners.reshape(-1, 9)
@@ -240,8 +240,9 @@ def _face_rows(
     rows[:, tables.BODY] = bodies
     if len(normals):
         rows[:, tables.NORMALS : tables.COORDINATES] = normals.reshape(-1, 9)
-    if coordinates is not None and len(coordinates):
+    if len(coordinates):
         rows[:, tables.COORDINATES : tables.COORDINATES + 6] = coordinates[:, :, :2].reshape(-1, 6)
+        rows[:, tables.THIRD] = coordinates[:, :, 2]
     return rows
 
 

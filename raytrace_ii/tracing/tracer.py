@@ -35,7 +35,6 @@ from .kernels.tables import (
     REFRACTION,
     SHADOW,
     SKY_IMAGE,
-    SPAWNED,
     TICKS,
     UNTESTED,
     WEAK_SHADOW,
@@ -218,6 +217,14 @@ def _rows(batch: Batch, some: slice) -> Batch:
     return type(batch)(*arrays)
 
 
+def _joined(rays: Rays, first: int, start: int, count: int) -> Rays:
+    """Return the first rays, followed by a number of others from row ``start`` on."""
+    for array in rays:
+        if len(array):
+            array[first : first + count] = array[start : start + count]
+    return _rows(rays, slice(first + count))
+
+
 class Tracer:
     """Traces batches of up to ``capacity`` primary rays, keeping its work arrays between batches. One a thread.
 
@@ -242,6 +249,7 @@ class Tracer:
         self._shadow = _shadow_room(0, self.scene.nested)
         self._work = work()
         self._tools = self.scene.intersector.tools(self._work.single[PACKET:])
+        self._told = _NO_NUMBERS, False  # whether rays of these tables may start within glass
         self._follow = way_kernel(self.scene.intersector.width)
         # hits and shadow rays that the kernel does not see to the end
         self._finds = self._tools.nearest.packet != 0 and not self.scene.passes
@@ -330,11 +338,21 @@ class Tracer:
         room.inside.fill(-1)
         if keys is not None:
             room.keys[:n] = keys
-        if self.scene.transmits or not self._finds:  # they are wanted before the kernel runs
+        if self._near_glass(start) or not self._finds:  # they are wanted before the kernel runs
             start_separable_rays(start, self._work, room.origins, room.directions)
             room.weights.fill(1)
             start = _NO_START
         self._trace(room, n, radiance, support, start)
+
+    def _near_glass(self, start: Start) -> bool:
+        """Return whether any camera ray of the picture may start within the bounds of a clear body."""
+        if self._told[0] is not start.column_rays:
+            columns, rows = (rays.reshape(-1, 8)[:, :3] for rays in (start.column_rays, start.row_rays))
+            low, high = columns.min(axis=0) + rows.min(axis=0), columns.max(axis=0) + rows.max(axis=0)
+            around, slack = self.scene.clear_bounds, 1e-6 * (np.abs(low) + np.abs(high))  # rays start at float32's
+            near = ((low - slack <= around[:, 1]) & (high + slack >= around[:, 0])).all(axis=1).any()
+            self._told = start.column_rays, bool(near)
+        return self._told[1]
 
     def _trace(
         self, primary: Rays, n: int, radiance: NDArray[np.float32], support: Support | None, start: Start
@@ -342,7 +360,7 @@ class Tracer:
         """Trace the first n of the primary rays."""
         rays = _rows(primary, slice(n))
         self.count.rays["primary"] += n
-        if self.scene.transmits:
+        if self.scene.transmits and not len(start.rows):
             self._start_inside(rays)
         for depth in range(self.max_depth + 1):
             lobe_rays = self.lobes[0] if depth == 0 else 1
@@ -360,12 +378,14 @@ class Tracer:
         s, n = self.scene, len(rays.pixels)
         hits = _NO_HITS if self._finds else self._hits(rays)
         spawn = spawn and (s.mirrors or s.transmits or s.blends)
-        most = (lobe_rays if s.glossy else 1) + s.transmits + 2 * s.disperses + s.blends
-        following = _room(most * n if spawn else 0, s.nested, s.glossy, any(self.footprint))
+        through, mirrored = n * (s.transmits + 2 * s.disperses + s.blends), n * (lobe_rays if s.glossy else 1)
+        following = _room(through + mirrored if spawn else 0, s.nested, s.glossy, any(self.footprint))
         if len(self._shadow.reach) < n * len(s.lights):  # memory that nothing is written to is not used
             self._shadow = _shadow_room(n * len(s.lights), s.nested)
         counts, lit = np.zeros(COUNTS, np.int64), np.zeros(len(s.lights), np.int64)
-        passage = Passage(s.least, lobe_rays, self.lobes[1], *self.footprint, placed=s.passes, later=self._later)
+        passage = Passage(
+            s.least, lobe_rays, self.lobes[1], *self.footprint, placed=s.passes, later=self._later, mirrored=through,
+        )  # fmt: skip
         images: list[Any] = [*(support or Support()).rows(), self.pose[:3, 3], self.pose[:3, 2]]
         generation = Generation(
             hits, self._tools, s.intersector.first_of_same, start, rays, s.surfaces, s.surroundings, passage,
@@ -383,7 +403,7 @@ class Tracer:
         for light in np.flatnonzero(lit):
             some = slice(light * n, light * n + lit[light])
             self._light(_rows(self._shadow, some), radiance, tested=not counts[UNTESTED])
-        return _rows(following, slice(int(counts[SPAWNED])))
+        return _joined(following, int(counts[REFRACTION] + counts[PASSED]), through, int(counts[REFLECTION]))
 
     def _stages(self, generation: Generation, recorded: bool, spawn: bool) -> Stages:
         """Addresses of the stages that the generation needs, compiled here when the first scene needs them."""

@@ -390,6 +390,30 @@ def test_a_signal_ends_a_run_within_two_seconds(tmp_path, number, code):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
+def test_ctrl_c_ends_depth_and_leaves_no_file(tmp_path):
+    """The costs of 289 views of 256×256 px take one thread ten seconds; the signal comes among them."""
+    tile = np.random.default_rng(0).integers(0, 256, (256, 256, 3), np.uint8)
+    IIPicture(np.tile(tile, (17, 17, 1)), (256, 256), (17, 17)).save(tmp_path / "field.png")
+    command = ("depth", "field.png", "--disparity", "--range", "-9,9", "--workers", "1", "--preview", "p.png")
+    with subprocess.Popen(
+        [*COMMAND, *command, "-o", "d.exr"], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+        preexec_fn=hear_interrupts,
+    ) as running:  # fmt: skip
+        try:
+            time.sleep(6)
+            assert running.poll() is None
+            started = time.monotonic()
+            running.send_signal(signal.SIGINT)
+            assert running.wait(60) == 130
+            seconds = time.monotonic() - started
+            said = running.stderr.read()
+        finally:
+            running.kill()
+    assert seconds < 4 and "interrupted" in said and "Traceback" not in said
+    assert {file.name for file in tmp_path.iterdir()} <= {"field.png", "field.png.json"}
+
+
 @pytest.fixture
 def served(picture, tmp_path):
     """A served page: its process, port and folder."""

@@ -140,3 +140,22 @@ def test_a_pickle_in_a_matlab_file_is_not_loaded(tmp_path):
     (tmp_path / "b.mat").write_bytes(b"\x80\x04cos\nsystem\n.")
     with pytest.raises(ValueError, match="is no light field"):
         find_views(tmp_path / "b.mat")
+
+
+def test_three_arrays_of_colours_and_doubles_of_whole_numbers(tmp_path):
+    """As in antipa/light-fields: ``lfr``, ``lfg`` and ``lfb``, whose doubles are codes."""
+    codes = np.random.default_rng(5).integers(0, 225, (2, 3, 5, 7, 3))
+    path = tmp_path / "field.mat"
+    scipy.io.savemat(path, {f"lf{c}": codes[..., i].astype(float) for i, c in enumerate("rgb")})
+    views = array_views(path)
+    assert views.shape == (2, 3)
+    view = views.read(1, 2)
+    np.testing.assert_array_equal(view, codes[1, 2])
+    assert view.dtype == np.uint8
+    scipy.io.savemat(path, {"LF": codes * 256.0})
+    assert array_views(path).read(0, 0).dtype == np.uint16
+    red = codes[..., 0].astype(float)
+    for wrong in ({"lfr": red, "lfg": red}, dict.fromkeys(("lfr", "lfg", "lfx"), red)):
+        scipy.io.savemat(path, wrong)
+        with pytest.raises(ValueError, match=r"it holds [23] arrays of four or five axes"):
+            array_views(path)

@@ -9,12 +9,15 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from benchmarks.accuracy.calibration import (
+    SHIFTS,
     behind_glass,
     distorted,
     errors,
     exposed,
     growth,
     micro_image_centres,
+    multi_focus_pictures,
+    psnr,
     random_camera,
     trial,
     white_image,
@@ -31,8 +34,11 @@ from ii_core import (
     resampled,
     sub_images,
 )
-from ii_core.base.colour import srgb
+from ii_core.base.colour import linear, srgb
+from ii_core.base.files import write_image
 from ii_core.calibration.demosaic import METHODS, MOSAICS, demosaiced, phases
+from ii_core.calibration.lens_types import LensTypes
+from ii_core.calibration.multi_focus import fused, lens_foci, of_camera, shifts_of, virtual_depths, with_foci
 from ii_core.calibration.white import FLOOR, averaged, gain
 from ii_core.formats.lytro import RawColour
 from ii_core.formats.mosaic import load_mosaic
@@ -477,3 +483,98 @@ def test_a_mosaic_that_does_not_divide_is_cut_with_a_warning(tmp_path):
     write_image(tmp_path / "m.png", image)
     with pytest.warns(UserWarning, match="cut off"):
         load_mosaic(tmp_path / "m.png", (13, 13))
+
+
+@pytest.fixture(scope="module")
+def multi_focus():
+    return multi_focus_pictures(20, (14, 12), 36)
+
+
+def test_lens_types_and_their_foci_are_found(multi_focus):
+    """At every depth another type is sharp, so that types are alike over the whole picture."""
+    raw, white = multi_focus.raw, multi_focus.white
+    rng = np.random.default_rng(3)
+    light = linear(raw.pixels / 255) * white[..., None]
+    frames = [rng.poisson(3000 * a + 10).astype(np.uint16) for a in (light, white)]
+    found = calibrate(frames[0], white=frames[1], gap_mm=0.4, pixel_pitch_mm=0.006)
+    assert found.types.pattern == "3" and found.report()["lens_type_rows"] == [[0, 1, 2], [2, 0, 1]]
+    picture = calibrated_picture(found, *frames[:1], white=frames[1])
+    foci = lens_foci(picture, found.types)
+    np.testing.assert_allclose(foci.shifts, SHIFTS, atol=0.03)
+    camera = with_foci(found.camera, foci)
+    assert of_camera(camera).shifts == pytest.approx(sorted(foci.shifts, reverse=True))
+    given = lens_foci(picture, found.types, depths=(5, 1 / 0.3, 10))
+    assert given.shifts == pytest.approx(SHIFTS)
+    with pytest.raises(ValueError, match="2 virtual depths are given, and the array has 3"):
+        lens_foci(picture, found.types, depths=(2.0, 3.0))
+    even = calibrate(frames[1], white=frames[1]).types
+    assert even.pattern == "one" and lens_foci(picture, even) is None
+
+
+def test_pixels_come_from_lenses_in_focus(multi_focus):
+    """The truth is rendered through pinholes."""
+    raw, sharp, _, true, inner = multi_focus
+    shifts = shifts_of(raw)
+    assert np.nanmedian(abs(shifts - true)[inner]) < 0.005 and (abs(shifts - true)[inner] < 0.03).mean() > 0.9
+    made, taken = fused(raw, shifts=shifts)
+    assert psnr(made, sharp, inner) > psnr(raw, sharp, inner) + 4
+    assert 0.4 < taken[inner].mean() < 0.8 and (made.pixels[~taken] == raw.pixels[~taken]).all()
+    assert of_camera(made.camera) is None
+    near = inner & (abs(true - 0.3) < 0.01)
+    of_each = [psnr(fused(raw, only=t, shifts=shifts)[0], sharp, near) for t in range(3)]
+    assert of_each[0] > of_each[1] + 3 > of_each[2] + 6  # type 0 of the camera has the shortest focal length
+    with pytest.raises(ValueError, match="lens type is 3: the array has types 0 to 2"):
+        fused(raw, only=3)
+    with pytest.raises(ValueError, match="only one focus"):
+        fused(made)
+
+
+def test_a_depth_that_one_lens_alone_shows_is_left():
+    """Matching needs two other lenses that show the point; without detail nothing changes."""
+    camera = preset("multi-focus", scale=64)
+    flat = IIPicture(np.full((*camera.pixels[::-1], 3), 90, np.uint8), camera.lenses, camera.ei_pixels, camera)
+    assert (fused(flat)[0].pixels == 90).all()
+    assert len(of_camera(camera).shifts) == 4 and lens_foci(flat, LensTypes("2×2", 1.0, (0.0,) * 4)) is None
+
+
+def test_virtual_depths_of_a_raytrix_file(tmp_path):
+    """The form is that of samliu0631/Light-Field-Simulation and shabiouyang/Raytrix-Light-Field-Video."""
+    each = (
+        "<lens_type id='{}'><depth_range units='virtual_depth'><min>{}</min><max>{}</max></depth_range></lens_type>"
+    )
+    body = "".join(each.format(i, low, high) for i, low, high in ((1, 2, 6), (0, 1, 3), (2, 3, 6)))
+    file = tmp_path / "calibration.xml"
+    file.write_text(f"<RayCalibData version='1.0'>{body}</RayCalibData>")
+    assert virtual_depths(file) == pytest.approx((1.5, 3.0, 4.0))
+    for text, said in (
+        (f"<!DOCTYPE a [<!ENTITY b 'c'>]><RayCalibData>{body}</RayCalibData>", "without declarations"),
+        ("<RayCalibData/>", "of 0 lens_type: <RayCalibData> of 2 to 4 is needed"),
+        (f"<Other>{body}</Other>", "<Other>"),
+        (f"<RayCalibData>{body.replace('6', 'nan')}</RayCalibData>", "min < max"),
+        ("none", "no calibration of a Raytrix camera"),
+    ):
+        file.write_text(text)
+        with pytest.raises(ValueError, match=said):
+            virtual_depths(file)
+
+
+def test_import_of_a_multi_focus_picture(run, refused, multi_focus, tmp_path):
+    """Types are kept, fused, or one is taken; foci are found or given."""
+    rng = np.random.default_rng(3)
+    light = linear(multi_focus.raw.pixels / 255) * multi_focus.white[..., None]
+    for name, values in (("raw", light), ("white", multi_focus.white)):
+        write_image(tmp_path / f"{name}.png", rng.poisson(20000 * values + 10).astype(np.uint16))
+    command = "import", tmp_path / "raw.png", "--whites", tmp_path / "white.png", "-o", tmp_path / "f.png", "--force"
+    code, out, _ = run(*command, "--foci", "3.33,10,5")
+    assert code == 0 and "type 0: +0.100, type 1: +0.200, type 2: +0.300" in out
+    kept = IIPicture.load(tmp_path / "f.png")
+    assert of_camera(kept.camera).matrix == ((2, 1, 0), (0, 2, 1))  # by focal length
+    code, out, _ = run(*command, "--lens-types", "fuse")
+    made = IIPicture.load(tmp_path / "f.png")
+    assert code == 0 and "in better focus" in out and of_camera(made.camera) is None
+    assert made.lenses == kept.lenses
+    refused(run(*command, "--lens-types", "sharp"), "keep, fuse or the number of a type")
+    refused(run(*command, "--foci", "3,x"), "2 to 4 virtual depths beyond 1")
+    refused(
+        run("import", tmp_path / "f.png", "--ei-pixels", "2x2", "-o", tmp_path / "g.png", "--foci", "2,3"), "--whites"
+    )

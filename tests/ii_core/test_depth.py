@@ -8,6 +8,7 @@ from ii_core.depth.all_views import disparity_of_views
 from ii_core.depth.around import half_lines, views_around
 from ii_core.depth.estimate import field_range, labels_between
 from ii_core.depth.points import view_points
+from ii_core.picture.assumed import with_assumed_camera
 
 RNG = np.random.default_rng(3)
 WAVES = RNG.uniform(-0.9, 0.9, (24, 2)), RNG.uniform(0, 6.3, (24, 3)), RNG.uniform(0.3, 1, 24)
@@ -72,6 +73,13 @@ def test_range_of_large_views_is_found_in_halved_ones():
     picture, truth = slanted(views=(5, 5), size=(300, 240), at=-6.0, slope=0.002)
     low, high = field_range(picture)
     assert low < truth.min() < truth.max() < high and high - low < 5
+
+
+def test_a_nominal_camera_does_not_limit_the_range():
+    """Its lens plane is no bound: a photograph of a Lytro, disparities 0 to 1, was searched from −1 to 0."""
+    picture, truth = slanted(views=(5, 5), size=(64, 48), at=1.0)
+    low, high = field_range(with_assumed_camera(picture))
+    assert low < truth.min() < truth.max() < high
 
 
 def test_any_view_and_any_number_of_threads():

@@ -12,10 +12,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ii_core import IIPicture, find_views, load_mosaic, picture_of, preset, resampled, sub_images, view_image
+from benchmarks.accuracy.moire import measured
+from ii_core import Eye, IIPicture, find_views, load_mosaic, picture_of, preset, resampled, sub_images, view_image
+from ii_core.base.colour import linear
 from ii_core.base.files import read_image, write_image
 from ii_core.display.look import display_views
-from ii_core.display.looking_glass import CELL, native_picture, read_looking_glass, view_numbers, view_of_native
+from ii_core.display.looking_glass import (
+    CELL,
+    native_eye_image,
+    native_picture,
+    read_looking_glass,
+    view_numbers,
+    view_of_native,
+)
 from ii_core.display.quilt import shown_shares
 from ii_core.formats.grid import camera_views
 from ii_core.formats.hci import view_disparity, write_hci
@@ -510,3 +519,31 @@ def test_display_by_a_calibration_writes_the_panels_picture(run, tmp_path):
     assert read_image(tmp_path / "n.png").shape == (64, 48, 3)
     code, _, error = run(*options, "--as", "lenticular", "--pitch", "3", "-o", tmp_path / "m.png")
     assert code == 2 and "--calibration does not use --pitch" in error
+
+
+def test_an_eye_sees_even_views_without_moire_by_the_displays_own_calibration(tmp_path):
+    """The light of every direction is known in closed form; the eye's rays pass lenses, not the shader's formula."""
+    assert max(measured("its own")["light"]) < 0.006
+    assert min(measured("pitch + 0.1 %")["light"]) > 0.02 and min(measured("slope + 2 %")["light"]) > 0.08
+    d, eye = display(tmp_path), Eye(position_mm=(0, 0, -400.0), pupil_mm=4)
+    grey = np.full((64, 48, 3), 188, np.uint8)
+    seen = native_eye_image(grey, d, eye, size=(4, 4), rays=4096).light[1:-1, 1:-1]
+    np.testing.assert_allclose(seen, linear(188 / 255), rtol=0.15)  # two lenses: stripes are left in it
+    np.testing.assert_allclose(seen.mean(axis=2), linear(188 / 255), rtol=0.02)
+    for wrong, said in (
+        ((grey[:9], d, eye), "the panel|uint8"),
+        ((grey, replace(d, flip_x=True), eye), "upright stripes are needed"),
+        ((grey, d, Eye(position_mm=(0, 0, 1.0))), "not before the panel"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            native_eye_image(*wrong)
+
+
+def test_the_eye_command_takes_a_panels_picture(run, refused, tmp_path):
+    write_image(tmp_path / "panel.png", np.full((64, 48, 3), 188, np.uint8))
+    display(tmp_path)
+    command = "eye", tmp_path / "panel.png", "--calibration", tmp_path / "visual.json", "-o", tmp_path / "e.png"
+    assert run(*command, "--at", "0,0,-400", "--size", "4x4")[0] == 0
+    assert read_image(tmp_path / "e.png").shape == (4, 4, 3)
+    refused(run(*command, "--force"), "at is missing")
+    refused(run(*command, "--at", "0,0,-400", "--turn", "3", "--force"), "--turn")

@@ -14,6 +14,7 @@ from numpy.random import Generator
 from PIL import Image, ImageCms
 
 from ii_core import IIPicture, preset
+from ii_core.calibration.multi_focus import virtual_depths
 from ii_core.display.looking_glass import native_picture, read_looking_glass, view_numbers
 from ii_core.formats.arrays import MATLAB_5, array_depth, write_array
 from ii_core.formats.find import find_views, picture_of
@@ -22,7 +23,7 @@ from ii_core.formats.lytro import Setting
 from ii_core.formats.whites import nearest_white, white_pictures
 
 from . import seeds
-from .containers import bytes_changed
+from .containers import bytes_changed, text_file
 from .measurements import ABOUT, lfp_section
 from .readers import Read, _fresh, _json, reader
 from .trees import json_text, mutated, pick
@@ -44,6 +45,20 @@ VALUES = {
     "pitch": 52.6, "slope": -7.1, "center": 0.8, "viewCone": 40.0, "invView": 1.0, "DPI": 324.0, "screenW": 24.0,
     "screenH": 32.0, "flipImageX": 0.0, "flipImageY": 0.0, "flipSubp": 0.0,
 }  # fmt: skip
+TYPE = """<lens_type id="{0}">
+<depth_range units="virtual_depth">
+<min> {1}.5 </min>
+<max> {2}.2 </max>
+</depth_range>
+</lens_type>"""
+RAYTRIX = "\n".join(
+    (
+        '<RayCalibData version="1.0">',
+        '<diameter units="pix"> 23.2 </diameter>',
+        *(TYPE.format(i, i + 1, i + 3) for i in range(3)),
+        "</RayCalibData>",
+    )
+)
 DISPLAY = {name: {"value": value} for name, value in VALUES.items()} | {"subpixelCells": [CELL], "CellPatternMode": 1}
 
 
@@ -188,3 +203,11 @@ def visual(rng: Generator, folder: Path) -> Read:
             native_picture(_shown(), display, views=3)
 
     return read
+
+
+@reader("Raytrix XML")
+def raytrix(rng: Generator, folder: Path) -> Read:
+    """The depth ranges of lens types."""
+    path = folder / "calibration.xml"
+    path.write_bytes(text_file(RAYTRIX, rng, ('<!DOCTYPE a [<!ENTITY b "c">]>', "<min>nan</min>", "<min>&b;</min>")))
+    return partial(virtual_depths, path)

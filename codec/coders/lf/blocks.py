@@ -7,9 +7,13 @@ be predicted *in time* (`motion`), or by the mean of that and synthesis (*mixed*
 
 from __future__ import annotations
 
+import contextlib
+import math
+import mmap
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ii_core.base.jit import array_kernel, part_kernel, stage_kernel, tuned_kernel
 
@@ -30,6 +34,7 @@ MOST_REFERENCES = 4
 SIDE, STRAIGHT = 17, 8  # directions from one side, and the place of the straight one among them
 LIMIT = 8191  # of a decoded sample's magnitude, in eighths of an 8-bit code
 MOST_INDEX = 1 << 14
+LARGE_BYTES = 1 << 20
 UNKNOWN = -32768  # disparity
 DIFFERENT = 205  # disparities that lead this far apart, in 2^-8 samples, are of different surfaces
 # What is known of each 4×4. SKIPPED is 1 without a transform, else twice its kind.
@@ -143,6 +148,22 @@ def new_work() -> Work:
 def new_blocks(height: int, width: int) -> np.ndarray[Any, Any]:
     """Nothing known yet."""
     return np.zeros((FIELDS, height // 4, width // 4), np.int16)
+
+
+def zeros(shape: tuple[int, ...], dtype: Any = np.int16) -> tuple[NDArray[Any], mmap.mmap | None]:
+    """Return zeros; if they are many, in memory that the system gets back at once, also in parts, where it can.
+
+    The allocator keeps what is given back to it. Huge pages would take the memory of views that are never written,
+    beside others that are.
+    """
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    if size < LARGE_BYTES or not hasattr(mmap, "MADV_DONTNEED"):
+        return np.zeros(shape, dtype), None
+    memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    if hasattr(mmap, "MADV_NOHUGEPAGE"):
+        with contextlib.suppress(OSError):  # a system without huge pages
+            memory.madvise(mmap.MADV_NOHUGEPAGE)
+    return np.frombuffer(memory, dtype).reshape(shape), memory
 
 
 @tuned_kernel

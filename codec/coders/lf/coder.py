@@ -18,7 +18,7 @@ from ... import clock
 from ...contract import Coder, Goal, Option, Options, Pixels
 from ...search import Axis, CodingResult, Run, meet_size, nearest, trials
 from . import arithmetic, denoise, loop_filter_search, planes, ranges, search, stream, synthesis, tuning
-from .blocks import MOST_REFERENCES, Job, Work, code_blend, code_view, new_work
+from .blocks import MOST_REFERENCES, Job, Work, code_blend, code_view, new_work, zeros
 from .contexts import Contexts
 from .field import Field
 from .pyramid import Node, Place, pyramid
@@ -49,6 +49,7 @@ DENOISED_LEVELS = 2  # of views, by neighbours, from `balanced` on
 TRIAL_LEVELS = 2  # of views that show how errors share among planes
 CROSS = stream.QUARTERS, stream.EIGHTHS  # unit of factors between planes: of principal axes, and of BT.709
 MOST_VIEWS = 1 << 14
+MOST_AT_ONCE = 1 << 20  # samples of views whose blocks are found before they are coded, unless there are more threads
 VIEW_BYTES, EXACT_BYTES = 24, 96  # a sample's most
 # Settings that meet a size.
 SIZES = Axis(low=FINEST * FRACTIONS, high=COARSEST * FRACTIONS, start=START, octave=OCTAVE, step=1)
@@ -118,10 +119,10 @@ class LightField(Coder):
         """Level by level; a level that ends early is damage."""
         started = clock.cpu_seconds()
         field, levels = _opened(payload, blank)
-        for _ in decoded_batches(field, levels, threads_of(options)):
-            pass
         pixels = np.empty(blank.pixels.shape, blank.pixels.dtype)
-        field.show(pixels)
+        for _, nodes, _ in decoded_batches(field, levels, threads_of(options)):
+            field.show(pixels, nodes)
+            field.forget(nodes)
         return pixels, clock.cpu_seconds() - started
 
     def decode_component(self, payload: bytes, blank: IIPicture, options: Options, index: int) -> Pixels:
@@ -298,13 +299,13 @@ class Source:
     def run(self, setting: float) -> Run:
         """The payload at a quantiser."""
         started = clock.cpu_seconds()
-        payload, _ = self.coded(setting)
+        payload, _ = self.coded(setting, forgetful=True)
         return Run(payload, clock.cpu_seconds() - started)
 
-    def coded(self, setting: float) -> tuple[bytes, Field]:
-        """The payload at a quantiser, and what the decoder will make of it."""
+    def coded(self, setting: float, *, forgetful: bool = False) -> tuple[bytes, Field]:
+        """The payload at a quantiser, and what the decoder will make of it: all, or views that predict others."""
         field = self.field(self.header_at(setting))
-        levels = self.levels(field, Contexts())
+        levels = self.levels(field, Contexts(), forgetful=forgetful)
         return stream.pack(field.header, levels, self.count), field
 
     def header_at(self, setting: float) -> Header:
@@ -358,7 +359,7 @@ class Source:
             field.pixels[:] = by_view.reshape(field.pixels.shape)
         return field
 
-    def levels(self, field: Field, contexts: Contexts) -> list[bytes]:
+    def levels(self, field: Field, contexts: Contexts, *, forgetful: bool = False) -> list[bytes]:
         """Return the bytes of each level; the field then holds what the decoder will make of them."""
         work, levels = new_work(), []
         with Workers(self.threads) as workers:
@@ -369,22 +370,31 @@ class Source:
                     costs = arithmetic.bit_costs(coder.contexts)
                     if number == 0 and self.effort and not field.header.exact and not field.past:
                         costs = self._learned_costs(field, nodes[0], costs, contexts, work)
-                    found = partial(self._found, field, costs)
-                    jobs, made, blends, filters = zip(*workers.map(found, nodes), strict=True)
+                    some = max(self.threads, MOST_AT_ONCE // (field.shape[0] * field.shape[1]))
+                    begun = partial(self._begun, field, forgetful=len(nodes) > some)
+                    jobs, made, blends = zip(*workers.map(begun, nodes), strict=True)
                     for job, nearest in zip(jobs, blends, strict=True):
                         if job.synthesised:
                             code_blend(coder, nearest)
-                    for job, filtering in zip(jobs, filters, strict=True):
-                        coder = arithmetic.enlarged(coder, room)
-                        same = 0
-                        if filtering:
-                            same = loop_filter_search.choose_filters(
-                                coder, field.filters, job.at, filtering, worth(job.step)
-                            )
-                        field.code(coder, job, work, same)
-                    workers.map(field.refine, nodes, jobs, made)
+                    batch = list(zip(nodes, jobs, made, blends, strict=True))
+                    del job, jobs, made
+                    for first in range(0, len(nodes), some):
+                        part = batch[first : first + some]
+                        jobs, made, filters = zip(*workers.map(partial(self._found, field, costs), part), strict=True)
+                        for job, filtering in zip(jobs, filters, strict=True):
+                            coder = arithmetic.enlarged(coder, room)
+                            same = 0
+                            if filtering:
+                                same = loop_filter_search.choose_filters(
+                                    coder, field.filters, job.at, filtering, worth(job.step)
+                                )
+                            field.code(coder, job, work, same)
+                        workers.map(field.refine, nodes[first : first + some], jobs, made)
+                        if forgetful:
+                            field.forget(nodes[first : first + some])
+                        del part, job, jobs, made  # before the next takes as much
+                    del batch
                     field.finish(nodes)
-                    del job, jobs, made  # before the next batch takes as much
                 levels.append(arithmetic.finish(coder))
                 contexts.after(number)
         return levels
@@ -400,18 +410,33 @@ class Source:
         code_view(coder, job, work)
         return arithmetic.bit_costs(coder.contexts)
 
-    def _found(
-        self, field: Field, costs: NDArray[np.float32], node: Node
-    ) -> tuple[Job, synthesis.Synthesis, int, loop_filter_search.Found | None]:
-        """A view's blocks, found and decoded; its synthesis, in which way that is blended, and its best filters."""
+    def _begun(self, field: Field, node: Node, *, forgetful: bool) -> tuple[Job, synthesis.Synthesis, int]:
+        """A view's synthesis, and in which way that is blended; without the samples that `_found` blends again."""
         job, made = field.job(node)
+        nearest = 0
+        if job.synthesised:
+            nearest = _nearer_blend(made, self._target(field, node), BLEND_ROWS[self.effort])
+        if forgetful:
+            nothing = made.made[:, :0].copy()
+            job, made = job._replace(made=nothing, levels=nothing), made._replace(made=nothing)
+        return job, made, nearest
+
+    def _found(
+        self, field: Field, costs: NDArray[np.float32], begun: tuple[Node, Job, synthesis.Synthesis, int]
+    ) -> tuple[Job, synthesis.Synthesis, loop_filter_search.Found | None]:
+        """A view's blocks, found and decoded; its synthesis, and its best filters."""
+        node, job, made, nearest = begun
+        if not made.made.size:
+            samples, levels = (zeros((3, *field.shape))[0] for _ in range(2))
+            job, made = job._replace(made=samples, levels=levels), made._replace(made=samples)
+            if job.synthesised:
+                synthesis.blend(made, nearest, 1)
         original = self._target(field, node)
-        nearest = _nearer_blend(made, original, BLEND_ROWS[self.effort]) if job.synthesised else 0
         search.find_blocks(costs, job, self._search(job, original))
         filters = None
         if field.header.filtered:
             filters = loop_filter_search.search_filters(field.views, job.at, original, worth(job.step))
-        return job, made, nearest, filters
+        return job, made, filters
 
     def _target(self, field: Field, node: Node) -> NDArray[np.int16]:
         """Return the planes to be coded: those of the view, with less noise where it predicts many others."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -10,7 +11,18 @@ from numpy.typing import NDArray
 
 from . import loop_filter, motion, synthesis
 from .arithmetic import Arithmetic
-from .blocks import DONE, MOST_HALVINGS, MOST_INDEX, MOST_REFERENCES, UNKNOWN, Job, Work, code_view, new_blocks
+from .blocks import (
+    DONE,
+    MOST_HALVINGS,
+    MOST_INDEX,
+    MOST_REFERENCES,
+    UNKNOWN,
+    Job,
+    Work,
+    code_view,
+    new_blocks,
+    zeros,
+)
 from .exact import code_exact, new_exact, prepare
 from .planes import gather, scatter
 from .pyramid import Node, Place, batches, pyramid
@@ -46,8 +58,8 @@ class Field:
         self.grid = grid
         self.levels = pyramid(*grid, header.log_stride, MOST_REFERENCES, header.sources)
         self.shape = -(-height // 4) * 4, -(-width // 4) * 4
-        self.views = np.zeros((grid[0] * grid[1], 3, *self.shape), np.int16)
-        self.disparities = np.zeros((len(self.views), *self.shape), np.int16)
+        self.views, self._memory = zeros((grid[0] * grid[1], 3, *self.shape))
+        self.disparities, _ = zeros((len(self.views), *self.shape))
         # Pixels by view, if coding is lossless.
         self.pixels = np.zeros((len(self.views) if header.exact else 0, height, width, 3), dtype)
         self._exact = new_exact(height, width, dtype)
@@ -95,7 +107,7 @@ class Field:
             skipping=int(self.header.skipping),
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),
-            levels=np.zeros((3, *self.shape), np.int16),
+            levels=zeros((3, *self.shape))[0],
             past=np.stack([field.views[at] for field in self.past]) if self.past else motion.NOTHING,
             motions=self.motions,
         )
@@ -126,12 +138,12 @@ class Field:
         scatter(self.views, number, (1, 1), 0, 0, self.header.colours, pixels.itemsize == 2, pixels)
         return pixels
 
-    def show(self, pixels: NDArray[Any]) -> None:
-        """Write all views into a picture's pixels (N, M, 3)."""
+    def show(self, pixels: NDArray[Any], nodes: Sequence[Node] | None = None) -> None:
+        """Write all views, or those of some nodes, into a picture's pixels (N, M, 3)."""
         rows, cols = self.grid
-        for number in range(len(self.views)):
-            row, col = divmod(number, cols)
-            pixels[row::rows, col::cols] = self.view_pixels(number)
+        places = np.ndindex(rows, cols) if nodes is None else ((node.row, node.col) for node in nodes)
+        for row, col in places:
+            pixels[row::rows, col::cols] = self.view_pixels(self.number((row, col)))
 
     def refine(self, node: Node, job: Job, made: Synthesis) -> None:
         """Filter a decoded view, and note its disparity, for those that follow."""
@@ -154,6 +166,16 @@ class Field:
         last = nodes[-1]
         if last.level == 1 and (last.phase in FIRST_AGAIN or last is self.levels[1][-1]):
             self._first()
+
+    def forget(self, nodes: Sequence[Node]) -> None:
+        """Give back the memory of views of a finished batch that no other is predicted from; they become 0."""
+        size = self.views[0].nbytes
+        for node in nodes:
+            if self._memory is not None and node.level > 1 and (node.row, node.col) not in self.used:
+                start = self.number((node.row, node.col)) * size
+                first, end = -(-start // mmap.PAGESIZE), (start + size) // mmap.PAGESIZE  # whole pages
+                if end > first:
+                    self._memory.madvise(mmap.MADV_DONTNEED, first * mmap.PAGESIZE, (end - first) * mmap.PAGESIZE)
 
     def batches(self, level: int) -> Iterator[list[Node]]:
         """Views of a level that are coded together."""

@@ -16,7 +16,7 @@ import numpy as np
 from ii_core.base.jit import array_kernel, lean_kernel, part_kernel, stage_kernel
 
 from .agreement import LONELY, MATCHED, ROWS, SLOTS, SPAN, TRUNCATED, agrees, disagreement, hashed
-from .blocks import EXPLICIT, INDEX, KIND, UNKNOWN
+from .blocks import EXPLICIT, INDEX, KIND, UNKNOWN, zeros
 from .warp import BEFORE, FILTERS, LATTICE, TAPS, clamped, filtered, lead
 
 CANDIDATES = 8
@@ -91,10 +91,10 @@ def new_synthesis(views: Any, disparities: Any, sources: Any) -> Synthesis:
         views=views,
         disparities=disparities,
         sources=sources,
-        candidates=np.zeros((CANDIDATES, height, width), np.int16),
-        counts=np.zeros((height, width), np.uint8),
-        made=np.zeros((3, height, width), np.int16),
-        disparity=np.zeros((height, width), np.int16),
+        candidates=zeros((CANDIDATES, height, width))[0],
+        counts=zeros((height, width), np.uint8)[0],
+        made=zeros((3, height, width))[0],
+        disparity=zeros((height, width))[0],
         doubt=np.zeros((height // 4, width // 4), np.int16),
         scratch=np.zeros((10, MOST_SOURCES), np.int64),
         tried=np.zeros(16, np.int64),

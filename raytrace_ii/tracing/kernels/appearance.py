@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ii_core.base.jit import inline_kernel, lane_stage, late_kernel, late_lane_kernel, part_kernel, stage_kernel
+from ii_core.base.jit import inline_kernel, lane_stage, late_lane_kernel, part_kernel, stage_kernel
 
 from . import lanes as at
 from .addresses import value_at
@@ -28,44 +28,53 @@ from .tables import (
     NORMAL_SCALE,
     TEXTURE,
 )
-from .textures import noise_colour, pattern_colour, share_there
-from .vectors import edge, interpolate, three, three_doubles
+from .textures import exponential, noise_colour, pattern_colour, share_there
+from .vectors import edge, three, three_doubles
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
 
-@late_kernel
+@late_lane_kernel
 def attenuate(generation, first, lanes, _):
     """Dim rays on their way through bodies (Beer–Lambert), or through fog outside of them, which adds its light.
 
     A ray that meets an open body from behind has run inside: that is noted in ``inside``.
     """
     g = value_at(generation)
-    rays, fog, work, materials = g.rays, g.surroundings.fog, g.work, g.surfaces.materials
-    single, whole = work.single, work.whole
-    for k in range(lanes):
-        i, body, t = first + k, whole[at.BODY + k], np.float64(single[at.DISTANCE + k])
-        if fog.shape[0] > 0:
-            single[at.F0 + k], single[at.F1 + k], single[at.F2 + k] = 0.0, 0.0, 0.0
-        if single[at.HIT + k] == _ZERO:
-            continue
-        medium = -1
-        if rays.inside.shape[1] > 0:
-            if materials[body, EXTRAS] > 0.0 and single[at.ENTERING + k] < 0.0 and clearness(materials, body) > 0.0:
-                enter(rays.inside, i, body)
-            medium = medium_of(rays.inside, i, materials, -1)
-        if medium >= 0:
-            single[at.W0 + k] *= math.exp(-materials[medium, ABSORPTION] * t)
-            single[at.W1 + k] *= math.exp(-materials[medium, ABSORPTION + 1] * t)
-            single[at.W2 + k] *= math.exp(-materials[medium, ABSORPTION + 2] * t)
-        elif fog.shape[0] > 0:
-            through = math.exp(-fog[3] * t)
-            single[at.F0 + k] = single[at.W0 + k] * (1.0 - through) * fog[0]
-            single[at.F1 + k] = single[at.W1 + k] * (1.0 - through) * fog[1]
-            single[at.F2 + k] = single[at.W2 + k] * (1.0 - through) * fog[2]
-            single[at.W0 + k] *= through
-            single[at.W1 + k] *= through
-            single[at.W2 + k] *= through
+    rays, fog, single, whole = g.rays, g.surroundings.fog, g.work.single, g.work.whole
+    density, bodies = np.float32(fog[3]) if fog.shape[0] > 0 else _ZERO, False
+    for k in range(BLOCK):
+        foggy = density * single[at.HIT + k]
+        single[at.Q0 + k], single[at.Q1 + k], single[at.Q2 + k] = foggy, foggy, foggy
+        single[at.SHARE + k] = single[at.HIT + k]
+    if rays.inside.shape[1] > 0:
+        for k in range(lanes):
+            if single[at.HIT + k] > _ZERO:
+                bodies |= _take_medium(k, np.uint64(first + k), rays.inside, g.surfaces.materials, single, whole)
+    if fog.shape[0] == 0 and not bodies:
+        return
+    for c in range(3):
+        light = np.float32(fog[c]) if fog.shape[0] > 0 else _ZERO
+        for k in range(BLOCK):
+            way = single[at.DISTANCE + k]  # of a miss it may be anything
+            through = exponential(-single[at.Q0 + c * BLOCK + k] * (way if single[at.HIT + k] > _ZERO else _ZERO))
+            weight, foggy = single[at.W0 + c * BLOCK + k], single[at.SHARE + k] * light
+            single[at.F0 + c * BLOCK + k] = weight * (_ONE - through) * foggy
+            single[at.W0 + c * BLOCK + k] = weight * through
+
+
+@stage_kernel
+def _take_medium(k, i, inside, materials, single, whole):
+    """Take what absorbs the light of one lane's ray from the body that it runs in; return whether there is one."""
+    body = whole[at.BODY + k]
+    if materials[body, EXTRAS] > 0.0 and single[at.ENTERING + k] < 0.0 and clearness(materials, body) > 0.0:
+        enter(inside, i, body)
+    medium = medium_of(inside, i, materials, -1)
+    if medium >= 0:
+        for c in range(3):
+            single[at.Q0 + c * BLOCK + k] = materials[medium, ABSORPTION + c]
+        single[at.SHARE + k] = _ZERO
+    return medium >= 0
 
 
 @lane_stage
@@ -101,12 +110,13 @@ def scatter(ambient, single):
             single[at.L0 + k] = w * single[at.E0 + k] + scattered * a if hit > _ZERO else _ZERO
 
 
-@late_kernel
+@late_lane_kernel
 def paint(generation, first, lanes, _):
     """Textures of bodies that have patterns, and nothing else of ``EXTRAS``."""
     g = value_at(generation)
     for k in range(BLOCK):
         g.work.single[at.CLEAR + k] = _ZERO
+    _place_on_textures(g.work.single, g.work.double)
     _take_patterns(lanes, g.surfaces, g.work)
 
 
@@ -119,8 +129,8 @@ def look_closely(generation, first, lanes, _):
     if g.passage.first_width == 0.0 and g.passage.spread == 0.0:
         for k in range(4 * BLOCK):
             single[at.AU + k] = _ZERO
-    if s.maps.any:
-        _place_on_images(single, double)
+    if s.coordinates.shape[0] > 0:
+        _place_on_textures(single, double)
     for k in range(3 * BLOCK):
         single[at.B0 + k] = _ZERO
     if s.maps.blend and blending:
@@ -153,13 +163,14 @@ def _is_special(k, single):
 
 
 @lane_stage
-def _place_on_images(single, double):
-    """(u, v) of all hits on the images of their bodies."""
+def _place_on_textures(single, double):
+    """Texture coordinates of all hits."""
     for k in range(BLOCK):
         u, v, c = np.float64(single[at.U + k]), np.float64(single[at.V + k]), at.COORDINATE + k
         w = 1.0 - u - v
         double[at.SU + k] = w * single[c] + u * single[c + 2 * BLOCK] + v * single[c + 4 * BLOCK]
         double[at.SV + k] = w * single[c + BLOCK] + u * single[c + 3 * BLOCK] + v * single[c + 5 * BLOCK]
+        double[at.SW + k] = w * single[at.THIRD_0 + k] + u * single[at.THIRD_1 + k] + v * single[at.THIRD_2 + k]
 
 
 @lane_stage
@@ -226,7 +237,7 @@ def _take_patterns(lanes, surfaces, work):
 def _take_pattern(k, row, surfaces, work, noisy):
     """Colour one lane by a pattern, or note the place where its noise is wanted as number ``noisy``: 1 then."""
     single, double, whole, table = work.single, work.double, work.whole, surfaces.textures
-    x, y, z = interpolate(surfaces.coordinates, np.uint64(whole[at.FACE + k]), single[at.U + k], single[at.V + k])
+    x, y, z = three_doubles(double, at.SU, k)
     if table[row, 0] != NOISE:
         t0, t1, t2 = pattern_colour(table, row, x, y, z)
         single[at.T0 + k], single[at.T1 + k], single[at.T2 + k] = t0, t1, t2

@@ -124,7 +124,8 @@ class Passage(NamedTuple):
     places stand ``lobe_stride`` apart. A ray is ``first_width`` wide where it starts, if it has no width of its own,
     and grows by ``spread`` a mm, from a negative width through 0: images are filtered over its width, not at all if
     both are 0. Hits that are not ``placed`` stand where Embree put them. Shadow rays are written for ``later`` if
-    they may pass through clear bodies, or if Embree cannot be called from the kernel.
+    they may pass through clear bodies, or if Embree cannot be called from the kernel. Rays over mirrors are written
+    from row ``mirrored`` on.
     """
 
     least: float
@@ -134,6 +135,7 @@ class Passage(NamedTuple):
     spread: float
     placed: bool
     later: bool
+    mirrored: int
 
 
 class Recorded(NamedTuple):

@@ -15,7 +15,7 @@ from .lanes import BLOCK, take_rows
 from .packets import place_hit
 from .tables import ALL_COLUMNS, FLAT_COLUMNS, IMAGES
 from .textures import footprint
-from .vectors import three, three_doubles, three_of_row
+from .vectors import pull_by, three, three_doubles, three_of_row
 
 _ZERO, _ONE, _THIRD, _WIDE = np.float32(0), np.float32(1), np.float32(1 / 3), np.int64(FLAT_COLUMNS)
 
@@ -85,15 +85,20 @@ def settle(single):
 def place(single):
     """Hit points, normals on the ray's side, and places to start from."""
     for k in range(BLOCK):
-        u, v, pull = single[at.U + k], single[at.V + k], single[at.PULL + k]
+        u, v, lift, c = single[at.U + k], single[at.V + k], single[at.LIFT + k], at.CORNER + k
+        pull = pull_by(
+            lift, _ONE,
+            single[c + 3 * BLOCK] - single[c], single[c + 4 * BLOCK] - single[c + BLOCK],
+            single[c + 5 * BLOCK] - single[c + 2 * BLOCK],
+            single[c + 6 * BLOCK] - single[c], single[c + 7 * BLOCK] - single[c + BLOCK],
+            single[c + 8 * BLOCK] - single[c + 2 * BLOCK],
+        )  # fmt: skip
         u, v = u + pull * (_THIRD - u), v + pull * (_THIRD - v)
         w = _ONE - u - v
-        c = at.CORNER + k
         px = w * single[c] + u * single[c + 3 * BLOCK] + v * single[c + 6 * BLOCK]
         py = w * single[c + BLOCK] + u * single[c + 4 * BLOCK] + v * single[c + 7 * BLOCK]
         pz = w * single[c + 2 * BLOCK] + u * single[c + 5 * BLOCK] + v * single[c + 8 * BLOCK]
         gx, gy, gz = three(single, at.FACE_NORMAL, k)
-        lift = single[at.LIFT + k]
         entering = gx * single[at.DX + k] + gy * single[at.DY + k] + gz * single[at.DZ + k] < _ZERO
         side = _ONE if entering else -_ONE
         gx, gy, gz = side * gx, side * gy, side * gz

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.core.typing import templates
 from numpy.typing import NDArray
 
@@ -43,15 +42,16 @@ def _offsets(many: int) -> tuple[int, ...]:
 START = next(_offset)
 _offsets(2)
 DX, DY, DZ, W0, W1, W2, U, V, DISTANCE, HIT = _offsets(10)  # weights: after fog, media and blending
-# A row of the table of faces: corners, normal, lift, pull, body; then normals and (u, v) of the corners.
+# A row of the table of faces: corners, normal, lift, body; then normals and texture coordinates of the corners.
 CORNER = next(_offset)
 _offsets(8)
 FACE_NORMAL = next(_offset)
 _offsets(2)
-LIFT, PULL, FACE_BODY, _, NORMAL = _offsets(5)
+LIFT, FACE_BODY, THIRD_0, THIRD_1, NORMAL = _offsets(5)
 _offsets(8)
 COORDINATE = next(_offset)
-_offsets(6)
+_offsets(5)
+THIRD_2 = next(_offset)
 PX, PY, PZ = _offsets(3)  # the hit, drawn to the middle of its face
 GX, GY, GZ = _offsets(3)  # the face's normal on the ray's side
 OX, OY, OZ = _offsets(3)  # where rays start that stay on that side
@@ -68,7 +68,7 @@ R0, R1, R2, K0, K1, K2, E0, E1, E2, SCATTERED, GLOSS, EXPONENT, HALF_FROM, ROUGH
 CLEAR = next(_offset)  # share let through
 T0, T1, T2 = _offsets(3)  # colour of the texture
 LX, LY, LZ, COSINE, HALF, SHINE, CONE = _offsets(7)  # of the light at hand
-C0, C1, C2, WANTED = _offsets(4)  # what its shadow rays would let through, and 1 where there is one
+C0, C1, C2, WANTED, LEFT = _offsets(5)  # what its shadow rays would let through, and 1 where there is one, or is left
 L0, L1, L2 = _offsets(3)  # light that a ray brings
 Q0, Q1, Q2 = _offsets(3)  # colours of images
 QUAD = next(_offset)  # the same, four numbers a lane
@@ -93,7 +93,7 @@ _SINGLES = next(_offset)
 # Quantities in float64. Of a noise: place, sum and strength of the octave.
 _offset = count(0, BLOCK)
 SX, SY, SZ, TOTAL, STRENGTH = _offsets(5)
-SU, SV = _offsets(2)  # place in an image
+SU, SV, SW = _offsets(3)  # texture coordinates of the hit
 RAY = next(_offset)  # origin and direction of a camera ray, of any length; two to spare
 _offsets(7)
 _DOUBLES = next(_offset)
@@ -228,36 +228,6 @@ def _transposed(builder: Any, rows: Any) -> Any:
                 turned[i + step] = builder.shuffle_vector(a, b, ir.Constant(kind, high))
         rows = turned
     return rows
-
-
-def _side(typing: Any, values: Any, at: Any, width: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        number = ir.FloatType()
-        data = context.make_array(values)(context, builder, arguments[0]).data
-        place, found = builder.gep(data, [arguments[1]]), cgutils.alloca_once(builder, number)
-        for many in (16, 8, 4):  # the width is a constant after inlining: one of them stays
-            with builder.if_then(builder.icmp_signed("==", arguments[2], ir.Constant(arguments[2].type, many))):
-                vector = ir.VectorType(number, many)
-                row, ends = builder.load(builder.bitcast(place, vector.as_pointer()), align=4), []
-                for end in ("fmax", "fmin"):
-                    reduce = builder.module.declare_intrinsic(
-                        f"llvm.vector.reduce.{end}.v{many}f32", fnty=ir.FunctionType(number, [vector])
-                    )
-                    ends.append(builder.call(reduce, [row], fastmath=("nnan", "nsz")))
-                builder.store(builder.fsub(*ends), found)
-        return builder.load(found)
-
-    return types.float32(values, types.intp, types.intp), generate
-
-
-@compiled_by(_side)
-def side(values: Any, at: Any, width: Any) -> Any:
-    """Largest less smallest of 16, 8 or 4 numbers, none of them NaN.
-
-    LLVM makes no vectors of numba's minima: one number after the other takes 4 ns a ray (*Apples*, full `setup1`,
-    2026-11-25).
-    """
-    return max(values[at : at + width]) - min(values[at : at + width])
 
 
 def _bits_of(typing: Any, number: Any) -> Any:

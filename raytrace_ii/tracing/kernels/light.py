@@ -150,6 +150,24 @@ def keep_rays(lanes, first, rays, shadows, row, single):
 
 
 @stage_kernel
+def set_aside(first, lanes, rays, single):
+    """Keep a copy of ``WANTED``, from which those shadow rays go that start within a body."""
+    for k in range(BLOCK):
+        single[at.LEFT + k] = single[at.WANTED + k]
+    if rays.inside.shape[1] > 0:
+        for k in range(lanes):
+            within = rays.inside[np.uint64(first + k), 0] >= 0
+            single[at.WANTED + k] = _ZERO if within else single[at.WANTED + k]
+
+
+@stage_kernel
+def take_left(single):
+    """Want those shadow rays that were set aside and are not done."""
+    for k in range(BLOCK):
+        single[at.WANTED + k] = single[at.LEFT + k] - single[at.WANTED + k]
+
+
+@stage_kernel
 def add_free(single):
     """Add the light of one light that arrives."""
     for k in range(BLOCK):

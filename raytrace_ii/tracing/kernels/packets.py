@@ -22,7 +22,7 @@ from ii_core.base.jit import inline_kernel, lane_kernel, part_kernel
 
 from . import lanes as at
 from .addresses import call
-from .lanes import BLOCK, NO_END, side
+from .lanes import BLOCK, NO_END
 from .vectors import three_of_row
 
 # Rows of a packet.
@@ -58,11 +58,13 @@ NO_CALLS = Calls(0, 0, 0, 0, 0, 0, np.float32(0), np.float32(0))
 class Tools(NamedTuple):
     """Embree's calls for a packet in lanes: nearest hit, whether anything stops a ray, and which lanes are traced.
 
-    The address of a function is 0 if Embree cannot be called so, or if nothing stops any ray.
+    The address of a function is 0 if Embree cannot be called so, or if nothing stops any ray. ``clear`` is whether
+    a ray meets a face that lets light through.
     """
 
     nearest: Calls
     occluded: Calls
+    clear: Calls
     active: NDArray[np.int32]
     chosen: NDArray[np.int32]
 
@@ -117,20 +119,20 @@ def _begin(packet, numbers, width):
 
 
 @stage_kernel
-def _spread(packet, first, width):
-    """Sum of the sides of the box around a quantity of three rows."""
-    total = np.float32(0)
-    for c in range(first, first + 3):
-        total += side(packet, c * width, width)
-    return total
-
-
-@stage_kernel
 def _together(packet, calls, ahead, width):
-    """Whether rays are near enough to each other for coherent tracing, at their origins and ``ahead`` of them."""
-    x, y, z = packet[DIRECTION * width], packet[(DIRECTION + 1) * width], packet[(DIRECTION + 2) * width]
-    apart, turned = _spread(packet, np.int64(0), width), _spread(packet, np.int64(DIRECTION), width)
-    return (apart + turned * ahead <= calls.near) & (turned <= calls.narrow * (abs(x) + abs(y) + abs(z)))
+    """Whether rays are near enough to the first for coherent tracing, at their origins and ``ahead`` of them."""
+    x, y, z = packet[0], packet[width], packet[2 * width]
+    dx, dy, dz = packet[DIRECTION * width], packet[(DIRECTION + 1) * width], packet[(DIRECTION + 2) * width]
+    narrow, apart = calls.narrow * (abs(dx) + abs(dy) + abs(dz)), 0
+    for lane in range(width):
+        away = abs(packet[lane] - x) + abs(packet[width + lane] - y) + abs(packet[2 * width + lane] - z)
+        turned = (
+            abs(packet[4 * width + lane] - dx)
+            + abs(packet[5 * width + lane] - dy)
+            + abs(packet[6 * width + lane] - dz)
+        )
+        apart += (away + turned * ahead > calls.near) | (turned > narrow)
+    return apart == 0
 
 
 @stage_kernel
@@ -240,8 +242,8 @@ def nearest_of_lanes(tools, first_of_same, ahead, lanes, work, width):
 
 
 @stage_kernel
-def occluded_of_lanes(tools, work, width):
-    """Take those shadow rays in the lanes out of ``WANTED`` that a face stops."""
+def occluded_of_lanes(tools, calls, work, width):
+    """Take those shadow rays in the lanes out of ``WANTED`` that meet a face."""
     single, room = work.single, at.PACKET
     packet, numbers = single[room : room + PACKET_ROWS * width], work.bits[room : room + PACKET_ROWS * width]
     for first in range(0, BLOCK, width):
@@ -267,7 +269,7 @@ def occluded_of_lanes(tools, work, width):
             packet[FAR * width + lane] = single[at.REACH + first + lane]
         for lane in range(width):
             tools.active[lane] = -1 if single[at.WANTED + first + lane] > 0 else 0
-        _trace(tools.occluded, tools.active, tools.chosen, packet, np.float32(0), some, width)
+        _trace(calls, tools.active, tools.chosen, packet, np.float32(0), some, width)
         for lane in range(width):
             free = packet[FAR * width + lane] >= 0
             single[at.WANTED + first + lane] = single[at.WANTED + first + lane] if free else np.float32(0)
@@ -313,7 +315,7 @@ def packet_kernels(width: int) -> tuple[Any, Any]:
             _take(first, lanes, origins, directions, reach, o, d, end, single)
             for k in range(BLOCK):
                 single[at.WANTED + k] = np.float32(1) if k < lanes else np.float32(0)
-            occluded_of_lanes(tools, work, wide)
+            occluded_of_lanes(tools, tools.occluded, work, wide)
             for k in range(lanes):
                 found[first + k] = -1 if single[at.WANTED + k] > 0 else 0
 

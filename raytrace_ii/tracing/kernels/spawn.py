@@ -20,7 +20,6 @@ from .tables import (
     PASSED,
     REFLECTION,
     REFRACTION,
-    SPAWNED,
     TRANSMISSION,
     WEAK_REFLECTION,
     WEAK_REFRACTION,
@@ -39,7 +38,7 @@ def reflect(generation, first, lanes, _):
             continue
         m0, m1, m2 = _mirrored(k, g.work.single)
         if max(m0, m1, m2) >= g.passage.least:
-            _reflect(k, first + k, m0, m1, m2, g.rays, g.following, g.work, g.counts)
+            _reflect(k, first + k, m0, m1, m2, g.rays, g.passage, g.following, g.work, g.counts)
         else:
             g.counts[WEAK_REFLECTION] += max(m0, m1, m2) > 0.0
 
@@ -48,7 +47,8 @@ def reflect(generation, first, lanes, _):
 def spawn(generation, first, lanes, _):
     """Write the rays that the hits of a block send on, over mirrors and through what is clear.
 
-    All rays of a hit stand side by side: the order in which a pixel's light is added depends on no block.
+    Those that go through stand before all that are mirrored, which run apart from them: the order in which a pixel's
+    light is added depends on no block.
     """
     g = value_at(generation)
     rays, passage, following, work, counts = g.rays, g.passage, g.following, g.work, g.counts
@@ -69,7 +69,7 @@ def spawn(generation, first, lanes, _):
         elif work.single[at.ROUGH + k] > 0.0:
             _reflect_over_lobe(k, i, m0, m1, m2, rays, passage, following, work, counts)
         else:
-            _reflect(k, i, m0, m1, m2, rays, following, work, counts)
+            _reflect(k, i, m0, m1, m2, rays, passage, following, work, counts)
 
 
 @inline_kernel
@@ -83,7 +83,7 @@ def _mirrored(k, single):
 
 
 @stage_kernel
-def _send(k, i, kind, ox, oy, oz, dx, dy, dz, w0, w1, w2, rays, following, work, counts):
+def _send(k, i, kind, ox, oy, oz, dx, dy, dz, w0, w1, w2, rays, passage, following, work, counts):
     """Write a ray that a lane sends on, with the pixel, bodies around it and place in lobes of the ray before.
 
     Returns
@@ -91,7 +91,7 @@ def _send(k, i, kind, ox, oy, oz, dx, dy, dz, w0, w1, w2, rays, following, work,
     int
         Its row.
     """
-    row = counts[SPAWNED]
+    row = passage.mirrored + counts[kind] if kind == REFLECTION else counts[REFRACTION] + counts[PASSED]
     put(following.origins, row, ox, oy, oz)
     put(following.directions, row, dx, dy, dz)
     put(following.weights, row, w0, w1, w2)
@@ -103,7 +103,6 @@ def _send(k, i, kind, ox, oy, oz, dx, dy, dz, w0, w1, w2, rays, following, work,
     if following.keys.shape[0] > 0:
         following.keys[row] = rays.keys[i]
     counts[kind] += 1
-    counts[SPAWNED] += 1
     return row
 
 
@@ -119,7 +118,7 @@ def _pass_through(k, i, rays, surfaces, passage, following, work, counts):
         single[at.ENTERING + k] > 0.0,
     )  # fmt: skip
     dx, dy, dz = three_doubles(single, at.DX, k)
-    _send(k, i, PASSED, x, y, z, dx, dy, dz, b0, b1, b2, rays, following, work, counts)
+    _send(k, i, PASSED, x, y, z, dx, dy, dz, b0, b1, b2, rays, passage, following, work, counts)
 
 
 @stage_kernel
@@ -161,7 +160,7 @@ def _refract(k, i, m0, m1, m2, rays, materials, passage, following, work, counts
             x, y, z = (
                 single[at.PX + k] - lift * gx, single[at.PY + k] - lift * gy, single[at.PZ + k] - lift * gz,
             )  # fmt: skip
-            row = _send(k, i, REFRACTION, x, y, z, tx, ty, tz, t0, t1, t2, rays, following, work, counts)
+            row = _send(k, i, REFRACTION, x, y, z, tx, ty, tz, t0, t1, t2, rays, passage, following, work, counts)
             cross(following.inside, row, body, entering)
     return m0, m1, m2
 
@@ -187,14 +186,14 @@ def _reflect_over_lobe(k, i, m0, m1, m2, rays, passage, following, work, counts)
         if along <= 0.0:  # out of the face that it would go into
             rx, ry, rz = rx - 2.0 * along * gx, ry - 2.0 * along * gy, rz - 2.0 * along * gz
         row = _send(
-            k, i, REFLECTION, ox, oy, oz, rx, ry, rz, share * m0, share * m1, share * m2, rays, following, work,
-            counts,
+            k, i, REFLECTION, ox, oy, oz, rx, ry, rz, share * m0, share * m1, share * m2, rays, passage, following,
+            work, counts,
         )  # fmt: skip
         following.keys[row] = mix_bits(key + np.uint64(j))
 
 
 @stage_kernel
-def _reflect(k, i, m0, m1, m2, rays, following, work, counts):
+def _reflect(k, i, m0, m1, m2, rays, passage, following, work, counts):
     """The ray over a smooth mirror."""
     single = work.single
     dx, dy, dz = three_doubles(work.single, at.DX, k)
@@ -206,7 +205,7 @@ def _reflect(k, i, m0, m1, m2, rays, following, work, counts):
     if rx * gx + ry * gy + rz * gz <= 0.0:  # nor may a bent normal send a reflection into the face
         twice = 2.0 * (dx * gx + dy * gy + dz * gz)
         rx, ry, rz = dx - twice * gx, dy - twice * gy, dz - twice * gz
-    _send(k, i, REFLECTION, ox, oy, oz, rx, ry, rz, m0, m1, m2, rays, following, work, counts)
+    _send(k, i, REFLECTION, ox, oy, oz, rx, ry, rz, m0, m1, m2, rays, passage, following, work, counts)
 
 
 @inline_kernel

@@ -9,16 +9,17 @@ LEAST_WEIGHT = 0.5 / 255 / 12.92
 FAR = np.float32(1e30)  # how far a shadow ray to a directional light reaches, in its own lengths
 # What is counted.
 (
-    REFLECTION, REFRACTION, WEAK_SHADOW, WEAK_REFLECTION, WEAK_REFRACTION, PASSED, SPAWNED, SHADOW, SHADOW_PACKETS,
-    UNTESTED, EMBREE_TICKS, TICKS, COUNTS,
-) = range(13)  # fmt: skip
+    REFLECTION, REFRACTION, WEAK_SHADOW, WEAK_REFLECTION, WEAK_REFRACTION, PASSED, SHADOW, SHADOW_PACKETS, UNTESTED,
+    EMBREE_TICKS, TICKS, COUNTS,
+) = range(12)  # fmt: skip
 IMAGE, CHECKER, NOISE, VERTEX, STRIPES = 0, 1, 2, 3, 4  # kinds of texture
 REPEAT, MIRROR, CLAMP = 0, 1, 2  # how an image goes on beyond its border
 POINT, DIRECTIONAL, SPOT = 0, 1, 2  # kinds of light
 
-# Columns of the table of faces, float32: corners, unit normal, lift and pull, body; then, unless all are flat and
-# without images, normals of the corners and their (u, v).
-CORNERS, FACE, BODY, FLAT_COLUMNS, NORMALS, COORDINATES, ALL_COLUMNS = 0, 9, 14, 16, 16, 25, 32
+# Columns of the table of faces, float32: corners, unit normal and lift, body; then, unless all are flat and without
+# textures, normals of the corners and their (u, v), whose third coordinates stand where room is left.
+CORNERS, FACE, BODY, FLAT_COLUMNS, NORMALS, COORDINATES, ALL_COLUMNS = 0, 9, 13, 16, 16, 25, 32
+THIRD = [14, 15, 31]
 # Columns of the table of materials, a row a body; colours have three. The first `LANED` are brought to lanes as they
 # stand, see lanes.py.
 COLOUR, MIRROR_SHARE, EMISSION, LOCAL, SPECULAR, SHININESS, LEAST_HALF = 0, 3, 6, 9, 10, 11, 12

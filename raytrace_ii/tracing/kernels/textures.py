@@ -18,6 +18,8 @@ _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
 _MANTISSA, _EXPONENT_0, _23, _127 = np.int32(0x7FFFFF), np.int32(0x3F800000), np.int32(23), np.int32(127)
 # of the logarithm: 2/ln 2 · 1/(2k + 1)
 _C0, _C1, _C2, _C3, _C4, _C5 = (np.float32(2 / math.log(2) / k) for k in (1, 3, 5, 7, 9, 11))
+_PER_OCTAVE, _LEAST_EXPONENT = np.float32(1 / math.log(2)), np.float32(-126)
+_E2, _E3, _E4, _E5, _E6 = (np.float32(1 / math.factorial(k)) for k in (2, 3, 4, 5, 6))
 
 
 @part_kernel
@@ -118,6 +120,16 @@ def logarithm(x):
     q = t * t
     series = _C0 + q * (_C1 + q * (_C2 + q * (_C3 + q * (_C4 + q * _C5))))
     return np.float32(np.int32(number >> _23) - _127) + t * series
+
+
+@inline_kernel
+def exponential(x):
+    """e^x of a float32 up to 0: exponent, and a series of the rest, for vectors; below 2⁻¹²⁶ that."""
+    y = max(x * _PER_OCTAVE, _LEAST_EXPONENT)
+    n = np.floor(y + _HALF)
+    t = (y - n) / _PER_OCTAVE
+    series = _ONE + t * (_ONE + t * (_E2 + t * (_E3 + t * (_E4 + t * (_E5 + t * _E6)))))
+    return series * single_of(np.int32((np.int32(n) + _127) << _23))
 
 
 @inline_kernel

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ii_core.base.jit import inline_kernel, part_kernel
@@ -25,23 +27,34 @@ def interpolate(values, f, u, v):
 
 
 @inline_kernel
-def start_point(corners, faces, f, u, v):
-    """The hit point drawn a hair towards the middle of its face, for rays to start from.
-
-    On an edge it would lie in the neighbouring face too, which a ray from there cannot meet: light would come in
-    at the corners of a closed room.
-    """
-    u, v, pull = float(u), float(v), float(faces[f, 4])
-    return interpolate(corners, f, u + pull * (1.0 / 3.0 - u), v + pull * (1.0 / 3.0 - v))
-
-
-@inline_kernel
 def edge(corners, f, k):
     return (
         np.float64(corners[f, k, 0]) - corners[f, 0, 0],
         np.float64(corners[f, k, 1]) - corners[f, 0, 1],
         np.float64(corners[f, k, 2]) - corners[f, 0, 2],
     )
+
+
+@inline_kernel
+def pull_by(lift, one, ax, ay, az, bx, by, bz):
+    """Share of the way to the middle of a face that is about as long as its lift, by its lift and two edges."""
+    cx, cy, cz = bx - ax, by - ay, bz - az
+    longest = max(ax * ax + ay * ay + az * az, max(bx * bx + by * by + bz * bz, cx * cx + cy * cy + cz * cz))
+    return min(lift / math.sqrt(longest if longest > 0 else one), one / 4)
+
+
+@inline_kernel
+def start_point(corners, faces, f, u, v):
+    """The hit point drawn a hair towards the middle of its face, for rays to start from.
+
+    On an edge it would lie in the neighbouring face too, which a ray from there cannot meet: light would come in
+    at the corners of a closed room.
+    """
+    u, v = float(u), float(v)
+    ax, ay, az = edge(corners, f, 1)
+    bx, by, bz = edge(corners, f, 2)
+    pull = pull_by(float(faces[f, 3]), 1.0, ax, ay, az, bx, by, bz)
+    return interpolate(corners, f, u + pull * (1.0 / 3.0 - u), v + pull * (1.0 / 3.0 - v))
 
 
 @part_kernel

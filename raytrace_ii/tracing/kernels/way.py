@@ -26,7 +26,7 @@ from .attributes import (
     up_to_smooth,
 )
 from .lanes import BLOCK
-from .light import add_free, in_cone, keep_rays, lift_rays, towards_light, weigh
+from .light import add_free, in_cone, keep_rays, lift_rays, set_aside, take_left, towards_light, weigh
 from .packets import nearest_of_lanes, occluded_of_lanes
 from .sky import add_background
 from .start import start_lanes
@@ -91,7 +91,7 @@ def way_kernel(width: int) -> Any:
             if stages.spawn and hits > 0:
                 call(stages.spawn, here, first, lanes, 0)
             g.counts[TICKS] += ticks() - start if timed else 0
-            if first == _TRIED and g.counts[SHADOW] < _SPARSE * BLOCK * g.counts[SHADOW_PACKETS]:
+            if first == _TRIED and not later and g.counts[SHADOW] < _SPARSE * BLOCK * g.counts[SHADOW_PACKETS]:
                 later, g.counts[UNTESTED] = True, 1
 
     return follow
@@ -134,7 +134,15 @@ def light_up(g, first, lanes, timed, later, wide):
         if g.counts[UNTESTED] == 0:
             g.counts[SHADOW_PACKETS] += 1
             before = ticks() if timed else 0
-            occluded_of_lanes(g.tools, g.work, wide)
+            calls, clear = g.tools.occluded, later and g.tools.clear.packet != 0
+            for test in range(1 + clear):  # one call of a part that is inlined: two would be compiled
+                if test == 1:
+                    calls = g.tools.clear
+                    set_aside(first, lanes, g.rays, single)
+                occluded_of_lanes(g.tools, calls, g.work, wide)
+            if clear:
+                add_free(single)
+                take_left(single)
             g.counts[EMBREE_TICKS] += ticks() - before if timed else 0
         if later:
             row = light * g.rays.pixels.shape[0] + g.lit[light]

@@ -262,7 +262,8 @@ def test_narrower_cpus_and_embreex_give_the_same_pictures(configuration, says, u
     assert says in render(hall(), SMALL).stats.embree
     other = pictures()
     for name, expected in usual_pictures.items():
-        if name.startswith("small"):
+        single = says == "embreex" and "depth" not in name
+        if name.startswith("small") and not single:
             np.testing.assert_array_equal(other[name], expected, err_msg=name)
             continue
         # Single pixels differ by a float32 rounding, presumably where a ray meets the edge of two faces: either
@@ -274,7 +275,8 @@ def test_narrower_cpus_and_embreex_give_the_same_pictures(configuration, says, u
             assert np.argwhere(differs.any(axis=-1)).tolist() in ([], [[0, 23]])
             assert np.abs(other[name].astype(float) - expected).max() <= 2
             continue
-        assert differs.sum() <= 4, name
+        # Packets add light that meets no glass before that of other rays of a pixel: up to 7 of 5952 numbers.
+        assert differs.sum() <= (differs.size // 500 if single else 4), name
         step = 2.0**-22 * expected[differs] if "depth" in name else 1
         assert (np.abs(other[name][differs].astype(float) - expected[differs]) <= step).all(), name
 

@@ -92,7 +92,7 @@ def agree(scene, monkeypatch):
         monkeypatch.setattr(tracer, name, getattr(tracer, name).py_func)
     # Python can call neither Embree nor a stage by address: Embree's hits come in arrays, the function stands for its
     # address and a tuple for its place
-    monkeypatch.setattr(Intersector, "tools", lambda *_: Tools(NO_CALLS, NO_CALLS, *lane_masks()))
+    monkeypatch.setattr(Intersector, "tools", lambda *_: Tools(NO_CALLS, NO_CALLS, NO_CALLS, *lane_masks()))
     monkeypatch.setattr(tracer, "way_kernel", lambda width: way.way_kernel(width).py_func)
     monkeypatch.setattr(tracer, "addresses", lambda stages, _: {stage: stage.py_func for stage in stages})
     monkeypatch.setattr(way, "call", lambda stage, *arguments: stage(*arguments))
