@@ -39,6 +39,7 @@ PIXELS = {
     "rotated": "1c1d667939667f5b19d172dd13ee2637d5e29ae8e9c7d0f11a44a72bcd47be85",
     "dependent": "acb8e241356f7e43f530b611839fbefbbac435bae303635eafc0b8c355efe3cf",
     "directed": "f3d2f5aaf76a3db69ab2b2cb58612ba11f7fbc5b101a8a96d99cedcffffb3b84",
+    "parted": "4fed4243261259d830d4fb3764e1c4d2ab4062f7e87ff84fe47535170d7c80a9",
     "row": "8779e10e45bc0ef8e8a3921c5f3ed192d0b0dad3092e0d9619ae1a54c87281c0",
     "exact": "be2c46c242ca2aae010544f6e178dd5dfa93b5aec5566384427e4a469a1b2cfd",
 }
