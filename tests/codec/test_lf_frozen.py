@@ -1,4 +1,4 @@
-"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 9: the same bytes decode to the same pixels on every machine.
+"""Frozen streams of `si-lf`, versions 3, 5 and 7 to 10: the same bytes decode to the same pixels on every machine.
 
 In ``tests/golden/lf.zip``, ``lossy.ii`` holds 6×6 views of *Apples* of 40×28 pixels at quantiser 34, ``exact.ii`` 6×6
 views of 8×6 pixels of 16 bits, lossless; the encoder of f44d50a wrote both. ``skipped.ii``, of version 5, holds 6×6
@@ -6,7 +6,8 @@ views of *Apples* at quantiser 26; the first encoder that left out transforms wr
 *Apples* of 32×16 pixels at quantiser 36, by cdd3aba: its first view is matched to one that no other view is made of.
 ``tuned.ii`` and ``rotated.ii``, of version 7, hold 7×6 views of 58×38 pixels and 7×2 of them of the benchmark's 9×9
 views of *Apples*, at quantiser 36, tuned by ctc and rgb; 046fc0d wrote them. ``dependent.ii``, of
-version 8, and ``directed.ii``, of version 9, hold 5×4 of those views of 46×35 pixels at quantiser 32. The decoder has
+version 8, ``directed.ii``, of version 9, and ``parted.ii``, of version 10, hold 5×4 of those views of 46×35 pixels at
+quantiser 32. The decoder has
 integer arithmetic alone, so that a hash of the pixels is the expectation.
 """
 
@@ -24,7 +25,7 @@ import pytest
 
 from codec import Encoded, decode
 from codec.coders.lf import stream
-from codec.coders.lf.blocks import CODED, DIRECTION, EXPLICIT, INTRA, KIND, LOG, SKIPPED, SYNTHESIS
+from codec.coders.lf.blocks import CODED, DIRECTION, EXPLICIT, INTRA, KIND, LOG, SKIPPED, SYNTHESIS, TALL, WIDE
 from codec.coders.lf.field import Field
 from codec.coders.lf.pyramid import ALIKE, NEAREST, _spread, pyramid
 from ii_core.base.jit import lean_kernel, part_kernel
@@ -38,6 +39,7 @@ PIXELS = {
     "rotated": "1c1d667939667f5b19d172dd13ee2637d5e29ae8e9c7d0f11a44a72bcd47be85",
     "dependent": "acb8e241356f7e43f530b611839fbefbbac435bae303635eafc0b8c355efe3cf",
     "directed": "f3d2f5aaf76a3db69ab2b2cb58612ba11f7fbc5b101a8a96d99cedcffffb3b84",
+    "parted": "4fed4243261259d830d4fb3764e1c4d2ab4062f7e87ff84fe47535170d7c80a9",
     "row": "8779e10e45bc0ef8e8a3921c5f3ed192d0b0dad3092e0d9619ae1a54c87281c0",
     "exact": "be2c46c242ca2aae010544f6e178dd5dfa93b5aec5566384427e4a469a1b2cfd",
 }
@@ -51,6 +53,7 @@ VERSIONS = {
     "rotated": stream.TUNED,
     "dependent": stream.DEPENDENT,
     "directed": stream.DIRECTED,
+    "parted": stream.PARTED,
 }
 
 
@@ -85,7 +88,7 @@ def test_the_lossy_stream_has_all_kinds_of_blocks(monkeypatch):
 
 def test_versions_are_the_numbers_in_the_streams():
     numbers = stream.UNCROSSED, stream.VERSION, stream.SKIPPING, stream.SKIPPING_UNCROSSED
-    assert (*numbers, *stream.FLAGGED) == (2, 3, 5, 6, 7, 8, 9)
+    assert (*numbers, *stream.FLAGGED) == (2, 3, 5, 6, 7, 8, 9, 10)
 
 
 def test_the_third_stream_has_blocks_without_a_transform(monkeypatch):
@@ -116,6 +119,25 @@ def test_the_directed_stream_has_each_kind_of_transform_and_of_modes(monkeypatch
     decode(Encoded.load(FOLDER / "directed.ii"))
     assert {0, 2, 4, 6} <= kinds
     assert {0, 1, 10, 27} <= modes and len(modes) > 20
+
+
+def test_the_parted_stream_has_blocks_of_unequal_sides(monkeypatch):
+    """Wide and tall ones, halved once and twice, of each kind of prediction and with sines."""
+    found, transforms, code = set(), set(), Field.code
+
+    def noting(field, coder, job, work, *same):
+        code(field, coder, job, work, *same)
+        fields = job.blocks[[KIND, TALL, WIDE]].reshape(3, -1).tolist()
+        found.update(zip(*fields, strict=True))
+        unequal = (job.blocks[TALL] != job.blocks[WIDE]) & (job.blocks[CODED] == 1)
+        transforms.update(job.blocks[SKIPPED][unequal].tolist())
+
+    monkeypatch.setattr(Field, "code", noting)
+    decode(Encoded.load(FOLDER / "parted.ii"))
+    assert {np.sign(tall - wide) for kind, tall, wide in found if kind == INTRA} == {-1, 0, 1}
+    assert {kind for kind, tall, wide in found if tall != wide} >= {INTRA, EXPLICIT}
+    assert max(abs(tall - wide) for _, tall, wide in found) == 2
+    assert {0, 2, 4, 6} <= transforms
 
 
 def test_the_tuned_stream_has_filters_of_several_kinds(monkeypatch):

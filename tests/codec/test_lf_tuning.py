@@ -113,6 +113,7 @@ def test_headers_are_read_as_they_were_written(numbers, lattice, tools, scales, 
         filtered=tools[1],
         dependent=version > stream.TUNED,
         directed=version > stream.DEPENDENT,
+        parted=version > stream.DIRECTED,
         steps=tuple(rng.integers(1, (1 << 18) + 1, log_stride + 2).tolist()),
     )
     levels = [rng.bytes(int(rng.integers(0, 300))) for _ in header.steps]

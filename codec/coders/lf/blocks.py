@@ -24,10 +24,11 @@ from .coefficients import code_coefficients
 from .cross import code_cross, keep_first, rebuild
 from .intra import MODES, SMOOTH, fill_border, predict_intra
 from .samples import LARGEST_SKIPPED, code_samples
-from .transform import LARGEST, SINE_ACROSS, SINE_DOWN
+from .transform import LARGEST, SINE_ACROSS, SINE_DOWN, sides, size_of
 from .warp import LATTICE, lead, moved_block
 
 LOG_LARGEST, LOG_LEAST = 5, 2
+MOST_HALVINGS = 2  # of a square
 INTRA, EXPLICIT, SYNTHESIS, TIMED, MIXED = range(5)
 MOST_REFERENCES = 4
 SIDE, STRAIGHT = 17, 8  # directions from one side, and the place of the straight one among them
@@ -37,7 +38,7 @@ LARGE_BYTES = 1 << 20
 UNKNOWN = -32768  # disparity
 DIFFERENT = 205  # disparities that lead this far apart, in 2^-8 samples, are of different surfaces
 # What is known of each 4×4. SKIPPED is 1 without a transform, else twice its kind.
-KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, CROSS_1, CROSS_2, SKIPPED, FIELDS = range(11)
+KIND, INDEX, MASK, DIRECTION, LOG, CODED, DONE, CROSS_1, CROSS_2, SKIPPED, TALL, WIDE, PARTS, FIELDS = range(14)
 
 
 class Job(NamedTuple):
@@ -84,6 +85,8 @@ class Job(NamedTuple):
         Whether the quantiser of coefficients is a dependent one.
     directed : int
         Whether intra blocks have the modes and transforms of version 9.
+    parted : int
+        How often squares may be halved.
     """
 
     views: Any
@@ -107,6 +110,7 @@ class Job(NamedTuple):
     finer: Any = 0
     dependent: Any = 0
     directed: Any = 0
+    parted: Any = 0
 
 
 class Work(NamedTuple):
@@ -174,17 +178,17 @@ def neighbours(blocks, field, value, by, bx):
 
 
 @tuned_kernel
-def doubt_class(job, by, bx, log):
+def doubt_class(job, by, bx, shape):
     """0–3 by how far the synthesis' sources differ in the block, in steps of the quantiser; 0 without synthesis."""
     if not job.synthesised:
         return 0
     height, width = job.doubt.shape
-    size = 1 << (log - 2)
+    h, w = sides(shape)
     total = np.int64(0)
-    for y in range(by, min(by + size, height)):
-        for x in range(bx, min(bx + size, width)):
+    for y in range(by, min(by + (h >> 2), height)):
+        for x in range(bx, min(bx + (w >> 2), width)):
             total += job.doubt[y, x]
-    total <<= 8 - 2 * (log - 2)
+    total <<= 12 - shape[0] - shape[1]
     # ``doubt`` is in 2^-3, the step in 2^-7.
     return 0 if total < 2 * job.step else (1 if total < 5 * job.step else (2 if total < 12 * job.step else 3))
 
@@ -198,48 +202,48 @@ def split_context(job, by, bx, log):
         count += 1
     if bx > 0 and blocks[LOG, by, bx - 1] < log:
         count += 1
-    return at.SPLIT + ((log - 3) * 3 + count) * 4 + doubt_class(job, by, bx, log)
+    return at.SPLIT + ((log - 3) * 3 + count) * 4 + doubt_class(job, by, bx, (log, log))
 
 
 @tuned_kernel
-def synthesis_context(job, by, bx, log):
+def synthesis_context(job, by, bx, shape):
     """By size, how many of the blocks above and left are synthesised, and doubt."""
     like = neighbours(job.blocks, np.int64(KIND), np.int64(SYNTHESIS), by, bx)
-    return at.SYNTHESIS + ((log - 2) * 3 + like) * 4 + doubt_class(job, by, bx, log)
+    return at.SYNTHESIS + ((size_of(shape) - 2) * 3 + like) * 4 + doubt_class(job, by, bx, shape)
 
 
 @tuned_kernel
-def residual_context(job, by, bx, log, kind):
+def residual_context(job, by, bx, shape, kind):
     """By size, kind, how many of the blocks above and left have a residual, and doubt."""
     other = 0 if kind == SYNTHESIS else 1
     like = neighbours(job.blocks, np.int64(CODED), np.int64(1), by, bx)
     if kind >= TIMED:
-        return at.RESIDUAL_IN_TIME + ((log - 2) * 2 + (1 if kind == MIXED else 0)) * 3 + like
-    return at.RESIDUAL + (((log - 2) * 2 + other) * 3 + like) * 4 + doubt_class(job, by, bx, log)
+        return at.RESIDUAL_IN_TIME + ((size_of(shape) - 2) * 2 + (1 if kind == MIXED else 0)) * 3 + like
+    return at.RESIDUAL + (((size_of(shape) - 2) * 2 + other) * 3 + like) * 4 + doubt_class(job, by, bx, shape)
 
 
 @tuned_kernel
-def coded_context(plane, log, kind, first, skipped):
+def coded_context(plane, shape, kind, first, skipped):
     """By plane, size, kind, whether the first plane has a residual, and whether the transform is skipped."""
     if skipped == 1:
-        return at.SAMPLE_CODED + (plane * 2 + log - 2) * 2 + first
-    return at.CODED + ((plane * 4 + log - 2) * 2 + (1 if kind == INTRA else 0)) * 2 + first
+        return at.SAMPLE_CODED + (plane * 2 + size_of(shape) - 2) * 2 + first
+    return at.CODED + ((plane * 4 + size_of(shape) - 2) * 2 + (1 if kind == INTRA else 0)) * 2 + first
 
 
 @tuned_kernel
-def skipped_context(job, by, bx, log):
+def skipped_context(job, by, bx, shape):
     """By size, and how many of the blocks above and left have no transform."""
-    return at.SKIPPED + (log - 2) * 3 + neighbours(job.blocks, np.int64(SKIPPED), np.int64(1), by, bx)
+    return at.SKIPPED + (size_of(shape) - 2) * 3 + neighbours(job.blocks, np.int64(SKIPPED), np.int64(1), by, bx)
 
 
 @tuned_kernel
-def guesses(job, by, bx, log):
+def guesses(job, by, bx, shape):
     """Indices that the synthesis and the blocks left and above suggest; below the range where there is none."""
     none = job.low - 1
     made = left = above = none
     if job.synthesised:
-        half = (1 << log) >> 1
-        d = np.int64(job.disparity[by * 4 + half, bx * 4 + half])
+        h, w = sides(shape)
+        d = np.int64(job.disparity[by * 4 + (h >> 1), bx * 4 + (w >> 1)])
         made = min(max((2 * d + job.unit) // (2 * job.unit), job.low), job.high)
     if bx > 0 and job.blocks[KIND, by, bx - 1] == EXPLICIT:
         left = np.int64(job.blocks[INDEX, by, bx - 1])
@@ -249,9 +253,9 @@ def guesses(job, by, bx, log):
 
 
 @tuned_kernel
-def from_where(job, by, bx, log, index):
+def from_where(job, by, bx, shape, index):
     """Return the source that predicts an index: 1 synthesis, 2 block to the left, 3 block above, 0 none."""
-    made, left, above = guesses(job, by, bx, log)
+    made, left, above = guesses(job, by, bx, shape)
     none = job.low - 1
     if made > none and index == made:
         return 1
@@ -261,20 +265,21 @@ def from_where(job, by, bx, log, index):
 
 
 @tuned_kernel
-def seen_mask(job, by, bx, log, index):
+def seen_mask(job, by, bx, shape, index):
     """The references whose own disparity agrees at three of five places of the block, or is not known."""
     height, width = job.disparities.shape[1:]
-    quarter = (1 << log) >> 2
+    h, w = sides(shape)
+    down, right = h >> 2, w >> 2
     seen = 0
     for r in range(job.references.shape[0]):
-        view, across, down = job.references[r, 0], job.references[r, 1], job.references[r, 2]
+        view, columns, rows = job.references[r, 0], job.references[r, 1], job.references[r, 2]
         d = index * job.unit
-        farthest = max(abs(across), abs(down))
+        farthest = max(abs(columns), abs(rows))
         against = 0
         for place in range(5):
-            y = 4 * by + (2 * quarter if place == 4 else quarter + 2 * quarter * (place >> 1))
-            x = 4 * bx + (2 * quarter if place == 4 else quarter + 2 * quarter * (place & 1))
-            i, j = x + ((lead(d, across) + 128) >> 8), y + ((lead(d, down) + 128) >> 8)
+            y = 4 * by + (2 * down if place == 4 else down + 2 * down * (place >> 1))
+            x = 4 * bx + (2 * right if place == 4 else right + 2 * right * (place & 1))
+            i, j = x + ((lead(d, columns) + 128) >> 8), y + ((lead(d, rows) + 128) >> 8)
             if i < 0 or j < 0 or i >= width or j >= height:
                 against += 1
             else:
@@ -305,9 +310,9 @@ def expected_mask(job, by, bx, where, seen):
 
 
 @tuned_kernel
-def _made_context(made, left, none, log):
+def _made_context(made, left, none, shape):
     """By size, and whether the block left has the same index, another, or none."""
-    return at.MERGE + (log - 2) * 5 + (0 if left <= none else (1 if left == made else 2))
+    return at.MERGE + (size_of(shape) - 2) * 5 + (0 if left <= none else (1 if left == made else 2))
 
 
 @tuned_kernel
@@ -321,49 +326,49 @@ def likely_directions(blocks, by, bx):
 
 
 @tuned_kernel
-def mixed_context(job, by, bx, log):
+def mixed_context(job, by, bx, shape):
     """By size, and how many of the blocks above and left are mixed."""
-    return at.MIXED + (log - 2) * 3 + neighbours(job.blocks, np.int64(KIND), np.int64(MIXED), by, bx)
+    return at.MIXED + (size_of(shape) - 2) * 3 + neighbours(job.blocks, np.int64(KIND), np.int64(MIXED), by, bx)
 
 
 @tuned_kernel
-def code_kind(coder, job, by, bx, log, kind, index, mask, direction):
+def code_kind(coder, job, by, bx, shape, kind, index, mask, direction):
     """Write or read how a block is predicted; return kind, index, mask and direction.
 
     The index of a block predicted in time is its vector.
     """
     blocks, count = job.blocks, job.references.shape[0]
-    if job.past.shape[0] and code_bit(coder, motion.time_context(job, by, bx, log), 1 if kind >= TIMED else 0):
+    if job.past.shape[0] and code_bit(coder, motion.time_context(job, by, bx, shape), 1 if kind >= TIMED else 0):
         mixed = 0
         if job.synthesised:
-            mixed = code_bit(coder, mixed_context(job, by, bx, log), 1 if kind == MIXED else 0)
-        vector = motion.code_vector(coder, job, by, bx, log, index)
+            mixed = code_bit(coder, mixed_context(job, by, bx, shape), 1 if kind == MIXED else 0)
+        vector = motion.code_vector(coder, job, by, bx, shape, index)
         return np.int64(MIXED if mixed else TIMED), vector, mask, direction
     if count == 0:
         kind = INTRA
     else:
         made = 0
         if job.synthesised:
-            made = code_bit(coder, synthesis_context(job, by, bx, log), 1 if kind == SYNTHESIS else 0)
+            made = code_bit(coder, synthesis_context(job, by, bx, shape), 1 if kind == SYNTHESIS else 0)
         if made:
             kind = SYNTHESIS
         else:
             context = at.INTRA + neighbours(blocks, np.int64(KIND), np.int64(INTRA), by, bx)
             kind = INTRA if code_bit(coder, context, 1 if kind == INTRA else 0) else EXPLICIT
     if kind == SYNTHESIS:
-        index = guesses(job, by, bx, log)[0]
+        index = guesses(job, by, bx, shape)[0]
     elif kind == INTRA:
-        direction = _code_mode(coder, job, by, bx, log, direction)
+        direction = _code_mode(coder, job, by, bx, shape, direction)
     else:
-        index = _code_index(coder, job, by, bx, log, index)
-        where = from_where(job, by, bx, log, index)
-        seen = seen_mask(job, by, bx, log, index)
+        index = _code_index(coder, job, by, bx, shape, index)
+        where = from_where(job, by, bx, shape, index)
+        seen = seen_mask(job, by, bx, shape, index)
         mask = _code_mask(coder, job, by, bx, where, seen, mask) if count > 1 else 1
     return kind, index, mask, direction
 
 
 @tuned_kernel
-def mode_contexts(job, by, bx, log):
+def mode_contexts(job, by, bx, shape):
     """Of the first likely mode, the second, flat or smooth, and which of these; the last is -1 of even bits."""
     if not job.directed:
         return np.int64(at.INTRA_MODE), np.int64(at.INTRA_MODE + 1), np.int64(at.INTRA_MODE + 2), np.int64(-1)
@@ -371,15 +376,15 @@ def mode_contexts(job, by, bx, log):
     like = neighbours(blocks, np.int64(KIND), np.int64(INTRA), by, bx)
     if like == 2 and blocks[DIRECTION, by, bx - 1] == blocks[DIRECTION, by - 1, bx]:
         like = 3
-    first = np.int64(at.LIKELY + (log - 2) * 4 + like)
-    return first, first + 16, np.int64(at.UNDIRECTED + log - 2), np.int64(at.UNDIRECTED + 4)
+    first = np.int64(at.LIKELY + (size_of(shape) - 2) * 4 + like)
+    return first, first + 16, np.int64(at.UNDIRECTED + size_of(shape) - 2), np.int64(at.UNDIRECTED + 4)
 
 
 @tuned_kernel
-def _code_mode(coder, job, by, bx, log, mode):
+def _code_mode(coder, job, by, bx, shape, mode):
     """Write or read an intra mode: one of two likely ones, flat, smooth, or a direction."""
     first, second = likely_directions(job.blocks, by, bx)
-    one, two, undirected, smooth = mode_contexts(job, by, bx, log)
+    one, two, undirected, smooth = mode_contexts(job, by, bx, shape)
     if code_bit(coder, one, 1 if mode == first else 0):
         return first
     if code_bit(coder, two, 1 if mode == second else 0):
@@ -433,10 +438,10 @@ def _slope_cost(costs, value):
 
 
 @part_kernel
-def _mode_cost(costs, job, by, bx, log, mode):
+def _mode_cost(costs, job, by, bx, shape, mode):
     """Bits that `_code_mode` would take."""
     first, second = likely_directions(job.blocks, by, bx)
-    one, two, undirected, smooth = mode_contexts(job, by, bx, log)
+    one, two, undirected, smooth = mode_contexts(job, by, bx, shape)
     bits = bit_cost(costs, one, 1 if mode == first else 0)
     if mode == first:
         return bits
@@ -450,12 +455,12 @@ def _mode_cost(costs, job, by, bx, log, mode):
 
 
 @tuned_kernel
-def _code_index(coder, job, by, bx, log, index):
-    made, left, above = guesses(job, by, bx, log)
+def _code_index(coder, job, by, bx, shape, index):
+    made, left, above = guesses(job, by, bx, shape)
     none = job.low - 1
-    if made > none and code_bit(coder, _made_context(made, left, none, log), 1 if index == made else 0):
+    if made > none and code_bit(coder, _made_context(made, left, none, shape), 1 if index == made else 0):
         return made
-    context = at.MERGE + (log - 2) * 5 + 3
+    context = at.MERGE + (size_of(shape) - 2) * 5 + 3
     if left > none and left != made and code_bit(coder, context, 1 if index == left else 0):
         return left
     new = above > none and above != made and above != left
@@ -485,41 +490,41 @@ def _code_mask(coder, job, by, bx, where, seen, mask):
 
 
 @part_kernel
-def kind_cost(costs, job, by, bx, log, kind, index, mask, direction):
+def kind_cost(costs, job, by, bx, shape, kind, index, mask, direction):
     """Bits that `code_kind` would take; those of the references left out if the mask is 0."""
     blocks, count = job.blocks, job.references.shape[0]
     bits = np.float32(0)
     if job.past.shape[0]:
-        bits += bit_cost(costs, motion.time_context(job, by, bx, log), 1 if kind >= TIMED else 0)
+        bits += bit_cost(costs, motion.time_context(job, by, bx, shape), 1 if kind >= TIMED else 0)
     if kind >= TIMED:
         if job.synthesised:
-            bits += bit_cost(costs, mixed_context(job, by, bx, log), 1 if kind == MIXED else 0)
-        return bits + motion.vector_cost(costs, job, by, bx, log, index)
+            bits += bit_cost(costs, mixed_context(job, by, bx, shape), 1 if kind == MIXED else 0)
+        return bits + motion.vector_cost(costs, job, by, bx, shape, index)
     if count and job.synthesised:
-        bits += bit_cost(costs, synthesis_context(job, by, bx, log), 1 if kind == SYNTHESIS else 0)
+        bits += bit_cost(costs, synthesis_context(job, by, bx, shape), 1 if kind == SYNTHESIS else 0)
     if count and kind != SYNTHESIS:
         context = at.INTRA + neighbours(blocks, np.int64(KIND), np.int64(INTRA), by, bx)
         bits += bit_cost(costs, context, 1 if kind == INTRA else 0)
     if kind == INTRA:
-        bits += _mode_cost(costs, job, by, bx, log, direction)
+        bits += _mode_cost(costs, job, by, bx, shape, direction)
     elif kind == EXPLICIT:
-        bits += _index_cost(costs, job, by, bx, log, index)
+        bits += _index_cost(costs, job, by, bx, shape, index)
         if count > 1 and mask:
-            seen = seen_mask(job, by, bx, log, index)
-            bits += mask_cost(costs, job, by, bx, from_where(job, by, bx, log, index), seen, mask)
+            seen = seen_mask(job, by, bx, shape, index)
+            bits += mask_cost(costs, job, by, bx, from_where(job, by, bx, shape, index), seen, mask)
     return bits
 
 
 @part_kernel
-def _index_cost(costs, job, by, bx, log, index):
-    made, left, above = guesses(job, by, bx, log)
+def _index_cost(costs, job, by, bx, shape, index):
+    made, left, above = guesses(job, by, bx, shape)
     none = job.low - 1
     bits = np.float32(0)
     if made > none:
-        bits += bit_cost(costs, _made_context(made, left, none, log), 1 if index == made else 0)
+        bits += bit_cost(costs, _made_context(made, left, none, shape), 1 if index == made else 0)
         if index == made:
             return bits
-    context = at.MERGE + (log - 2) * 5 + 3
+    context = at.MERGE + (size_of(shape) - 2) * 5 + 3
     if left > none and left != made:
         bits += bit_cost(costs, context, 1 if index == left else 0)
         if index == left:
@@ -554,14 +559,14 @@ def mask_cost(costs, job, by, bx, where, seen, mask):
 
 
 @tuned_kernel
-def predict_explicit(job, work, y0, x0, n, index, mask):
+def predict_explicit(job, work, y0, x0, shape, index, mask):
     """work.predicted = the mean of the masked references at a disparity."""
-    d = index * job.unit
+    (h, w), d = sides(shape), index * job.unit
     count = 0
     predicted = work.predicted
     for p in range(3):
-        for y in range(n):
-            for x in range(n):
+        for y in range(h):
+            for x in range(w):
                 predicted[p, y, x] = 0
     for r in range(job.references.shape[0]):
         if (mask >> r) & 1:
@@ -573,7 +578,8 @@ def predict_explicit(job, work, y0, x0, n, index, mask):
                     p,
                     y0,
                     x0,
-                    n,
+                    h,
+                    w,
                     lead(d, job.references[r, 2]),
                     lead(d, job.references[r, 1]),
                     work.rows,
@@ -581,40 +587,42 @@ def predict_explicit(job, work, y0, x0, n, index, mask):
                 )
     if count == 3:
         for p in range(3):
-            for y in range(n):
-                for x in range(n):
+            for y in range(h):
+                for x in range(w):
                     predicted[p, y, x] = (np.int64(predicted[p, y, x]) * 21845 + (1 << 27)) >> 28
     else:
         shift = 11 + max(count, 1)
         if count == 4:
             shift = 14
         for p in range(3):
-            for y in range(n):
-                for x in range(n):
+            for y in range(h):
+                for x in range(w):
                     predicted[p, y, x] = np.int32(predicted[p, y, x] + np.int32(1 << (shift - 1))) >> shift
 
 
 @tuned_kernel
-def predict_synthesis(job, work, y0, x0, n):
+def predict_synthesis(job, work, y0, x0, shape):
     """work.predicted = the synthesised view."""
+    h, w = sides(shape)
     for p in range(3):
-        for y in range(n):
-            for x in range(n):
+        for y in range(h):
+            for x in range(w):
                 work.predicted[p, y, x] = job.made[p, y0 + y, x0 + x]
 
 
 @tuned_kernel
-def predict_direction(job, work, plane, y0, x0, n, direction):
+def predict_direction(job, work, plane, y0, x0, shape, direction):
     """work.predicted[plane] from the block's surroundings."""
-    fill_border(job.views, job.at, plane, job.blocks, np.int64(DONE), y0, x0, n, work.border, job.directed)
-    predict_intra(work.border, direction, n, work.predicted, plane, job.directed)
+    fill_border(job.views, job.at, plane, job.blocks, np.int64(DONE), y0, x0, shape, work.border, job.directed)
+    predict_intra(work.border, direction, shape, work.predicted, plane, job.directed)
 
 
 @tuned_kernel
-def store(job, work, plane, y0, x0, n, residual):
+def store(job, work, plane, y0, x0, shape, residual):
     """Decoded samples: the prediction, and work.block if there is a residual."""
-    for y in range(n):
-        for x in range(n):
+    h, w = sides(shape)
+    for y in range(h):
+        for x in range(w):
             value = work.predicted[plane, y, x]
             if residual:
                 value = min(max(np.int32(value + work.block[y, x]), -LIMIT), LIMIT)
@@ -622,35 +630,36 @@ def store(job, work, plane, y0, x0, n, residual):
 
 
 @tuned_kernel
-def mark(blocks, by, bx, log, kind, index, mask, direction, coded):
+def mark(blocks, by, bx, shape, leaf, kind, index, mask, direction, coded):
     """Note a block as decoded."""
-    size = 1 << (log - 2)
-    for y in range(by, by + size):
-        for x in range(bx, bx + size):
+    h, w = sides(shape)
+    for y in range(by, by + (h >> 2)):
+        for x in range(bx, bx + (w >> 2)):
             blocks[KIND, y, x] = kind
             blocks[INDEX, y, x] = index
             blocks[MASK, y, x] = mask
             blocks[DIRECTION, y, x] = direction if kind == INTRA else SMOOTH
-            blocks[LOG, y, x] = log
+            blocks[LOG, y, x], blocks[PARTS, y, x] = leaf[0], leaf[1]
+            blocks[TALL, y, x], blocks[WIDE, y, x] = shape[0], shape[1]
             blocks[CODED, y, x] = coded
             blocks[DONE, y, x] = 1
 
 
 @tuned_kernel
-def mark_block(job, by, bx, log, kind, index, mask, direction, coded):
+def mark_block(job, by, bx, shape, leaf, kind, index, mask, direction, coded):
     """Note a block as decoded, and its vector if there are earlier instants."""
     if job.past.shape[0]:
-        vector = index if kind >= TIMED else motion.inherited(job, by, bx, log)[0]
-        motion.note(job, by, bx, log, 1 if kind >= TIMED else 0, vector)
-    mark(job.blocks, by, bx, log, kind, 0 if kind >= TIMED else index, mask, direction, coded)
+        vector = index if kind >= TIMED else motion.inherited(job, by, bx, shape)[0]
+        motion.note(job, by, bx, shape, 1 if kind >= TIMED else 0, vector)
+    mark(job.blocks, by, bx, shape, leaf, kind, 0 if kind >= TIMED else index, mask, direction, coded)
 
 
 @tuned_kernel
-def _load_levels(job, work, plane, y0, x0, n):
+def _load_levels(job, work, plane, y0, x0, shape):
     """work.levels = the encoder's; return whether one is not zero."""
-    found = 0
-    for y in range(n):
-        for x in range(n):
+    (h, w), found = sides(shape), 0
+    for y in range(h):
+        for x in range(w):
             level = job.levels[plane, y0 + y, x0 + x]
             work.levels[y, x] = level
             if level:
@@ -659,33 +668,35 @@ def _load_levels(job, work, plane, y0, x0, n):
 
 
 @tuned_kernel
-def _note_levels(job, work, plane, y0, x0, n):
+def _note_levels(job, work, plane, y0, x0, shape):
     """job.levels = those decoded, contexts of the planes that follow."""
-    for y in range(n):
-        for x in range(n):
+    h, w = sides(shape)
+    for y in range(h):
+        for x in range(w):
             job.levels[plane, y0 + y, x0 + x] = work.levels[y, x]
 
 
 @tuned_kernel
-def note_skipped(blocks, by, bx, log, skipped):
+def note_skipped(blocks, by, bx, shape, skipped):
     """Note whether a block has no transform."""
-    size = 1 << (log - 2)
-    for y in range(by, by + size):
-        for x in range(bx, bx + size):
+    h, w = sides(shape)
+    for y in range(by, by + (h >> 2)):
+        for x in range(bx, bx + (w >> 2)):
             blocks[SKIPPED, y, x] = skipped
 
 
 @tuned_kernel
-def _clear(levels, n):
-    for y in range(n):
-        for x in range(n):
+def _clear(levels, shape):
+    h, w = sides(shape)
+    for y in range(h):
+        for x in range(w):
             levels[y, x] = 0
 
 
 @tuned_kernel
-def _code_transform(coder, log, kind):
+def _code_transform(coder, shape, kind):
     """Write or read the kind of transform of an intra block."""
-    context = np.int64(at.TRANSFORM + (log - 2) * 3)
+    context = np.int64(at.TRANSFORM + (size_of(shape) - 2) * 3)
     if not code_bit(coder, context, 1 if kind else 0):
         return 0
     if code_bit(coder, context + 1, 1 if kind == SINE_DOWN + SINE_ACROSS else 0):
@@ -694,9 +705,9 @@ def _code_transform(coder, log, kind):
 
 
 @part_kernel
-def transform_cost(costs, log, kind):
+def transform_cost(costs, shape, kind):
     """Bits that the kind of transform of an intra block would take."""
-    context = at.TRANSFORM + (log - 2) * 3
+    context = at.TRANSFORM + (size_of(shape) - 2) * 3
     bits = bit_cost(costs, context, 1 if kind else 0)
     if kind:
         bits += bit_cost(costs, context + 1, 1 if kind == SINE_DOWN + SINE_ACROSS else 0)
@@ -706,76 +717,150 @@ def transform_cost(costs, log, kind):
 
 
 @tuned_kernel
-def code_block(coder, job, work, y0, x0, log):
+def code_block(coder, job, work, y0, x0, shape, leaf):
     """Write a block that is marked, or read and decode one."""
-    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    by, bx = y0 >> 2, x0 >> 2
     blocks = job.blocks
     decoding = coder.state[DECODING]
     kind, index = np.int64(blocks[KIND, by, bx]), np.int64(blocks[INDEX, by, bx])
     mask, direction = np.int64(blocks[MASK, by, bx]), np.int64(blocks[DIRECTION, by, bx])
     if kind >= TIMED:
         index = motion.noted(job, job.at, by, bx)
-    kind, index, mask, direction = code_kind(coder, job, by, bx, log, kind, index, mask, direction)
+    kind, index, mask, direction = code_kind(coder, job, by, bx, shape, kind, index, mask, direction)
     if decoding:
-        _predict(job, work, y0, x0, n, kind, index, mask, direction)
-    coded = code_bit(coder, residual_context(job, by, bx, log, kind), np.int64(blocks[CODED, by, bx]))
+        _predict(job, work, y0, x0, shape, kind, index, mask, direction)
+    coded = code_bit(coder, residual_context(job, by, bx, shape, kind), np.int64(blocks[CODED, by, bx]))
     first = skipped = 0
-    if coded and job.skipping and log <= LARGEST_SKIPPED:
-        skipped = code_bit(coder, skipped_context(job, by, bx, log), np.int64(blocks[SKIPPED, by, bx]) & 1)
+    if coded and job.skipping and shape[0] + shape[1] <= LARGEST_SKIPPED:
+        skipped = code_bit(coder, skipped_context(job, by, bx, shape), np.int64(blocks[SKIPPED, by, bx]) & 1)
     if coded and job.directed and kind == INTRA and not skipped:
-        skipped = 2 * _code_transform(coder, log, np.int64(blocks[SKIPPED, by, bx]) >> 1)
+        skipped = 2 * _code_transform(coder, shape, np.int64(blocks[SKIPPED, by, bx]) >> 1)
     for p in range(3):
         some = cross = 0
         if coded:
-            some, cross = _code_plane(coder, job, work, y0, x0, log, p, kind, first, skipped)
+            some, cross = _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped)
             if p == 0:
                 first = some
         if decoding:
             if some or cross:
                 rows, cols = rebuild(
-                    work, work.levels, log, job.step, some, cross, job.crossed, skipped, job.dependent
+                    work, work.levels, shape, job.step, some, cross, job.crossed, skipped, job.dependent
                 )
                 if p == 0:
                     keep_first(work, rows, cols)
-            store(job, work, p, y0, x0, n, some or cross)
+            store(job, work, p, y0, x0, shape, some or cross)
     if decoding:
-        mark_block(job, by, bx, log, kind, index, mask, direction, coded)
-        note_skipped(blocks, by, bx, log, skipped)
+        mark_block(job, by, bx, shape, leaf, kind, index, mask, direction, coded)
+        note_skipped(blocks, by, bx, shape, skipped)
 
 
 @stage_kernel
-def _predict(job, work, y0, x0, n, kind, index, mask, direction):
+def _predict(job, work, y0, x0, shape, kind, index, mask, direction):
     """work.predicted = the prediction of a block."""
     if kind == SYNTHESIS:
-        predict_synthesis(job, work, y0, x0, n)
+        predict_synthesis(job, work, y0, x0, shape)
     elif kind == EXPLICIT:
-        predict_explicit(job, work, y0, x0, n, index, mask)
+        predict_explicit(job, work, y0, x0, shape, index, mask)
     elif kind >= TIMED:
-        motion.predict_in_time(job, work, y0, x0, n, index, kind == MIXED)
+        motion.predict_in_time(job, work, y0, x0, shape, index, kind == MIXED)
     else:
         for p in range(3):
-            predict_direction(job, work, p, y0, x0, n, direction)
+            predict_direction(job, work, p, y0, x0, shape, direction)
 
 
 @stage_kernel
-def _code_plane(coder, job, work, y0, x0, log, p, kind, first, skipped):
+def _code_plane(coder, job, work, y0, x0, shape, p, kind, first, skipped):
     """Write or read the residual of a plane; return whether there are levels, and the factor of `cross`."""
-    n, decoding = 1 << log, coder.state[DECODING]
+    decoding = coder.state[DECODING]
     some = cross = 0
     if p and first and job.crossed:
-        cross = code_cross(coder, p, log, np.int64(job.blocks[CROSS_1 + p - 1, y0 >> 2, x0 >> 2]))
+        cross = code_cross(coder, p, size_of(shape), np.int64(job.blocks[CROSS_1 + p - 1, y0 >> 2, x0 >> 2]))
     if not decoding:
-        some = _load_levels(job, work, p, y0, x0, n)
-    some = code_bit(coder, coded_context(p, log, kind, first, skipped), some)
+        some = _load_levels(job, work, p, y0, x0, shape)
+    some = code_bit(coder, coded_context(p, shape, kind, first, skipped), some)
     if some and decoding:
-        _clear(work.levels, n)
+        _clear(work.levels, shape)
     if some and skipped == 1:
-        code_samples(coder, work.levels, job.levels, y0, x0, p, log)
+        code_samples(coder, work.levels, job.levels, y0, x0, p, shape)
         if decoding:
-            _note_levels(job, work, p, y0, x0, n)
+            _note_levels(job, work, p, y0, x0, shape)
     elif some:
-        code_coefficients(coder, work.levels, p, log, 1 if kind == INTRA else 0, job.finer, job.dependent)
+        code_coefficients(coder, work.levels, p, shape, 1 if kind == INTRA else 0, job.finer, job.dependent)
     return some, cross
+
+
+@tuned_kernel
+def part_ways(job, shape, depth):
+    """Ways to halve a block: 1 into an upper and a lower half, 2 into a left and a right one, 3 both, 0 none."""
+    if depth >= job.parted:
+        return 0
+    return (1 if shape[0] > LOG_LEAST else 0) + (2 if shape[1] > LOG_LEAST else 0)
+
+
+@tuned_kernel
+def part_context(job, by, bx, shape):
+    """By area, and how many of the blocks above and left are narrower and lower."""
+    blocks = job.blocks
+    count = 0
+    if by > 0 and blocks[WIDE, by - 1, bx] < shape[1]:
+        count += 1
+    if bx > 0 and blocks[TALL, by, bx - 1] < shape[0]:
+        count += 1
+    return at.PARTED + (6 if job.references.shape[0] else 0) * 3 + (shape[0] + shape[1] - 5) * 3 + count
+
+
+@tuned_kernel
+def across_context(job, by, bx, shape):
+    """Of halves beside each other: by form, and whether the block above is narrower, or the one left lower."""
+    blocks = job.blocks
+    narrow = 1 if by > 0 and blocks[WIDE, by - 1, bx] < shape[1] else 0
+    low = 1 if bx > 0 and blocks[TALL, by, bx - 1] < shape[0] else 0
+    form = 0 if shape[0] == shape[1] else (1 if shape[0] < shape[1] else 2)
+    return at.ACROSS + form * 3 + (1 + narrow - low)
+
+
+@tuned_kernel
+def code_way(coder, job, by, bx, shape, ways, way):
+    """Write or read how a block is halved: 0 for not."""
+    if not ways or not code_bit(coder, part_context(job, by, bx, shape), 1 if way else 0):
+        return 0
+    if ways < 3:
+        return ways
+    return 1 + code_bit(coder, across_context(job, by, bx, shape), 1 if way == 2 else 0)
+
+
+@part_kernel
+def way_cost(costs, job, by, bx, shape, ways, way):
+    """Bits that `code_way` would take."""
+    if not ways:
+        return np.float32(0)
+    bits = bit_cost(costs, part_context(job, by, bx, shape), 1 if way else 0)
+    if way and ways == 3:
+        bits += bit_cost(costs, across_context(job, by, bx, shape), 1 if way == 2 else 0)
+    return bits
+
+
+@stage_kernel
+def halved(shape, way):
+    """Shape of the halves."""
+    return (shape[0] - 1, shape[1]) if way == 1 else (shape[0], shape[1] - 1)
+
+
+@array_kernel
+def code_parts(coder, job, work, y0, x0, shape, leaf, depth):
+    """Write or read the blocks of a square that is not split; ``leaf`` is its size and how it was parted."""
+    by, bx = y0 >> 2, x0 >> 2
+    ways = part_ways(job, shape, depth)
+    way = code_way(coder, job, by, bx, shape, ways, (np.int64(job.blocks[PARTS, by, bx]) >> (2 * depth)) & 3)
+    if way == 0:
+        code_block(coder, job, work, y0, x0, shape, leaf)
+    else:
+        half = halved(shape, way)
+        h, w = sides(half)
+        leaf = leaf[0], leaf[1] + (way << (2 * depth))
+        for part in range(2):
+            down, across = (part * h, 0) if way == 1 else (0, part * w)
+            code_parts(coder, job, work, y0 + down, x0 + across, half, leaf, depth + 1)
 
 
 @array_kernel
@@ -797,7 +882,7 @@ def code_tree(coder, job, work, y0, x0, log):
         for part in range(4):
             code_tree(coder, job, work, y0 + (part >> 1) * half, x0 + (part & 1) * half, log - 1)
     else:
-        code_block(coder, job, work, y0, x0, log)
+        code_parts(coder, job, work, y0, x0, (log, log), (log, np.int64(0)), np.int64(0))
 
 
 @array_kernel

@@ -38,7 +38,8 @@ GOOD = 0.3, 0.22, 0.1  # cost of a block by effort, in bits a sample, below whic
 # Views of more samples than so many are smoother, and their blocks cheaper: there GOOD is less by their share.
 GOOD_SAMPLES = 128 * 64
 SURELY = 5.0, 5.0, 2.0  # times GOOD: intra modes are not tried below it
-FIRST_TRIES = 8  # intra modes that are coded on trial in the first view
+FIRST_ESTIMATES, FIRST_TRIES = 8, 3  # intra modes of the first view that are compared by coefficients, coded on trial
+HALVINGS = 0, 1, 2  # of squares of blocks
 BLEND_ROWS = 4, 4, 1  # the kind of blending is chosen by every so many-th row
 WEIGHT = 0.12  # squared error a bit is worth, in squared steps
 # Quantisers by which each level is finer than the next, for more is predicted from it. The first view is finer than
@@ -268,6 +269,7 @@ class Source:
             filtered=not exact,
             dependent=not exact,
             directed=not exact,
+            parted=not exact,
             steps=(),
         )
 
@@ -402,7 +404,8 @@ class Source:
     ) -> NDArray[np.float32]:
         """Return costs of bits after a first run of the first view, whose initial contexts are of other pictures."""
         job, _ = field.job(node)
-        search.find_blocks(costs, job, self._search(job, self._target(field, node)))
+        quick = self._search(job, self._target(field, node))._replace(intra_tries=1, halvings=1)
+        search.find_blocks(costs, job, quick)
         coder = arithmetic.writer(contexts.of(node.level).copy(), VIEW_BYTES * job.levels[0].size + 1024)
         code_view(coder, job, work)
         return arithmetic.bit_costs(coder.contexts)
@@ -456,6 +459,8 @@ class Source:
             weight=np.float32(worth(job.step)),
             least=3 if effort == 0 else 2,
             intra_tries=FIRST_TRIES if first else (1, 1, 3)[effort],
+            intra_estimates=FIRST_ESTIMATES if first else 0,
+            halvings=HALVINGS[effort],
             good=np.float32(GOOD[effort] * share),
             surely=np.float32(SURELY[effort]),
             planes=1 if effort == 0 else 3,

@@ -21,6 +21,7 @@ from .contexts import (
     ABOVE_ONE_THERE_FINE,
     ABOVE_TWO,
     LAST,
+    LAST_PARTED,
     REST,
     REST_NEAR,
     SIGNIFICANT,
@@ -29,7 +30,7 @@ from .contexts import (
     SIGNIFICANT_THERE_FINE,
     WEIGHTS,
 )
-from .transform import LARGEST, SCANS
+from .transform import LARGEST, SCANS, sides, size_of
 
 MOST_LEVEL = 32000
 NEVER = 0.62  # of a step: less is never worth being the last coefficient
@@ -41,15 +42,15 @@ HOPE = np.float32(2.5)  # bits that a lone last coefficient costs besides its ow
 
 
 @stage_kernel
-def _scanned(log, k):
+def _scanned(shape, k):
     """Row and column of the k-th place in the order of the scan."""
-    place = np.int64(SCANS[np.uint64(log), np.uint64(k)])
+    place = np.int64(SCANS[np.uint64(shape[0]), np.uint64(shape[1]), np.uint64(k)])
     return place >> 5, place & 31
 
 
 @stage_kernel
-def _at(square, log, k):
-    y, x = _scanned(log, k)
+def _at(square, shape, k):
+    y, x = _scanned(shape, k)
     return square[np.uint64(y), np.uint64(x)]
 
 
@@ -60,19 +61,19 @@ def _magnitude(level, dependent):
 
 
 @stage_kernel
-def _neighbourhood(levels, y, x, n, dependent):
+def _neighbourhood(levels, y, x, h, w, dependent):
     """Class 0–9 by the sum of the magnitudes of the five places before, in the order of coding."""
     total = 0
-    row, below = levels[np.uint64(y)], levels[np.uint64(min(y + 1, n - 1))]
-    if x + 1 < n:
+    row, below = levels[np.uint64(y)], levels[np.uint64(min(y + 1, h - 1))]
+    if x + 1 < w:
         total += _magnitude(row[np.uint64(x + 1)], dependent)
-        if y + 1 < n:
+        if y + 1 < h:
             total += _magnitude(below[np.uint64(x + 1)], dependent)
-        if x + 2 < n:
+        if x + 2 < w:
             total += _magnitude(row[np.uint64(x + 2)], dependent)
-    if y + 1 < n:
+    if y + 1 < h:
         total += _magnitude(below[np.uint64(x)], dependent)
-        if y + 2 < n:
+        if y + 2 < h:
             total += _magnitude(levels[np.uint64(y + 2), np.uint64(x)], dependent)
     return _class_of(total)
 
@@ -96,6 +97,14 @@ def _place(y, x):
 
 
 @stage_kernel
+def _last_context(plane, shape):
+    """By plane and area; areas between those of squares have contexts of their own."""
+    log = size_of(shape) - 2
+    odd = (shape[0] + shape[1]) & 1
+    return LAST_PARTED + (plane * 3 + log) * 12 if odd else LAST + (plane * 4 + log) * 12
+
+
+@stage_kernel
 def _significant_context(plane, log, place, near, state):
     context = ((plane * 4 + log - 2) * 4 + place) * 8 + near
     return SIGNIFICANT + context if state < 2 else SIGNIFICANT_FINE + (state - 2) * 384 + context
@@ -113,22 +122,22 @@ def _above_one_context(context, state):
 
 
 @tuned_kernel
-def code_coefficients(coder, levels, plane, log, intra, finer, dependent):
-    """Write or read levels[:n, :n], of which one at least is not zero; a reader finds only zeros there before."""
-    n = 1 << log
+def code_coefficients(coder, levels, plane, shape, intra, finer, dependent):
+    """Write or read levels[:h, :w], of which one at least is not zero; a reader finds only zeros there before."""
+    (h, w), log = sides(shape), size_of(shape)
     state: Any = np.int64(0)
-    last = n * n - 1
-    while last > 0 and _at(levels, log, last) == 0:
+    last = h * w - 1
+    while last > 0 and _at(levels, shape, last) == 0:
         last -= 1
-    last = min(code_number(coder, LAST + (plane * 4 + log - 2) * 12, np.int64(12), np.int64(0), last), n * n - 1)
+    last = min(code_number(coder, _last_context(plane, shape), np.int64(12), np.int64(0), last), h * w - 1)
     for k in range(last, -1, -1):
-        y, x = _scanned(log, k)
+        y, x = _scanned(shape, k)
         value = np.int64(levels[y, x])
         size = _magnitude(value, dependent)
-        around = _neighbourhood(levels, y, x, n, dependent)
+        around = _neighbourhood(levels, y, x, h, w, dependent)
         near, place = min(around, 7), _place(y, x)
         context = _significant_context(plane, log, place, near, state)
-        there = ((y << 2 >> log) * 4 + (x << 2 >> log)) * 2 + intra
+        there = ((y << 2 >> shape[0]) * 4 + (x << 2 >> shape[1])) * 2 + intra
         other = _significant_there(plane, log, there, state)
         if k < last and not code_mixed(coder, context, other, WEIGHTS + plane * 4 + log - 2, 1 if size else 0):
             state = np.int64(NEXT[state, 0]) if dependent else state
@@ -166,29 +175,29 @@ def _level_cost(costs, size, around, place, plane, log, last, finer, state):
 
 
 @stage_kernel
-def _places_within(diagonal, n):
+def _places_within(diagonal, h, w):
     """Number of places whose row and column add up to so much at most."""
-    beyond = max(diagonal - n + 1, 0)
-    return ((diagonal + 1) * (diagonal + 2) >> 1) - beyond * (beyond + 1)
+    below, right = max(diagonal - h + 1, 0), max(diagonal - w + 1, 0)
+    return ((diagonal + 1) * (diagonal + 2) - below * (below + 1) - right * (right + 1)) >> 1
 
 
 @stage_kernel
-def _none(coefficients, never, levels, n):
-    """levels[:n, :n] = 0; return the squared error, and the first place in the order of coding that may be more."""
+def _none(coefficients, never, levels, h, w):
+    """levels[:h, :w] = 0; return the squared error, and the first place in the order of coding that may be more."""
     nothing, furthest = np.float32(0), np.int32(-1)
     large = np.int32(never)
-    for y in range(n):
+    for y in range(h):
         row, into = coefficients[y], levels[y]
-        for x in range(n):
+        for x in range(w):
             into[x] = 0
             nothing += np.float32(row[x]) * np.float32(row[x])
             furthest = max(furthest, np.int32(y + x) if abs(row[x]) > large else np.int32(-1))
-    return nothing, _places_within(furthest, n) - 1 if furthest >= 0 else -1
+    return nothing, _places_within(furthest, h, w) - 1 if furthest >= 0 else -1
 
 
 @part_kernel
-def quantise(costs, coefficients, plane, log, step, weight, levels, finer):
-    """Fill levels[:n, :n]; return the bits, those of "coded or not" left out, and the squared error.
+def quantise(costs, coefficients, plane, shape, step, weight, levels, finer):
+    """Fill levels[:h, :w]; return the bits, those of "coded or not" left out, and the squared error.
 
     Parameters
     ----------
@@ -197,16 +206,16 @@ def quantise(costs, coefficients, plane, log, step, weight, levels, finer):
     weight : float32
         Squared error that a bit is worth.
     """
-    n = 1 << log
+    (h, w), log = sides(shape), size_of(shape)
     never = np.float32(NEVER) * step
-    nothing, first = _none(coefficients, never, levels, n)
+    nothing, first = _none(coefficients, never, levels, h, w)
     error, bits, last = nothing, np.float32(0), -1
     for k in range(first, -1, -1):
-        value = _at(coefficients, log, k)
+        value = _at(coefficients, shape, k)
         size = abs(np.float32(value))
         if size <= never:  # a level of 1 gains 0.24 squared steps at most, and its bits weigh 0.42 at least
             continue
-        y, x = _scanned(log, k)
+        y, x = _scanned(shape, k)
         level: Any = min(np.int64(size / step + np.float32(0.5)), MOST_LEVEL)
         cost = _level_cost(costs, level, 0, _place(y, x), plane, log, True, finer, 0)
         missed = size - np.float32(level) * step
@@ -218,11 +227,11 @@ def quantise(costs, coefficients, plane, log, step, weight, levels, finer):
             levels[np.uint64(y), np.uint64(x)] = -level if value < 0 else level
             break
     for k in range(last - 1, -1, -1):
-        y, x = _scanned(log, k)
+        y, x = _scanned(shape, k)
         value = coefficients[np.uint64(y), np.uint64(x)]
         size = abs(np.float32(value))
         level = min(np.int64(size / step + np.float32(0.5)), MOST_LEVEL)
-        near, where = _neighbourhood(levels, y, x, n, 0), _place(y, x)
+        near, where = _neighbourhood(levels, y, x, h, w, 0), _place(y, x)
         best: Any = 0
         cost = _level_cost(costs, 0, near, where, plane, log, False, finer, 0)
         least = size * size + weight * cost
@@ -238,10 +247,10 @@ def quantise(costs, coefficients, plane, log, step, weight, levels, finer):
         levels[np.uint64(y), np.uint64(x)] = -best if value < 0 else best
     if last < 0:
         return np.float32(0), nothing
-    bits += number_cost(costs, LAST + (plane * 4 + log - 2) * 12, np.int64(12), np.int64(0), last)
+    bits += number_cost(costs, _last_context(plane, shape), np.int64(12), np.int64(0), last)
     if error + weight * bits >= nothing:
-        for y in range(n):
-            for x in range(n):
+        for y in range(h):
+            for x in range(w):
                 levels[y, x] = 0
         return np.float32(0), nothing
     return bits, error
@@ -271,12 +280,13 @@ def new_trellis() -> Trellis:
 @stage_kernel
 def _branch(costs, trellis, now, came, around, where, half, size, weight, finer):
     """Extend the path to a state, or begin one if it is -1, by the levels next to a coefficient; keep the better."""
-    k, place, plane, log = where
+    k, place, plane, shape = where
+    log = size_of(shape)
     first = came < 0
     state: Any = max(came, 0)
     odd = np.float32(state >> 1)
     if first:
-        bits = number_cost(costs, LAST + (plane * 4 + log - 2) * 12, np.int64(12), np.int64(0), k)
+        bits = number_cost(costs, _last_context(plane, shape), np.int64(12), np.int64(0), k)
         total = weight * bits
     else:
         total, bits = trellis.totals[now, state], trellis.bits[now, state]
@@ -323,21 +333,21 @@ def _follow(trellis, now, k, y, diagonal, n):
 
 
 @part_kernel
-def quantise_dependent(costs, coefficients, plane, log, step, weight, levels, finer, trellis):
+def quantise_dependent(costs, coefficients, plane, shape, step, weight, levels, finer, trellis):
     """As `quantise`, by a dependent quantiser: the path of least cost through its states (Viterbi)."""
-    n = 1 << log
-    nothing, first = _none(coefficients, np.float32(NEVER) * step, levels, n)
+    h, w = sides(shape)
+    nothing, first = _none(coefficients, np.float32(NEVER) * step, levels, h, w)
     half = step * np.float32(HALF / 16)
     now = diagonal = 0
     for came in range(STATES):
         trellis.totals[0, came] = HUGE
     for k in range(first, -1, -1):
-        y, x = _scanned(log, k)
+        y, x = _scanned(shape, k)
         if k == first or y + x != diagonal:
             diagonal = y + x
-            _clear_recent(trellis.recent[now], diagonal, 3 if k == first else 1, n)
+            _clear_recent(trellis.recent[now], diagonal, 3 if k == first else 1, h)
         size = abs(np.float32(coefficients[np.uint64(y), np.uint64(x)]))
-        where = k, _place(y, x), plane, log
+        where = k, _place(y, x), plane, shape
         for to in range(STATES):
             trellis.totals[1 - now, to], trellis.came[to, k], trellis.levels[to, k] = HUGE, -1, 0
         for came in range(STATES):
@@ -346,7 +356,7 @@ def quantise_dependent(costs, coefficients, plane, log, step, weight, levels, fi
                 _branch(costs, trellis, now, came, around, where, half, size, weight, finer)
         if size > half:
             _branch(costs, trellis, now, np.int64(-1), 0, where, half, size, weight, finer)
-        _follow(trellis, now, k, y, diagonal, n)
+        _follow(trellis, now, k, y, diagonal, h)
         now = 1 - now
     state: Any = np.int64(0)
     for other in range(1, STATES):
@@ -359,7 +369,7 @@ def quantise_dependent(costs, coefficients, plane, log, step, weight, levels, fi
         level: Any = np.int64(trellis.levels[state, k])
         before: Any = np.int64(trellis.came[state, k])
         if level:
-            y, x = _scanned(log, k)
+            y, x = _scanned(shape, k)
             level = 2 * level - (max(before, 0) >> 1)
             levels[np.uint64(y), np.uint64(x)] = -level if coefficients[np.uint64(y), np.uint64(x)] < 0 else level
         if before < 0:
@@ -369,15 +379,15 @@ def quantise_dependent(costs, coefficients, plane, log, step, weight, levels, fi
 
 
 @tuned_kernel
-def dequantise(levels, log, step, coefficients, dependent):
-    """Fill coefficients[:n, :n] where they are not zero; return the rows and columns that hold them.
+def dequantise(levels, shape, step, coefficients, dependent):
+    """Fill coefficients[:h, :w] where they are not zero; return the rows and columns that hold them.
 
     ``step`` is in units of 1/16.
     """
-    n = 1 << log
+    h, w = sides(shape)
     rows = cols = 0
-    for y in range(n):
-        for x in range(n):
+    for y in range(h):
+        for x in range(w):
             if levels[y, x]:
                 rows = y + 1
                 cols = max(cols, x + 1)

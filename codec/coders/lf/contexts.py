@@ -66,7 +66,11 @@ STRAIGHT = SIDE + 1  # side 2
 TURN = STRAIGHT + 2  # side 2
 SLOPE = TURN + 2  # side 2 × nodes of a tree of 8 leaves 8
 TRANSFORM = SLOPE + 16  # block size 4 × (not of cosines alone, of sines alone, sines across) 3
-COUNT = TRANSFORM + 12
+# Of version 10: blocks of unequal sides.
+PARTED = TRANSFORM + 12  # first view, others 2 × area 6 × narrower or lower neighbours 3
+ACROSS = PARTED + 36  # form 3 × narrower above, lower to the left 3
+LAST_PARTED = ACROSS + 9  # plane 3 × area 3 × 12 digits
+COUNT = LAST_PARTED + 108
 
 # Probabilities to begin with: log(p / (1 - p)) from -6.2 up in steps of 0.2, by its digit; * where none is known. The
 # mean over eight coded pictures: three scenes and a flower of a real light field camera, at two quantisers each.
@@ -166,6 +170,7 @@ def starting_contexts() -> NDArray[np.int32]:
     unknown = np.tile([1 << 15, 1 << 15, 0], (COUNT - EXACT, 1))
     contexts = np.concatenate([found, weights, unknown]).astype(np.int32)
     contexts[REST_NEAR:FILTERED] = np.repeat(contexts[REST:BLEND].reshape(3, 1, 16, 3), 6, axis=1).reshape(-1, 3)
+    contexts[LAST_PARTED:COUNT] = contexts[LAST:SIGNIFICANT].reshape(3, 4, 12, 3)[:, :3].reshape(-1, 3)
     for to, of, end in (
         (SIGNIFICANT_FINE, SIGNIFICANT, ABOVE_ONE),
         (SIGNIFICANT_FINE + 384, SIGNIFICANT, ABOVE_ONE),

@@ -13,7 +13,7 @@ from ii_core.base.jit import part_kernel, tuned_kernel
 from . import contexts as at
 from .arithmetic import bit_cost, code_bit
 from .coefficients import dequantise
-from .transform import inverse
+from .transform import inverse, sides
 
 MOST_CROSS = 4  # units
 
@@ -76,7 +76,7 @@ def subtract_cross(work, cross, shift):
 
 
 @tuned_kernel
-def rebuild(work, levels, log, step, some, cross, shift, skipped, dependent):
+def rebuild(work, levels, shape, step, some, cross, shift, skipped, dependent):
     """work.block = the residual, of levels if there are ``some``, and of the first plane by a factor in 2^-shift.
 
     ``skipped`` is 1 without a transform, else twice its kind. Return the rows and columns of work.coefficients that
@@ -84,7 +84,7 @@ def rebuild(work, levels, log, step, some, cross, shift, skipped, dependent):
     """
     rows = cols = 0
     if some:
-        rows, cols = dequantise(levels, log, step, work.coefficients, dependent and skipped != 1)
+        rows, cols = dequantise(levels, shape, step, work.coefficients, dependent and skipped != 1)
     if cross:
         high, wide = max(rows, work.reach[0]), max(cols, work.reach[1])
         for y in range(high):
@@ -95,9 +95,10 @@ def rebuild(work, levels, log, step, some, cross, shift, skipped, dependent):
                 work.coefficients[y, x] = value
         rows, cols = high, wide
     if skipped == 1:
-        for y in range(1 << log):
-            for x in range(1 << log):
+        h, w = sides(shape)
+        for y in range(h):
+            for x in range(w):
                 work.block[y, x] = work.coefficients[y, x] if y < rows and x < cols else 0
     else:
-        inverse(work.coefficients, log, rows, cols, work.half, work.block, skipped >> 1)
+        inverse(work.coefficients, shape, rows, cols, work.half, work.block, skipped >> 1)
     return rows, cols

@@ -118,7 +118,7 @@ def _move(views, references, disparity, original, moved, misfits):
                     for y in range(4):
                         for x in range(4):
                             block[p, y, x] = 0
-                    moved_block(views, references[r, 0], p, y0, x0, 4, dy, dx, rows, block)
+                    moved_block(views, references[r, 0], p, y0, x0, 4, 4, dy, dx, rows, block)
                     for y in range(4):
                         for x in range(4):
                             value = (block[p, y, x] + 2048) >> 12

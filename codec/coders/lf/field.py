@@ -11,7 +11,18 @@ from numpy.typing import NDArray
 
 from . import loop_filter, motion, synthesis
 from .arithmetic import Arithmetic
-from .blocks import DONE, MOST_INDEX, MOST_REFERENCES, UNKNOWN, Job, Work, code_view, new_blocks, zeros
+from .blocks import (
+    DONE,
+    MOST_HALVINGS,
+    MOST_INDEX,
+    MOST_REFERENCES,
+    UNKNOWN,
+    Job,
+    Work,
+    code_view,
+    new_blocks,
+    zeros,
+)
 from .exact import code_exact, new_exact, prepare
 from .planes import gather, scatter
 from .pyramid import Node, Place, batches, pyramid
@@ -92,6 +103,7 @@ class Field:
             finer=int(self.header.tuned),
             dependent=int(self.header.dependent),
             directed=int(self.header.directed),
+            parted=MOST_HALVINGS * self.header.parted,
             skipping=int(self.header.skipping),
             step=self.header.steps[node.level],
             blocks=new_blocks(*self.shape),

@@ -6,28 +6,30 @@ import numpy as np
 
 from ii_core.base.jit import stage_kernel, tuned_kernel
 
-from .transform import LARGEST
+from .transform import LARGEST, sides, size_of
 
 FLAT, SMOOTH, DIRECTIONS = 0, 1, 34
 MODES = 2 + DIRECTIONS
 # Eighths of a sample by the slope's magnitude and the place.
 BEYOND = np.array([[64 * (i + 1) // max(slope, 1) for i in range(LARGEST)] for slope in range(9)])
-# Of version 9, by block size (4, 8, 16, 32): least slopes of directions that go on from a smoothed border, and how
-# far the border draws flat, smooth and straight blocks: its weight halves after 2^(fade - 1) samples.
-LEAST_SLOPES, FADES = (99, 7, 2, 1), (0, 1, 1, 2)
+# From version 9 on, by block size (4, 8, 16, 32): least slopes of directions that go on from a smoothed border. The
+# border draws flat, smooth and straight blocks towards it: its weight halves after 2^(fade - 1) samples.
+LEAST_SLOPES = 99, 7, 2, 1
 # Directions 0–16 go on from the row above by (m − 8) / 8 of a sample a row; 17–33 likewise from the column left.
 
 
 @tuned_kernel
-def fill_border(views, at, plane, blocks, done, y0, x0, n, border, smoothed):
-    """border[0] = the corner and 2·n samples above, border[1] = the corner and 2·n to the left.
+def fill_border(views, at, plane, blocks, done, y0, x0, shape, border, smoothed):
+    """border[0] = the corner and h + w samples above, border[1] = the corner and h + w to the left.
 
     ``blocks[done]`` says by 4×4 samples what is decoded. What is not there takes the value before it. border[2:] is
     the same, ``smoothed`` by (1, 2, 1) / 4, if blocks are larger than 4×4.
     """
     height, width = views.shape[2:]
+    h, w = sides(shape)
+    both = h + w
     above, left = y0 > 0, x0 > 0
-    for i in range(2 * n):
+    for i in range(both):
         x, y = x0 + i, y0 + i
         if above:
             if x < width and blocks[done, (y0 - 1) >> 2, x >> 2]:
@@ -40,70 +42,74 @@ def fill_border(views, at, plane, blocks, done, y0, x0, n, border, smoothed):
             else:
                 border[1, i + 1] = border[1, i]
     if not above:
-        for i in range(2 * n):
+        for i in range(both):
             border[0, i + 1] = border[1, 1] if left else 0
     if not left:
-        for i in range(2 * n):
+        for i in range(both):
             border[1, i + 1] = border[0, 1] if above else 0
     corner = views[at, plane, y0 - 1, x0 - 1] if above and left else (border[0, 1] if above else border[1, 1])
     border[0, 0] = border[1, 0] = corner
-    if smoothed and n > 4:
+    if smoothed and size_of(shape) > 2:
         for side in range(2):
             row, into = border[side], border[2 + side]
             into[0] = (border[0, 1] + 2 * corner + border[1, 1] + 2) >> 2
-            for i in range(1, 2 * n):
+            for i in range(1, both):
                 into[i] = (row[i - 1] + 2 * row[i] + row[i + 1] + 2) >> 2
-            into[2 * n] = row[2 * n]
+            into[both] = row[both]
 
 
 @tuned_kernel
-def predict_intra(border, mode, n, out, plane, smoothed):
-    """out[plane, :n, :n] = the prediction; of version 9, ``smoothed``."""
-    square, log = out[plane], _doubled_log(n) - 1
+def predict_intra(border, mode, shape, out, plane, smoothed):
+    """out[plane, :h, :w] = the prediction; from version 9 on, ``smoothed``."""
+    square, (h, w), log = out[plane], sides(shape), size_of(shape)
+    fade = (shape[0] + shape[1] - 2) >> 2
     if mode == FLAT:
-        total = n
-        for i in range(1, n + 1):
-            total += border[0, i] + border[1, i]
-        value = np.int32(total >> (log + 1))
-        for y in range(n):
+        value = _flat(border, h, w)
+        for y in range(h):
             row = square[y]
-            for x in range(n):
+            for x in range(w):
                 row[x] = value
     elif mode == SMOOTH:
-        first = 2 if smoothed and n > 4 else 0
-        halvings, side, other = np.int32(log + 1), border[first], border[first + 1]
-        right, below = side[n + 1], other[n + 1]
-        for y in range(n):
+        first = 2 if smoothed and log > 2 else 0
+        side, other = border[first], border[first + 1]
+        # Means across have one weight for all, means down another: whole numbers if the longer side is the unit.
+        longer = max(shape[0], shape[1])
+        tall, wide, halvings = np.int32(longer - shape[0]), np.int32(longer - shape[1]), np.int32(longer + 1)
+        right, below = side[w + 1], other[h + 1]
+        for y in range(h):
             row, left = square[y], other[y + 1]
-            up, down = np.int32(n - 1 - y), np.int32((y + 1) * below + n)
-            for x in range(n):
-                level = np.int32(np.int32(n - 1 - x) * left) + np.int32(np.int32(x + 1) * right)
-                row[x] = np.int32(np.int32(level) + np.int32(np.int32(up * side[x + 1]) + down)) >> halvings
+            up, down = np.int32(h - 1 - y), np.int32((y + 1) * below)
+            for x in range(w):
+                level = np.int32(np.int32(w - 1 - x) * left) + np.int32(np.int32(x + 1) * right)
+                slope = np.int32(np.int32(up * side[x + 1]) + down)
+                both = np.int32(np.int32(level) << wide) + np.int32(slope << tall)
+                row[x] = np.int32(both + np.int32(1 << longer)) >> halvings
     else:
         from_left = mode - 2 >= DIRECTIONS // 2
         slope = (mode - 2) % (DIRECTIONS // 2) - 8
         first = 2 if smoothed and abs(slope) >= LEAST_SLOPES[log - 2] else 0
         side, other = border[first + (1 if from_left else 0)], border[first + (0 if from_left else 1)]
-        for along in range(n):  # the distance from the border
+        reach, length = (w, h) if from_left else (h, w)
+        for along in range(reach):  # the distance from the border
             row, shift = square[along], (along + 1) * slope
             across = 0
-            while across < n and 8 * (across + 1) + shift < 0:  # beyond the corner
+            while across < length and 8 * (across + 1) + shift < 0:  # beyond the corner
                 at = max(0, 8 * (along + 1) - BEYOND[-slope, across])
                 i, eighths = at >> 3, at & 7
                 row[across] = (other[i] * (8 - eighths) + other[i + 1] * eighths + 4) >> 3
                 across += 1
             start, part = 1 + (shift >> 3), np.int32(shift & 7)
             rest = np.int32(8 - part)
-            for i in range(across, n):
+            for i in range(across, length):
                 one, two = side[np.uint64(start + i)], side[np.uint64(start + i + 1)]
                 both = np.int32(np.int32(one * rest) + np.int32(two * part))
                 row[np.uint64(i)] = np.int32(both + np.int32(4)) >> np.int32(3)
         if smoothed and slope == 0:
-            _draw_straight(other, square, n, FADES[log - 2])
+            _draw_straight(other, square, reach, length, fade)
         if from_left:
-            _transpose(square, n)
+            _transpose(square, max(h, w))
     if smoothed and mode <= SMOOTH:
-        _draw_to_border(border, square, n, FADES[log - 2])
+        _draw_to_border(border, square, h, w, fade)
 
 
 @stage_kernel
@@ -113,31 +119,43 @@ def _weight(distance, fade):
 
 
 @stage_kernel
-def _draw_to_border(border, square, n, fade):
+def _draw_to_border(border, square, h, w, fade):
     """Move samples near the border towards it (Said et al. 2016, position dependent intra prediction)."""
-    reach = min(n, 3 << fade)
-    for y in range(n):
+    reach = 3 << fade
+    for y in range(h):
         row, left = square[y], np.int32(border[1, y + 1])
         down = _weight(y, fade) if y < reach else np.int32(0)
-        for x in range(n if y < reach else reach):
+        for x in range(w if y < reach else min(w, reach)):
             across = _weight(x, fade) if x < reach else np.int32(0)
             near = np.int32(across * left) + np.int32(down * border[0, x + 1])
             row[x] = np.int32(near + np.int32((64 - across - down) * row[x]) + 32) >> 6
 
 
 @stage_kernel
-def _draw_straight(other, square, n, fade):
+def _draw_straight(other, square, reach, length, fade):
     """Add to samples that repeat one side what the other side differs from the corner, the less the further."""
-    for y in range(n):
+    for y in range(reach):
         row, more = square[y], np.int32(other[y + 1] - other[0])
-        for x in range(min(n, 3 << fade)):
+        for x in range(min(length, 3 << fade)):
             row[x] += np.int32(_weight(x, fade) * more + 32) >> 6
 
 
 @stage_kernel
-def _doubled_log(n):
-    """Binary logarithm of 2·n: shifts take a tenth of the time of divisions by unknown numbers."""
-    return 3 if n == 4 else (4 if n == 8 else (5 if n == 16 else 6))
+def _flat(border, h, w):
+    """Mean of the longer side of the border, or of both."""
+    total, count = np.int32(0), 0
+    if w >= h:
+        for i in range(1, w + 1):
+            total += border[0, i]
+        count += w
+    if h >= w:
+        for i in range(1, h + 1):
+            total += border[1, i]
+        count += h
+    halvings = 0
+    while 1 << halvings < count:
+        halvings += 1
+    return np.int32(np.int32(total + np.int32(count >> 1)) >> np.int32(halvings))
 
 
 @stage_kernel

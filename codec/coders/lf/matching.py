@@ -13,7 +13,7 @@ import numpy as np
 from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel
 
 from .blocks import EXPLICIT, MOST_REFERENCES, UNKNOWN, from_where, guesses, kind_cost, mask_cost, seen_mask
-from .transform import LARGEST
+from .transform import LARGEST, sides
 from .warp import clamped, lead, moved_block
 
 PAIRS = MOST_REFERENCES * (MOST_REFERENCES + 1) // 2  # the lower triangle by rows
@@ -187,14 +187,14 @@ def fill_products(job, original, y0, x0, match):
 
 
 @part_kernel
-def _add_cells(match, by, bx, size, pairs):
+def _add_cells(match, by, bx, rows, cols, pairs):
     """match.total = products summed over a block."""
     for at in range(pairs):
         into, indices = match.total[at], match.count[0]
         for k in range(indices):
             into[k] = 0
-        for i in range(by, by + size):
-            for j in range(bx, bx + size):
+        for i in range(by, by + rows):
+            for j in range(bx, bx + cols):
                 cell = match.products[i, j, at]
                 for k in range(indices):
                     into[k] += cell[k]
@@ -236,17 +236,17 @@ def _add_index(job, tried, number, index):
 
 
 @part_kernel
-def _likely_indices(job, match, weight, y0, x0, log):
+def _likely_indices(job, match, weight, y0, x0, shape):
     """Fill match.tried with indices worth comparing as decoded; return their number."""
-    by, bx = y0 >> 2, x0 >> 2
+    (h, w), by, bx = sides(shape), y0 >> 2, x0 >> 2
     count, indices, errors = job.references.shape[0], match.count[0], match.errors[0]
-    _add_cells(match, by & (CELLS - 1), bx & (CELLS - 1), 1 << (log - 2), count * (count + 1) >> 1)
+    _add_cells(match, by & (CELLS - 1), bx & (CELLS - 1), h >> 2, w >> 2, count * (count + 1) >> 1)
     _set_errors(match, count)
     least, number = HUGE, 0
     for k in range(indices):
         least = min(least, errors[k])
     most = WORSE * least + MORE_BITS * weight if match.hurried else HUGE
-    for guess in guesses(job, by, bx, log):
+    for guess in guesses(job, by, bx, shape):
         if _error_near(match, guess) <= most:
             number = _add_index(job, match.tried, number, guess)
     for _ in range(BEST if match.hurried else MOST_BEST):
@@ -273,21 +273,21 @@ def _error_near(match, index):
 
 
 @part_kernel
-def _compare(job, match, work, original, y0, x0, n, index, planes):
+def _compare(job, match, work, original, y0, x0, h, w, index, planes):
     """match.moved = the block's differences from each reference as decoded."""
     d = index * job.unit
     for r in range(job.references.shape[0]):
         for p in range(planes):
             into = work.predicted[p]
-            for y in range(n):
-                for x in range(n):
+            for y in range(h):
+                for x in range(w):
                     into[y, x] = 0
             dy, dx = lead(d, job.references[r, 2]), lead(d, job.references[r, 1])
-            moved_block(job.views, job.references[r, 0], p, y0, x0, n, dy, dx, work.rows, work.predicted)
+            moved_block(job.views, job.references[r, 0], p, y0, x0, h, w, dy, dx, work.rows, work.predicted)
             missed = match.moved[r]
-            for y in range(n):
-                own, moved, at = original[p, np.uint64(y0 + y)], into[y], (p * n + y) * n
-                for x in range(n):
+            for y in range(h):
+                own, moved, at = original[p, np.uint64(y0 + y)], into[y], (p * h + y) * w
+                for x in range(w):
                     difference = np.int32(own[np.uint64(x0 + x)]) - (np.int32(moved[x] + 2048) >> 12)
                     missed[np.uint64(at + x)] = np.float32(difference)
 
@@ -304,18 +304,18 @@ def _dot(one, other, size):
 
 
 @part_kernel
-def _best_set(costs, job, match, work, original, weight, planes, y0, x0, log, index):
+def _best_set(costs, job, match, work, original, weight, planes, y0, x0, shape, index):
     """Squared error + weight · bits of an index by the best set of references, and that set."""
-    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    (h, w), by, bx = sides(shape), y0 >> 2, x0 >> 2
     count, total, sets = job.references.shape[0], match.total, match.sets
-    where, seen = from_where(job, by, bx, log, index), seen_mask(job, by, bx, log, index)
-    _compare(job, match, work, original, y0, x0, n, index, planes)
+    where, seen = from_where(job, by, bx, shape, index), seen_mask(job, by, bx, shape, index)
+    _compare(job, match, work, original, y0, x0, h, w, index, planes)
     at = 0
     for r in range(count):
         for s in range(r + 1):
-            total[at, 0] = _dot(match.moved[r], match.moved[s], planes * n * n)
+            total[at, 0] = _dot(match.moved[r], match.moved[s], planes * h * w)
             at += 1
-    side = weight * kind_cost(costs, job, by, bx, log, np.int64(EXPLICIT), index, np.int64(0), np.int64(0))
+    side = weight * kind_cost(costs, job, by, bx, shape, np.int64(EXPLICIT), index, np.int64(0), np.int64(0))
     best, best_mask = HUGE, 1
     sets[0] = 0
     for r in range(count):
@@ -339,14 +339,14 @@ def _best_set(costs, job, match, work, original, weight, planes, y0, x0, log, in
 
 
 @part_kernel
-def best_explicit(costs, job, match, work, original, weight, planes, y0, x0, log):
+def best_explicit(costs, job, match, work, original, weight, planes, y0, x0, shape):
     """Index and set of references of the least squared error + weight · bits, before any residual."""
     tried = match.tried
-    number = _likely_indices(job, match, weight, y0, x0, log)
+    number = _likely_indices(job, match, weight, y0, x0, shape)
     best, best_index, best_mask = HUGE, job.low, 1
     t, between = 0, match.every == 1
     while t < number:
-        cost, mask = _best_set(costs, job, match, work, original, weight, planes, y0, x0, log, tried[t])
+        cost, mask = _best_set(costs, job, match, work, original, weight, planes, y0, x0, shape, tried[t])
         if cost < best:
             best, best_index, best_mask = cost, tried[t], mask
         t += 1

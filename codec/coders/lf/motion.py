@@ -13,6 +13,7 @@ from ii_core.base.jit import lean_kernel, part_kernel, stage_kernel, tuned_kerne
 
 from . import contexts as at
 from .arithmetic import bit_cost, code_bit, code_number, number_cost
+from .transform import sides, size_of
 from .warp import clamped, lead, moved_block
 
 MOST_PAST = 4  # earlier instants
@@ -50,12 +51,12 @@ def noted(job, view, by, bx):
 
 
 @tuned_kernel
-def note(job, by, bx, log, in_time, vector):
+def note(job, by, bx, shape, in_time, vector):
     """Note the vector of a decoded block."""
     past, down, across = unpacked(vector)
-    size = 1 << (log - 2)
-    for y in range(by, by + size):
-        for x in range(bx, bx + size):
+    h, w = sides(shape)
+    for y in range(by, by + (h >> 2)):
+        for x in range(bx, bx + (w >> 2)):
             job.motions[job.at, IN_TIME, y, x] = in_time
             job.motions[job.at, PAST, y, x] = past
             job.motions[job.at, DOWN, y, x] = down
@@ -63,7 +64,7 @@ def note(job, by, bx, log, in_time, vector):
 
 
 @tuned_kernel
-def inherited(job, by, bx, log):
+def inherited(job, by, bx, shape):
     """Vector of the nearest view of the same instant at what the block shows; and whether it is predicted in time.
 
     Without such a view: no motion, and 0; else 1 or 2.
@@ -71,8 +72,8 @@ def inherited(job, by, bx, log):
     if job.references.shape[0] == 0:
         return np.int64(STILL), 0
     height, width = job.blocks.shape[1:]
-    half = (1 << log) >> 1
-    y, x = 4 * by + half, 4 * bx + half
+    h, w = sides(shape)
+    y, x = 4 * by + (h >> 1), 4 * bx + (w >> 1)
     if job.synthesised:
         d = np.int64(job.disparity[y, x])
         x += (lead(d, job.references[0, 1]) + 128) >> 8
@@ -83,32 +84,32 @@ def inherited(job, by, bx, log):
 
 
 @tuned_kernel
-def guesses(job, by, bx, log):
+def guesses(job, by, bx, shape):
     """Vectors inherited, of the block left and of the block above; `NONE` where these are not predicted in time."""
     left = above = np.int64(NONE)
     if bx > 0 and job.motions[job.at, IN_TIME, by, bx - 1]:
         left = noted(job, job.at, by, bx - 1)
     if by > 0 and job.motions[job.at, IN_TIME, by - 1, bx]:
         above = noted(job, job.at, by - 1, bx)
-    return inherited(job, by, bx, log)[0], left, above
+    return inherited(job, by, bx, shape)[0], left, above
 
 
 @tuned_kernel
-def time_context(job, by, bx, log):
+def time_context(job, by, bx, shape):
     """By size, how many of the blocks above and left are predicted in time, and the inherited block."""
     motions, like = job.motions, 0
     if by > 0 and motions[job.at, IN_TIME, by - 1, bx]:
         like += 1
     if bx > 0 and motions[job.at, IN_TIME, by, bx - 1]:
         like += 1
-    return at.IN_TIME + ((log - 2) * 3 + like) * 3 + inherited(job, by, bx, log)[1]
+    return at.IN_TIME + ((size_of(shape) - 2) * 3 + like) * 3 + inherited(job, by, bx, shape)[1]
 
 
 @tuned_kernel
-def code_vector(coder, job, by, bx, log, vector):
+def code_vector(coder, job, by, bx, shape, vector):
     """Write or read a vector."""
-    first, left, above = guesses(job, by, bx, log)
-    context = at.VECTOR + (log - 2) * 5
+    first, left, above = guesses(job, by, bx, shape)
+    context = at.VECTOR + (size_of(shape) - 2) * 5
     if code_bit(coder, _first_context(context, first, left), 1 if vector == first else 0):
         return first
     if left != NONE and left != first and code_bit(coder, context + 3, 1 if vector == left else 0):
@@ -142,10 +143,10 @@ def _code_component(coder, first, value):
 
 
 @part_kernel
-def vector_cost(costs, job, by, bx, log, vector):
+def vector_cost(costs, job, by, bx, shape, vector):
     """Bits that `code_vector` would take."""
-    first, left, above = guesses(job, by, bx, log)
-    context = at.VECTOR + (log - 2) * 5
+    first, left, above = guesses(job, by, bx, shape)
+    context = at.VECTOR + (size_of(shape) - 2) * 5
     bits = bit_cost(costs, _first_context(context, first, left), 1 if vector == first else 0)
     if vector == first:
         return bits
@@ -174,28 +175,30 @@ def _component_cost(costs, first, value):
 
 
 @tuned_kernel
-def move(job, work, planes, y0, x0, n, vector):
+def move(job, work, planes, y0, x0, shape, vector):
     """work.predicted = the first planes of the same view at an earlier instant, moved by a vector."""
     past, down, across = unpacked(vector)
+    h, w = sides(shape)
     predicted = work.predicted
     for p in range(planes):
-        for y in range(n):
-            for x in range(n):
+        for y in range(h):
+            for x in range(w):
                 predicted[p, y, x] = 0
-        moved_block(job.past, past, p, y0, x0, n, down * QUARTER, across * QUARTER, work.rows, predicted)
-        for y in range(n):
-            for x in range(n):
+        moved_block(job.past, past, p, y0, x0, h, w, down * QUARTER, across * QUARTER, work.rows, predicted)
+        for y in range(h):
+            for x in range(w):
                 predicted[p, y, x] = np.int32(predicted[p, y, x] + np.int32(2048)) >> 12
 
 
 @tuned_kernel
-def predict_in_time(job, work, y0, x0, n, vector, mixed):
+def predict_in_time(job, work, y0, x0, shape, vector, mixed):
     """work.predicted = the view at an earlier instant; ``mixed``: its mean with the synthesised view."""
-    move(job, work, 3, y0, x0, n, vector)
+    move(job, work, 3, y0, x0, shape, vector)
     if mixed:
+        h, w = sides(shape)
         for p in range(3):
-            for y in range(n):
-                for x in range(n):
+            for y in range(h):
+                for x in range(w):
                     work.predicted[p, y, x] = (
                         work.predicted[p, y, x] + np.int32(job.made[p, y0 + y, x0 + x]) + 1
                     ) >> 1

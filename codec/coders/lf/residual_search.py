@@ -8,110 +8,131 @@ import numpy as np
 
 from ii_core.base.jit import part_kernel, stage_kernel
 
+from . import motion
 from .arithmetic import bit_cost
-from .blocks import INTRA, LIMIT, coded_context, residual_context, skipped_context, transform_cost
+from .blocks import FIELDS, INTRA, LIMIT, coded_context, residual_context, skipped_context, transform_cost
 from .coefficients import Trellis, new_trellis, quantise, quantise_dependent
 from .cross import best_cross, cross_cost, keep_first, rebuild, subtract_cross
 from .intra import MODES
 from .matching import HUGE
 from .samples import LARGEST_SKIPPED, quantise_samples
-from .transform import LARGEST, forward
+from .transform import LARGEST, forward, sides, size_of
 
+BEST = 2
+FIRST_BITS, OCTAVE_BITS = 4.5, 1.6  # of a coefficient of one step, and for each doubling, about
 WORTH_SKIPPING = np.float32(1.2)  # times the least cost so far: beyond it, skipping the transform is not tried
 
 
-class Trial(NamedTuple):
-    """Memory of the search, by block size."""
+class Kept(NamedTuple):
+    """The best blocks found in a region so far, by the binary logarithm of its area."""
 
-    decoded: Any  # (6, 3, 32, 32) of the best way found; slot 0 for another one
+    decoded: Any
+    levels: Any
+    blocks: Any
+    motions: Any
+
+
+class Trial(NamedTuple):
+    """Memory of the search."""
+
+    decoded: Any  # (3, 3, 32, 32) of the best way found in slot `BEST`; slots 0 and 1 for others
     levels: Any
     trial_decoded: Any  # (3, 32, 32) of the way tried
     trial_levels: Any
-    cross: Any  # (6, 2) factors of `cross`
+    cross: Any  # (3, 2) factors of `cross`
     trial_cross: Any
-    skipped: Any  # (6,) whether there is no transform
+    skipped: Any  # (3,) whether there is no transform
     trial_skipped: Any  # (1,)
     errors: Any  # (MODES,) of intra prediction
+    modes: Any  # (MODES,) of the least errors
     trellis: Trellis
+    kept: Kept
 
 
 def new_trial() -> Trial:
     """Memory of the search."""
     return Trial(
-        decoded=np.zeros((6, 3, LARGEST, LARGEST), np.int16),
-        levels=np.zeros((6, 3, LARGEST, LARGEST), np.int16),
+        decoded=np.zeros((3, 3, LARGEST, LARGEST), np.int16),
+        levels=np.zeros((3, 3, LARGEST, LARGEST), np.int16),
         trial_decoded=np.zeros((3, LARGEST, LARGEST), np.int16),
         trial_levels=np.zeros((3, LARGEST, LARGEST), np.int16),
-        cross=np.zeros((6, 2), np.int64),
+        cross=np.zeros((3, 2), np.int64),
         trial_cross=np.zeros(2, np.int64),
-        skipped=np.zeros(6, np.int64),
+        skipped=np.zeros(3, np.int64),
         trial_skipped=np.zeros(1, np.int64),
         errors=np.zeros(MODES, np.float32),
+        modes=np.zeros(MODES, np.int64),
         trellis=new_trellis(),
+        kept=Kept(
+            decoded=np.zeros((11, 3, LARGEST, LARGEST), np.int16),
+            levels=np.zeros((11, 3, LARGEST, LARGEST), np.int16),
+            blocks=np.zeros((11, FIELDS, LARGEST // 4, LARGEST // 4), np.int16),
+            motions=np.zeros((11, motion.FIELDS, LARGEST // 4, LARGEST // 4), np.int16),
+        ),
     )
 
 
 @stage_kernel
-def _copy_block(block, to, n):
-    for y in range(n):
-        for x in range(n):
+def _copy_block(block, to, shape):
+    h, w = sides(shape)
+    for y in range(h):
+        for x in range(w):
             to[y, x] = block[y, x]
 
 
 @part_kernel
-def _quantise(costs, work, trial, plane, log, step, weight, levels, skipped, ways):
+def _quantise(costs, work, trial, plane, shape, step, weight, levels, skipped, ways):
     """Quantise work.coefficients, which are samples if the transform is skipped."""
     if skipped == 1:
-        return quantise_samples(costs, work.coefficients, trial.trial_levels, plane, log, step, weight, levels)
+        return quantise_samples(costs, work.coefficients, trial.trial_levels, plane, shape, step, weight, levels)
     finer, dependent = ways
     if dependent:
-        return quantise_dependent(costs, work.coefficients, plane, log, step, weight, levels, finer, trial.trellis)
-    return quantise(costs, work.coefficients, plane, log, step, weight, levels, finer)
+        return quantise_dependent(costs, work.coefficients, plane, shape, step, weight, levels, finer, trial.trellis)
+    return quantise(costs, work.coefficients, plane, shape, step, weight, levels, finer)
 
 
 @part_kernel
-def _try_plane(costs, work, trial, plane, log, step, weight, kind, first, crossed, error, skipped, ways):
+def _try_plane(costs, work, trial, plane, shape, step, weight, kind, first, crossed, error, skipped, ways):
     """Quantise work.block; return bits, whether there are levels, which array has them, and the factor of `cross`.
 
     ``first`` says whether the first plane has a residual, ``error`` is the squared error without one, and ``ways``
     say whether contexts are those of version 7, and whether the quantiser is dependent.
     """
-    context = coded_context(plane, log, kind, first, skipped)
+    context = coded_context(plane, shape, kind, first, skipped)
     free, full = bit_cost(costs, context, np.int64(0)), bit_cost(costs, context, np.int64(1))
     predictable = plane > 0 and first and crossed
-    none = cross_cost(costs, plane, log, np.int64(0)) if predictable else np.float32(0)
+    none = cross_cost(costs, plane, size_of(shape), np.int64(0)) if predictable else np.float32(0)
     bits, some, cross = free + none, 0, np.int64(0)
     if error <= np.float32(0.2) * step * step:
         return bits, some, cross
     if skipped == 1:
-        _copy_block(work.block, work.coefficients, 1 << log)
+        _copy_block(work.block, work.coefficients, shape)
     else:
-        forward(work.block, log, work.half, work.coefficients, skipped >> 1)
-    more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.levels, skipped, ways)
+        forward(work.block, shape, work.half, work.coefficients, skipped >> 1)
+    more, missed = _quantise(costs, work, trial, plane, shape, step, weight, work.levels, skipped, ways)
     best = error + weight * bits
     if more > 0 and missed + weight * (more + full + none) < best:
         best, bits, some = missed + weight * (more + full + none), more + full + none, 1
     factor = best_cross(work, crossed) if predictable else np.int64(0)
     if factor:
         subtract_cross(work, factor, crossed)
-        more, missed = _quantise(costs, work, trial, plane, log, step, weight, work.spare, skipped, ways)
-        more += (full if more > 0 else free) + cross_cost(costs, plane, log, factor)
+        more, missed = _quantise(costs, work, trial, plane, shape, step, weight, work.spare, skipped, ways)
+        more += (full if more > 0 else free) + cross_cost(costs, plane, size_of(shape), factor)
         if missed + weight * more < best:
             bits, some, cross = more, 1, factor
     return bits, some, cross
 
 
 @part_kernel
-def try_residual(costs, job, search, work, trial, y0, x0, log, kind, so_far):
+def try_residual(costs, job, search, work, trial, y0, x0, shape, kind, so_far):
     """Code the difference to work.predicted; return bits, error and whether there is a residual.
 
     ``so_far`` is the least cost of the block: far above it, skipping the transform is not tried.
     """
-    n = 1 << log
     trial.trial_skipped[0] = 0
-    bits, error, coded = _try_way(costs, job, search, work, trial, y0, x0, log, kind, 0, HUGE)
+    bits, error, coded = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, 0, HUGE)
     cost = error + search.weight * bits
-    if not coded or not job.skipping or log > LARGEST_SKIPPED or cost > WORTH_SKIPPING * so_far:
+    if not coded or not job.skipping or shape[0] + shape[1] > LARGEST_SKIPPED or cost > WORTH_SKIPPING * so_far:
         return bits, error, coded
     trial.cross[1, 0], trial.cross[1, 1] = trial.trial_cross[0], trial.trial_cross[1]
     copy_trial(
@@ -121,9 +142,9 @@ def try_residual(costs, job, search, work, trial, y0, x0, log, kind, so_far):
         trial.decoded[1],
         trial.levels[1],
         trial.cross[1],
-        n,
+        shape,
     )
-    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, log, kind, 1, cost)
+    more, missed, some = _try_way(costs, job, search, work, trial, y0, x0, shape, kind, 1, cost)
     if some and missed + search.weight * more < cost:
         trial.trial_skipped[0] = 1
         return more, missed, some
@@ -134,71 +155,96 @@ def try_residual(costs, job, search, work, trial, y0, x0, log, kind, so_far):
         trial.trial_decoded,
         trial.trial_levels,
         trial.trial_cross,
-        n,
+        shape,
     )
     return bits, error, coded
 
 
 @part_kernel
-def try_transform(costs, job, search, work, trial, y0, x0, log, kind, limit):
+def try_transform(costs, job, search, work, trial, y0, x0, shape, kind, limit):
     """As `try_residual` of an intra block, by a kind of transform; give up without a residual beyond a cost."""
     trial.trial_skipped[0] = 2 * kind
-    return _try_way(costs, job, search, work, trial, y0, x0, log, np.int64(INTRA), 2 * kind, limit)
+    return _try_way(costs, job, search, work, trial, y0, x0, shape, np.int64(INTRA), 2 * kind, limit)
 
 
 @part_kernel
-def _try_way(costs, job, search, work, trial, y0, x0, log, kind, skipped, limit):
+def _try_way(costs, job, search, work, trial, y0, x0, shape, kind, skipped, limit):
     """As `try_residual`, without a transform or by twice its kind; give up without a residual beyond a cost."""
-    n, by, bx = 1 << log, y0 >> 2, x0 >> 2
+    by, bx = y0 >> 2, x0 >> 2
     step = np.float32(job.step / 16)
     bits, error, without = np.float32(0), np.float32(0), np.float32(0)
     first, coded = 0, 0
     ways = job.finer, job.dependent
     for p in range(3):
-        least = _subtract_prediction(search, work, p, y0, x0, n)
+        least = _subtract_prediction(search, work, p, y0, x0, shape)
         without += least
         more, some, cross = _try_plane(
-            costs, work, trial, p, log, step, search.weight, kind, first, job.crossed, least, skipped, ways
+            costs, work, trial, p, shape, step, search.weight, kind, first, job.crossed, least, skipped, ways
         )
         bits += more
         if p:
             trial.trial_cross[p - 1] = cross
         if some:
             levels = work.spare if cross else work.levels
-            rows, cols = rebuild(work, levels, log, job.step, 1, cross, job.crossed, skipped, job.dependent)
+            rows, cols = rebuild(work, levels, shape, job.step, 1, cross, job.crossed, skipped, job.dependent)
             if p == 0:
                 keep_first(work, rows, cols)
                 first = 1
             coded = 1
-            error = _add_prediction(search, work, trial, p, y0, x0, n, error)
-            _copy_block(levels, trial.trial_levels[p], n)
+            error = _add_prediction(search, work, trial, p, y0, x0, shape, error)
+            _copy_block(levels, trial.trial_levels[p], shape)
         else:
-            _leave(trial, work, p, n)
+            _leave(trial, work, p, shape)
             error += least
         if error + search.weight * bits > limit:
             return bits, error, 0
-    context = residual_context(job, by, bx, log, kind)
+    context = residual_context(job, by, bx, shape, kind)
     empty = bit_cost(costs, context, np.int64(0))
     if coded:
         bits += bit_cost(costs, context, 1)
-        if job.skipping and log <= LARGEST_SKIPPED:
-            bits += bit_cost(costs, skipped_context(job, by, bx, log), skipped & 1)
+        if job.skipping and shape[0] + shape[1] <= LARGEST_SKIPPED:
+            bits += bit_cost(costs, skipped_context(job, by, bx, shape), skipped & 1)
         if job.directed and kind == INTRA and skipped != 1:
-            bits += transform_cost(costs, log, skipped >> 1)
+            bits += transform_cost(costs, shape, skipped >> 1)
         if error + search.weight * bits < without + search.weight * empty:
             return bits, error, 1
         for p in range(3):
-            _leave(trial, work, p, n)
+            _leave(trial, work, p, shape)
     return empty, without, 0
 
 
+@part_kernel
+def estimated_cost(job, search, work, y0, x0, shape, kind, planes):
+    """Squared error + weight · bits of the first planes' differences to work.predicted, by their coefficients alone.
+
+    A coefficient is left out, or costs the error of a uniform quantiser and bits that grow with its logarithm.
+    """
+    (h, w), total = sides(shape), np.float32(0)
+    step = np.float32(job.step / 16)
+    per_step, least = np.float32(1) / step, np.float32(0.09) * step * step + np.float32(FIRST_BITS) * search.weight
+    for p in range(planes):
+        _subtract_prediction(search, work, p, y0, x0, shape)
+        forward(work.block, shape, work.half, work.coefficients, kind)
+        for y in range(h):
+            row = work.coefficients[y]
+            for x in range(w):
+                size = abs(np.float32(row[x]))
+                cost = size * size
+                if cost > least:
+                    cost = least + np.float32(OCTAVE_BITS) * search.weight * np.log2(
+                        max(size * per_step, np.float32(1))
+                    )
+                total += cost
+    return total
+
+
 @stage_kernel
-def _subtract_prediction(search, work, p, y0, x0, n):
+def _subtract_prediction(search, work, p, y0, x0, shape):
     """work.block = the difference to work.predicted; return its squared error."""
-    error = np.float32(0)
-    for y in range(n):
+    (h, w), error = sides(shape), np.float32(0)
+    for y in range(h):
         own, predicted, block = search.original[p, np.uint64(y0 + y)], work.predicted[p, y], work.block[y]
-        for x in range(n):
+        for x in range(w):
             difference = np.int32(own[np.uint64(x0 + x)] - predicted[x])
             block[x] = difference
             error += np.float32(difference * difference)
@@ -206,12 +252,13 @@ def _subtract_prediction(search, work, p, y0, x0, n):
 
 
 @stage_kernel
-def _add_prediction(search, work, trial, p, y0, x0, n, error):
+def _add_prediction(search, work, trial, p, y0, x0, shape, error):
     """trial.trial_decoded = work.predicted and the decoded difference; return ``error`` and its squared error."""
-    for y in range(n):
+    h, w = sides(shape)
+    for y in range(h):
         own, predicted, block = search.original[p, np.uint64(y0 + y)], work.predicted[p, y], work.block[y]
         decoded = trial.trial_decoded[p, y]
-        for x in range(n):
+        for x in range(w):
             value = min(max(np.int32(predicted[x] + block[x]), np.int32(-LIMIT)), np.int32(LIMIT))
             decoded[x] = value
             difference = np.int32(own[np.uint64(x0 + x)] - value)
@@ -220,33 +267,35 @@ def _add_prediction(search, work, trial, p, y0, x0, n, error):
 
 
 @stage_kernel
-def _leave(trial, work, p, n):
+def _leave(trial, work, p, shape):
     """A plane without a residual."""
-    for y in range(n):
-        for x in range(n):
+    h, w = sides(shape)
+    for y in range(h):
+        for x in range(w):
             trial.trial_decoded[p, y, x] = work.predicted[p, y, x]
             trial.trial_levels[p, y, x] = 0
 
 
 @stage_kernel
-def keep(trial, log):
-    """Note the way tried as the best one of a block of this size."""
-    n = 1 << log
-    trial.cross[log, 0], trial.cross[log, 1] = trial.trial_cross[0], trial.trial_cross[1]
-    trial.skipped[log] = trial.trial_skipped[0]
+def keep(trial, shape):
+    """Note the way tried as the best one of a block."""
+    h, w = sides(shape)
+    trial.cross[BEST, 0], trial.cross[BEST, 1] = trial.trial_cross[0], trial.trial_cross[1]
+    trial.skipped[BEST] = trial.trial_skipped[0]
     for p in range(3):
-        for y in range(n):
-            for x in range(n):
-                trial.decoded[log, p, y, x] = trial.trial_decoded[p, y, x]
-                trial.levels[log, p, y, x] = trial.trial_levels[p, y, x]
+        for y in range(h):
+            for x in range(w):
+                trial.decoded[BEST, p, y, x] = trial.trial_decoded[p, y, x]
+                trial.levels[BEST, p, y, x] = trial.trial_levels[p, y, x]
 
 
 @stage_kernel
-def copy_trial(decoded, levels, cross, to_decoded, to_levels, to_cross, n):
-    """Copy what a way makes of a block of n×n samples."""
+def copy_trial(decoded, levels, cross, to_decoded, to_levels, to_cross, shape):
+    """Copy what a way makes of a block."""
+    h, w = sides(shape)
     to_cross[0], to_cross[1] = cross[0], cross[1]
     for p in range(3):
-        for y in range(n):
-            for x in range(n):
+        for y in range(h):
+            for x in range(w):
                 to_decoded[p, y, x] = decoded[p, y, x]
                 to_levels[p, y, x] = levels[p, y, x]

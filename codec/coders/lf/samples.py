@@ -23,15 +23,16 @@ from .contexts import (
     SAMPLE_SIGN,
     SAMPLE_WEIGHTS,
 )
+from .transform import sides, size_of
 
-LARGEST_SKIPPED = 3  # binary logarithm of the side
+LARGEST_SKIPPED = 6  # binary logarithm of the number of samples
 # Class by samples before that are not zero, and all samples before.
-_SAMPLES = np.arange(1 << 2 * LARGEST_SKIPPED)
+_SAMPLES = np.arange(1 << LARGEST_SKIPPED)
 DENSITY = np.minimum(8 * _SAMPLES[:, None] // np.maximum(_SAMPLES, 4), 8).astype(np.uint8)
 
 
 @stage_kernel
-def _around(levels, y, x, n):
+def _around(levels, y, x, w):
     """Class 0–7 by the magnitudes left, above (twice each) and diagonally above."""
     total = 0
     row, above = levels[np.uint64(y)], levels[np.uint64(max(y - 1, 0))]
@@ -41,7 +42,7 @@ def _around(levels, y, x, n):
         total += 2 * abs(above[np.uint64(x)])
         if x:
             total += abs(above[np.uint64(x - 1)])
-        if x + 1 < n:
+        if x + 1 < w:
             total += abs(above[np.uint64(x + 1)])
     return total if total < 5 else (5 if total < 7 else (6 if total < 10 else 7))
 
@@ -64,17 +65,17 @@ def _sign_context(planes, plane, y, x):
 
 
 @tuned_kernel
-def code_samples(coder, levels, planes, y0, x0, plane, log):
-    """Write or read levels[:n, :n]; a reader finds only zeros there before.
+def code_samples(coder, levels, planes, y0, x0, plane, shape):
+    """Write or read levels[:h, :w]; a reader finds only zeros there before.
 
-    ``planes[:plane, y0 : y0 + n, x0 : x0 + n]`` are the levels of earlier planes.
+    ``planes[:plane, y0 : y0 + h, x0 : x0 + w]`` are the levels of earlier planes.
     """
-    n, before = 1 << log, 0
-    for k in range(n * n):
-        y, x = k >> log, k & (n - 1)
+    (h, w), log, before = sides(shape), size_of(shape), 0
+    for k in range(h * w):
+        y, x = k >> shape[1], k & (w - 1)
         value = np.int64(levels[y, x])
         size = abs(value)
-        around = _around(levels, y, x, n)
+        around = _around(levels, y, x, w)
         beside = _beside(planes, plane, y0 + y, x0 + x, before, k)
         by_size = plane * 2 + log - 2
         one, other = SAMPLE + by_size * 8 + around, SAMPLE_BESIDE + by_size * 9 + beside
@@ -114,18 +115,18 @@ def _sample_cost(costs, size, around, beside, plane, log):
 
 
 @part_kernel
-def quantise_samples(costs, block, planes, plane, log, step, weight, levels):
-    """Fill levels[:n, :n]; return the bits, 0 if there are no levels, and the squared error.
+def quantise_samples(costs, block, planes, plane, shape, step, weight, levels):
+    """Fill levels[:h, :w]; return the bits, 0 if there are no levels, and the squared error.
 
-    ``planes[:plane, :n, :n]`` are the levels of earlier planes; units are those of `coefficients.quantise`.
+    ``planes[:plane, :h, :w]`` are the levels of earlier planes; units are those of `coefficients.quantise`.
     """
-    n, before = 1 << log, 0
+    (h, w), log, before = sides(shape), size_of(shape), 0
     error, bits = np.float32(0), np.float32(0)
-    for k in range(n * n):
-        y, x = k >> log, k & (n - 1)
+    for k in range(h * w):
+        y, x = k >> shape[1], k & (w - 1)
         value = block[np.uint64(y), np.uint64(x)]
         size = abs(np.float32(value))
-        around = _around(levels, y, x, n)
+        around = _around(levels, y, x, w)
         beside = _beside(planes, plane, y, x, before, k)
         level: Any = min(np.int64(size / step + np.float32(0.5)), MOST_LEVEL)
         best: Any = np.int64(0)

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from ...bitstream.compact import leb128, read_leb128
 from .planes import bt709_colours
 
-# Versions 2, 3, 5 and 6 say by their number which tools they have: by factors between planes, and residuals without a
+# Versions 2, 3, 5 and 6 say by their number which tools they have: factors between planes, and residuals without a
 # transform. Version 4 is that of segments of takes. Version 7 has flags, version 8 a dependent
-# quantiser as well, version 9 other intra modes, too; lossless coding still writes 2 and 3.
-VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED, TUNED, DEPENDENT, DIRECTED = 3, 2, 5, 6, 7, 8, 9
-FLAGGED = TUNED, DEPENDENT, DIRECTED
+# quantiser as well, version 9 other intra modes, too, version 10 halved blocks; lossless coding still writes 2 and 3.
+VERSION, UNCROSSED, SKIPPING, SKIPPING_UNCROSSED, TUNED, DEPENDENT, DIRECTED, PARTED = 3, 2, 5, 6, 7, 8, 9, 10
+FLAGGED = TUNED, DEPENDENT, DIRECTED, PARTED
 _VERSIONS = {
     (False, False): UNCROSSED,
     (True, False): VERSION,
@@ -25,7 +25,7 @@ _VERSIONS = {
 }
 _TOOLS = {version: tools for tools, version in _VERSIONS.items()}
 QUARTERS, EIGHTHS = 2, 3  # binary logarithms of the unit of factors between planes
-# Flags of versions 7 to 9; the lowest two bits are 0, or the logarithm of the factors' unit.
+# Flags of versions 7 to 10; the lowest two bits are 0, or the logarithm of the factors' unit.
 _SKIPS, _FILTERS, _DOWN, _BT709, _SKEWED, _FLAGS = 4, 8, 16, 32, 64, 128
 PIXELS_A_BYTE = (
     4096  # at least a byte for so many pixels, zeros if need be: few bytes cannot claim memory without end
@@ -71,13 +71,15 @@ class Header:
     skipping : bool
         Whether small blocks may have a residual without a transform.
     tuned : bool
-        Versions 7 to 9: large coefficients have contexts by their neighbourhood, and views may be filtered.
+        Versions 7 to 10: large coefficients have contexts by their neighbourhood, and views may be filtered.
     filtered : bool
         Whether views may be filtered in the loop.
     dependent : bool
-        Versions 8 and 9: the quantiser of coefficients is a dependent one.
+        Versions 8 to 10: the quantiser of coefficients is a dependent one.
     directed : bool
-        Version 9: intra blocks smooth borders, have contexts of directions, and transforms of sines.
+        Versions 9 and 10: intra blocks smooth borders, have contexts of directions, and transforms of sines.
+    parted : bool
+        Version 10: squares of blocks may be halved.
     steps : tuple of int
         The quantiser's step of each level, in 2^-7 of an 8-bit code.
     """
@@ -96,6 +98,7 @@ class Header:
     filtered: bool = False
     dependent: bool = False
     directed: bool = False
+    parted: bool = False
     steps: tuple[int, ...]
 
 
@@ -115,7 +118,7 @@ def _head(header: Header, levels: list[bytes]) -> bytes:
     flags = header.crossed | _SKIPS * header.skipping | _FILTERS * header.filtered
     flags |= _DOWN * (header.lattice[2] < 0) | _BT709 * (header.scales is not None) | _SKEWED * _skewed(header)
     head = _TUNED.pack(
-        FLAGGED[header.dependent + header.directed],
+        FLAGGED[header.dependent + header.directed + header.parted],
         flags,
         header.log_stride | header.sources << 3,
         header.low,
@@ -229,6 +232,7 @@ def _read_tuned(payload: bytes) -> _Read:
         "tuned": True,
         "filtered": bool(flags & _FILTERS),
         "dependent": version >= DEPENDENT,
-        "directed": version == DIRECTED,
+        "directed": version >= DIRECTED,
+        "parted": version >= PARTED,
     }
     return values, index, at

@@ -31,17 +31,30 @@ def _matrices():
 
 def _scans():
     """Places y·32 + x by rising y + x, up and down in turn."""
-    found = np.zeros((_SIZES, LARGEST * LARGEST), np.uint16)
-    for log in range(2, _SIZES):
-        n = 1 << log
-        places = sorted((y + x, y if (x + y) % 2 else x, y * LARGEST + x) for y in range(n) for x in range(n))
-        found[log, : n * n] = [place for _, _, place in places]
+    found = np.zeros((_SIZES, _SIZES, LARGEST * LARGEST), np.uint16)
+    for down in range(2, _SIZES):
+        for across in range(2, _SIZES):
+            y, x = (places.ravel() for places in np.mgrid[: 1 << down, : 1 << across])
+            order = np.lexsort((np.where((x + y) % 2, y, x), x + y))
+            found[down, across, : y.size] = (y * LARGEST + x)[order]
     return found
 
 
 MATRICES = _matrices()
 TRANSPOSED = np.ascontiguousarray(MATRICES.swapaxes(2, 3))
 SCANS = _scans()
+
+
+@stage_kernel
+def sides(shape):
+    """Height and width of a block of a shape: their binary logarithms."""
+    return 1 << shape[0], 1 << shape[1]
+
+
+@stage_kernel
+def size_of(shape):
+    """Binary logarithm of the side of a square of the same area, rounded down: the class of size of contexts."""
+    return (shape[0] + shape[1]) >> 1
 
 
 @stage_kernel
@@ -68,16 +81,16 @@ def _product(left, right, rows, terms, n, rounding, shift, out):
 
 
 @part_kernel
-def forward(block, log, half, out, kind):
-    """out[:n, :n] = the transform of block[:n, :n]; all (32, 32) of int32."""
-    n = 1 << log
-    _product(MATRICES[kind & SINE_DOWN, log], block, n, n, n, 128, 8, half)
-    _product(half, TRANSPOSED[kind >> 1, log], n, n, n, 2048, 12, out)
+def forward(block, shape, half, out, kind):
+    """out[:h, :w] = the transform of block[:h, :w]; all (32, 32) of int32."""
+    h, w = sides(shape)
+    _product(MATRICES[kind & SINE_DOWN, shape[0]], block, h, h, w, 128, 8, half)
+    _product(half, TRANSPOSED[kind >> 1, shape[1]], h, w, w, 2048, 12, out)
 
 
 @tuned_kernel
-def inverse(coefficients, log, rows, cols, half, out, kind):
-    """out[:n, :n] = the inverse transform of coefficients that are zero but for the first rows and columns."""
-    n = 1 << log
-    _product(coefficients, MATRICES[kind >> 1, log], rows, cols, n, 32, 6, half)
-    _product(TRANSPOSED[kind & SINE_DOWN, log], half, n, rows, n, 8192, 14, out)
+def inverse(coefficients, shape, rows, cols, half, out, kind):
+    """out[:h, :w] = the inverse transform of coefficients that are zero but for the first rows and columns."""
+    h, w = sides(shape)
+    _product(coefficients, MATRICES[kind >> 1, shape[1]], rows, cols, w, 32, 6, half)
+    _product(TRANSPOSED[kind & SINE_DOWN, shape[0]], half, h, rows, w, 8192, 14, out)

@@ -89,8 +89,8 @@ def _add_four(out, at, one, two, three, four):
 
 
 @tuned_kernel
-def moved_block(views, view, plane, y0, x0, n, dy, dx, rows, out):
-    """out[plane, :n, :n] += 64² times the block at (y0 + dy, x0 + dx) of a plane; ``rows`` is (38, 40) for use.
+def moved_block(views, view, plane, y0, x0, h, w, dy, dx, rows, out):
+    """out[plane, :h, :w] += 64² times the block at (y0 + dy, x0 + dx) of a plane; ``rows`` is (38, 40) for use.
 
     Indices that cannot be negative are cast to unsigned: for others, numba emits a look for negative ones.
     """
@@ -98,8 +98,8 @@ def moved_block(views, view, plane, y0, x0, n, dy, dx, rows, out):
     height, width = source.shape
     iy, ix = y0 + (dy >> 8), x0 + (dx >> 8)
     py, px = (dy >> 4) & 15, (dx >> 4) & 15
-    first, count = (0, n) if py == 0 else (-BEFORE, n + TAPS - 1)
-    start, taken = ix - BEFORE, n + TAPS - 1
+    first, count = (0, h) if py == 0 else (-BEFORE, h + TAPS - 1)
+    start, taken = ix - BEFORE, w + TAPS - 1
     inside = start >= 0 and start + taken <= width
     bordered = rows[LARGEST + TAPS - 1]
     for i in range(count):
@@ -107,23 +107,23 @@ def moved_block(views, view, plane, y0, x0, n, dy, dx, rows, out):
         if not inside:
             for j in range(taken):
                 bordered[j] = line[np.uint64(clamped(start + j, width))]
-            _filter_row(bordered, 0, n, px, row)
+            _filter_row(bordered, 0, w, px, row)
         elif px == 0:
-            for j in range(n):
+            for j in range(w):
                 row[j] = np.int32(line[np.uint64(ix + j)]) * np.int32(64)
         else:
-            _filter_row(line, start, n, px, row)
+            _filter_row(line, start, w, px, row)
     a, b, c, d, e, f = FILTERS[py, 0], FILTERS[py, 1], FILTERS[py, 2], FILTERS[py, 3], FILTERS[py, 4], FILTERS[py, 5]
-    for i in range(n):
+    for i in range(h):
         into = out[plane, i]
         if py == 0:
             row = rows[i]
-            for j in range(n):
+            for j in range(w):
                 into[j] = np.int32(into[j] + np.int32(row[j] * np.int32(64)))
-        elif n == 4:
+        elif w == 4:
             one, two = _filtered_down(rows, i, 0, a, b, c, d, e, f), _filtered_down(rows, i, 1, a, b, c, d, e, f)
             three, four = _filtered_down(rows, i, 2, a, b, c, d, e, f), _filtered_down(rows, i, 3, a, b, c, d, e, f)
             _add_four(into, 0, one, two, three, four)
         else:
-            for j in range(n):
+            for j in range(w):
                 into[j] = np.int32(into[j] + _filtered_down(rows, i, j, a, b, c, d, e, f))
