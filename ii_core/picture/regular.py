@@ -170,9 +170,9 @@ def resampled(picture: IIPicture, ei_pixels: Pair | None = None, *, deshift: boo
     dx = (np.arange(u) - (u - 1) / 2) * (lattice.pitch[0] / u)
     dy = (np.arange(v) - (v - 1) / 2) * (lattice.pitch[1] / v)
     inside = _in_cell(lattice, dx, dy)
-    dx, dy = (np.broadcast_to(a, (v, u)) for a in lattice.offsets(dx[None, :], dy[:, None]))
-    x, y = lattice.centres(np.arange(k)[None, :], np.arange(l)[:, None])
-    x, y = np.broadcast_to(x, (l, k)), np.broadcast_to(y, (l, k))
+    # copies of one layout: the kernel is compiled for each
+    dx, dy = (np.broadcast_to(a, (v, u)).copy() for a in lattice.offsets(dx[None, :], dy[:, None]))
+    x, y = (np.broadcast_to(a, (l, k)).copy() for a in lattice.centres(np.arange(k)[None, :], np.arange(l)[:, None]))
     owner = owners(lattice, picture.size)
     pixels, valid = np.zeros((l, v, k, u, 3), source.dtype), np.zeros((l, v, k, u), np.bool_)
     whole = source.dtype.kind != "f"

@@ -126,10 +126,8 @@ def _morton(points: NDArray[np.float64], bits: int) -> Integers:
 
 def _order(keys: Integers, width: int) -> Order:
     pixels = np.argsort(keys, axis=None, kind="stable")
-    found = Order(*(part.astype(np.int32) for part in (pixels, pixels // width, pixels % width)))
-    for array in found:
-        array.flags.writeable = False
-    return found
+    # not made read-only: kernels would be compiled once more for such arrays
+    return Order(*(part.astype(np.int32) for part in (pixels, pixels // width, pixels % width)))
 
 
 def _lattice(camera: Camera) -> Lattice | None:

@@ -231,10 +231,12 @@ def _face_rows(
     corners: NDArray[np.float32], bodies: NDArray[np.int32], normals: NDArray[np.float32],
     coordinates: NDArray[np.float32],
 ) -> NDArray[np.float32]:  # fmt: skip
-    """Return the table of faces, see `kernels.tables`: rows of one cache line or two."""
+    """Return the table of faces, see `kernels.tables`: at least two rows, of one cache line or two."""
     wide = len(normals) > 0 or len(coordinates) > 0
     columns = tables.ALL_COLUMNS if wide else tables.FLAT_COLUMNS
-    rows = aligned(len(corners) * columns).reshape(-1, columns)
+    # one row is contiguous whatever is cut out of it: kernels would be compiled again for it
+    padded = aligned(max(len(corners), 2) * columns).reshape(-1, columns)
+    rows = padded[: len(corners)]
     rows[:, : tables.FACE] = corners.reshape(-1, 9)
     lift.fill_face_table(corners, rows[:, tables.FACE : tables.BODY])
     rows[:, tables.BODY] = bodies
@@ -243,7 +245,7 @@ def _face_rows(
     if len(coordinates):
         rows[:, tables.COORDINATES : tables.COORDINATES + 6] = coordinates[:, :, :2].reshape(-1, 6)
         rows[:, tables.THIRD] = coordinates[:, :, 2]
-    return rows
+    return padded
 
 
 def _light_row(light: Light) -> list[float]:

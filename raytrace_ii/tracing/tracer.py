@@ -314,8 +314,9 @@ class Tracer:
     ) -> tuple[Rays, int]:  # fmt: skip
         """Return the room of primary rays and how many of them carry light."""
         shape = locations.shape[:-1]
-        locations, directions = locations.reshape(-1, 3), directions.reshape(-1, 3)
-        shares = np.empty(0) if shares is None else shares.reshape(-1)
+        # one kind of array, for which the kernel is compiled once
+        locations, directions = (np.require(a.reshape(-1, 3), float, ["C", "W"]) for a in (locations, directions))
+        shares = np.empty(0) if shares is None else np.require(shares.reshape(-1), float, ["C", "W"])
         room = self._primary
         n, bad = start_rays(
             locations, directions, shares, order, self.pose[:3, :3], self.pose[:3, 3],

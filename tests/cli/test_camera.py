@@ -10,6 +10,7 @@ from ii_core import IICamera, IIPicture, camera_names, preset
 from ii_core.base.files import read_image, write_image
 from ii_core.camera.maps import FORMATS
 from tests.support.processes import full_disk
+from tests.support.slow import first_fast
 
 
 def test_every_camera_is_listed(run):
@@ -18,7 +19,7 @@ def test_every_camera_is_listed(run):
     assert {line.split()[0] for line in out.splitlines()} == set(camera_names())
 
 
-@pytest.mark.parametrize("format", FORMATS)
+@pytest.mark.parametrize("format", first_fast(FORMATS, 2))
 def test_maps_are_written_and_rendered(run, tmp_path, format):
     folder, suffix = tmp_path / "cam", FORMATS[format][0]
     assert run("camera", "grin", "--scale", 64, "--format", format, "-o", folder)[0] == 0

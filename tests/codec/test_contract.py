@@ -208,7 +208,7 @@ def test_a_file_decodes_by_itself(scheme, tmp_path):
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize(
     ("lenses", "ei_pixels"),
-    first_fast([((1, 1), (1, 1)), ((17, 2), (2, 19)), ((5, 3), (1, 1)), ((1, 1), (7, 2)), ((1, 9), (3, 1))], 2),
+    first_fast([((1, 1), (1, 1)), ((17, 2), (2, 19)), ((5, 3), (1, 1)), ((1, 1), (7, 2)), ((1, 9), (3, 1))]),
 )
 def test_any_size_down_to_one_pixel(scheme, lenses, ei_pixels):
     rng = np.random.default_rng(3)

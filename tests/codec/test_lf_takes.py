@@ -14,6 +14,7 @@ from codec.coders.lf.field import Field
 from codec.contract import checked_options, find
 from ii_core import IIPicture, sub_images, video_of
 from tests.support.golden import unpacked
+from tests.support.slow import first_fast
 
 FROZEN = unpacked("lf.zip")
 PIXELS = {
@@ -56,7 +57,7 @@ def error(video, again):
     )
 
 
-@pytest.mark.parametrize("across", [1.0, 0.25, -2.0])
+@pytest.mark.parametrize("across", first_fast([0.25, 1.0, -2.0]))
 def test_motion_takes_few_bytes(across):
     """A plane that moves: a later instant costs less than a third of one coded alone, at a step of 4 codes.
 
@@ -163,6 +164,7 @@ def test_threads_change_no_byte():
     assert one == two
 
 
+@pytest.mark.slow
 def test_a_rate_is_met_over_the_take():
     coded = encode_take(plane(), "si-lf", bpp=1.0)
     assert coded.reached

@@ -61,6 +61,7 @@ def test_rates_of_a_textured_picture_are_met_within_two_percent(kind, bpp):
     assert coded.bpp == pytest.approx(bpp, rel=0.02)
 
 
+@pytest.mark.slow
 def test_low_rates_of_sub_images_are_met():
     for bpp in (0.1, 0.2):
         assert encode(large(), "si-h264", bpp=bpp).reached

@@ -69,6 +69,7 @@ def test_range_is_found_and_confidence_is_honest():
     assert sure.mean() > 0.4 and (np.abs(found.disparity - truth)[sure] > 0.07).mean() <= 0.02
 
 
+@pytest.mark.slow
 def test_range_of_large_views_is_found_in_halved_ones():
     picture, truth = slanted(views=(5, 5), size=(300, 240), at=-6.0, slope=0.002)
     low, high = field_range(picture)

@@ -521,6 +521,7 @@ def test_display_by_a_calibration_writes_the_panels_picture(run, tmp_path):
     assert code == 2 and "--calibration does not use --pitch" in error
 
 
+@pytest.mark.slow
 def test_an_eye_sees_even_views_without_moire_by_the_displays_own_calibration(tmp_path):
     """The light of every direction is known in closed form; the eye's rays pass lenses, not the shader's formula."""
     assert max(measured("its own")["light"]) < 0.006

@@ -427,6 +427,7 @@ def test_stacked_sensors_share_their_lens_plane():
         np.testing.assert_allclose(np.array(images) + planes[0], np.array([15, 40, 120]) + 0.184088454, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_moving_lenslets_interleave_evenly():
     cameras = preset_cameras("moving-lenslets", scale=16)
     L = np.concatenate([camera.rays()[0].reshape(-1, 3) for camera in cameras])

@@ -333,6 +333,7 @@ def test_nan_stays_in_its_own_pixel():
     assert bad[0, 0] and not bad[3:].any() and not bad[:, 3:].any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", first_fast(["plenoptic", "hdtv"]))
 def test_presets_reach_a_view_image(name):
     camera = preset(name)

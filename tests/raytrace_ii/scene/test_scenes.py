@@ -116,6 +116,7 @@ def test_scenes_load_the_same_every_time_and_are_no_burden(name):
     assert sum(len(body.faces) for body in first.bodies) < 400_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_no_lens_stands_in_or_under_a_body(name):
     """Bodies at z < 8 mm stay below the lowest lens."""

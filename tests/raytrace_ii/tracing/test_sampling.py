@@ -109,6 +109,7 @@ def test_places_of_few_samples_miss_less_of_an_edge_than_the_sequence(samples):
         assert (np.sqrt(squares(doubling_places(MOST)[:samples])) < [0.95, 1.0] * chance).all()
 
 
+@pytest.mark.slow
 def test_error_of_an_edge_is_that_of_random_lines():
     """18 000 lines that meet the pixel: the mean of squares has a standard error of 1 %."""
     random, table = np.random.default_rng(0), fixed_places(4)
@@ -199,7 +200,7 @@ def test_neighbours_under_another_lens_do_not_count():
     assert shot.stats.samples == {4: 128 * 64}
 
 
-@pytest.mark.parametrize("which", ["noise", "hall"])
+@pytest.mark.parametrize("which", first_fast(["hall", "noise"]))
 def test_pixels_that_stopped_are_within_the_target(which):
     """Against 400 samples, whose own error is about a tenth of a step."""
     scene, camera = hall(), IICamera(pixels=(64, 32), lenses=(8, 4), pixel_pitch_mm=0.78, gap_mm=11.7)

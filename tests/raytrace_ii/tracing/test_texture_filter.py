@@ -41,6 +41,7 @@ def test_levels_of_a_pyramid_are_means_over_area(shape):
     np.testing.assert_allclose(levels[0], blocks.mean(axis=(1, 3)), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_width_of_a_texel_or_less_reads_the_image_itself():
     for ellipse in ((1 / 64, 0, 0, 0.5 / 64), (0, 0, 0, 0)):
         assert filter_taps(*map(np.float32, (64, 64, 6, *ellipse)))[:2] == (1, 0.0)

@@ -56,6 +56,7 @@ def test_a_sphere_is_hit_between_its_inscribed_and_its_own_radius():
         assert facing.min() >= math.cos(math.sqrt(2) * math.pi / segments) - slack
 
 
+@pytest.mark.slow
 def test_sphere_hits_approach_the_closed_form_as_the_segments_squared():
     start = np.array([[0.3, -0.2, 0.0]])
     direction = np.array([[0.02, 0.03, 1.0]])

@@ -379,6 +379,7 @@ def test_black_is_black():
     assert (seen.radiance == 0).all()
 
 
+@pytest.mark.slow
 def test_rays_through_corners_of_faces_seldom_slip_through():
     """Embree's robust mode closes edges, not corners: a few of a hundred rays aimed at corners miss, others never."""
     x = (np.arange(100) + 0.5) / 50 - 1
